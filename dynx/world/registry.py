@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dynx.errors import BackendError, UnknownBackendError
+from dynx.errors import BackendError, NotInstalledError, UnknownBackendError
 from dynx.registry import ClassRegistry
 from dynx.world.engine import WorldEngine
 
@@ -23,3 +23,17 @@ world_names = _engines.names
 world_class = _engines.find
 register = _engines.register
 unregister = _engines.unregister
+
+
+def installed_worlds() -> tuple[str, ...]:
+    """Return the names of the engines that are installed. Raises NotInstalledError if none is."""
+    found = []
+    for name in world_names():
+        try:
+            world_class(name).require_engine()
+        except BackendError:
+            continue
+        found.append(name)
+    if not found:
+        raise NotInstalledError("no engine for worlds is installed: pip install 'dynx[mujoco]'")
+    return tuple(found)

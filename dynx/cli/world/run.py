@@ -16,17 +16,15 @@ from dynx.cli.world.plot import plot
 from dynx.cli.world.tables import show
 from dynx.errors import (
     ArgumentError,
-    BackendError,
     DynxError,
-    NotInstalledError,
     UnknownNameError,
     nearest,
     shown,
 )
 from dynx.files.figures import picture_format
-from dynx.world import World, world_names
+from dynx.world import World
 from dynx.world.comparison import WorldComparison, compare_worlds
-from dynx.world.registry import world_class
+from dynx.world.registry import installed_worlds, world_class
 from dynx.world.scene import read_scene
 from dynx.world.settings import Setting
 
@@ -54,7 +52,7 @@ def world(
             check_writable(path)
     if plot_path is not None:
         picture_format(plot_path)
-    chosen = engines or installed_engines()
+    chosen = engines or installed_worlds()
     described = read_scene(scene)
     given = settings_by_engine(chosen, settings)
     errors: list[DynxError] = []
@@ -95,20 +93,6 @@ def world(
     if errors:
         return BAD_INPUT
     return NEGATIVE_RESULT if _is_negative(comparison, within) else DONE
-
-
-def installed_engines() -> tuple[str, ...]:
-    """Return the names of the engines that are installed. Raises NotInstalledError if none is."""
-    found = []
-    for name in world_names():
-        try:
-            world_class(name).require_engine()
-        except BackendError:
-            continue
-        found.append(name)
-    if not found:
-        raise NotInstalledError("no engine for worlds is installed: pip install 'dynx[mujoco]'")
-    return tuple(found)
 
 
 def settings_by_engine(engines: Sequence[str], given: Sequence[tuple[str, str]]) -> dict[str, dict[str, Any]]:

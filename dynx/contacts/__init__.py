@@ -1,0 +1,52 @@
+"""Contact conformance: how far each engine is from mechanics where bodies touch.
+
+A `Case` is a scene with a closed form. `conform` runs every case in every engine at several steps and gives
+each measured `Figure` a verdict: it is exact, its error falls with the step, the error is attributed to a
+setting of the engine (proved by running again with the setting changed), the engine lacks the coefficient,
+or the error is unexplained::
+
+    from dynx.contacts import conform
+
+    found = conform(["mujoco"], steps=(4e-3, 2e-3, 1e-3), cases=["slope", "rebound"])
+    for result in found.results:
+        print(result.case, result.trial, result.figure, result.errors, result.verdict.kind)
+
+A case is a module in `dynx.contacts.cases` with a subclass of `Case`, and a line in
+`dynx.contacts.registry.BUILT_IN`; a package offers its cases by entry points in the group
+``dynx.contact_cases``. Its `trials` are independent scenes, which `measure` steps in a world of any engine,
+with the help of `dynx.contacts.motion`. A case names no engine and writes down no verdict: tolerances state
+below which error a figure counts as exact, `Figure.rests_on` the coefficients without which no engine can
+give it. Settings to which errors are attributed are listed in `dynx.contacts.candidates`, with a reason each.
+
+A result depends on the moment within a step at which bodies touch. A case whose figure does so has several
+bodies that touch at different moments and gives the largest error, which then falls with the step.
+"""
+
+from dynx.contacts.candidates import CANDIDATES, Candidate
+from dynx.contacts.case import Case, Figure
+from dynx.contacts.conformance import STEPS, Conformance, FigureResult, NoResult, conform
+from dynx.contacts.registry import case_names, find_case, find_cases
+from dynx.contacts.registry import register as register_case
+from dynx.contacts.registry import unregister as unregister_case
+from dynx.contacts.verdict import VERDICTS, Attribution, Verdict, VerdictKind
+
+__all__ = [
+    "CANDIDATES",
+    "STEPS",
+    "VERDICTS",
+    "Attribution",
+    "Candidate",
+    "Case",
+    "Conformance",
+    "Figure",
+    "FigureResult",
+    "NoResult",
+    "Verdict",
+    "VerdictKind",
+    "case_names",
+    "conform",
+    "find_case",
+    "find_cases",
+    "register_case",
+    "unregister_case",
+]

@@ -1,0 +1,87 @@
+"""Settings of each engine to which an error may be attributed, in the order in which they are tried."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Changes of one setting of an engine, or of several at once, tried one after the other.
+
+    `values` has as many values for each setting, each farther from the default than the one before. A numeric
+    setting of positive values may make an error fall in proportion; any other has to remove it.
+    """
+
+    values: Mapping[str, tuple[Any, ...]]
+    reason: str
+    """Part that the setting plays in the engine, as a sentence."""
+
+
+CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
+    "pybullet": (
+        Candidate(
+            {"contact_distance": (0.002, 0.0002)},
+            "Bullet keeps contacts of shapes that are still apart, and stops their approach there.",
+        ),
+        Candidate(
+            {"restitution_speed": (0.005, 0.0005)},
+            "Bullet lets no impact rebound that is slower than this speed.",
+        ),
+        Candidate(
+            {"contact_erp": (0.05, 0.0)},
+            "Bullet pushes shapes that penetrate apart by this share in every step, which adds speed.",
+        ),
+        Candidate(
+            {"friction_erp": (0.05, 0.0)},
+            "Bullet pulls a sticking contact back by this share of its drift in every step.",
+        ),
+        Candidate(
+            {"residual_threshold": (1e-12, 0.0), "solver_iterations": (400, 2000)},
+            "Bullet's solver of impulses is iterative and stops at this residual or number of iterations.",
+        ),
+    ),
+    "mujoco": (
+        Candidate(
+            {"time_constant": (0.0035, 0.002)},
+            "A contact of MuJoCo is a damped spring with this time constant.",
+        ),
+        Candidate(
+            {"impratio": (100.0, 1000.0)},
+            "MuJoCo's friction is a soft constraint, stiffer than the normal force by this ratio.",
+        ),
+        Candidate(
+            {"noslip_iterations": (5, 50)},
+            "MuJoCo's friction is soft and lets contacts creep, unless this solver removes the slip.",
+        ),
+        Candidate(
+            {"impedance": ((0.99, 0.99, 0.001, 0.5, 2.0), (0.9999, 0.9999, 0.001, 0.5, 2.0))},
+            "MuJoCo's constraints reach this share of the acceleration that they aim at.",
+        ),
+    ),
+    "drake": (
+        Candidate(
+            {"stiction_tolerance": (1e-5, 1e-6)},
+            "Friction of Drake grows with the sliding speed up to this speed, so that bodies creep.",
+        ),
+        Candidate(
+            {"stiffness": (1e7, 1e8)},
+            "A point contact of Drake is a spring of this stiffness.",
+        ),
+        Candidate(
+            {"modulus": (1e9, 1e10)},
+            "A surface contact of Drake has a pressure in proportion to this modulus.",
+        ),
+        Candidate(
+            {"dissipation": (1.0, 0.0)},
+            "Contacts of Drake dissipate in proportion to this factor.",
+        ),
+        Candidate(
+            {"contact_approximation": ("sap",)},
+            "Drake approximates friction and dissipation within a step in this manner.",
+        ),
+    ),
+}
+"""Candidates by engine; an engine that is not named has none, and its errors that stay are unexplained."""

@@ -1,0 +1,64 @@
+"""Cases of contact with a closed form: scenes, the figures measured in them and their exact values."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from dynx.world import Scene, World
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A measured number of a case, and the value that mechanics gives it."""
+
+    name: str
+    """Noun phrase, unique within a trial of the case."""
+    measured: float
+    exact: float
+    unit: str
+    """Unit in which both are given, such as ``m/s``; empty for a ratio."""
+    scale: float
+    """Magnitude by which the error is divided: the exact value, or another one where that is 0."""
+    tolerance: float = 1e-3
+    """Relative error below which an engine counts as exact."""
+    rests_on: tuple[str, ...] = ()
+    """Coefficients of `dynx.world.Material`, such as ``restitution``, without which the exact value would be
+    another one: an engine that lacks one of them cannot give it."""
+
+    @property
+    def error(self) -> float:
+        """Distance from the exact value, relative to the scale."""
+        return abs(self.measured - self.exact) / self.scale
+
+
+class Case(ABC):
+    """A closed form of mechanics that an engine is measured against.
+
+    Each entry of `trials` is a scene of its own: its name, and the parameters that `scene` and `measure` get.
+    A case has no state, so that trials run in any process. Nothing in a case depends on the engine.
+    """
+
+    name: ClassVar[str]
+    """Name by which users choose the case, in lower case with underscores."""
+    title: ClassVar[str]
+    """Noun phrase that stands alone, such as ``Rebound height``."""
+    law: ClassVar[str]
+    """Equation of the exact values in plain text, with the meaning of its letters."""
+    source: ClassVar[str]
+    """Where the equation comes from: a textbook with its section, or the principle from which it follows."""
+    trials: ClassVar[Mapping[str, Any]] = {"": None}
+    """Parameters by the name of the trial; the name is empty where a case has one trial only."""
+
+    @abstractmethod
+    def scene(self, parameters: Any) -> Scene:
+        """Return the scene of a trial."""
+
+    @abstractmethod
+    def measure(self, world: World, parameters: Any) -> Sequence[Figure]:
+        """Step the world, which is at the start of the scene, and return the figures.
+
+        The step is `world.dt`. Figures have the same names at every step and in every engine.
+        """

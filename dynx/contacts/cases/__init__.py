@@ -1,0 +1,1 @@
+"""Cases of dynx, a module each."""

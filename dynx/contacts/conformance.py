@@ -1,0 +1,221 @@
+"""`conform`: how far each engine is from mechanics in every case, with the cause of each error that stays."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from dynx.contacts.attribution import attribute
+from dynx.contacts.candidates import CANDIDATES, Candidate
+from dynx.contacts.case import Case
+from dynx.contacts.registry import find_cases
+from dynx.contacts.run import Measured, Run, Unmeasured
+from dynx.contacts.runner import Runner
+from dynx.contacts.series import Series, TrialOfEngine, collect
+from dynx.contacts.trend import judge
+from dynx.contacts.verdict import VERDICTS, Verdict, VerdictKind
+from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
+from dynx.model.configuration import positive_seconds
+from dynx.world.registry import installed_worlds, world_class
+from dynx.world.settings import checked_settings
+
+STEPS = (4e-3, 2e-3, 1e-3)
+"""Steps [s] where none are given."""
+
+TIMEOUT = 60.0
+"""Time [s] after which one run is ended."""
+
+
+@dataclass(frozen=True)
+class FigureResult:
+    """A figure of one engine at every step, with the verdict on its error."""
+
+    engine: str
+    case: str
+    trial: str
+    """Name of the trial; empty where the case has one only."""
+    figure: str
+    unit: str
+    exact: float
+    scale: float
+    """Magnitude by which errors are divided."""
+    tolerance: float
+    """Relative error below which the engine counts as exact."""
+    measured: tuple[float, ...]
+    """Measured value at each step."""
+    errors: tuple[float, ...]
+    """Relative error at each step."""
+    verdict: Verdict
+
+
+@dataclass(frozen=True)
+class NoResult:
+    """A trial that one engine refused, or in which it failed, at one step."""
+
+    engine: str
+    case: str
+    trial: str
+    dt: float
+    kind: str
+    """``refused``, ``error``, ``crash``, ``timeout`` or ``defect``."""
+    message: str
+
+
+@dataclass(frozen=True)
+class Conformance:
+    """Results of every case in every engine."""
+
+    steps: tuple[float, ...]
+    """Steps [s], largest first."""
+    engines: tuple[str, ...]
+    cases: tuple[Case, ...]
+    settings: Mapping[str, Mapping[str, Any]]
+    """Settings given, by engine."""
+    results: tuple[FigureResult, ...]
+    refusals: tuple[NoResult, ...]
+    """Trials that an engine cannot represent and refuses by name."""
+    failures: tuple[NoResult, ...]
+    """Trials in which an engine failed, crashed or took too long."""
+    runs: int
+    """Number of runs, those for attributions included."""
+
+    def count(self, kind: VerdictKind, engine: str | None = None) -> int:
+        """Return the number of figures with a verdict, of one engine or of all."""
+        return self.counts(engine)[kind]
+
+    def counts(self, engine: str | None = None) -> dict[VerdictKind, int]:
+        """Return the number of figures with each verdict, of one engine or of all."""
+        found = Counter(r.verdict.kind for r in self.results if engine in (None, r.engine))
+        return {kind: found[kind] for kind in VERDICTS}
+
+    @property
+    def unexplained(self) -> tuple[FigureResult, ...]:
+        """Figures whose error neither falls nor has a known cause."""
+        return tuple(result for result in self.results if result.verdict.kind == "unexplained")
+
+    def __repr__(self) -> str:
+        counted = ", ".join(f"{n} {kind}" for kind, n in self.counts().items() if n)
+        return f"<Conformance of {', '.join(self.engines)}: {counted or 'no figures'}>"
+
+
+def conform(
+    engines: Sequence[str] | None = None,
+    steps: Sequence[float] = STEPS,
+    cases: Sequence[str | Case] | None = None,
+    *,
+    settings: Mapping[str, Mapping[str, Any]] | None = None,
+    candidates: Mapping[str, Sequence[Candidate]] = CANDIDATES,
+    jobs: int | None = None,
+    timeout: float | None = TIMEOUT,
+    progress: Callable[[int, int], object] | None = None,
+) -> Conformance:
+    """Measure engines against mechanics: every trial of every case, in every engine, at every step.
+
+    Engines and cases are all that are installed unless named. `settings` are those of `World` by engine;
+    `candidates` are the settings to which errors may be attributed. Runs take place in `jobs` processes (as
+    many as processors), and one that crashes or takes longer than `timeout` [s] is recorded as such.
+    `progress(done, total)` is called after each run; the total grows when errors have to be attributed.
+
+    Raises the errors of `World` for engines and settings, UnknownNameError for a case, ArgumentError for
+    steps.
+    """
+    chosen = tuple(engines) if engines is not None else installed_worlds()
+    given = _checked(chosen, settings or {})
+    sizes = _checked_steps(steps)
+    found = _found(cases)
+    with Runner(jobs or os.cpu_count() or 1, timeout, progress) as runner:
+        trials = [
+            TrialOfEngine(name, case, trial) for case in found for trial in case.trials for name in chosen
+        ]
+        runs = [
+            Run(each.engine, each.case, each.trial, dt, given[each.engine]) for each in trials for dt in sizes
+        ]
+        outcomes = runner.run(runs)
+        series, lost = _gather(trials, runs, outcomes, sizes)
+        verdicts = _judged(series, sizes)
+        open_series = [each for each in series if each not in verdicts]
+        verdicts |= attribute(open_series, sizes, given, candidates, runner)
+        total = runner.done
+    results = tuple(_result(each, verdicts[each]) for each in series)
+    refusals = tuple(each for each in lost if each.kind == "refused")
+    failures = tuple(each for each in lost if each.kind != "refused")
+    return Conformance(sizes, chosen, found, given, results, refusals, failures, total)
+
+
+def _gather(
+    trials: Sequence[TrialOfEngine],
+    runs: Sequence[Run],
+    outcomes: Sequence[Measured | Unmeasured],
+    steps: tuple[float, ...],
+) -> tuple[list[Series], list[NoResult]]:
+    """Return the series of every figure, and the runs without any."""
+    series: list[Series] = []
+    lost = [
+        NoResult(run.engine, run.case.name, run.trial, run.dt, outcome.kind, outcome.message)
+        for run, outcome in zip(runs, outcomes, strict=True)
+        if isinstance(outcome, Unmeasured)
+    ]
+    for number, trial in enumerate(trials):
+        series += collect(trial, outcomes[number * len(steps) : (number + 1) * len(steps)])
+    return series, lost
+
+
+def _judged(series: Sequence[Series], steps: tuple[float, ...]) -> dict[Series, Verdict]:
+    """Return the verdicts that need no further run."""
+    verdicts: dict[Series, Verdict] = {}
+    for each in series:
+        trend = judge(steps, each.errors, each.figures[0].tolerance)
+        if trend.kind != "stays":
+            verdicts[each] = Verdict(trend.kind, order=trend.order)
+        elif each.reason is not None:
+            verdicts[each] = Verdict("cannot", reason=each.reason)
+    return verdicts
+
+
+def _result(series: Series, verdict: Verdict) -> FigureResult:
+    trial, first = series.trial, series.figures[0]
+    return FigureResult(
+        trial.engine,
+        trial.case.name,
+        trial.trial,
+        first.name,
+        first.unit,
+        first.exact,
+        first.scale,
+        first.tolerance,
+        tuple(figure.measured for figure in series.figures),
+        series.errors,
+        verdict,
+    )
+
+
+def _checked(
+    engines: Sequence[str], settings: Mapping[str, Mapping[str, Any]]
+) -> dict[str, Mapping[str, Any]]:
+    """Return the settings given to each engine, after a check that the engine is installed and has them."""
+    for name in settings:
+        if name not in engines:
+            raise UnknownNameError(
+                f"settings are given for {shown(name)}, which does not run{nearest(name, engines)}"
+            )
+    for name in engines:
+        kind = world_class(name)
+        kind.require_engine()
+        checked_settings(name, kind.settings, settings.get(name, {}))
+    return {name: dict(settings.get(name, {})) for name in engines}
+
+
+def _checked_steps(steps: Sequence[float]) -> tuple[float, ...]:
+    sizes = sorted({positive_seconds("a step", step) for step in steps}, reverse=True)
+    if not sizes:
+        raise ArgumentError("steps is empty; wanted at least one step [s]")
+    return tuple(sizes)
+
+
+def _found(cases: Sequence[str | Case] | None) -> tuple[Case, ...]:
+    if cases is None:
+        return find_cases()
+    return tuple(each if isinstance(each, Case) else find_cases([each])[0] for each in cases)

@@ -1,0 +1,72 @@
+"""Motions of bodies, recorded step by step for the cases."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynx.spatial.scalar import Floats
+from dynx.world import World, WorldState
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """States of a world after every step, the first of them before the first step."""
+
+    times: Floats
+    """Times (n,) [s]."""
+    states: tuple[WorldState, ...]
+
+    def positions(self, body: str) -> Floats:
+        """Return the origin (n, 3) of the frame of a body [m]."""
+        return np.array([state.bodies[body].T_world_body[:3, 3] for state in self.states])
+
+    def rotations(self, body: str) -> Floats:
+        """Return the rotation matrices (n, 3, 3) of a body."""
+        return np.array([state.bodies[body].T_world_body[:3, :3] for state in self.states])
+
+    def velocities(self, body: str) -> Floats:
+        """Return linear [m/s] and angular [rad/s] velocities (n, 6) of a body, in world axes."""
+        return np.array([state.bodies[body].twist for state in self.states])
+
+
+def record(world: World, duration: float) -> Motion:
+    """Take steps for `duration` [s] and return the motion."""
+    states = [world.state]
+    for _ in range(step_count(world, duration)):
+        world.step()
+        states.append(world.state)
+    return Motion(np.array([state.time for state in states]), tuple(states))
+
+
+def step_count(world: World, duration: float) -> int:
+    """Return the number of steps of a world that is nearest to `duration` [s], at least 1."""
+    return max(1, round(duration / world.dt))
+
+
+def contact_force(world: World, body: str) -> Floats:
+    """Return the sum (3,) of the contact forces of the last step on a body [N]."""
+    total: Floats = np.zeros(3)
+    for contact in world.contacts():
+        if contact.a == body:
+            total += contact.force
+        elif contact.b == body:
+            total -= contact.force
+    return total
+
+
+def mean_contact_force(world: World, body: str, duration: float) -> Floats:
+    """Take steps for `duration` [s] and return the mean (3,) of the contact forces on a body [N]."""
+    forces: list[Floats] = []
+    for _ in range(step_count(world, duration)):
+        world.step()
+        forces.append(contact_force(world, body))
+    mean: Floats = np.mean(forces, axis=0)
+    return mean
+
+
+def acceleration(times: Floats, velocities: Floats) -> float:
+    """Return the slope of the straight line through velocities over time (least squares)."""
+    centred = times - times.mean()
+    return float(centred @ velocities / (centred @ centred))

@@ -1,0 +1,37 @@
+"""Cases by name: those of dynx, of the running program, and of installed packages."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from dynx.contacts.case import Case
+from dynx.errors import ArgumentError, UnknownNameError
+from dynx.registry import ClassRegistry
+
+GROUP = "dynx.contact_cases"
+"""The entry-point group: ``name = "package.module:CaseClass"``."""
+
+BUILT_IN = {
+    "resting_force": "dynx.contacts.cases.resting_force:RestingForce",
+    "resting_depth": "dynx.contacts.cases.resting_depth:RestingDepth",
+    "slope": "dynx.contacts.cases.slope:Slope",
+    "rebound": "dynx.contacts.cases.rebound:Rebound",
+}
+"""Cases of dynx itself, in the order of reports."""
+
+_cases = ClassRegistry(
+    "contact case", GROUP, BUILT_IN, lambda: Case, error=ArgumentError, unknown=UnknownNameError
+)
+case_names = _cases.names
+register = _cases.register
+unregister = _cases.unregister
+
+
+def find_case(name: str) -> Case:
+    """Return the case of that name; UnknownNameError where nobody provides it."""
+    return _cases.find(name)()
+
+
+def find_cases(names: Sequence[str] | None = None) -> tuple[Case, ...]:
+    """Return the cases of these names, or all."""
+    return tuple(find_case(name) for name in (case_names() if names is None else names))

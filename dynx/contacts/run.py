@@ -1,0 +1,73 @@
+"""One run: a trial of a case in one engine at one step, in a worker process."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from dynx.contacts.case import Case, Figure
+from dynx.errors import DynxError, EngineLimitError, NotInstalledError, UnsupportedFeatureError
+from dynx.world import Scene, World
+from dynx.world.registry import world_class
+
+STRICT = "strict_materials"
+"""Setting of an engine that makes it refuse the coefficients that it lacks."""
+
+COEFFICIENTS = ("restitution", "torsional_friction", "rolling_friction", "friction")
+"""Coefficients of materials that an engine may lack."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A trial of a case in one engine at the step `dt` [s], with settings that differ from the defaults."""
+
+    engine: str
+    case: Case
+    trial: str
+    dt: float
+    settings: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Figures of a run, and the coefficients that the engine lacks, each with its reason."""
+
+    figures: tuple[Figure, ...]
+    lacking: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Unmeasured:
+    """Reason why a run has no figures: the engine refused the scene or failed in it."""
+
+    kind: Literal["refused", "error", "crash", "timeout", "defect"]
+    message: str
+
+
+def carry_out(run: Run) -> Measured | Unmeasured:
+    """Open the world of a run, and measure."""
+    parameters = run.case.trials[run.trial]
+    scene = run.case.scene(parameters)
+    try:
+        with World(scene, run.engine, run.dt, **run.settings) as world:
+            figures = tuple(run.case.measure(world, parameters))
+    except NotInstalledError:
+        raise
+    except (UnsupportedFeatureError, EngineLimitError) as error:
+        return Unmeasured("refused", str(error))
+    except DynxError as error:
+        return Unmeasured("error", f"{type(error).__name__}: {error}")
+    return Measured(figures, lacking_coefficients(run, scene))
+
+
+def lacking_coefficients(run: Run, scene: Scene) -> dict[str, str]:
+    """Return the coefficients of the materials of a scene that the engine lacks, with the engine's reason."""
+    if STRICT not in world_class(run.engine).settings:
+        return {}
+    try:
+        World(scene, run.engine, run.dt, **{**run.settings, STRICT: True}).close()
+    except UnsupportedFeatureError as error:
+        named = [each for each in COEFFICIENTS if each in str(error)]
+        return dict.fromkeys(named[:1], str(error))
+    return {}

@@ -1,0 +1,47 @@
+"""Series of one figure over the steps, collected from the runs of a trial."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from dynx.contacts.case import Case, Figure
+from dynx.contacts.run import Measured, Unmeasured
+
+
+class TrialOfEngine(NamedTuple):
+    """A trial of a case in one engine."""
+
+    engine: str
+    case: Case
+    trial: str
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """One figure of a trial at every step, largest first."""
+
+    trial: TrialOfEngine
+    figures: tuple[Figure, ...]
+    reason: str | None = None
+    """Why the engine cannot give the exact value; None where it can."""
+
+    @property
+    def errors(self) -> tuple[float, ...]:
+        """Relative error at each step."""
+        return tuple(figure.error for figure in self.figures)
+
+
+def collect(trial: TrialOfEngine, outcomes: Sequence[Measured | Unmeasured]) -> list[Series]:
+    """Return the series of every figure of a trial; none where a run of it has no figures."""
+    measured = [outcome for outcome in outcomes if isinstance(outcome, Measured)]
+    if len(measured) < len(outcomes):
+        return []
+    lacking = measured[0].lacking
+    series = []
+    for number, first in enumerate(measured[0].figures):
+        reasons = [lacking[name] for name in first.rests_on if name in lacking]
+        figures = tuple(outcome.figures[number] for outcome in measured)
+        series.append(Series(trial, figures, reasons[0] if reasons else None))
+    return series
