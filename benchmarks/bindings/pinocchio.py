@@ -42,13 +42,11 @@ def binding_calls(model: Model, sample: Sample) -> dict[str, Call]:
 
     def frame_velocity() -> Floats:
         pin.forwardKinematics(engine, data, q, v)
-        pin.updateFramePlacement(engine, data, tool)
         velocity: Floats = pin.getFrameVelocity(engine, data, tool, axes).vector
         return velocity
 
     def frame_acceleration() -> Floats:
         pin.forwardKinematics(engine, data, q, v, a)
-        pin.updateFramePlacement(engine, data, tool)
         acceleration: Floats = pin.getFrameClassicalAcceleration(engine, data, tool, axes).vector
         return acceleration
 

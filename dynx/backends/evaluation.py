@@ -64,11 +64,9 @@ class Evaluation:
             return reduce(result)
         return result
 
-    def of_sample(
-        self, function: Callable[..., Any], velocities: int, reduce: Reduction | None
-    ) -> Callable[..., Any]:
-        """Return the function of a backend, q, `velocities` velocities and details in model coordinates that
-        evaluates `function`, which is that of a hook, at one sample.
+    def of_sample(self, function: Callable[..., Any], reduce: Reduction | None) -> Callable[..., Any]:
+        """Return the function of a backend, q and velocities in model coordinates that evaluates `function`,
+        which is that of a hook, at one sample.
 
         Mimic joints are expanded by products, which takes half of the time of gathering and scaling, and is
         exact as well, because each row of S has one entry.
@@ -77,9 +75,8 @@ class Evaluation:
             return function
         expand_q, S = self._expansion_of_sample(), self._S
 
-        def reduced(backend: object, q: Floats, *rest: Any) -> Any:
-            rates = [S.dot(v) for v in rest[:velocities]]
-            result = function(backend, expand_q(q), *rates, *rest[velocities:])
+        def reduced(backend: object, q: Floats, *velocities: Floats) -> Any:
+            result = function(backend, expand_q(q), *[S.dot(v) for v in velocities])
             return result if reduce is None else reduce(np.asarray(result))
 
         return reduced

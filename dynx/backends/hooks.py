@@ -46,6 +46,15 @@ class EngineHooks(ABC):
         """
         return None
 
+    def _sample_hook(self, hook: str, arguments: int, details: tuple[Any, ...]) -> Callable[..., Any]:
+        """Return the function of this backend and of `arguments` arrays of one sample that evaluates a hook,
+        without the translation of exceptions.
+
+        `details` is empty or has what hooks take after the arrays: a frame, or a frame and a reference.
+        """
+        function = untranslated(getattr(type(self), hook))
+        return _with_details(function, arguments, *details) if details else function
+
     @classmethod
     def _is_native(cls, quantity: Quantity) -> bool:
         """Check whether the engine computes the quantity itself, rather than by a derivation of dynx."""
@@ -140,6 +149,20 @@ def untranslated(hook: Callable[..., Any]) -> Callable[..., Any]:
     """Return a hook without the translation of its engine's exceptions (`dynx.backends.engine_errors`)."""
     found: Callable[..., Any] = getattr(hook, "untranslated", hook)
     return found
+
+
+def _with_details(hook: Callable[..., Any], arguments: int, *details: Any) -> Callable[..., Any]:
+    """Return the function of a backend and `arguments` arrays that calls a hook with them and `details`."""
+    # Arguments are written out, because a call with a star takes longer.
+    if len(details) == 1:
+        (frame,) = details
+        return lambda backend, q: hook(backend, q, frame)
+    frame, reference = details
+    if arguments == 1:
+        return lambda backend, q: hook(backend, q, frame, reference)
+    if arguments == 2:
+        return lambda backend, q, v: hook(backend, q, v, frame, reference)
+    return lambda backend, q, v, a: hook(backend, q, v, a, frame, reference)
 
 
 def solve_mass_matrix(M: Floats, torque: Floats) -> Floats:

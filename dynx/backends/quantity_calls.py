@@ -22,7 +22,7 @@ from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.backends.lifecycle import Lifecycle
 from dynx.backends.quantities import QUANTITIES
 from dynx.backends.solvability import Solvability
-from dynx.backends.straight import StraightCall, sample_check, straight_call
+from dynx.backends.straight import StraightCall, straight_call
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
@@ -101,9 +101,9 @@ class QuantityCalls(Lifecycle, EngineHooks):
             hook = partial(self._derive, name)
             details = details or plan.implied_details
         elif plan.hook not in vars(self) and key not in self._straight:
-            function = untranslated(getattr(type(self), plan.hook))
-            function = self._evaluation.of_sample(function, len(rates), plan.reduction)
-            self._store_straight(key, function, len(arguments), details)
+            function = self._sample_hook(plan.hook, len(arguments), details)
+            function = self._evaluation.of_sample(function, plan.reduction)
+            self._store_straight(key, function, len(arguments))
         return self._evaluation(hook, plan.result_shape, q, *rates, args=details, reduce=plan.reduction)
 
     def _solved_acceleration(self, q: Floats, v: Floats, tau: Floats) -> Floats:
@@ -116,11 +116,8 @@ class QuantityCalls(Lifecycle, EngineHooks):
             self._evaluate("mass_matrix", (q,)), tau - self._evaluate("bias_torque", (q, v))
         )
 
-    def _store_straight(
-        self, key: Key, function: Callable[..., Any], arguments: int, details: tuple[Any, ...] = ()
-    ) -> None:
-        check = sample_check(self.model, arguments, validate=self._validate)
-        self._straight[key] = straight_call(function, arguments, details, check)
+    def _store_straight(self, key: Key, function: Callable[..., Any], arguments: int) -> None:
+        self._straight[key] = straight_call(self.model, function, arguments, validate=self._validate)
         if self._arguments.closed:
             # Another thread closed this backend meanwhile.
             self._straight.clear()

@@ -1,6 +1,7 @@
 """Functions for one sample of a quantity, made once: one check of all arguments, then the engine's hook.
 
-They write out the arguments, because a call with ``*arguments`` takes longer than all else that they do.
+Short arrays are checked where the hook is called, and arguments are written out, because a call of a function
+or with ``*arguments`` takes longer than most of what they do.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from dynx.backends.arguments import MAX_LISTED
 from dynx.model import Model
 from dynx.model.configuration import MAX_MAGNITUDE, UNIT_NORM_TOLERANCE
 
-SampleCheck = Callable[..., bool]
-"""Function of q and what follows that checks whether they are float64 arrays of one valid sample."""
+SampleHook = Callable[..., Any]
+"""Function of a backend and the arrays of one sample that evaluates a hook."""
 
 StraightCall = Callable[[object, tuple[Any, ...]], Any]
 """Function of a backend and the arguments that returns the result of a hook, or None where the arguments are
@@ -31,57 +32,67 @@ MAX_LISTED_OF_ALL = 80
 _MAX_SQUARE = MAX_MAGNITUDE**2
 
 
-def sample_check(model: Model, arguments: int, *, validate: bool) -> SampleCheck:
-    """Return the check of q and `arguments` - 1 vectors (nv,); without `validate`, that each has one axis.
+def straight_call(model: Model, hook: SampleHook, arguments: int, *, validate: bool) -> StraightCall:
+    """Return the function that checks q and `arguments` - 1 vectors (nv,) and calls a hook with them; without
+    `validate`, it checks that each has one axis.
 
     The norm of all entries is below a bound only if every entry is, and no entry is NaN. One C loop over
     lists computes it several times faster than NumPy at this size. If the norm is too large, the methods of
     `Arguments` check every entry.
     """
     if not validate:
-        return _have_one_axis
+        return _call_of_arrays_with_one_axis(hook, arguments)
     entries_of_all = model.nq + (arguments - 1) * model.nv
     # An empty array may have two axes and no entry that shows it.
     if not model.nv or model.nq > MAX_LISTED or entries_of_all > MAX_LISTED_OF_ALL:
-        return _check_of_long_arrays(model)
+        return _call_of_long_arrays(model, hook)
     nq, nv, fixed = model.nq, model.nv, not model.floating
 
     # The entries of an array with two axes are lists, and those of one with none are no list: `hypot` and the
     # stars raise TypeError for them. Comparing lengths takes half of the time of comparing shapes.
 
-    def one(q: Any) -> bool:
+    def of_one(backend: object, arguments: tuple[Any, ...]) -> Any:
+        (q,) = arguments
         if type(q) is ndarray and q.dtype is _FLOAT64:
             try:
                 entries = q.tolist()
-                return len(q) == nq and hypot(*entries) < MAX_MAGNITUDE and (fixed or _is_unit(entries))
+                valid = len(q) == nq and hypot(*entries) < MAX_MAGNITUDE and (fixed or _is_unit(entries))
             except TypeError:
-                pass
-        return False
+                return None
+            if valid:
+                return hook(backend, q)
+        return None
 
-    def two(q: Any, v: Any) -> bool:
+    def of_two(backend: object, arguments: tuple[Any, ...]) -> Any:
+        q, v = arguments
         if type(q) is type(v) is ndarray and q.dtype is v.dtype is _FLOAT64:
             try:
-                if len(q) == nq and len(v) == nv:
-                    entries = q.tolist()
-                    size = hypot(*entries, *v.tolist())
-                    return size < MAX_MAGNITUDE and (fixed or _is_unit(entries))
+                if len(q) != nq or len(v) != nv:
+                    return None
+                entries = q.tolist()
+                valid = hypot(*entries, *v.tolist()) < MAX_MAGNITUDE and (fixed or _is_unit(entries))
             except TypeError:
-                pass
-        return False
+                return None
+            if valid:
+                return hook(backend, q, v)
+        return None
 
-    def three(q: Any, v: Any, a: Any) -> bool:
+    def of_three(backend: object, arguments: tuple[Any, ...]) -> Any:
+        q, v, a = arguments
         if type(q) is type(v) is type(a) is ndarray and q.dtype is v.dtype is a.dtype is _FLOAT64:
             try:
-                if len(q) == nq and len(v) == nv == len(a):
-                    entries = q.tolist()
-                    size = hypot(*entries, *v.tolist(), *a.tolist())
-                    return size < MAX_MAGNITUDE and (fixed or _is_unit(entries))
+                if len(q) != nq or len(v) != nv or len(a) != nv:
+                    return None
+                entries = q.tolist()
+                size = hypot(*entries, *v.tolist(), *a.tolist())
+                valid = size < MAX_MAGNITUDE and (fixed or _is_unit(entries))
             except TypeError:
-                pass
-        return False
+                return None
+            if valid:
+                return hook(backend, q, v, a)
+        return None
 
-    checks: tuple[SampleCheck, ...] = one, two, three
-    return checks[arguments - 1]
+    return (of_one, of_two, of_three)[arguments - 1]
 
 
 def _is_unit(entries: list[float]) -> bool:
@@ -90,69 +101,33 @@ def _is_unit(entries: list[float]) -> bool:
     return abs(x * x + y * y + z * z + w * w - 1.0) <= UNIT_NORM_TOLERANCE
 
 
-def _check_of_long_arrays(model: Model) -> SampleCheck:
+def _call_of_long_arrays(model: Model, hook: SampleHook) -> StraightCall:
     q_shape, v_shape, fixed = (model.nq,), (model.nv,), not model.floating
 
-    def are_sample(*arguments: Any) -> bool:
+    def call(backend: object, arguments: tuple[Any, ...]) -> Any:
         shape = q_shape
         for array in arguments:
             if type(array) is not ndarray or array.dtype is not _FLOAT64 or array.shape != shape:
-                return False
+                return None
             if not np.vdot(array, array) < _MAX_SQUARE:
-                return False
+                return None
             shape = v_shape
-        return fixed or _is_unit(arguments[0][:7].tolist())
+        return hook(backend, *arguments) if fixed or _is_unit(arguments[0][:7].tolist()) else None
 
-    return are_sample
-
-
-def _have_one_axis(q: Any, v: Any = None, a: Any = None) -> bool:
-    return q.ndim == 1 and (v is None or v.ndim == 1) and (a is None or a.ndim == 1)
+    return call
 
 
-def straight_call(
-    hook: Callable[..., Any], arguments: int, details: tuple[Any, ...], are_sample: SampleCheck
-) -> StraightCall:
-    """Return the function that checks `arguments` arrays and calls a hook with them and `details`: none, a
-    frame, or a frame and a reference."""
-    if arguments == 1:
-        return _call_of_q(hook, details, are_sample)
-    frame, reference = details or (None, None)
+def _call_of_arrays_with_one_axis(hook: SampleHook, arguments: int) -> StraightCall:
+    def of_one(backend: object, arguments: tuple[Any, ...]) -> Any:
+        (q,) = arguments
+        return hook(backend, q) if q.ndim == 1 else None
 
     def of_two(backend: object, arguments: tuple[Any, ...]) -> Any:
         q, v = arguments
-        return hook(backend, q, v) if are_sample(q, v) else None
-
-    def of_two_in_frame(backend: object, arguments: tuple[Any, ...]) -> Any:
-        q, v = arguments
-        return hook(backend, q, v, frame, reference) if are_sample(q, v) else None
+        return hook(backend, q, v) if q.ndim == 1 and v.ndim == 1 else None
 
     def of_three(backend: object, arguments: tuple[Any, ...]) -> Any:
         q, v, a = arguments
-        return hook(backend, q, v, a) if are_sample(q, v, a) else None
+        return hook(backend, q, v, a) if q.ndim == 1 and v.ndim == 1 and a.ndim == 1 else None
 
-    def of_three_in_frame(backend: object, arguments: tuple[Any, ...]) -> Any:
-        q, v, a = arguments
-        return hook(backend, q, v, a, frame, reference) if are_sample(q, v, a) else None
-
-    if arguments == 2:
-        return of_two_in_frame if details else of_two
-    return of_three_in_frame if details else of_three
-
-
-def _call_of_q(hook: Callable[..., Any], details: tuple[Any, ...], is_sample: SampleCheck) -> StraightCall:
-    frame, reference = (*details, None, None)[:2]
-
-    def of_one(backend: object, arguments: tuple[Any, ...]) -> Any:
-        (q,) = arguments
-        return hook(backend, q) if is_sample(q) else None
-
-    def at_frame(backend: object, arguments: tuple[Any, ...]) -> Any:
-        (q,) = arguments
-        return hook(backend, q, frame) if is_sample(q) else None
-
-    def in_frame(backend: object, arguments: tuple[Any, ...]) -> Any:
-        (q,) = arguments
-        return hook(backend, q, frame, reference) if is_sample(q) else None
-
-    return (of_one, at_frame, in_frame)[len(details)]
+    return (of_one, of_two, of_three)[arguments - 1]

@@ -137,21 +137,45 @@ class PinocchioBackend(Backend):
         return dJ if self._nv > 1 else dJ.reshape(6, self._nv)
 
     def _frame_velocity(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
-        engine, data, frame = self._engine, self._workspace.data, self._frame_ids[frame]
-        pin.forwardKinematics(engine, data, q, v)
-        pin.updateFramePlacement(engine, data, frame)
-        velocity: Floats = pin.getFrameVelocity(engine, data, frame, _AXES[reference]).vector
-        return velocity
+        return self._velocity_function(frame, reference)(self, q, v)
 
     def _frame_acceleration(
         self, q: Floats, v: Floats, a: Floats, frame: int, reference: Reference
     ) -> Floats:
-        engine, data, frame = self._engine, self._workspace.data, self._frame_ids[frame]
-        pin.forwardKinematics(engine, data, q, v, a)
-        pin.updateFramePlacement(engine, data, frame)
-        function, axes = _ACCELERATION[reference]
-        acceleration: Floats = function(engine, data, frame, axes).vector
+        return self._acceleration_function(frame, reference)(self, q, v, a)
+
+    def _velocity_function(self, frame: int, reference: Reference) -> Callable[..., Floats]:
+        """Return the function of this backend, q and v that computes the velocity of a frame."""
+        number, axes = self._frame_ids[frame], _AXES[reference]
+        kinematics, read = pin.forwardKinematics, pin.getFrameVelocity
+
+        def velocity(backend: PinocchioBackend, q: Floats, v: Floats) -> Floats:
+            engine, data = backend._engine, backend._workspace.data
+            kinematics(engine, data, q, v)
+            found: Floats = read(engine, data, number, axes).vector
+            return found
+
+        return velocity
+
+    def _acceleration_function(self, frame: int, reference: Reference) -> Callable[..., Floats]:
+        """Return the function of this backend, q, v and a that computes the acceleration of a frame."""
+        number, (read, axes) = self._frame_ids[frame], _ACCELERATION[reference]
+        kinematics = pin.forwardKinematics
+
+        def acceleration(backend: PinocchioBackend, q: Floats, v: Floats, a: Floats) -> Floats:
+            engine, data = backend._engine, backend._workspace.data
+            kinematics(engine, data, q, v, a)
+            found: Floats = read(engine, data, number, axes).vector
+            return found
+
         return acceleration
+
+    def _sample_hook(self, hook: str, arguments: int, details: tuple[Any, ...]) -> Callable[..., Any]:
+        """Return the functions of velocities and accelerations of frames without the hooks around them."""
+        prepared = _PREPARED.get(hook)
+        if prepared is None or getattr(type(self), hook) is not getattr(PinocchioBackend, hook):
+            return super()._sample_hook(hook, arguments, details)
+        return prepared(self, *details)
 
     # -- dynamics -----------------------------------------------------------------------------
 
@@ -233,3 +257,10 @@ class PinocchioBackend(Backend):
     def _potential_energy(self, q: Floats) -> Floats:
         moving = pin.computePotentialEnergy(self._engine, self._workspace.data, q)
         return np.asarray(moving + self._rest_energy)
+
+
+_PREPARED: dict[str, Callable[..., Callable[..., Floats]]] = {
+    "_frame_velocity": PinocchioBackend._velocity_function,
+    "_frame_acceleration": PinocchioBackend._acceleration_function,
+}
+"""Methods that prepare the function of a hook for a frame and a reference."""
