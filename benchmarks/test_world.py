@@ -1,8 +1,9 @@
 """A step of `World` beside the engine's own step: ``pytest benchmarks/test_world.py``.
 
-A quadruped floats above a plane, with and without torques on its joints, so that every step costs the same.
-The target is at most 5 microseconds more than the raw engine; ``us``, ``raw_us`` and ``more_us`` in the extra
-information are one step. Both sides step the same world in turn.
+A quadruped floats above a plane, with and without torques or motors on its joints, so that every step costs
+the same. The target is at most 5 microseconds more than the raw engine; ``us``, ``raw_us`` and ``more_us`` in
+the extra information are one step. Both sides step the same world in turn. Beside motors, the raw loop reads
+the joints from the engine, evaluates the law of a PD motor with NumPy, and applies the torques.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 import dynx
-from dynx.world import Scene, SceneRobot, World, ground
+from dynx.world import PDMotor, PositionMotor, Scene, SceneRobot, World, ground
 
 ROUNDS, STEPS = 60, 200
 
@@ -30,8 +31,11 @@ def floating(engine: str) -> World:
     return World(Scene("s", robots=(robot,), bodies=(ground(),), gravity=(0.0, 0.0, 0.0)), engine)
 
 
-def raw_step(world: World, torques: list[float] | None) -> Callable[[], None]:
-    """Return the engine's own step of a world, with torques on the joints."""
+STANCE, KP, KD = np.tile([0.0, 0.8, -1.6], 4), 10.0, 0.2
+
+
+def raw_step(world: World, torques: list[float] | None, *, motors: bool = False) -> Callable[[], None]:
+    """Return the engine's own step of a world, with torques on the joints or with a user's own PD law."""
     engine: Any = world._engine
     if world.engine == "pybullet":
         import pybullet
@@ -39,12 +43,17 @@ def raw_step(world: World, torques: list[float] | None) -> Callable[[], None]:
         robot, client = engine._robots[0].object, engine._client.number
 
         def step() -> None:
-            if torques is not None:
+            forces = torques
+            if motors:
+                states = pybullet.getJointStates(robot.body, robot.links, physicsClientId=client)
+                q, v = (np.array([state[k] for state in states]) for k in range(2))
+                forces = KP * (STANCE - q) - KD * v
+            if forces is not None:
                 pybullet.setJointMotorControlArray(
                     robot.body,
                     robot.links,
                     pybullet.TORQUE_CONTROL,
-                    forces=torques,
+                    forces=forces,
                     physicsClientId=client,
                 )
             pybullet.stepSimulation(physicsClientId=client)
@@ -56,7 +65,9 @@ def raw_step(world: World, torques: list[float] | None) -> Callable[[], None]:
     dofs = slice(model.nv - 12, model.nv)
 
     def advance() -> None:
-        if torques is not None:
+        if motors:
+            data.qfrc_applied[dofs] = KP * (STANCE - data.qpos[-12:]) - KD * data.qvel[dofs]
+        elif torques is not None:
             data.qfrc_applied[dofs] = torques
         mujoco.mj_step(model, data)
 
@@ -72,23 +83,38 @@ def test_world_step(benchmark: BenchmarkFixture, engine: str, loaded: bool) -> N
     torques = {"dog": tau} if loaded else None
     with floating(engine) as world:
         raw = raw_step(world, tau[6:].tolist() if loaded else None)
-        steps = 3 if benchmark.disabled else STEPS
-        rounds = 1 if benchmark.disabled else ROUNDS
-        best = {"world": np.inf, "raw": np.inf}
-        for _ in range(rounds):
-            # Alternately, because the load of the machine changes.
-            for name in best:
-                began = time.process_time()
-                for _ in range(steps):
-                    if name == "raw":
-                        raw()
-                    else:
-                        world.step(torques=torques)
-                best[name] = min(best[name], (time.process_time() - began) / steps)
-        repeat: Any = benchmark.pedantic
-        repeat(lambda: world.step(torques=torques), rounds=1 if benchmark.disabled else ROUNDS)
-        assert np.isfinite(world.state.robots["dog"].q).all()
+        compare(benchmark, world, raw, lambda: world.step(torques=torques))
     benchmark.group = f"{engine}, {'torques' if loaded else 'free'}"
+
+
+@pytest.mark.parametrize("motor", [PDMotor, PositionMotor])
+@pytest.mark.parametrize("engine", ["pybullet", "mujoco"])
+def test_world_step_with_motors(
+    benchmark: BenchmarkFixture, engine: str, motor: type[PDMotor | PositionMotor]
+) -> None:
+    pytest.importorskip(engine)
+    motors = {"dog": motor(STANCE, KP, KD, max_force=3.0)}
+    with floating(engine) as world:
+        compare(benchmark, world, raw_step(world, None, motors=True), lambda: world.step(motors=motors))
+    benchmark.group = f"{engine}, {motor.__name__}"
+
+
+def compare(
+    benchmark: BenchmarkFixture, world: World, raw: Callable[[], None], step: Callable[[], None]
+) -> None:
+    """Time a step of the world and of the raw engine in turn, because the load of the machine changes."""
+    steps = 3 if benchmark.disabled else STEPS
+    rounds = 1 if benchmark.disabled else ROUNDS
+    best = {"world": np.inf, "raw": np.inf}
+    for _ in range(rounds):
+        for name, call in (("world", step), ("raw", raw)):
+            began = time.process_time()
+            for _ in range(steps):
+                call()
+            best[name] = min(best[name], (time.process_time() - began) / steps)
+    repeat: Any = benchmark.pedantic
+    repeat(step, rounds=rounds)
+    assert np.isfinite(world.state.robots["dog"].q).all()
     benchmark.extra_info.update(
         us=1e6 * best["world"], raw_us=1e6 * best["raw"], more_us=1e6 * (best["world"] - best["raw"])
     )

@@ -197,7 +197,7 @@ def _definite_solution(M: Floats, torque: Floats) -> Floats | None:
     if len(M) < 2:
         # A quotient is exact where a square root is not.
         return np.asarray(torque / M[0]) if len(M) and 0.0 < M[0, 0] < np.inf else None
-    factor, a, failed = _cholesky_solver()(M, torque)
+    factor, a, failed = cholesky_solver()(M, torque)
     if failed:
         return None
     determinant = prod(
@@ -208,7 +208,8 @@ def _definite_solution(M: Floats, torque: Floats) -> Floats | None:
 
 
 @cache
-def _cholesky_solver() -> Callable[..., Any]:
+def cholesky_solver() -> Callable[..., Any]:
+    """Return LAPACK's dposv: A, b -> factor, solution, 0 or the order of the minor that is not positive."""
     # Importing it takes a tenth of a second, which most programs can save.
     from scipy.linalg.lapack import dposv
 

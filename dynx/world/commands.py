@@ -114,7 +114,8 @@ class Commands:
             for k in repeated:
                 q, v = engine.robot_state(k)
                 tau = self._loads[k].torque(q, v, held.get(k), frames.get(k, ()))
-                if not np.isfinite(tau).all():
+                # A finite sum of squares has finite entries.
+                if not tau.dot(tau) < np.inf and not np.isfinite(tau).all():
                     return False
                 engine.set_torques(k, tau)
             if pushes or self._pushed:

@@ -88,35 +88,33 @@ class TorqueMotor(Motor):
 
 
 @dataclass(frozen=True)
-class PDMotor(Motor):
+class _Servo(Motor):
+    """Arguments of motors that follow a position."""
+
+    target: ArrayLike
+    kp: ArrayLike
+    kd: ArrayLike
+    velocity: ArrayLike = 0.0
+    max_force: ArrayLike | None = None
+    joints: Sequence[str] | None = None
+
+
+@dataclass(frozen=True)
+class PDMotor(_Servo):
     """A motor with the torque kp (target - q) + kd (velocity - v) at the beginning of each step.
 
     `kp` [N m/rad or N/m], `kd` [N m s/rad or N s/m] and `max_force` [N m or N] are one number or one per
     joint.
     """
 
-    target: ArrayLike
-    kp: ArrayLike
-    kd: ArrayLike
-    velocity: ArrayLike = 0.0
-    max_force: ArrayLike | None = None
-    joints: Sequence[str] | None = None
-
     def law(self, model: Model) -> tuple[tuple[int, ...], JointLaw]:
         return self._law(model, implicit=False)
 
 
 @dataclass(frozen=True)
-class PositionMotor(Motor):
+class PositionMotor(_Servo):
     """A motor with the torque kp (target - q) + kd (velocity - v) at the end of each step, stable at any
     gain; arguments as for `PDMotor`."""
-
-    target: ArrayLike
-    kp: ArrayLike
-    kd: ArrayLike
-    velocity: ArrayLike = 0.0
-    max_force: ArrayLike | None = None
-    joints: Sequence[str] | None = None
 
     def law(self, model: Model) -> tuple[tuple[int, ...], JointLaw]:
         return self._law(model, implicit=True)

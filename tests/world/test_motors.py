@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import dynx
+from dynx.model import Inertial, Joint, Link, Model
 from dynx.world import (
     PDMotor,
     PositionMotor,
@@ -16,6 +17,9 @@ from dynx.world import (
     World,
     ground,
 )
+from dynx.world.layout import RobotLayout
+from dynx.world.loads import RobotLoads
+from dynx.world.preparation import prepare
 from tests.world.engines import FAST_WORLDS, WORLDS
 from tests.world.scenes import standing
 
@@ -93,3 +97,24 @@ def test_r2d2_drives_on_its_wheels(engine: str) -> None:
         world.run(1.0, motors=motors)
         after = world.state.robots["r2d2"].q
     assert np.linalg.norm(after[:2] - before[:2]) == pytest.approx(5.0 * 0.035, rel=0.01)
+
+
+def test_a_motor_at_the_end_of_a_step_acts_where_another_joint_moves_no_mass() -> None:
+    links = (Link("base"), Link("arm", Inertial(1.0, ixx=0.1, iyy=0.1, izz=0.1)), Link("tip"))
+    joints = (
+        Joint("shoulder", "revolute", "base", "arm", axis=(0.0, 0.0, 1.0)),
+        Joint("wrist", "revolute", "arm", "tip", axis=(0.0, 0.0, 1.0)),
+    )
+    model = Model("m", links, joints)
+    loads = RobotLoads(prepare_robot(model), 1e-3)
+    loads.set_motors([PositionMotor(0.5, 100.0, 1.0, joints=["shoulder"])])
+    tau = loads.torque(np.zeros(2), np.zeros(2), None, ())
+    # kp (q* - q - h v) - kd v at the end of the step, where v = h tau / I.
+    assert tau == pytest.approx([50.0 / (1.0 + 1e-3 * (1.0 + 1e-3 * 100.0) / 0.1), 0.0])
+
+
+def prepare_robot(model: Model) -> RobotLayout:
+    scene = Scene(robots=(SceneRobot("r", model),))
+    return prepare(
+        scene, collisions=False, joint_limits=False, joint_damping=False, joint_friction=False
+    ).robots[0]

@@ -215,7 +215,7 @@ class BulletPlant(Plant):
 
     def _base_coordinates(self, base: BaseState, joints: Floats, rates: Floats) -> tuple[Floats, Floats]:
         # Bullet may change the sign of the quaternion; the sign nearer to the previous one is kept.
-        base_q, base_v = self._root.coordinates(base, self._q[3:7])
+        base_q, base_v = self._root.coordinates(base, self._q[3:7].tolist())
         return np.concatenate([base_q, joints]), np.concatenate([base_v, rates])
 
     def _read(self, q: Floats, v: Floats, sticking: Mask | None = None) -> None:

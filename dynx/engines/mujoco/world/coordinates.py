@@ -16,6 +16,7 @@ from dynx.engines.mujoco.library import mujoco
 from dynx.engines.mujoco.tree import quat_wxyz
 from dynx.model import Model
 from dynx.model.mechanism import Mechanism
+from dynx.spatial.plain import minus_cross, rotate, rotate_back, rotation_rows
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.so3 import cross, rotation_from_quat
 from dynx.world.layout import BodyLayout
@@ -58,10 +59,12 @@ class RobotCoordinates:
         else:
             q, v = self._q[self._own_q], self._v[self._own_v]
         if self._floating:
-            q[3:7] = q[[4, 5, 6, 3]]
-            R, linear = self._rotation(), v[:3].copy()
-            q[:3] -= R @ self._center
-            v[:3] = linear @ R - cross(v[3:6], self._center)
+            x, y, z, qw, qx, qy, qz = q[:7].tolist()
+            base_v, c = v[:6].tolist(), self._center.tolist()
+            R = rotation_rows(qx, qy, qz, qw)
+            ahead = rotate(R, c)
+            q[:7] = x - ahead[0], y - ahead[1], z - ahead[2], qx, qy, qz, qw
+            v[:3] = minus_cross(rotate_back(R, base_v[:3]), base_v[3:], c)
         return RobotState(q, v)
 
     def write(self, q: Floats, v: Floats) -> None:

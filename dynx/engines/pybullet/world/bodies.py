@@ -15,8 +15,7 @@ from dynx.model.mechanism import Mechanism
 from dynx.spatial.extended import longdouble
 from dynx.spatial.inertia import inertia_about_origin
 from dynx.spatial.scalar import Floats
-from dynx.spatial.se3 import homogeneous
-from dynx.spatial.so3 import cross, quat_from_rotation, rotation_from_quat
+from dynx.spatial.so3 import cross, quat_from_rotation
 from dynx.world.layout import BodyLayout, Collider
 from dynx.world.state import BodyState
 
@@ -62,14 +61,7 @@ class BulletBody:
         """Return pose and twist of the body frame."""
         if self._layout.fixed:
             return BodyState(self._layout.T.copy(), np.zeros(6))
-        base = self.object.base_state()
-        quat = np.array(base.quat_xyzw)
-        R = rotation_from_quat(quat / np.sqrt(quat.dot(quat))) @ self._axes.T
-        lever, w = R @ self.object.root.center, np.array(base.angular)
-        return BodyState(
-            homogeneous(R, np.array(base.position) - lever),
-            np.concatenate([np.array(base.linear) - cross(w, lever), w]),
-        )
+        return BodyState(*self.object.root.pose_and_twist(self.object.base_state()))
 
     def push(self) -> None:
         """Apply the wrench during the next step."""

@@ -170,7 +170,7 @@ class BulletWorld(WorldEngine):
             path.write_bytes(data[1 + size :])
             self._client.call(self._client.engine.restoreState, fileName=str(path))
         for robot, quat in zip(self._robots, near, strict=True):
-            robot.near = quat.copy()
+            robot.near = quat.tolist()
         (self._contacts.fresh,) = struct.unpack("<?", data[:1])
 
     # -- queries ------------------------------------------------------------------------------

@@ -64,9 +64,11 @@ class BulletRobot:
         self._client = client
         self._coupling = model.mechanism.coupling
         self._S = np.eye(model.nv) if self._coupling is None else self._coupling.matrix()
-        self._owners = np.flatnonzero([joint.mimic is None for joint in model.joints if joint.moves])
+        owns = [joint.mimic is None for joint in model.joints if joint.moves]
+        self._owners: list[int] = np.flatnonzero(owns).tolist()
         self._friction = layout.friction
-        self._near = np.array([0.0, 0.0, 0.0, 1.0])
+        self.near = [0.0, 0.0, 0.0, 1.0]
+        """Quaternion (4,) of the last state read, whose sign the next one has."""
         self.loaded = False
         """Whether `apply` is called before every step."""
         self._wrench: Floats | None = None
@@ -106,35 +108,26 @@ class BulletRobot:
 
     # -- state --------------------------------------------------------------------------------
 
-    @property
-    def near(self) -> Floats:
-        """Quaternion (4,) of the last state read, whose sign the next one has."""
-        return self._near
-
-    @near.setter
-    def near(self, quat_xyzw: Floats) -> None:
-        self._near = quat_xyzw
-
     def set_state(self, q: Floats, v: Floats) -> None:
         """Set the configuration and velocity of the model."""
         tree_q = self._tree_q(q)
         tree_v = self._S @ v
         if self._base:
-            self._near = q[3:7].copy()
+            self.near = q[3:7].tolist()
             self.object.place_base(self.object.root.base_state(q, v))
             tree_q = tree_q[7:]
         self.object.place_joints(tree_q.tolist(), tree_v[self._base :].tolist())
 
     def state(self) -> RobotState:
         """Return the configuration and velocity of the model."""
-        positions, rates = (np.array(numbers) for numbers in self.object.joint_states())
+        positions, rates = self.object.joint_states()
         if self._coupling is not None:
-            positions, rates = positions[self._owners], rates[self._owners]
+            positions, rates = [positions[k] for k in self._owners], [rates[k] for k in self._owners]
         if not self._base:
-            return RobotState(positions, rates)
-        q, v = self.object.root.coordinates(self.object.base_state(), self._near)
-        self._near = q[3:7]
-        return RobotState(np.concatenate([q, positions]), np.concatenate([v, rates]))
+            return RobotState(np.array(positions), np.array(rates))
+        q, v = self.object.root.coordinates(self.object.base_state(), self.near)
+        self.near = q[3:]
+        return RobotState(np.array(q + positions), np.array(v + rates))
 
     # -- forces -------------------------------------------------------------------------------
 
@@ -166,8 +159,8 @@ class BulletRobot:
                 physicsClientId=self._client.number,
             )
         if self._wrench is not None:
-            q, _ = self.object.root.coordinates(self.object.base_state(), self._near)
-            R, force = rotation_from_quat(q[3:7]), self._wrench[:3]
+            q, _ = self.object.root.coordinates(self.object.base_state(), self.near)
+            R, force = rotation_from_quat(np.array(q[3:])), self._wrench[:3]
             moment = self._wrench[3:] - cross(self.object.root.center, force)
             self.object.push_base((R @ force).tolist(), (R @ moment).tolist())
 
