@@ -28,7 +28,10 @@ def attribute(
     candidates: Mapping[str, Sequence[Candidate]],
     runner: Runner,
 ) -> dict[Series, Verdict]:
-    """Return the verdict on every series: a setting that is its cause, or none."""
+    """Return the verdict on every series: a setting that is its cause, or none.
+
+    Series are left out where the runner was interrupted before a cause was found.
+    """
     left = list(series)
     verdicts: dict[Series, Verdict] = {}
     rounds = max((len(candidates.get(each.trial.engine, ())) for each in left), default=0)
@@ -47,7 +50,7 @@ def attribute(
                 if cause is not None:
                     verdicts[each] = Verdict("setting", attribution=cause)
         left = [each for each in left if each not in verdicts]
-    return verdicts | {each: Verdict("unexplained") for each in left}
+    return verdicts | ({} if runner.interrupted else {each: Verdict("unexplained") for each in left})
 
 
 def _runs(
@@ -68,7 +71,7 @@ def changes(candidate: Candidate) -> list[dict[str, Any]]:
 
 
 def _errors(
-    candidate: Candidate, steps: tuple[float, ...], outcomes: Iterator[Measured | Unmeasured]
+    candidate: Candidate, steps: tuple[float, ...], outcomes: Iterator[Measured | Unmeasured | None]
 ) -> list[dict[str, tuple[float, ...]]] | None:
     """Return the errors at every step of every figure, one dict for each change; None if a run failed."""
     found: list[dict[str, tuple[float, ...]]] | None = []

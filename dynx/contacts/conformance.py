@@ -81,6 +81,10 @@ class Conformance:
     """Trials in which an engine failed, crashed or took too long."""
     runs: int
     """Number of runs, those for attributions included."""
+    versions: Mapping[str, str]
+    """Version of each engine; empty for an engine without results."""
+    not_done: int = 0
+    """Number of trials of an engine that an interruption left without a verdict."""
 
     def count(self, kind: VerdictKind, engine: str | None = None) -> int:
         """Return the number of figures with a verdict, of one engine or of all."""
@@ -111,6 +115,7 @@ def conform(
     jobs: int | None = None,
     timeout: float | None = TIMEOUT,
     progress: Callable[[int, int], object] | None = None,
+    interruptible: bool = False,
 ) -> Conformance:
     """Measure engines against mechanics: every trial of every case, in every engine, at every step.
 
@@ -118,6 +123,7 @@ def conform(
     `candidates` are the settings to which errors may be attributed. Runs take place in `jobs` processes (as
     many as processors), and one that crashes or takes longer than `timeout` [s] is recorded as such.
     `progress(done, total)` is called after each run; the total grows when errors have to be attributed.
+    With `interruptible`, KeyboardInterrupt ends the runs, and the results so far are returned.
 
     Raises the errors of `World` for engines and settings, UnknownNameError for a case, ArgumentError for
     steps.
@@ -126,7 +132,7 @@ def conform(
     given = _checked(chosen, settings or {})
     sizes = _checked_steps(steps)
     found = _found(cases)
-    with Runner(jobs or os.cpu_count() or 1, timeout, progress) as runner:
+    with Runner(jobs or os.cpu_count() or 1, timeout, progress, interruptible=interruptible) as runner:
         trials = [
             TrialOfEngine(name, case, trial) for case in found for trial in case.trials for name in chosen
         ]
@@ -139,16 +145,30 @@ def conform(
         open_series = [each for each in series if each not in verdicts]
         verdicts |= attribute(open_series, sizes, given, candidates, runner)
         total = runner.done
-    results = tuple(_result(each, verdicts[each]) for each in series)
+    results = tuple(_result(each, verdicts[each]) for each in series if each in verdicts)
     refusals = tuple(each for each in lost if each.kind == "refused")
     failures = tuple(each for each in lost if each.kind != "refused")
-    return Conformance(sizes, chosen, found, given, results, refusals, failures, total)
+    versions = _versions(runs, outcomes)
+    not_done = {trials[k // len(sizes)] for k, outcome in enumerate(outcomes) if outcome is None}
+    not_done |= {each.trial for each in series if each not in verdicts}
+    return Conformance(
+        sizes, chosen, found, given, results, refusals, failures, total, versions, len(not_done)
+    )
+
+
+def _versions(runs: Sequence[Run], outcomes: Sequence[Measured | Unmeasured | None]) -> dict[str, str]:
+    """Return the version of each engine, without the engine's name, with which most versions begin."""
+    found = {run.engine: "" for run in runs}
+    for run, outcome in zip(runs, outcomes, strict=True):
+        if isinstance(outcome, Measured):
+            found[run.engine] = outcome.version.removeprefix(run.engine).strip()
+    return found
 
 
 def _gather(
     trials: Sequence[TrialOfEngine],
     runs: Sequence[Run],
-    outcomes: Sequence[Measured | Unmeasured],
+    outcomes: Sequence[Measured | Unmeasured | None],
     steps: tuple[float, ...],
 ) -> tuple[list[Series], list[NoResult]]:
     """Return the series of every figure, and the runs without any."""

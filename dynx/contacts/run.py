@@ -34,6 +34,8 @@ class Measured:
     """Figures of a run, and the coefficients that the engine lacks, each with its reason."""
 
     figures: tuple[Figure, ...]
+    version: str = ""
+    """Version of the engine."""
     lacking: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -51,6 +53,7 @@ def carry_out(run: Run) -> Measured | Unmeasured:
     scene = run.case.scene(parameters)
     try:
         with World(scene, run.engine, run.dt, **run.settings) as world:
+            version = world.version
             figures = tuple(run.case.measure(world, parameters))
     except NotInstalledError:
         raise
@@ -58,7 +61,7 @@ def carry_out(run: Run) -> Measured | Unmeasured:
         return Unmeasured("refused", str(error))
     except DynxError as error:
         return Unmeasured("error", f"{type(error).__name__}: {error}")
-    return Measured(figures, lacking_coefficients(run, scene))
+    return Measured(figures, version, lacking_coefficients(run, scene))
 
 
 def lacking_coefficients(run: Run, scene: Scene) -> dict[str, str]:

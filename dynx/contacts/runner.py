@@ -9,13 +9,24 @@ from dynx.workers import Workers
 
 
 class Runner:
-    """Worker processes that carry out runs; leaving the context ends them."""
+    """Worker processes that carry out runs; leaving the context ends them.
+
+    With `interruptible`, KeyboardInterrupt ends the runs and is not raised again.
+    """
 
     def __init__(
-        self, jobs: int, timeout: float | None, progress: Callable[[int, int], object] | None
+        self,
+        jobs: int,
+        timeout: float | None,
+        progress: Callable[[int, int], object] | None,
+        *,
+        interruptible: bool = False,
     ) -> None:
         self._workers = Workers(carry_out, jobs, timeout)
         self._progress = progress
+        self._interruptible = interruptible
+        self.interrupted = False
+        """Whether KeyboardInterrupt has ended the runs."""
         self.done = 0
         """Number of runs that have been carried out."""
 
@@ -25,9 +36,19 @@ class Runner:
     def __exit__(self, *_: object) -> None:
         self._workers.close()
 
-    def run(self, runs: Sequence[Run]) -> list[Measured | Unmeasured]:
-        """Carry out all runs and return their outcomes in the order of the runs."""
-        outcomes: list[Measured | Unmeasured] = [Unmeasured("defect", "not run")] * len(runs)
+    def run(self, runs: Sequence[Run]) -> list[Measured | Unmeasured | None]:
+        """Carry out all runs and return their outcomes in the order of the runs; None for a run left out."""
+        outcomes: list[Measured | Unmeasured | None] = [None] * len(runs)
+        try:
+            if not self.interrupted:
+                self._carry_out(runs, outcomes)
+        except KeyboardInterrupt:
+            if not self._interruptible:
+                raise
+            self.interrupted = True
+        return outcomes
+
+    def _carry_out(self, runs: Sequence[Run], outcomes: list[Measured | Unmeasured | None]) -> None:
         total = self.done + len(runs)
         for outcome in self._workers.run(runs):
             if outcome.failure is not None:
@@ -37,4 +58,3 @@ class Runner:
             self.done += 1
             if self._progress is not None:
                 self._progress(self.done, total)
-        return outcomes

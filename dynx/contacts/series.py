@@ -33,7 +33,7 @@ class Series:
         return tuple(figure.error for figure in self.figures)
 
 
-def collect(trial: TrialOfEngine, outcomes: Sequence[Measured | Unmeasured]) -> list[Series]:
+def collect(trial: TrialOfEngine, outcomes: Sequence[Measured | Unmeasured | None]) -> list[Series]:
     """Return the series of every figure of a trial; none where a run of it has no figures."""
     measured = [outcome for outcome in outcomes if isinstance(outcome, Measured)]
     if len(measured) < len(outcomes):
