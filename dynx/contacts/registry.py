@@ -15,7 +15,11 @@ BUILT_IN = {
     "resting_force": "dynx.contacts.cases.resting_force:RestingForce",
     "resting_depth": "dynx.contacts.cases.resting_depth:RestingDepth",
     "slope": "dynx.contacts.cases.slope:Slope",
+    "friction_isotropy": "dynx.contacts.cases.friction_isotropy:FrictionIsotropy",
+    "rolling": "dynx.contacts.cases.rolling:Rolling",
+    "sliding_to_rolling": "dynx.contacts.cases.sliding_to_rolling:SlidingToRolling",
     "rebound": "dynx.contacts.cases.rebound:Rebound",
+    "free_momentum": "dynx.contacts.cases.free_momentum:FreeMomentum",
 }
 """Cases of dynx itself, in the order of reports."""
 

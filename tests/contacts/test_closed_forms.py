@@ -1,0 +1,71 @@
+"""Closed forms of the cases, against exact mechanics that knows no case, right and falsified."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from dynx.contacts import Case, Figure, find_case
+from dynx.world import World, register_world, unregister_world
+from tests.contacts.exact_world import ExactWorld
+
+CASES = (
+    "resting_force",
+    "resting_depth",
+    "slope",
+    "friction_isotropy",
+    "rolling",
+    "sliding_to_rolling",
+    "rebound",
+)
+"""Cases whose bodies `ExactWorld` can move."""
+
+FAULTS = (
+    ("resting_force", {"weight_factor": 1.01}),
+    ("resting_depth", {"depth": 1e-4}),
+    ("slope", {"friction_factor": 2.0}),
+    ("slope", {"friction_factor": 0.5}),
+    ("slope", {"creep": 1e-3}),
+    ("friction_isotropy", {"friction_factor": 2.0}),
+    ("friction_isotropy", {"friction_factor": 1.01}),
+    ("friction_isotropy", {"pyramid": True}),
+    ("rolling", {"inertia_factor": 1.1}),
+    ("rolling", {"friction_factor": 0.05}),
+    ("sliding_to_rolling", {"friction_factor": 2.0}),
+    ("sliding_to_rolling", {"friction_factor": 0.5}),
+    ("sliding_to_rolling", {"inertia_factor": 1.1}),
+    ("rebound", {"restitution_factor": 0.95}),
+    ("rebound", {"restitution_factor": 0.0}),
+)
+"""Cases, and settings of `ExactWorld` that they have to notice."""
+
+
+@pytest.fixture(autouse=True)
+def exact() -> Iterator[None]:
+    register_world("exact", lambda: ExactWorld)
+    yield
+    unregister_world("exact")
+
+
+def figures(case: Case, trial: str, dt: float, **settings: Any) -> list[Figure]:
+    """Return the figures of a trial in the exact world."""
+    parameters = case.trials[trial]
+    with World(case.scene(parameters), "exact", dt, **settings) as world:
+        return list(case.measure(world, parameters))
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_exact_mechanics_has_no_error(name: str) -> None:
+    case = find_case(name)
+    for trial in case.trials:
+        for figure in figures(case, trial, 2e-3):
+            assert figure.error <= figure.tolerance, figure
+
+
+@pytest.mark.parametrize(("name", "settings"), FAULTS)
+def test_false_mechanics_has_errors(name: str, settings: dict[str, Any]) -> None:
+    case = find_case(name)
+    found = [figure for trial in case.trials for figure in figures(case, trial, 4e-3, **settings)]
+    assert any(figure.error > figure.tolerance for figure in found)
