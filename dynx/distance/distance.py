@@ -1,0 +1,186 @@
+"""Distance of two convex shapes between bounds that anyone can check."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.distance.cores import ConvexShape, Core, core_of
+from dynx.distance.gjk import CorePair
+from dynx.distance.parallel_axes import penetration_of_parallel
+from dynx.distance.penetration import penetration
+from dynx.distance.vectors import Vector3
+from dynx.errors import ArgumentError, NotFiniteError, ShapeError, shown
+from dynx.model import Pose
+from dynx.model.configuration import MAX_MAGNITUDE, checked_pose, checked_vector
+from dynx.model.elements import RIGIDITY_TOLERANCE
+from dynx.model.geometry import Plane
+from dynx.spatial.scalar import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Distance:
+    """Signed distance of two shapes between two bounds: negative where they overlap.
+
+    The distance of overlapping shapes is minus the depth, the length of the shortest translation after which
+    their interiors are disjoint. `lower` is in every case the separation of the shapes along `normal`
+    (`separation`), from the support functions alone. `upper` of separated shapes is the distance of the two
+    points; of overlapping ones it is minus the radius of a ball in their difference, or `lower` again where
+    the depth is known in closed form.
+    """
+
+    lower: float
+    upper: float
+    point_a: Floats
+    """Point (3,) of a [m]."""
+    point_b: Floats
+    """Point (3,) of b [m]; `point_a - point_b` is the distance times the normal."""
+    normal: Floats
+    """Unit vector (3,) from b to a, along which a leaves b by the shortest way where they overlap."""
+
+    @property
+    def distance(self) -> float:
+        """The bound that the points attain: the upper one if separated, otherwise the lower one."""
+        return self.upper if self.upper > 0.0 else self.lower
+
+    @property
+    def gap(self) -> float:
+        """Difference of the bounds [m], at least 0: the largest error of the distance."""
+        return max(0.0, self.upper - self.lower)
+
+
+def distance(
+    shape_a: ConvexShape | Plane, T_a: Pose | ArrayLike, shape_b: ConvexShape | Plane, T_b: Pose | ArrayLike
+) -> Distance:
+    """Return the signed distance of two convex shapes at poses (a `Pose` or a matrix (4, 4)).
+
+    A mesh stands for its convex hull, a plane for its half-space. Raises ArgumentError for two planes and for
+    anything that is no convex shape, the errors of `Mesh.hull`, and those of invalid poses.
+    """
+    poses = _checked_pose("T_a", T_a), _checked_pose("T_b", T_b)
+    return distance_of(_prepared(shape_a), poses[0], _prepared(shape_b), poses[1])
+
+
+def support(shape: ConvexShape | Plane, T: Pose | ArrayLike, direction: ArrayLike) -> tuple[float, Floats]:
+    """Return h(n) = max {n . x : x in shape} for the unit vector n of a direction, and its point.
+
+    For a plane h is infinite along all directions but its normal.
+    """
+    n = checked_vector("direction", direction)
+    length = float(np.linalg.norm(n))
+    if length == 0.0:
+        raise ArgumentError("direction is zero; wanted a vector of any length above zero")
+    n, pose, core = n / length, _checked_pose("T", T), _prepared(shape)
+    if core is None:
+        up, p = _normal(pose), pose[:3, 3]
+        along = np.abs(n - up).max() <= NORMAL_ROUNDING
+        return (float(n @ p), p.copy()) if along else (np.inf, np.full(3, np.nan))
+    core.place(pose[:3, :3], _tuple(pose[:3, 3]))
+    point = np.array(core.support(_tuple(n))) + core.radius * n
+    return float(n @ point), point
+
+
+def separation(
+    shape_a: ConvexShape | Plane,
+    T_a: Pose | ArrayLike,
+    shape_b: ConvexShape | Plane,
+    T_b: Pose | ArrayLike,
+    normal: ArrayLike,
+) -> float:
+    """Return min {n . x : x in a} - max {n . x : x in b} for the unit vector n of `normal`.
+
+    It is a lower bound of the signed distance for every normal, and equal to it for the best.
+    """
+    T_a, T_b = _checked_pose("T_a", T_a), _checked_pose("T_b", T_b)
+    n = checked_vector("normal", normal)
+    # Far from the origin of the world the digits of a difference of heights would be lost.
+    near_a, near_b = T_a.copy(), T_b.copy()
+    near_a[:3, 3], near_b[:3, 3] = 0.0, T_b[:3, 3] - T_a[:3, 3]
+    return -support(shape_a, near_a, -n)[0] - support(shape_b, near_b, n)[0]
+
+
+NORMAL_ROUNDING = 1e-15
+"""Difference of a direction from the normal of a half-space that is rounding."""
+
+
+def distance_of(a: Core | None, T_a: Floats, b: Core | None, T_b: Floats) -> Distance:
+    """Return the distance of two cores at checked poses (4, 4), where None is a half-space."""
+    p_a, p_b = T_a[:3, 3], T_b[:3, 3]
+    if a is None or b is None:
+        if a is not None:
+            return _height(a, T_a, T_b)
+        if b is not None:
+            return _swapped(_height(b, T_b, T_a))
+        raise ArgumentError("both shapes are planes; the distance of two half-spaces is not defined")
+    between = _tuple(p_b - p_a)
+    a.place(T_a[:3, :3], (0.0, 0.0, 0.0))
+    b.place(T_b[:3, :3], between)
+    guess = (-between[0], -between[1], -between[2]) if any(between) else (0.0, 0.0, 1.0)
+    pair = CorePair(a, b, guess).run()
+    if pair.separated:
+        normal = np.array(pair.normal)
+        on_a, on_b = np.array(pair.point_a), np.array(pair.point_b)
+        # Along the line of the two points, so that their distance is that of the core's less the radii.
+        along = (on_a - on_b) / pair.upper
+        lower, upper = pair.lower, pair.upper
+    else:
+        found = penetration_of_parallel(a, b) or penetration(a, b)
+        normal = along = -found.normal
+        on_a, on_b, lower, upper = found.point_a, found.point_b, -found.upper, -found.lower
+    radii = a.radius + b.radius
+    return Distance(
+        lower=lower - radii,
+        upper=max(lower, upper) - radii,
+        point_a=p_a + (on_a - a.radius * along),
+        point_b=p_a + (on_b + b.radius * along),
+        normal=normal,
+    )
+
+
+def _height(a: Core, T_a: Floats, T_plane: Floats) -> Distance:
+    """Return the distance of a core from a half-space: the height of its lowest point, of either sign."""
+    up = _normal(T_plane)
+    a.place(T_a[:3, :3], (0.0, 0.0, 0.0))
+    lowest = np.array(a.support(_tuple(-up))) - a.radius * up
+    height = float(up @ (lowest + (T_a[:3, 3] - T_plane[:3, 3])))
+    point = T_a[:3, 3] + lowest
+    return Distance(height, height, point, point - height * up, up)
+
+
+def _normal(T_plane: Floats) -> Floats:
+    up = T_plane[:3, 2]
+    return np.asarray(up / np.linalg.norm(up))
+
+
+def _swapped(found: Distance) -> Distance:
+    return Distance(found.lower, found.upper, found.point_b, found.point_a, -found.normal)
+
+
+def _prepared(shape: ConvexShape | Plane) -> Core | None:
+    return None if isinstance(shape, Plane) else core_of(shape)
+
+
+def _tuple(vector: Floats) -> Vector3:
+    x, y, z = vector.tolist()
+    return x, y, z
+
+
+def _checked_pose(name: str, T: Pose | ArrayLike) -> Floats:
+    """Return a pose as a matrix, as it is: not the nearest rotation."""
+    if isinstance(T, Pose):
+        return checked_pose(name, T).matrix
+    try:
+        array = np.asarray(T, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ArgumentError(f"{name} is {shown(T)}; wanted a Pose or a matrix (4, 4)") from None
+    if array.shape != (4, 4):
+        raise ShapeError(f"{name} has shape {array.shape}; wanted a Pose or a matrix (4, 4)")
+    if not np.isfinite(array).all():
+        raise NotFiniteError(f"{name} has an entry that is NaN or infinite")
+    R = array[:3, :3]
+    off = max(np.abs(R.T @ R - np.eye(3)).max(), np.abs(array[3] - [0, 0, 0, 1]).max())
+    if off > RIGIDITY_TOLERANCE or np.linalg.det(R) < 0.0 or np.abs(array[:3, 3]).max() >= MAX_MAGNITUDE:
+        raise ArgumentError(f"{name} is not a rigid transform: wanted [[R, p], [0, 1]] with R a rotation")
+    return array
