@@ -2,8 +2,8 @@
 
 Bodies are plates that lie on a plane, and balls, cylinders and hoops that roll on it or fly. Between events
 (a touch, the end of a slide) accelerations are constant, so that the motion is exact at any step: flight,
-Newton's law of restitution, Coulomb's law for forces and impulses. Nothing here comes from the cases. Settings
-plant the faults that a case has to notice.
+Newton's law of restitution, Coulomb's law for forces and impulses. Nothing here comes from the cases.
+Settings plant the faults that a case has to notice.
 """
 
 from __future__ import annotations

@@ -158,10 +158,12 @@ def read_entries(path: Path) -> list[Entry]:
 
 
 def differs(entry: Entry, above: float | None = None) -> bool:
-    """Check whether any engine differs from the file above the tolerance, or refuses it."""
+    """Check whether any engine differs from the file above the tolerance, refuses it or is not used on it."""
     limit = entry["tolerance"] if above is None else above
     return any(
-        engine["refused"] or any(error is None or error > limit for error in engine["before"].values())
+        engine["refused"]
+        or engine["not_used"]
+        or any(error is None or error > limit for error in engine["before"].values())
         for engine in entry["engines"]
     )
 
