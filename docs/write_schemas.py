@@ -14,6 +14,7 @@ from typing import Any
 
 from dynx.agreement.report import AgreementDocument
 from dynx.bench.document import BenchDocument
+from dynx.cli.contacts.document import ContactsDocument
 from dynx.cli.sim.document_types import SimDocument, TutorialDocument
 from dynx.cli.world.document import WorldDocument
 from dynx.doctor.formats.baseline import BaselineDocument
@@ -31,6 +32,7 @@ def schemas() -> dict[str, dict[str, Any]]:
         "agree": json_schema(AgreementDocument, "dynx agree --json"),
         "baseline": json_schema(BaselineDocument, "dynx doctor --write-baseline", omits_defaults=True),
         "bench": json_schema(BenchDocument, "dynx bench --json"),
+        "contacts": json_schema(ContactsDocument, "dynx contacts --json"),
         "doctor": json_schema(DoctorDocument, "dynx doctor --json"),
         "scenario": json_schema(ScenarioDocument, "dynx.Scenario.to_json"),
         "scene": json_schema(SceneDocument, "dynx.world.write_scene", omits_defaults=True),

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import shlex
-import sys
 from collections.abc import Mapping, Sequence
 
 from rich.console import Console
@@ -16,7 +14,7 @@ from dynx.cli.doctor.repetition import doctor_command
 from dynx.cli.doctor.tables import show_one
 from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, one_line, short_line
 from dynx.cli.shell.run import Run
-from dynx.cli.shell.terminal import console, counted
+from dynx.cli.shell.terminal import command_line, console, counted
 from dynx.doctor.formats.baseline import Baseline
 from dynx.doctor.report import DoctorReport
 from dynx.doctor.task import DoctorTask, missing_engines
@@ -60,7 +58,7 @@ class Conclusion:
         """Write and show everything; return the exit code."""
         reports = self._run.results
         # Files are written first, so that they are not lost if a pipe closes while a table is written.
-        errors = self._outputs.write(reports, self._run.not_done, self._baseline, command())
+        errors = self._outputs.write(reports, self._run.not_done, self._baseline, command_line())
         self._problems += map(str, errors)
         mended = self._mend()
         saved = [self._save_counterexamples(report) for report in reports]
@@ -153,8 +151,3 @@ def refusal(report: DoctorReport) -> str:
     assert report.error is not None
     message = report.error.message
     return message if report.robot in message else f"{short_line(report.robot)}: {message}"
-
-
-def command() -> str:
-    """Return the command line of this process, for running it again."""
-    return shlex.join(["dynx", *map(one_line, sys.argv[1:])])

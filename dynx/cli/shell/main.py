@@ -24,6 +24,10 @@ COMMANDS = {
     "world": LazyCommand(
         "dynx.cli.world.command:world", "Run a scene with contacts on several engines, and compare them."
     ),
+    "contacts": LazyCommand(
+        "dynx.cli.contacts.command:contacts",
+        "Measure how far contacts of engines are from mechanics, and why.",
+    ),
     "bench": LazyCommand("dynx.cli.bench.command:bench", "Time the engines on a robot and this machine."),
     "explain": LazyCommand(
         "dynx.cli.queries.commands:explain", "Explain a rule of the doctor, such as DX101."

@@ -81,6 +81,16 @@ def choice_pair(word: str) -> tuple[str, str]:
     return rule, choice
 
 
+def name_value(word: str) -> tuple[str, str]:
+    """Read ``name=value``, such as solver_iterations=100."""
+    name, equals, value = word.partition("=")
+    if not equals or not name.strip() or not value.strip():
+        raise click.BadParameter(
+            f"{shown(word)} is not of the form name=value, such as solver_iterations=100"
+        )
+    return name.strip(), value.strip()
+
+
 def _pair(word: str) -> tuple[str, float]:
     """Read one ``joint=value``; the name may hold any character but a comma or white space."""
     name, equals, text = word.rpartition("=")

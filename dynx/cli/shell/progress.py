@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from typing import Protocol
 
 import click
 
 from dynx.cli.shell.terminal import console
 
-Advance = Callable[[int, str], None]
-"""Function that takes the number of items done and the text beside the bar."""
+
+class Advance(Protocol):
+    """Function that takes the number of items done, the text beside the bar, and a changed total."""
+
+    def __call__(self, done: int, words: str, total: int | None = None, /) -> None:
+        """Redraw the bar."""
 
 
 @contextmanager
 def progress_bar(total: int, done: int = 0, words: str = "", *, enabled: bool = True) -> Iterator[Advance]:
     """Show a bar of `total` items during the block."""
     if not enabled or not sys.stderr.isatty():
-        yield lambda done, words: None
+        yield lambda done, words, total=None: None
         return
     # Imported where a bar is shown: it takes a quarter of the time that importing all of rich takes.
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -34,7 +39,9 @@ def progress_bar(total: int, done: int = 0, words: str = "", *, enabled: bool = 
     screen.soft_wrap = False  # a bar longer than the line could not be redrawn in place
     with Progress(*columns, console=screen, transient=True) as progress:
         bar = progress.add_task(words, total=total, completed=done)
-        yield lambda done, words: progress.update(bar, completed=done, description=words)
+        yield lambda done, words, total=None: progress.update(
+            bar, completed=done, description=words, total=total
+        )
 
 
 def log(line: str) -> None:

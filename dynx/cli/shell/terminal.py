@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import shlex
 import sys
 from collections.abc import Callable, Mapping
 from typing import TextIO, TypeVar
@@ -11,7 +12,7 @@ from typing import TextIO, TypeVar
 import click
 from rich.console import Console
 
-from dynx.cli.shell.exits import failure_of
+from dynx.cli.shell.exits import failure_of, one_line
 from dynx.errors import DynxError
 from dynx.files.documents import json_text
 from dynx.files.writing import write_text
@@ -69,6 +70,11 @@ def number(value: float) -> str:
 def counted(count: int, noun: str) -> str:
     """Write ``1 robot`` or ``2 robots``."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def command_line() -> str:
+    """Return the command line of this process, for running it again."""
+    return shlex.join(["dynx", *map(one_line, sys.argv[1:])])
 
 
 def summary_line(what: str, counts: Mapping[str, int], not_done: int, seconds: float) -> str:

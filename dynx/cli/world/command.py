@@ -5,15 +5,7 @@ from __future__ import annotations
 import click
 
 from dynx.cli.shell.lazy import runs
-from dynx.cli.shell.options import GroupedCommand, group, json_option, name_list
-
-
-def setting(word: str) -> tuple[str, str]:
-    """Read ``name=value`` or ``engine.name=value``."""
-    name, equals, value = word.partition("=")
-    if not equals or not name.strip() or not value.strip():
-        raise click.BadParameter(f"{word!r} is not of the form name=value, such as solver_iterations=100")
-    return name.strip(), value.strip()
+from dynx.cli.shell.options import GroupedCommand, group, json_option, name_list, name_value
 
 
 @click.command(cls=GroupedCommand)
@@ -51,7 +43,7 @@ def setting(word: str) -> tuple[str, str]:
     click.option(
         "--set",
         "settings",
-        type=setting,
+        type=name_value,
         multiple=True,
         metavar="NAME=VALUE",
         help="Setting of an engine (docs/world.md), as name=value for all engines that have it or "

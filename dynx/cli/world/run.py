@@ -2,34 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, failure_of
 from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.output_file import check_json, check_writable
 from dynx.cli.shell.progress import progress_bar
+from dynx.cli.shell.settings import settings_by_engine
 from dynx.cli.shell.terminal import present
 from dynx.cli.world.document import document
 from dynx.cli.world.plot import plot
 from dynx.cli.world.tables import show
-from dynx.errors import (
-    ArgumentError,
-    DynxError,
-    UnknownNameError,
-    nearest,
-    shown,
-)
+from dynx.errors import DynxError
 from dynx.files.figures import picture_format
 from dynx.world import World
 from dynx.world.comparison import WorldComparison, compare_worlds
-from dynx.world.registry import installed_worlds, world_class
+from dynx.world.registry import installed_worlds
 from dynx.world.scene import read_scene
-from dynx.world.settings import Setting
-
-WORDS = {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}
-"""Words for truth values of settings."""
 
 
 def world(
@@ -93,48 +83,6 @@ def world(
     if errors:
         return BAD_INPUT
     return NEGATIVE_RESULT if _is_negative(comparison, within) else DONE
-
-
-def settings_by_engine(engines: Sequence[str], given: Sequence[tuple[str, str]]) -> dict[str, dict[str, Any]]:
-    """Return the settings of each engine from ``name=value`` and ``engine.name=value``.
-
-    Raises UnknownNameError for a setting that no engine has, ArgumentError for a value of another type.
-    """
-    known: dict[str, Mapping[str, Setting]] = {name: world_class(name).settings for name in engines}
-    found: dict[str, dict[str, Any]] = {name: {} for name in engines}
-    for full, text in given:
-        engine, dot, name = full.rpartition(".")
-        if dot and engine not in known:
-            raise UnknownNameError(
-                f"--set {shown(full)}: {shown(engine)} does not run{nearest(engine, known)}"
-            )
-        having = [each for each in ([engine] if dot else engines) if name in known[each]]
-        if not having:
-            names = sorted({each for settings in known.values() for each in settings})
-            raise UnknownNameError(
-                f"--set {shown(full)}: {', '.join([engine] if dot else engines)} has no such setting"
-                f"{nearest(name, names)}"
-            )
-        for each in having:
-            found[each][name] = _value(known[each][name], full, text)
-    return found
-
-
-def _value(setting: Setting, name: str, text: str) -> Any:
-    """Return the text as a value of the type of the setting."""
-    if isinstance(setting.default, bool):
-        if text.lower() not in WORDS:
-            raise ArgumentError(f"--set {name}={text}: wanted true or false")
-        return WORDS[text.lower()]
-    if isinstance(setting.default, str):
-        return text
-    try:
-        if isinstance(setting.default, tuple):
-            return [float(word) for word in text.replace(",", " ").split()]
-        return int(text) if isinstance(setting.default, int) else float(text)
-    except ValueError:
-        kind = "a whole number" if isinstance(setting.default, int) else "a number"
-        raise ArgumentError(f"--set {name}={text}: wanted {kind}") from None
 
 
 def _own_path(path: str, engine: str, engines: int) -> str:

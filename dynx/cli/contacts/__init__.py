@@ -1,0 +1,1 @@
+"""``dynx contacts``: how far each engine is from mechanics where bodies touch."""

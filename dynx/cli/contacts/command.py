@@ -1,0 +1,99 @@
+"""Declaration of ``dynx contacts``."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import click
+
+from dynx.cli.shell.lazy import runs
+from dynx.cli.shell.options import GroupedCommand, finite_number, group, json_option, name_list, name_value
+from dynx.errors import shown
+
+
+def steps(text: str) -> tuple[float, ...]:
+    """Read steps [s] separated by commas, each a number or a fraction such as 1/240."""
+    found = []
+    for word in text.replace(",", " ").split():
+        try:
+            number = float(Fraction(word)) if "/" in word else finite_number(word)
+        except (ValueError, ZeroDivisionError):
+            raise click.BadParameter(f"{shown(word)} is not a number [s], such as 0.002 or 1/480") from None
+        if not number > 0.0:
+            raise click.BadParameter(f"{shown(word)} is not positive")
+        found.append(number)
+    if not found:
+        raise click.BadParameter("wanted steps [s] separated by commas, such as 1/240,1/480")
+    return tuple(found)
+
+
+@click.command(cls=GroupedCommand)
+@group(
+    "Measurement",
+    click.option(
+        "--engine",
+        "engines",
+        type=name_list,
+        metavar="A,B,C",
+        help="Engines to measure (default: all that are installed).",
+    ),
+    click.option(
+        "--case",
+        "cases",
+        type=name_list,
+        metavar="A,B,C",
+        help="Cases to run, of which every figure is printed (default: all cases, with one figure of each "
+        "engine).",
+    ),
+    click.option(
+        "--dt",
+        "steps",
+        type=steps,
+        metavar="A,B,C",
+        help="Steps [s], numbers or fractions such as 1/240 (default: 0.004,0.002,0.001).",
+    ),
+    click.option(
+        "--set",
+        "settings",
+        type=name_value,
+        multiple=True,
+        metavar="NAME=VALUE",
+        help="Setting of an engine (docs/world.md), as name=value for all engines that have it or "
+        "engine.name=value; may be given several times.",
+    ),
+    click.option(
+        "--jobs",
+        type=click.IntRange(min=1),
+        help="Number of runs at a time, each in its own process (default: one per processor).",
+    ),
+)
+@group(
+    "Output",
+    click.option("--list", "only_list", is_flag=True, help="List of the cases, without running them."),
+    json_option,
+    click.option(
+        "--html", "html_path", metavar="FILE", help="File for the results as one HTML page with plots."
+    ),
+    click.option(
+        "--quiet", is_flag=True, help="No tables and no progress: only errors, files and the exit code."
+    ),
+)
+@runs("dynx.cli.contacts.run:contacts")
+def contacts() -> None:
+    """Measure how far engines are from mechanics where bodies touch, and why.
+
+    Each case is a scene whose motion or force is known in closed form. It is run by every engine at several
+    steps. An error either falls with the step, at the order printed, or is attributed to a setting of the
+    engine: changing it removes the error, which is shown by running again. Errors are relative, and those of
+    the table belong to the smallest step.
+
+    Exit code 0 if every error is explained, 1 if one is not or an engine failed, 2 for input that cannot be
+    used. Ctrl-C ends the run with the results so far and exit code 130.
+
+    \b
+    Examples:
+      dynx contacts
+      dynx contacts --engine mujoco --case slope --set impratio=100
+      dynx contacts --dt 1/240,1/480,1/960 --html contacts.html --json contacts.json
+      dynx contacts --list
+    """

@@ -1,0 +1,113 @@
+"""Wording of verdicts, settings and numbers of the document of ``dynx contacts``, for screen and page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+Entry = Mapping[str, Any]
+
+RANKS = ("exact", "falls", "cannot", "setting", "unexplained")
+"""Verdicts in the order in which they deserve a look."""
+
+VERDICT_MEANINGS = {
+    "exact": "the error is within the tolerance at every step",
+    "falls": "the error falls with the step, at the order given",
+    "setting": "the error stays, and a setting of the engine removes it: shown by running again",
+    "cannot": "the engine lacks a parameter on which the exact value rests",
+    "unexplained": "the error stays, and no setting that is known removes it",
+}
+
+MAX_ORDER = 9.0
+"""Largest order that is written as a number: beyond it an error vanishes from one step to the next."""
+
+
+def worst_figure(figures: Sequence[Entry]) -> Entry:
+    """Return the figure that deserves the first look: by verdict, then by the error at the smallest step."""
+    return max(figures, key=lambda each: (RANKS.index(each["verdict"]), last_error(each) / each["tolerance"]))
+
+
+def last_error(figure: Entry) -> float:
+    """Return the error at the smallest step; infinity where it is not finite."""
+    return as_number(figure["errors"][-1])
+
+
+def as_number(value: float | None) -> float:
+    """Return an error of a document, in which null stands for a number that is not finite."""
+    return math.inf if value is None or not math.isfinite(value) else value
+
+
+def error_text(value: float | None) -> str:
+    """Write a relative error with two digits."""
+    number = as_number(value)
+    if number == math.inf:
+        return "not finite"
+    return "0" if number == 0.0 else f"{number:.1e}"
+
+
+def figure_name(figure: Entry) -> str:
+    """Write the name of a figure with that of its trial."""
+    return ", ".join(part for part in (figure["figure"], figure["trial"]) if part)
+
+
+def quantity_text(value: float | None, unit: str) -> str:
+    """Write a measured or exact value with its unit."""
+    return ("not finite" if value is None else f"{value:.6g}") + (f" {unit}" if unit else "")
+
+
+def step_text(dt: float) -> str:
+    """Write a step in milliseconds, or as the part of a second that it is."""
+    milliseconds = 1e3 * dt
+    if math.isclose(milliseconds, round(milliseconds, 3), rel_tol=1e-9):
+        return f"{milliseconds:g} ms"
+    part = 1.0 / dt
+    return f"1/{part:.0f} s" if math.isclose(part, round(part), rel_tol=1e-9) else f"{milliseconds:.4g} ms"
+
+
+def steps_text(steps: Sequence[float]) -> str:
+    """Write the steps, largest first."""
+    return ", ".join(step_text(each) for each in steps)
+
+
+def order_text(order: float) -> str:
+    """Write the order of an error."""
+    return f"order {order:.1f}" if order <= MAX_ORDER else f"order above {MAX_ORDER:g}"
+
+
+def change_text(settings: Mapping[str, Sequence[Any]], *, arrow: str = "->") -> str:
+    """Write settings with the value in use and the last one tried, of lists the numbers that change."""
+    parts = []
+    for name, values in settings.items():
+        before, after = values[0], values[-1]
+        if isinstance(before, list):
+            changed = [k for k, pair in enumerate(zip(before, after, strict=True)) if pair[0] != pair[1]]
+            before, after = ([value[k] for k in changed] for value in (before, after))
+        parts.append(f"{name} {_value(before)} {arrow} {_value(after)}")
+    return ", ".join(parts)
+
+
+def verdict_text(figure: Entry) -> str:
+    """Write the verdict on a figure with what proves it."""
+    verdict: str = figure["verdict"]
+    if verdict == "falls":
+        return f"falls with the step ({order_text(figure['order'])})"
+    if verdict == "setting":
+        return setting_text(figure["attribution"])
+    if verdict == "cannot":
+        return f"cannot: {figure['reason']}"
+    return verdict
+
+
+def setting_text(attribution: Entry) -> str:
+    """Write the change of settings that removes an error, and what is left of it."""
+    left = error_text(attribution["errors"][-1][-1])
+    if attribution["order"] is not None:
+        left = f"falls to {left} ({order_text(attribution['order'])})"
+    return f"{change_text(attribution['settings'])}: {left}"
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, list):
+        return " ".join(map(_value, value))
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,89 @@
+"""The page of ``dynx contacts``: well-formed, self-contained, complete, and unharmed by names."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dynx.cli.contacts.page import ENGINE_STYLES, contacts_page
+from dynx.cli.contacts.plots import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, plots
+from dynx.files.documents import json_text
+from tests.cli.contacts.documents import ENGINES, STEPS, example
+from tests.files.page import Page, contrast
+
+ALLOWED = {
+    *("html", "head", "meta", "title", "style", "body", "header", "main", "footer", "section", "div", "span"),
+    *("h1", "h2", "h3", "h4", "p", "a", "code", "pre", "details", "summary", "figure", "figcaption"),
+    *("table", "thead", "tbody", "tr", "th", "td", "ul", "li", "dl", "dt", "dd"),
+    *("svg", "g", "rect", "circle", "path", "polyline", "text", "tspan"),
+}
+"""Elements that fetch nothing and run nothing."""
+
+
+def test_the_page_is_well_formed_and_needs_nothing_else() -> None:
+    text = contacts_page(example(not_done=3), command="dynx contacts")
+    page = Page(text)
+    assert text.isascii()
+    assert set(page.tags) <= ALLOWED
+    assert not {key for key, _ in page.attributes if key.startswith("on") or key in ("src", "style")}
+    assert all(value.startswith("#") for key, value in page.attributes if key == "href")
+    assert not re.search(r"url\(|@import|https?:", text)
+
+
+def test_the_page_says_everything() -> None:
+    words = " ".join(Page(contacts_page(example(not_done=3), command="dynx contacts --jobs 2")).text.split())
+    wanted = [
+        *("1 of 9 errors are unexplained, and 1 runs failed", "3 trials of an engine were not done"),
+        *("one ran with impratio=10.0", "sliding, acceleration, slow", "1.0e-01 \u2192 1.0e-03", "order 1.0"),
+        *("impedance 0.9 \u2192 0.99, impratio 1 \u2192 100", "Contacts are soft.", "Contacts are springs."),
+        *("(exact: -2 m/s^2)", "not finite", "crash two at 4 ms, upward: word", "dynx contacts --jobs 2"),
+        *("exact in every engine: word, fast", "one 1.0", "99 runs, 12.5 s", "cannot: word"),
+    ]
+    assert [each for each in wanted if each not in words] == []
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_a_page_without_results_is_well_formed(number: int) -> None:
+    document = example()
+    document["cases"] = document["cases"][:number]
+    for case in document["cases"]:
+        case["figures"] = []
+    assert "Cases and engines" in Page(contacts_page(document)).text
+
+
+@given(st.text(max_size=30))
+def test_nothing_escapes_from_text(text: str) -> None:
+    assert Page(contacts_page(example(text))).tags == Page(contacts_page(example("x"))).tags
+
+
+def test_the_page_of_the_written_document_is_the_same() -> None:
+    document = example()
+    assert contacts_page(json.loads(json_text(document))) == contacts_page(document)
+
+
+def test_points_lie_on_the_axes_and_triangles_have_the_order_of_the_error() -> None:
+    (case,) = example()["cases"]
+    fast, slow = plots(case, STEPS, ENGINES)
+    for line in (*fast.lines, *slow.lines):
+        for x, y in (*line.points, *line.changed):
+            assert LEFT < x < WIDTH - RIGHT
+            assert TOP <= y <= HEIGHT - BOTTOM
+        assert [x for x, _ in line.points] == sorted((x for x, _ in line.points), reverse=True)
+    line = next(line for line in fast.lines if line.engine == "two")
+    assert line.triangle is not None
+    assert line.triangle.label == "1.0"
+    (ax, ay), (bx, by), _ = (map(float, each.split(",")) for each in line.triangle.points.split())
+    (right, upper), (left, lower) = line.points[0], line.points[-1]
+    assert (ay - by) / (bx - ax) == pytest.approx((lower - upper) / (right - left), rel=1e-2)
+
+
+def test_lines_can_be_seen_on_either_page() -> None:
+    parts = re.findall(r":root {[^}]*--e0.*?}", contacts_page(example()))
+    light, dark = (dict(re.findall(r"--(e\d): (#\w{6})", part)) for part in parts)
+    assert len(light) == len(dark) == ENGINE_STYLES
+    for colours, ground in ((light, "#ffffff"), (dark, "#0f1317")):
+        assert all(contrast(colour, ground) >= 3.0 for colour in colours.values())  # WCAG 2.1, graphics
