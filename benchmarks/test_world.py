@@ -36,7 +36,7 @@ STANCE, KP, KD = np.tile([0.0, 0.8, -1.6], 4), 10.0, 0.2
 
 def raw_step(world: World, torques: list[float] | None, *, motors: bool = False) -> Callable[[], None]:
     """Return the engine's own step of a world, with torques on the joints or with a user's own PD law."""
-    engine: Any = world._engine
+    engine: Any = world._motion.engine
     if world.engine == "pybullet":
         import pybullet
 

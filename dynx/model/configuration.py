@@ -27,6 +27,9 @@ A moment is a product of two lengths, two speeds and a mass. The bound prevents 
 engine would silently return infinity or NaN.
 """
 
+DIVERGENCE_SPEED = 1e8
+"""Norm of the velocity [rad/s or m/s] above which a simulation or a world counts as diverged."""
+
 
 def checked_array(name: str, value: ArrayLike, length: int) -> Floats:
     """Return `value` as float64 (..., length) with entries below `MAX_MAGNITUDE`.

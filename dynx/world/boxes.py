@@ -8,7 +8,7 @@ from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane
 from dynx.rbd.kinematics import body_poses
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
-from dynx.world.layout import WORLD, Collider, Layout
+from dynx.world.layout import WORLD, Collider, Layout, Owner
 from dynx.world.state import WorldState
 
 Corners = tuple[Floats, Floats]
@@ -16,14 +16,14 @@ Corners = tuple[Floats, Floats]
 
 def collider_box(layout: Layout, collider: Collider, state: WorldState) -> Corners:
     """Return the lower and the upper corner (3,) of the box around the shapes of a collider."""
-    T_world_owner = owner_pose(layout, collider, state)
+    T_world_owner = owner_pose(layout, collider.owner, state)
     corners = [shape_box(each.shape, T_world_owner @ each.T) for each in collider.shapes]
     return np.min([c[0] for c in corners], axis=0), np.max([c[1] for c in corners], axis=0)
 
 
-def owner_pose(layout: Layout, collider: Collider, state: WorldState) -> Floats:
-    """Return the pose (4, 4) in the world of the rigid body to which a collider belongs."""
-    robot, body = collider.owner
+def owner_pose(layout: Layout, owner: Owner, state: WorldState) -> Floats:
+    """Return the pose (4, 4) in the world of a rigid body."""
+    robot, body = owner
     if robot is None:
         return np.eye(4) if body == WORLD else state.bodies[layout.bodies[body].name].T_world_body
     model = layout.robots[robot].model

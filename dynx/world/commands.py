@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from math import isfinite
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +13,7 @@ from dynx.errors import ArgumentError, ShapeError, UnknownNameError, nearest, sh
 from dynx.model import Model
 from dynx.model.configuration import checked_array
 from dynx.spatial.scalar import Floats
+from dynx.world.divergence import LastLoads, RobotLoad
 from dynx.world.engine import WorldEngine
 from dynx.world.layout import Layout, RobotLayout
 from dynx.world.loads import RobotLoads, Wrench, checked_torques, robot_number
@@ -40,6 +41,8 @@ class Commands:
         self._zeros = [np.zeros(robot.model.nv) for robot in layout.robots]
         self._floating = [robot.model.floating for robot in layout.robots]
         self._no_wrench = np.zeros((len(layout.bodies), 6))
+        self._held: Mapping[int, Floats] = _NOTHING
+        self._wrenches: Floats = self._no_wrench
         self.forget()
 
     def forget(self) -> None:
@@ -49,6 +52,18 @@ class Commands:
         self._pushed = True
         self._commanded: set[int] = set()
         self._forget_steps(frozenset())
+
+    def last(self) -> LastLoads:
+        """Return the loads of the last step."""
+        pushed = np.flatnonzero(self._wrenches.any(axis=1)).tolist()
+        return LastLoads(
+            [
+                RobotLoad(k, loads.dynamics, self._held.get(k), *loads.law)
+                for k, loads in enumerate(self._loads)
+                if loads.has_motors or k in self._held
+            ],
+            {k: self._wrenches[k] for k in pushed},
+        )
 
     def memory(self) -> Memory:
         """Return what the motors keep from one step to the next."""
@@ -71,7 +86,9 @@ class Commands:
         )
         if count > 1 and any(self._floating[k] and tau[:6].any() for k, tau in checked.items()):
             return False
+        self._held = checked
         if self._pushed:
+            self._wrenches = self._no_wrench
             engine.set_wrenches(self._no_wrench)
             self._pushed = False
         if self._remembering:
@@ -95,7 +112,7 @@ class Commands:
         wrenches: Sequence[Wrench],
     ) -> Act:
         """Check what acts in the next steps, and return the function that applies it before each of them."""
-        held = checked_torques(torques, self._robots, self._layout.robots)
+        held = self._held = checked_torques(torques, self._robots, self._layout.robots)
         commands = self._set_motors(motors or {})
         frames, pushes = self._sort_wrenches(wrenches)
         motored = frozenset(k for k, loads in enumerate(self._loads) if loads.has_motors)
@@ -114,8 +131,8 @@ class Commands:
             for k in repeated:
                 q, v = engine.robot_state(k)
                 tau = self._loads[k].torque(q, v, held.get(k), frames.get(k, ()))
-                # A finite sum of squares has finite entries.
-                if not tau.dot(tau) < np.inf and not np.isfinite(tau).all():
+                # A finite sum has finite entries; of few numbers, Python's is the fastest.
+                if not isfinite(sum(tau.tolist())) and not np.isfinite(tau).all():
                     return False
                 engine.set_torques(k, tau)
             if pushes or self._pushed:
@@ -180,6 +197,7 @@ class Commands:
         for k, wrenches in pushes.items():
             T, center = engine.body_state(k).T_world_body, self._layout.bodies[k].center
             total[k] = np.sum([wrench.at(T, center) for wrench in wrenches], axis=0)
+        self._wrenches = total
         engine.set_wrenches(total)
         self._pushed = bool(pushes)
 
@@ -207,20 +225,6 @@ def with_scene_motors(
             raise ArgumentError(f"{name} is of type {type(given).__name__}; wanted a dict by robot")
     driven = {**(motors or {}), **(torques or {})}  # type: ignore[dict-item]
     return {**{name: own for name, own in scene_motors.items() if name not in driven}, **(motors or {})}
-
-
-def loads_of(world: object, loads: Callable[..., object], fixed: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the arguments of the next step: those that `loads` gives for this world, or else the fixed ones.
-
-    Raises ArgumentError unless it gives a dict of torques, motors and wrenches.
-    """
-    given = loads(world)
-    if not isinstance(given, Mapping):
-        raise ArgumentError(f"loads returned {shown(given)}; wanted a dict of {', '.join(fixed)}")
-    for name in given:
-        if name not in fixed:
-            raise UnknownNameError(f"loads returned {shown(name)}{nearest(str(name), fixed)}")
-    return {**fixed, **given}
 
 
 def checked_command(command: MotorCommand, model: Model) -> MotorCommand:

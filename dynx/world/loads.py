@@ -17,7 +17,7 @@ from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross
 from dynx.world.layout import BodyLayout, RobotLayout
-from dynx.world.motors import Motor, combine
+from dynx.world.motors import JointLaw, Motor, combine
 from dynx.world.state import BodyState
 
 _FLOAT64 = np.dtype(np.float64)
@@ -92,11 +92,15 @@ class RobotLoads:
         """Whether the robot has a motor in this call."""
         return bool(self._motors)
 
+    @property
+    def law(self) -> tuple[JointLaw | None, Floats | None]:
+        """Law of the motors, and 1 for the joints where it holds at the end of a step, else 0."""
+        return (self._law, self._implicit_joints) if self._motors else (None, None)
+
     def set_motors(self, motors: Sequence[Motor]) -> None:
         """Use these motors in the next calls of `torque`."""
         if [*map(id, motors)] != [*map(id, self._motors)]:
-            self._law, implicit = combine(self.model, motors)
-            law = self._law
+            law, implicit = self._law, self._implicit_joints = combine(self.model, motors)
             self._motors = tuple(motors)
             # At the end of the step: q + h v+ in place of q, v+ = v + h a in place of v.
             self._ahead = implicit * self._h * law.kp
@@ -180,8 +184,8 @@ def checked_torques(
             tau = real_array(f"torque of {name}", tau)
             if tau.shape != (nv,):
                 raise ShapeError(f"torque of {name} has shape {tau.shape}; wanted ({nv},)")
-        # A finite sum of squares has finite entries below the bound.
-        if not tau.dot(tau) < 1e100:
+        # Entries are below the bound where the sum of their magnitudes is; of few numbers, Python's is fast.
+        if not sum(map(abs, tau.tolist())) < 1e50:
             checked_entries(f"torque of {name}", tau)
         checked[number] = tau
     return checked

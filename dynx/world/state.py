@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from math import hypot, isfinite
 from typing import NamedTuple
 
 import numpy as np
 
+from dynx.model.configuration import DIVERGENCE_SPEED
 from dynx.spatial.scalar import Floats
 
 
@@ -37,6 +39,9 @@ class WorldState:
     bodies: Mapping[str, BodyState]
 
 
-def is_finite(parts: Sequence[Floats]) -> bool:
-    """Check whether all numbers of a state are finite."""
-    return all(np.isfinite(part).all() for part in parts)
+def has_diverged(position: Floats, velocity: Floats) -> bool:
+    """Check whether a number of a state is not finite, or its velocity too large to be meaningful."""
+    if not hypot(*velocity.tolist()) < DIVERGENCE_SPEED:
+        return True
+    # A finite sum has finite entries; of few numbers, Python's is the fastest.
+    return not isfinite(sum(position.ravel().tolist())) and not np.isfinite(position).all()

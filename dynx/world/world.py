@@ -2,42 +2,37 @@
 
 from __future__ import annotations
 
-import math
 import os
-import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, NoReturn
+from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, ClosedError, DivergedError, EngineError
+from dynx.errors import ArgumentError
 from dynx.model.configuration import positive_seconds, whole_number
 from dynx.model.package_paths import StrPath
 from dynx.spatial.scalar import Floats
 from dynx.world.camera import Camera, Picture, cast_rays, draw_picture
-from dynx.world.commands import Act, Commands, MotorsOf, loads_of, with_scene_motors
+from dynx.world.commands import Commands, MotorsOf, with_scene_motors
 from dynx.world.contacts import ClosestPoints, Contact, RayHits
 from dynx.world.engine import WorldEngine
 from dynx.world.identity import identity
 from dynx.world.loads import Wrench
+from dynx.world.motion import Motion
+from dynx.world.overlaps import Overlap, overlaps_of
 from dynx.world.preparation import prepare
 from dynx.world.queries import MAX_RAY_LENGTH, Queries
 from dynx.world.registry import world_class
+from dynx.world.running import run_for
 from dynx.world.scene import Scene
 from dynx.world.scene.paths import ScenePaths
 from dynx.world.scene.reading import scene_from_document
 from dynx.world.scene.writing import scene_document
 from dynx.world.settings import checked_settings, checked_switches
 from dynx.world.snapshot import Snapshot, read_snapshot, write_snapshot
-from dynx.world.state import BodyState, RobotState, WorldState, is_finite
+from dynx.world.start_notes import notes_on_start
+from dynx.world.state import BodyState, RobotState, WorldState
 from dynx.world.state_checks import apply_state, checked_state
-
-STEPS_BETWEEN_CHECKS = 1000
-"""Number of steps of the engine after which the state is checked for divergence, unless it was read."""
-
-TIME_ROUNDING = 1e-9
-"""Tolerance within which the ratio of two times counts as a whole number."""
 
 TorquesOf = Mapping[str, ArrayLike]
 LoadsOf = Callable[["World"], Mapping[str, Any]]
@@ -70,7 +65,6 @@ class World:
         """Raises UnknownBackendError and NotInstalledError for an engine, UnknownNameError and ArgumentError
         for settings, DescriptionError for collision shapes, EngineLimitError for what the engine cannot
         represent."""
-        self._engine: WorldEngine | None = None
         if not isinstance(scene, Scene):
             raise ArgumentError(f"scene is of type {type(scene).__name__}; wanted a Scene")
         self._kind = world_class(engine)
@@ -91,29 +85,26 @@ class World:
         """Options of the world other than the engine's settings."""
         self._layout = prepare(scene, **switches)
         self._scene_motors = {robot.name: robot.motors for robot in scene.robots if robot.motors}
-        self._robots = {robot.name: k for k, robot in enumerate(self._layout.robots)}
-        self._bodies = {body.name: k for k, body in enumerate(self._layout.bodies)}
-        self._h = self.dt / self.substeps
-        self._commands = Commands(self._layout, self._robots, self._bodies, self._h)
+        robots = {robot.name: k for k, robot in enumerate(self._layout.robots)}
+        bodies = {body.name: k for k, body in enumerate(self._layout.bodies)}
+        self._commands = Commands(self._layout, robots, bodies, self.dt / self.substeps)
         self._queries = Queries(scene, self._layout)
         self._identity: str | None = None
-        self._engine = self._build()
-        self._steps, self._start, self._unchecked = 0, 0.0, 0
-        self._state: WorldState | None = None
-        self._good: tuple[WorldState, int, float]
-        self._note()
+        self._motion = Motion(self._layout, self._commands, self._build, self.dt, self.substeps)
+        self.notes: tuple[str, ...] = notes_on_start(self._motion.engine, self._motion.state, scene)
+        """Parts that overlap at the start, and constraints that it violates, one sentence each."""
 
     @property
     def version(self) -> str:
         """Version of the engine."""
-        return self._require().version
+        return self._motion.engine.version
 
     # -- motion -------------------------------------------------------------------------------
 
     @property
     def time(self) -> float:
         """Time [s]."""
-        return self._start + self._steps * self.dt
+        return self._motion.time
 
     def step(
         self,
@@ -128,32 +119,19 @@ class World:
         whose law is evaluated in every step of the engine. The motors of the scene act on robots that
         neither names; otherwise, what is not given does not act.
 
-        Raises ArgumentError (and its kinds) for arguments, DivergedError where the state stops being finite:
-        the world is then at the last state that was read or checked.
+        Raises ArgumentError (and its kinds) for arguments, DivergedError where the state stops being finite,
+        with the likely cause. After that, and after Ctrl-C in a step, the world is at the last state that was
+        read, or at a later one at most 1,000 steps old.
         """
-        engine = self._require()
+        engine = self._motion.engine
         if not isinstance(wrenches, tuple | list):
             raise ArgumentError(f"wrenches is of type {type(wrenches).__name__}; wanted a list of Wrench")
         if type(n) is not int or n < 1:
             n = whole_number("n", n, 1)
-        count = n * self.substeps
         if self._scene_motors:
             motors = with_scene_motors(self._scene_motors, torques, motors)
-        held = not motors and not wrenches and self._commands.hold(engine, torques, count)
-        act = None if held else self._commands.plan(torques, motors, wrenches)
-        try:
-            if act is None:
-                engine.step(count)
-            else:
-                self._step_one_by_one(engine, count, act)
-        except EngineError:
-            self._return_to_good()
-            raise
-        self._steps += n
-        self._state = None
-        self._unchecked += count
-        if self._unchecked >= STEPS_BETWEEN_CHECKS:
-            self._note()
+        held = not motors and not wrenches and self._commands.hold(engine, torques, n * self.substeps)
+        self._motion.advance(n, None if held else self._commands.plan(torques, motors, wrenches))
 
     def run(
         self,
@@ -171,25 +149,17 @@ class World:
         during it (``torques``, ``motors``, ``wrenches``); those given here act otherwise. With `real_time` no
         step is taken before its time has come on the clock of the machine.
         """
-        self._require()
-        n = math.ceil(positive_seconds("duration", duration) / self.dt - TIME_ROUNDING)
-        fixed: dict[str, Any] = {"torques": torques, "motors": motors, "wrenches": wrenches}
-        if loads is None and not real_time:
-            self.step(max(1, n), torques, motors, wrenches)
-            return
+        _ = self._motion.engine
         if loads is not None and not callable(loads):
             raise ArgumentError(f"loads is of type {type(loads).__name__}; wanted a function of the world")
-        began = time.perf_counter()
-        for k in range(max(1, n)):
-            self.step(1, **(fixed if loads is None else loads_of(self, loads, fixed)))
-            if real_time:
-                time.sleep(max(0.0, began + (k + 1) * self.dt - time.perf_counter()))
-
-    def _step_one_by_one(self, engine: WorldEngine, count: int, act: Act) -> None:
-        for taken in range(count):
-            if not act(engine):
-                self._diverge(f"a load is not finite after {taken} of {count} steps of the engine")
-            engine.step(1)
+        run_for(
+            duration,
+            self.dt,
+            self.step,
+            {"torques": torques, "motors": motors, "wrenches": wrenches},
+            None if loads is None else lambda: loads(self),
+            real_time=real_time,
+        )
 
     # -- state --------------------------------------------------------------------------------
 
@@ -199,11 +169,7 @@ class World:
 
         Raises DivergedError where they are not finite: the world is then at the last state that was.
         """
-        self._require()
-        if self._state is None:
-            self._note()
-        assert self._state is not None
-        return self._state
+        return self._motion.state
 
     def set_state(
         self,
@@ -216,34 +182,26 @@ class World:
 
         The time is that of `state`. Everything is checked before anything is set.
         """
-        engine = self._require()
+        _ = self._motion.engine
+        if state is None and robots is None and bodies is None:
+            raise ArgumentError("set_state was given nothing; wanted a state, robots= or bodies=")
         checked = checked_state(self._layout, state, robots or {}, bodies or {})
-        apply_state(engine, checked)
-        if state is not None:
-            self._start, self._steps = checked.time, 0
-        self._commands.forget()
-        self._state = None
-        self._note()
+        clock = None if state is None else (checked.time, 0)
+        self._motion.change(lambda engine: apply_state(engine, checked), clock)
 
     def reset(self) -> None:
         """Return to the start of the scene, at time 0, as a new world is."""
-        self._require().close()
-        self._engine = self._build()
-        self._start, self._steps = 0.0, 0
-        self._commands.forget()
-        self._state = None
-        self._note()
+        self._motion.reset()
 
     def save(self) -> Snapshot:
         """Return everything that determines the later steps, which `restore` continues bit for bit."""
-        engine = self._require()
+        engine = self._motion.engine
         return Snapshot(
             self.engine,
             engine.version,
             self.identity,
             self.time,
-            self._start,
-            self._steps,
+            *self._motion.clock,
             self._commands.memory(),
             engine.dump(),
         )
@@ -253,16 +211,16 @@ class World:
 
         Raises ArgumentError for any other.
         """
-        engine = self._require()
+        engine = self._motion.engine
         if not isinstance(snapshot, Snapshot):
             raise ArgumentError(f"snapshot is of type {type(snapshot).__name__}; wanted one of World.save")
         snapshot.require(self.engine, engine.version, self.identity)
-        self._commands.forget()
-        engine.load(snapshot.data)
-        self._commands.remember(snapshot.memory)
-        self._start, self._steps = snapshot.start, snapshot.steps
-        self._state = None
-        self._note()
+
+        def load(engine: WorldEngine) -> None:
+            engine.load(snapshot.data)
+            self._commands.remember(snapshot.memory)
+
+        self._motion.change(load, (snapshot.start, snapshot.steps))
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the world and its state to a file, from which `read` continues bit for bit.
@@ -310,7 +268,12 @@ class World:
 
         After the state was set, they are those of the new state, without forces.
         """
-        return self._queries.contacts(self._require())
+        return self._queries.contacts(self._motion.engine)
+
+    def overlaps(self) -> tuple[Overlap, ...]:
+        """Return the parts that may touch and overlap at the present state by more than bodies at rest do,
+        the deepest first; an engine pushes them apart, often violently."""
+        return overlaps_of(self._motion.engine)
 
     def closest_points(self, a: str, b: str, within: float = 1.0) -> tuple[ClosestPoints, ...]:
         """Return the nearest points of two parts, nearest first: one entry for each pair of their links that
@@ -318,7 +281,7 @@ class World:
 
         A part is a body, ``robot/link``, or a robot for all its links.
         """
-        return self._queries.closest_points(self._require(), a, b, within)
+        return self._queries.closest_points(self._motion.engine, a, b, within)
 
     def aabb(self, name: str) -> tuple[Floats, Floats]:
         """Return the lower and upper corner (3,) of the box around a part, along the axes of the world."""
@@ -330,7 +293,7 @@ class World:
 
     def cast_rays(self, origins: ArrayLike, directions: ArrayLike, length: float = MAX_RAY_LENGTH) -> RayHits:
         """Return what rays from `origins` (n, 3) along `directions` (n, 3) hit first within `length` [m]."""
-        return self._queries.cast_rays(self._require(), origins, directions, length)
+        return self._queries.cast_rays(self._motion.engine, origins, directions, length)
 
     def camera(self, camera: Camera, renderer: str | None = None) -> Picture:
         """Return what a camera sees, drawn by dynx or by the renderer of an engine (``"pybullet"``)."""
@@ -341,9 +304,7 @@ class World:
 
     def close(self) -> None:
         """Release the engine; further calls raise ClosedError. Closing twice is harmless."""
-        if self._engine is not None:
-            self._engine.close()
-            self._engine = None
+        self._motion.close()
 
     def __enter__(self) -> World:
         return self
@@ -352,49 +313,8 @@ class World:
         self.close()
 
     def __repr__(self) -> str:
-        return f"<World {self.scene.name} in {self.engine} at {self.time:.6g} s>"
-
-    # -- internals ----------------------------------------------------------------------------
-
-    def _require(self) -> WorldEngine:
-        if self._engine is None:
-            raise ClosedError(f"the world of {self.scene.name} is closed")
-        return self._engine
+        notes = f", {len(self.notes)} notes" if self.notes else ""
+        return f"<World {self.scene.name} in {self.engine} at {self.time:.6g} s{notes}>"
 
     def _build(self) -> WorldEngine:
-        return self._kind(self._layout, self._h, self.settings)
-
-    def _note(self) -> None:
-        """Read the state; keep it if it is finite, otherwise go back to the one kept before."""
-        engine = self._require()
-        robots = {name: engine.robot_state(k) for name, k in self._robots.items()}
-        bodies = {name: engine.body_state(k) for name, k in self._bodies.items()}
-        total = sum(float(np.sum(part)) for state in (*robots.values(), *bodies.values()) for part in state)
-        if not math.isfinite(total):
-            bad = [name for name, parts in {**robots, **bodies}.items() if not is_finite(parts)]
-            self._diverge(f"the state of {' and '.join(bad[:3])} is not finite")
-        self._state = WorldState(self.time, robots, bodies)
-        self._good = self._state, self._steps, self._start
-        self._unchecked = 0
-
-    def _diverge(self, reason: str) -> NoReturn:
-        """Return to the last state that was finite, and raise DivergedError."""
-        failed_at, step = self.time, self._steps
-        self._return_to_good()
-        robots = self._good[0].robots
-        raise DivergedError(
-            f"the world of {self.scene.name} diverged in {self.engine} at {failed_at:.6g} s: {reason}; "
-            f"it is at {self.time:.6g} s again",
-            time=failed_at,
-            step=step,
-            state=tuple(next(iter(robots.values()), (None, None))),  # type: ignore[arg-type]
-        )
-
-    def _return_to_good(self) -> None:
-        """Rebuild the engine at the last state that was finite."""
-        state, self._steps, self._start = self._good
-        self._require().close()
-        self._engine = self._build()
-        apply_state(self._engine, state)
-        self._commands.forget()
-        self._state, self._unchecked = state, 0
+        return self._kind(self._layout, self.dt / self.substeps, self.settings)

@@ -121,6 +121,7 @@ CALLS: dict[str, tuple[Callable[[World], object], type[DynxError], str]] = {
     "wrench in no axes": (lambda w: w.step(wrenches=[Wrench("brick", axes="x")]), ArgumentError, "axes"),
     "wrenches in a set": (lambda w: w.step(wrenches={1}), ArgumentError, "list of Wrench"),  # type: ignore[arg-type]
     "state with NaN": (lambda w: w.set_state(robots={"arm": ([NAN, 0], [0, 0])}), ArgumentError, "q of arm"),
+    "no state": (lambda w: w.set_state(), ArgumentError, "robots= or bodies="),
     "state of a removed body": (
         lambda w: w.set_state(bodies={"gone": (np.eye(4), [0] * 6)}),
         UnknownNameError,
@@ -191,7 +192,7 @@ def test_a_closed_world_refuses_every_call(world: World) -> None:
         lambda: world.state,
         lambda: world.run(1.0),
         lambda: world.restore(snapshot),
-        lambda: world.set_state(),
+        lambda: world.set_state(world.state),
         lambda: world.aabb("brick"),
         lambda: world.cast_rays([0, 0, 1], [0, 0, -1]),
     ]

@@ -21,11 +21,11 @@ from dynx.control.base import Controller, Measurement, chain_of, gains_of
 from dynx.control.content import content_of
 from dynx.errors import ArgumentError, TraceError, UnsupportedFeatureError, shown
 from dynx.model import Mechanism, Model
+from dynx.model.configuration import DIVERGENCE_SPEED
 from dynx.sim.batch.disturbances import BatchDisturbances
 from dynx.sim.batch.traced_controller import innermost, traced_controller
 from dynx.sim.loop.controller_checks import ControllerWatch, defect_of_outcome, is_row
 from dynx.sim.loop.own_controllers import refuse_irreproducible, traced_torque
-from dynx.sim.loop.plain import DIVERGENCE_SPEED
 from dynx.sim.plants.friction_law import FrictionLaw, FrictionStep
 from dynx.sim.plants.friction_solver import CORRECTIONS, MAX_CORRECTED_OPERATIONS
 from dynx.sim.plants.integrators import SemiImplicitEuler

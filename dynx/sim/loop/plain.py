@@ -18,6 +18,7 @@ import numpy as np
 from dynx.control.base import Controller, Measurement
 from dynx.control.engine_motors import EngineMotor
 from dynx.errors import ControlError, DivergedError, SimulationError, shown
+from dynx.model.configuration import DIVERGENCE_SPEED
 from dynx.model.masks import refuse_mask
 from dynx.sim.clock import Clock
 from dynx.sim.loop.controller_checks import ControllerWatch, defect_of_outcome
@@ -36,9 +37,6 @@ PROGRESS_STEPS = 200
 PROBE_DISPLACEMENT = 1e-3
 """Displacement of measured coordinates [rad or m] and velocities [rad/s or m/s] at which a controller is
 evaluated to see whether it changes itself."""
-
-DIVERGENCE_SPEED = 1e8
-"""Norm of the velocity [rad/s or m/s] above which a simulation counts as diverged."""
 
 
 @dataclass

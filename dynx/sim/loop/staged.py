@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from dynx.control.base import Measurement
 from dynx.control.engine_motors import EngineMotor
 from dynx.errors import CompileError, TraceError
+from dynx.model.configuration import DIVERGENCE_SPEED
 from dynx.sim.loop.controller_checks import is_row
 from dynx.sim.loop.own_controllers import refuse_irreproducible, traced_torque
-from dynx.sim.loop.plain import DIVERGENCE_SPEED, Loop, LoopState
+from dynx.sim.loop.plain import Loop, LoopState
 from dynx.sim.loop.record import Record
 from dynx.sim.loop.stages import EngineCall, EngineCallTracer, StagedStep, refuse_impure, traced_controller
 from dynx.sim.plants.integrated import IntegratedPlant

@@ -1,0 +1,125 @@
+"""Worlds that diverge or are interrupted: the likely cause by name, and a valid state afterwards."""
+
+from __future__ import annotations
+
+import _thread
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import dynx
+from dynx import Pose
+from dynx.errors import DivergedError, EngineError
+from dynx.world import PDMotor, PositionMotor, Scene, SceneRobot, World, Wrench, box, ground
+from tests.world.engines import FAST_WORLDS, WORLDS
+
+
+def arm(engine: str) -> World:
+    return World(Scene("s", robots=(SceneRobot("arm", dynx.load("six_axis_arm")),)), engine)
+
+
+def diverge(world: World, **loads: Any) -> str:
+    with pytest.raises((DivergedError, EngineError)) as raised:
+        world.run(3.0, **loads)
+    assert np.isfinite(world.time)
+    world.step()
+    return str(raised.value)
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+def test_stiff_gains_are_named_with_their_ratio_to_the_inertia(engine: str) -> None:
+    with arm(engine) as world:
+        message = diverge(world, motors={"arm": PDMotor(0.3, kp=1e4, kd=1e6)})
+        M = dynx.backend("reference", dynx.load("six_axis_arm")).mass_matrix(np.zeros(6))
+    ratio = float((1e-3 * 1e6 * np.linalg.inv(M).diagonal()).max())
+    assert f"kd dt is {ratio:.3g} times the inertia" in message
+    assert "PositionMotor" in message
+    with arm(engine) as world:
+        assert "kp dt^2 is" in diverge(world, motors={"arm": PDMotor(0.3, kp=1e9, kd=0.0)})
+
+
+@pytest.mark.parametrize("engine", FAST_WORLDS)
+def test_large_loads_are_named(engine: str) -> None:
+    scene = Scene(
+        "s",
+        robots=(SceneRobot("arm", dynx.load("planar_2r")),),
+        bodies=(box("brick", (0.1, 0.1, 0.1), mass=0.5, pose=Pose((0, 0, 3))),),
+    )
+    with World(scene, engine) as world:
+        message = diverge(world, torques={"arm": [0.0, 1e59]})
+        assert "torque of 1e+59 on 'arm/" in message
+        message = diverge(world, wrenches=[Wrench("brick", (1e55, 1e57, 0.0), (1e58, 0, 1e58))])
+        assert "changes the velocity of 'brick' by" in message
+
+
+def test_a_cause_that_is_not_known_is_not_made_up() -> None:
+    with arm("pybullet") as world:
+        message = diverge(world, loads=lambda w: {"torques": {"arm": np.full(6, 1e-3 * np.exp(60 * w.time))}})
+    assert "torque of" in message
+    assert "gains" not in message
+    assert "overlap" not in message
+
+
+def interrupting(world: World, after: int) -> Callable[[int], None]:
+    """Return the engine's step, interrupted after some steps of a call."""
+    step = world._motion.engine.step
+
+    def interrupted(n: int) -> None:
+        step(min(n, after))
+        raise KeyboardInterrupt
+
+    return interrupted
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+def test_an_interrupted_step_leaves_a_world_that_continues(
+    engine: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = Scene("s", bodies=(ground(), box("brick", (0.1, 0.1, 0.1), mass=1.0, pose=Pose((0, 0, 1)))))
+    with World(scene, engine) as world, World(scene, engine) as other:
+        world.step(20)
+        before = world.state
+        monkeypatch.setattr(world._motion.engine, "step", interrupting(world, 3))
+        with pytest.raises(KeyboardInterrupt):
+            world.step(10)
+        assert world.time == before.time
+        np.testing.assert_array_equal(
+            world.state.bodies["brick"].T_world_body, before.bodies["brick"].T_world_body
+        )
+        world.step(5)
+        other.step(25)
+        assert world.time == other.time
+        np.testing.assert_allclose(
+            world.state.bodies["brick"].T_world_body,
+            other.state.bodies["brick"].T_world_body,
+            rtol=0,
+            atol=1e-12,
+        )
+
+
+def test_a_long_run_that_is_interrupted_keeps_what_was_simulated() -> None:
+    scene = Scene("s", bodies=(box("brick", (0.1, 0.1, 0.1), mass=1.0),))
+    with World(scene, "pybullet", 1e-4) as world:
+        timer = threading.Timer(0.3, _thread.interrupt_main)
+        timer.start()
+        with pytest.raises(KeyboardInterrupt):
+            world.run(1e4)
+        timer.join()
+        assert world.time > 0.0
+        # z = -g t (t + dt) / 2 of semi-implicit Euler.
+        z = -9.81 * world.time * (world.time + 1e-4) / 2.0
+        assert world.state.bodies["brick"].T_world_body[2, 3] == pytest.approx(z, rel=1e-9)
+        world.step()
+
+
+def test_stiff_motors_at_the_end_of_a_step_are_not_blamed() -> None:
+    with arm("mujoco") as world:
+        message = diverge(
+            world,
+            torques={"arm": np.full(6, 1e59)},
+            motors={"arm": PositionMotor(0.0, 1e9, 1e9, max_force=1.0)},
+        )
+    assert "gains" not in message

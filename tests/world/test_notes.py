@@ -1,0 +1,84 @@
+"""Notes on the start of a world: parts that overlap, constraints that are violated."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from dynx import Pose
+from dynx.world import (
+    PointToPoint,
+    Scene,
+    SceneBody,
+    Weld,
+    World,
+    box,
+    ground,
+    read_scene,
+    scene_names,
+    sphere,
+)
+from tests.world.engines import WORLDS
+
+
+def brick(name: str, x: float = 0.0, **options: object) -> SceneBody:
+    return box(name, (0.2, 0.2, 0.2), mass=1.0, pose=Pose((x, 0.0, 0.0)), **options)
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+def test_parts_that_overlap_at_the_start_are_noted_with_their_depth(engine: str) -> None:
+    bodies = (brick("a"), brick("b", 0.15), brick("far", 5.0))
+    with World(Scene("s", bodies=bodies), engine) as world:
+        assert len(world.notes) == 1
+        assert world.notes[0].startswith("'a' and 'b' overlap by 50 mm at the start")
+        assert "1 note" in repr(world)
+        ((a, b, depth),) = world.overlaps()
+        assert (a, b) == ("a", "b")
+        assert depth == pytest.approx(0.05, abs=1e-6)
+    with World(Scene("s", bodies=bodies, ignored=(("a", "b"),)), engine) as world:
+        assert world.notes == ()
+        assert world.overlaps() == ()
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+def test_parts_at_rest_on_one_another_are_not_noted(engine: str) -> None:
+    bodies = (
+        ground(),
+        box("cube", (0.2, 0.2, 0.2), mass=1.0, pose=Pose((0, 0, 0.1))),
+        box("upper", (0.2, 0.2, 0.2), mass=1.0, pose=Pose((0, 0, 0.3))),
+    )
+    with World(Scene("s", bodies=bodies), engine) as world:
+        assert world.notes == ()
+        world.run(0.5)
+        assert world.overlaps() == ()
+
+
+def test_overlaps_of_small_parts_count_relative_to_their_size() -> None:
+    marbles = (sphere("a", 1e-3, mass=0.1), sphere("b", 1e-3, mass=0.1, pose=Pose((1.5e-3, 0, 0))))
+    with World(Scene("s", bodies=marbles), "mujoco") as world:
+        assert "overlap by 0.5 mm" in world.notes[0]
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+def test_constraints_that_the_start_violates_are_noted(engine: str) -> None:
+    bodies = (brick("a"), brick("b", 0.5))
+    at = Pose((0.4, 0.0, 0.0), (0.0, 0.0, math.pi / 2))
+    with World(Scene("s", bodies=bodies, constraints=(Weld("a", "b", at),)), engine) as world:
+        (note,) = world.notes
+        assert note.startswith("the ends of the Weld of 'a' and 'b' are 100 mm apart and turned by 1.57 rad")
+    point = PointToPoint("a", "world", (0.0, 0.0, 0.1), (0.0, 0.3, 0.1))
+    with World(Scene("s", bodies=bodies, constraints=(point,)), engine) as world:
+        (note,) = world.notes
+        assert note.startswith(
+            "the ends of the PointToPoint of 'a' and 'world' are 300 mm apart at the start"
+        )
+    met = (Weld("a", "b"), PointToPoint("a", "world", (0.0, 0.0, 0.1), (0.0, 0.0, 0.1)))
+    with World(Scene("s", bodies=bodies, constraints=met), engine) as world:
+        assert world.notes == ()
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_the_scenes_of_dynx_have_no_notes(name: str) -> None:
+    with World(read_scene(name), "pybullet") as world:
+        assert world.notes == ()
