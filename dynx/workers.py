@@ -70,7 +70,8 @@ class Workers:
     """Up to `size` processes that compute ``target(task)`` for each task.
 
     `target` is a module-level function; tasks and values are pickled. `timeout` [s] is the time limit of one
-    task, None for no limit. Use it as a context: leaving it ends the processes.
+    task, None for no limit. Use it as a context: leaving it ends the processes, which one call of `run` keeps
+    for the next.
     """
 
     def __init__(self, target: Callable[[Any], Any], size: int, timeout: float | None = None) -> None:
@@ -80,6 +81,7 @@ class Workers:
         self._lock = threading.Lock()
         self._closed = False
         self._alive: set[_Worker] = set()
+        self._idle: list[_Worker] = []
         self._threads: list[threading.Thread] = []
 
     def __enter__(self) -> Workers:
@@ -94,12 +96,18 @@ class Workers:
         for numbered in enumerate(tasks):
             waiting.put(numbered)
         outcomes: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
-        for _ in range(min(self._size, len(tasks))):
-            thread = threading.Thread(target=self._drive, args=(waiting, outcomes), daemon=True)
-            self._threads.append(thread)
+        threads = [
+            threading.Thread(target=self._drive, args=(waiting, outcomes), daemon=True)
+            for _ in range(min(self._size, len(tasks)))
+        ]
+        self._threads += threads
+        for thread in threads:
             thread.start()
         for _ in tasks:
             yield outcomes.get()
+        # Their workers are then idle, and the next call takes them.
+        for thread in threads:
+            thread.join()
 
     def close(self) -> None:
         """End every process, also during a task."""
@@ -109,6 +117,9 @@ class Workers:
                 worker.kill()
         for thread in self._threads:
             thread.join()
+        for worker in self._idle:
+            worker.end()
+        self._idle.clear()
 
     def _drive(
         self, waiting: queue.SimpleQueue[tuple[int, Any]], outcomes: queue.SimpleQueue[Outcome]
@@ -119,6 +130,7 @@ class Workers:
                 try:
                     index, task = waiting.get_nowait()
                 except queue.Empty:
+                    worker = self._keep(worker)
                     return
                 if worker is not None and worker.ended:
                     self._forget(worker)
@@ -139,9 +151,21 @@ class Workers:
         with self._lock:
             if self._closed:
                 return None
+            if self._idle:
+                return self._idle.pop()
             worker = _Worker(self._target)
             self._alive.add(worker)
             return worker
+
+    def _keep(self, worker: _Worker | None) -> _Worker | None:
+        """Keep a worker for the next call of `run`; return one that cannot be kept."""
+        if worker is None or worker.ended:
+            return worker
+        with self._lock:
+            if self._closed:
+                return worker
+            self._idle.append(worker)
+        return None
 
     def _forget(self, worker: _Worker) -> None:
         worker.end()

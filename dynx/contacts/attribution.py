@@ -1,16 +1,17 @@
 """Attribution of errors that stay: each candidate setting is changed, and the trial is run again.
 
-An error is attributed to the first candidate with which it vanishes, falls with the step, or falls in
-proportion to the setting, at the smallest step, as `dynx.contacts.trend` judges.
+An error is attributed to the first candidate that at least halves it at the smallest step, and under which it
+is within the tolerance or falls with the step, or in proportion to which it falls, as `dynx.contacts.trend`
+judges.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dynx.contacts.candidates import Candidate
-from dynx.contacts.run import Measured, Run, Unmeasured
+from dynx.contacts.run import Measured
 from dynx.contacts.runner import Runner
 from dynx.contacts.series import Series, TrialOfEngine
 from dynx.contacts.trend import judge
@@ -19,6 +20,16 @@ from dynx.world.registry import world_class
 
 LEAST_GAIN = 2.0
 """Factor by which a change has to reduce the error at the smallest step to be its cause."""
+
+Change = tuple[TrialOfEngine, int]
+"""A trial, and the number of a change of the candidate that is tried, from 0."""
+
+Errors = dict[str, tuple[float, ...]]
+"""Errors by the name of the figure, at every step or at the smallest alone."""
+
+
+Used = Mapping[str, Any]
+"""Values of settings before a change."""
 
 
 def attribute(
@@ -37,93 +48,106 @@ def attribute(
     rounds = max((len(candidates.get(each.trial.engine, ())) for each in left), default=0)
     for number in range(rounds):
         tried = {
-            trial: candidates[trial.engine][number]
-            for trial in dict.fromkeys(each.trial for each in left)
-            if number < len(candidates.get(trial.engine, ()))
+            each.trial: candidates[each.trial.engine][number]
+            for each in left
+            if number < len(candidates.get(each.trial.engine, ()))
         }
-        runs = [run for trial, each in tried.items() for run in _runs(trial, each, steps, settings)]
-        outcomes = iter(runner.run(runs))
-        found = {trial: _errors(each, steps, outcomes) for trial, each in tried.items()}
-        for each in left:
-            if each.trial in tried:
-                cause = _cause(each, tried[each.trial], found[each.trial], steps, settings)
-                if cause is not None:
-                    verdicts[each] = Verdict("setting", attribution=cause)
+        trial_series = [each for each in left if each.trial in tried]
+        finest, all_steps = _try(tried, trial_series, steps, settings, runner)
+        for each in trial_series:
+            candidate = tried[each.trial]
+            used = _settings_in_use(each, candidate, settings[each.trial.engine])
+            cause = _removal(each, candidate, all_steps, steps, used)
+            cause = cause or _proportion(each, candidate, finest, used)
+            if cause is not None:
+                verdicts[each] = Verdict("setting", attribution=cause)
         left = [each for each in left if each not in verdicts]
     return verdicts | ({} if runner.interrupted else {each: Verdict("unexplained") for each in left})
 
 
-def _runs(
-    trial: TrialOfEngine,
-    candidate: Candidate,
+def _try(
+    tried: Mapping[TrialOfEngine, Candidate],
+    series: Sequence[Series],
     steps: tuple[float, ...],
     settings: Mapping[str, Mapping[str, Any]],
-) -> Iterator[Run]:
-    for changed in changes(candidate):
-        for dt in steps:
-            yield Run(trial.engine, trial.case, trial.trial, dt, {**settings[trial.engine], **changed})
-
-
-def changes(candidate: Candidate) -> list[dict[str, Any]]:
-    """Return the settings that a candidate changes together, one dict for each change."""
-    names = list(candidate.values)
-    return [dict(zip(names, values, strict=True)) for values in zip(*candidate.values.values(), strict=True)]
+    runner: Runner,
+) -> tuple[dict[Change, Errors], dict[Change, Errors]]:
+    """Return the errors under every change: at the smallest step, and at all steps where it helps there."""
+    changed = {
+        (trial, k): {**settings[trial.engine], **change}
+        for trial, candidate in tried.items()
+        for k, change in enumerate(candidate.changes)
+    }
+    finest = _errors(changed, steps[-1:], runner)
+    helpful = {
+        (trial, k): changed[trial, k]
+        for (trial, k), found in finest.items()
+        if any(each.trial == trial and _helps(each, found[each.name][-1]) for each in series)
+    }
+    coarser = _errors(helpful, steps[:-1], runner)
+    return finest, {
+        change: {name: (*found.get(name, ()), *last) for name, last in finest[change].items()}
+        for change, found in coarser.items()
+    }
 
 
 def _errors(
-    candidate: Candidate, steps: tuple[float, ...], outcomes: Iterator[Measured | Unmeasured | None]
-) -> list[dict[str, tuple[float, ...]]] | None:
-    """Return the errors at every step of every figure, one dict for each change; None if a run failed."""
-    found: list[dict[str, tuple[float, ...]]] | None = []
-    for _ in changes(candidate):
-        measured = [next(outcomes) for _ in steps]
-        figures = [outcome.figures for outcome in measured if isinstance(outcome, Measured)]
-        if len(figures) < len(steps):
-            found = None
-        if found is not None:
-            names = [figure.name for figure in figures[0]]
-            found.append({name: tuple(each[k].error for each in figures) for k, name in enumerate(names)})
+    changed: Mapping[Change, Mapping[str, Any]], steps: tuple[float, ...], runner: Runner
+) -> dict[Change, Errors]:
+    """Return the errors under settings at these steps; changes under which a run failed are left out."""
+    runs = [trial.run(dt, given) for (trial, _), given in changed.items() for dt in steps]
+    outcomes = iter(runner.run(runs))
+    found: dict[Change, Errors] = {}
+    for change in changed:
+        measured = [outcome for outcome in (next(outcomes) for _ in steps) if isinstance(outcome, Measured)]
+        if len(measured) == len(steps):
+            names = [figure.name for figure in measured[0].figures] if measured else []
+            found[change] = {
+                name: tuple(outcome.figures[k].error for outcome in measured) for k, name in enumerate(names)
+            }
     return found
 
 
-def _cause(
-    series: Series,
-    candidate: Candidate,
-    found: list[dict[str, tuple[float, ...]]] | None,
-    steps: tuple[float, ...],
-    settings: Mapping[str, Mapping[str, Any]],
+def _helps(series: Series, error: float) -> bool:
+    """Check whether an error at the smallest step is much less than that of a series."""
+    return error * LEAST_GAIN <= series.errors[-1]
+
+
+def _removal(
+    series: Series, candidate: Candidate, found: Mapping[Change, Errors], steps: tuple[float, ...], used: Used
 ) -> Attribution | None:
-    """Return the candidate as the cause of the error of a series; None where it is not."""
-    if found is None:
-        return None
-    figure = series.figures[0]
-    errors = (series.errors, *(each[figure.name] for each in found))
-    values = _values_in_use(series.trial.engine, candidate, settings)
-    for k in range(1, len(errors)):
-        gained = errors[k][-1] * LEAST_GAIN <= errors[0][-1]
-        if gained and judge(steps, errors[k], figure.tolerance).kind != "stays":
-            tried = {name: found_values[: k + 1] for name, found_values in values.items()}
-            return Attribution(tried, candidate.reason, errors[: k + 1], None)
-    order = _order([*values.values()], [each[-1] for each in errors], figure.tolerance)
-    return None if order is None else Attribution(values, candidate.reason, errors, order)
+    """Return the candidate as the cause of an error that one of its changes removes, or None."""
+    for k, change in enumerate(candidate.changes):
+        errors = found.get((series.trial, k), {}).get(series.name)
+        if errors is None or not _helps(series, errors[-1]):
+            continue
+        if judge(steps, errors, series.tolerance).kind != "stays":
+            values = {name: (used[name], value) for name, value in change.items()}
+            return Attribution(values, candidate.reason, (series.errors, errors), None)
+    return None
 
 
-def _order(values: Sequence[tuple[Any, ...]], errors: list[float], tolerance: float) -> float | None:
-    """Return the order at which errors fall with the values of one setting; None where they do not."""
-    numbers = values[0]
-    if len(values) > 1 or len(numbers) < 3 or errors[-1] * LEAST_GAIN > errors[0]:
+def _proportion(
+    series: Series, candidate: Candidate, found: Mapping[Change, Errors], used: Used
+) -> Attribution | None:
+    """Return the candidate as the cause of an error that falls along the values of one numeric setting, or
+    None."""
+    errors = [found.get((series.trial, k), {}).get(series.name) for k in range(len(candidate.changes))]
+    if len(candidate.values) > 1 or len(errors) < 2 or None in errors:
         return None
+    ((name, tried),) = candidate.values.items()
+    numbers = (used[name], *tried)
     if not all(type(number) in (int, float) and number > 0 for number in numbers):
         return None
     sizes = numbers if numbers[-1] < numbers[0] else tuple(1.0 / number for number in numbers)
-    trend = judge(sizes, errors, tolerance)
-    return trend.order if trend.kind == "falls" else None
+    falling = (series.errors[-1:], *(each for each in errors if each is not None))
+    trend = judge(sizes, [each[-1] for each in falling], series.tolerance)
+    if trend.kind != "falls" or not _helps(series, falling[-1][-1]):
+        return None
+    return Attribution({name: numbers}, candidate.reason, falling, trend.order)
 
 
-def _values_in_use(
-    engine: str, candidate: Candidate, settings: Mapping[str, Mapping[str, Any]]
-) -> dict[str, tuple[Any, ...]]:
-    """Return the values of each setting of a candidate, after the one in use."""
-    known = world_class(engine).settings
-    used = {name: settings[engine].get(name, known[name].default) for name in candidate.values}
-    return {name: (used[name], *values) for name, values in candidate.values.items()}
+def _settings_in_use(series: Series, candidate: Candidate, given: Mapping[str, Any]) -> Used:
+    """Return the value of each setting of a candidate before its changes."""
+    known = world_class(series.trial.engine).settings
+    return {name: given.get(name, known[name].default) for name in candidate.values}

@@ -19,6 +19,12 @@ class Candidate:
     reason: str
     """Part that the setting plays in the engine, as a sentence."""
 
+    @property
+    def changes(self) -> list[dict[str, Any]]:
+        """Settings that are changed together, one dict for each change."""
+        rows = zip(*self.values.values(), strict=True)
+        return [dict(zip(self.values, row, strict=True)) for row in rows]
+
 
 CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
     "pybullet": (

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from dynx.errors import ArgumentError, shown
 from dynx.world import Scene, World
 
 
@@ -27,6 +28,13 @@ class Figure:
     rests_on: tuple[str, ...] = ()
     """Coefficients of `dynx.world.Material`, such as ``restitution``, without which the exact value would be
     another one: an engine that lacks one of them cannot give it."""
+
+    def __post_init__(self) -> None:
+        for name in ("scale", "tolerance"):
+            if not getattr(self, name) > 0.0:
+                raise ArgumentError(
+                    f"{name} of the figure {shown(self.name)} is {getattr(self, name)}; wanted a positive number"
+                )
 
     @property
     def error(self) -> float:

@@ -18,7 +18,7 @@ from dynx.contacts.series import Series, TrialOfEngine, collect
 from dynx.contacts.trend import judge
 from dynx.contacts.verdict import VERDICTS, Verdict, VerdictKind
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
-from dynx.model.configuration import positive_seconds
+from dynx.model.configuration import positive_seconds, whole_number
 from dynx.world.registry import installed_worlds, world_class
 from dynx.world.settings import checked_settings
 
@@ -121,7 +121,8 @@ def conform(
 
     Engines and cases are all that are installed unless named. `settings` are those of `World` by engine;
     `candidates` are the settings to which errors may be attributed. Runs take place in `jobs` processes (as
-    many as processors), and one that crashes or takes longer than `timeout` [s] is recorded as such.
+    many as processors), and one that crashes or takes longer than `timeout` [s] is recorded as such; with 0
+    they take place in this process, which a crash ends.
     `progress(done, total)` is called after each run; the total grows when errors have to be attributed.
     With `interruptible`, KeyboardInterrupt ends the runs, and the results so far are returned.
 
@@ -132,13 +133,12 @@ def conform(
     given = _checked(chosen, settings or {})
     sizes = _checked_steps(steps)
     found = _found(cases)
-    with Runner(jobs or os.cpu_count() or 1, timeout, progress, interruptible=interruptible) as runner:
+    workers = (os.cpu_count() or 1) if jobs is None else whole_number("jobs", jobs, 0)
+    with Runner(workers, timeout, progress, interruptible=interruptible) as runner:
         trials = [
             TrialOfEngine(name, case, trial) for case in found for trial in case.trials for name in chosen
         ]
-        runs = [
-            Run(each.engine, each.case, each.trial, dt, given[each.engine]) for each in trials for dt in sizes
-        ]
+        runs = [each.run(dt, given[each.engine]) for each in trials for dt in sizes]
         outcomes = runner.run(runs)
         series, lost = _gather(trials, runs, outcomes, sizes)
         verdicts = _judged(series, sizes)
@@ -187,7 +187,7 @@ def _judged(series: Sequence[Series], steps: tuple[float, ...]) -> dict[Series, 
     """Return the verdicts that need no further run."""
     verdicts: dict[Series, Verdict] = {}
     for each in series:
-        trend = judge(steps, each.errors, each.figures[0].tolerance)
+        trend = judge(steps, each.errors, each.tolerance)
         if trend.kind != "stays":
             verdicts[each] = Verdict(trend.kind, order=trend.order)
         elif each.reason is not None:

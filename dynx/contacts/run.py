@@ -9,7 +9,8 @@ from typing import Any, Literal
 from dynx.contacts.case import Case, Figure
 from dynx.errors import DynxError, EngineLimitError, NotInstalledError, UnsupportedFeatureError
 from dynx.world import Scene, World
-from dynx.world.registry import world_class
+from dynx.world.engine import WorldEngine
+from dynx.world.registry import register, world_class, world_names
 
 STRICT = "strict_materials"
 """Setting of an engine that makes it refuse the coefficients that it lacks."""
@@ -27,6 +28,8 @@ class Run:
     trial: str
     dt: float
     settings: Mapping[str, Any]
+    kind: type[WorldEngine] | None = None
+    """Class of an engine that the running program registered, which a worker process does not know."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,9 @@ def carry_out(run: Run) -> Measured | Unmeasured:
     """Open the world of a run, and measure."""
     parameters = run.case.trials[run.trial]
     scene = run.case.scene(parameters)
+    if run.kind is not None and run.engine not in world_names():
+        kind = run.kind
+        register(run.engine, lambda: kind)
     try:
         with World(scene, run.engine, run.dt, **run.settings) as world:
             version = world.version

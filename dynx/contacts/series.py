@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from dynx.contacts.case import Case, Figure
-from dynx.contacts.run import Measured, Unmeasured
+from dynx.contacts.run import Measured, Run, Unmeasured
+from dynx.world.registry import world_class
 
 
 class TrialOfEngine(NamedTuple):
@@ -16,6 +17,10 @@ class TrialOfEngine(NamedTuple):
     engine: str
     case: Case
     trial: str
+
+    def run(self, dt: float, settings: Mapping[str, Any]) -> Run:
+        """Return the run of the trial at a step, with these settings of the engine."""
+        return Run(self.engine, self.case, self.trial, dt, settings, world_class(self.engine))
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +31,16 @@ class Series:
     figures: tuple[Figure, ...]
     reason: str | None = None
     """Why the engine cannot give the exact value; None where it can."""
+
+    @property
+    def name(self) -> str:
+        """Name of the figure."""
+        return self.figures[0].name
+
+    @property
+    def tolerance(self) -> float:
+        """Relative error below which the engine counts as exact."""
+        return self.figures[0].tolerance
 
     @property
     def errors(self) -> tuple[float, ...]:

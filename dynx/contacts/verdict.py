@@ -26,7 +26,8 @@ class Attribution:
     reason: str
     """Part that the setting plays in the engine."""
     errors: tuple[tuple[float, ...], ...]
-    """Relative errors at every step, for each of the values in turn."""
+    """Relative errors for each of the values in turn: at every step, or at the smallest step alone where the
+    error falls with the setting."""
     order: float | None
     """Order at which the error falls with the setting; None where the last change removes it."""
 

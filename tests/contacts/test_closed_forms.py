@@ -64,7 +64,11 @@ def test_exact_mechanics_has_no_error(name: str) -> None:
             assert figure.error <= figure.tolerance, figure
 
 
-@pytest.mark.parametrize(("name", "settings"), FAULTS)
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    FAULTS,
+    ids=lambda part: "-".join(part) if isinstance(part, dict) else part,
+)
 def test_false_mechanics_has_errors(name: str, settings: dict[str, Any]) -> None:
     case = find_case(name)
     found = [figure for trial in case.trials for figure in figures(case, trial, 4e-3, **settings)]

@@ -25,7 +25,7 @@ def test_an_interruption_keeps_the_trials_that_are_done() -> None:
         ENGINES[:1],
         (4e-3,),
         ["resting_force", "slope"],
-        jobs=1,
+        jobs=0,
         progress=interrupt,
         interruptible=True,
     )
@@ -40,4 +40,4 @@ def test_an_interruption_keeps_the_trials_that_are_done() -> None:
 
 def test_an_interruption_is_raised_where_nobody_asks_for_the_results() -> None:
     with pytest.raises(KeyboardInterrupt):
-        conform(ENGINES[:1], (4e-3,), ["resting_force", "slope"], jobs=1, progress=interrupt)
+        conform(ENGINES[:1], (4e-3,), ["resting_force", "slope"], jobs=0, progress=interrupt)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tests.faults.checks import CHECKS_FAULTS
+from tests.faults.contacts import CONTACTS_FAULTS
 from tests.faults.description import DESCRIPTION_FAULTS
 from tests.faults.engines import ENGINES_FAULTS
 from tests.faults.fault import Fault
@@ -14,6 +15,7 @@ FAULTS_BY_AREA: dict[str, tuple[Fault, ...]] = {
     "description": DESCRIPTION_FAULTS,
     "engines": ENGINES_FAULTS,
     "checks": CHECKS_FAULTS,
+    "contacts": CONTACTS_FAULTS,
     "simulation": SIMULATION_FAULTS,
 }
 FAULTS: tuple[Fault, ...] = tuple(fault for faults in FAULTS_BY_AREA.values() for fault in faults)

@@ -48,6 +48,17 @@ def test_an_exception_and_printing_are_survived_by_the_process() -> None:
     assert values[0].value[1] == values[2].value[1] == values[3].value[1]
 
 
+def test_the_next_call_has_the_same_processes() -> None:
+    with Workers(act, 1) as workers:
+        (first,) = workers.run(["a"])
+        (second,) = workers.run(["b"])
+        assert first.value[1] == second.value[1]
+        (deadly,) = workers.run(["exit"])
+        assert deadly.failure is not None
+        (third,) = workers.run(["c"])
+        assert third.value[0] == "c"
+
+
 def test_leaving_ends_what_is_under_way() -> None:
     started = time.monotonic()
     with Workers(act, 2) as workers:
