@@ -31,9 +31,10 @@ class Figure:
 
     def __post_init__(self) -> None:
         for name in ("scale", "tolerance"):
-            if not getattr(self, name) > 0.0:
+            value = getattr(self, name)
+            if not value > 0.0:
                 raise ArgumentError(
-                    f"{name} of the figure {shown(self.name)} is {getattr(self, name)}; wanted a positive number"
+                    f"{name} of the figure {shown(self.name)} is {value}; wanted a positive number"
                 )
 
     @property
