@@ -1,4 +1,4 @@
-"""Hypothesis strategies for robots, configurations, poses, wrenches and URDF text.
+"""Hypothesis strategies for robots, configurations, poses, wrenches, URDF text and scenes.
 
     from hypothesis import given, strategies as st
     from dynx.testing.strategies import models, samples
@@ -12,7 +12,7 @@ Drawn values are valid by construction, not by filtering, so no health check of 
 failing example shrinks. Shrink targets: a model shrinks to the fewest links in a chain with a fixed base,
 standard gravity, fixed or revolute joints about z at the parent's origin, round numbers, no mimic joint, no
 limits and no dynamics; a configuration to the neutral one; velocities and wrenches to zero; poses to the
-identity; text to the plainest spelling.
+identity; text to the plainest spelling; a scene to one ball at rest above a plane.
 
 Arguments are checked when a strategy is made, not when it is drawn from; an invalid one raises an error of
 `dynx.errors`.
@@ -38,6 +38,7 @@ from dynx.testing.strategies.configurations import (
 from dynx.testing.strategies.geometry import poses, quaternions, unit_vectors, vectors, wrenches
 from dynx.testing.strategies.inertials import inertials
 from dynx.testing.strategies.models import models
+from dynx.testing.strategies.scenes import materials, scenes, shapes
 from dynx.testing.strategies.urdf_text import urdf_text
 
 __all__ = [
@@ -45,10 +46,13 @@ __all__ = [
     "accelerations",
     "configurations",
     "inertials",
+    "materials",
     "models",
     "poses",
     "quaternions",
     "samples",
+    "scenes",
+    "shapes",
     "unit_vectors",
     "urdf_text",
     "vectors",

@@ -12,7 +12,7 @@ from dynx.world.engine import TouchingPoint
 
 
 def read_contacts(results: Any, query: Any, collider_of: Mapping[int, int]) -> list[TouchingPoint]:
-    """Return the contacts of a step: one for each point, and one at the centroid of each surface.
+    """Return the contacts of a step: one for each point, and one at the centre of pressure of each surface.
 
     A surface has the depth of the pair of shapes as its distance. `query` is that at the beginning of the
     step.
@@ -56,11 +56,27 @@ def _on_surface(
     normal = np.sum([surface.area(k) * surface.face_normal(k) for k in faces], axis=0)
     normal = normal / np.linalg.norm(normal)
     depth = depths.get((a, b), depths.get((b, a), 0.0))
-    center, half = np.array(surface.centroid()), 0.5 * depth * normal
-    force = np.array(info.F_Ac_W().translational())
+    wrench = info.F_Ac_W()
+    force = np.array(wrench.translational())
+    center = _center_of_pressure(surface, normal, force, np.array(wrench.rotational()))
+    half = 0.5 * depth * normal
     return TouchingPoint(
         collider_of[a], collider_of[b], center - half, center + half, normal, -depth, *_parts(force, normal)
     )
+
+
+def _center_of_pressure(surface: Any, normal: Floats, force: Floats, moment: Floats) -> Floats:
+    """Return the point of the surface about which the force, whose moment about the centroid is `moment`, has
+    none but that along the normal; the centroid where that point would be outside of the surface."""
+    centroid = np.array(surface.centroid())
+    along = float(force @ normal)
+    if along <= 0.0:
+        return centroid
+    shift = np.cross(normal, moment) / along
+    mesh = surface.tri_mesh_W() if surface.is_triangle() else surface.poly_mesh_W()
+    corners = np.array([mesh.vertex(k) for k in range(mesh.num_vertices())])
+    reach = float(np.max(np.linalg.norm(corners - centroid, axis=1)))
+    return centroid + shift if float(np.linalg.norm(shift)) <= reach else centroid
 
 
 def _parts(force: Floats, normal: Floats) -> tuple[float, Floats]:
