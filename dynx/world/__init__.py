@@ -4,6 +4,7 @@ from dynx.world.camera import Camera, Picture
 from dynx.world.comparison import WorldComparison, compare_worlds
 from dynx.world.contacts import ClosestPoints, Contact, RayHits
 from dynx.world.loads import Wrench
+from dynx.world.materials import InexactMaterial
 from dynx.world.motors import Motor, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
 from dynx.world.registry import register as register_world
 from dynx.world.registry import unregister as unregister_world
@@ -17,6 +18,7 @@ from dynx.world.scene import (
     Weld,
     body_to_urdf,
     box,
+    contact_material,
     ground,
     read_scene,
     scene_names,
@@ -35,6 +37,7 @@ __all__ = [
     "ClosestPoints",
     "Contact",
     "ContactTable",
+    "InexactMaterial",
     "Material",
     "Motor",
     "PDMotor",
@@ -58,6 +61,7 @@ __all__ = [
     "body_to_urdf",
     "box",
     "compare_worlds",
+    "contact_material",
     "ground",
     "read_scene",
     "register_world",

@@ -17,6 +17,7 @@ from dynx.spatial.scalar import Floats
 from dynx.world.camera.drawing import Drawing, DrawnShape
 from dynx.world.camera.view import Camera
 from dynx.world.layout import Layout
+from dynx.world.materials import EffectiveCoefficient
 from dynx.world.settings import Setting
 from dynx.world.state import BodyState, RobotState
 
@@ -67,6 +68,11 @@ class WorldEngine(ABC):
     def require_engine(cls) -> None:
         """Raise NotInstalledError where the engine is not installed."""
         return
+
+    def effective_materials(self) -> Mapping[str, EffectiveCoefficient]:
+        """Return, by name, the coefficients of contact that the engine does not have for every pair of
+        materials as `dynx.world.materials.combined` gives them."""
+        return {}
 
     # -- motion -------------------------------------------------------------------------------
 

@@ -18,6 +18,7 @@ from dynx.world.contacts import ClosestPoints, Contact, RayHits
 from dynx.world.engine import WorldEngine
 from dynx.world.identity import identity
 from dynx.world.loads import Wrench
+from dynx.world.materials import InexactMaterial, inexact_materials, open_engine
 from dynx.world.motion import Motion
 from dynx.world.overlaps import Overlap, overlaps_of
 from dynx.world.preparation import prepare
@@ -240,12 +241,8 @@ class World:
         of another version of the engine, or whose meshes changed.
         """
         snapshot, given = read_snapshot(path)
-        world = cls(
-            scene_from_document(given["scene"], ScenePaths(None, package_dirs)),
-            given["engine"],
-            **given["options"],
-            **given["settings"],
-        )
+        scene = scene_from_document(given["scene"], ScenePaths(None, package_dirs))
+        world = cls(scene, given["engine"], **given["options"], **given["settings"])
         try:
             world.restore(snapshot)
         except BaseException:
@@ -275,12 +272,13 @@ class World:
         the deepest first; an engine pushes them apart, often violently."""
         return overlaps_of(self._motion.engine)
 
-    def closest_points(self, a: str, b: str, within: float = 1.0) -> tuple[ClosestPoints, ...]:
-        """Return the nearest points of two parts, nearest first: one entry for each pair of their links that
-        are at most `within` [m] apart.
+    def inexact_materials(self) -> tuple[InexactMaterial, ...]:
+        """Return the coefficients of contact that the engine does not have as the scene states them."""
+        return inexact_materials(self._motion.engine)
 
-        A part is a body, ``robot/link``, or a robot for all its links.
-        """
+    def closest_points(self, a: str, b: str, within: float = 1.0) -> tuple[ClosestPoints, ...]:
+        """Return the nearest points of two parts, nearest first: one entry for each pair of their links at
+        most `within` [m] apart. A part is a body, ``robot/link``, or a robot for all its links."""
         return self._queries.closest_points(self._motion.engine, a, b, within)
 
     def aabb(self, name: str) -> tuple[Floats, Floats]:
@@ -317,4 +315,4 @@ class World:
         return f"<World {self.scene.name} in {self.engine} at {self.time:.6g} s{notes}>"
 
     def _build(self) -> WorldEngine:
-        return self._kind(self._layout, self.dt / self.substeps, self.settings)
+        return open_engine(self._kind, self._layout, self.dt / self.substeps, self.settings)

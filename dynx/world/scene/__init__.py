@@ -4,7 +4,7 @@ from dynx.world.scene.bodies import SceneBody, box, ground, sphere
 from dynx.world.scene.body_urdf import body_to_urdf
 from dynx.world.scene.constraints import PointToPoint, Weld
 from dynx.world.scene.files import read_scene, scene_names, write_scene
-from dynx.world.scene.material import Material
+from dynx.world.scene.material import Material, contact_material
 from dynx.world.scene.mjcf import scene_to_mjcf
 from dynx.world.scene.robots import SceneRobot
 from dynx.world.scene.scene import Scene
@@ -18,6 +18,7 @@ __all__ = [
     "Weld",
     "body_to_urdf",
     "box",
+    "contact_material",
     "ground",
     "read_scene",
     "scene_names",

@@ -7,7 +7,6 @@ by the names of the scene. Robots are nested as their joints are; links on fixed
 from __future__ import annotations
 
 import math
-from itertools import combinations
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
@@ -19,8 +18,9 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_quat
 from dynx.world.scene.constraints import PointToPoint, Weld
-from dynx.world.scene.filters import CollisionFilter, merged_links
+from dynx.world.scene.filters import merged_links
 from dynx.world.scene.link_frames import LinkFrames
+from dynx.world.scene.mjcf_contacts import ContactWriter
 from dynx.world.scene.mjcf_inertias import add_inertial, add_inertias
 from dynx.world.scene.mjcf_shapes import ShapeWriter, placement, quat_text, text
 from dynx.world.scene.names import WORLD, split_name
@@ -43,9 +43,11 @@ def scene_to_mjcf(scene: Scene) -> str:
 
     Bodies are named ``robot/link`` or as the body of the scene, joints ``robot/joint``, free joints as the
     robot or body that they move, geoms by their part and number; the state at the start is the keyframe
-    ``start``. Meshes are written as their convex hulls. Left out are restitution, velocity and effort limits,
-    motors, added frames and visual shapes, of which links keep the first colour. Where MuJoCo refuses the
-    inertias of links that fixed joints connect, the first of these links gets the merged inertia.
+    ``start``. Meshes are written as their convex hulls. Coefficients of contact are those of pairs, by
+    priorities of geoms and, where these will not do, by explicit pairs; restitution is that of MuJoCo's
+    default step of 2 ms. Left out are velocity and effort limits, motors, added frames and visual shapes, of
+    which links keep the first colour. Where MuJoCo refuses the inertias of links that fixed joints connect,
+    the first of these links gets the merged inertia.
 
     Raises UnsupportedFeatureError for an inertia that MuJoCo refuses, such as a link that moves without mass,
     DescriptionError for a fault in a collision shape or its mesh, EngineLimitError for a robot with more than
@@ -70,6 +72,7 @@ class _Document:
         # MuJoCo's own filter of parents and children is replaced by that of the scene.
         SubElement(option, "flag", filterparent="disable")
         self._shapes = ShapeWriter(SubElement(self._root, "asset"))
+        self._contacts = ContactWriter(scene)
         self._bodies = {WORLD: SubElement(self._root, "worldbody")}
         self._contact = SubElement(self._root, "contact")
         self._equality = SubElement(self._root, "equality")
@@ -91,8 +94,10 @@ class _Document:
                 R = body.pose.matrix[:3, :3]
                 q += [text(body.pose.xyz), quat_text(R)]
                 v += [text(body.twist[:3]), text(np.array(body.twist[3:]) @ R)]
-            self._shapes.add(element, body.name, body.shapes, body.material, body.material.rgba)
-        self._exclude_pairs()
+            given = self._contacts.geom(body.name)
+            self._shapes.add(element, body.name, body.shapes, given, body.material.rgba)
+        geoms = {name: len(body.findall("geom")) for name, body in self._bodies.items()}
+        self._contacts.add_pairs(self._contact, geoms)
         for number, constraint in enumerate(self._scene.constraints):
             self._constrain(number, constraint)
         if q:
@@ -147,21 +152,13 @@ class _Document:
                     source=model.source,
                     line=grounds[0].line,
                 )
-            self._shapes.add(bodies[link.name], f"{robot.name}/{link.name}", placed, material, rgba)
+            if placed:
+                name = f"{robot.name}/{link.name}"
+                self._shapes.add(bodies[link.name], name, placed, self._contacts.geom(name), rgba)
 
     def _add_body(self, parent: str, name: str, T: Floats) -> Element:
         self._bodies[name] = SubElement(self._bodies[parent], "body", {"name": name, **placement(T)})
         return self._bodies[name]
-
-    def _exclude_pairs(self) -> None:
-        """Exclude the pairs that may not collide; MuJoCo itself tests none that are both fixed."""
-        scene = self._scene
-        parts = [name for name in scene.parts if self._bodies[name].find("geom") is not None]
-        filters = CollisionFilter(scene.robots, scene.bodies, ())
-        fixed = {name for name in parts if filters.is_fixed(name)}
-        for a, b in combinations(parts, 2):
-            if not (a in fixed and b in fixed) and not scene.may_collide(a, b):
-                SubElement(self._contact, "exclude", body1=a, body2=b)
 
     def _constrain(self, number: int, constraint: Weld | PointToPoint) -> None:
         """Add a constraint between sites at its two ends."""

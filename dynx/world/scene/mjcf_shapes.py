@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
@@ -11,7 +11,6 @@ import numpy as np
 from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
-from dynx.world.scene.material import Material
 
 LEAST_HEIGHT = 1e-6
 """Range of heights [m] that a level height field is given, because MuJoCo requires one above zero."""
@@ -44,14 +43,18 @@ class ShapeWriter:
         self._names: dict[Shape, str] = {}
 
     def add(
-        self, body: Element, name: str, placed: Iterable[Collision], material: Material, rgba: Iterable[float]
+        self,
+        body: Element,
+        name: str,
+        placed: Iterable[Collision],
+        contact: Mapping[str, str],
+        rgba: Iterable[float],
     ) -> None:
-        """Add shapes of one material, named by the part and their number.
+        """Add shapes with the same attributes of `contact`, named by the part and their number.
 
         Raises DescriptionError for a mesh that cannot be read.
         """
-        friction = (material.friction, material.torsional_friction, material.rolling_friction)
-        given = {"friction": text(friction), "condim": str(_directions(*friction)), "rgba": text(rgba)}
+        given = {**contact, "rgba": text(rgba)}
         for number, each in enumerate(placed):
             T = each.origin.matrix.copy()
             shape = each.shape
@@ -101,8 +104,3 @@ class ShapeWriter:
 
     def _new_name(self, kind: str, shape: Shape) -> str:
         return self._names.setdefault(shape, f"{kind}{len(self._names)}")
-
-
-def _directions(sliding: float, torsional: float, rolling: float) -> int:
-    """Return MuJoCo's number of directions in which a contact with these coefficients has forces."""
-    return 6 if rolling else 4 if torsional else 3 if sliding else 1

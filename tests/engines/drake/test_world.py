@@ -171,7 +171,8 @@ def test_what_drake_lacks_is_refused_where_asked() -> None:
         (Material(restitution=0.5), "restitution"),
         (Material(rolling_friction=0.01), "rolling_friction"),
     ):
-        scene = Scene("s", bodies=(ground(), sphere("ball", 0.1, mass=1.0, material=material)))
+        bodies = (ground(material=material), sphere("ball", 0.1, mass=1.0, material=material))
+        scene = Scene("s", bodies=bodies)
         with pytest.raises(UnsupportedFeatureError, match=lacks):
             World(scene, "drake", strict_materials=True)
         World(scene, "drake").close()

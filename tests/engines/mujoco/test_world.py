@@ -11,7 +11,6 @@ from dynx import Pose
 from dynx.engines.mujoco.world.build import build_scene
 from dynx.engines.mujoco.world.engine import MujocoWorld
 from dynx.engines.mujoco.world.filters import collision_masks, pairs_to_exclude
-from dynx.engines.mujoco.world.options import SMALLEST_RESTITUTION, damping_ratio
 from dynx.errors import SingularMassMatrixError
 from dynx.model.geometry import Box, Collision, HeightField, Sphere
 from dynx.world import Material, PointToPoint, Scene, SceneBody, SceneRobot, Weld, World, box, ground, sphere
@@ -34,7 +33,7 @@ def layout_of(scene: Scene) -> Layout:
     return prepare(scene, **SWITCHES)
 
 
-def test_masks_and_excluded_pairs_are_the_filter_of_the_scene() -> None:
+def test_masks_and_excluded_pairs_are_the_filter_of_the_scene(monkeypatch: pytest.MonkeyPatch) -> None:
     layout = layout_of(two_arms())
     masks = collision_masks(layout)
     excluded = set(pairs_to_exclude(layout, masks))
@@ -44,8 +43,10 @@ def test_masks_and_excluded_pairs_are_the_filter_of_the_scene() -> None:
             rigid = owners[0] == owners[1] or all(map(layout.is_fixed, owners))
             tested = bool(masks[a][0] & masks[b][1] or masks[b][0] & masks[a][1])
             assert (tested and not rigid and (a, b) not in excluded) == layout.collides[a, b]
+    assert build_scene(layout, 1e-3, DEFAULTS).model.nexclude == 0
+    monkeypatch.setattr("dynx.engines.mujoco.world.materials.MAX_PAIRS", 0)
     built = build_scene(layout, 1e-3, DEFAULTS)
-    assert built.model.nexclude == len(excluded)
+    assert (built.model.npair, built.model.nexclude) == (0, len(excluded))
     # The arm without self-collision needs no excluded pairs.
     arm = {k for k, collider in enumerate(layout.colliders) if collider.name.startswith("a/")}
     assert not any(a in arm and b in arm for a, b in excluded)
@@ -61,13 +62,6 @@ def test_a_ball_bounces_with_the_restitution_of_its_material(wanted: float) -> N
     with World(scene, "mujoco", 2e-4) as world:
         world.step(200)
         assert world.state.bodies["ball"].twist[2] / 2.0 == pytest.approx(wanted, abs=0.02)
-
-
-def test_the_damping_ratio_falls_from_one_to_zero_with_the_restitution() -> None:
-    ratios = [damping_ratio(e) for e in np.linspace(SMALLEST_RESTITUTION, 1.0, 20)]
-    assert ratios[0] == 1.0
-    assert ratios[-1] < 1e-3
-    assert (np.diff(ratios) < 0.0).all()
 
 
 def test_a_box_on_a_slope_creeps_less_than_a_tenth_of_a_millimetre_per_second() -> None:

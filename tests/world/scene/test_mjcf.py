@@ -135,7 +135,9 @@ def test_every_shape_has_its_size_pose_and_material() -> None:
     material = Material(friction=0.7, torsional_friction=0.02, rolling_friction=0.001, rgba=COLOUR)
     shapes = (Box((1, 2, 3)), Sphere(0.3), Cylinder(0.2, 0.6), Capsule(0.1, 0.5))
     placed = tuple(Collision(shape, Pose((0.1, 0.2, 0.3), (0.5, 0, 0))) for shape in shapes)
-    scene = Scene("s", bodies=(SceneBody("b", placed, mass=1.0, material=material), ground("g")))
+    scene = Scene(
+        "s", bodies=(SceneBody("b", placed, mass=1.0, material=material), ground("g", material=material))
+    )
     model, _ = load(scene)
     sizes = [[0.5, 1, 1.5], [0.3, 0, 0], [0.2, 0.3, 0], [0.1, 0.25, 0]]
     for number, size in enumerate(sizes):
@@ -143,7 +145,7 @@ def test_every_shape_has_its_size_pose_and_material() -> None:
         np.testing.assert_array_equal(geom.size, size)
         np.testing.assert_allclose(geom.pos, (0.1, 0.2, 0.3), atol=1e-15)
         np.testing.assert_allclose(geom.quat, (np.cos(0.25), np.sin(0.25), 0, 0), atol=1e-12)
-        np.testing.assert_array_equal(geom.friction, (0.7, 0.02, 0.001))
+        np.testing.assert_allclose(geom.friction, (0.7, 0.02, 0.001), rtol=1e-15)
         np.testing.assert_allclose(geom.rgba, COLOUR, rtol=1e-6)
         assert geom.condim[0] == 6
     inertial = scene.body("b").inertial

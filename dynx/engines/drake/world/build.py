@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dynx.backends.solvability import Solvability
 from dynx.engines.drake.library import (
@@ -28,7 +29,8 @@ from dynx.engines.drake.library import (
 )
 from dynx.engines.drake.multibody_plant import drake_pose, inertia_parts
 from dynx.engines.drake.world.coordinates import BodyCoordinates, RobotCoordinates, root_center
-from dynx.engines.drake.world.options import APPROXIMATIONS, MODELS, proximity_properties, refuse_material
+from dynx.engines.drake.world.materials import Copies, copies_of
+from dynx.engines.drake.world.options import APPROXIMATIONS, MODELS, proximity_properties
 from dynx.engines.drake.world.shapes import drake_shapes
 from dynx.errors import EngineLimitError, UnsupportedFeatureError, shown
 from dynx.model.mechanism import ROOT
@@ -52,7 +54,7 @@ class Carrier(NamedTuple):
 @dataclass(frozen=True, eq=False)
 class BuiltScene:
     """A finalized scene and where to find its parts in it: coordinates of robots and moving bodies, Drake's
-    geometries of each collider and the collider of each, by its number."""
+    geometries of each collider (its first copy) and the collider of every geometry, by its number."""
 
     diagram: Any
     plant: Any
@@ -90,10 +92,11 @@ def build_scene(layout: Layout, dt: float, settings: Mapping[str, Any]) -> Built
     for number, body in enumerate(layout.bodies):
         if body.fixed:
             carriers[Owner(None, number)] = Carrier(plant.world_body(), body.T)
-    geometries = _add_shapes(plant, layout, carriers, settings)
+    copies = copies_of(layout)
+    geometries = _add_shapes(plant, layout, carriers, copies, settings)
     _add_constraints(plant, layout, carriers)
     plant.Finalize()
-    _filter(scene_graph, layout, geometries)
+    _filter(scene_graph, copies.touch, geometries)
     return BuiltScene(
         builder.Build(),
         plant,
@@ -113,8 +116,12 @@ def build_scene(layout: Layout, dt: float, settings: Mapping[str, Any]) -> Built
             )
             for number, joint in free.items()
         },
-        geometries,
-        {each.get_value(): number for number, found in enumerate(geometries) for each in found},
+        geometries[: len(layout.colliders)],
+        {
+            each.get_value(): number
+            for number, found in zip(copies.collider.tolist(), geometries, strict=True)
+            for each in found
+        },
         np.array(
             [
                 np.arange(4) + joint.position_start()
@@ -198,20 +205,20 @@ def _add_body(plant: Any, number: int, body: BodyLayout, carriers: dict[Owner, C
 
 
 def _add_shapes(
-    plant: Any, layout: Layout, carriers: Mapping[Owner, Carrier], settings: Mapping[str, Any]
+    plant: Any, layout: Layout, carriers: Mapping[Owner, Carrier], copies: Copies, settings: Mapping[str, Any]
 ) -> tuple[tuple[Any, ...], ...]:
-    """Add the shapes of all colliders; return Drake's numbers of them."""
+    """Add the shapes of all copies of colliders; return Drake's numbers of them."""
     found = []
-    for number, collider in enumerate(layout.colliders):
-        if settings["strict_materials"]:
-            refuse_material(collider.name, collider.material)
+    for copy, number in enumerate(copies.collider.tolist()):
+        collider = layout.colliders[number]
         fixed = layout.is_fixed(collider.owner)
         carrier = carriers[collider.owner]
+        friction = float(copies.friction[copy])
         added: list[Any] = []
         for placed in collider.shapes:
-            properties = proximity_properties(placed.shape, collider.material, settings, fixed)
+            properties = proximity_properties(placed.shape, friction, settings, fixed)
             for shape in drake_shapes(placed.shape):
-                name = f"{number}.{len(added)}"
+                name = f"{copy}.{len(added)}"
                 pose = carrier.pose(placed.T)
                 added.append(plant.RegisterCollisionGeometry(carrier.body, pose, shape, name, properties))
         found.append(tuple(added))
@@ -241,15 +248,15 @@ def _add_constraints(plant: Any, layout: Layout, carriers: Mapping[Owner, Carrie
             plant.AddBallConstraint(body_a, at_a.translation(), body_b, at_b.translation())
 
 
-def _filter(scene_graph: Any, layout: Layout, geometries: tuple[tuple[Any, ...], ...]) -> None:
-    """Let exactly those pairs collide that the layout has."""
+def _filter(scene_graph: Any, touch: NDArray[np.bool_], geometries: tuple[tuple[Any, ...], ...]) -> None:
+    """Let exactly those copies of colliders collide that touch."""
     manager = scene_graph.collision_filter_manager()
     for number, found in enumerate(geometries):
         own = geometry.GeometrySet()
         own.Add(list(found))
         others = [
             each
-            for other in np.flatnonzero(~layout.collides[number]).tolist()
+            for other in np.flatnonzero(~touch[number]).tolist()
             if other > number
             for each in geometries[other]
         ]

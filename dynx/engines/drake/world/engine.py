@@ -17,6 +17,7 @@ from dynx.engines.drake.library import DRAKE_FAILURES, captured_log, drake_versi
 from dynx.engines.drake.world.build import build_scene
 from dynx.engines.drake.world.contacts import read_contacts, touching_point
 from dynx.engines.drake.world.distances import closest_of_pair, closest_to_plane
+from dynx.engines.drake.world.materials import effective_materials
 from dynx.engines.drake.world.options import SETTINGS
 from dynx.errors import ClosedError, DynxError, EngineError, shown
 from dynx.model.geometry import HeightField, Plane
@@ -25,6 +26,7 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.world.engine import RayHit, TouchingPoint, WorldEngine
 from dynx.world.layout import WORLD, Collider, Layout
+from dynx.world.materials import EffectiveCoefficient
 from dynx.world.ray_casting import cast_on_shape
 from dynx.world.settings import Setting
 from dynx.world.state import BodyState, RobotState
@@ -84,6 +86,9 @@ class DrakeWorld(WorldEngine):
         for number, body in built.bodies.items():
             body.write(layout.bodies[number].T, layout.bodies[number].twist, q, v)
         self._set_state(q, v)
+
+    def effective_materials(self) -> Mapping[str, EffectiveCoefficient]:
+        return effective_materials()
 
     # -- motion -------------------------------------------------------------------------------
 

@@ -7,8 +7,8 @@ pair of shapes, on which a box that slides or is stacked rattles. Spheres and ca
 point, because their approximation by triangles would not roll well, and meshes, because surfaces between
 hulls of thousands of triangles take minutes for a second of simulated time.
 
-Of two materials Drake takes the harmonic mean of the coefficients of friction. It has no restitution and no
-torsional or rolling friction.
+Drake has the harmonic mean of the friction of two materials (see `materials`), and no restitution, torsional
+or rolling friction.
 """
 
 from __future__ import annotations
@@ -22,9 +22,8 @@ from dynx.engines.drake.library import (
     DiscreteContactApproximation,
     geometry,
 )
-from dynx.errors import UnsupportedFeatureError, shown
 from dynx.model.geometry import Box, Cylinder, HeightField, Plane, Shape
-from dynx.world.scene import Material
+from dynx.world.materials import STRICT_MATERIALS
 from dynx.world.settings import Setting
 
 SETTINGS: Mapping[str, Setting] = {
@@ -46,10 +45,7 @@ SETTINGS: Mapping[str, Setting] = {
     "relaxation_time": Setting(0.01, "dissipation of contacts under 'sap': time of relaxation [s]", 0.0),
     "dissipation": Setting(10.0, "dissipation of Hunt and Crossley under 'lagged' and 'similar' [s/m]", 0.0),
     "stiction_tolerance": Setting(1e-4, "sliding speed below which shapes count as sticking [m/s]", 1e-9),
-    "strict_materials": Setting(
-        False,
-        "whether restitution, torsional and rolling friction, which Drake lacks, are refused, not left out",
-    ),
+    "strict_materials": STRICT_MATERIALS,
 }
 """Settings by name; the defaults are dynx's canonical ones."""
 
@@ -69,14 +65,14 @@ MODELS: Mapping[str, Any] = {
 }
 
 
-def proximity_properties(shape: Shape, material: Material, settings: Mapping[str, Any], fixed: bool) -> Any:
+def proximity_properties(shape: Shape, friction: float, settings: Mapping[str, Any], fixed: bool) -> Any:
     """Return Drake's properties of a shape, which is rigid if `fixed` in the world."""
     properties = geometry.ProximityProperties()
     geometry.AddContactMaterial(
         properties=properties,
         dissipation=settings["dissipation"],
         point_stiffness=settings["stiffness"],
-        friction=CoulombFriction(material.friction, material.friction),
+        friction=CoulombFriction(friction, friction),
     )
     properties.AddProperty("material", "relaxation_time", settings["relaxation_time"])
     if settings["contact_model"] == "hydroelastic" and isinstance(shape, HYDROELASTIC):
@@ -86,13 +82,3 @@ def proximity_properties(shape: Shape, material: Material, settings: Mapping[str
         else:
             geometry.AddCompliantHydroelasticProperties(edge, settings["modulus"], properties)
     return properties
-
-
-def refuse_material(name: str, material: Material) -> None:
-    """Raise UnsupportedFeatureError for coefficients that Drake does not have."""
-    for each in ("restitution", "torsional_friction", "rolling_friction"):
-        if getattr(material, each):
-            raise UnsupportedFeatureError(
-                f"the material of {shown(name)} has {each}, which 'drake' does not have; "
-                "strict_materials=False leaves it out"
-            )

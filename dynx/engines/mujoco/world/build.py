@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +23,8 @@ from dynx.engines.mujoco.tree import MAX_NV, quat_wxyz, set_substitute_inertia
 from dynx.engines.mujoco.world.coordinates import root_center
 from dynx.engines.mujoco.world.filters import collision_masks, pairs_to_exclude
 from dynx.engines.mujoco.world.inertias import write_body_inertia, write_rigid_inertia
-from dynx.engines.mujoco.world.options import constraint_reference, contact_reference, set_options
+from dynx.engines.mujoco.world.materials import ContactMaterials
+from dynx.engines.mujoco.world.options import constraint_reference, limit_reference, set_options
 from dynx.engines.mujoco.world.shapes import ShapeBuilder
 from dynx.errors import EngineLimitError
 from dynx.model.mechanism import ROOT, build_mechanism
@@ -48,6 +50,7 @@ class BuiltScene:
     bodies: tuple[int, ...]
     geom_collider: tuple[int, ...]
     collider_geoms: tuple[tuple[int, ...], ...]
+    materials: ContactMaterials
 
 
 class Carrier(NamedTuple):
@@ -94,7 +97,8 @@ def build_scene(layout: Layout, dt: float, settings: Mapping[str, Any]) -> Built
         if not body.fixed:
             added.add_freejoint(name=f"b{number}", align=False)
         carriers[Owner(None, number)] = Carrier(added, np.zeros(3) if body.fixed else body.center)
-    _add_colliders(spec, layout, carriers, settings, dt)
+    materials = ContactMaterials(layout, settings, dt)
+    _add_colliders(spec, layout, carriers, materials)
     _add_constraints(spec, layout, carriers, reference, impedance)
 
     model = spec.compile()
@@ -112,6 +116,7 @@ def build_scene(layout: Layout, dt: float, settings: Mapping[str, Any]) -> Built
         tuple(model.body(f"b{number}").id for number in range(len(layout.bodies))),
         tuple(owner[geom] for geom in range(model.ngeom)),
         geoms,
+        materials,
     )
 
 
@@ -164,12 +169,11 @@ def _couple_mimics(
         )
 
 
-def _add_colliders(
-    spec: Any, layout: Layout, carriers: Carriers, settings: Mapping[str, Any], dt: float
-) -> None:
+def _add_colliders(spec: Any, layout: Layout, carriers: Carriers, materials: ContactMaterials) -> None:
     """Add the shapes of all colliders, each collider on a body of its own where its owner has several."""
     shapes = ShapeBuilder(spec)
-    masks = collision_masks(layout)
+    # Explicit pairs are tested whatever the masks.
+    masks = [(0, 0)] * len(layout.colliders) if materials.complete else collision_masks(layout)
     owners = [collider.owner for collider in layout.colliders]
     names = []
     for number, collider in enumerate(layout.colliders):
@@ -179,27 +183,14 @@ def _add_colliders(
             body = body.add_body(name=f"c{number}")
             set_substitute_inertia(body)
         names.append(body.name)
-        material = collider.material
-        coefficients = [material.friction, material.torsional_friction, material.rolling_friction]
-        options = {
-            "contype": masks[number][0],
-            "conaffinity": masks[number][1],
-            "condim": _contact_dimension(coefficients),
-            "friction": coefficients,
-            "solref": contact_reference(settings, material.restitution, dt),
-            "solimp": settings["impedance"],
-            "margin": settings["margin"],
-        }
+        options = materials.geom(number) | {"contype": masks[number][0], "conaffinity": masks[number][1]}
         for k, placed in enumerate(collider.shapes):
             shapes.add(body, placed.shape, carrier.placed(placed.T), f"{number}.{k}", options)
-    for a, b in pairs_to_exclude(layout, masks):
+    for a, b in () if materials.complete else pairs_to_exclude(layout, masks):
         spec.add_exclude(bodyname1=names[a], bodyname2=names[b])
-
-
-def _contact_dimension(coefficients: list[float]) -> int:
-    """Return MuJoCo's number of directions in which a contact with these coefficients has forces."""
-    sliding, torsional, rolling = coefficients
-    return 6 if rolling else 4 if torsional else 3 if sliding else 1
+    for a, b, options in materials.pairs:
+        for i, j in product(range(len(layout.colliders[a].shapes)), range(len(layout.colliders[b].shapes))):
+            spec.add_pair(geomname1=f"{a}.{i}", geomname2=f"{b}.{j}", **options)
 
 
 def _add_constraints(
@@ -254,7 +245,7 @@ def _write_inertias(model: Any, layout: Layout) -> None:
 def _write_joints(model: Any, layout: Layout, settings: Mapping[str, Any], dt: float) -> None:
     """Write limits, damping and dry friction of all joints into the compiled model."""
     model.jnt_limited[:] = False
-    model.jnt_solref[:] = contact_reference(settings, 0.0, dt)
+    model.jnt_solref[:] = limit_reference(settings, dt)
     model.jnt_solimp[:] = settings["impedance"]
     model.dof_solref[:] = constraint_reference(settings, dt)
     model.dof_solimp[:, :2] = settings["joint_friction_impedance"]

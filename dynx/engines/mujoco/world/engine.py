@@ -25,6 +25,7 @@ from dynx.model.geometry import HeightField
 from dynx.spatial.scalar import Floats
 from dynx.world.engine import RayHit, TouchingPoint, WorldEngine
 from dynx.world.layout import Layout
+from dynx.world.materials import EffectiveCoefficient
 from dynx.world.ray_casting import cast_on_shape
 from dynx.world.state import BodyState, RobotState
 
@@ -102,6 +103,9 @@ class MujocoWorld(WorldEngine):
         # Height fields are left to dynx, because a ray through a point of the grid passes MuJoCo's.
         self._groups = np.ones(6, dtype=np.uint8)
         self._groups[FIELD_GROUP] = 0
+
+    def effective_materials(self) -> Mapping[str, EffectiveCoefficient]:
+        return self._built.materials.effective()
 
     # -- motion -------------------------------------------------------------------------------
 

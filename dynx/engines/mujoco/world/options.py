@@ -2,19 +2,18 @@
 
 A contact of MuJoCo is a damped spring between accelerations: in it the bodies approach each other with
 a = -b v - k r, whatever their masses (r is the distance, negative where they penetrate). dynx gives k and b
-directly, for a natural frequency 1 / `time_constant` and a damping ratio that follows from the restitution of
-the material. Of two materials MuJoCo takes the larger damping, thus the lower restitution, and the larger
-coefficient of each kind of friction.
+directly, for a natural frequency 1 / `time_constant` and a damping ratio that follows from the restitution.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 from dynx.engines.mujoco.library import mujoco
 from dynx.spatial.scalar import Floats
+from dynx.world.materials import STRICT_MATERIALS
+from dynx.world.scene.contact_springs import damping_ratio, restitution_of
 from dynx.world.settings import Setting
 
 SETTINGS: Mapping[str, Setting] = {
@@ -27,11 +26,17 @@ SETTINGS: Mapping[str, Setting] = {
     "iterations": Setting(100, "largest number of iterations of the solver", 1),
     "tolerance": Setting(1e-10, "tolerance at which the solver stops", 0.0),
     "cone": Setting("elliptic", "friction cone", choices=("elliptic", "pyramidal")),
-    "impratio": Setting(10.0, "ratio of the impedances of friction and normal force", 1e-6),
+    "impratio": Setting(100.0, "ratio of the impedances of friction and normal force", 1e-6),
     "noslip_iterations": Setting(0, "iterations of the solver that removes slip", 0),
     "ccd_iterations": Setting(50, "largest number of iterations of convex collision detection", 1),
     "time_constant": Setting(
         0.005, "time constant of contacts and joint limits [s], at least two steps: smaller is stiffer", 1e-6
+    ),
+    "slip_time_constant": Setting(
+        0.01,
+        "time constant at which slip decays in contacts that stick [s], at least two steps: smaller lets "
+        "bodies hop that slide",
+        1e-6,
     ),
     "impedance": Setting(
         (0.9, 0.95, 0.001, 0.5, 2.0),
@@ -54,13 +59,9 @@ SETTINGS: Mapping[str, Setting] = {
         0.0001,
         0.9999,
     ),
+    "strict_materials": STRICT_MATERIALS,
 }
 """Settings by name; the defaults are dynx's canonical ones."""
-
-SMALLEST_RESTITUTION = math.exp(-2.0)
-"""Restitution of a critically damped contact, the least that a contact of MuJoCo has in dynx: 0.135."""
-
-LARGEST_RESTITUTION = 0.999
 
 _INTEGRATORS = {
     "euler": mujoco.mjtIntegrator.mjINT_EULER,
@@ -94,32 +95,45 @@ def set_options(option: Any, settings: Mapping[str, Any], gravity: Floats, dt: f
     option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET | mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
 
 
-def contact_reference(settings: Mapping[str, Any], restitution: float, dt: float) -> tuple[float, float]:
-    """Return MuJoCo's solref (-k, -b) of a contact with this restitution."""
-    frequency = 1.0 / max(settings["time_constant"], 2.0 * dt)
-    return -(frequency**2), -2.0 * damping_ratio(restitution) * frequency
+def natural_frequency(settings: Mapping[str, Any], dt: float) -> float:
+    """Return the natural frequency [rad/s] of contacts and joint limits."""
+    return 1.0 / max(float(settings["time_constant"]), 2.0 * dt)
+
+
+def contact_reference(
+    settings: Mapping[str, Any], restitution: float, dt: float, *, slips: bool = False
+) -> tuple[float, float]:
+    """Return MuJoCo's solref (-k, -b) of a contact with this restitution, or with the nearest possible.
+
+    Where it `slips` by the same reference, the contact is damped critically at most.
+    """
+    frequency = natural_frequency(settings, dt)
+    return -(frequency**2), -2.0 * _ratio(settings, restitution, dt, slips) * frequency
+
+
+def contact_restitution(
+    settings: Mapping[str, Any], restitution: float, dt: float, *, slips: bool = False
+) -> float:
+    """Return the restitution of the contact that `contact_reference` gives for the wanted one."""
+    return restitution_of(_ratio(settings, restitution, dt, slips), natural_frequency(settings, dt) * dt)
+
+
+def _ratio(settings: Mapping[str, Any], restitution: float, dt: float, slips: bool) -> float:
+    ratio = damping_ratio(restitution, natural_frequency(settings, dt) * dt)
+    return min(ratio, 1.0) if slips else ratio
+
+
+def slip_reference(settings: Mapping[str, Any], dt: float) -> tuple[float, float]:
+    """Return MuJoCo's solreffriction (-k, -b) of contacts; slip has no spring, and MuJoCo ignores k."""
+    return -1.0, -1.0 / max(settings["slip_time_constant"], 2.0 * dt)
+
+
+def limit_reference(settings: Mapping[str, Any], dt: float) -> tuple[float, float]:
+    """Return MuJoCo's solref (-k, -b) of joint limits, which are damped critically."""
+    frequency = natural_frequency(settings, dt)
+    return -(frequency**2), -2.0 * frequency
 
 
 def constraint_reference(settings: Mapping[str, Any], dt: float) -> tuple[float, float]:
     """Return MuJoCo's solref of welds, point-to-point constraints, mimic joints and joint friction."""
     return max(settings["constraint_time_constant"], 2.0 * dt), 1.0
-
-
-def damping_ratio(restitution: float) -> float:
-    """Return the damping ratio, from 0 to 1, of a contact with this restitution.
-
-    A body that touches a damped spring loses contact when the force has fallen to zero, before the spring is
-    at its rest length (Schwager and Poeschel, Granular Matter 9, 2007, eq. 19); the ratio of the speeds is
-    then exp(-2 z atan(s / z) / s) with s = sqrt(1 - z^2), which falls from 1 at z = 0 to exp(-2) at z = 1.
-    """
-    if restitution <= SMALLEST_RESTITUTION:
-        return 1.0
-    wanted, low, high = min(restitution, LARGEST_RESTITUTION), 0.0, 1.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        s = math.sqrt(1.0 - middle * middle)
-        if math.exp(-2.0 * middle * math.atan2(s, middle) / s) > wanted:
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)

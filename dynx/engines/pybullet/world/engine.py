@@ -22,6 +22,7 @@ from dynx.engines.pybullet.world.client import WorldClient
 from dynx.engines.pybullet.world.constraints import add_constraint
 from dynx.engines.pybullet.world.contacts import ContactReader
 from dynx.engines.pybullet.world.filters import set_filters
+from dynx.engines.pybullet.world.materials import bullet_materials
 from dynx.engines.pybullet.world.objects import BulletObject
 from dynx.engines.pybullet.world.renderer import draw
 from dynx.engines.pybullet.world.robot import BulletRobot
@@ -32,6 +33,7 @@ from dynx.model.mechanism import ROOT
 from dynx.spatial.scalar import Floats
 from dynx.world.engine import RayHit, TouchingPoint, WorldEngine
 from dynx.world.layout import Collider, Layout
+from dynx.world.materials import EffectiveCoefficient
 from dynx.world.settings import Setting
 from dynx.world.state import BodyState, RobotState
 
@@ -93,10 +95,14 @@ class BulletWorld(WorldEngine):
             for shape in filter(is_ground, collider.shapes):
                 T = np.eye(4) if collider.owner.robot is not None else layout.bodies[collider.owner.body].T
                 places[number].append((load_ground(client, shape, T), ROOT))
-        set_filters(client, layout, places, settings)
+        self._materials = bullet_materials(layout)
+        set_filters(client, layout, places, self._materials, settings)
         self._contacts = ContactReader(client, places)
         for constraint in layout.constraints:
             add_constraint(client, constraint, self._robots, self._bodies, settings["constraint_force"])
+
+    def effective_materials(self) -> Mapping[str, EffectiveCoefficient]:
+        return self._materials.effective()
 
     # -- motion -------------------------------------------------------------------------------
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import sqrt
 from typing import Any
 
 from dynx.engines.pybullet.world.client import WorldClient
+from dynx.engines.pybullet.world.materials import BulletMaterials
 from dynx.model.geometry import Mesh
 from dynx.world.layout import Layout
 
@@ -15,21 +15,20 @@ Place = tuple[int, int]
 
 
 def set_filters(
-    client: WorldClient, layout: Layout, places: Sequence[Sequence[Place]], settings: Mapping[str, Any]
+    client: WorldClient,
+    layout: Layout,
+    places: Sequence[Sequence[Place]],
+    materials: BulletMaterials,
+    settings: Mapping[str, Any],
 ) -> None:
-    """Set the materials of all colliders, and which pairs of them may touch.
-
-    Bullet multiplies friction and restitution of two surfaces; given the square roots it uses their geometric
-    mean, so that two surfaces of one material have the coefficients of that material.
-    """
+    """Set the materials of all colliders, and which pairs of them may touch."""
     engine = client.engine
-    for collider, found in zip(layout.colliders, places, strict=True):
-        material = collider.material
+    for number, (collider, found) in enumerate(zip(layout.colliders, places, strict=True)):
         options = {
-            "lateralFriction": sqrt(material.friction),
-            "spinningFriction": material.torsional_friction,
-            "rollingFriction": material.rolling_friction,
-            "restitution": sqrt(material.restitution),
+            "lateralFriction": float(materials.friction[number]),
+            "spinningFriction": float(materials.spinning[number]),
+            "rollingFriction": float(materials.rolling[number]),
+            "restitution": float(materials.restitution[number]),
         }
         if any(isinstance(each.shape, Mesh) for each in collider.shapes):
             options["collisionMargin"] = settings["mesh_margin"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dynx.world.materials import STRICT_MATERIALS
 from dynx.world.settings import Setting
 
 SETTINGS = {
@@ -17,6 +18,7 @@ SETTINGS = {
     "contact_distance": Setting(0.02, "distance [m] below which contact points are kept"),
     "mesh_margin": Setting(0.0, "distance [m] by which the hull of a mesh is enlarged", most=1.0),
     "constraint_force": Setting(1e6, "largest force [N] or moment [N m] of welds and points", most=1e12),
+    "strict_materials": STRICT_MATERIALS,
 }
 """Settings by name."""
 

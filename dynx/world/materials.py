@@ -1,0 +1,110 @@
+"""Coefficients of the contacts of a scene, and which of them an engine does not have.
+
+Two surfaces in contact have the geometric mean of their coefficients: of friction, sliding, torsional and
+rolling, and of restitution. An engine that combines coefficients by another rule is given such ones that its
+rule has this result; where it cannot, it says so by `WorldEngine.effective_materials`.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dynx.errors import UnsupportedFeatureError
+from dynx.spatial.scalar import Floats
+from dynx.world.layout import Layout
+from dynx.world.settings import Setting
+
+if TYPE_CHECKING:
+    from dynx.world.engine import WorldEngine
+
+STRICT_MATERIALS = Setting(
+    False, "whether a scene with coefficients of contact that the engine cannot have is refused"
+)
+"""The setting `strict_materials`, which every engine has."""
+
+TOLERANCE = 1e-6
+"""Relative error of a coefficient that counts as none."""
+
+
+@dataclass(frozen=True)
+class InexactMaterial:
+    """A coefficient of contact that the engine does not have as the scene states it."""
+
+    quantity: str
+    """Name of the coefficient in `Material`."""
+    wanted: float
+    """Geometric mean of the coefficients of both surfaces."""
+    effective: float
+    """Coefficient in effect."""
+    reason: str
+    pairs: tuple[tuple[str, str], ...]
+    """Bodies, or links as ``robot/link``, between which it is in effect."""
+
+    def __str__(self) -> str:
+        (a, b), more = self.pairs[0], len(self.pairs) - 1
+        others = f" and {more} more pair{'s' * (more > 1)}" if more else ""
+        return (
+            f"{self.quantity} of {a} and {b}{others} is {self.effective:.4g}, not {self.wanted:.4g}: "
+            f"{self.reason}"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class EffectiveCoefficient:
+    """A coefficient of contact as an engine has it."""
+
+    of: Callable[[int, NDArray[np.intp]], Floats]
+    """Function that returns the coefficients in effect between a collider and others, by number."""
+    reason: str
+    """Why it differs from the wanted one, where it does."""
+
+
+def coefficients(layout: Layout, name: str) -> Floats:
+    """Return a coefficient (n,) of the material of each collider."""
+    return np.array([getattr(each.material, name) for each in layout.colliders], dtype=np.float64)
+
+
+def inexact_materials(engine: WorldEngine) -> tuple[InexactMaterial, ...]:
+    """Return the coefficients that the engine does not have as the scene states them, for the pairs of
+    colliders that may touch."""
+    layout, found = engine.layout, []
+    for name, effective in engine.effective_materials().items():
+        values = coefficients(layout, name)
+        groups: dict[tuple[float, float], list[tuple[str, str]]] = defaultdict(list)
+        for i, each in enumerate(layout.colliders):
+            partners = np.flatnonzero(layout.collides[i, i + 1 :]) + i + 1
+            wanted, actual = np.sqrt(values[i] * values[partners]), effective.of(i, partners)
+            for k in np.flatnonzero(abs(actual - wanted) > TOLERANCE * wanted).tolist():
+                pair = each.name, layout.colliders[partners[k]].name
+                groups[float(wanted[k]), float(actual[k])].append(pair)
+        found += [InexactMaterial(name, *key, effective.reason, tuple(each)) for key, each in groups.items()]
+    return tuple(found)
+
+
+def open_engine(
+    kind: type[WorldEngine], layout: Layout, h: float, settings: Mapping[str, Any]
+) -> WorldEngine:
+    """Return the engine with the scene in it, in steps of `h` [s].
+
+    Raises UnsupportedFeatureError for inexact coefficients of contact where `strict_materials` is set.
+    """
+    engine = kind(layout, h, settings)
+    if not settings.get("strict_materials"):
+        return engine
+    try:
+        inexact = inexact_materials(engine)
+    except BaseException:
+        engine.close()
+        raise
+    if inexact:
+        engine.close()
+        raise UnsupportedFeatureError(
+            f"{inexact[0]} ({kind.name!r}); strict_materials=False takes what the engine has"
+        )
+    return engine
