@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +19,6 @@ from dynx.errors import UnsupportedFeatureError
 from dynx.spatial.scalar import Floats
 from dynx.world.layout import Layout
 from dynx.world.settings import Setting
-
-if TYPE_CHECKING:
-    from dynx.world.engine import WorldEngine
 
 STRICT_MATERIALS = Setting(
     False, "whether a scene with coefficients of contact that the engine cannot have is refused"
@@ -65,12 +62,27 @@ class EffectiveCoefficient:
     """Why it differs from the wanted one, where it does."""
 
 
+class EngineWithMaterials(Protocol):
+    """The part of `WorldEngine` that this module needs."""
+
+    layout: Layout
+
+    def effective_materials(self) -> Mapping[str, EffectiveCoefficient]:
+        """Return coefficients in effect, by name."""
+
+    def close(self) -> None:
+        """Release what the engine holds."""
+
+
+Engine = TypeVar("Engine", bound=EngineWithMaterials)
+
+
 def coefficients(layout: Layout, name: str) -> Floats:
     """Return a coefficient (n,) of the material of each collider."""
     return np.array([getattr(each.material, name) for each in layout.colliders], dtype=np.float64)
 
 
-def inexact_materials(engine: WorldEngine) -> tuple[InexactMaterial, ...]:
+def inexact_materials(engine: EngineWithMaterials) -> tuple[InexactMaterial, ...]:
     """Return the coefficients that the engine does not have as the scene states them, for the pairs of
     colliders that may touch."""
     layout, found = engine.layout, []
@@ -88,8 +100,11 @@ def inexact_materials(engine: WorldEngine) -> tuple[InexactMaterial, ...]:
 
 
 def open_engine(
-    kind: type[WorldEngine], layout: Layout, h: float, settings: Mapping[str, Any]
-) -> WorldEngine:
+    kind: Callable[[Layout, float, Mapping[str, Any]], Engine],
+    layout: Layout,
+    h: float,
+    settings: Mapping[str, Any],
+) -> Engine:
     """Return the engine with the scene in it, in steps of `h` [s].
 
     Raises UnsupportedFeatureError for inexact coefficients of contact where `strict_materials` is set.
@@ -104,7 +119,5 @@ def open_engine(
         raise
     if inexact:
         engine.close()
-        raise UnsupportedFeatureError(
-            f"{inexact[0]} ({kind.name!r}); strict_materials=False takes what the engine has"
-        )
+        raise UnsupportedFeatureError(f"{inexact[0]}; strict_materials=False takes what the engine has")
     return engine
