@@ -39,6 +39,8 @@ class EngineRun:
     contacts: tuple[Contact, ...]
     """Contacts of the last step."""
     settings: Mapping[str, Any]
+    notes: tuple[str, ...] = ()
+    """Overlaps and violated constraints of the start, a sentence each."""
     error: DynxError | None = None
     """Why the engine ended early."""
 
@@ -134,7 +136,8 @@ def _run(
     if finish is not None:
         finish(world)
     times = np.array([state.time for state in states])
-    return EngineRun(world.engine, world.version, times, tuple(states), contacts, world.settings, error)
+    engine, version = world.engine, world.version
+    return EngineRun(engine, version, times, tuple(states), contacts, world.settings, world.notes, error)
 
 
 def _separation(scene: Scene, one: EngineRun, other: EngineRun) -> Separation:

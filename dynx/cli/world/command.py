@@ -68,6 +68,13 @@ from dynx.cli.shell.options import GroupedCommand, group, json_option, name_list
         "engines the name of each stands before the suffix.",
     ),
     click.option(
+        "--export",
+        "export_path",
+        metavar="FILE",
+        help="File for the scene in another format, which is not run then: .xml or .mjcf (MJCF), .toml, "
+        ".json, or .urdf, with a file for each robot and body, whose name stands before the suffix.",
+    ),
+    click.option(
         "--quiet", is_flag=True, help="No tables and no progress: only errors, files and the exit code."
     ),
 )
@@ -78,7 +85,7 @@ def world() -> None:
     SCENE is a scene file (TOML or JSON) or the name of a scene of dynx: bowling, duck, pushing, rolling,
     slope, stack or standing.
     The final states are printed, the contacts of the last step, and for every two engines how far apart
-    their motions are over time.
+    their motions are over time. Notes name parts that overlap at the start, and constraints that it violates.
 
     Exit code 0; 1 if an engine ended early or the engines are farther apart than --within; 2 for a scene
     that cannot be run. After Ctrl-C the exit code is 130.
@@ -88,4 +95,5 @@ def world() -> None:
       dynx world stack
       dynx world bowling --engine pybullet,mujoco --duration 3 --plot apart.png
       dynx world my_scene.toml --engine mujoco --set impratio=100 --json
+      dynx world my_scene.toml --export my_scene.xml
     """

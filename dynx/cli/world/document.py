@@ -42,13 +42,15 @@ class ContactEntry(TypedDict):
 
 
 class EngineEntry(TypedDict):
-    """Run of the scene by one engine; `error` is why it ended early."""
+    """Run of the scene by one engine; `error` is why it ended early, `notes` name overlaps and violated
+    constraints of the start."""
 
     engine: str
     version: str
     settings: dict[str, Any]
     time: float
     error: str | None
+    notes: list[str]
     robots: list[RobotEntry]
     bodies: list[BodyEntry]
     contacts: list[ContactEntry]
@@ -106,6 +108,7 @@ def _engine(comparison: WorldComparison, run: EngineRun) -> EngineEntry:
         "settings": dict(run.settings),
         "time": last.time,
         "error": None if run.error is None else str(run.error),
+        "notes": list(run.notes),
         "robots": [
             {
                 "name": robot.name,

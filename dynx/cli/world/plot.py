@@ -7,8 +7,11 @@ import numpy as np
 from dynx.files.figures import new_figure, save_figure
 from dynx.world.comparison import WorldComparison
 
-FLOOR = 1e-16
-"""Smallest distance drawn [m]: the axis is logarithmic, and equal positions have none."""
+FLOOR = 1e-9
+"""Smallest distance drawn [m], unless all are smaller: below it there is rounding alone."""
+
+SPAN = 1e-4
+"""Smallest distance drawn, relative to the largest, where all are below `FLOOR`."""
 
 
 def plot(comparison: WorldComparison, path: str) -> None:
@@ -19,10 +22,11 @@ def plot(comparison: WorldComparison, path: str) -> None:
     figure = new_figure(7.0, 4.0)
     axes = figure.subplots()
     if comparison.separations:
+        bottom = _lowest(max(float(each.distance.max()) for each in comparison.separations))
         for each in comparison.separations:
-            axes.semilogy(
-                each.times, np.maximum(each.distance, FLOOR), lw=1.3, label=" - ".join(each.engines)
-            )
+            distance = np.maximum(each.distance, bottom)
+            axes.semilogy(each.times, distance, lw=1.3, label=" - ".join(each.engines))
+        axes.set_ylim(bottom=bottom)
         axes.set_ylabel("largest distance [m]")
     else:
         run = comparison.runs[0]
@@ -41,6 +45,11 @@ def plot(comparison: WorldComparison, path: str) -> None:
     if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=8)
     save_figure(figure, path)
+
+
+def _lowest(largest: float) -> float:
+    """Return the lower limit of the logarithmic axis for a largest distance [m]."""
+    return FLOOR if largest > FLOOR or largest == 0.0 else SPAN * largest
 
 
 def _plain(text: str) -> str:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
-from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, failure_of
+from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, failure_of, one_line
 from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.output_file import check_json, check_writable
 from dynx.cli.shell.progress import progress_bar
 from dynx.cli.shell.settings import settings_by_engine
-from dynx.cli.shell.terminal import present
+from dynx.cli.shell.terminal import console, present
 from dynx.cli.world.document import document
+from dynx.cli.world.export import check_suffix, export, own_path
 from dynx.cli.world.plot import plot
 from dynx.cli.world.tables import show
-from dynx.errors import DynxError
+from dynx.errors import ArgumentError, DynxError
 from dynx.files.figures import picture_format
 from dynx.world import World
 from dynx.world.comparison import WorldComparison, compare_worlds
@@ -33,9 +33,15 @@ def world(
     json_path: str | None,
     plot_path: str | None,
     save_path: str | None,
+    export_path: str | None,
     quiet: bool,
 ) -> int:
-    """Run the scene in each engine and compare; return the exit code."""
+    """Export the scene, or run it in each engine and compare; return the exit code."""
+    if export_path is not None:
+        for option, path in (("--json", json_path), ("--plot", plot_path), ("--save", save_path)):
+            if path is not None:
+                raise ArgumentError(f"{option} is given with --export, which runs nothing")
+        return _export(scene, export_path, quiet=quiet)
     check_json(json_path)
     for path in (plot_path, save_path):
         if path is not None:
@@ -49,7 +55,7 @@ def world(
 
     def save(world: World) -> None:
         if save_path is not None:
-            error = failure_of(world.write, _own_path(save_path, world.engine, len(chosen)))
+            error = failure_of(world.write, own_path(save_path, world.engine, len(chosen)))
             errors.extend([error] if error is not None else [])
 
     with interruptible() as interruption:
@@ -85,12 +91,13 @@ def world(
     return NEGATIVE_RESULT if _is_negative(comparison, within) else DONE
 
 
-def _own_path(path: str, engine: str, engines: int) -> str:
-    """Return the file of one engine: with several, its name stands before the suffix."""
-    if engines == 1:
-        return path
-    file = Path(path)
-    return str(file.with_name(f"{file.stem}.{engine}{file.suffix}"))
+def _export(scene: str, path: str, *, quiet: bool) -> int:
+    check_suffix(path)
+    check_writable(path)
+    for file in export(read_scene(scene), path):
+        if not quiet:
+            console().print(f"wrote {one_line(file)}")
+    return DONE
 
 
 def _is_negative(comparison: WorldComparison, within: float | None) -> bool:

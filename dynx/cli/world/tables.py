@@ -32,10 +32,22 @@ def show(out: Console, report: Entry) -> None:
             out.print(
                 f"{each['engine']} ended at {each['time']:.6g} s: {one_line(each['error'])}", style="red"
             )
+    _show_notes(out, engines)
     _show_bodies(out, engines)
     _show_robots(out, engines)
     _show_contacts(out, engines)
     _show_separations(out, report["separations"])
+
+
+def _show_notes(out: Console, engines: Sequence[Entry]) -> None:
+    """Print the notes on the start, once where the engines have the same."""
+    found: dict[str, list[str]] = defaultdict(list)
+    for each in engines:
+        for note in each["notes"]:
+            found[note].append(each["engine"])
+    for note, names in list(found.items())[:MAX_ROWS]:
+        where = "" if len(names) == len(engines) else f" ({', '.join(names)})"
+        out.print(f"note: {one_line(note)}{where}", style="yellow")
 
 
 def _show_bodies(out: Console, engines: Sequence[Entry]) -> None:

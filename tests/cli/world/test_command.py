@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,8 @@ from click.testing import CliRunner, Result
 
 import dynx
 from dynx.cli.shell.main import cli
-from dynx.world import World, world_names
+from dynx.cli.world.plot import _lowest
+from dynx.world import World, read_scene, world_names
 from tests.world.engines import WORLDS
 
 ENGINES = [name for name in WORLDS if find_spec(name) is not None]
@@ -111,3 +113,82 @@ def test_wrong_input_gives_one_line_and_exit_code_2(arguments: list[str], messag
 
 def test_every_engine_of_dynx_is_offered() -> None:
     assert {"pybullet", "mujoco", "drake"} <= set(world_names())
+
+
+OVERLAPPING = """schema = "dynx.scene/1"
+[[bodies]]
+name = "kugel α"
+shape = { sphere = 0.1 }
+mass = 1.0
+[[bodies]]
+name = "b"
+shape = { sphere = 0.1 }
+mass = 1.0
+pose = [0.0, 0.0, 0.15]
+[[constraints]]
+kind = "point"
+a = "b"
+b = "world"
+"""
+
+
+@pytest.fixture
+def overlapping(tmp_path: Path) -> str:
+    path = tmp_path / "overlapping.toml"
+    path.write_text(OVERLAPPING, encoding="utf-8")
+    return str(path)
+
+
+def test_notes_on_the_start_are_shown(overlapping: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.json"
+    result = run(overlapping, "--engine", ",".join(ENGINES), "--duration", "0.01", "--json", str(path))
+    assert "note: 'kugel α' and 'b' overlap by 50 mm at the start" in result.output
+    assert "note: the ends of the PointToPoint of 'b' and 'world' are 150 mm apart" in result.output
+    assert all(len(each["notes"]) == 2 for each in json.loads(path.read_text())["engines"])
+
+
+def test_a_scene_is_exported_by_the_suffix_and_not_run(overlapping: str, tmp_path: Path) -> None:
+    for suffix in ("xml", "json", "urdf"):
+        result = run(overlapping, "--export", str(tmp_path / f"out.{suffix}"))
+        assert result.exit_code == 0, result.output
+        assert "wrote" in result.output
+        assert "bodies at the end" not in result.output
+    assert 'name="kugel α"' in (tmp_path / "out.xml").read_text(encoding="utf-8")
+    assert read_scene(tmp_path / "out.json") == read_scene(overlapping)
+    assert dynx.load(tmp_path / "out.kugel α.urdf", base="floating").total_mass == 1.0
+    assert (tmp_path / "out.b.urdf").is_file()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["stack", "--export", "scene.xmll"], "did you mean '.xml'"),
+        (["stack", "--export", "/no/such/folder/x.xml"], "no directory"),
+        (
+            ["stack", "--export", "x.xml", "--plot", "y.png"],
+            "--plot is given with --export",
+        ),
+    ],
+)
+def test_exports_that_are_impossible_are_refused(arguments: list[str], message: str) -> None:
+    result = run(*arguments)
+    assert result.exit_code == 2
+    assert message in result.output
+
+
+@pytest.mark.parametrize(("largest", "bottom"), [(1.0, 1e-9), (2e-9, 1e-9), (1e-13, 1e-17), (0.0, 1e-9)])
+def test_plots_begin_where_distances_are_more_than_rounding(largest: float, bottom: float) -> None:
+    assert _lowest(largest) == pytest.approx(bottom)
+
+
+def test_ctrl_c_ends_the_command_with_130_and_one_line(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    step = World.step
+
+    def interrupted(world: World, n: int) -> None:
+        step(world, n)
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(World, "step", interrupted)
+    result = run(scene, "--engine", ENGINES[0])
+    assert result.exit_code == 130
+    assert result.output.strip() == "dynx: error: interrupted"
