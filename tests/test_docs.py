@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from dynx.contacts import case_names
 from dynx.rules import all_rules
+from tests.cli.contacts.documents import example
 
 DOCS = Path(__file__).parents[1] / "docs"
 
@@ -29,3 +31,28 @@ def test_every_rule_has_one_anchor_and_its_trap_is_linked(rules_page: str) -> No
     for rule in all_rules():
         assert rules_page.count(f'<a id="{rule.id.lower()}"></a>') == 1
         assert f"(../models/traps/{rule.trap()})" in rules_page
+
+
+def test_the_cases_of_contacts_are_listed_and_have_results() -> None:
+    writer = runpy.run_path(str(DOCS / "write_contacts.py"))
+    page = (DOCS / "contacts.md").read_text(encoding="utf-8")
+    current = writer["replaced"](page, "cases", writer["cases"]())
+    assert current == page, "run: python docs/write_contacts.py"
+    results = page.partition("<!-- written: verdicts -->")[2].partition("<!-- end -->")[0]
+    assert [name for name in case_names() if f"| `{name}` |" not in results] == []
+
+
+def test_tables_of_contacts_have_every_verdict() -> None:
+    parts = runpy.run_path(str(DOCS / "write_contacts.py"))["results"](example("a | b"))
+    assert (
+        "9 figures of 1 cases (4 exact, 1 falls, 1 cannot, 2 setting, 1 unexplained)" in parts["conditions"]
+    )
+    assert (
+        "| `sliding` | setting, 1.0e-01 | unexplained, not finite | setting, 3.0e-02 |" in parts["verdicts"]
+    )
+    assert (
+        "| one | `stiffness 1e+06 \u2192 1e+08` | `sliding`: acceleration, slow | 1.0e-01 | 1.0e-03 |"
+        in parts["settings"]
+    )
+    assert "| three | a \\| b | `sliding`: acceleration, slow; `sliding`: upward |" in parts["lacking"]
+    assert "falls (order 1.0), 1.0e-02" in parts["figures"]

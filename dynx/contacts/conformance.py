@@ -238,4 +238,11 @@ def _checked_steps(steps: Sequence[float]) -> tuple[float, ...]:
 def _found(cases: Sequence[str | Case] | None) -> tuple[Case, ...]:
     if cases is None:
         return find_cases()
-    return tuple(each if isinstance(each, Case) else find_cases([each])[0] for each in cases)
+    found = tuple(each if isinstance(each, Case) else find_cases([each])[0] for each in cases)
+    for each in found:
+        if type(each).__module__ == "__main__":
+            raise ArgumentError(
+                f"the case {shown(each.name)} is defined in the program that runs; it has to be in a module "
+                "of its own, which worker processes import"
+            )
+    return found

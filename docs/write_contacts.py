@@ -1,0 +1,155 @@
+"""Write the tables of docs/contacts.md: the cases, and how far each engine is from mechanics in them.
+
+    python docs/write_contacts.py                 # measures, which takes some minutes
+    python docs/write_contacts.py contacts.json   # takes the document that dynx contacts --json wrote
+
+Tables stand between ``<!-- written: NAME -->`` and ``<!-- end -->``; the other text of the page is kept.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from dynx.cli.contacts import wording
+from dynx.cli.contacts.page import cell_figure, removals
+from dynx.contacts import find_cases
+
+PAGE = Path(__file__).with_name("contacts.md")
+
+Entry = Mapping[str, Any]
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Write the page."""
+    report = json.loads(Path(arguments[0]).read_text(encoding="utf-8") if arguments else measured())
+    text = PAGE.read_text(encoding="utf-8")
+    for name, part in {"cases": cases(), **results(report)}.items():
+        text = replaced(text, name, part)
+    PAGE.write_text(text, encoding="utf-8")
+
+
+def measured() -> str:
+    """The document of a run of every case in every engine."""
+    with TemporaryDirectory() as folder:
+        path = os.path.join(folder, "contacts.json")
+        done = subprocess.run([sys.executable, "-m", "dynx", "contacts", "--json", path], check=False)
+        if done.returncode not in (0, 1):
+            sys.exit(done.returncode)
+        return Path(path).read_text(encoding="utf-8")
+
+
+def cases() -> str:
+    """The table of cases."""
+    rows = ((f"`{case.name}`", case.title, case.law, case.source) for case in find_cases())
+    return table(("case", "title", "law", "source"), rows)
+
+
+def results(report: Entry) -> dict[str, str]:
+    """The parts of the page that follow from a measurement, by name."""
+    return {
+        "conditions": conditions(report),
+        "verdicts": verdicts(report),
+        "settings": settings(report),
+        "lacking": lacking(report),
+        "figures": figures(report),
+    }
+
+
+def conditions(report: Entry) -> str:
+    """The engines with their versions, the steps, and the number of figures with each verdict."""
+    engines = ", ".join(f"{each['engine']} {each['version']}" for each in report["engines"])
+    found = [each["verdict"] for case in report["cases"] for each in case["figures"]]
+    counts = ", ".join(f"{found.count(each)} {each}" for each in wording.RANKS if each in found)
+    return (
+        f"Written by `python docs/write_contacts.py` for {engines}, at steps of "
+        f"{wording.steps_text(report['steps'])}: {len(found)} figures of {len(report['cases'])} cases "
+        f"({counts}), {report['runs']} runs.\n"
+    )
+
+
+def verdicts(report: Entry) -> str:
+    """The table of cases and engines: the verdict that deserves the first look, and its error."""
+    names = [each["engine"] for each in report["engines"]]
+    rows = (
+        (f"`{case['name']}`", *(cell(cell_figure(case, name)) for name in names)) for case in report["cases"]
+    )
+    return table(("case", *names), rows)
+
+
+def cell(figure: Entry | None) -> str:
+    """A verdict with the relative error at the smallest step."""
+    if figure is None:
+        return ""
+    order = f" ({wording.order_text(figure['order'])})" if figure["verdict"] == "falls" else ""
+    return f"{figure['verdict']}{order}, {wording.error_text(wording.last_error(figure))}"
+
+
+def settings(report: Entry) -> str:
+    """The table of settings that remove errors, with the errors before and after."""
+    rows = []
+    for removal in removals(report["cases"]):
+        for case, figure in removal.figures:
+            errors = figure["attribution"]["errors"]
+            before, after = (wording.error_text(each[-1]) for each in (errors[0], errors[-1]))
+            what = f"`{case['name']}`: {wording.figure_name(figure)}"
+            rows.append((removal.engine, f"`{removal.change}`", what, before, after))
+    return table(("engine", "setting", "figure", "error", "with the setting"), rows)
+
+
+def lacking(report: Entry) -> str:
+    """The table of figures that an engine cannot give."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for case in report["cases"]:
+        for figure in case["figures"]:
+            if figure["verdict"] == "cannot":
+                key = figure["engine"], figure["reason"]
+                found.setdefault(key, []).append(f"`{case['name']}`: {wording.figure_name(figure)}")
+        for lost in case["no_results"]:
+            what = f"`{case['name']}`" + (f": {lost['trial']}" if lost["trial"] else "")
+            known = found.setdefault((lost["engine"], lost["message"]), [])
+            if what not in known:
+                known.append(what)
+    rows = ((engine, reason, "; ".join(names)) for (engine, reason), names in found.items())
+    return table(("engine", "reason", "figures"), rows)
+
+
+def figures(report: Entry) -> str:
+    """The table of every figure: the error of each engine at the smallest step."""
+    names = [each["engine"] for each in report["engines"]]
+    rows = []
+    for case in report["cases"]:
+        by_name: dict[str, dict[str, Entry]] = {}
+        for figure in case["figures"]:
+            by_name.setdefault(wording.figure_name(figure), {})[figure["engine"]] = figure
+        for name, found in by_name.items():
+            first = next(iter(found.values()))
+            exact = wording.quantity_text(first["exact"], first["unit"])
+            rows.append((f"`{case['name']}`", name, exact, *(cell(found.get(each)) for each in names)))
+    return table(("case", "figure", "exact", *names), rows)
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table in Markdown."""
+    lines = [heads, ["---"] * len(heads), *rows]
+    return "".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |\n" for line in lines)
+
+
+def replaced(text: str, name: str, part: str) -> str:
+    """The text with what stands between the marks of `name` replaced."""
+    mark = f"<!-- written: {name} -->\n"
+    pattern = re.compile(re.escape(mark) + ".*?(?=<!-- end -->)", re.DOTALL)
+    if not pattern.search(text):
+        sys.exit(f"{PAGE.name} has no place for {name!r}")
+    return pattern.sub(lambda _: mark + part, text)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
