@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -31,11 +32,12 @@ class Motion:
         return np.array([state.bodies[body].twist for state in self.states])
 
 
-def record(world: World, duration: float) -> Motion:
-    """Take steps for `duration` [s] and return the motion."""
+def record(world: World, duration: float, **loads: Any) -> Motion:
+    """Take steps for `duration` [s], during which `loads` act (arguments of `World.step`); return the
+    motion."""
     states = [world.state]
     for _ in range(step_count(world, duration)):
-        world.step()
+        world.step(**loads)
         states.append(world.state)
     return Motion(np.array([state.time for state in states]), tuple(states))
 
@@ -70,3 +72,16 @@ def acceleration(times: Floats, velocities: Floats) -> float:
     """Return the slope of the straight line through velocities over time (least squares)."""
     centred = times - times.mean()
     return float(centred @ velocities / (centred @ centred))
+
+
+def tilts(rotations: Floats) -> Floats:
+    """Return the angles (n,) [rad] of rotations (n, 3, 3) about the y axis."""
+    return np.asarray(np.arctan2(rotations[:, 0, 2], rotations[:, 2, 2]))
+
+
+def rate_at(angle: float, angles: Floats, rates: Floats) -> float:
+    """Return the rate where angles (n,) first exceed `angle`, by linear interpolation; 0 if none does."""
+    after = int(np.argmax(angles > angle))
+    return (
+        float(np.interp(angle, angles[after - 1 : after + 1], rates[after - 1 : after + 1])) if after else 0.0
+    )

@@ -20,6 +20,19 @@ BUILT_IN = {
     "sliding_to_rolling": "dynx.contacts.cases.sliding_to_rolling:SlidingToRolling",
     "rebound": "dynx.contacts.cases.rebound:Rebound",
     "free_momentum": "dynx.contacts.cases.free_momentum:FreeMomentum",
+    "collision": "dynx.contacts.cases.collision:Collision",
+    "newtons_cradle": "dynx.contacts.cases.newtons_cradle:NewtonsCradle",
+    "spinning_ball": "dynx.contacts.cases.spinning_ball:SpinningBall",
+    "bouncing_ball": "dynx.contacts.cases.bouncing_ball:BouncingBall",
+    "restitution_pairs": "dynx.contacts.cases.restitution_pairs:RestitutionPairs",
+    "friction_pairs": "dynx.contacts.cases.friction_pairs:FrictionPairs",
+    "tipping_box": "dynx.contacts.cases.tipping_box:TippingBox",
+    "pushed_box": "dynx.contacts.cases.pushed_box:PushedBox",
+    "stack": "dynx.contacts.cases.stack:Stack",
+    "driven_platform": "dynx.contacts.cases.driven_platform:DrivenPlatform",
+    "standing_robot": "dynx.contacts.cases.standing_robot:StandingRobot",
+    "spin_down": "dynx.contacts.cases.spin_down:SpinDown",
+    "rolling_resistance": "dynx.contacts.cases.rolling_resistance:RollingResistance",
 }
 """Cases of dynx itself, in the order of reports."""
 

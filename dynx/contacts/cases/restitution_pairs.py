@@ -1,0 +1,71 @@
+"""Restitution of two different materials."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import combinations_with_replacement
+from typing import ClassVar, NamedTuple
+
+from dynx.contacts.case import Case, Figure
+from dynx.contacts.impacts import SPREAD, farthest
+from dynx.model import Pose
+from dynx.world import Material, Scene, World, box, sphere
+
+RADIUS = 0.05
+SPEED = 1.0
+"""Speed of the balls towards the slab [m/s]."""
+
+HEIGHTS = tuple(0.1 + k * SPREAD for k in range(5))
+"""Heights of the lowest points at the start [m]."""
+
+DURATION = 0.25
+"""Time [s] by which every ball has met the slab."""
+
+
+class Pair(NamedTuple):
+    """Restitution of the slab and of the balls."""
+
+    slab: float
+    ball: float
+
+
+class RestitutionPairs(Case):
+    """Balls that meet a slab of another material, without gravity, for pairs of four materials."""
+
+    name: ClassVar[str] = "restitution_pairs"
+    title: ClassVar[str] = "Restitution of two materials"
+    law: ClassVar[str] = (
+        "v' = -sqrt(e_a e_b) v, for speeds v before and v' after the impact and the restitution of each"
+    )
+    source: ClassVar[str] = (
+        "Newton's law of restitution, with dynx's rule for two materials: the geometric mean"
+    )
+    trials: ClassVar[dict[str, Pair]] = {
+        f"{a:g} and {b:g}": Pair(a, b) for a, b in combinations_with_replacement((0.0, 0.25, 0.5, 1.0), 2)
+    }
+
+    def scene(self, parameters: Pair) -> Scene:
+        slab = Material(friction=0.0, restitution=parameters.slab)
+        ball = Material(friction=0.0, restitution=parameters.ball)
+        twist = (0.0, 0.0, -SPEED, 0.0, 0.0, 0.0)
+        balls = [
+            sphere(
+                f"ball {k}",
+                RADIUS,
+                mass=1.0,
+                pose=Pose((0.2 * k, 0.0, RADIUS + height)),
+                twist=twist,
+                material=ball,
+            )
+            for k, height in enumerate(HEIGHTS)
+        ]
+        ground = box("slab", (2.0, 1.0, 0.2), pose=Pose((0.4, 0.0, -0.1)), material=slab)
+        return Scene("restitution_pairs", bodies=(ground, *balls), gravity=(0.0, 0.0, 0.0))
+
+    def measure(self, world: World, parameters: Pair) -> Sequence[Figure]:
+        world.run(DURATION)
+        speeds = [float(world.state.bodies[f"ball {k}"].twist[2]) / SPEED for k in range(len(HEIGHTS))]
+        exact = math.sqrt(parameters.slab * parameters.ball)
+        rests_on = ("restitution",) if exact else ()
+        return [Figure("restitution", farthest(speeds, exact), exact, "", 1.0, rests_on=rests_on)]

@@ -1,0 +1,90 @@
+"""Closed forms of impacts, against conservation laws and the integral of Coulomb's friction."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dynx.contacts.cases import bouncing_ball
+from dynx.contacts.impacts import Throw, after_bounce, farthest, speeds_after_collision
+
+MASSES = st.floats(0.01, 100.0)
+SPEEDS = st.floats(-10.0, 10.0)
+RESTITUTIONS = st.floats(0.0, 1.0)
+
+
+@given(MASSES, MASSES, SPEEDS, SPEEDS, RESTITUTIONS)
+def test_collisions_conserve_momentum_and_separate_by_the_restitution(
+    m1: float, m2: float, v1: float, v2: float, e: float
+) -> None:
+    w1, w2 = speeds_after_collision(m1, m2, v1, v2, e)
+    scale = (m1 + m2) * 20.0
+    assert abs(m1 * w1 + m2 * w2 - m1 * v1 - m2 * v2) <= 1e-14 * scale
+    assert math.isclose(w2 - w1, e * (v1 - v2), abs_tol=1e-12)
+    reduced = m1 * m2 / (m1 + m2)
+    lost = 0.5 * (m1 * (v1**2 - w1**2) + m2 * (v2**2 - w2**2))
+    assert math.isclose(lost, 0.5 * reduced * (1.0 - e**2) * (v1 - v2) ** 2, abs_tol=1e-13 * scale * 20.0)
+
+
+@given(SPEEDS)
+def test_equal_masses_exchange_speeds_and_a_wall_reflects_them(v: float) -> None:
+    assert np.allclose(speeds_after_collision(1.0, 1.0, v, 0.0, 1.0), (0.0, v), atol=1e-12)
+    assert math.isclose(speeds_after_collision(1.0, 1e12, v, 0.0, 1.0)[0], -v, abs_tol=1e-9)
+
+
+@given(SPEEDS, SPEEDS, st.floats(0.1, 5.0), st.floats(0.0, 2.0), RESTITUTIONS)
+def test_a_bounce_is_the_integral_of_friction_over_the_normal_impulse(
+    speed: float, backspin: float, fall: float, friction: float, e: float
+) -> None:
+    n, normal = 2000, (1.0 + e) * fall
+    v, w = speed, backspin
+    for _ in range(n):
+        # Friction of one part of the impulse reverses no slip: it ends it.
+        part = min(friction * normal / n, 2.0 / 7.0 * abs(v + w))
+        part = math.copysign(part, v + w)
+        v, w = v - part, w - 2.5 * part
+    assert np.allclose(after_bounce(Throw(speed, backspin, fall, friction, e)), (v, w), atol=1e-9)
+
+
+@given(SPEEDS, SPEEDS, st.floats(0.1, 5.0), st.floats(0.0, 2.0), RESTITUTIONS)
+def test_a_bounce_keeps_the_angular_momentum_about_the_contact_and_adds_no_energy(
+    speed: float, backspin: float, fall: float, friction: float, e: float
+) -> None:
+    v, w = after_bounce(Throw(speed, backspin, fall, friction, e))
+    assert math.isclose(w - 2.5 * v, backspin - 2.5 * speed, abs_tol=1e-11)
+    assert v**2 + 0.4 * w**2 <= speed**2 + 0.4 * backspin**2 + 1e-11
+    # The slip keeps its direction or ends.
+    assert (v + w) * (speed + backspin) >= -1e-11
+
+
+def test_a_ball_with_enough_backspin_comes_back() -> None:
+    assert after_bounce(Throw(1.0, 3.0, 1.0, 1.0, 0.5))[0] < 0.0
+
+
+def test_bounces_are_those_of_a_ball_whose_flights_are_integrated() -> None:
+    g, height, velocity, time = 9.81, 1.0, 0.0, 0.0
+    tops, impacts = [], []
+    for _ in range(4):
+        # From rest or from the ground: the positive root of the height.
+        flight = (velocity + math.sqrt(velocity**2 + 2.0 * g * height)) / g
+        time += flight
+        impacts.append(time)
+        velocity, height = bouncing_ball.RESTITUTION * (g * flight - velocity), 0.0
+        tops.append(velocity**2 / (2.0 * g))
+    unit = bouncing_ball.fall_time(1.0)
+    assert np.allclose([bouncing_ball.impact_time(n) for n in range(1, 5)], np.array(impacts) / unit)
+    assert np.allclose(tops, [bouncing_ball.RESTITUTION ** (2 * n) for n in range(1, 5)])
+
+
+def test_a_ball_rests_at_the_limit_of_all_bounces() -> None:
+    # All bounces take (1 + e) / (1 - e) of the time of the fall.
+    e = bouncing_ball.RESTITUTION
+    assert math.isclose(bouncing_ball.impact_time(60), (1.0 + e) / (1.0 - e), rel_tol=1e-12)
+    assert bouncing_ball.impact_time(3) < bouncing_ball.time_of_rest() < bouncing_ball.impact_time(5)
+
+
+def test_farthest_is_the_largest_error_and_not_the_largest_number() -> None:
+    assert farthest([0.9, 1.0, 1.05], 1.0) == 0.9
