@@ -37,6 +37,10 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
             "Bullet lets no impact rebound that is slower than this speed.",
         ),
         Candidate(
+            {"contact_slop": (2e-6, 0.0)},
+            "Bullet leaves penetrations that are no deeper than this.",
+        ),
+        Candidate(
             {"contact_erp": (0.05, 0.0)},
             "Bullet pushes shapes that penetrate apart by this share in every step, which adds speed.",
         ),
@@ -48,11 +52,20 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
             {"residual_threshold": (1e-12, 0.0), "solver_iterations": (400, 2000)},
             "Bullet's solver of impulses is iterative and stops at this residual or number of iterations.",
         ),
+        Candidate(
+            {"contact_distance": (0.0,), "contact_erp": (0.0,)},
+            "Bullet slows shapes before they touch, and pushes those apart that penetrate; both change the "
+            "speed of a rebound.",
+        ),
     ),
     "mujoco": (
         Candidate(
             {"time_constant": (0.0035, 0.002)},
             "A contact of MuJoCo is a damped spring with this time constant.",
+        ),
+        Candidate(
+            {"time_constant": (0.02, 0.05)},
+            "A contact of MuJoCo is a damped spring, which the step resolves the better, the softer it is.",
         ),
         Candidate(
             {"impratio": (100.0, 1000.0)},
@@ -83,6 +96,10 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
         Candidate(
             {"dissipation": (1.0, 0.0)},
             "Contacts of Drake dissipate in proportion to this factor.",
+        ),
+        Candidate(
+            {"contact_model": ("point",)},
+            "In Drake's contacts over surfaces a cylinder is a prism, which does not roll like a circle.",
         ),
         Candidate(
             {"contact_approximation": ("sap",)},

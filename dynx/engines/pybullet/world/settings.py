@@ -16,6 +16,7 @@ SETTINGS = {
     "cone_friction": Setting(True, "whether friction is limited by a cone, not by a pyramid"),
     "restitution_speed": Setting(0.05, "least approach speed [m/s] of an impact that rebounds"),
     "contact_distance": Setting(0.02, "distance [m] below which contact points are kept"),
+    "contact_slop": Setting(1e-5, "depth [m] to which a penetration is not removed", most=1.0),
     "mesh_margin": Setting(0.0, "distance [m] by which the hull of a mesh is enlarged", most=1.0),
     "constraint_force": Setting(1e6, "largest force [N] or moment [N m] of welds and points", most=1e12),
     "strict_materials": STRICT_MATERIALS,
@@ -31,5 +32,6 @@ PARAMETERS = {
     "cone_friction": "enableConeFriction",
     "restitution_speed": "restitutionVelocityThreshold",
     "contact_distance": "contactBreakingThreshold",
+    "contact_slop": "contactSlop",
 }
 """Names in `setPhysicsEngineParameter` of the settings that it takes."""
