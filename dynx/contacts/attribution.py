@@ -8,6 +8,7 @@ judges.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 from dynx.contacts.candidates import Candidate
@@ -140,6 +141,9 @@ def _proportion(
     if not all(type(number) in (int, float) and number > 0 for number in numbers):
         return None
     sizes = numbers if numbers[-1] < numbers[0] else tuple(1.0 / number for number in numbers)
+    # A setting that the user has changed may be beyond values that are tried.
+    if any(after >= before for before, after in pairwise(sizes)):
+        return None
     falling = (series.errors[-1:], *(each for each in errors if each is not None))
     trend = judge(sizes, [each[-1] for each in falling], series.tolerance)
     if trend.kind != "falls" or not _helps(series, falling[-1][-1]):

@@ -68,7 +68,7 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
             "A contact of MuJoCo is a damped spring, which the step resolves the better, the softer it is.",
         ),
         Candidate(
-            {"impratio": (100.0, 1000.0)},
+            {"impratio": (1e3, 1e4)},
             "MuJoCo's friction is a soft constraint, stiffer than the normal force by this ratio.",
         ),
         Candidate(

@@ -93,6 +93,12 @@ def test_an_error_in_proportion_to_a_setting_is_attributed_to_it() -> None:
     assert attribution.after < 0.3 * attribution.before
 
 
+def test_a_setting_that_is_beyond_the_values_tried_is_no_cause_in_proportion() -> None:
+    candidates = [Candidate({"depth": (1e-2, 2e-2)}, REASON)]
+    found = conformance(["resting_depth"], {"depth": 1e-2}, candidates)
+    assert figure(found, "depth of the ball").verdict.kind == "unexplained"
+
+
 def test_two_settings_are_a_cause_together_where_neither_is_alone() -> None:
     candidates = [
         Candidate({"friction_factor": (1.0,)}, "Friction."),
