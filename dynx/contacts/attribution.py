@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
-from dynx.contacts.candidates import Candidate
+from dynx.contacts.candidates import SUBSTEPS, Candidate
 from dynx.contacts.run import Measured
 from dynx.contacts.runner import Runner
 from dynx.contacts.series import Series, TrialOfEngine
@@ -154,4 +154,5 @@ def _proportion(
 def _settings_in_use(series: Series, candidate: Candidate, given: Mapping[str, Any]) -> Used:
     """Return the value of each setting of a candidate before its changes."""
     known = world_class(series.trial.engine).settings
-    return {name: given.get(name, known[name].default) for name in candidate.values}
+    defaults = {name: setting.default for name, setting in known.items()} | {SUBSTEPS: 1}
+    return {name: given.get(name, defaults[name]) for name in candidate.values}

@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+SUBSTEPS = "substeps"
+"""Number of steps of the engine in each step, an option of every world that counts as a setting here."""
+
 
 @dataclass(frozen=True)
 class Candidate:
@@ -78,6 +81,11 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
         Candidate(
             {"impedance": ((0.99, 0.99, 0.001, 0.5, 2.0), (0.9999, 0.9999, 0.001, 0.5, 2.0))},
             "MuJoCo's constraints reach this share of the acceleration that they aim at.",
+        ),
+        Candidate(
+            {"time_constant": (0.002, 0.001), SUBSTEPS: (8, 16)},
+            "A contact of MuJoCo is a damped spring. Gravity acts while it is loaded, and a stiffer one "
+            "needs shorter steps.",
         ),
     ),
     "drake": (
