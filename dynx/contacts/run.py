@@ -8,15 +8,9 @@ from typing import Any, Literal
 
 from dynx.contacts.case import Case, Figure
 from dynx.errors import DynxError, EngineLimitError, NotInstalledError, UnsupportedFeatureError
-from dynx.world import Scene, World
+from dynx.world import World
 from dynx.world.engine import WorldEngine
-from dynx.world.registry import register, world_class, world_names
-
-STRICT = "strict_materials"
-"""Setting of an engine that makes it refuse the coefficients that it lacks."""
-
-COEFFICIENTS = ("restitution", "torsional_friction", "rolling_friction", "friction")
-"""Coefficients of materials that an engine may lack."""
+from dynx.world.registry import register, world_names
 
 
 @dataclass(frozen=True)
@@ -34,12 +28,13 @@ class Run:
 
 @dataclass(frozen=True)
 class Measured:
-    """Figures of a run, and the coefficients that the engine lacks, each with its reason."""
+    """Figures of a run."""
 
     figures: tuple[Figure, ...]
     version: str = ""
     """Version of the engine."""
     lacking: Mapping[str, str] = field(default_factory=dict)
+    """Coefficients that the engine does not have as the scene states them, each with its reason."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +55,7 @@ def carry_out(run: Run) -> Measured | Unmeasured:
     try:
         with World(scene, run.engine, run.dt, **run.settings) as world:
             version = world.version
+            lacking = {each.quantity: str(each) for each in world.inexact_materials()}
             figures = tuple(run.case.measure(world, parameters))
     except NotInstalledError:
         raise
@@ -67,16 +63,4 @@ def carry_out(run: Run) -> Measured | Unmeasured:
         return Unmeasured("refused", str(error))
     except DynxError as error:
         return Unmeasured("error", f"{type(error).__name__}: {error}")
-    return Measured(figures, version, lacking_coefficients(run, scene))
-
-
-def lacking_coefficients(run: Run, scene: Scene) -> dict[str, str]:
-    """Return the coefficients of the materials of a scene that the engine lacks, with the engine's reason."""
-    if STRICT not in world_class(run.engine).settings:
-        return {}
-    try:
-        World(scene, run.engine, run.dt, **{**run.settings, STRICT: True}).close()
-    except UnsupportedFeatureError as error:
-        named = [each for each in COEFFICIENTS if each in str(error)]
-        return dict.fromkeys(named[:1], str(error))
-    return {}
+    return Measured(figures, version, lacking)

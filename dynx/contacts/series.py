@@ -53,7 +53,8 @@ def collect(trial: TrialOfEngine, outcomes: Sequence[Measured | Unmeasured | Non
     measured = [outcome for outcome in outcomes if isinstance(outcome, Measured)]
     if len(measured) < len(outcomes):
         return []
-    lacking = measured[0].lacking
+    # An engine may have a coefficient in short steps only.
+    lacking = measured[-1].lacking
     series = []
     for number, first in enumerate(measured[0].figures):
         reasons = [lacking[name] for name in first.rests_on if name in lacking]
