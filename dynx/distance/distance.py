@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,6 +51,10 @@ class Distance:
         """Difference of the bounds [m], at least 0: the largest error of the distance."""
         return max(0.0, self.upper - self.lower)
 
+    def swapped(self) -> Distance:
+        """Return the distance of b and a."""
+        return Distance(self.lower, self.upper, self.point_b, self.point_a, -self.normal)
+
 
 def distance(
     shape_a: ConvexShape | Plane, T_a: Pose | ArrayLike, shape_b: ConvexShape | Plane, T_b: Pose | ArrayLike
@@ -60,7 +65,9 @@ def distance(
     anything that is no convex shape, the errors of `Mesh.hull`, and those of invalid poses.
     """
     poses = _checked_pose("T_a", T_a), _checked_pose("T_b", T_b)
-    return distance_of(_prepared(shape_a), poses[0], _prepared(shape_b), poses[1])
+    found = distance_of(_prepared(shape_a), poses[0], _prepared(shape_b), poses[1])
+    assert found is not None
+    return found
 
 
 def support(shape: ConvexShape | Plane, T: Pose | ArrayLike, direction: ArrayLike) -> tuple[float, Floats]:
@@ -105,20 +112,27 @@ NORMAL_ROUNDING = 1e-15
 """Difference of a direction from the normal of a half-space that is rounding."""
 
 
-def distance_of(a: Core | None, T_a: Floats, b: Core | None, T_b: Floats) -> Distance:
-    """Return the distance of two cores at checked poses (4, 4), where None is a half-space."""
+def distance_of(
+    a: Core | None, T_a: Floats, b: Core | None, T_b: Floats, limit: float = math.inf
+) -> Distance | None:
+    """Return the distance of two cores at checked poses (4, 4), where None is a half-space.
+
+    Returns None where the distance is certainly larger than `limit`.
+    """
     p_a, p_b = T_a[:3, 3], T_b[:3, 3]
     if a is None or b is None:
         if a is not None:
             return _height(a, T_a, T_b)
         if b is not None:
-            return _swapped(_height(b, T_b, T_a))
+            return _height(b, T_b, T_a).swapped()
         raise ArgumentError("both shapes are planes; the distance of two half-spaces is not defined")
     between = _tuple(p_b - p_a)
     a.place(T_a[:3, :3], (0.0, 0.0, 0.0))
     b.place(T_b[:3, :3], between)
     guess = (-between[0], -between[1], -between[2]) if any(between) else (0.0, 0.0, 1.0)
-    pair = CorePair(a, b, guess).run()
+    pair = CorePair(a, b, guess).run(limit + a.radius + b.radius)
+    if pair.lower > limit + a.radius + b.radius:
+        return None
     if pair.separated:
         normal = np.array(pair.normal)
         on_a, on_b = np.array(pair.point_a), np.array(pair.point_b)
@@ -152,10 +166,6 @@ def _height(a: Core, T_a: Floats, T_plane: Floats) -> Distance:
 def _normal(T_plane: Floats) -> Floats:
     up = T_plane[:3, 2]
     return np.asarray(up / np.linalg.norm(up))
-
-
-def _swapped(found: Distance) -> Distance:
-    return Distance(found.lower, found.upper, found.point_b, found.point_a, -found.normal)
 
 
 def _prepared(shape: ConvexShape | Plane) -> Core | None:

@@ -10,6 +10,7 @@ on termination) and becomes a vertex, until the bounds meet.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from dynx.distance.cores import Core
@@ -49,8 +50,9 @@ class CorePair:
         and the points mean nothing."""
         return self.lower > 0.0
 
-    def run(self) -> CorePair:
-        """Search until the bounds meet or rounding prevents progress; return the pair."""
+    def run(self, limit: float = math.inf) -> CorePair:
+        """Search until the bounds meet or rounding prevents progress, or until the lower bound exceeds
+        `limit`; return the pair."""
         a, b = self.a, self.b
         direction = self.normal
         on_a: list[Vector3] = []
@@ -68,8 +70,8 @@ class CorePair:
             if better:
                 self.lower = separation
                 self.normal = (direction[0] / length, direction[1] / length, direction[2] / length)
-            limit = TOLERANCE * self.upper + ROUNDING * size
-            if (simplex and self.upper - self.lower <= limit) or w in simplex:
+            enough = TOLERANCE * self.upper + ROUNDING * size
+            if (simplex and self.upper - self.lower <= enough) or w in simplex or self.lower > limit:
                 break
             on_a.append(p)
             on_b.append(q)

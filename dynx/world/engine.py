@@ -140,10 +140,13 @@ class WorldEngine(ABC):
         """Return the contacts of the last step with their forces; after a change of the state, those of the
         new state without forces. Pairs that do not collide are left out."""
 
-    @abstractmethod
     def closest(self, a: int, b: int, within: float) -> TouchingPoint | None:
-        """Return the nearest points of two colliders, whether or not they may touch; None if they are
-        farther apart than `within` [m]."""
+        """Return the engine's own nearest points of two colliders, whether or not they may touch; None if
+        they are farther apart than `within` [m].
+
+        Raises EngineLimitError where the engine computes none.
+        """
+        raise EngineLimitError(f"{self.name} has no distances of its own; leave native out for those of dynx")
 
     @abstractmethod
     def cast_rays(self, origins: Floats, directions: Floats, length: float) -> Sequence[RayHit]:

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dynx.world.boxes import shape_box
 from dynx.world.engine import WorldEngine
+from dynx.world.geometry.boxes import shape_box
 from dynx.world.layout import Collider
 
 DEPTH = 1e-3

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.distance import Distance
 from dynx.errors import ArgumentError, ShapeError, UnknownNameError, shown
 from dynx.model.configuration import MAX_MAGNITUDE, checked_array, checked_vector, is_real
 from dynx.spatial.scalar import Floats
-from dynx.world.boxes import collider_box
 from dynx.world.contacts import ClosestPoints, Contact, RayHits
 from dynx.world.engine import TouchingPoint, WorldEngine
+from dynx.world.geometry.boxes import collider_box
+from dynx.world.geometry.distances import Distances
 from dynx.world.layout import Layout
 from dynx.world.scene import Scene
 from dynx.world.state import WorldState
@@ -28,6 +32,7 @@ class Queries:
         self._scene = scene
         self._layout = layout
         self._names = tuple(collider.name for collider in layout.colliders)
+        self._distances = Distances(layout)
         self._number = {name: k for k, name in enumerate(self._names)}
 
     def contacts(self, engine: WorldEngine) -> tuple[Contact, ...]:
@@ -48,21 +53,27 @@ class Queries:
             for p in points
         )
 
-    def closest_points(self, engine: WorldEngine, a: str, b: str, within: float) -> tuple[ClosestPoints, ...]:
-        """Return the nearest points of each pair of parts, nearest pair first."""
+    def closest_points(
+        self, engine: WorldEngine, state: WorldState, a: str, b: str, within: float, native: bool
+    ) -> tuple[ClosestPoints, ...]:
+        """Return the nearest points of each pair of parts, nearest pair first, by dynx or by the engine."""
         if not is_real(within) or not 0.0 <= within < MAX_MAGNITUDE:
             raise ArgumentError(f"within is {shown(within)}; wanted a number of at least 0 [m]")
         first, second = self._colliders(a), self._colliders(b)
-        found = []
-        for i in first:
-            for j in second:
-                point = None if i == j else engine.closest(i, j, float(within))
-                if point is not None:
-                    names = self._names[i], self._names[j]
-                    found.append(
-                        ClosestPoints(*names, point.point_a, point.point_b, point.normal, point.distance)
-                    )
-        return tuple(sorted(found, key=lambda points: points.distance))
+        points: list[ClosestPoints] = []
+        if native:
+            for i, j in product(first, second):
+                found = engine.closest(i, j, float(within)) if i != j else None
+                if found is not None:
+                    points.append(self._nearest(i, j, found))
+        else:
+            distances = self._distances.closest(state, first, second, float(within))
+            points += [self._nearest(i, j, found) for i, j, found in distances]
+        return tuple(sorted(points, key=lambda each: each.distance))
+
+    def _nearest(self, i: int, j: int, found: TouchingPoint | Distance) -> ClosestPoints:
+        names = self._names[i], self._names[j]
+        return ClosestPoints(*names, found.point_a, found.point_b, found.normal, found.distance)
 
     def aabb(self, state: WorldState, name: str) -> tuple[Floats, Floats]:
         """Return the corners of the smallest box that holds the boxes of all links of a part."""

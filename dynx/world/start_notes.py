@@ -8,8 +8,8 @@ import numpy as np
 
 from dynx.errors import shown
 from dynx.spatial.so3 import quat_from_rotation, quat_log
-from dynx.world.boxes import owner_pose
 from dynx.world.engine import WorldEngine
+from dynx.world.geometry.boxes import owner_pose
 from dynx.world.layout import ConstraintLayout
 from dynx.world.overlaps import overlaps_of
 from dynx.world.scene import Scene

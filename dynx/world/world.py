@@ -276,10 +276,13 @@ class World:
         """Return the coefficients of contact that the engine does not have as the scene states them."""
         return inexact_materials(self._motion.engine)
 
-    def closest_points(self, a: str, b: str, within: float = 1.0) -> tuple[ClosestPoints, ...]:
-        """Return the nearest points of two parts, nearest first: one entry for each pair of their links at
-        most `within` [m] apart. A part is a body, ``robot/link``, or a robot for all its links."""
-        return self._queries.closest_points(self._motion.engine, a, b, within)
+    def closest_points(
+        self, a: str, b: str, within: float = 1.0, *, native: bool = False
+    ) -> tuple[ClosestPoints, ...]:
+        """Return the nearest points of two parts (a body, ``robot/link``, a robot), nearest first: one entry
+        for each pair of their links at most `within` [m] apart, by `dynx.distance` or, if `native`, by the
+        engine."""
+        return self._queries.closest_points(self._motion.engine, self.state, a, b, within, native)
 
     def aabb(self, name: str) -> tuple[Floats, Floats]:
         """Return the lower and upper corner (3,) of the box around a part, along the axes of the world."""

@@ -13,7 +13,7 @@ from dynx import Pose
 from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, Shape, Sphere
 from dynx.spatial.so3 import rotation_from_rpy
 from dynx.world import Scene, SceneBody, SceneRobot, World, box, ground, sphere
-from dynx.world.boxes import shape_box
+from dynx.world.geometry.boxes import shape_box
 from tests.world.engines import WORLDS
 
 angles = st.floats(-3.0, 3.0)

@@ -11,7 +11,7 @@ from dynx.model import Pose
 from dynx.model.elements import Vector
 from dynx.model.geometry import Plane
 from dynx.spatial.scalar import Floats
-from dynx.world.boxes import Corners, shape_box
+from dynx.world.geometry.boxes import Corners, shape_box
 from dynx.world.scene import SceneBody, SceneRobot
 from dynx.world.scene.link_frames import LinkFrames
 

@@ -9,11 +9,9 @@ from numpy.testing import assert_allclose
 import dynx
 from dynx import Pose
 from dynx.engines.drake.world.build import build_scene
-from dynx.engines.drake.world.distances import support
 from dynx.engines.drake.world.engine import DrakeWorld
 from dynx.errors import SingularMassMatrixError, UnsupportedFeatureError
-from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, Shape, Sphere
-from dynx.spatial.so3 import rotation_from_rpy
+from dynx.model.geometry import Box, Collision, HeightField
 from dynx.world import Material, PointToPoint, Scene, SceneBody, SceneRobot, Weld, World, box, ground, sphere
 from dynx.world.layout import Layout
 from dynx.world.preparation import prepare
@@ -121,21 +119,6 @@ def test_mimic_joints_stay_coupled() -> None:
     assert_allclose(q[-1], q[-2], atol=1e-6)
 
 
-SOLIDS = (Box((0.2, 0.4, 0.6)), Sphere(0.3), Cylinder(0.2, 0.5), Capsule(0.2, 0.5))
-
-
-@pytest.mark.parametrize("shape", SOLIDS, ids=lambda shape: type(shape).__name__)
-def test_the_support_of_a_solid_is_where_its_box_ends(shape: Shape) -> None:
-    from dynx.world.boxes import shape_box
-
-    for seed in range(5):
-        T = np.eye(4)
-        T[:3, :3] = R = rotation_from_rpy(np.random.default_rng(seed).uniform(-3, 3, 3))
-        _, upper = shape_box(shape, T)
-        for axis in range(3):
-            assert (R @ support(shape, R[axis]))[axis] == pytest.approx(upper[axis], abs=1e-12)
-
-
 def test_distances_to_the_ground_and_to_one_another() -> None:
     bodies = (
         ground(),
@@ -143,9 +126,9 @@ def test_distances_to_the_ground_and_to_one_another() -> None:
         box("cube", (0.2,) * 3, mass=1.0, pose=Pose((1.0, 0, 0.3))),
     )
     with World(Scene("s", bodies=bodies), "drake") as world:
-        (down,) = world.closest_points("ball", "ground", 1.0)
-        (aside,) = world.closest_points("cube", "ball", 1.0)
-        assert world.closest_points("cube", "ball", 0.1) == ()
+        (down,) = world.closest_points("ball", "ground", 1.0, native=True)
+        (aside,) = world.closest_points("cube", "ball", 1.0, native=True)
+        assert world.closest_points("cube", "ball", 0.1, native=True) == ()
     assert down.distance == pytest.approx(0.4)
     assert_allclose(down.normal, [0, 0, 1.0], atol=1e-9)
     assert_allclose(down.point_b, [0, 0, 0], atol=1e-9)

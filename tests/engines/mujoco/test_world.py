@@ -127,8 +127,8 @@ def test_the_normal_of_shapes_that_just_touch() -> None:
     bodies = (ground(), SceneBody("ball", (Collision(Sphere(0.5)),), mass=1.0, pose=Pose((0.3, 0, 0.5))))
     other = SceneBody("other", (Collision(Sphere(0.5)),), mass=1.0, pose=Pose((0.3, 1.0, 0.5)))
     with World(Scene("s", bodies=(*bodies, other)), "mujoco") as world:
-        (below,) = world.closest_points("ground", "ball", 1.0)
-        (beside,) = world.closest_points("ball", "other", 1.0)
+        (below,) = world.closest_points("ground", "ball", 1.0, native=True)
+        (beside,) = world.closest_points("ball", "other", 1.0, native=True)
     assert_allclose(below.normal, [0, 0, -1.0], atol=1e-6)
     assert_allclose(beside.normal, [0, -1.0, 0], atol=1e-4)
     assert_allclose([below.distance, beside.distance], 0.0, atol=1e-9)

@@ -13,10 +13,11 @@ from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
+from dynx.distance import distance
 from dynx.engines.drake.library import DRAKE_FAILURES, captured_log, drake_version, error_message
 from dynx.engines.drake.world.build import build_scene
 from dynx.engines.drake.world.contacts import read_contacts, touching_point
-from dynx.engines.drake.world.distances import closest_of_pair, closest_to_plane
+from dynx.engines.drake.world.distances import closest_of_pair
 from dynx.engines.drake.world.materials import effective_materials
 from dynx.engines.drake.world.options import SETTINGS
 from dynx.errors import ClosedError, DynxError, EngineError, shown
@@ -25,9 +26,9 @@ from dynx.rbd.kinematics import body_poses
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.world.engine import RayHit, TouchingPoint, WorldEngine
+from dynx.world.geometry.ray_casting import cast_on_shape
 from dynx.world.layout import WORLD, Collider, Layout
 from dynx.world.materials import EffectiveCoefficient
-from dynx.world.ray_casting import cast_on_shape
 from dynx.world.settings import Setting
 from dynx.world.state import BodyState, RobotState
 
@@ -214,16 +215,17 @@ class DrakeWorld(WorldEngine):
         return nearest if nearest is not None and nearest.distance <= within else None
 
     def _closest_to_planes(self, a: int, b: int) -> list[TouchingPoint]:
+        """Return the nearest points of a ground and other shapes by dynx: Drake has them for balls only."""
         found = []
-        colliders = self.layout.colliders
-        for plane, other in ((a, b), (b, a)):
-            T_plane, T_other = self._pose(colliders[plane]), self._pose(colliders[other])
-            for ground in colliders[plane].shapes:
-                for placed in colliders[other].shapes:
-                    if isinstance(ground.shape, Plane) and not isinstance(placed.shape, Plane | HeightField):
-                        at = T_plane @ ground.T, placed.shape, T_other @ placed.T
-                        point = closest_to_plane((plane, other), *at)
-                        found.append(point if plane == a else _swapped(point))
+        first, second = self.layout.colliders[a], self.layout.colliders[b]
+        T_first, T_second = self._pose(first), self._pose(second)
+        for one in first.shapes:
+            for other in second.shapes:
+                planes = isinstance(one.shape, Plane) + isinstance(other.shape, Plane)
+                if planes != 1 or isinstance(one.shape, HeightField) or isinstance(other.shape, HeightField):
+                    continue
+                near = distance(one.shape, T_first @ one.T, other.shape, T_second @ other.T)
+                found.append(TouchingPoint(a, b, near.point_a, near.point_b, near.normal, near.distance))
         return found
 
     @_engine_errors
@@ -272,7 +274,3 @@ class DrakeWorld(WorldEngine):
 
 def _is_plane(collider: Collider) -> bool:
     return any(isinstance(placed.shape, Plane) for placed in collider.shapes)
-
-
-def _swapped(point: TouchingPoint) -> TouchingPoint:
-    return TouchingPoint(point.b, point.a, point.point_b, point.point_a, -point.normal, point.distance)

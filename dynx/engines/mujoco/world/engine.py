@@ -24,9 +24,9 @@ from dynx.errors import ClosedError, DynxError, EngineError, nonblank_lines, sho
 from dynx.model.geometry import HeightField
 from dynx.spatial.scalar import Floats
 from dynx.world.engine import RayHit, TouchingPoint, WorldEngine
+from dynx.world.geometry.ray_casting import cast_on_shape
 from dynx.world.layout import Layout
 from dynx.world.materials import EffectiveCoefficient
-from dynx.world.ray_casting import cast_on_shape
 from dynx.world.state import BodyState, RobotState
 
 _MISS = RayHit(None, np.inf, np.full(3, np.nan))

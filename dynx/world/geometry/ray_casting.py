@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Sphere
 from dynx.spatial.scalar import Floats
-from dynx.world.height_field_rays import cast_on_height_field
+from dynx.world.geometry.height_field_rays import cast_on_height_field
 
 MAX_PRODUCTS = 2_000_000
 """Largest number of pairs of a ray and a face of a hull that are computed at once."""
