@@ -155,7 +155,9 @@ def main() -> None:
         found = check_entries(entries, Path(folder))
     verdicts = []
     for entry, of_engines in zip(entries, found, strict=True):
-        refusing = [each["engine"] for each in entry["engines"] if each["refused_after"]]
+        refusing = [
+            each["engine"] for each in entry["engines"] if each["refused_after"] or each["not_used_after"]
+        ]
         messages = {
             engine: message or f"{gap:.1e}"
             for engine, (gap, message) in of_engines.items()
@@ -168,7 +170,7 @@ def main() -> None:
             print(f"DIFFERS: {entry['path']}, {entry['base']}: {engine} {message[:200]}")
     for whole in (True, False):
         of = [each for each in verdicts if whole == (not each["refusing"])]
-        what = "that all engines load" if whole else "that an engine refuses, as the report states"
+        what = "that all engines load" if whole else "on which an engine is of no use, as the report states"
         print(f"files {what}: {sum(not each['apart'] for each in of)} of {len(of)} alike within {BAR:g}")
     if options.json:
         options.json.write_text(json.dumps(verdicts), encoding="utf-8")

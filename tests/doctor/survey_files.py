@@ -199,6 +199,8 @@ def remarks(entry: Entry) -> Iterator[str]:
     for each in entry["engines"]:
         if each["refused_after"]:
             yield f"{each['engine']} does not load it: {each['refused_after']}"
+        elif each["not_used_after"]:
+            yield f"{each['engine']} is not used: {each['not_used_after']}"
 
 
 def summary(entries: Sequence[Entry], root: Path) -> Iterator[str]:
