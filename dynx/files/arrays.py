@@ -19,6 +19,9 @@ from dynx.errors import ArgumentError, shown
 from dynx.files.reading import checked_path, open_regular, printable
 from dynx.files.writing import atomic_file
 
+WORLD_FILE = b"dynx world "
+"""Beginning of the files of worlds, whatever their version."""
+
 SCHEMA_ENTRY = "schema"
 """Entry of a file with the name and version of its layout."""
 
@@ -81,7 +84,13 @@ def read_arrays(path: str | os.PathLike[str], what: str, schema: str | None = No
     try:
         with open_regular(path) as file:
             if not zipfile.is_zipfile(file):
-                raise ValueError("it is not a .npz file, or it is truncated")
+                file.seek(0)
+                head = file.read(len(WORLD_FILE))
+                raise ValueError(
+                    "it is a file of World.write, which dynx.world.World.read reads"
+                    if head == WORLD_FILE
+                    else "it is not a .npz file, or it is truncated"
+                )
             size = os.fstat(file.fileno()).st_size
             with zipfile.ZipFile(file) as archive:
                 parts = archive.infolist()

@@ -10,10 +10,10 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
-from types import UnionType
-from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar
 
-from dynx.errors import ArgumentError, nearest, shown
+from dynx.errors import ArgumentError
+from dynx.files.document_checks import check_document
 
 SCHEMA_DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
@@ -64,36 +64,18 @@ def read_document(text: str, document_class: type[T]) -> T:
 def convert_document(document: object, document_class: type[T]) -> T:
     """Convert a document of text and numbers to `document_class`, a dataclass.
 
-    Raises ArgumentError for an unknown key, naming the nearest, and for a value of another type.
+    Raises ArgumentError for an unknown key, naming the nearest, and for a value of another type, with the
+    place.
     """
     import msgspec
 
     try:
-        _refuse_unknown_keys(document, document_class, "")
+        check_document(document, document_class)
         return msgspec.convert(document, document_class)
     except msgspec.ValidationError as error:
         raise ArgumentError(str(error).replace("`$.", "`")) from None
     except RecursionError as error:
         raise ArgumentError(f"the document is nested too deeply: {error}") from None
-
-
-def _refuse_unknown_keys(part: object, kind: Any, place: str) -> None:
-    """Raise ArgumentError for a key that the class of this part of a document does not have."""
-    if get_origin(kind) in (Union, UnionType):
-        kind = next((each for each in get_args(kind) if each is not type(None)), kind)
-    if isinstance(part, list) and get_origin(kind) is list:
-        for k, each in enumerate(part):
-            _refuse_unknown_keys(each, get_args(kind)[0], f"{place}[{k}]")
-    elif isinstance(part, Mapping) and get_origin(kind) is dict:
-        for key, each in part.items():
-            _refuse_unknown_keys(each, get_args(kind)[1], f"{place}.{key}")
-    elif isinstance(part, Mapping) and is_dataclass(kind):
-        known = get_type_hints(kind)
-        for key, each in part.items():
-            if key not in known:
-                where = f"{place.removeprefix('.')} has" if place else "there is"
-                raise ArgumentError(f"{where} no key {shown(key)}{nearest(str(key), known)}")
-            _refuse_unknown_keys(each, known[key], f"{place}.{key}")
 
 
 def json_schema(document_class: type[Any], title: str, *, omits_defaults: bool = False) -> dict[str, Any]:

@@ -2,8 +2,16 @@
 
 from __future__ import annotations
 
-from dynx.errors import BackendError, NotInstalledError, UnknownBackendError
+from dynx.errors import (
+    ArgumentError,
+    BackendError,
+    NotInstalledError,
+    UnknownBackendError,
+    nearest,
+    shown,
+)
 from dynx.registry import ClassRegistry
+from dynx.world.camera.drawing import Draw
 from dynx.world.engine import WorldEngine
 
 GROUP = "dynx.worlds"
@@ -37,3 +45,17 @@ def installed_worlds() -> tuple[str, ...]:
     if not found:
         raise NotInstalledError("no engine for worlds is installed: pip install 'dynx[mujoco]'")
     return tuple(found)
+
+
+def renderer_of(name: str) -> Draw:
+    """Return the renderer of an engine. Raises UnknownBackendError for another name."""
+    if not isinstance(name, str):
+        raise ArgumentError(
+            f"renderer is {shown(name)}; wanted the name of an engine, or None for dynx's own"
+        )
+    if name not in world_names():
+        raise UnknownBackendError(
+            f"no renderer {shown(name)}; wanted None, for that of dynx, or 'pybullet', for PyBullet's in "
+            f"software{nearest(name, ['pybullet'])}"
+        )
+    return world_class(name).draw

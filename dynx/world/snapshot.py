@@ -14,10 +14,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from dynx.errors import ArgumentError, shown
+from dynx.files.arrays import WORLD_FILE
 from dynx.files.reading import checked_path, open_regular, printable
 from dynx.files.writing import write_bytes
 
-MAGIC = b"dynx world 1\n"
+MAGIC = WORLD_FILE + b"1\n"
 MAX_BYTES = 1 << 30
 """Largest file that is read."""
 
@@ -96,7 +97,7 @@ def read_snapshot(path: str | os.PathLike[str]) -> tuple[Snapshot, dict[str, Any
         raise ArgumentError(f"{name} cannot be read: {error.strerror or error}") from None
     start = len(MAGIC) + hashlib.sha256().digest_size
     if not data.startswith(MAGIC):
-        raise ArgumentError(f"{name} is no file that World.write wrote, or is of another version of it")
+        raise ArgumentError(f"{name} is no file that World.write wrote{_other_kind(data, name)}")
     content = data[start:]
     if len(data) > MAX_BYTES or hashlib.sha256(content).digest() != data[len(MAGIC) : start]:
         raise ArgumentError(f"{name} is damaged: its content does not match its checksum")
@@ -107,6 +108,17 @@ def read_snapshot(path: str | os.PathLike[str]) -> tuple[Snapshot, dict[str, Any
     # The header of a file that was not written by dynx may have any form.
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise ArgumentError(f"{name} cannot be read as a world: {error}") from error
+
+
+def _other_kind(data: bytes, name: str) -> str:
+    """Return what a file is that `write_snapshot` did not write, for a message."""
+    if data.startswith(WORLD_FILE):
+        return " in this version of dynx"
+    if data.startswith(b"PK"):
+        return "; a record of a simulation is read by dynx.Rollout.load"
+    if name.lower().endswith((".toml", ".json")):
+        return "; a scene is read by dynx.world.read_scene"
+    return ""
 
 
 def _snapshot(header: dict[str, Any], data: bytes) -> Snapshot:

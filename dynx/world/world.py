@@ -23,7 +23,7 @@ from dynx.world.motion import Motion
 from dynx.world.overlaps import Overlap, overlaps_of
 from dynx.world.preparation import prepare
 from dynx.world.queries import MAX_RAY_LENGTH, Queries
-from dynx.world.registry import world_class
+from dynx.world.registry import renderer_of, world_class
 from dynx.world.running import run_for
 from dynx.world.scene import Scene
 from dynx.world.scene.paths import ScenePaths
@@ -298,7 +298,7 @@ class World:
 
     def camera(self, camera: Camera, renderer: str | None = None) -> Picture:
         """Return what a camera sees, drawn by dynx or by the renderer of an engine (``"pybullet"``)."""
-        draw = cast_rays if renderer is None else world_class(renderer).draw
+        draw = cast_rays if renderer is None else renderer_of(renderer)
         return draw_picture(self.scene, self.state, camera, draw)
 
     # -- end ----------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import dynx
 from dynx.errors import ArgumentError
 from dynx.spatial.scalar import Floats
 from dynx.world import PositionMotor, Scene, VelocityMotor, World, box, ground
@@ -103,3 +104,17 @@ def test_reset_returns_to_the_start(engine: str) -> None:
         assert (world.state.bodies["b"].T_world_body == start.bodies["b"].T_world_body).all()
         world.step(50)
         assert (world.state.bodies["b"].T_world_body == first.bodies["b"].T_world_body).all()
+
+
+def test_files_of_another_kind_name_the_function_that_reads_them(tmp_path: Path) -> None:
+    world_file, npz, toml = (str(tmp_path / name) for name in ("a.world", "b.npz", "c.toml"))
+    with World(Scene("s", bodies=(box("a", (1, 1, 1), mass=1.0),)), "pybullet") as world:
+        world.write(world_file)
+    np.savez(npz, x=np.zeros(3))
+    Path(toml).write_text("schema = 'dynx.scene/1'")
+    with pytest.raises(ArgumentError, match=r"a file of World.write, which dynx.world.World.read reads"):
+        dynx.Rollout.load(world_file)
+    with pytest.raises(ArgumentError, match=r"read by dynx.Rollout.load"):
+        World.read(npz)
+    with pytest.raises(ArgumentError, match=r"a scene is read by dynx.world.read_scene"):
+        World.read(toml)

@@ -75,7 +75,11 @@ class Camera:
         right = np.cross(forward, above)
         length = float(np.linalg.norm(right))
         if length <= 1e-9 * float(np.linalg.norm(above)):
-            raise ArgumentError(f"up is {above.tolist()}, along the view; wanted another direction")
+            across = np.eye(3)[int(np.argmin(np.abs(forward)))].tolist()
+            raise ArgumentError(
+                f"up is {above.tolist()}, along the view from eye to target; wanted another direction as "
+                f"the upper edge of the picture, such as up={across}"
+            )
         right = right / length
         R = np.stack([right, np.cross(forward, right), forward], axis=1)
         return cls(Pose.from_matrix(homogeneous(R, start), "the view"), **options)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +14,7 @@ from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.model import Inertial, Pose
 from dynx.model.configuration import checked_array, checked_pose
 from dynx.model.elements import IDENTITY, Vector
-from dynx.model.geometry import Box, Collision, HeightField, Plane, Sphere, solid_properties
+from dynx.model.geometry import Box, Collision, HeightField, Plane, Shape, Sphere, solid_properties
 from dynx.model.geometry.sizes import finite_numbers, finite_vector, positive_number
 from dynx.model.urdf.links import inertia_fault
 from dynx.spatial.scalar import Floats
@@ -42,6 +42,20 @@ class SceneBody:
     center_of_mass: Vector | None = None
     twist: tuple[float, ...] = (0.0,) * 6
     material: Material = DEFAULT_MATERIAL
+
+    if TYPE_CHECKING:
+        # Type checkers see what is accepted; the fields hold what is made of it.
+        def __init__(
+            self,
+            name: str,
+            shapes: Shape | Collision | Sequence[Shape | Collision],
+            pose: Pose | ArrayLike = IDENTITY,
+            mass: float | None = None,
+            inertia: ArrayLike | None = None,
+            center_of_mass: ArrayLike | None = None,
+            twist: ArrayLike = ...,
+            material: Material = DEFAULT_MATERIAL,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         checked_name("body", self.name)
@@ -101,7 +115,7 @@ def ground(
     name: str = "ground", *, pose: Pose | ArrayLike = IDENTITY, material: Material = DEFAULT_MATERIAL
 ) -> SceneBody:
     """Return a fixed plane, the half-space below z = 0 of `pose`."""
-    return SceneBody(name, Plane(), checked_pose("pose", pose), material=material)  # type: ignore[arg-type]
+    return SceneBody(name, Plane(), checked_pose("pose", pose), material=material)
 
 
 def box(name: str, size: ArrayLike, **options: object) -> SceneBody:

@@ -57,8 +57,11 @@ def scene_from_document(document: object, paths: ScenePaths | None = None) -> Sc
     elsewhere names no file that is read as a robot. Raises ArgumentError, DescriptionError and their kinds,
     naming the place in the document.
     """
-    if not isinstance(document, Mapping) or document.get("schema") != SCHEMA:
-        raise ArgumentError(f"a scene's document has schema {SCHEMA!r}; this one does not")
+    if not isinstance(document, Mapping):
+        raise ArgumentError(f"a scene's document is a table of keys; this is {shown(document)}")
+    if document.get("schema") != SCHEMA:
+        found = f"is {shown(document['schema'])}" if "schema" in document else "is absent"
+        raise ArgumentError(f"schema {found}; wanted schema = {SCHEMA!r}")
     given = convert_document(document, SceneDocument)
     robots, bodies, constraints = [], [], []
     for k, robot in enumerate(given.robots):
@@ -75,9 +78,9 @@ def scene_from_document(document: object, paths: ScenePaths | None = None) -> Sc
         tuple(robots),
         tuple(bodies),
         tuple(constraints),
-        given.ignored,  # type: ignore[arg-type]
-        given.groups,  # type: ignore[arg-type]
-        given.gravity,  # type: ignore[arg-type]
+        given.ignored,
+        given.groups,
+        given.gravity,
     )
 
 
@@ -109,7 +112,7 @@ def _robot(given: RobotDocument, paths: ScenePaths | None) -> SceneRobot:
         q,
         _coordinates("v", given.v, model, model.nv),
         _material(given.material),
-        {link: _material(each) for link, each in given.materials.items()},  # type: ignore[arg-type]
+        {link: _material(each) for link, each in given.materials.items()},
         given.self_collision,
         tuple(_motor(k, each) for k, each in enumerate(given.motors)),
     )
@@ -191,9 +194,9 @@ def _body(given: BodyDocument, paths: ScenePaths) -> SceneBody:
         tuple(_shape(each, paths) for each in shapes),
         _pose("pose", given.pose) or IDENTITY,
         given.mass,
-        given.inertia,  # type: ignore[arg-type]
-        given.center_of_mass,  # type: ignore[arg-type]
-        (0.0,) * 6 if given.twist is None else given.twist,  # type: ignore[arg-type]
+        given.inertia,
+        given.center_of_mass,
+        (0.0,) * 6 if given.twist is None else given.twist,
         _material(given.material),
     )
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
@@ -34,6 +35,20 @@ class SceneRobot:
     materials: tuple[tuple[str, Material], ...] = ()
     self_collision: bool = False
     motors: tuple[Motor, ...] = ()
+
+    if TYPE_CHECKING:
+        # Type checkers see what is accepted; the fields hold what is made of it.
+        def __init__(
+            self,
+            name: str,
+            model: Model,
+            q: ArrayLike | None = None,
+            v: ArrayLike | None = None,
+            material: Material = DEFAULT_MATERIAL,
+            materials: Mapping[str, Material] | Iterable[tuple[str, Material]] = (),
+            self_collision: bool = False,
+            motors: Motor | Iterable[Motor] = (),
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         checked_name("robot", self.name)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
+
+from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model.configuration import checked_gravity
@@ -36,6 +39,19 @@ class Scene:
     groups: tuple[tuple[str, tuple[str, ...]], ...] = ()
     gravity: Vector = STANDARD_GRAVITY
 
+    if TYPE_CHECKING:
+        # Type checkers see what is accepted; the fields hold what is made of it.
+        def __init__(
+            self,
+            name: str = "scene",
+            robots: Iterable[SceneRobot] = (),
+            bodies: Iterable[SceneBody] = (),
+            constraints: Iterable[Constraint] = (),
+            ignored: Iterable[Sequence[str]] = (),
+            groups: Mapping[str, Iterable[str]] | Iterable[tuple[str, Iterable[str]]] = (),
+            gravity: ArrayLike = STANDARD_GRAVITY,
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         put = object.__setattr__
         checked_name("scene", self.name)
@@ -49,7 +65,7 @@ class Scene:
             self, "groups", tuple((name, _names(f"group {shown(name)}", members)) for name, members in groups)
         )
         self._check_groups()
-        put(self, "ignored", tuple(_pair(pair) for pair in self.ignored))
+        put(self, "ignored", tuple(_pair(k, pair) for k, pair in enumerate(self.ignored)))
         for name in (name for pair in self.ignored for name in pair):
             if name not in self._groups:
                 self.require(name)
@@ -174,10 +190,10 @@ def _names(what: str, names: object) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _pair(pair: object) -> tuple[str, str]:
-    names = _names("a pair of ignored parts", pair)
+def _pair(k: int, pair: object) -> tuple[str, str]:
+    names = _names(f"ignored[{k}]", pair)
     if len(names) != 2:
-        raise ArgumentError(f"a pair of ignored parts is {shown(names)}; wanted two names")
+        raise ArgumentError(f"ignored[{k}] is {shown(list(names))}; wanted the names of two parts")
     return names[0], names[1]
 
 

@@ -94,6 +94,10 @@ def test_engines_without_a_renderer_are_refused() -> None:
             world.camera(Camera(), "mujoco")
         with pytest.raises(UnknownBackendError, match="did you mean 'pybullet'"):
             world.camera(Camera(), "bullet")
+        with pytest.raises(UnknownBackendError, match=r"'opengl'; wanted None, .* or 'pybullet'"):
+            world.camera(Camera(), "opengl")
+        with pytest.raises(ArgumentError, match="renderer is '1'"):
+            world.camera(Camera(), 1)  # type: ignore[arg-type]
         with pytest.raises(EngineLimitError, match="at most 1e5 times near"):
             world.camera(Camera(far=1e4), "pybullet")
 
@@ -113,3 +117,9 @@ def test_pictures_in_png_files_hold_colour_depth_and_parts(tmp_path: Path) -> No
         picture.write_png(tmp_path / "a.png", "colour")
     with pytest.raises(ArgumentError, match="written as"):
         picture.write_png(tmp_path / "a.jpg")
+
+
+def test_a_view_straight_down_names_the_argument_that_is_missing() -> None:
+    with pytest.raises(ArgumentError, match=r"along the view from .* such as up=\[1.0, 0.0, 0.0\]"):
+        Camera.look_at((0, 0, 2), (0, 0, 0))
+    assert Camera.look_at((0, 0, 2), (0, 0, 0), up=(1, 0, 0)).pose.matrix[2, 2] == pytest.approx(-1.0)

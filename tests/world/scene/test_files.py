@@ -102,7 +102,7 @@ def test_a_file_gives_an_equal_scene(suffix: str, tmp_path: Path) -> None:
     if suffix == ".toml":
         pytest.importorskip("tomli_w")
     heights = HeightField(((0.0, 0.1), (0.2, 0.3), (0.1, 0.0)), (2.0, 3.0))
-    scene = Scene("text \"with\" 'quotes' \\ and ünïcode", bodies=(SceneBody("hills", heights),))  # type: ignore[arg-type]
+    scene = Scene("text \"with\" 'quotes' \\ and ünïcode", bodies=(SceneBody("hills", heights),))
     path = tmp_path / f"scene{suffix}"
     write_scene(scene, path)
     assert read_scene(path) == scene
@@ -155,14 +155,14 @@ pose = [0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 1.0]
 BODY: dict[str, Any] = {"name": "b", "shape": {"box": [1, 1, 1]}}
 
 FAULTS: list[tuple[dict[str, Any], type[DynxError], str]] = [
-    ({"schema": "dynx.scene/2"}, ArgumentError, "has schema 'dynx.scene/1'"),
+    ({"schema": "dynx.scene/2"}, ArgumentError, "wanted schema = 'dynx.scene/1'"),
     ({"bodys": []}, ArgumentError, "no key 'bodys'; did you mean 'bodies'"),
     (
         {"bodies": [{**BODY, "masss": 1.0}]},
         ArgumentError,
-        r"bodies\[0\] has no key 'masss'; did you",
+        r"bodies\[0\], 'b' has no key 'masss'; did you",
     ),
-    ({"bodies": [{**BODY, "mass": "1"}]}, ArgumentError, r"bodies\[0\].mass"),
+    ({"bodies": [{**BODY, "mass": "1"}]}, ArgumentError, r"bodies\[0\], 'b': mass is '1'; wanted a number"),
     ({"bodies": [{**BODY, "mass": -1.0}]}, ArgumentError, r"bodies\[0\], 'b': mass of body 'b' is '-1"),
     ({"bodies": [{**BODY, "mass": float("nan")}]}, ArgumentError, "mass of body 'b' is 'nan"),
     ({"bodies": [{**BODY, "pose": [1.0, float("nan"), 0.0]}]}, NotFiniteError, r"bodies\[0\], 'b': pose"),

@@ -160,7 +160,7 @@ def test_every_shape_has_its_size_pose_and_material() -> None:
 
 def test_a_height_field_has_its_heights() -> None:
     heights = HeightField(((-0.5, 0.1, 0.2), (0.4, 0.3, 0.9)), (4.0, 2.0))
-    model, data = load(Scene("s", bodies=(SceneBody("hills", heights, Pose((0, 0, 0.5))),)))  # type: ignore[arg-type]
+    model, data = load(Scene("s", bodies=(SceneBody("hills", heights, Pose((0, 0, 0.5))),)))
     for row, column in np.ndindex(2, 3):
         x, y = 1.999 * (column - 1), 1.998 * (row - 0.5)
         distance = mujoco.mj_ray(model, data, [x, y, 5.0], [0, 0, -1.0], None, 1, -1, np.zeros(1, np.int32))
@@ -287,8 +287,8 @@ def test_a_body_is_loaded_from_its_urdf() -> None:
     visual = model.geometry.visuals(body.name)[0]
     assert visual.material is not None
     assert visual.material.rgba == body.material.rgba
-    fixed = dynx.load(body_to_urdf(SceneBody("floor", Plane())))  # type: ignore[arg-type]
+    fixed = dynx.load(body_to_urdf(SceneBody("floor", Plane())))
     assert fixed.links[0].inertial is None
-    hills = SceneBody("hills", HeightField(((0, 0), (0, 0)), (1, 1)))  # type: ignore[arg-type]
+    hills = SceneBody("hills", HeightField(((0, 0), (0, 0)), (1, 1)))
     with pytest.raises(DescriptionError, match="HeightField of link 'hills'"):
         body_to_urdf(hills)
