@@ -123,3 +123,36 @@ def test_stiff_motors_at_the_end_of_a_step_are_not_blamed() -> None:
             motors={"arm": PositionMotor(0.0, 1e9, 1e9, max_force=1.0)},
         )
     assert "gains" not in message
+
+
+@pytest.mark.parametrize("engine", FAST_WORLDS)
+def test_links_without_mass_between_three_axes_are_named(engine: str) -> None:
+    robot = SceneRobot("human", dynx.load("human"))
+    with World(Scene("falling", robots=(robot,)), engine, collisions=False) as world:
+        message = diverge(world)
+    assert "the links between 'human/left_hip_Z' and 'human/left_hip_Y' have no mass" in message
+
+
+def test_a_mass_matrix_that_is_singular_to_rounding_is_named() -> None:
+    model = dynx.load("icub")
+    scene = Scene("hanging", robots=(SceneRobot("icub", model, q=tuple(model.clip(model.neutral()))),))
+    with World(scene, "mujoco", collisions=False) as world:
+        message = diverge(world)
+    assert "the mass matrix of 'icub' is singular to rounding" in message
+    assert "almost no inertia about 'icub/neck_" in message
+    # The other solvers of MuJoCo minimise a function that is not convex for such a matrix.
+    with World(scene, "mujoco", collisions=False, solver="pgs") as world:
+        world.run(0.5)
+        assert abs(world.state.robots["icub"].v).max() < 100.0
+
+
+def test_a_robot_in_the_ground_diverges_and_one_above_it_does_not() -> None:
+    model = dynx.load("icub_reduced")
+    robot = SceneRobot("icub", model, q=tuple(model.clip(model.neutral())))
+    inside = Scene("inside", robots=(robot,), bodies=(ground(),))
+    with World(inside, "pybullet") as world, pytest.raises(DivergedError, match="'ground' overlap by 59"):
+        world.run(1.0)
+    above = Scene("above", robots=(robot,), bodies=(ground(pose=Pose((0, 0, -2))),))
+    with World(above, "pybullet") as world:
+        world.run(0.3)
+        assert abs(world.state.robots["icub"].v).max() < 100.0
