@@ -36,6 +36,9 @@ ASIDE = 5.0
 BELOW = 10.0
 """Distance of an order triangle below its line [pixels]."""
 
+APART_X, APART_Y = 40.0, 14.0
+"""Distances between the labels of two order triangles that do not touch [pixels]."""
+
 MAX_LABELS = 6
 """Largest number of labels on the axis of errors."""
 
@@ -110,9 +113,16 @@ def by_name(case: Entry) -> list[list[Entry]]:
 def _plot(figures: Sequence[Entry], steps: Sequence[float], engines: Sequence[str]) -> Plot:
     first = figures[0]
     axes = _Axes.around(figures, steps)
-    middle = 0.5 * (len(engines) - 1)
-    numbers = (engines.index(each["engine"]) for each in figures)
-    lines = (_line(each, axes, k, ASIDE * (k - middle)) for each, k in zip(figures, numbers, strict=True))
+    lines: list[Line] = []
+    for figure in figures:
+        number = engines.index(figure["engine"])
+        aside = ASIDE * (number - 0.5 * (len(engines) - 1))
+        points = axes.points(figure["errors"], aside)
+        cause = figure["attribution"]
+        changed = () if cause is None else axes.points(cause["errors"][-1], aside)
+        placed = [each.triangle for each in lines if each.triangle is not None]
+        triangle = None if figure["order"] is None else _triangle(figure["order"], points, axes, placed)
+        lines.append(Line(figure["engine"], number, points, changed, triangle))
     return Plot(
         figure_name(first),
         quantity_text(first["exact"], first["unit"]),
@@ -123,27 +133,23 @@ def _plot(figures: Sequence[Entry], steps: Sequence[float], engines: Sequence[st
     )
 
 
-def _line(figure: Entry, axes: _Axes, number: int, aside: float) -> Line:
-    points = axes.points(figure["errors"], aside)
-    found = figure["attribution"]
-    changed = () if found is None else axes.points(found["errors"][-1], aside)
-    triangle = None if figure["order"] is None else _triangle(figure["order"], points, axes)
-    return Line(figure["engine"], number, points, changed, triangle)
-
-
-def _triangle(order: float, points: Sequence[tuple[float, float]], axes: _Axes) -> Triangle | None:
-    """Return the triangle below the steepest interval of a line; None where there is no room for it."""
-    if order > MAX_ORDER or len(points) < 2:
-        return None
-    (right, upper), (left, lower) = max(pairwise(points), key=lambda pair: pair[1][1] - pair[0][1])
-    half = 0.25 * (right - left)
-    rise = axes.slope(order) * 2.0 * half
-    x, y = 0.5 * (left + right), 0.5 * (upper + lower) + BELOW
-    corners = ((x - half, y + 0.5 * rise), (x + half, y - 0.5 * rise), (x + half, y + 0.5 * rise))
-    if corners[0][1] > HEIGHT - BOTTOM:
-        return None
-    text = " ".join(f"{x:.1f},{y:.1f}" for x, y in corners)
-    return Triangle(text, f"{order:.1f}", x + half + 3.0, y + 4.0)
+def _triangle(
+    order: float, points: Sequence[tuple[float, float]], axes: _Axes, placed: Sequence[Triangle]
+) -> Triangle | None:
+    """Return the triangle below an interval of a line, the steepest where there is room; None without any."""
+    intervals = sorted(pairwise(points), key=lambda pair: pair[0][1] - pair[1][1])
+    for (right, upper), (left, lower) in intervals if order <= MAX_ORDER else ():
+        half = 0.25 * (right - left)
+        rise = axes.slope(order) * 2.0 * half
+        x, y = 0.5 * (left + right), 0.5 * (upper + lower) + BELOW
+        corners = ((x - half, y + 0.5 * rise), (x + half, y - 0.5 * rise), (x + half, y + 0.5 * rise))
+        found = Triangle(
+            " ".join(f"{a:.1f},{b:.1f}" for a, b in corners), f"{order:.1f}", x + half + 3.0, y + 4.0
+        )
+        free = all(abs(found.x - each.x) > APART_X or abs(found.y - each.y) > APART_Y for each in placed)
+        if free and corners[0][1] <= HEIGHT - BOTTOM:
+            return found
+    return None
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ ALLOWED = {
     *("html", "head", "meta", "title", "style", "body", "header", "main", "footer", "section", "div", "span"),
     *("h1", "h2", "h3", "h4", "p", "a", "code", "pre", "details", "summary", "figure", "figcaption"),
     *("table", "thead", "tbody", "tr", "th", "td", "ul", "li", "dl", "dt", "dd"),
-    *("svg", "g", "rect", "circle", "path", "polyline", "text", "tspan"),
+    *("svg", "wbr", "g", "rect", "circle", "path", "polyline", "text", "tspan"),
 }
 """Elements that fetch nothing and run nothing."""
 
