@@ -59,6 +59,7 @@ def results(report: Entry) -> dict[str, str]:
         "verdicts": verdicts(report),
         "settings": settings(report),
         "lacking": lacking(report),
+        "pairs": pairs(report),
         "figures": figures(report),
     }
 
@@ -121,15 +122,33 @@ def lacking(report: Entry) -> str:
     return table(("engine", "reason", "figures"), rows)
 
 
+def pairs(report: Entry) -> str:
+    """The table of effective coefficients of two materials."""
+    names = [each["engine"] for each in report["engines"]]
+    rows = []
+    for case in report["cases"]:
+        for name, found in (
+            wording.figures_by_name(case).items() if case["name"] in wording.PAIR_CASES else ()
+        ):
+            exact = wording.quantity_text(next(iter(found.values()))["exact"], "", 4)
+            rows.append((name, exact, *(effective(found.get(each)) for each in names)))
+    return table(("materials", "geometric mean", *names), rows)
+
+
+def effective(figure: Entry | None) -> str:
+    """The measured value at the smallest step, with a verdict that is neither exact nor falls."""
+    if figure is None:
+        return ""
+    verdict = "" if figure["verdict"] in ("exact", "falls") else f" ({figure['verdict']})"
+    return wording.quantity_text(figure["measured"][-1], "", 4) + verdict
+
+
 def figures(report: Entry) -> str:
     """The table of every figure: the error of each engine at the smallest step."""
     names = [each["engine"] for each in report["engines"]]
     rows = []
     for case in report["cases"]:
-        by_name: dict[str, dict[str, Entry]] = {}
-        for figure in case["figures"]:
-            by_name.setdefault(wording.figure_name(figure), {})[figure["engine"]] = figure
-        for name, found in by_name.items():
+        for name, found in wording.figures_by_name(case).items():
             first = next(iter(found.values()))
             exact = wording.quantity_text(first["exact"], first["unit"])
             rows.append((f"`{case['name']}`", name, exact, *(cell(found.get(each)) for each in names)))

@@ -23,8 +23,8 @@ class AttributionEntry(TypedDict):
     """Settings whose change removes an error, proved by running again.
 
     `settings` has the values of each setting: the one in use, then those that were tried. `errors` has the
-    errors at every step for each of the values in turn. `order` is the order at which the error falls with
-    the setting; null where the last change removes it.
+    errors for each of the values in turn, at every step or at the smallest alone. `order` is the order at
+    which the error falls with the setting; null where the last change removes it.
     """
 
     settings: dict[str, list[Any]]

@@ -53,6 +53,7 @@ def contacts_page(report: Entry, *, command: str | None = None) -> str:
         plots={case["name"]: plots(case, report["steps"], engines) for case in cases},
         counts={verdict: sum(each["verdict"] == verdict for each in figures) for verdict in wording.RANKS},
         removals=removals(cases),
+        pairs=[case for case in cases if case["name"] in wording.PAIR_CASES and case["figures"]],
         command=command,
         footer=_footer(report),
     )
@@ -84,6 +85,7 @@ def template_environment() -> Environment:
     environment.filters.update({each.__name__: each for each in filters})
     environment.filters["name"] = lambda text: escaped(text, NAME_LENGTH)
     more = (
+        wording.figures_by_name,
         wording.last_error,
         wording.quantity_text,
         wording.step_text,

@@ -11,7 +11,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from dynx.cli.contacts.wording import MAX_ORDER, as_number, figure_name, quantity_text, step_text
+from dynx.cli.contacts.wording import (
+    MAX_ORDER,
+    as_number,
+    figure_name,
+    figures_by_name,
+    quantity_text,
+    step_text,
+)
 
 Entry = Mapping[str, Any]
 
@@ -86,28 +93,17 @@ class Plot:
 
 def plots(case: Entry, steps: Sequence[float], engines: Sequence[str]) -> list[Plot]:
     """Return the plots of a case, one for each figure that is not exact in every engine."""
-    return [
-        _plot(figures, steps, engines)
-        for figures in by_name(case)
-        if any(each["verdict"] != "exact" for each in figures)
-    ]
+    named = figures_by_name(case).values()
+    return [_plot([*found.values()], steps, engines) for found in named if not _is_exact(found)]
 
 
 def all_exact(case: Entry) -> list[str]:
     """Return the names of the figures that are exact in every engine."""
-    return [
-        figure_name(figures[0])
-        for figures in by_name(case)
-        if all(each["verdict"] == "exact" for each in figures)
-    ]
+    return [name for name, found in figures_by_name(case).items() if _is_exact(found)]
 
 
-def by_name(case: Entry) -> list[list[Entry]]:
-    """Return the figures of a case by trial and name, with those of every engine together."""
-    found: dict[tuple[str, str], list[Entry]] = {}
-    for each in case["figures"]:
-        found.setdefault((each["trial"], each["figure"]), []).append(each)
-    return [*found.values()]
+def _is_exact(figures: Mapping[str, Entry]) -> bool:
+    return all(each["verdict"] == "exact" for each in figures.values())
 
 
 def _plot(figures: Sequence[Entry], steps: Sequence[float], engines: Sequence[str]) -> Plot:
@@ -184,10 +180,12 @@ class _Axes:
         return HEIGHT - BOTTOM - part * (HEIGHT - TOP - BOTTOM)
 
     def points(self, errors: Sequence[float | None], aside: float) -> tuple[tuple[float, float], ...]:
-        """Return the places of the errors at the steps, moved aside by some pixels."""
-        return tuple(
-            (self.x(dt) + aside, self.y(error)) for dt, error in zip(self.steps, errors, strict=True)
-        )
+        """Return the places of the errors, moved aside by some pixels.
+
+        Fewer errors than steps belong to the smallest.
+        """
+        steps = self.steps[len(self.steps) - len(errors) :]
+        return tuple((self.x(dt) + aside, self.y(error)) for dt, error in zip(steps, errors, strict=True))
 
     def slope(self, order: float) -> float:
         """Return the pixels by which a line of that order rises for each pixel to the right."""

@@ -19,6 +19,9 @@ VERDICT_MEANINGS = {
     "unexplained": "the error stays, and no setting that is known removes it",
 }
 
+PAIR_CASES = ("friction_pairs", "restitution_pairs")
+"""Cases whose measured values are the effective coefficients of two materials."""
+
 MAX_ORDER = 9.0
 """Largest order that is written as a number: beyond it an error vanishes from one step to the next."""
 
@@ -31,6 +34,14 @@ def worst_figure(figures: Sequence[Entry]) -> Entry:
 def last_error(figure: Entry) -> float:
     """Return the error at the smallest step; infinity where it is not finite."""
     return as_number(figure["errors"][-1])
+
+
+def figures_by_name(case: Entry) -> dict[str, dict[str, Entry]]:
+    """Return the figures of a case by name and engine."""
+    found: dict[str, dict[str, Entry]] = {}
+    for each in case["figures"]:
+        found.setdefault(figure_name(each), {})[each["engine"]] = each
+    return found
 
 
 def as_number(value: float | None) -> float:
@@ -51,9 +62,11 @@ def figure_name(figure: Entry) -> str:
     return ", ".join(part for part in (figure["figure"], figure["trial"]) if part)
 
 
-def quantity_text(value: float | None, unit: str) -> str:
+def quantity_text(value: float | None, unit: str, digits: int = 6) -> str:
     """Write a measured or exact value with its unit."""
-    return ("not finite" if value is None else f"{value:.6g}") + (f" {unit}" if unit else "")
+    number = as_number(value)
+    text = "not finite" if number == math.inf else f"{number:.{digits}g}"
+    return f"{text} {unit}" if unit else text
 
 
 def step_text(dt: float) -> str:
