@@ -108,6 +108,9 @@ def separation(
     return -support(shape_a, near_a, -n)[0] - support(shape_b, near_b, n)[0]
 
 
+TOUCHING = 1e-12
+"""Distance of cores relative to their size below which the direction between their points is not used."""
+
 NORMAL_ROUNDING = 1e-15
 """Difference of a direction from the normal of a half-space that is rounding."""
 
@@ -137,7 +140,9 @@ def distance_of(
         normal = np.array(pair.normal)
         on_a, on_b = np.array(pair.point_a), np.array(pair.point_b)
         # Along the line of the two points, so that their distance is that of the core's less the radii.
-        along = (on_a - on_b) / pair.upper
+        # The direction of points that touch is rounding.
+        resolved = pair.upper > TOUCHING * (a.extent + b.extent)
+        along = (on_a - on_b) / pair.upper if resolved else normal
         lower, upper = pair.lower, pair.upper
     else:
         found = penetration_of_parallel(a, b) or penetration(a, b)

@@ -81,13 +81,13 @@ class CorePair:
                 break
             on_a, on_b, simplex = _kept(nearest, on_a), _kept(nearest, on_b), _kept(nearest, simplex)
             distance = norm(nearest.point)
-            if distance <= ROUNDING * size:
-                break
             closer = distance < self.upper
             if closer:
                 self.upper = distance
                 self.point_a = combination(nearest.weights, on_a)
                 self.point_b = combination(nearest.weights, on_b)
+            if distance <= ROUNDING * size:
+                break
             stalled = 0 if closer or better else stalled + 1
             if stalled >= STALLS:
                 break

@@ -157,3 +157,15 @@ def test_equal_shapes_at_equal_poses(kind: str) -> None:
     for direction in np.random.default_rng(6).normal(size=(100, 3)):
         assert -separation(shape, np.eye(4), shape, np.eye(4), direction) >= -found.upper - ROUNDING
     assert found.gap <= 1e-9
+
+
+@settings(max_examples=40)
+@given(shapes(), shapes(), poses(1.0))
+def test_shapes_that_touch(a: ConvexShape, b: ConvexShape, T: Floats) -> None:
+    start = distance(a, np.eye(4), b, T)
+    moved = np.eye(4)
+    moved[:3, 3] = -start.lower * start.normal
+    found = distance(a, moved, b, T)
+    check_certificate(found, a, moved, b, T)
+    assert abs(found.lower) <= 1e-12 + start.gap
+    assert abs(found.upper) <= 1e-12 + start.gap + found.gap

@@ -1,0 +1,41 @@
+"""`World.closest_points` beside the distances of the engine: ``pytest benchmarks/test_distances.py``.
+
+A robot and a crate. ``us`` and ``native_us`` in the extra information are the times per pair of links.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+import pytest
+from pytest_benchmark.fixture import BenchmarkFixture
+
+import dynx
+from dynx.world import Scene, SceneRobot, World, box
+
+ROUNDS = 30
+
+
+@pytest.mark.parametrize("robot", ["a1", "ur5"])
+@pytest.mark.parametrize("engine", ["pybullet", "mujoco", "drake"])
+def test_closest_points(benchmark: BenchmarkFixture, engine: str, robot: str) -> None:
+    pytest.importorskip("pydrake" if engine == "drake" else engine)
+    crate = box("crate", (0.3, 0.3, 0.3), pose=dynx.Pose((0.9, 0.1, 0.15)))
+    scene = Scene("s", robots=(SceneRobot("robot", dynx.load(robot)),), bodies=(crate,))
+    with World(scene, engine) as world:
+        best = {False: np.inf, True: np.inf}
+        for _ in range(1 if benchmark.disabled else ROUNDS):
+            # Alternately, because the load of the machine changes.
+            for native in best:
+                began = time.process_time()
+                pairs = world.closest_points("robot", "crate", within=5.0, native=native)
+                best[native] = min(best[native], (time.process_time() - began) / len(pairs))
+        repeat: Any = benchmark.pedantic
+        repeat(
+            lambda: world.closest_points("robot", "crate", within=5.0),
+            rounds=1 if benchmark.disabled else ROUNDS,
+        )
+    benchmark.group = f"{robot} in {engine}"
+    benchmark.extra_info.update(us=1e6 * best[False], native_us=1e6 * best[True])

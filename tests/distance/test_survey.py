@@ -1,0 +1,29 @@
+"""The survey of engines finds what its table says, on a few pairs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.distance.survey import measure, table
+from tests.distance.survey_engines import ENGINES
+
+CAUSES = {
+    "bullet": (("Box", "Hull", "separated"), 1e-5, 1e-12),
+    "mujoco": (("Box", "Cylinder", "touching"), 1e-9, 1e-8),
+    "coal": (("Cylinder", "Cylinder", "separated"), 1e-8, 1e-8),
+    "drake": (("Box", "Capsule", "touching"), 1e-8, 1e-3),
+}
+"""For each engine a case with the least of its worst errors as it comes, and the largest after the change."""
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_changed_setting_removes_the_error(engine: str) -> None:
+    pytest.importorskip({"bullet": "pybullet", "drake": "pydrake"}.get(engine, engine))
+    case, least, most = CAUSES[engine]
+    run = ENGINES[engine]()
+    rows = [measure({engine: run}, np.random.default_rng(seed), case) for seed in range(6)]
+    errors = np.array([row.errors[engine] for row in rows])
+    assert errors[:, 0].max() > least
+    assert errors[:, 1].max() < most
+    assert f"| {case[0]}, {case[1]} |" in "\n".join(table(rows, [engine]))
