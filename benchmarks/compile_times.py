@@ -180,7 +180,7 @@ KINDS: dict[str, Kind] = {
     },
     "batch, plain": _batch_with,
     "batch, dry friction": partial(_batch_with, friction=0.1, damping=0.1, armature=0.01),
-    "batch, smooth friction": partial(_batch_with, friction=0.1, damping=0.1, friction_slip=0.1),
+    "batch, smooth friction": partial(_batch_with, friction=0.1, damping=0.1, friction_slip=100.0),
     "batch, position limits": partial(_batch_with, position_limits=True),
     "batch, all parameters, noise, limits, pushes": _batch_with_everything,
     "batch, operational space": _batch_in_operational_space,

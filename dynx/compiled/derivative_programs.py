@@ -78,7 +78,7 @@ def solution_by_factors(mechanism: Mechanism) -> Program:
     nv, filled = filled_entries(mechanism)
 
     def solution(factors: Array, b: Array) -> Array:
-        L = [[np.asarray(0.0)] * i for i in range(nv)]
+        L: list[dict[int, Array]] = [{} for _ in range(nv)]
         for (i, j), entry in zip(filled, factors, strict=False):
             L[i][j] = entry
         return solve_with_factors(L, list(factors[len(filled) :]), b)

@@ -20,9 +20,9 @@ def factorize_mass_matrix(mechanism: Mechanism, M: Array) -> Factors:
     A = np.zeros((nv, nv), dtype=object)
     for i, j in [*filled, *((i, i) for i in range(nv))]:
         A[i, j] = M[nv - 1 - i, nv - 1 - j]
-    return ldl_factors(A)
+    return ldl_factors(A, filled)
 
 
-def solve_with_factors(L: list[list[Array]], D: list[Array], b: Array) -> Array:
+def solve_with_factors(L: list[dict[int, Array]], D: list[Array], b: Array) -> Array:
     """Solve M x = b for right-hand sides b (..., nv), from the factors of M."""
     return solve_ldl(L, D, b[..., ::-1])[..., ::-1]

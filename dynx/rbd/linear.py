@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from dynx.spatial.scalar import Array
 
-Factors = tuple[list[list[Array]], list[Array]]
+Factors = tuple[list[dict[int, Array]], list[Array]]
+"""Rows of L left of its diagonal of ones, as entries by column, and the diagonal of D."""
 
 
 def solve_positive_definite(A: Array, b: Array) -> Array:
@@ -24,42 +27,51 @@ def solve_columns(A: Array, B: Array) -> Array:
     return np.asarray(solve_positive_definite(A, B.T).T)
 
 
-def ldl_factors(A: Array) -> Factors:
+def ldl_factors(A: Array, filled: Iterable[tuple[int, int]] | None = None) -> Factors:
     """Return L and D with A = L D L'.
 
-    L has a unit diagonal; its row i holds the i entries left of the diagonal.
+    `filled` are the positions left of the diagonal where L may differ from zero, row by row from left to
+    right; by default all of them.
     """
     n = A.shape[-1]
-    L: list[list[Array]] = [[] for _ in range(n)]
+    columns = [list(range(i)) for i in range(n)]
+    if filled is not None:
+        columns = [[] for _ in range(n)]
+        for i, j in filled:
+            columns[i].append(j)
+    L: list[dict[int, Array]] = []
     D: list[Array] = []
     for i in range(n):
-        scaled: list[Array] = []
-        for j in range(i):
+        scaled: dict[int, Array] = {}
+        row: dict[int, Array] = {}
+        for j in columns[i]:
             entry = A[..., i, j]
-            for k in range(j):
-                entry = entry - scaled[k] * L[j][k]
-            scaled.append(entry)
-            L[i].append(entry / D[j])
+            for k, factor in L[j].items():
+                if k in scaled:
+                    entry = entry - scaled[k] * factor
+            scaled[j] = entry
+            row[j] = entry / D[j]
         pivot = A[..., i, i]
-        for k in range(i):
-            pivot = pivot - scaled[k] * L[i][k]
+        for k, factor in row.items():
+            pivot = pivot - scaled[k] * factor
+        L.append(row)
         D.append(pivot)
     return L, D
 
 
-def solve_ldl(L: list[list[Array]], D: list[Array], b: Array) -> Array:
+def solve_ldl(L: list[dict[int, Array]], D: list[Array], b: Array) -> Array:
     """Return x (..., n) with L D L' x = b, by forward and back substitution."""
     if not D:
         return b
-    n = len(D)
     x: list[Array] = []
-    for i in range(n):
+    for i, row in enumerate(L):
         entry = b[..., i]
-        for k in range(i):
-            entry = entry - L[i][k] * x[k]
+        for k, factor in row.items():
+            entry = entry - factor * x[k]
         x.append(entry)
     x = [entry / pivot for entry, pivot in zip(x, D, strict=True)]
-    for i in reversed(range(n)):
-        for k in range(i + 1, n):
-            x[i] = x[i] - L[k][i] * x[k]
+    for i in reversed(range(len(L))):
+        for k in range(i + 1, len(L)):
+            if i in L[k]:
+                x[i] = x[i] - L[k][i] * x[k]
     return np.stack(x, axis=-1)

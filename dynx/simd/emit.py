@@ -22,7 +22,7 @@ from dynx.simd.program import Program
 from dynx.simd.rows import Rows
 from dynx.simd.schedule import ELEMENTARY, Segment, TrigGroup, schedule, spill_slots
 from dynx.simd.target import Target
-from dynx.simd.trigonometry import declarations, sines_and_cosines
+from dynx.simd.trigonometry import declarations, replacements, sines_and_cosines
 from dynx.simd.verify import check_schedule
 
 ENTRY = "kernel"
@@ -51,6 +51,11 @@ their code from memory."""
 QUICK_SEGMENT = 400
 """Length of the segments that are not optimised. In shorter ones fewer values leave the registers, but more
 are spilled between them."""
+
+
+MAX_QUICK_MODULE = 200_000
+"""Length of the text of a module with several segments that are not optimised [characters]. A module of its
+own for each segment takes a fifth longer; Ctrl-C takes effect between two modules."""
 
 
 @dataclass(frozen=True)
@@ -87,13 +92,21 @@ def emit(program: Program, target: Target, settings: Settings) -> str:
 
 
 def emit_modules(program: Program, target: Target, settings: Settings) -> list[str]:
-    """Return the texts of LLVM modules that evaluate a program together, one for each segment and one for
-    the loop over the samples. Each is compiled in a fraction of a second."""
+    """Return the texts of LLVM modules that evaluate a program together: segments, each in a module of its
+    own if they are optimised, and the loop over the samples. Each is compiled in a fraction of a second."""
     bodies, loop = _functions(program, target, settings, "")
     if len(bodies) == 1:
         return [emit(program, target, settings)]
+    groups: list[list[str]] = []
+    room = 0
+    for body in bodies:
+        if not settings.quick or len(body) > room:
+            groups.append([])
+            room = MAX_QUICK_MODULE
+        groups[-1].append(body)
+        room -= len(body)
     declared = [f"declare void @segment{k}(ptr, i64, ptr)" for k in range(len(bodies))]
-    return [_module(texts, target, settings) for texts in (*([body] for body in bodies), [*declared, loop])]
+    return [_module(texts, target, settings) for texts in (*groups, [*declared, loop])]
 
 
 def _functions(program: Program, target: Target, settings: Settings, linkage: str) -> tuple[list[str], str]:
@@ -109,7 +122,7 @@ def _functions(program: Program, target: Target, settings: Settings, linkage: st
 
 
 def _module(functions: Sequence[str], target: Target, settings: Settings) -> str:
-    parts = [f'target triple = "{target.triple}"', *functions]
+    parts = [f'target triple = "{target.triple}"', *functions, *replacements(functions, settings.lanes)]
     parts += [*declarations(settings.lanes), "declare void @llvm.prefetch.p0(ptr, i32, i32, i32)"]
     return "\n".join(parts) + "\n"
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from llvmlite import binding
 
 from dynx.errors import CompileError
+from dynx.simd.collection import collection_paused
 from dynx.simd.emit import ENTRY, Settings, emit_modules
 from dynx.simd.program import Port, Program
 from dynx.simd.routines import RoutineSet, emit_routines
@@ -58,9 +59,10 @@ def compile_image(program: Program, target: Target | None = None, settings: Sett
     """
     target = host() if target is None else target
     settings = (Settings(target.lanes) if settings is None else settings).for_length(program_length(program))
-    # Python handles Ctrl-C between two modules.
-    texts = emit_modules(program, target, settings)
-    objects = tuple(compile_text(text, target, quick=settings.quick) for text in texts)
+    with collection_paused():
+        # Python handles Ctrl-C between two modules.
+        texts = emit_modules(program, target, settings)
+        objects = tuple(compile_text(text, target, quick=settings.quick) for text in texts)
     return Image(program.inputs, program.outputs, settings.lanes, target, objects)
 
 

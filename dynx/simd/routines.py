@@ -30,7 +30,7 @@ from dynx.simd.rows import Rows, tiles
 from dynx.simd.schedule import Segment, schedule
 from dynx.simd.target import Target
 from dynx.simd.trace import trace
-from dynx.simd.trigonometry import declarations
+from dynx.simd.trigonometry import declarations, replacements
 
 Place = Literal["vectors", "constants"] | int
 """Where the values of a port are: in the workspace, in the table of constants (inputs only), or in the rows
@@ -92,6 +92,7 @@ def emit_routines(routines: RoutineSet, target: Target, settings: Settings) -> s
         for number, routine in enumerate(routines.routines.values())
     ]
     parts = [f'target triple = "{target.triple}"', *bodies, _loop(routines, settings.lanes)]
+    parts += replacements(bodies, settings.lanes)
     parts += [*declarations(settings.lanes), "declare void @llvm.memset.p0.i64(ptr, i8, i64, i1)"]
     return "\n".join(parts) + "\n"
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from dynx.errors import TraceError
+from dynx.simd.collection import collection_paused
 from dynx.simd.expr import Graph, Simplify, Symbol
 from dynx.simd.program import Port, Program, extract_program, scalar_ranges
 from dynx.simd.simplify import FAST
@@ -32,6 +33,13 @@ def trace(
     arrays. Entries that are plain numbers become constants. Raises TraceError if the function branches on a
     symbol, mixes symbols of two traces, or returns an entry that is neither a symbol nor a number.
     """
+    with collection_paused():
+        return _traced(function, inputs, simplify)
+
+
+def _traced(
+    function: Callable[..., Any], inputs: Mapping[str, tuple[int, ...]], simplify: Simplify | None
+) -> Program:
     graph = Graph(simplify)
     ports = [Port(name, tuple(shape)) for name, shape in inputs.items()]
     arguments: dict[str, Array] = {}

@@ -50,6 +50,10 @@ ROUNDING_SHIFT = 6755399441055744.0
 """1.5 * 2^52: adding it to a double rounds that to an integer, which the last bits then hold."""
 
 
+_BEYOND = "beyond_limit_"
+"""Start of the names of the functions for lanes beyond the limit."""
+
+
 class SineCosine(NamedTuple):
     """Names of the vectors of sines and cosines."""
 
@@ -74,7 +78,7 @@ def sines_and_cosines(write: Writer, angles: Sequence[str]) -> list[SineCosine]:
     write.label(before)
     write.do(f"br i1 {some}, label %{slow}, label %{done}, !prof !0")
     write.label(slow)
-    called = [_call_libm(write, x, pair) for x, pair in zip(angles, near, strict=True)]
+    called = [_corrected(write, x, pair) for x, pair in zip(angles, near, strict=True)]
     write.do(f"br label %{done}")
     write.label(done)
     found = []
@@ -169,21 +173,42 @@ def _reduce_without_fma(write: Writer, x: str, k: str) -> str:
     return write.arithmetic("fadd", r, rest)
 
 
-def _call_libm(write: Writer, x: str, near: SineCosine) -> SineCosine:
-    """Replace each lane beyond the limit by the result of the C library."""
-    results = []
-    for function, pair in zip(("sin", "cos"), near, strict=True):
-        vector = pair
-        for lane in range(write.lanes):
-            one = write.let(f"extractelement {write.vector} {x}, i32 {lane}")
-            exact = write.let(f"call double @{function}(double {one})")
-            magnitude = write.let(f"call double @llvm.fabs.f64(double {one})")
-            beyond = write.let(f"fcmp ogt double {magnitude}, {hex_double(LIMIT)}")
-            kept = write.let(f"extractelement {write.vector} {vector}, i32 {lane}")
-            chosen = write.let(f"select i1 {beyond}, double {exact}, double {kept}")
-            vector = write.let(f"insertelement {write.vector} {vector}, double {chosen}, i32 {lane}")
-        results.append(vector)
-    return SineCosine(*results)
+def _corrected(write: Writer, x: str, near: SineCosine) -> SineCosine:
+    """Call the functions that replace lanes beyond the limit."""
+    found = (
+        write.let(f"call {write.vector} @{_BEYOND}{function}({write.vector} {x}, {write.vector} {vector})")
+        for function, vector in zip(("sin", "cos"), near, strict=True)
+    )
+    return SineCosine(*found)
+
+
+def _replacement(function: str, lanes: int) -> str:
+    """Return the text of the function of x and a near result that replaces each lane beyond the limit by the
+    result of the C library.
+
+    It is called and not written out for each angle, because it is long and hardly ever needed.
+    """
+    write = Writer(lanes, fma=False)
+    found = "%near"
+    for lane in range(lanes):
+        one = write.let(f"extractelement {write.vector} %x, i32 {lane}")
+        exact = write.let(f"call double @{function}(double {one})")
+        magnitude = write.let(f"call double @llvm.fabs.f64(double {one})")
+        beyond = write.let(f"fcmp ogt double {magnitude}, {hex_double(LIMIT)}")
+        kept = write.let(f"extractelement {write.vector} {found}, i32 {lane}")
+        chosen = write.let(f"select i1 {beyond}, double {exact}, double {kept}")
+        found = write.let(f"insertelement {write.vector} {found}, double {chosen}, i32 {lane}")
+    vector = write.vector
+    head = f"define internal {vector} @{_BEYOND}{function}({vector} %x, {vector} %near) cold noinline {{"
+    return "\n".join([head, *write.lines, f"  ret {vector} {found}", "}"])
+
+
+def replacements(functions: Sequence[str], lanes: int) -> list[str]:
+    """Return the texts of the functions that sines and cosines in the texts `functions` call, if there are
+    any."""
+    if not any(f"@{_BEYOND}" in text for text in functions):
+        return []
+    return [_replacement(function, lanes) for function in ("sin", "cos")]
 
 
 def declarations(lanes: int) -> list[str]:

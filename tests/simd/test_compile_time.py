@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -65,8 +66,27 @@ def test_only_long_programs_are_compiled_without_optimisation(monkeypatch: pytes
     np.testing.assert_allclose(found, wanted, rtol=1e-9)
 
 
+def test_segments_without_optimisation_share_modules() -> None:
+    program, lanes = long_program(), host().lanes
+    settings = emit.Settings(lanes, segment=100)
+    alone = emit.emit_modules(program, host(), settings)
+    together = emit.emit_modules(program, host(), replace(settings, quick=True))
+    for modules in (alone, together):
+        assert "".join(modules).count("define  void @segment") == len(alone) - 1
+    assert max(map(len, together[:-1])) < 2 * emit.MAX_QUICK_MODULE
+    assert 2 * len(together) < len(alone)
+
+
+def test_the_calls_for_distant_angles_are_written_once() -> None:
+    program = trace(lambda x: np.sin(x) * np.cos(x), {"x": (20,)})
+    text = emit.emit(program, host(), emit.Settings(host().lanes))
+    for function in ("sin", "cos"):
+        assert text.count(f"call double @{function}(") == host().lanes
+
+
 def test_an_interrupted_compilation_leaves_the_compiler_usable(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(emit, "MAX_OPTIMISED_LENGTH", 0)
+    monkeypatch.setattr(emit, "MAX_QUICK_MODULE", 0)
     compiled = []
 
     def interrupted(*arguments: object, **options: object) -> bytes:

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.compiled.kernels import evaluate_quantity
-from dynx.compiled.mass_factors import factorize_mass_matrix, solve_with_factors
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.sim.batch.kernel import FusedStep
+from dynx.sim.plants.friction_law import FrictionLaw
 from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.kernel import Kernel
 from dynx.simd.trace import trace
@@ -101,10 +101,11 @@ class BatchStops:
 def _impact_kernel(step: FusedStep) -> Kernel:
     """Compile the velocities after inelastic impulses on the coordinates that are struck.
 
-    The change of velocity x has x = -v for these, and no impulse M x on the others; one symmetric matrix
-    stands for both conditions. The second output is the impulse along the outward sign.
+    The change of velocity x has x = -v for these, and no impulse M x on the others: the equation of joints
+    that stick under dry friction. The second output is the impulse along the outward sign.
     """
     mechanism, disturbances = simplify_mechanism(step.model.mechanism), step.disturbances
+    equation = FrictionLaw.of(step.model, np.zeros(step.model.nv))
     sizes = {"q": step.model.nq, "v": step.model.nv, "struck": step.model.nv}
     if step.plant is not None:
         sizes["parameters"] = len(step.plant.parameters.names)
@@ -120,10 +121,8 @@ def _impact_kernel(step: FusedStep) -> Kernel:
         armature = disturbances.armature_of(given)
         if armature is not None:
             M = M + np.diag(armature)
-        free = 1.0 - stuck
-        A = free[:, None] * M * free + np.diag(stuck)
-        x = solve_with_factors(*factorize_mass_matrix(mechanism, A), free * (M @ (stuck * v)) - stuck * v)
-        return {"v": v + x, "pull": given["struck"] * (M @ x)}
+        x, left = equation.accelerations(M, [0.0] * len(v), list(1.0 - stuck), list(-stuck * v))
+        return {"v": v + np.array(x), "pull": -given["struck"] * np.array(left)}
 
     program = trace(impact, {name: (size,) for name, size in sizes.items()})
     return load_kernel(program_recipe(program), lambda: program)

@@ -102,7 +102,7 @@ class FrictionLaw:
             moves[joint] = abs(mode)
             given[joint] = (moves[joint] - 1.0) * (v[joint] / h)
             rest[joint] = rest[joint] - mode * most
-        a, left = self._accelerations(A, rest, moves, given)
+        a, left = self.accelerations(A, rest, moves, given)
         torque, corrected, changes = [], [], 0.0
         scales = self.inertia if inertia is None else inertia
         rows = zip(self.joints, modes, friction, scales, strict=True)
@@ -118,7 +118,7 @@ class FrictionLaw:
         arrays = [np.array(each, dtype=object) for each in (a, moves, torque[::-1], corrected[::-1])]
         return FrictionStep(arrays[0], arrays[1], arrays[2], arrays[3], changes)
 
-    def _accelerations(
+    def accelerations(
         self, A: Array, rest: list[Any], moves: list[Any], given: list[Any]
     ) -> tuple[list[Any], list[Any]]:
         """Solve A a = rest for the coordinates that move; the others have the accelerations `given`.

@@ -66,44 +66,18 @@ entry:
 near48:
   br i1 %v47, label %far49, label %trig50, !prof !0
 far49:
-  %v51 = extractelement <2 x double> %v3, i32 0
-  %v52 = call double @sin(double %v51)
-  %v53 = call double @llvm.fabs.f64(double %v51)
-  %v54 = fcmp ogt double %v53, 0x40F86A0000000000
-  %v55 = extractelement <2 x double> %v41, i32 0
-  %v56 = select i1 %v54, double %v52, double %v55
-  %v57 = insertelement <2 x double> %v41, double %v56, i32 0
-  %v58 = extractelement <2 x double> %v3, i32 1
-  %v59 = call double @sin(double %v58)
-  %v60 = call double @llvm.fabs.f64(double %v58)
-  %v61 = fcmp ogt double %v60, 0x40F86A0000000000
-  %v62 = extractelement <2 x double> %v57, i32 1
-  %v63 = select i1 %v61, double %v59, double %v62
-  %v64 = insertelement <2 x double> %v57, double %v63, i32 1
-  %v65 = extractelement <2 x double> %v3, i32 0
-  %v66 = call double @cos(double %v65)
-  %v67 = call double @llvm.fabs.f64(double %v65)
-  %v68 = fcmp ogt double %v67, 0x40F86A0000000000
-  %v69 = extractelement <2 x double> %v45, i32 0
-  %v70 = select i1 %v68, double %v66, double %v69
-  %v71 = insertelement <2 x double> %v45, double %v70, i32 0
-  %v72 = extractelement <2 x double> %v3, i32 1
-  %v73 = call double @cos(double %v72)
-  %v74 = call double @llvm.fabs.f64(double %v72)
-  %v75 = fcmp ogt double %v74, 0x40F86A0000000000
-  %v76 = extractelement <2 x double> %v71, i32 1
-  %v77 = select i1 %v75, double %v73, double %v76
-  %v78 = insertelement <2 x double> %v71, double %v77, i32 1
+  %v51 = call <2 x double> @beyond_limit_sin(<2 x double> %v3, <2 x double> %v41)
+  %v52 = call <2 x double> @beyond_limit_cos(<2 x double> %v3, <2 x double> %v45)
   br label %trig50
 trig50:
-  %v79 = phi <2 x double> [%v41, %near48], [%v64, %far49]
-  %v80 = phi <2 x double> [%v45, %near48], [%v78, %far49]
-  %v81 = fmul <2 x double> %v3, %v4
-  %v82 = fadd <2 x double> %v81, %v79
-  %v83 = shufflevector <2 x double> %v82, <2 x double> poison, <1 x i32> <i32 0>
-  store <1 x double> %v83, ptr %p1_0, align 8
-  %v84 = shufflevector <2 x double> %v82, <2 x double> poison, <1 x i32> <i32 1>
-  store <1 x double> %v84, ptr %p1_1, align 8
+  %v53 = phi <2 x double> [%v41, %near48], [%v51, %far49]
+  %v54 = phi <2 x double> [%v45, %near48], [%v52, %far49]
+  %v55 = fmul <2 x double> %v3, %v4
+  %v56 = fadd <2 x double> %v55, %v53
+  %v57 = shufflevector <2 x double> %v56, <2 x double> poison, <1 x i32> <i32 0>
+  store <1 x double> %v57, ptr %p1_0, align 8
+  %v58 = shufflevector <2 x double> %v56, <2 x double> poison, <1 x i32> <i32 1>
+  store <1 x double> %v58, ptr %p1_1, align 8
   ret void
 }
 define void @kernel(ptr noalias nocapture readonly %arguments) {
@@ -122,6 +96,40 @@ group:
   br i1 %more, label %group, label %done
 done:
   ret void
+}
+define internal <2 x double> @beyond_limit_sin(<2 x double> %x, <2 x double> %near) cold noinline {
+  %v1 = extractelement <2 x double> %x, i32 0
+  %v2 = call double @sin(double %v1)
+  %v3 = call double @llvm.fabs.f64(double %v1)
+  %v4 = fcmp ogt double %v3, 0x40F86A0000000000
+  %v5 = extractelement <2 x double> %near, i32 0
+  %v6 = select i1 %v4, double %v2, double %v5
+  %v7 = insertelement <2 x double> %near, double %v6, i32 0
+  %v8 = extractelement <2 x double> %x, i32 1
+  %v9 = call double @sin(double %v8)
+  %v10 = call double @llvm.fabs.f64(double %v8)
+  %v11 = fcmp ogt double %v10, 0x40F86A0000000000
+  %v12 = extractelement <2 x double> %v7, i32 1
+  %v13 = select i1 %v11, double %v9, double %v12
+  %v14 = insertelement <2 x double> %v7, double %v13, i32 1
+  ret <2 x double> %v14
+}
+define internal <2 x double> @beyond_limit_cos(<2 x double> %x, <2 x double> %near) cold noinline {
+  %v1 = extractelement <2 x double> %x, i32 0
+  %v2 = call double @cos(double %v1)
+  %v3 = call double @llvm.fabs.f64(double %v1)
+  %v4 = fcmp ogt double %v3, 0x40F86A0000000000
+  %v5 = extractelement <2 x double> %near, i32 0
+  %v6 = select i1 %v4, double %v2, double %v5
+  %v7 = insertelement <2 x double> %near, double %v6, i32 0
+  %v8 = extractelement <2 x double> %x, i32 1
+  %v9 = call double @cos(double %v8)
+  %v10 = call double @llvm.fabs.f64(double %v8)
+  %v11 = fcmp ogt double %v10, 0x40F86A0000000000
+  %v12 = extractelement <2 x double> %v7, i32 1
+  %v13 = select i1 %v11, double %v9, double %v12
+  %v14 = insertelement <2 x double> %v7, double %v13, i32 1
+  ret <2 x double> %v14
 }
 declare <2 x double> @llvm.fabs.v2f64(<2 x double>)
 declare <2 x double> @llvm.fma.v2f64(<2 x double>, <2 x double>, <2 x double>)
