@@ -11,7 +11,7 @@ import numpy as np
 
 import dynx
 from dynx import Pose
-from dynx.model.geometry import Collision, Mesh, Shape
+from dynx.model.geometry import Capsule, Collision, Mesh, Shape, Sphere
 from dynx.spatial.scalar import Floats
 from dynx.world import Material, Scene, SceneBody, SceneRobot, World, box, ground
 from tests.world.engines import WORLDS
@@ -98,6 +98,59 @@ def speed_on_slope(kind: str, engine: str, a: Material, b: Material, tangent: fl
         return float(velocity(world)[0] / (0.4 * G * np.sin(angle)))
 
 
+def dropping_scene(kind: str, a: Material, b: Material, height: float, folder: Path) -> tuple[Scene, float]:
+    """Return a body of material `a` at a height above a ground of material `b`, and the height of its centre
+    when it touches."""
+    bodies, robots = [ground(material=b)], []
+    if kind == "link":
+        half = 0.05
+        q = (0, 0, half + height, 0, 0, 0, 1)
+        robots.append(SceneRobot("slider", slab_robot(SIZE, "floating"), q=q, material=a))
+    else:
+        half = 0.05 if kind in ("box", "mesh") else 0.1
+        rpy = (float(np.pi / 2), 0.0, 0.0) if kind == "capsule" else (0.0, 0.0, 0.0)
+        pose = Pose((0, 0, half + height), rpy)
+        shapes = {"ball": Sphere(0.1), "capsule": Capsule(0.1, 0.3)}
+        if kind == "box":
+            bodies.append(box("slider", SIZE, mass=2.0, pose=pose, material=a))
+        else:
+            shape = slab_mesh(folder) if kind == "mesh" else shapes[kind]
+            bodies.append(SceneBody("slider", (Collision(shape),), pose, 2.0, material=a))
+    return Scene("dropping", robots=tuple(robots), bodies=tuple(bodies)), half
+
+
+def rebound(
+    kind: str, engine: str, a: Material, b: Material, folder: Path, dt: float = 1e-3, height: float = 1.0
+) -> float:
+    """Return the height to which a body rebounds after a fall, relative to that of the fall."""
+    scene, half = dropping_scene(kind, a, b, height, folder)
+    fall = float(np.sqrt(2.0 * height / G))
+    with World(scene, engine, dt) as world:
+        world.run(0.98 * fall)
+        heights = []
+        for _ in range(int(1.4 * fall / dt)):
+            world.step()
+            state = world.state
+            body, robot = state.bodies.get("slider"), state.robots.get("slider")
+            heights.append((robot.q[2] if body is None else body.T_world_body[2, 3]) - half)  # type: ignore[union-attr]
+            # Until it falls again.
+            if len(heights) > 2 and heights[-3] < heights[-2] > heights[-1] and heights[-1] > 0.0:
+                break
+    lowest = int(np.argmin(heights))
+    return float(max(heights[lowest:]) / height)
+
+
+def mean_rebound(kind: str, engine: str, a: Material, b: Material, folder: Path, dt: float = 1e-3) -> Floats:
+    """Return mean and largest deviation from it of rebounds after falls from heights near 1 m.
+
+    A body meets the surface at a random part of a step, so that single rebounds differ.
+    """
+    drops = [
+        rebound(kind, engine, a, b, folder, dt, height) for height in (0.97, 0.98, 0.99, 1.0, 1.01, 1.02)
+    ]
+    return np.array([np.mean(drops), np.max(np.abs(drops - np.mean(drops)))])
+
+
 def main() -> None:
     """Print the tables."""
     coefficients = (0.0, 0.1, 0.5, 1.5)
@@ -111,6 +164,20 @@ def main() -> None:
                 found = sliding_friction("box", engine, Material(friction=a), Material(friction=b), Path())
                 row.append(f"{found:.4f}")
             print("| " + " | ".join(row) + " |")
+    engines = ("pybullet", "mujoco")
+    steps = (4e-3, 2e-3, 1e-3)
+    heads = [f"{engine}, {1e3 * dt:g} ms" for engine in engines for dt in steps]
+    print(
+        "\n| restitution of the two | height | " + " | ".join(heads) + " |\n|---|---|" + "---|" * len(heads)
+    )
+    for one, other in ((0.0, 1.0), (0.2, 0.2), (0.25, 1.0), (0.8, 0.8), (1.0, 1.0)):
+        row = [f"{one:g}, {other:g}", f"{one * other:.3f}"]
+        for engine in engines:
+            for dt in steps:
+                surfaces = Material(restitution=one), Material(restitution=other)
+                mean, spread = mean_rebound("ball", engine, *surfaces, Path(), dt)
+                row.append(f"{abs(mean):.3f} ± {spread:.3f}")
+        print("| " + " | ".join(row) + " |")
 
 
 if __name__ == "__main__":

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from dynx import Pose
 from dynx.errors import UnsupportedFeatureError
 from dynx.world import Material, Scene, World, box, contact_material, ground, sphere
-from dynx.world.pair_terms import pair_terms
 from dynx.world.scene.contact_priorities import contact_priorities
+from dynx.world.scene.pair_terms import pair_terms
 from tests.world.engines import WORLDS
-from tests.world.materials import SLIDERS, G, sliding_friction, speed_on_slope
+from tests.world.materials import SLIDERS, G, mean_rebound, rebound, sliding_friction, speed_on_slope
 
 TOLERANCE = {"pybullet": 0.02, "mujoco": 0.05, "drake": 0.001}
 """Relative error of the mean deceleration; sliding bodies rattle in Bullet and hop a little in MuJoCo."""
@@ -88,6 +88,57 @@ def test_every_pair_of_a_scene_of_many_materials_has_its_mean(
         # One contact for each slab, although its shapes are registered more than once.
         assert sorted(contact.b for contact in contacts) == ["slab0", "slab1", "slab2"]
         assert all(contact.normal_force == pytest.approx(2.0 * G, rel=0.01) for contact in contacts)
+
+
+@pytest.mark.parametrize("kind", ["ball", "box", "mesh", "link", "capsule"])
+@pytest.mark.parametrize(("a", "b"), [(0.0, 1.0), (0.2, 0.2), (0.25, 1.0), (1.0, 0.64), (1.0, 1.0)])
+def test_bodies_rebound_in_pybullet_with_the_mean_of_two_materials(
+    kind: str, a: float, b: float, tmp_path: Path
+) -> None:
+    found = rebound(kind, "pybullet", Material(restitution=a), Material(restitution=b), tmp_path)
+    assert found == pytest.approx(a * b, abs=0.01)
+
+
+@pytest.mark.parametrize("restitution", [0.2, 0.5, 0.8, 1.0])
+def test_the_error_of_a_rebound_in_pybullet_falls_with_the_step(restitution: float, tmp_path: Path) -> None:
+    material = Material(restitution=restitution)
+    for dt in (4e-3, 1e-3, 2.5e-4):
+        for height in (1.0, 0.987, 0.4):
+            found = rebound("ball", "pybullet", material, material, tmp_path, dt, height)
+            # Of the way in a step, and of the penetration that is removed in it (0.5 s is the time constant).
+            way = np.sqrt(2.0 * G * height) * dt / height
+            assert abs(found - restitution**2) < way + 2.0 * dt / 0.5
+
+
+@pytest.mark.parametrize("kind", ["ball", "box", "mesh", "link"])
+@pytest.mark.parametrize(("a", "b"), [(0.0, 1.0), (0.2, 0.2), (0.25, 1.0), (1.0, 0.64), (1.0, 1.0)])
+def test_bodies_rebound_in_mujoco_with_the_mean_of_two_materials(
+    kind: str, a: float, b: float, tmp_path: Path
+) -> None:
+    mean, _ = mean_rebound(kind, "mujoco", Material(restitution=a), Material(restitution=b), tmp_path)
+    assert mean == pytest.approx(a * b, abs=0.025)
+
+
+def test_bouncy_boxes_rest_in_a_stack_and_continue_bit_for_bit() -> None:
+    bouncy = Material(restitution=0.8)
+    boxes = tuple(
+        box(f"b{k}", (0.2, 0.2, 0.1), mass=1.0, pose=Pose((0, 0, 0.051 + 0.101 * k)), material=bouncy)
+        for k in range(5)
+    )
+    scene = Scene("stack", bodies=(ground(material=bouncy), *boxes))
+    with World(scene, "pybullet") as world:
+        world.run(0.4)
+        saved = world.save()
+        world.run(1.0)
+        ends = [world.state.bodies[each.name].T_world_body for each in boxes]
+        force = sum(contact.normal_force for contact in world.contacts() if contact.a == "ground")
+        world.restore(saved)
+        world.run(1.0)
+        again = [world.state.bodies[each.name].T_world_body for each in boxes]
+    assert np.array_equal(ends, again)
+    assert force == pytest.approx(5.0 * G, rel=1e-3)
+    for k, T in enumerate(ends):
+        assert T[2, 3] == pytest.approx(0.05 + 0.1 * k, abs=5e-4)
 
 
 @pytest.mark.parametrize("engine", ["pybullet", "mujoco"])

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from dynx.spatial.scalar import Floats
 from dynx.world.layout import Layout
 from dynx.world.materials import EffectiveCoefficient
-from dynx.world.pair_terms import CLOSE, pair_terms
 from dynx.world.scene.material import geometric_means, material_numbers
+from dynx.world.scene.pair_terms import CLOSE, pair_terms
 
 
 class Copies(NamedTuple):

@@ -72,7 +72,10 @@ class BulletWorld(WorldEngine):
     def _load(self, folder: Path, settings: Mapping[str, Any]) -> None:
         layout, client = self.layout, self._client
         client.call(client.engine.setGravity, *layout.gravity.tolist())
-        files = ShapeFiles(folder)
+        self._materials = bullet_materials(layout)
+        rebounds = self._materials.rebounds
+        # With the faces of polyhedra Bullet finds all points of a contact in one step.
+        files = ShapeFiles(folder, client.engine.URDF_INITIALIZE_SAT_FEATURES if rebounds.any() else 0)
         owned: dict[tuple[int | None, int], dict[int, Collider]] = {}
         for number, collider in enumerate(layout.colliders):
             robot, body = collider.owner
@@ -94,9 +97,9 @@ class BulletWorld(WorldEngine):
         for number, collider in enumerate(layout.colliders):
             for shape in filter(is_ground, collider.shapes):
                 T = np.eye(4) if collider.owner.robot is not None else layout.bodies[collider.owner.body].T
-                places[number].append((load_ground(client, shape, T), ROOT))
-        self._materials = bullet_materials(layout)
-        set_filters(client, layout, places, self._materials, settings)
+                ground = load_ground(client, files, shape, T, rebounds=bool(rebounds[number]))
+                places[number].append((ground, ROOT))
+        set_filters(client, layout, places, self._materials, settings, self.dt)
         self._contacts = ContactReader(client, places)
         for constraint in layout.constraints:
             add_constraint(client, constraint, self._robots, self._bodies, settings["constraint_force"])

@@ -20,16 +20,12 @@ def set_filters(
     places: Sequence[Sequence[Place]],
     materials: BulletMaterials,
     settings: Mapping[str, Any],
+    dt: float,
 ) -> None:
     """Set the materials of all colliders, and which pairs of them may touch."""
     engine = client.engine
     for number, (collider, found) in enumerate(zip(layout.colliders, places, strict=True)):
-        options = {
-            "lateralFriction": float(materials.friction[number]),
-            "spinningFriction": float(materials.spinning[number]),
-            "rollingFriction": float(materials.rolling[number]),
-            "restitution": float(materials.restitution[number]),
-        }
+        options = materials.options(number, settings, dt)
         if any(isinstance(each.shape, Mesh) for each in collider.shapes):
             options["collisionMargin"] = settings["mesh_margin"]
         for body, link in found:

@@ -3,12 +3,17 @@
 Bullet multiplies the coefficients of friction and of restitution of two surfaces: given the square roots, it
 has the geometric mean. Of torsional and rolling friction it adds that of each surface times the sliding
 coefficient of the other, r_a f_b + r_b f_a: with r = y f the sum of y_a and y_b times f_a f_b.
+
+Bullet gives an approach speed v over a gap d the rebound e v - d / dt, and removes in the same step a share
+of a penetration. So the contacts of surfaces that rebound are processed once they touch, and their
+penetration is removed slowly; then the rebound is e v.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +21,23 @@ from numpy.typing import NDArray
 from dynx.spatial.scalar import Floats
 from dynx.world.layout import Layout
 from dynx.world.materials import EffectiveCoefficient, coefficients
-from dynx.world.pair_terms import pair_terms
 from dynx.world.scene.material import COEFFICIENTS, geometric_means, material_numbers
+from dynx.world.scene.pair_terms import pair_terms
 
 MAX_FRICTION = 10.0
 """Largest coefficient of a contact in Bullet, of each kind of friction."""
 
 ADDED = "Bullet adds the coefficients of two surfaces, each times the other's sliding friction"
 LIMITED = f"Bullet limits the friction of two surfaces to {MAX_FRICTION:g}"
+
+
+STIFFNESS = 1e20
+"""Stiffness [N/m] of contacts that rebound; from it and the damping Bullet derives the share of a penetration
+that it removes in a step."""
+
+TOUCHING = 0.1
+"""Gap below which a contact that rebounds is processed, in units of the way in a step at the least speed that
+rebounds: bodies at rest keep their contacts in spite of rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +48,23 @@ class BulletMaterials:
     spinning: Floats
     rolling: Floats
     restitution: Floats
+    rebounds: NDArray[np.bool_]
+    """Whether the collider rebounds from any that it may touch."""
+
+    def options(self, number: int, settings: Mapping[str, Any], dt: float) -> dict[str, float]:
+        """Return the options of `changeDynamics` for a collider."""
+        found = {
+            "lateralFriction": float(self.friction[number]),
+            "spinningFriction": float(self.spinning[number]),
+            "rollingFriction": float(self.rolling[number]),
+            "restitution": float(self.restitution[number]),
+        }
+        if self.rebounds[number]:
+            found["contactProcessingThreshold"] = TOUCHING * settings["restitution_speed"] * dt
+            found["contactStiffness"] = STIFFNESS
+            # Of two surfaces Bullet adds the damping and halves the stiffness.
+            found["contactDamping"] = 0.25 * STIFFNESS * settings["rebound_time_constant"]
+        return found
 
     def effective(self) -> Mapping[str, EffectiveCoefficient]:
         """Return the coefficients in effect."""
@@ -59,7 +90,14 @@ def bullet_materials(layout: Layout) -> BulletMaterials:
         _terms(layout, "torsional_friction", friction),
         _terms(layout, "rolling_friction", friction),
         np.sqrt(coefficients(layout, "restitution")),
+        rebounding(layout),
     )
+
+
+def rebounding(layout: Layout) -> NDArray[np.bool_]:
+    """Return for every collider (n,) whether it rebounds from any that it may touch."""
+    bouncy = coefficients(layout, "restitution") > 0.0
+    return np.asarray(bouncy & layout.collides[:, bouncy].any(axis=1))
 
 
 def _terms(layout: Layout, name: str, f: Floats) -> Floats:

@@ -73,6 +73,7 @@ class BulletObject:
         path = folder / "object.urdf"
         path.write_text(write_bullet_urdf(tree, attachments), encoding="ascii")
         flags = engine.URDF_USE_INERTIA_FROM_FILE | engine.URDF_USE_SELF_COLLISION | IMPLICIT_CYLINDER
+        flags |= files.flags
         with decimal_point():
             self.body = int(
                 client.call(engine.loadURDF, str(path), useFixedBase=not tree.floating, flags=flags)

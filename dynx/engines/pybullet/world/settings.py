@@ -11,10 +11,13 @@ SETTINGS = {
     ),
     "residual_threshold": Setting(1e-7, "squared residual at which the solver stops iterating"),
     "erp": Setting(0.2, "share of the error of constraints and joint limits removed in a step", most=1.0),
-    "contact_erp": Setting(0.2, "share of a penetration removed in a step", most=1.0),
+    "contact_erp": Setting(0.05, "share of a penetration removed in a step", most=1.0),
     "friction_erp": Setting(0.2, "share of the drift of a sticking contact removed in a step", most=1.0),
     "cone_friction": Setting(True, "whether friction is limited by a cone, not by a pyramid"),
     "restitution_speed": Setting(0.05, "least approach speed [m/s] of an impact that rebounds"),
+    "rebound_time_constant": Setting(
+        0.5, "time constant [s] of the removal of penetrations between surfaces that rebound", most=1e6
+    ),
     "contact_distance": Setting(0.02, "distance [m] below which contact points are kept"),
     "contact_slop": Setting(1e-5, "depth [m] to which a penetration is not removed", most=1.0),
     "mesh_margin": Setting(0.0, "distance [m] by which the hull of a mesh is enlarged", most=1.0),

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dynx.engines.decimal_point import decimal_point
 from dynx.engines.pybullet.canonical_urdf import locale_free, pose_element
 from dynx.engines.pybullet.world.client import WorldClient
 from dynx.errors import EngineLimitError
@@ -18,10 +19,16 @@ MAX_VERTICES = 100_000
 """Largest number of points of a height field; Bullet takes 131,072 in one call."""
 
 
+EXTENT = 1000.0
+"""Half the edge [m] of the box that stands for a plane from which bodies rebound."""
+
+
 class ShapeFiles:
     """URDF elements of shapes, with the hulls of meshes as files in one folder."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, flags: int = 0) -> None:
+        """`flags` are those of Bullet's `loadURDF` for all objects with shapes."""
+        self.flags = flags
         self._folder = folder
         self._files: dict[Mesh, Path] = {}
 
@@ -53,6 +60,19 @@ class ShapeFiles:
             self._files[mesh] = path
         return str(self._files[mesh])
 
+    def block(self) -> Path:
+        """Return a URDF file of a fixed box whose upper face stands for the plane z = 0."""
+        path = self._folder / "block.urdf"
+        size, origin = locale_free(2.0 * EXTENT), locale_free(-EXTENT)
+        inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+        path.write_text(
+            f'<robot name="block"><link name="b"><inertial><mass value="0"/>{inertia}</inertial>'
+            f'<collision><origin xyz="0 0 {origin}"/><geometry><box size="{size} {size} {size}"/></geometry>'
+            "</collision></link></robot>",
+            encoding="ascii",
+        )
+        return path
+
 
 def binary_stl(triangles: Floats) -> bytes:
     """Return triangles (n, 3, 3) as a binary STL file, with the normals by which they are shaded."""
@@ -71,9 +91,21 @@ def is_ground(placed: PlacedShape) -> bool:
     return isinstance(placed.shape, Plane | HeightField)
 
 
-def load_ground(client: WorldClient, placed: PlacedShape, T: Floats) -> int:
-    """Load a plane or height field whose owner has the pose T (4, 4); return Bullet's number of the body."""
+def load_ground(
+    client: WorldClient, files: ShapeFiles, placed: PlacedShape, T: Floats, rebounds: bool
+) -> int:
+    """Load a plane or height field whose owner has the pose T (4, 4); return Bullet's number of the body.
+
+    A plane that `rebounds` is the upper face of a large box, because with a plane Bullet finds one point of
+    contact in a step: a body that lands flat would rebound from one corner.
+    """
     engine, shape, at = client.engine, placed.shape, T @ placed.T
+    position, quat = at[:3, 3].tolist(), quat_from_rotation(at[:3, :3]).tolist()
+    if isinstance(shape, Plane) and rebounds:
+        with decimal_point():
+            path = str(files.block())
+            body = client.call(engine.loadURDF, path, position, quat, useFixedBase=True, flags=files.flags)
+        return int(body)
     if isinstance(shape, Plane):
         number = client.call(engine.createCollisionShape, engine.GEOM_PLANE, planeNormal=[0.0, 0.0, 1.0])
     else:
@@ -94,7 +126,7 @@ def load_ground(client: WorldClient, placed: PlacedShape, T: Floats) -> int:
             engine.createMultiBody,
             baseMass=0.0,
             baseCollisionShapeIndex=number,
-            basePosition=at[:3, 3].tolist(),
-            baseOrientation=quat_from_rotation(at[:3, :3]).tolist(),
+            basePosition=position,
+            baseOrientation=quat,
         )
     )
