@@ -11,7 +11,7 @@ that of a contact that does not rebound; geoms without an explicit pair are damp
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,7 @@ from dynx.world.scene.material import geometric_means, material_numbers
 MAX_PAIRS = 2000
 """Largest number of explicit pairs of geoms, beside those without which a contact had other coefficients."""
 
-TOLERANCE = 1e-3
+TOLERANCE = 0.02
 """Error of the height of a rebound, relative to that of the fall, that counts as none."""
 
 REASON = "in steps this long a damped spring rebounds at least so much; in shorter ones it can rebound less"
@@ -44,15 +44,18 @@ class ContactMaterials:
         rows, inverse = np.unique(means.reshape(-1, 4), axis=0, return_inverse=True)
         combination = inverse.reshape(means.shape[:2])
         found = contact_priorities(numbers, combination, layout.collides)
-        explicit = _explicit_pairs(layout)
-        self.complete = explicit is not None and len(explicit) == int(np.triu(layout.collides).sum())
+        self._explicit = _explicit_pairs(layout)
+        for i, j in found.pairs:
+            self._explicit[i, j] = self._explicit[j, i] = True
+        self.complete = bool((self._explicit == layout.collides).all())
         """Whether all that may touch are explicit pairs."""
-        pairs = {*(map(tuple, explicit) if explicit is not None else ()), *map(_sorted, found.pairs)}
-        self._pairs = pairs
         self._geoms = [self._geom_options(row) for row in rows.tolist()]
         self._combination, self._priority = found.combination, found.priority
         of_pair = [self._pair_options(row) for row in rows.tolist()]
-        self.pairs = [(i, j, of_pair[combination[numbers[i], numbers[j]]]) for i, j in sorted(pairs)]
+        self.pairs = [
+            (i, j, of_pair[combination[numbers[i], numbers[j]]])
+            for i, j in np.argwhere(np.triu(self._explicit)).tolist()
+        ]
         """Numbers of two colliders, and the options of their pairs of geoms."""
 
     def geom(self, collider: int) -> dict[str, Any]:
@@ -82,7 +85,7 @@ class ContactMaterials:
 
         def restitution(i: int, j: NDArray[np.intp]) -> Floats:
             found = np.sqrt(self._restitution[i] * self._restitution[j])
-            slips = np.array([_sorted((i, each)) not in self._pairs for each in j.tolist()], dtype=bool)
+            slips = ~self._explicit[i, j]
             for wanted in np.unique(found).tolist():
                 for alone in (True, False):
                     actual = contact_restitution(self._settings, wanted, self._dt, slips=alone)
@@ -93,18 +96,15 @@ class ContactMaterials:
         return {"restitution": EffectiveCoefficient(restitution, REASON)}
 
 
-def _explicit_pairs(layout: Layout) -> list[list[int]] | None:
-    """Return the pairs of colliders that may touch, or those of which one is fixed, or None, whichever first
-    are at most `MAX_PAIRS` pairs of geoms."""
-    shapes = np.array([len(collider.shapes) for collider in layout.colliders])
+def _explicit_pairs(layout: Layout) -> NDArray[np.bool_]:
+    """Return which colliders (n, n) are explicit pairs: all that may touch, or those of which one is fixed,
+    or none, whichever first are at most `MAX_PAIRS` pairs of geoms."""
+    shapes = np.array([len(collider.shapes) for collider in layout.colliders], dtype=np.intp)
     fixed = np.array([layout.is_fixed(collider.owner) for collider in layout.colliders], dtype=bool)
     for touch in (layout.collides, layout.collides & (fixed[:, None] | fixed)):
-        pairs = np.argwhere(np.triu(touch))
-        if shapes[pairs].prod(axis=1).sum() <= MAX_PAIRS:
-            return pairs.tolist()
-    return None
-
-
-def _sorted(pair: Iterable[int]) -> tuple[int, int]:
-    i, j = pair
-    return min(i, j), max(i, j)
+        if (
+            sum(int(shapes[row].sum()) * int(n) for row, n in zip(touch, shapes, strict=True))
+            <= 2 * MAX_PAIRS
+        ):
+            return np.asarray(touch.copy())
+    return np.zeros_like(layout.collides)
