@@ -16,7 +16,7 @@ SETTINGS = {
     "cone_friction": Setting(True, "whether friction is limited by a cone, not by a pyramid"),
     "restitution_speed": Setting(0.05, "least approach speed [m/s] of an impact that rebounds"),
     "rebound_time_constant": Setting(
-        0.5, "time constant [s] of the removal of penetrations between surfaces that rebound", most=1e6
+        0.2, "time constant [s] of the removal of penetrations between surfaces that rebound", most=1e6
     ),
     "contact_distance": Setting(0.02, "distance [m] below which contact points are kept"),
     "contact_slop": Setting(1e-5, "depth [m] to which a penetration is not removed", most=1.0),
