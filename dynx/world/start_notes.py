@@ -1,4 +1,5 @@
-"""Notes on the start of a world: parts that overlap, and constraints that are violated."""
+"""Notes on the start of a world: parts that overlap, constraints that are violated, and coefficients of
+contact that the engine does not have."""
 
 from __future__ import annotations
 
@@ -11,6 +12,7 @@ from dynx.spatial.so3 import quat_from_rotation, quat_log
 from dynx.world.engine import WorldEngine
 from dynx.world.geometry.boxes import owner_pose
 from dynx.world.layout import ConstraintLayout
+from dynx.world.materials import inexact_materials
 from dynx.world.overlaps import overlaps_of
 from dynx.world.scene import Scene
 from dynx.world.state import WorldState
@@ -23,8 +25,9 @@ GAP, ANGLE = 1e-4, 1e-3
 
 
 def notes_on_start(engine: WorldEngine, state: WorldState, scene: Scene) -> tuple[str, ...]:
-    """Return one sentence for each overlap and for each violated constraint of an engine at a state."""
-    return (*_overlaps(engine), *_violations(engine, state, scene))
+    """Return one sentence for each overlap and each violated constraint of an engine at a state, and for each
+    coefficient of contact that it does not have."""
+    return (*_overlaps(engine), *_violations(engine, state, scene), *map(str, inexact_materials(engine)))
 
 
 def _overlaps(engine: WorldEngine) -> Iterator[str]:

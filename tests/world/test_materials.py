@@ -178,6 +178,7 @@ def test_what_an_engine_lacks_is_named_and_refused_where_asked() -> None:
     for engine, quantities in lacks.items():
         with World(scene, engine, dt=2e-4) as world:
             found = world.inexact_materials()
+            assert {*map(str, found)} <= {*world.notes}
         assert {each.quantity for each in found} >= quantities
         assert {each.quantity for each in found} <= quantities | {"torsional_friction"}
         for each in found:
