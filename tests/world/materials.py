@@ -110,7 +110,7 @@ def dropping_scene(kind: str, a: Material, b: Material, height: float, folder: P
         half = 0.05 if kind in ("box", "mesh") else 0.1
         rpy = (float(np.pi / 2), 0.0, 0.0) if kind == "capsule" else (0.0, 0.0, 0.0)
         pose = Pose((0, 0, half + height), rpy)
-        shapes = {"ball": Sphere(0.1), "capsule": Capsule(0.1, 0.3)}
+        shapes: dict[str, Shape] = {"ball": Sphere(0.1), "capsule": Capsule(0.1, 0.3)}
         if kind == "box":
             bodies.append(box("slider", SIZE, mass=2.0, pose=pose, material=a))
         else:
