@@ -145,10 +145,10 @@ def mean_rebound(kind: str, engine: str, a: Material, b: Material, folder: Path,
 
     A body meets the surface at a random part of a step, so that single rebounds differ.
     """
-    drops = [
-        rebound(kind, engine, a, b, folder, dt, height) for height in (0.97, 0.98, 0.99, 1.0, 1.01, 1.02)
-    ]
-    return np.array([np.mean(drops), np.max(np.abs(drops - np.mean(drops)))])
+    heights = (0.97, 0.98, 0.99, 1.0, 1.01, 1.02)
+    drops = np.array([rebound(kind, engine, a, b, folder, dt, height) for height in heights])
+    mean = float(np.mean(drops))
+    return np.array([mean, float(abs(drops - mean).max())])
 
 
 def main() -> None:
