@@ -94,32 +94,35 @@ def cell(figure: Entry | None) -> str:
 
 
 def settings(report: Entry) -> str:
-    """The table of settings that remove errors, with the errors before and after."""
-    rows = []
-    for removal in removals(report["cases"]):
-        for case, figure in removal.figures:
-            errors = figure["attribution"]["errors"]
-            before, after = (wording.error_text(each[-1]) for each in (errors[0], errors[-1]))
-            what = f"`{case['name']}`: {wording.figure_name(figure)}"
-            rows.append((removal.engine, f"`{removal.change}`", what, before, after))
-    return table(("engine", "setting", "figure", "error", "with the setting"), rows)
+    """The table of settings that remove errors, with the largest error of a case before and after."""
+    rows = [
+        (
+            *(removal.engine, f"`{removal.change}`", f"`{each.case}`: {each.figures}"),
+            *(wording.error_text(each.before), wording.error_text(each.after)),
+        )
+        for removal in removals(report["cases"])
+        for each in removal.errors
+    ]
+    return table(("engine", "setting", "case", "error", "with the setting"), rows)
 
 
 def lacking(report: Entry) -> str:
-    """The table of figures that an engine cannot give."""
-    found: dict[tuple[str, str], list[str]] = {}
+    """The table of cases in which an engine cannot give an exact value, or refuses a trial."""
+    found: dict[str, dict[str, list[str]]] = {}
     for case in report["cases"]:
-        for figure in case["figures"]:
-            if figure["verdict"] == "cannot":
-                key = figure["engine"], figure["reason"]
-                found.setdefault(key, []).append(f"`{case['name']}`: {wording.figure_name(figure)}")
-        for lost in case["no_results"]:
-            what = f"`{case['name']}`" + (f": {lost['trial']}" if lost["trial"] else "")
-            known = found.setdefault((lost["engine"], lost["message"]), [])
-            if what not in known:
-                known.append(what)
-    rows = ((engine, reason, "; ".join(names)) for (engine, reason), names in found.items())
-    return table(("engine", "reason", "figures"), rows)
+        lost = {each["engine"]: each["message"] for each in case["no_results"]}
+        cannot = [each for each in case["figures"] if each["verdict"] == "cannot"]
+        lost |= {each["engine"]: each["reason"] for each in cannot}
+        for engine, reason in lost.items():
+            count = sum(each["engine"] == engine for each in cannot)
+            what = f"`{case['name']}`" + (f" ({count} figures)" if count > 1 else "")
+            found.setdefault(engine, {}).setdefault(reason, []).append(what)
+    rows = (
+        (engine, "; ".join(names), reason)
+        for engine, reasons in found.items()
+        for reason, names in reasons.items()
+    )
+    return table(("engine", "cases", "reason (the first of the case)"), rows)
 
 
 def pairs(report: Entry) -> str:
@@ -130,7 +133,7 @@ def pairs(report: Entry) -> str:
         for name, found in (
             wording.figures_by_name(case).items() if case["name"] in wording.PAIR_CASES else ()
         ):
-            exact = wording.quantity_text(next(iter(found.values()))["exact"], "", 4)
+            exact = wording.coefficient_text(next(iter(found.values()))["exact"])
             rows.append((name, exact, *(effective(found.get(each)) for each in names)))
     return table(("materials", "geometric mean", *names), rows)
 
@@ -140,7 +143,7 @@ def effective(figure: Entry | None) -> str:
     if figure is None:
         return ""
     verdict = "" if figure["verdict"] in ("exact", "falls") else f" ({figure['verdict']})"
-    return wording.quantity_text(figure["measured"][-1], "", 4) + verdict
+    return wording.coefficient_text(figure["measured"][-1]) + verdict
 
 
 def figures(report: Entry) -> str:

@@ -9,7 +9,7 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dynx._version import __version__
 from dynx.cli.contacts import wording
@@ -29,15 +29,25 @@ ENGINE_STYLES = 6
 """Number of colours and markers of engines in the style sheet; more engines repeat them."""
 
 
+class RemovedErrors(NamedTuple):
+    """Errors of figures of one case, the largest before and after the change of a setting."""
+
+    case: str
+    figures: str
+    before: float
+    after: float
+    order: float | None
+    """Order at which the error of a single figure falls with the setting; None where that removes it."""
+
+
 @dataclass(frozen=True)
 class Removal:
-    """A change of an engine's settings, and the figures whose error it removes."""
+    """A change of an engine's settings, and the errors that it removes, by case."""
 
     engine: str
     change: str
     reason: str
-    figures: tuple[tuple[Entry, Entry], ...]
-    """Case and figure of each."""
+    errors: tuple[RemovedErrors, ...]
 
 
 def contacts_page(report: Entry, *, command: str | None = None) -> str:
@@ -60,15 +70,26 @@ def contacts_page(report: Entry, *, command: str | None = None) -> str:
 
 
 def removals(cases: Sequence[Entry]) -> list[Removal]:
-    """Return the changes of settings to which errors are attributed, with their figures."""
-    found: dict[tuple[str, str, str], list[tuple[Entry, Entry]]] = defaultdict(list)
+    """Return the changes of settings to which errors are attributed."""
+    found: dict[tuple[str, str, str], dict[str, list[Entry]]] = defaultdict(lambda: defaultdict(list))
     for case in cases:
         for figure in case["figures"]:
             cause = figure["attribution"]
             if cause is not None:
                 change = wording.change_text(cause["settings"], arrow="\N{RIGHTWARDS ARROW}")
-                found[figure["engine"], change, cause["reason"]].append((case, figure))
-    return [Removal(*key, tuple(each)) for key, each in sorted(found.items())]
+                found[figure["engine"], change, cause["reason"]][case["name"]].append(figure)
+    return [
+        Removal(*key, tuple(_removed(name, figures) for name, figures in by_case.items()))
+        for key, by_case in sorted(found.items())
+    ]
+
+
+def _removed(case: str, figures: Sequence[Entry]) -> RemovedErrors:
+    causes = [each["attribution"] for each in figures]
+    before, after = (max(wording.as_number(each["errors"][k][-1]) for each in causes) for k in (0, -1))
+    if len(figures) > 1:
+        return RemovedErrors(case, f"{len(figures)} figures", before, after, None)
+    return RemovedErrors(case, wording.figure_name(figures[0]), before, after, causes[0]["order"])
 
 
 def cell_figure(case: Entry, engine: str) -> Entry | None:
@@ -86,6 +107,7 @@ def template_environment() -> Environment:
     environment.filters["name"] = lambda text: escaped(text, NAME_LENGTH)
     more = (
         wording.figures_by_name,
+        wording.coefficient_text,
         wording.last_error,
         wording.quantity_text,
         wording.step_text,

@@ -62,11 +62,17 @@ def figure_name(figure: Entry) -> str:
     return ", ".join(part for part in (figure["figure"], figure["trial"]) if part)
 
 
-def quantity_text(value: float | None, unit: str, digits: int = 6) -> str:
+def quantity_text(value: float | None, unit: str) -> str:
     """Write a measured or exact value with its unit."""
     number = as_number(value)
-    text = "not finite" if number == math.inf else f"{number:.{digits}g}"
+    text = "not finite" if number == math.inf else f"{number:.6g}"
     return f"{text} {unit}" if unit else text
+
+
+def coefficient_text(value: float | None) -> str:
+    """Write a coefficient of friction or restitution."""
+    number = as_number(value)
+    return "not finite" if number == math.inf else f"{abs(number) if abs(number) < 5e-5 else number:.4f}"
 
 
 def step_text(dt: float) -> str:
