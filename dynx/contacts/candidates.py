@@ -56,9 +56,9 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
             "Bullet's solver of impulses is iterative and stops at this residual or number of iterations.",
         ),
         Candidate(
-            {"contact_distance": (0.0,), "contact_erp": (0.0,)},
-            "Bullet slows shapes before they touch, and pushes those apart that penetrate; both change the "
-            "speed of a rebound.",
+            {"contact_distance": (0.0,), "contact_erp": (0.0,), "contact_slop": (0.0,)},
+            "Bullet slows shapes before they touch, pushes those apart that penetrate, and lets them "
+            "approach to the slop; all three change the speed of a rebound.",
         ),
     ),
     "mujoco": (
@@ -69,6 +69,15 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
         Candidate(
             {"time_constant": (0.02, 0.05)},
             "A contact of MuJoCo is a damped spring, which the step resolves the better, the softer it is.",
+        ),
+        Candidate(
+            {"slip_time_constant": (0.1, 1.0), SUBSTEPS: (1, 8)},
+            "Friction of MuJoCo opposes slip within this time: the shorter it is, the more its contacts, "
+            "which are convex problems, push bodies apart that slide.",
+        ),
+        Candidate(
+            {"slip_time_constant": (1e-3, 1e-6), SUBSTEPS: (8, 16)},
+            "Friction of MuJoCo opposes slip within this time, or a step, which is too long for an impact.",
         ),
         Candidate(
             {"impratio": (1e3, 1e4)},
@@ -102,8 +111,18 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
             "A surface contact of Drake has a pressure in proportion to this modulus.",
         ),
         Candidate(
-            {"dissipation": (1.0, 0.0)},
-            "Contacts of Drake dissipate in proportion to this factor.",
+            {"dissipation": (100.0, 1000.0)},
+            "Contacts of Drake dissipate in proportion to this factor: the less, the more a body rebounds.",
+        ),
+        Candidate(
+            {"contact_approximation": ("similar",)},
+            "Drake limits friction by the normal force at the beginning of a step, which may be far larger "
+            "than the one that acts, unless it is told to use that.",
+        ),
+        Candidate(
+            {"modulus": (1e7, 1e6)},
+            "Boxes that slide in Drake chatter where contacts over surfaces are too stiff for the step, and "
+            "friction is then too large.",
         ),
         Candidate(
             {"contact_model": ("point",)},

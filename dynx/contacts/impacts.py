@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-SPREAD = 0.8e-3
-"""Difference [m] between the distances at which bodies start that touch one after the other.
-
-At 1 m/s bodies that start at five distances touch at evenly spaced moments within steps of 4, 2 and 1 ms.
-"""
+MOMENTS = tuple(0.8e-3 * k for k in range(5))
+"""Delays [s] of bodies that touch at different moments, evenly spaced within steps of 4, 2 and 1 ms."""
 
 
 def farthest(measured: Iterable[float], exact: float) -> float:
     """Return the number of several that is farthest from the exact one."""
     return max(measured, key=lambda value: abs(value - exact))
+
+
+def rms_deviation(measured: Sequence[float], exact: float) -> float:
+    """Return the root mean square of the distances of several numbers from the exact one."""
+    return math.sqrt(sum((value - exact) ** 2 for value in measured) / len(measured))
 
 
 def speeds_after_collision(
@@ -39,16 +42,24 @@ class Throw(NamedTuple):
     friction: float
     restitution: float
 
+    @property
+    def slips(self) -> bool:
+        """Whether the ball still slips when it leaves the ground."""
+        return self.friction * (1.0 + self.restitution) * self.fall < self.grip
+
+    @property
+    def grip(self) -> float:
+        """Impulse of friction per mass that ends the slip [m/s]: 2/7 of it, for the moment of inertia
+        2/5 m r^2 of a homogeneous ball."""
+        return 2.0 / 7.0 * abs(self.speed + self.backspin)
+
 
 def after_bounce(throw: Throw) -> tuple[float, float]:
     """Return the speed along the ground and the backspin [m/s] of a homogeneous ball after an impact.
 
     The normal impulse per mass is (1 + e) times the speed of the fall. Friction opposes the slip of the
-    lowest point in proportion to it until the slip is zero, which takes 2/7 of the slip for the moment of
-    inertia 2/5 m r^2.
+    lowest point, in proportion to it, until the slip is zero.
     """
-    slip = throw.speed + throw.backspin
-    grip = 2.0 / 7.0 * abs(slip)
-    impulse = min(throw.friction * (1.0 + throw.restitution) * throw.fall, grip)
-    impulse = impulse if slip > 0.0 else -impulse
+    impulse = min(throw.friction * (1.0 + throw.restitution) * throw.fall, throw.grip)
+    impulse = math.copysign(impulse, throw.speed + throw.backspin)
     return throw.speed - impulse, throw.backspin - 2.5 * impulse

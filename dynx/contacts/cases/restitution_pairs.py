@@ -8,7 +8,7 @@ from itertools import combinations_with_replacement
 from typing import ClassVar, NamedTuple
 
 from dynx.contacts.case import Case, Figure
-from dynx.contacts.impacts import SPREAD, farthest
+from dynx.contacts.impacts import MOMENTS, farthest
 from dynx.model import Pose
 from dynx.world import Material, Scene, World, box, sphere
 
@@ -16,7 +16,7 @@ RADIUS = 0.05
 SPEED = 1.0
 """Speed of the balls towards the slab [m/s]."""
 
-HEIGHTS = tuple(0.1 + k * SPREAD for k in range(5))
+HEIGHTS = tuple(0.1 + delay * SPEED for delay in MOMENTS)
 """Heights of the lowest points at the start [m]."""
 
 DURATION = 0.25

@@ -6,16 +6,15 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from dynx.contacts.case import Case, Figure
-from dynx.contacts.impacts import SPREAD, Throw, after_bounce, farthest
+from dynx.contacts.impacts import MOMENTS, Throw, after_bounce, farthest
 from dynx.model import Pose
 from dynx.world import Material, Scene, World, ground, sphere
 
 RADIUS = 0.1
-HEIGHTS = tuple(0.1 + k * SPREAD for k in range(5))
-"""Heights of the lowest points at the start [m]."""
+TIME = 0.1
+"""Time [s] at which the first ball meets the ground."""
 
 DURATION = 0.25
-"""Time [s] by which every ball has met the ground."""
 
 
 class SpinningBall(Case):
@@ -24,8 +23,9 @@ class SpinningBall(Case):
     name: ClassVar[str] = "spinning_ball"
     title: ClassVar[str] = "Impact of a spinning ball"
     law: ClassVar[str] = (
-        "v' = v - J and w' r = w r - 5/2 J with J = min(mu (1 + e) u, 2/7 (v + w r)), for the speed v along "
-        "the ground, the backspin w, the speed u of the fall, friction mu and restitution e"
+        "v' = v - J and w' r = w r - 5/2 J with J = min(mu (u + u'), 2/7 (v + w r)) and u' = e u, for speeds "
+        "v along the ground, u of the fall and u' of the rebound, backspin w, radius r, friction mu and "
+        "restitution e"
     )
     source: ClassVar[str] = (
         "Coulomb's law for the impulses of rigid bodies (Brody, That's how the ball bounces, The Physics "
@@ -35,7 +35,7 @@ class SpinningBall(Case):
         "slides": Throw(2.0, 1.0, 1.0, 0.2, 0.0),
         "grips": Throw(1.0, 0.5, 1.0, 1.0, 0.0),
         "slides and rebounds": Throw(2.0, 1.0, 1.0, 0.2, 0.5),
-        "comes back": Throw(1.0, 3.0, 1.0, 1.0, 0.5),
+        "comes back": Throw(1.0, 3.0, 2.0, 1.0, 0.5),
     }
 
     def scene(self, parameters: Throw) -> Scene:
@@ -46,7 +46,7 @@ class SpinningBall(Case):
                 name,
                 RADIUS,
                 mass=1.0,
-                pose=Pose((0.0, 0.5 * k, RADIUS + HEIGHTS[k])),
+                pose=Pose((0.0, 0.5 * k, RADIUS + parameters.fall * (TIME + MOMENTS[k]))),
                 twist=twist,
                 material=material,
             )
@@ -57,28 +57,39 @@ class SpinningBall(Case):
 
     def measure(self, world: World, parameters: Throw) -> Sequence[Figure]:
         world.run(DURATION)
-        twists = [world.state.bodies[name].twist for name in _balls()]
-        speed, backspin = after_bounce(parameters)
+        twists = [world.state.bodies[name].twist.tolist() for name in _balls()]
         rests_on = ("restitution",) if parameters.restitution else ()
-        return [
+        rebound = parameters.restitution * parameters.fall
+        speed, backspin = after_bounce(parameters)
+        figures = [
             Figure(
-                "speed along the ground",
-                farthest([float(twist[0]) for twist in twists], speed),
-                speed,
+                "speed of the rebound",
+                farthest([twist[2] for twist in twists], rebound),
+                rebound,
                 "m/s",
-                parameters.speed,
+                parameters.fall,
                 rests_on=rests_on,
-            ),
-            Figure(
-                "speed of the surface by backspin",
-                farthest([float(-twist[4] * RADIUS) for twist in twists], backspin),
-                backspin,
-                "m/s",
-                parameters.speed,
-                rests_on=rests_on,
-            ),
+            )
         ]
+        if parameters.slips:
+            # The normal impulse is that of the rebound found, which has a figure of its own.
+            ratios = [(parameters.speed - twist[0]) / (parameters.fall + twist[2]) for twist in twists]
+            found = farthest(ratios, parameters.friction)
+            figures.append(
+                Figure(
+                    "impulse of friction, relative to the normal impulse", found, parameters.friction, "", 1.0
+                )
+            )
+        else:
+            found = farthest([twist[0] for twist in twists], speed)
+            figures.append(Figure("speed along the ground", found, speed, "m/s", parameters.speed))
+        # Friction acts at the ground, so that it leaves the angular momentum about a point there.
+        momentum = backspin - 2.5 * speed
+        found = farthest([-twist[4] * RADIUS - 2.5 * twist[0] for twist in twists], momentum)
+        scale = parameters.backspin + 2.5 * parameters.speed
+        figures.append(Figure("angular momentum about the ground, by 2/5 m r", found, momentum, "m/s", scale))
+        return figures
 
 
 def _balls() -> list[str]:
-    return [f"ball {k}" for k in range(len(HEIGHTS))]
+    return [f"ball {k}" for k in range(len(MOMENTS))]

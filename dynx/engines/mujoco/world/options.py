@@ -34,7 +34,7 @@ SETTINGS: Mapping[str, Setting] = {
     ),
     "slip_time_constant": Setting(
         0.01,
-        "time constant at which slip decays in contacts that stick [s], at least two steps: smaller lets "
+        "time constant at which slip decays in contacts that stick [s], at least a step: smaller lets "
         "bodies hop that slide",
         1e-6,
     ),
@@ -125,7 +125,7 @@ def _ratio(settings: Mapping[str, Any], restitution: float, dt: float, slips: bo
 
 def slip_reference(settings: Mapping[str, Any], dt: float) -> tuple[float, float]:
     """Return MuJoCo's solreffriction (-k, -b) of contacts; slip has no spring, and MuJoCo ignores k."""
-    return -1.0, -1.0 / max(settings["slip_time_constant"], 2.0 * dt)
+    return -1.0, -1.0 / max(settings["slip_time_constant"], dt)
 
 
 def limit_reference(settings: Mapping[str, Any], dt: float) -> tuple[float, float]:
