@@ -19,6 +19,7 @@ from dynx.world.engine import WorldEngine
 from dynx.world.layout import Layout, Owner
 from dynx.world.motors import JointLaw
 from dynx.world.overlaps import overlaps_of
+from dynx.world.start_notes import joints_beyond_limits, violations
 from dynx.world.state import WorldState
 
 SPEED_CHANGE = 100.0
@@ -60,9 +61,12 @@ def likely_causes(engine: WorldEngine, state: WorldState, loads: LastLoads, h: f
     layout = engine.layout
     try:
         causes = [
+            *_gravity(layout, h),
             *_gains_and_torques(layout, state, loads, h),
             *_wrenches(layout, loads, h),
             *_overlaps(engine),
+            *islice(violations(layout, state), 1),
+            *islice((each.rstrip(",") for each in joints_beyond_limits(layout, state)), 1),
             *_light_parts(engine),
             *_singular_robots(layout, state),
         ]
@@ -70,6 +74,12 @@ def likely_causes(engine: WorldEngine, state: WorldState, loads: LastLoads, h: f
         # The message of the failure itself matters more than its explanation.
         causes = []
     return causes[:MOST_CAUSES] or ["the step is too long for the motion; try a smaller dt or more substeps"]
+
+
+def _gravity(layout: Layout, h: float) -> Iterator[str]:
+    change = h * float(np.linalg.norm(layout.gravity))
+    if change > SPEED_CHANGE:
+        yield f"gravity changes velocities by {change:.3g} m/s in one step of {h:.3g} s"
 
 
 def _gains_and_torques(layout: Layout, state: WorldState, loads: LastLoads, h: float) -> Iterator[str]:

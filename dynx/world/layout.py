@@ -106,6 +106,8 @@ class ConstraintLayout:
     kind: Literal["weld", "point"]
     a: Anchor
     b: Anchor
+    names: tuple[str, str]
+    """Names of the parts at the ends, for messages."""
 
 
 @dataclass(frozen=True, eq=False)

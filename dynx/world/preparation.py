@@ -125,15 +125,16 @@ class _Parts:
 
     def constraint(self, constraint: Weld | PointToPoint) -> ConstraintLayout:
         """Return a constraint with its ends as frames in their owners."""
+        names = constraint.a, constraint.b
         (owner_a, T_a), (owner_b, T_b) = self._part(constraint.a), self._part(constraint.b)
         if isinstance(constraint, PointToPoint):
             at_a, at_b = Pose(constraint.point_a).matrix, Pose(constraint.point_b).matrix
-            return ConstraintLayout("point", Anchor(owner_a, T_a @ at_a), Anchor(owner_b, T_b @ at_b))
+            return ConstraintLayout("point", Anchor(owner_a, T_a @ at_a), Anchor(owner_b, T_b @ at_b), names)
         if constraint.T_a_b is not None:
             T_a_b = constraint.T_a_b.matrix
         else:
             T_a_b = np.linalg.inv(self._start(constraint.a)) @ self._start(constraint.b)
-        return ConstraintLayout("weld", Anchor(owner_a, T_a @ T_a_b), Anchor(owner_b, T_b))
+        return ConstraintLayout("weld", Anchor(owner_a, T_a @ T_a_b), Anchor(owner_b, T_b), names)
 
     def _part(self, name: str) -> tuple[Owner, Floats]:
         """Return the owner of a part, and the pose of the part's frame in it."""
@@ -170,9 +171,10 @@ def _collider(
 def _pairs(scene: Scene, colliders: tuple[Collider, ...]) -> np.ndarray[tuple[int, int], np.dtype[np.bool_]]:
     n = len(colliders)
     pairs = np.zeros((n, n), dtype=bool)
+    may_collide = scene.collision_filter.may_collide
     for i, a in enumerate(colliders):
         for j in range(i):
             b = colliders[j]
-            if a.owner != b.owner and scene.may_collide(a.name, b.name):
+            if a.owner != b.owner and may_collide(a.name, b.name):
                 pairs[i, j] = pairs[j, i] = True
     return pairs

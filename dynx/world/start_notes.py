@@ -1,5 +1,5 @@
-"""Notes on the start of a world: parts that overlap, constraints that are violated, and coefficients of
-contact that the engine does not have."""
+"""Notes on the start of a world: overlaps, violated constraints, joints beyond their limits, and coefficients
+of contact that the engine does not have."""
 
 from __future__ import annotations
 
@@ -11,23 +11,32 @@ from dynx.errors import shown
 from dynx.spatial.so3 import quat_from_rotation, quat_log
 from dynx.world.engine import WorldEngine
 from dynx.world.geometry.boxes import owner_pose
-from dynx.world.layout import ConstraintLayout
+from dynx.world.layout import ConstraintLayout, Layout
 from dynx.world.materials import inexact_materials
 from dynx.world.overlaps import overlaps_of
-from dynx.world.scene import Scene
 from dynx.world.state import WorldState
 
 MAX_OVERLAPS = 5
 """Largest number of overlaps that are noted one by one."""
 
+BEYOND = 1e-3
+"""Distance [rad or m] beyond a limit from which a joint is noted."""
+
 GAP, ANGLE = 1e-4, 1e-3
 """Distance [m] and angle [rad] between the ends of a constraint from which it counts as violated."""
 
 
-def notes_on_start(engine: WorldEngine, state: WorldState, scene: Scene) -> tuple[str, ...]:
-    """Return one sentence for each overlap and each violated constraint of an engine at a state, and for each
-    coefficient of contact that it does not have."""
-    return (*_overlaps(engine), *_violations(engine, state, scene), *map(str, inexact_materials(engine)))
+def notes_on_start(engine: WorldEngine, state: WorldState) -> tuple[str, ...]:
+    """Return one sentence for each overlap, violated constraint and joint beyond its limits of an engine at a
+    state, and for each coefficient of contact that the engine does not have."""
+    drawn = "so that they are pulled together in the first steps"
+    moved = "so that it is pushed back in the first steps"
+    return (
+        *_overlaps(engine),
+        *(f"{each} at the start, {drawn}" for each in violations(engine.layout, state)),
+        *(f"{each} at the start, {moved}" for each in joints_beyond_limits(engine.layout, state)),
+        *map(str, inexact_materials(engine)),
+    )
 
 
 def _overlaps(engine: WorldEngine) -> Iterator[str]:
@@ -41,21 +50,34 @@ def _overlaps(engine: WorldEngine) -> Iterator[str]:
         yield f"{len(found) - MAX_OVERLAPS} more pairs of parts overlap at the start"
 
 
-def _violations(engine: WorldEngine, state: WorldState, scene: Scene) -> Iterator[str]:
-    for given, constraint in zip(scene.constraints, engine.layout.constraints, strict=True):
-        gap, angle = _deviation(engine, constraint, state)
+def violations(layout: Layout, state: WorldState) -> Iterator[str]:
+    """Yield each constraint whose ends are apart, and by how much."""
+    for constraint in layout.constraints:
+        gap, angle = _deviation(layout, constraint, state)
         turned = constraint.kind == "weld" and angle > ANGLE
         if gap > GAP or turned:
+            kind = "weld" if constraint.kind == "weld" else "point-to-point constraint"
+            ends = " and ".join(map(shown, constraint.names))
             more = f" and turned by {angle:.3g} rad" if turned else ""
-            yield (
-                f"the ends of the {type(given).__name__} of {shown(given.a)} and {shown(given.b)} are "
-                f"{1e3 * gap:.3g} mm apart{more} at the start, so that they are pulled together in the first "
-                "steps"
-            )
+            yield f"the ends of the {kind} of {ends} are {1e3 * gap:.3g} mm apart{more}"
 
 
-def _deviation(engine: WorldEngine, constraint: ConstraintLayout, state: WorldState) -> tuple[float, float]:
+def joints_beyond_limits(layout: Layout, state: WorldState) -> Iterator[str]:
+    """Yield each joint that is beyond a limit, with both."""
+    for robot in layout.robots:
+        model, q = robot.model, state.robots[robot.name].q
+        coupling = model.mechanism.coupling
+        tree_q = q if coupling is None else coupling.expand_q(q)
+        positions = tree_q[7 if model.floating else 0 :]
+        names = (joint.name for joint in model.joints if joint.moves)
+        for name, x, lower, upper in zip(names, positions, robot.lower, robot.upper, strict=True):
+            if not lower - BEYOND <= x <= upper + BEYOND:
+                joint = shown(f"{robot.name}/{name}")
+                yield f"{joint} is at {x:.4g}, beyond its limits {lower:.4g} to {upper:.4g},"
+
+
+def _deviation(layout: Layout, constraint: ConstraintLayout, state: WorldState) -> tuple[float, float]:
     """Return the distance [m] and the angle [rad] between the frames of the two ends."""
-    a, b = (owner_pose(engine.layout, end.owner, state) @ end.T for end in (constraint.a, constraint.b))
+    a, b = (owner_pose(layout, end.owner, state) @ end.T for end in (constraint.a, constraint.b))
     rotation = quat_log(quat_from_rotation(a[:3, :3].T @ b[:3, :3]))
     return float(np.linalg.norm(a[:3, 3] - b[:3, 3])), float(np.linalg.norm(rotation))

@@ -35,6 +35,9 @@ from dynx.world.start_notes import notes_on_start
 from dynx.world.state import BodyState, RobotState, WorldState
 from dynx.world.state_checks import apply_state, checked_state
 
+SHORTEST_STEP = 1e-9
+"""Shortest step of an engine [s]."""
+
 TorquesOf = Mapping[str, ArrayLike]
 LoadsOf = Callable[["World"], Mapping[str, Any]]
 
@@ -74,6 +77,10 @@ class World:
         """Name of the engine."""
         self.dt = positive_seconds("dt", dt)
         self.substeps = whole_number("substeps", substeps, 1)
+        if self.dt / self.substeps < SHORTEST_STEP:
+            raise ArgumentError(
+                f"dt is {dt} in {substeps} substeps; wanted steps of at least {SHORTEST_STEP:g} s"
+            )
         switches = checked_switches(
             collisions=collisions,
             joint_limits=joint_limits,
@@ -92,8 +99,9 @@ class World:
         self._queries = Queries(scene, self._layout)
         self._identity: str | None = None
         self._motion = Motion(self._layout, self._commands, self._build, self.dt, self.substeps)
-        self.notes: tuple[str, ...] = notes_on_start(self._motion.engine, self._motion.state, scene)
-        """Parts that overlap at the start, and constraints that it violates, one sentence each."""
+        self.notes: tuple[str, ...] = notes_on_start(self._motion.engine, self._motion.state)
+        """Parts that overlap at the start, constraints that it violates, and joints beyond their limits, one
+        sentence each."""
 
     @property
     def version(self) -> str:

@@ -13,7 +13,7 @@ import pytest
 import dynx
 from dynx import Pose
 from dynx.errors import DivergedError, EngineError
-from dynx.world import PDMotor, PositionMotor, Scene, SceneRobot, World, Wrench, box, ground
+from dynx.world import PDMotor, PositionMotor, Scene, SceneRobot, Weld, World, Wrench, box, ground
 from tests.world.engines import FAST_WORLDS, WORLDS
 
 
@@ -156,3 +156,14 @@ def test_a_robot_in_the_ground_diverges_and_one_above_it_does_not() -> None:
     with World(above, "pybullet") as world:
         world.run(0.3)
         assert abs(world.state.robots["icub"].v).max() < 100.0
+
+
+def test_gravity_and_violated_constraints_are_named() -> None:
+    cubes = tuple(
+        box(name, (0.2, 0.2, 0.2), mass=1.0, pose=Pose((5 * k, 0, 0))) for k, name in enumerate("ab")
+    )
+    with World(Scene("s", bodies=cubes, gravity=(0.0, 0.0, -1e50)), "pybullet") as world:
+        assert "likely cause: gravity changes velocities by 1e+47 m/s in one step" in diverge(world)
+    weld = Weld("a", "b", Pose((0.0, 0.0, 0.2)))
+    with World(Scene("s", bodies=cubes, constraints=(weld,)), "mujoco") as world:
+        assert "likely cause: the ends of the weld of 'a' and 'b' are 5e+03 mm apart" in diverge(world)

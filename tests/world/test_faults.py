@@ -20,6 +20,7 @@ from dynx.errors import (
     DivergedError,
     DynxError,
     EngineError,
+    EngineLimitError,
     UnknownNameError,
 )
 from dynx.model.geometry import Box, Collision, Mesh, Plane
@@ -222,6 +223,13 @@ def mesh(path: Path, content: bytes, suffix: str = ".obj") -> Scene:
 
 SCENES: dict[str, tuple[Callable[[Path], Scene], type[DynxError], str]] = {
     "duplicate names": (lambda p: Scene(bodies=(ground(), ground())), ArgumentError, "two parts"),
+    "a body in place of bodies": (lambda p: Scene(bodies=ground()), ArgumentError, r"such as \[SceneBody"),  # type: ignore[arg-type]
+    "shape of text": (lambda p: Scene(bodies=(SceneBody("a", "box"),)), ArgumentError, "wanted a shape"),  # type: ignore[arg-type]
+    "too many bodies": (
+        lambda p: Scene(bodies=[box(f"b{k}", (1, 1, 1)) for k in range(10_001)]),
+        EngineLimitError,
+        "at most 10000",
+    ),
     "zero-size box": (lambda p: Scene(bodies=(box("a", (1.0, 0.0, 1.0)),)), ArgumentError, "positive"),
     "negative mass": (lambda p: Scene(bodies=(box("a", (1.0, 1.0, 1.0), mass=-1.0),)), ArgumentError, "mass"),
     "NaN pose": (
@@ -283,6 +291,8 @@ def test_a_bad_scene_is_refused(engine: str, fault: str, tmp_path: Path) -> None
 
 OPTIONS: dict[str, tuple[dict[str, Any], type[DynxError], str]] = {
     "zero step": ({"dt": 0.0}, ArgumentError, "dt"),
+    "step of no length": ({"dt": 1e-300}, ArgumentError, "at least 1e-09 s"),
+    "substeps of no length": ({"substeps": 10**9}, ArgumentError, "at least 1e-09 s"),
     "no substeps": ({"substeps": 0}, ArgumentError, "substeps"),
     "unknown engine": ({"engine": "bulet"}, DynxError, "pybullet"),
     "collisions by number": ({"collisions": 1}, ArgumentError, "True or False"),

@@ -6,11 +6,13 @@ import math
 
 import pytest
 
+import dynx
 from dynx import Pose
 from dynx.world import (
     PointToPoint,
     Scene,
     SceneBody,
+    SceneRobot,
     Weld,
     World,
     box,
@@ -66,12 +68,12 @@ def test_constraints_that_the_start_violates_are_noted(engine: str) -> None:
     at = Pose((0.4, 0.0, 0.0), (0.0, 0.0, math.pi / 2))
     with World(Scene("s", bodies=bodies, constraints=(Weld("a", "b", at),)), engine) as world:
         (note,) = world.notes
-        assert note.startswith("the ends of the Weld of 'a' and 'b' are 100 mm apart and turned by 1.57 rad")
+        assert note.startswith("the ends of the weld of 'a' and 'b' are 100 mm apart and turned by 1.57 rad")
     point = PointToPoint("a", "world", (0.0, 0.0, 0.1), (0.0, 0.3, 0.1))
     with World(Scene("s", bodies=bodies, constraints=(point,)), engine) as world:
         (note,) = world.notes
         assert note.startswith(
-            "the ends of the PointToPoint of 'a' and 'world' are 300 mm apart at the start"
+            "the ends of the point-to-point constraint of 'a' and 'world' are 300 mm apart at the start"
         )
     met = (Weld("a", "b"), PointToPoint("a", "world", (0.0, 0.0, 0.1), (0.0, 0.0, 0.1)))
     with World(Scene("s", bodies=bodies, constraints=met), engine) as world:
@@ -81,4 +83,14 @@ def test_constraints_that_the_start_violates_are_noted(engine: str) -> None:
 @pytest.mark.parametrize("name", scene_names())
 def test_the_scenes_of_dynx_have_no_notes(name: str) -> None:
     with World(read_scene(name), "pybullet") as world:
+        assert world.notes == ()
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+def test_joints_beyond_their_limits_at_the_start_are_noted(engine: str) -> None:
+    robot = SceneRobot("arm", dynx.load("planar_2r"), q=(0.0, -3.0))
+    with World(Scene("s", robots=(robot,)), engine) as world:
+        (note,) = world.notes
+        assert note.startswith("'arm/elbow' is at -3, beyond its limits -2.6 to 2.6, at the start")
+    with World(Scene("s", robots=(robot,)), engine, joint_limits=False) as world:
         assert world.notes == ()

@@ -129,6 +129,8 @@ def sphere(name: str, radius: float, **options: object) -> SceneBody:
 
 
 def _placed_shapes(what: str, shapes: object) -> tuple[Collision, ...]:
+    if isinstance(shapes, str):
+        raise ArgumentError(f"shapes of {what} is {shown(shapes)}; wanted a shape, such as Box((1, 1, 1))")
     listed: list[Any] = list(shapes) if isinstance(shapes, Sequence) else [shapes]
     if not listed:
         raise ArgumentError(f"{what} has no shape; wanted at least one")

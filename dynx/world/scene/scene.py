@@ -114,7 +114,7 @@ class Scene:
         """
         for name in (a, b):
             self.material(name)
-        return self._filter.may_collide(a, b)
+        return self.collision_filter.may_collide(a, b)
 
     @cached_property
     def parts(self) -> tuple[str, ...]:
@@ -123,7 +123,8 @@ class Scene:
         return (*links, *self._bodies)
 
     @cached_property
-    def _filter(self) -> CollisionFilter:
+    def collision_filter(self) -> CollisionFilter:
+        """Which parts may collide, by names that are not checked again."""
         return CollisionFilter(self.robots, self.bodies, [tuple(map(self._members, p)) for p in self.ignored])
 
     def _members(self, name: str) -> frozenset[str]:
@@ -162,7 +163,7 @@ class Scene:
                 raise UnknownNameError(
                     f"a {type(constraint).__name__} ends on the robot {shown(end)}; wanted robot/link"
                 )
-        if all(end == WORLD or self._filter.is_fixed(end) for end in ends):
+        if all(end == WORLD or self.collision_filter.is_fixed(end) for end in ends):
             raise ArgumentError(
                 f"a {type(constraint).__name__} connects {ends[0]!r} and {ends[1]!r}, both fixed"
             )
@@ -170,7 +171,9 @@ class Scene:
 
 def _instances(name: str, parts: object, kinds: type | object) -> tuple[object, ...]:
     if isinstance(parts, str) or not isinstance(parts, Iterable):
-        raise ArgumentError(f"{name} of a scene is {shown(parts)}; wanted a sequence")
+        single = not isinstance(parts, str) and isinstance(parts, kinds)  # type: ignore[arg-type]
+        hint = f", such as [{type(parts).__name__}(...)]" if single else ""
+        raise ArgumentError(f"{name} of a scene is {shown(parts)}; wanted a sequence{hint}")
     found = tuple(parts)
     for each in found:
         if not isinstance(each, kinds):  # type: ignore[arg-type]
@@ -193,11 +196,13 @@ def _names(what: str, names: object) -> tuple[str, ...]:
 def _pair(k: int, pair: object) -> tuple[str, str]:
     names = _names(f"ignored[{k}]", pair)
     if len(names) != 2:
-        raise ArgumentError(f"ignored[{k}] is {shown(list(names))}; wanted the names of two parts")
+        raise ArgumentError(f"ignored[{k}] is {shown(list(names))}; wanted two names")
     return names[0], names[1]
 
 
 def _refuse_repeated(names: list[str]) -> None:
-    for index, name in enumerate(names):
-        if name in names[:index]:
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
             raise ArgumentError(f"two parts of the scene are called {shown(name)}; wanted different names")
+        seen.add(name)

@@ -143,7 +143,7 @@ def test_notes_on_the_start_are_shown(overlapping: str, tmp_path: Path) -> None:
     path = tmp_path / "run.json"
     result = run(overlapping, "--engine", ",".join(ENGINES), "--duration", "0.01", "--json", str(path))
     assert "note: 'kugel α' and 'b' overlap by 50 mm at the start" in result.output
-    assert "note: the ends of the PointToPoint of 'b' and 'world' are 150 mm apart" in result.output
+    assert "note: the ends of the point-to-point constraint of 'b' and 'world'" in result.output
     assert all(len(each["notes"]) == 2 for each in json.loads(path.read_text())["engines"])
 
 

@@ -52,7 +52,7 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "list for a table": ({"bodies": [{**BODY, "shape": [1]}]}, "shape is the list [1]; wanted a table with"),
     "number too large": ({"gravity": [0, 0, 10**400]}, "gravity[2] is a number of too many digits"),
     "text for a group": ({"groups": {"tools": "cube"}}, "groups.tools is 'cube'; wanted a list of texts"),
-    "pair of one": ({"bodies": [BODY], "ignored": [["cube"]]}, "wanted the names of two parts"),
+    "pair of one": ({"bodies": [BODY], "ignored": [["cube"]]}, "wanted two names"),
     "unknown key": (
         {"bodies": [{**BODY, "materials": {}}]},
         "bodies[0], 'cube' has no key 'materials'; did you mean 'material'?",

@@ -71,6 +71,8 @@ class BulletObject:
             )
         engine = client.engine
         path = folder / "object.urdf"
+        # A new file: one that is overwritten is flushed to the disk, which takes 10 ms on some file systems.
+        path.unlink(missing_ok=True)
         path.write_text(write_bullet_urdf(tree, attachments), encoding="ascii")
         flags = engine.URDF_USE_INERTIA_FROM_FILE | engine.URDF_USE_SELF_COLLISION | IMPLICIT_CYLINDER
         flags |= files.flags
