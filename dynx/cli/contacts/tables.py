@@ -13,6 +13,7 @@ from dynx.cli.contacts.wording import (
     RANKS,
     error_text,
     figure_name,
+    figures_by_name,
     last_error,
     step_text,
     steps_text,
@@ -42,7 +43,7 @@ def show(out: Console, report: Entry, *, every_figure: bool = False) -> None:
             given = ", ".join(f"{name}={value}" for name, value in each["settings"].items())
             out.print(f"{one_line(each['engine'])} with {one_line(given)}")
     shown = {
-        case["name"]: case["figures"] if every_figure else worst_of_engines(case)
+        case["name"]: _by_name(case) if every_figure else worst_of_engines(case)
         for case in report["cases"]
         if case["figures"] or case["no_results"]
     }
@@ -55,8 +56,9 @@ def show(out: Console, report: Entry, *, every_figure: bool = False) -> None:
         for figure in shown[case["name"]]:
             layout.show(figure)
         for lost in _first_of_engines(case["no_results"]):
-            what = short_line(lost["message"])
-            out.print(f"  {one_line(lost['engine'])}: {lost['kind']}: {what}", style="yellow")
+            where = f" at {step_text(lost['dt'])}" + (f", {lost['trial']}" if lost["trial"] else "")
+            what = f"{lost['engine']}{where}: {lost['kind']}: {lost['message']}"
+            out.print(f"  {short_line(what)}", style="yellow")
     _show_conclusion(out, report, layout.steps)
 
 
@@ -66,6 +68,11 @@ def worst_of_engines(case: Entry) -> list[Entry]:
     return [
         worst_figure([each for each in case["figures"] if each["engine"] == engine]) for engine in engines
     ]
+
+
+def _by_name(case: Entry) -> list[Entry]:
+    """Return the figures of a case with those of all engines together."""
+    return [each for found in figures_by_name(case).values() for each in found.values()]
 
 
 class _Layout:

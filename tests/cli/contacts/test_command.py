@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from importlib.util import find_spec
 from io import StringIO
 from pathlib import Path
@@ -33,9 +34,11 @@ def run(*arguments: str) -> Result:
     return CliRunner().invoke(cli, ["contacts", *arguments])
 
 
-def printed(width: int, *, every_figure: bool = False, not_done: int = 0) -> str:
+def printed(
+    width: int, *, every_figure: bool = False, not_done: int = 0, document: ContactsDocument | None = None
+) -> str:
     out = Console(file=StringIO(), width=width, soft_wrap=True, markup=False, emoji=False, highlight=False)
-    show(out, example(not_done=not_done), every_figure=every_figure)
+    show(out, document or example(not_done=not_done), every_figure=every_figure)
     assert isinstance(out.file, StringIO)
     return out.file.getvalue()
 
@@ -86,13 +89,20 @@ def test_every_verdict_is_explained_on_the_screen() -> None:
         "acceleration, slow  stiffness 1e+06 -> 1e+08: falls to 1.0e-03 (order 1.0)",
         "acceleration, slow  cannot: word",
         "not finite  acceleration, slow  unexplained",
-        "three: refused: word",
-        "two: crash: word",
+        "three at 4 ms, upward: refused: word",
+        "two at 4 ms, upward: crash: word",
         "9 figures at 1 ms: 4 exact, 1 falls, 1 cannot, 2 setting, 1 unexplained; 99 runs in 12.5 s",
         "1 run failed",
         "1 trial not done",
     ):
         assert words in text, text
+
+
+def test_the_engines_of_a_figure_stand_together() -> None:
+    document = example()
+    document["cases"][0]["figures"].sort(key=lambda each: each["engine"])
+    text = printed(200, every_figure=True, document=document)
+    assert re.findall(r"acceleration, (\w+)", text) == ["fast"] * 3 + ["slow"] * 3
 
 
 @pytest.mark.parametrize("width", [60, 80, 100])
