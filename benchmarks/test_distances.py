@@ -1,6 +1,7 @@
 """`World.closest_points` beside the distances of the engine: ``pytest benchmarks/test_distances.py``.
 
-A robot and a crate. ``us`` and ``native_us`` in the extra information are the times per pair of links.
+A robot and a crate, apart or overlapping. ``us`` and ``native_us`` in the extra information are the times per
+pair of links.
 """
 
 from __future__ import annotations
@@ -18,11 +19,14 @@ from dynx.world import Scene, SceneRobot, World, box
 ROUNDS = 30
 
 
+@pytest.mark.parametrize("where", [(0.9, 0.9, 0.15), (0.3, 0.0, 0.15)], ids=["apart", "overlapping"])
 @pytest.mark.parametrize("robot", ["a1", "ur5"])
 @pytest.mark.parametrize("engine", ["pybullet", "mujoco", "drake"])
-def test_closest_points(benchmark: BenchmarkFixture, engine: str, robot: str) -> None:
+def test_closest_points(
+    benchmark: BenchmarkFixture, engine: str, robot: str, where: tuple[float, float, float]
+) -> None:
     pytest.importorskip("pydrake" if engine == "drake" else engine)
-    crate = box("crate", (0.3, 0.3, 0.3), pose=dynx.Pose((0.9, 0.1, 0.15)))
+    crate = box("crate", (0.3, 0.3, 0.3), pose=dynx.Pose(where))
     scene = Scene("s", robots=(SceneRobot("robot", dynx.load(robot)),), bodies=(crate,))
     with World(scene, engine) as world:
         best = {False: np.inf, True: np.inf}
@@ -37,5 +41,4 @@ def test_closest_points(benchmark: BenchmarkFixture, engine: str, robot: str) ->
             lambda: world.closest_points("robot", "crate", within=5.0),
             rounds=1 if benchmark.disabled else ROUNDS,
         )
-    benchmark.group = f"{robot} in {engine}"
     benchmark.extra_info.update(us=1e6 * best[False], native_us=1e6 * best[True])

@@ -20,7 +20,7 @@ import numpy as np
 
 from dynx.distance import Distance, distance
 from tests.distance.shapes import KINDS, random_pose, random_shape
-from tests.distance.survey_engines import ENGINES, Measure, Placed
+from tests.distance.survey_engines import CHANGES, ENGINES, Measure, Placed
 
 PLACEMENTS = ("separated", "touching", "overlapping")
 CASES = [(*kinds, place) for kinds in combinations_with_replacement(KINDS, 2) for place in PLACEMENTS]
@@ -88,7 +88,7 @@ def table(rows: Sequence[Row], engines: Sequence[str]) -> Iterator[str]:
         by_case[row.case].append(row)
     for place in PLACEMENTS:
         yield f"\n**{place.capitalize()}**\n"
-        header = [cell for name in engines for cell in (name, f"{name}, changed")]
+        header = [cell for name in engines for cell in (name, CHANGES.get(name)) if cell]
         yield "| pair | gap | " + " | ".join(header) + " |"
         yield "|---|" + "---|" * (1 + len(header))
         for case, found in by_case.items():
@@ -97,11 +97,14 @@ def table(rows: Sequence[Row], engines: Sequence[str]) -> Iterator[str]:
             cells = [f"{max(row.gap for row in found):.0e}"]
             for name in engines:
                 errors = np.array([row.errors[name] for row in found])
-                cells += [
-                    f"{errors[:, 0].max():.0e} ({np.median(errors[:, 0]):.0e})",
-                    f"{errors[:, 1].max():.0e}",
-                ]
+                columns = errors.T if name in CHANGES else errors.T[:1]
+                cells += [f"{shown(column.max())} ({shown(np.median(column))})" for column in columns]
             yield f"| {case[0]}, {case[1]} | " + " | ".join(cells) + " |"
+
+
+def shown(error: float) -> str:
+    """Return an error [m] in one digit; engines that fail raise, or return an infinite or huge number."""
+    return f"{error:.0e}" if error < 1e100 else "fails"
 
 
 def times(rows: Sequence[Row]) -> str:

@@ -81,8 +81,9 @@ def _rounded(placed: Placed) -> Placed:
     if not isinstance(shape, Hull):
         return placed
     low, high = shape.points.min(axis=0), shape.points.max(axis=0)
-    step, middle = (high - low) / 10216, (low + high) / 2
-    return Hull(np.trunc((shape.points - middle) / step) * step + middle), T
+    # The same operations as Bullet's: the extreme points are within rounding of a step.
+    step, middle = (high - low) * (1.0 / 10216), (low + high) * 0.5
+    return Hull(np.trunc((shape.points - middle) * (1.0 / step)) * step + middle), T
 
 
 def mujoco() -> Measure:
@@ -228,3 +229,10 @@ ENGINES: Mapping[str, Callable[[], Measure]] = {
     "coal": coal,
     "drake": drake,
 }
+
+CHANGES: Mapping[str, str] = {
+    "bullet": "margin 0",
+    "mujoco": "ccd_tolerance 1e-12",
+    "coal": "gjk_tolerance 1e-10",
+}
+"""Settings that are changed for the second distance of an engine."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from tests.faults.checks import CHECKS_FAULTS
 from tests.faults.contacts import CONTACTS_FAULTS
 from tests.faults.description import DESCRIPTION_FAULTS
+from tests.faults.distance import DISTANCE_FAULTS
 from tests.faults.engines import ENGINES_FAULTS
 from tests.faults.fault import Fault
 from tests.faults.rigid_body import RIGID_BODY_FAULTS
@@ -16,6 +17,7 @@ FAULTS_BY_AREA: dict[str, tuple[Fault, ...]] = {
     "engines": ENGINES_FAULTS,
     "checks": CHECKS_FAULTS,
     "contacts": CONTACTS_FAULTS,
+    "distance": DISTANCE_FAULTS,
     "simulation": SIMULATION_FAULTS,
 }
 FAULTS: tuple[Fault, ...] = tuple(fault for faults in FAULTS_BY_AREA.values() for fault in faults)

@@ -88,6 +88,14 @@ def test_links_and_meshes_are_where_the_robot_is() -> None:
             assert found[f"arm/{link}"].distance == pytest.approx(exact.distance, abs=1e-9)
 
 
+def test_broad_phase_loses_no_pair() -> None:
+    balls = (sphere("one", 0.4), sphere("two", 0.5, pose=Pose((1.0, 0, 0))))
+    with World(Scene("s", bodies=balls), "pybullet") as world:
+        (near,) = world.closest_points("one", "two", within=0.1 + 1e-12)
+        assert near.distance == pytest.approx(0.1)
+        assert world.closest_points("one", "two", within=0.1 - 1e-12) == ()
+
+
 @given(poses(), st.sampled_from(SHAPES))
 def test_supports_are_where_boxes_end(T: Floats, shape: Box | Cylinder | Sphere | Capsule) -> None:
     lower, upper = shape_box(shape, T)

@@ -1,0 +1,40 @@
+"""Faults in certified distances."""
+
+from __future__ import annotations
+
+from tests.faults.fault import Fault
+
+DISTANCE_FAULTS = (
+    Fault(
+        "distance_lower_bound_without_radii",
+        "dynx.distance.distance",
+        right="lower=lower - radii,",
+        wrong="lower=lower,",
+        test_file="tests/distance/test_certificate.py",
+        test="test_bounds_are_attained",
+    ),
+    Fault(
+        "distance_depth_of_the_first_polytope",
+        "dynx.distance.penetration",
+        right="self._offsets < self._upper - margin",
+        wrong="self._offsets < -self._upper - margin",
+        test_file="tests/distance/test_closed_forms.py",
+        test="test_boxes_that_overlap",
+    ),
+    Fault(
+        "distance_deeper_way_out_of_a_cylinder",
+        "dynx.distance.parallel_axes",
+        right="if to_side <= to_end:",
+        wrong="if to_side > to_end:",
+        test_file="tests/distance/test_certificate.py",
+        test="test_equal_shapes_at_equal_poses[Cylinder]",
+    ),
+    Fault(
+        "distance_broad_phase_without_radii",
+        "dynx.world.geometry.distances",
+        right="self._reach = self.core.extent + self.core.radius",
+        wrong="self._reach = self.core.extent",
+        test_file="tests/world/test_distances.py",
+        test="test_broad_phase_loses_no_pair",
+    ),
+)
