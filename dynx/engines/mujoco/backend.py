@@ -115,13 +115,30 @@ class MujocoBackend(Backend):
     def _jacobian(self, q: Floats, frame: int, reference: Reference) -> Floats:
         work, body = self._set_positions(q), self._bodies[frame]
         mujoco.mj_comPos(self._engine, work.data)
+        return self._jacobian_at(work, body, reference)
+
+    def _jacobian_derivative(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
+        work, body = self._set_state(q, v), self._bodies[frame]
+        return self._jacobian_derivative_at(work, v, body, reference)
+
+    def _frame_acceleration(
+        self, q: Floats, v: Floats, a: Floats, frame: int, reference: Reference
+    ) -> Floats:
+        # MuJoCo's own accelerations lose digits.
+        work, body = self._set_state(q, v), self._bodies[frame]
+        found = self._jacobian_at(work, body, reference).dot(a)
+        found += self._jacobian_derivative_at(work, v, body, reference).dot(v)
+        return np.asarray(found)
+
+    def _jacobian_at(self, work: _Workspace, body: int, reference: Reference) -> Floats:
+        """Return the Jacobian (6, nv) of a body's frame at the positions of the workspace."""
         J = self._columns(work, mujoco.mj_jac, ORIGIN if reference == "world" else work.p[body], body)
         if reference == "local":
             return np.concatenate([work.R[body].T @ J[:3], work.R[body].T @ J[3:]])
         return J
 
-    def _jacobian_derivative(self, q: Floats, v: Floats, frame: int, reference: Reference) -> Floats:
-        work, body = self._set_state(q, v), self._bodies[frame]
+    def _jacobian_derivative_at(self, work: _Workspace, v: Floats, body: int, reference: Reference) -> Floats:
+        """Return dJ/dt (6, nv) of a body's frame in the state of the workspace, whose velocity is `v`."""
         p, R = work.p[body], work.R[body]
         dJ = self._columns(work, mujoco.mj_jacDot, p, body)
         if self._floating:
@@ -171,6 +188,14 @@ class MujocoBackend(Backend):
     def _mass_matrix(self, q: Floats) -> Floats:
         work = self._set_positions(q)
         return self._dynamics.mass_matrix(work.data, work.R[ROOT], work.p[ROOT])
+
+    def _gravity_torque(self, q: Floats) -> Floats:
+        work = self._set_positions(q)
+        return self._dynamics.gravity_torque(work.data, work.R[ROOT], work.p[ROOT])
+
+    def _kinetic_energy(self, q: Floats, v: Floats) -> Floats:
+        work = self._set_positions(q)
+        return self._dynamics.kinetic_energy(work.data, work.R[ROOT], work.p[ROOT], v)
 
     def _mass_matrix_and_bias(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         """Return M (nv, nv) and C v + g (nv,) as MuJoCo's own forward dynamics has them."""

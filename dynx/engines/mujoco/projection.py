@@ -54,14 +54,27 @@ class ProjectedDynamics:
                 self._moves[first : first + n, column] = 1.0
                 body = engine.body_parentid[body]
         self._moves_vector: Floats = np.repeat(self._moves, 3, axis=1)
+        self._moved_masses: Floats = self._moves * mass
+        self._gravity: Floats = np.array(engine.opt.gravity)
+        self._gravity_cross: Floats = skew(self._gravity).T
 
     def mass_matrix(self, data: Any, R_root: Floats, p_root: Floats) -> Floats:
         """Return the mass matrix (nv, nv), after `mj_kinematics` on `data`; (R, p) is the root's pose."""
+        J = self._velocities(data, R_root, p_root)
+        M = (J * self._weights).dot(J.T)
+        return np.asarray(0.5 * (M + M.T))
+
+    def kinetic_energy(self, data: Any, R_root: Floats, p_root: Floats, v: Floats) -> Floats:
+        """Return the kinetic energy () at the velocity `v` (nv,), after `mj_kinematics` on `data`."""
+        velocity = v.dot(self._velocities(data, R_root, p_root))
+        return np.asarray(0.5 * (velocity * self._weights).dot(velocity))
+
+    def _velocities(self, data: Any, R_root: Floats, p_root: Floats) -> Floats:
+        """Return the velocities of all bodies (nv, 6 n) for unit velocities of each coordinate: those of the
+        centres of mass in world axes, then angular velocities in principal axes."""
         axes, lever = self._axes(data, R_root, p_root)
         n, count = self._moves_vector.shape
         angular = axes * self._revolute
-        # Rows are the columns of Jp and Jr of all bodies: velocities of centres of mass in world axes, then
-        # angular velocities in principal axes.
         J = np.empty((n, 2 * count))
         Jp, Jr = J[:, :count], J[:, count:]
         np.multiply(np.matmul(lever, _skew(-angular)).reshape(n, count), self._moves_vector, Jp)
@@ -69,8 +82,19 @@ class ProjectedDynamics:
             np.multiply.outer(self._moves[row], axes[row], out=Jp[row].reshape(-1, 3))
         to_principal = data.ximat.take(self._bodies, 0, None, "clip").reshape(-1, 3, 3).transpose(1, 0, 2)
         np.multiply(angular.dot(to_principal.reshape(3, count)), self._moves_vector, Jr)
-        M = (J * self._weights).dot(J.T)
-        return np.asarray(0.5 * (M + M.T))
+        return J
+
+    def gravity_torque(self, data: Any, R_root: Floats, p_root: Floats) -> Floats:
+        """Return the torque (nv,) at rest, after `mj_kinematics` on `data`: the moment of all weights that a
+        coordinate moves about its axis, or their sum along it."""
+        axes, lever = self._axes(data, R_root, p_root)
+        # A weight has the moment m (c - p) x g; its product with the axis is that of m (c - p) and g x axis.
+        moments = np.matmul(self._moved_masses[:, None], lever)[:, 0]
+        about_axis = (moments * axes.dot(self._gravity_cross)).sum(1)
+        if not self._translations.size:
+            return np.asarray(-about_axis)
+        along_axis = self._moved_masses.sum(1) * axes.dot(self._gravity)
+        return np.asarray(-np.where(self._revolute[:, 0], about_axis, along_axis))
 
     def torque(self, data: Any, R_root: Floats, p_root: Floats) -> Floats:
         """Return the torque (nv,), after `mj_rnePostConstraint` (accelerations without gravity) on `data`."""
