@@ -98,6 +98,22 @@ def speed_on_slope(kind: str, engine: str, a: Material, b: Material, tangent: fl
         return float(velocity(world)[0] / (0.4 * G * np.sin(angle)))
 
 
+def four_materials() -> Scene:
+    """Return slabs of three materials that slide side by side on a ground of another."""
+    slabs = [
+        box(
+            f"slab{k}",
+            (0.4, 0.4, 0.1),
+            mass=2.0,
+            pose=Pose((0, 2.0 * k, 0.05)),
+            twist=(3, 0, 0, 0, 0, 0),
+            material=Material(friction=friction),
+        )
+        for k, friction in enumerate((0.1, 0.4, 0.9))
+    ]
+    return Scene("slabs", bodies=(ground(material=Material(friction=0.25)), *slabs))
+
+
 def dropping_scene(kind: str, a: Material, b: Material, height: float, folder: Path) -> tuple[Scene, float]:
     """Return a body of material `a` at a height above a ground of material `b`, and the height of its centre
     when it touches."""

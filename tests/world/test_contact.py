@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -53,9 +52,7 @@ def test_the_ground_carries_the_weight_of_a_box_at_rest(engine: str) -> None:
 def test_the_moments_of_contact_forces_at_rest_balance(engine: str) -> None:
     center = np.array([0.12, -0.07, -0.05])
     brick = box("brick", (0.4, 0.4, 0.2), mass=MASS, pose=Pose((0, 0, 0.1)), center_of_mass=center)
-    # With the default modulus a box that leans on one edge rattles in Drake at this step; see docs/world.md.
-    settings: dict[str, Any] = {"modulus": 1e7} if engine == "drake" else {}
-    with World(Scene("rest", bodies=(ground(), brick)), engine, **settings) as world:
+    with World(Scene("rest", bodies=(ground(), brick)), engine) as world:
         world.run(1.0)
         contacts = world.contacts()
         T = world.state.bodies["brick"].T_world_body

@@ -15,12 +15,20 @@ from dynx.world import Material, Scene, World, box, contact_material, ground, sp
 from dynx.world.scene.contact_priorities import contact_priorities
 from dynx.world.scene.pair_terms import pair_terms
 from tests.world.engines import WORLDS
-from tests.world.materials import SLIDERS, G, mean_rebound, rebound, sliding_friction, speed_on_slope
+from tests.world.materials import (
+    SLIDERS,
+    G,
+    four_materials,
+    mean_rebound,
+    rebound,
+    sliding_friction,
+    speed_on_slope,
+)
 
 TOLERANCE = {"pybullet": 0.02, "mujoco": 0.05, "drake": 0.001}
 """Relative error of the mean deceleration; sliding bodies rattle in Bullet and hop a little in MuJoCo."""
 
-RATTLES = {("drake", "mesh"), ("drake", "box on a box"), ("drake", "box on a link")}
+RATTLES = {("drake", "mesh")}
 """Bodies that do not slide flat in an engine."""
 
 KINDS = [(engine, kind) for engine in WORLDS for kind in SLIDERS if (engine, kind) not in RATTLES]
@@ -49,22 +57,6 @@ def test_a_surface_without_friction_has_none_with_any_other(engine: str, tmp_pat
     rough, smooth = Material(friction=1.5), Material(friction=0.0)
     assert abs(sliding_friction("box", engine, rough, smooth, tmp_path)) < 1e-9
     assert abs(sliding_friction("box", engine, smooth, rough, tmp_path)) < 1e-9
-
-
-def four_materials() -> Scene:
-    """Return slabs of three materials that slide side by side on a ground of another."""
-    slabs = [
-        box(
-            f"slab{k}",
-            (0.4, 0.4, 0.1),
-            mass=2.0,
-            pose=Pose((0, 2.0 * k, 0.05)),
-            twist=(3, 0, 0, 0, 0, 0),
-            material=Material(friction=friction),
-        )
-        for k, friction in enumerate((0.1, 0.4, 0.9))
-    ]
-    return Scene("slabs", bodies=(ground(material=Material(friction=0.25)), *slabs))
 
 
 @pytest.mark.parametrize("engine", [*WORLDS, "mujoco without pairs"])

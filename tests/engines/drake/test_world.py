@@ -53,7 +53,7 @@ def test_a_box_rests_on_the_ground_with_its_weight() -> None:
     assert_allclose(contact.normal, [0, 0, -1.0], atol=1e-9)
     assert_allclose(contact.force, [0, 0, -2.0 * G], atol=1e-3)
     # The pressure of the modulus, over half of the edge, at this depth carries the weight.
-    assert contact.distance == pytest.approx(-2.0 * G / (1e8 / 0.1 * 0.2**2), rel=0.02)
+    assert contact.distance == pytest.approx(-2.0 * G / (3e6 / 0.1 * 0.2**2), rel=0.02)
     assert height == pytest.approx(0.1 + contact.distance, abs=1e-7)
 
 

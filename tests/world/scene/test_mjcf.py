@@ -29,6 +29,7 @@ from dynx.world import (
     sphere,
 )
 from dynx.world.scene.link_frames import LinkFrames
+from tests.world.materials import four_materials
 from tests.world.scene.test_files import require_robots
 
 mujoco = pytest.importorskip("mujoco")
@@ -292,3 +293,28 @@ def test_a_body_is_loaded_from_its_urdf() -> None:
     hills = SceneBody("hills", HeightField(((0, 0), (0, 0)), (1, 1)))
     with pytest.raises(DescriptionError, match="HeightField of link 'hills'"):
         body_to_urdf(hills)
+
+
+def test_a_document_slides_and_rebounds_by_the_means_of_its_materials() -> None:
+    model, data = load(four_materials())
+    model.opt.timestep = 1e-3
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_step(model, data, 100)
+    before = [data.joint(f"slab{k}").qvel[0] for k in range(3)]
+    mujoco.mj_step(model, data, 400)
+    after = [data.joint(f"slab{k}").qvel[0] for k in range(3)]
+    slowed = (np.array(before) - after) / 0.4 / 9.81
+    np.testing.assert_allclose(slowed, 0.5 * np.sqrt([0.1, 0.4, 0.9]), rtol=0.05)
+
+    bouncy = Material(restitution=0.8)
+    heights = []
+    for height in (0.97, 0.99, 1.01):
+        ball = sphere("ball", 0.1, mass=1.0, pose=Pose((0, 0, 0.1 + height)), material=bouncy)
+        model, data = load(Scene("s", bodies=(ground(material=bouncy), ball)))
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+        z = []
+        for _ in range(500):
+            mujoco.mj_step(model, data)
+            z.append(data.qpos[2] - 0.1)
+        heights.append(max(z[int(np.argmin(z)) :]) / height)
+    assert np.mean(heights) == pytest.approx(0.64, abs=0.05)

@@ -37,7 +37,7 @@ SETTINGS: Mapping[str, Setting] = {
         "pressure over the surface of contact, or one point",
         choices=("hydroelastic", "point"),
     ),
-    "modulus": Setting(1e8, "hydroelastic modulus of shapes that move [Pa]", 1e-3),
+    "modulus": Setting(3e6, "hydroelastic modulus of shapes that move [Pa]", 1e-3),
     "resolution": Setting(
         0.1, "length of the edges by which cylinders are approximated, relative to the radius", 0.02, 2.0
     ),
