@@ -10,6 +10,7 @@ from tests.faults.engines import ENGINES_FAULTS
 from tests.faults.fault import Fault
 from tests.faults.rigid_body import RIGID_BODY_FAULTS
 from tests.faults.simulation import SIMULATION_FAULTS
+from tests.faults.worlds import WORLDS_FAULTS
 
 FAULTS_BY_AREA: dict[str, tuple[Fault, ...]] = {
     "rigid_body": RIGID_BODY_FAULTS,
@@ -19,5 +20,6 @@ FAULTS_BY_AREA: dict[str, tuple[Fault, ...]] = {
     "contacts": CONTACTS_FAULTS,
     "distance": DISTANCE_FAULTS,
     "simulation": SIMULATION_FAULTS,
+    "worlds": WORLDS_FAULTS,
 }
 FAULTS: tuple[Fault, ...] = tuple(fault for faults in FAULTS_BY_AREA.values() for fault in faults)

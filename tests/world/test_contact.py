@@ -164,6 +164,28 @@ def test_contacts_before_the_first_step_are_those_of_the_start(engine: str) -> N
         assert all(c.normal_force == 0.0 for c in contacts)
 
 
+def test_contacts_after_the_state_was_set_are_those_of_the_new_state(engine: str) -> None:
+    with World(on_ground(), engine) as world:
+        world.step(20)
+        assert force_on("brick", world.contacts())[2] > 0.0
+        world.set_state(bodies={"brick": (Pose((0, 0, 0.09)).matrix, np.zeros(6))})
+        contacts = world.contacts()
+    assert min(c.distance for c in contacts) == pytest.approx(-0.01, abs=1e-3)
+    assert all(c.normal_force == 0.0 and not c.friction_force.any() for c in contacts)
+
+
+def test_contacts_after_several_steps_are_those_of_the_last(engine: str) -> None:
+    dropped = box("brick", (0.2, 0.2, 0.2), mass=1.0, pose=Pose((0, 0, 0.105)))
+    scene, forces = Scene("s", bodies=(ground(), dropped)), []
+    for calls in (1, 60):
+        with World(scene, engine) as world:
+            for _ in range(calls):
+                world.step(60 // calls)
+            forces.append(force_on("brick", world.contacts()))
+    assert forces[0][2] > 0.0
+    assert (forces[0] == forces[1]).all()
+
+
 def test_bodies_that_ignore_one_another_pass_through(engine: str) -> None:
     brick = box("brick", (0.2, 0.2, 0.2), mass=1.0, pose=Pose((0, 0, 0.3)))
     scene = Scene("s", bodies=(ground(), brick), ignored=(("ground", "brick"),))

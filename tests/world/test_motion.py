@@ -82,6 +82,31 @@ def test_a_force_at_a_point_turns_a_body(engine: str) -> None:
         assert_allclose(world.state.bodies["brick"].twist, expected, atol=1e-10)
 
 
+def test_a_force_at_the_centre_of_mass_turns_nothing(engine: str) -> None:
+    center = (0.1, 0.05, -0.02)
+    scene = Scene(
+        "s", bodies=(box("brick", (0.4, 0.2, 0.2), mass=2.0, center_of_mass=center),), gravity=(0, 0, 0)
+    )
+    with World(scene, engine, DT) as world:
+        world.step(wrenches=[Wrench("brick", force=(3.0, 1.0, -2.0), point=center)])
+        assert_allclose(world.state.bodies["brick"].twist, [1.5e-3, 0.5e-3, -1e-3, 0, 0, 0], atol=1e-12)
+
+
+def test_the_state_that_is_set_is_the_one_that_is_read(engine: str) -> None:
+    model = dynx.load("panda", base="floating")
+    rng = np.random.default_rng(3)
+    q, v = configuration.random(model, rng), rng.normal(size=model.nv)
+    pose, twist = Pose((0.3, 0.2, 0.1), (0.4, -0.5, 0.6)).matrix, rng.normal(size=6)
+    brick = box("brick", (0.3, 0.2, 0.1), mass=2.0, center_of_mass=(0.1, 0.0, 0.02))
+    with World(Scene("s", robots=(SceneRobot("r", model),), bodies=(brick,)), engine, DT) as world:
+        world.set_state(robots={"r": (q, v)}, bodies={"brick": (pose, twist)})
+        robot, body = world.state.robots["r"], world.state.bodies["brick"]
+    assert_allclose(robot.q, q, atol=1e-12)
+    assert_allclose(robot.v, v, atol=1e-12)
+    assert_allclose(body.T_world_body, pose, atol=1e-12)
+    assert_allclose(body.twist, twist, atol=1e-12)
+
+
 @pytest.mark.parametrize("base", ["fixed", "floating"])
 @pytest.mark.parametrize("name", ["six_axis_arm", "panda"])
 def test_a_wrench_on_a_link_acts_as_its_torque(engine: str, name: str, base: dynx.model.model.Base) -> None:

@@ -49,6 +49,20 @@ def test_motors_at_the_end_of_a_step_agree_with_those_at_its_beginning(engine: s
 
 
 @pytest.mark.parametrize("engine", WORLDS)
+def test_a_motor_after_the_state_was_set_acts_as_in_a_new_world(engine: str) -> None:
+    motors = {"arm": PositionMotor(0.3, kp=100.0, kd=10.0)}
+    rates = []
+    for moved in (False, True):
+        with arm(engine) as world:
+            if moved:
+                world.step(20, motors=motors)
+            world.set_state(robots={"arm": (np.full(6, 0.1), np.full(6, 0.5))})
+            world.step(motors=motors)
+            rates.append(world.state.robots["arm"].v)
+    assert rates[1] == pytest.approx(rates[0], abs=1e-9)
+
+
+@pytest.mark.parametrize("engine", WORLDS)
 def test_a_motor_gives_at_most_its_force(engine: str) -> None:
     limits = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
     with arm(engine) as world:

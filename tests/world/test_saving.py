@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -74,6 +75,18 @@ def test_a_snapshot_of_another_scene_or_step_is_refused(engine: str) -> None:
         assert (world.state.bodies["b"].T_world_body == before).all()
 
 
+def test_a_snapshot_of_other_settings_is_refused(engine: str) -> None:
+    changed: dict[str, dict[str, Any]] = {
+        "pybullet": {"erp": 0.1},
+        "mujoco": {"margin": 0.001},
+        "drake": {"modulus": 1e7},
+    }
+    with World(small(), engine, **changed[engine]) as other:
+        snapshot = other.save()
+    with World(small(), engine) as world, pytest.raises(ArgumentError, match="another scene"):
+        world.restore(snapshot)
+
+
 def test_a_damaged_file_is_refused_before_the_engine_sees_it(engine: str, tmp_path: Path) -> None:
     path = tmp_path / "world"
     with World(small(), engine) as world:
@@ -106,9 +119,9 @@ def test_reset_returns_to_the_start(engine: str) -> None:
         assert (world.state.bodies["b"].T_world_body == first.bodies["b"].T_world_body).all()
 
 
-def test_files_of_another_kind_name_the_function_that_reads_them(tmp_path: Path) -> None:
+def test_files_of_another_kind_name_the_function_that_reads_them(engine: str, tmp_path: Path) -> None:
     world_file, npz, toml = (str(tmp_path / name) for name in ("a.world", "b.npz", "c.toml"))
-    with World(Scene("s", bodies=(box("a", (1, 1, 1), mass=1.0),)), "pybullet") as world:
+    with World(Scene("s", bodies=(box("a", (1, 1, 1), mass=1.0),)), engine) as world:
         world.write(world_file)
     np.savez(npz, x=np.zeros(3))
     Path(toml).write_text("schema = 'dynx.scene/1'")

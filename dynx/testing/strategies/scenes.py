@@ -15,7 +15,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from dynx.errors import ArgumentError, DTypeError, UnknownNameError, nearest, shown
-from dynx.model import Pose
+from dynx.model import Limits, Model, Pose
 from dynx.model.elements import Vector
 from dynx.model.geometry import (
     Box,
@@ -102,9 +102,9 @@ def scenes(
 
     Bodies of one shape or several, of any attitude, with their own centre of mass or that of their shapes,
     masses from 0.1 to 10 kg, and materials; fixed bodies; robots from `models` with shapes on their links, on
-    fixed and floating bases, within their joint limits; welds and ball joints that hold at the start; pairs
-    and groups that do not collide; gravity of the earth, of another direction, or none. No two parts overlap
-    at the start.
+    fixed and floating bases, within their joint limits (joints that follow others have none); welds and ball
+    joints that hold at the start; pairs and groups that do not collide; gravity of the earth, of another
+    direction, or none. No two parts overlap at the start.
 
     - `ground`: ``"plane"``, ``"slope"``, ``"hills"`` (a height field), ``"none"`` or ``"any"`` of these
     - `moving`: whether parts have velocities at the start
@@ -219,7 +219,7 @@ def _robots(moving: bool) -> Strategy[SceneRobot]:
 
     @st.composite
     def robot(draw: st.DrawFn) -> SceneRobot:
-        model = draw(tree)
+        model = _without_limits_of_followers(draw(tree))
         links = {
             link.name: LinkGeometry(collisions=(Collision(draw(shape)),))
             for link in model.links
@@ -261,6 +261,13 @@ def _gravities(grounded: bool) -> Strategy[Vector]:
     if grounded:
         return st.just(STANDARD_GRAVITY)
     return st.sampled_from((STANDARD_GRAVITY, (0.0, 0.0, 0.0))) | vectors(10.0)
+
+
+def _without_limits_of_followers(model: Model) -> Model:
+    """Return the robot whose joints that follow others are unlimited, because a driver within its limits may
+    move them beyond theirs."""
+    joints = (each if each.mimic is None else replace(each, limits=Limits()) for each in model.joints)
+    return replace(model, joints=tuple(joints))
 
 
 # -- filters and constraints ----------------------------------------------------------------------
