@@ -131,13 +131,13 @@ def _removal(
 def _proportion(
     series: Series, candidate: Candidate, found: Mapping[Change, Errors], used: Used
 ) -> Attribution | None:
-    """Return the candidate as the cause of an error that falls along the values of one numeric setting, or
-    None."""
+    """Return the candidate as the cause of an error that falls along the values of its first setting, if that
+    is numeric, or None."""
     errors = [found.get((series.trial, k), {}).get(series.name) for k in range(len(candidate.changes))]
-    if len(candidate.values) > 1 or len(errors) < 2 or None in errors:
+    if len(errors) < 2 or None in errors:
         return None
-    ((name, tried),) = candidate.values.items()
-    numbers = (used[name], *tried)
+    values = {name: (used[name], *tried) for name, tried in candidate.values.items()}
+    numbers = next(iter(values.values()))
     if not all(type(number) in (int, float) and number > 0 for number in numbers):
         return None
     sizes = numbers if numbers[-1] < numbers[0] else tuple(1.0 / number for number in numbers)
@@ -148,7 +148,7 @@ def _proportion(
     trend = judge(sizes, [each[-1] for each in falling], series.tolerance)
     if trend.kind != "falls" or not _helps(series, falling[-1][-1]):
         return None
-    return Attribution({name: numbers}, candidate.reason, falling, trend.order)
+    return Attribution(values, candidate.reason, falling, trend.order)
 
 
 def _settings_in_use(series: Series, candidate: Candidate, given: Mapping[str, Any]) -> Used:

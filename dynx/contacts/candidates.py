@@ -15,7 +15,8 @@ class Candidate:
     """Changes of one setting of an engine, or of several at once, tried one after the other.
 
     `values` has as many values for each setting, each farther from the default than the one before. A numeric
-    setting of positive values may make an error fall in proportion; any other has to remove it.
+    setting of positive values, where it is the first, may make an error fall in proportion; any other has to
+    remove it.
     """
 
     values: Mapping[str, tuple[Any, ...]]
@@ -80,6 +81,10 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
             "Friction of MuJoCo opposes slip within this time, or a step, which is too long for an impact.",
         ),
         Candidate(
+            {"slip_time_constant": (0.005, 0.002, 0.001)},
+            "Slip of a contact of MuJoCo decays with this time constant.",
+        ),
+        Candidate(
             {"impratio": (1e3, 1e4)},
             "MuJoCo's friction is a soft constraint, stiffer than the normal force by this ratio.",
         ),
@@ -92,7 +97,7 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
             "MuJoCo's constraints reach this share of the acceleration that they aim at.",
         ),
         Candidate(
-            {"time_constant": (0.002, 0.001), SUBSTEPS: (8, 16)},
+            {"time_constant": (0.002, 0.001), SUBSTEPS: (16, 64)},
             "A contact of MuJoCo is a damped spring. Gravity acts while it is loaded, and a stiffer one "
             "needs shorter steps.",
         ),
