@@ -57,6 +57,10 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
             "Bullet's solver of impulses is iterative and stops at this residual or number of iterations.",
         ),
         Candidate(
+            {"contact_erp": (0.0,), "contact_slop": (0.0,)},
+            "Bullet changes the speed of an impact by the depth that is beyond the slop.",
+        ),
+        Candidate(
             {"contact_distance": (0.0,), "contact_erp": (0.0,), "contact_slop": (0.0,)},
             "Bullet slows shapes before they touch, pushes those apart that penetrate, and lets them "
             "approach to the slop; all three change the speed of a rebound.",
@@ -100,6 +104,11 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
             {"time_constant": (0.002, 0.001), SUBSTEPS: (16, 64)},
             "A contact of MuJoCo is a damped spring. Gravity acts while it is loaded, and a stiffer one "
             "needs shorter steps.",
+        ),
+        Candidate(
+            {"slip_time_constant": (0.002, 0.001), SUBSTEPS: (4, 8)},
+            "Slip of a contact of MuJoCo decays with this time constant, which is short beside an impact only in "
+            "short steps.",
         ),
     ),
     "drake": (
