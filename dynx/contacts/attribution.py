@@ -2,7 +2,7 @@
 
 An error is attributed to the first candidate that at least halves it at the smallest step, and under which it
 is within the tolerance or falls with the step, or in proportion to which it falls, as `dynx.contacts.trend`
-judges.
+judges. Where the error is within the tolerance at the smallest step, the step of the largest error counts.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def _try(
     helpful = {
         (trial, k): changed[trial, k]
         for (trial, k), found in finest.items()
-        if any(each.trial == trial and _helps(each, found[each.name][-1]) for each in series)
+        if any(each.trial == trial and _may_help(each, found[each.name][-1]) for each in series)
     }
     coarser = _errors(helpful, steps[:-1], runner)
     return finest, {
@@ -109,9 +109,9 @@ def _errors(
     return found
 
 
-def _helps(series: Series, error: float) -> bool:
-    """Check whether an error at the smallest step is much less than that of a series."""
-    return error * LEAST_GAIN <= series.errors[-1]
+def _may_help(series: Series, error: float) -> bool:
+    """Check whether a change with this error at the smallest step may remove the error of a series."""
+    return series.decisive < len(series.errors) - 1 or error * LEAST_GAIN <= series.errors[-1]
 
 
 def _removal(
@@ -120,7 +120,8 @@ def _removal(
     """Return the candidate as the cause of an error that one of its changes removes, or None."""
     for k, change in enumerate(candidate.changes):
         errors = found.get((series.trial, k), {}).get(series.name)
-        if errors is None or not _helps(series, errors[-1]):
+        at = series.decisive
+        if errors is None or errors[at] * LEAST_GAIN > series.errors[at]:
             continue
         if judge(steps, errors, series.tolerance).kind != "stays":
             values = {name: (used[name], value) for name, value in change.items()}
@@ -146,7 +147,7 @@ def _proportion(
         return None
     falling = (series.errors[-1:], *(each for each in errors if each is not None))
     trend = judge(sizes, [each[-1] for each in falling], series.tolerance)
-    if trend.kind != "falls" or not _helps(series, falling[-1][-1]):
+    if trend.kind != "falls" or falling[-1][-1] * LEAST_GAIN > series.errors[-1]:
         return None
     return Attribution(values, candidate.reason, falling, trend.order)
 

@@ -107,8 +107,8 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
         ),
         Candidate(
             {"slip_time_constant": (0.002, 0.001), SUBSTEPS: (4, 8)},
-            "Slip of a contact of MuJoCo decays with this time constant, which is short beside an impact only in "
-            "short steps.",
+            "Slip of a contact of MuJoCo decays with this time constant, which is short beside an impact "
+            "only in short steps.",
         ),
     ),
     "drake": (

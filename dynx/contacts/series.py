@@ -47,6 +47,14 @@ class Series:
         """Relative error at each step."""
         return tuple(figure.error for figure in self.figures)
 
+    @property
+    def decisive(self) -> int:
+        """Number of the step at which a cause has to reduce the error: that of the smallest step, or of the
+        largest error where the error is within the tolerance at the smallest step."""
+        errors = self.errors
+        last = len(errors) - 1
+        return last if not errors[last] <= self.tolerance else errors.index(max(errors))
+
 
 def collect(trial: TrialOfEngine, outcomes: Sequence[Measured | Unmeasured | None]) -> list[Series]:
     """Return the series of every figure of a trial; none where a run of it has no figures."""
