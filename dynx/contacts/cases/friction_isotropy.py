@@ -22,10 +22,10 @@ SIZE = (0.3, 0.3, 0.05)
 DIRECTIONS = (0.0, 15.0, 30.0, 45.0, 60.0)
 """Directions of sliding [deg], in the plane, from an edge of the plates."""
 
-STARTING = 0.05
+STARTING = 0.15
 """Time [s] after which the plates slide steadily."""
 
-DURATION = 0.25
+DURATION = 0.2
 """Time [s] of the measurement, at the end of which the plates still slide."""
 
 
