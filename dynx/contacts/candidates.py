@@ -45,7 +45,7 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
             "Bullet leaves penetrations that are no deeper than this.",
         ),
         Candidate(
-            {"contact_erp": (0.05, 0.0)},
+            {"contact_erp": (0.01, 0.0)},
             "Bullet pushes shapes that penetrate apart by this share in every step, which adds speed.",
         ),
         Candidate(
@@ -76,6 +76,10 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
             "A contact of MuJoCo is a damped spring, which the step resolves the better, the softer it is.",
         ),
         Candidate(
+            {"slip_time_constant": (0.005, 0.002, 0.001)},
+            "Slip of a contact of MuJoCo decays with this time constant.",
+        ),
+        Candidate(
             {"slip_time_constant": (0.1, 1.0), SUBSTEPS: (1, 8)},
             "Friction of MuJoCo opposes slip within this time: the shorter it is, the more its contacts, "
             "which are convex problems, push bodies apart that slide.",
@@ -83,10 +87,6 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
         Candidate(
             {"slip_time_constant": (1e-3, 1e-6), SUBSTEPS: (8, 16)},
             "Friction of MuJoCo opposes slip within this time, or a step, which is too long for an impact.",
-        ),
-        Candidate(
-            {"slip_time_constant": (0.005, 0.002, 0.001)},
-            "Slip of a contact of MuJoCo decays with this time constant.",
         ),
         Candidate(
             {"impratio": (1e3, 1e4)},
@@ -104,11 +104,6 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
             {"time_constant": (0.002, 0.001), SUBSTEPS: (16, 64)},
             "A contact of MuJoCo is a damped spring. Gravity acts while it is loaded, and a stiffer one "
             "needs shorter steps.",
-        ),
-        Candidate(
-            {"slip_time_constant": (0.002, 0.001), SUBSTEPS: (4, 8)},
-            "Slip of a contact of MuJoCo decays with this time constant, which is short beside an impact "
-            "only in short steps.",
         ),
     ),
     "drake": (
