@@ -6,9 +6,9 @@ together with the dynamics of the plant: what both need, such as sines and cosin
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -84,13 +84,19 @@ class FusedStep:
 
         Raises UnsupportedFeatureError for a controller that branches on its measurement.
         """
+        make = partial(self._traced, controlled=controlled, pushed=pushed)
+        return self.cached((controlled, pushed), make)
+
+    def cached(self, purpose: Hashable, make: Callable[[], Kernel]) -> Kernel:
+        """Return the kernel that `make` returned in an earlier batch of this process for an equal step and
+        this `purpose`, or make it."""
         try:
-            key = self._content(), controlled, pushed
+            key = self._content(), purpose
         except TypeError:
-            return self._traced(controlled=controlled, pushed=pushed)
+            return make()
         kernel = _made.get(key)
         if kernel is None:
-            kernel = _made[key] = self._traced(controlled=controlled, pushed=pushed)
+            kernel = _made[key] = make()
             for old in list(_made)[:-MAX_CACHED_KERNELS]:
                 _made.pop(old, None)
         return kernel

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -44,7 +45,7 @@ class BatchStops:
         lower, upper = step.model.lower[None, base:], step.model.upper[None, base:]
         if not np.isfinite([lower, upper]).any():
             return None
-        return cls(lower, upper, _impact_kernel(step))
+        return cls(lower, upper, step.cached("impact", partial(_impact_kernel, step)))
 
     def of_rows(self, rows: int) -> BatchStops:
         """Return the stops for a number of rollouts."""

@@ -13,7 +13,10 @@ from dynx.control.base import Controller, Measurement
 from dynx.control.content import content_of
 from dynx.sim import simulate, simulate_batch
 from dynx.sim.batch import kernel as fused
+from dynx.sim.batch import stopping
 from dynx.sim.batch.traced_controller import traced_controller
+from dynx.simd.program import Program
+from dynx.simd.trace import trace
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 from tests.sim.bars import tutorial_motion, tutorial_robot
@@ -104,3 +107,17 @@ def test_only_so_many_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     for kp in (1.0, 2.0, 3.0):
         worst(PD(ARM, kp=kp, kd=1.0))
     assert len(fused._made) == 2
+
+
+def test_impacts_at_position_limits_are_traced_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fused, "_made", {})
+    traced = []
+
+    def trace_and_count(*arguments: Any) -> Program:
+        traced.append(arguments)
+        return trace(*arguments)
+
+    monkeypatch.setattr(stopping, "trace", trace_and_count)
+    for _ in range(2):
+        simulate_batch(ARM, law(), tutorial_motion(), rollouts=2, duration=0.01, position_limits=True)
+    assert len(traced) == 1
