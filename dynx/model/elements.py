@@ -48,7 +48,9 @@ class Pose:
         except (TypeError, ValueError):
             raise ArgumentError(f"{name} is {shown(T)}; wanted a Pose or a matrix (4, 4)") from None
         if array.shape != (4, 4):
-            raise ShapeError(f"{name} has shape {array.shape}; wanted a Pose or a matrix (4, 4)")
+            position = ", ".join(f"{x:g}" for x in array.tolist()) if array.shape == (3,) else None
+            hint = f", such as Pose(({position}))" if position is not None else ""
+            raise ShapeError(f"{name} has shape {array.shape}; wanted a Pose or a matrix (4, 4){hint}")
         R = array[:3, :3]
         off = max(float(np.max(np.abs(R.T @ R - np.eye(3)))), float(np.max(np.abs(array[3] - [0, 0, 0, 1]))))
         if not off < RIGIDITY_TOLERANCE or np.linalg.det(R) < 0 or not np.isfinite(array).all():

@@ -35,9 +35,12 @@ class Queries:
         self._distances = Distances(layout)
         self._number = {name: k for k, name in enumerate(self._names)}
 
-    def contacts(self, engine: WorldEngine) -> tuple[Contact, ...]:
-        """Return the contacts of the last step, ordered by the parts of the scene."""
+    def contacts(self, engine: WorldEngine, part: str | None = None) -> tuple[Contact, ...]:
+        """Return the contacts of the last step, of a part or all, ordered by the parts of the scene."""
         points = sorted(map(_ordered, engine.contacts()), key=lambda point: (point.a, point.b))
+        if part is not None:
+            own = set(self._colliders(part))
+            points = [point for point in points if point.a in own or point.b in own]
         names = self._names
         return tuple(
             Contact(

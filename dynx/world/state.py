@@ -29,6 +29,11 @@ class BodyState(NamedTuple):
     """Linear velocity of the origin of the body frame [m/s], then angular velocity [rad/s] (6,), in world
     axes."""
 
+    @property
+    def position(self) -> Floats:
+        """Origin (3,) of the body frame in the world [m]."""
+        return self.T_world_body[:3, 3]
+
 
 @dataclass(frozen=True, eq=False)
 class WorldState:

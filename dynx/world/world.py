@@ -268,12 +268,13 @@ class World:
 
     # -- queries ------------------------------------------------------------------------------
 
-    def contacts(self) -> tuple[Contact, ...]:
-        """Return the contacts of the last step of the engine, with their forces.
+    def contacts(self, part: str | None = None) -> tuple[Contact, ...]:
+        """Return the contacts of the last step of the engine, with their forces: all, or those of a part.
 
-        After the state was set, they are those of the new state, without forces.
+        A part is a body, ``robot/link``, or a robot for all its links. After the state was set, the contacts
+        are those of the new state, without forces.
         """
-        return self._queries.contacts(self._motion.engine)
+        return self._queries.contacts(self._motion.engine, part)
 
     def overlaps(self) -> tuple[Overlap, ...]:
         """Return the parts that may touch and overlap at the present state by more than bodies at rest do,

@@ -10,11 +10,14 @@ from numpy.testing import assert_allclose
 
 import dynx
 from dynx import Pose
+from dynx.errors import ShapeError, UnknownNameError
 from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, Shape, Sphere
+from dynx.model.model import Base
 from dynx.spatial.so3 import rotation_from_rpy
 from dynx.world import Scene, SceneBody, SceneRobot, World, box, ground, sphere
 from dynx.world.geometry.boxes import shape_box
 from tests.world.engines import WORLDS
+from tests.world.scenes import quadruped
 
 angles = st.floats(-3.0, 3.0)
 
@@ -129,3 +132,28 @@ def surface(shape: Shape) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
         return np.concatenate([shape.radius * ball + half, shape.radius * ball - half])
     rim = shape.radius * ball[np.abs(ball[:, 2]) < 1e-9]
     return np.concatenate([rim + half, rim - half])
+
+
+def test_contacts_of_one_part_are_those_of_all_that_name_it() -> None:
+    bodies = (ground(), *(box(f"b{k}", (0.2,) * 3, mass=1.0, pose=Pose((k, 0, 0.1))) for k in range(2)))
+    model, q = quadruped("solo12")
+    dog = SceneRobot("dog", model, q).at(Pose((5.0, 0.0, q[2])))
+    with World(Scene("s", robots=(dog,), bodies=bodies)) as world:
+        world.run(0.2)
+        every = world.contacts()
+        assert {c.b for c in world.contacts("b0")} == {"b0"}
+        assert len(world.contacts("dog")) == sum(c.a.startswith("dog/") for c in every) > 0
+        assert len(world.contacts("ground")) == len(every)
+        assert world.state.bodies["b1"].position == pytest.approx([1.0, 0.0, 0.1], abs=1e-3)
+        with pytest.raises(UnknownNameError, match="did you mean 'dog'"):
+            world.contacts("dig")
+
+
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+def test_a_robot_is_placed_by_a_pose(base: Base) -> None:
+    pose = Pose((1.0, 2.0, 3.0), (0.3, -0.2, 0.5))
+    robot = SceneRobot("arm", dynx.load("planar_2r", base=base)).at(pose)
+    frame = dynx.backend("reference", robot.model).forward_kinematics(np.array(robot.q), "base")
+    np.testing.assert_allclose(frame, pose.matrix, atol=1e-12)
+    with pytest.raises(ShapeError, match=r"such as Pose\(\(0, 0, 1\)\)"):
+        robot.at((0.0, 0.0, 1.0))

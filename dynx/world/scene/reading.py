@@ -17,7 +17,7 @@ from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, 
 from dynx.model.geometry.sizes import finite_numbers
 from dynx.model.loading import load, read_model
 from dynx.spatial.se3 import homogeneous
-from dynx.spatial.so3 import quat_from_rotation, rotation_from_quat
+from dynx.spatial.so3 import rotation_from_quat
 from dynx.world.motors import Motor, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
 from dynx.world.scene.bodies import SceneBody
 from dynx.world.scene.constraints import Constraint, PointToPoint, Weld
@@ -99,29 +99,24 @@ def _place(place: str) -> Iterator[None]:
 
 def _robot(given: RobotDocument, paths: ScenePaths | None) -> SceneRobot:
     model, pose = _model(given, paths), _pose("pose", given.pose)
-    q = _coordinates("q", given.q, model, model.nq)
-    if pose is not None and model.floating:
-        start = model.neutral() if q is None else np.array(q)
-        if isinstance(given.q, list):
-            raise ArgumentError("q and pose are both given for a floating base; q begins with the pose")
-        start[:3], start[3:7] = pose.xyz, quat_from_rotation(pose.matrix[:3, :3])
-        q = tuple(start.tolist())
-    return SceneRobot(
+    if pose is not None and model.floating and isinstance(given.q, list):
+        raise ArgumentError("q and pose are both given for a floating base; q begins with the pose")
+    robot = SceneRobot(
         given.name,
         model,
-        q,
+        _coordinates("q", given.q, model, model.nq),
         _coordinates("v", given.v, model, model.nv),
         _material(given.material),
         {link: _material(each) for link, each in given.materials.items()},
         given.self_collision,
         tuple(_motor(k, each) for k, each in enumerate(given.motors)),
     )
+    return robot if pose is None else robot.at(pose)
 
 
 def _model(given: RobotDocument, paths: ScenePaths | None) -> Model:
     if (given.robot is None) == (given.urdf is None):
         raise ArgumentError("wanted either robot (a name or a file) or urdf (its text)")
-    pose = None if given.base == "floating" else _pose("pose", given.pose)
     if given.urdf is not None:
         return read_model(
             given.urdf,
@@ -129,7 +124,6 @@ def _model(given: RobotDocument, paths: ScenePaths | None) -> Model:
             given.name,
             base=given.base,
             lock=given.lock or None,
-            base_pose=pose,
             package_dirs=(paths or ScenePaths(None)).folders(given.mesh_folders),
         )
     assert given.robot is not None
@@ -142,7 +136,6 @@ def _model(given: RobotDocument, paths: ScenePaths | None) -> Model:
         robot,
         base=given.base,
         lock=given.lock or None,
-        base_pose=pose,
         package_dirs=paths.package_dirs,
     )
 

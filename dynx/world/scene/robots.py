@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError, shown
-from dynx.model import Model
-from dynx.model.configuration import checked_array, checked_q, neutral
+from dynx.model import Model, Pose
+from dynx.model.configuration import checked_array, checked_pose, checked_q, neutral
 from dynx.model.model import refuse_other_than_model
+from dynx.spatial.so3 import quat_from_rotation
 from dynx.world.motors import Motor, combine
 from dynx.world.scene.material import DEFAULT_MATERIAL, Material, checked_material
 from dynx.world.scene.names import checked_name
@@ -22,9 +24,9 @@ class SceneRobot:
     """A robot: its `model`, and its configuration `q` (nq,) and velocity `v` (nv,) at the start.
 
     `q` is the neutral configuration and `v` zero where they are None. A fixed base is at `model.base_pose`, a
-    floating one where `q` places it. `materials` are those of single links, by name; the others have
-    `material`. Links of one robot collide with one another only with `self_collision`, and never where a
-    joint connects them. `motors` act in every step of a world that is given none for this robot.
+    floating one where `q` places it; `at` places either. `materials` are those of single links, by name; the
+    others have `material`. Links of one robot collide with one another only with `self_collision`, and never
+    where a joint connects them. `motors` act in every step of a world that is given none for this robot.
     """
 
     name: str
@@ -76,6 +78,14 @@ class SceneRobot:
         object.__setattr__(self, "q", tuple(q.tolist()))
         object.__setattr__(self, "v", tuple(v.tolist()))
         object.__setattr__(self, "materials", tuple(sorted(materials.items())))
+
+    def at(self, pose: Pose | ArrayLike) -> SceneRobot:
+        """Return this robot with its base, fixed or floating, at a pose in the world."""
+        placed = checked_pose(f"pose of robot {shown(self.name)}", pose)
+        if not self.model.floating:
+            return replace(self, model=self.model.with_base_pose(placed))
+        quat = quat_from_rotation(placed.matrix[:3, :3]).tolist()
+        return replace(self, q=(*placed.xyz, *quat, *np.array(self.q)[7:].tolist()))
 
     def material_of(self, link: str) -> Material:
         """Return the material of a link; UnknownNameError for an unknown one."""
