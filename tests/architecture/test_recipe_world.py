@@ -26,7 +26,7 @@ from dynx.errors import UnsupportedFeatureError
 from dynx.spatial.branchless import quat_exp
 from dynx.spatial.so3 import rotation_from_quat
 from dynx.world.engine import RayHit, WorldEngine
-from dynx.world.ray_casting import cast_on_shape
+from dynx.world.geometry.ray_casting import cast_on_shape
 from dynx.world.settings import Setting
 from dynx.world.state import BodyState
 
