@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from dynx.distance.cores import ConvexShape, Core, core_of
 from dynx.distance.gjk import CorePair
 from dynx.distance.parallel_axes import penetration_of_parallel
-from dynx.distance.penetration import penetration
+from dynx.distance.penetration import Penetration, penetration
 from dynx.distance.vectors import Vector3
 from dynx.errors import ArgumentError, NotFiniteError, ShapeError, shown
 from dynx.model import Pose
@@ -111,6 +111,9 @@ def separation(
 TOUCHING = 1e-12
 """Distance of cores relative to their size below which the direction between their points is not used."""
 
+EXACT = 1e-12
+"""Gap of a closed form, relative to the size of the cores, that is not worth a polytope."""
+
 NORMAL_ROUNDING = 1e-15
 """Difference of a direction from the normal of a half-space that is rounding."""
 
@@ -145,7 +148,7 @@ def distance_of(
         along = (on_a - on_b) / pair.upper if resolved else normal
         lower, upper = pair.lower, pair.upper
     else:
-        found = penetration_of_parallel(a, b) or penetration(a, b)
+        found = _penetration(a, b)
         normal = along = -found.normal
         on_a, on_b, lower, upper = found.point_a, found.point_b, -found.upper, -found.lower
     radii = a.radius + b.radius
@@ -156,6 +159,16 @@ def distance_of(
         point_b=p_a + (on_b + b.radius * along),
         normal=normal,
     )
+
+
+def _penetration(a: Core, b: Core) -> Penetration:
+    """Return the depth in closed form where that is exact, otherwise with the better bounds."""
+    parallel = penetration_of_parallel(a, b)
+    if parallel is not None and parallel.upper - parallel.lower <= EXACT * (a.extent + b.extent):
+        return parallel
+    found = penetration(a, b)
+    closer = parallel is None or found.upper - found.lower <= parallel.upper - parallel.lower
+    return found if closer or parallel is None else parallel
 
 
 def _height(a: Core, T_a: Floats, T_plane: Floats) -> Distance:

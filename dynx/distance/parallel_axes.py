@@ -1,7 +1,8 @@
 """Depth of cylinders, segments and points whose axes are parallel, in closed form.
 
 The difference of such cores is a cylinder again, with the sums of the radii and of the lengths. Where their
-axes coincide all directions across are equally near, and no polytope has enough facets.
+axes coincide all directions across are equally near, and no polytope has enough facets. A small angle between
+the axes moves points of the second core, and with them the bounds, by at most its sine times their distance.
 """
 
 from __future__ import annotations
@@ -10,10 +11,10 @@ import numpy as np
 
 from dynx.distance.cores import Core, CylinderCore, PointCore, SegmentCore
 from dynx.distance.penetration import Penetration
-from dynx.spatial.scalar import Floats
+from dynx.distance.vectors import dot, minus
 
-PARALLEL = 1e-15
-"""Sine of the angle between axes that are parallel but for rounding."""
+PARALLEL = 1e-4
+"""Sine of the angle between axes below which the bounds may be better than those of a polytope."""
 
 
 def penetration_of_parallel(a: Core, b: Core) -> Penetration | None:
@@ -23,9 +24,13 @@ def penetration_of_parallel(a: Core, b: Core) -> Penetration | None:
         return found and Penetration(found.lower, found.upper, -found.normal, found.point_b, found.point_a)
     if not isinstance(a, CylinderCore) or not isinstance(b, PointCore | SegmentCore | CylinderCore):
         return None
-    axis = a.R[:, 2]
-    if not isinstance(b, PointCore) and np.linalg.norm(np.cross(axis, b.R[:, 2])) > PARALLEL:
-        return None
+    axis, axis_b, slack = a.R[:, 2], a.R[:, 2], 0.0
+    if not isinstance(b, PointCore):
+        axis_b = np.copysign(1.0, axis @ b.R[:, 2]) * b.R[:, 2]
+        sine = float(np.linalg.norm(np.cross(axis, axis_b)))
+        slack = sine * b.extent
+        if sine > PARALLEL:
+            return None
     (radius_a, half_a), (radius_b, half_b) = _sizes(a), _sizes(b)
     p_a, p_b = np.array(a.p), np.array(b.p)
     along = float((p_b - p_a) @ axis)
@@ -33,20 +38,19 @@ def penetration_of_parallel(a: Core, b: Core) -> Penetration | None:
     offset = float(np.linalg.norm(across))
     to_side, to_end = radius_a + radius_b - offset, half_a + half_b - abs(along)
     if to_side <= to_end:
-        normal = across / offset if offset > 0.0 else a.R[:, 0].copy()
+        depth, normal = to_side, across / offset if offset > 0.0 else a.R[:, 0].copy()
         on_axis = np.clip(along, -half_a, half_a)
         on_a = p_a + radius_a * normal + on_axis * axis
-        on_b = p_b - radius_b * normal + (on_axis - along) * axis
-        return _exact(to_side, normal, on_a, on_b)
-    normal = np.copysign(1.0, along) * axis
-    total = radius_a + radius_b
-    on_a = p_a + half_a * normal + radius_a / total * across
-    on_b = p_b - half_b * normal - radius_b / total * across
-    return _exact(to_end, normal, on_a, on_b)
-
-
-def _exact(depth: float, normal: Floats, on_a: Floats, on_b: Floats) -> Penetration:
-    return Penetration(max(depth, 0.0), depth, normal, on_a, on_b)
+        across_b = normal - normal @ axis_b * axis_b
+        on_b = p_b - radius_b * across_b / np.linalg.norm(across_b) + (on_axis - along) * axis_b
+    else:
+        sign, total = np.copysign(1.0, along), radius_a + radius_b
+        depth, normal = to_end, sign * axis
+        on_a = p_a + half_a * normal + radius_a / total * across
+        on_b = p_b - half_b * sign * axis_b - radius_b / total * (across - across @ axis_b * axis_b)
+    x, y, z = normal.tolist()
+    upper = dot(minus(a.support((x, y, z)), b.support((-x, -y, -z))), (x, y, z))
+    return Penetration(max(0.0, min(upper, depth - slack)), upper, normal, on_a, on_b)
 
 
 def _sizes(core: PointCore | SegmentCore | CylinderCore) -> tuple[float, float]:

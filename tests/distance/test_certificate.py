@@ -23,7 +23,8 @@ POINTS = 1e-6
 def test_bounds_are_attained(a: ConvexShape, b: ConvexShape, T: Floats) -> None:
     found = distance(a, np.eye(4), b, T)
     check_certificate(found, a, np.eye(4), b, T)
-    gap = 1e-11 if found.lower > 0.0 else 1e-6
+    # The depth of cylinders on nearly one axis is nearly the same all around.
+    gap = 1e-11 if found.lower > 0.0 else 1e-4
     assert found.gap <= gap * max(abs(found.distance), 0.1)
 
 
@@ -35,7 +36,7 @@ def check_certificate(found: Distance, a: ConvexShape, T_a: Floats, b: ConvexSha
     check_inside(a, T_a, found.point_a)
     check_inside(b, T_b, found.point_b)
     between = found.point_a - found.point_b
-    assert_allclose(between, found.distance * found.normal, atol=POINTS)
+    assert_allclose(between, found.distance * found.normal, atol=POINTS + 2.0 * found.gap)
     if found.upper > 0.0:
         assert np.linalg.norm(between) == pytest.approx(found.upper, abs=ROUNDING)
 
@@ -145,6 +146,19 @@ def test_nearly_parallel_faces(a: ConvexShape, b: ConvexShape, tilt: float, heig
     lowest = height - 0.1 - 0.2 * np.cos(tilt) - 0.3 * np.sin(tilt)
     assert found.lower == pytest.approx(lowest, abs=1e-9 + 0.3 * tilt * (lowest < 0.0))
     assert found.gap <= 1e-11
+
+
+@pytest.mark.parametrize("tilt", [1e-15, 1e-12, 1e-9, 1e-6, 1e-5])
+@pytest.mark.parametrize("other", [Cylinder(0.2, 0.3), Capsule(0.2, 0.3), Cylinder(0.3, 0.1)])
+def test_cylinders_on_nearly_one_axis(other: Cylinder | Capsule, tilt: float) -> None:
+    a, T = Cylinder(0.3, 1.5), np.eye(4)
+    T[1, 1] = T[2, 2] = -np.cos(tilt)
+    T[2, 1], T[1, 2] = np.sin(tilt), -np.sin(tilt)
+    T[2, 3] = 0.1
+    found = distance(a, np.eye(4), other, T)
+    check_certificate(found, a, np.eye(4), other, T)
+    assert found.distance == pytest.approx(-0.3 - other.radius, abs=tilt + 1e-12)
+    assert found.gap <= tilt + 1e-12
 
 
 @pytest.mark.parametrize("kind", KINDS)
