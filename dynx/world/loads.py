@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from math import hypot
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -184,8 +185,8 @@ def checked_torques(
             tau = real_array(f"torque of {name}", tau)
             if tau.shape != (nv,):
                 raise ShapeError(f"torque of {name} has shape {tau.shape}; wanted ({nv},)")
-        # Entries are below the bound where the sum of their magnitudes is; of few numbers, Python's is fast.
-        if not sum(map(abs, tau.tolist())) < 1e50:
+        # Entries are below the bound where their norm is, which of few numbers Python computes fastest.
+        if not hypot(*tau.tolist()) < 1e50:
             checked_entries(f"torque of {name}", tau)
         checked[number] = tau
     return checked
