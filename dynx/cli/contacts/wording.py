@@ -95,10 +95,13 @@ def order_text(order: float) -> str:
 
 
 def change_text(settings: Mapping[str, Sequence[Any]], *, arrow: str = "->") -> str:
-    """Write settings with the value in use and the last one tried, of lists the numbers that change."""
+    """Write settings that change, with the value in use and the last one tried; of lists the numbers that
+    change."""
     parts = []
     for name, values in settings.items():
         before, after = values[0], values[-1]
+        if before == after:
+            continue
         if isinstance(before, list):
             changed = [k for k, pair in enumerate(zip(before, after, strict=True)) if pair[0] != pair[1]]
             before, after = ([value[k] for k in changed] for value in (before, after))

@@ -44,7 +44,7 @@ def result(
 
 def softened() -> Verdict:
     """Return a verdict with a setting that is a list, of which one number changes."""
-    values = {"impedance": ((0.9, 0.95), (0.99, 0.95)), "impratio": (1.0, 100.0)}
+    values = {"impedance": ((0.9, 0.95), (0.99, 0.95)), "impratio": (1.0, 100.0), "substeps": (1, 1)}
     errors = ((3e-2,) * 3, (2e-3, 1e-3, 1e-4))
     return Verdict("setting", attribution=Attribution(values, "Contacts are soft.", errors, None))
 
