@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from llvmlite import binding
 
 from dynx.errors import CompileError
-from dynx.simd.collection import collection_paused
 from dynx.simd.emit import ENTRY, Settings, emit_modules
-from dynx.simd.program import Port, Program
+from dynx.simd.program import Port, Program, collection_paused
 from dynx.simd.routines import RoutineSet, emit_routines
 from dynx.simd.schedule import program_length
 from dynx.simd.target import Target, host

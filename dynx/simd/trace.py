@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 
 from dynx.errors import TraceError
-from dynx.simd.collection import collection_paused
 from dynx.simd.expr import Graph, Simplify, Symbol
-from dynx.simd.program import Port, Program, extract_program, scalar_ranges
+from dynx.simd.program import Port, Program, collection_paused, extract_program, scalar_ranges
 from dynx.simd.simplify import FAST
 from dynx.simd.verify import check_program
 from dynx.spatial.scalar import Array
