@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -36,6 +37,10 @@ class Figure:
                 raise ArgumentError(
                     f"{name} of the figure {shown(self.name)} is {value}; wanted a positive number"
                 )
+        if not math.isfinite(self.exact):
+            raise ArgumentError(
+                f"the exact value of the figure {shown(self.name)} is {self.exact}; wanted a finite number"
+            )
 
     @property
     def error(self) -> float:

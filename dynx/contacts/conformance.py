@@ -8,19 +8,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from dynx.contacts.arguments import checked_cases, checked_engines, checked_given, checked_steps
 from dynx.contacts.attribution import attribute
 from dynx.contacts.candidates import CANDIDATES, Candidate
 from dynx.contacts.case import Case
-from dynx.contacts.registry import find_cases
 from dynx.contacts.run import Measured, Run, Unmeasured
 from dynx.contacts.runner import Runner
 from dynx.contacts.series import Series, TrialOfEngine, collect
 from dynx.contacts.trend import judge
 from dynx.contacts.verdict import VERDICTS, Verdict, VerdictKind
-from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
-from dynx.model.configuration import positive_seconds, whole_number
-from dynx.world.registry import installed_worlds, world_class
-from dynx.world.settings import checked_settings
+from dynx.model.configuration import whole_number
 
 STEPS = (4e-3, 2e-3, 1e-3)
 """Steps [s] where none are given."""
@@ -119,20 +116,21 @@ def conform(
 ) -> Conformance:
     """Measure engines against mechanics: every trial of every case, in every engine, at every step.
 
-    Engines and cases are all that are installed unless named. `settings` are those of `World` by engine;
+    Engines and cases are all that are installed unless named. Steps are 1e-6 to 0.1 s; with a single one no
+    error can fall. `settings` are those of `World` by engine, `substeps` included;
     `candidates` are the settings to which errors may be attributed. Runs take place in `jobs` processes (as
     many as processors), and one that crashes or takes longer than `timeout` [s] is recorded as such; with 0
     they take place in this process, which a crash ends.
     `progress(done, total)` is called after each run; the total grows when errors have to be attributed.
     With `interruptible`, KeyboardInterrupt ends the runs, and the results so far are returned.
 
-    Raises the errors of `World` for engines and settings, UnknownNameError for a case, ArgumentError for
-    steps.
+    Raises the errors of `World` for engines and settings, UnknownNameError for the name of a case,
+    ArgumentError for steps and for a case that cannot be used.
     """
-    chosen = tuple(engines) if engines is not None else installed_worlds()
-    given = _checked(chosen, settings or {})
-    sizes = _checked_steps(steps)
-    found = _found(cases)
+    chosen = checked_engines(engines)
+    given = checked_given(chosen, {} if settings is None else settings)
+    sizes = checked_steps(steps)
+    found = checked_cases(cases)
     workers = (os.cpu_count() or 1) if jobs is None else whole_number("jobs", jobs, 0)
     with Runner(workers, timeout, progress, interruptible=interruptible) as runner:
         trials = [
@@ -210,39 +208,3 @@ def _result(series: Series, verdict: Verdict) -> FigureResult:
         series.errors,
         verdict,
     )
-
-
-def _checked(
-    engines: Sequence[str], settings: Mapping[str, Mapping[str, Any]]
-) -> dict[str, Mapping[str, Any]]:
-    """Return the settings given to each engine, after a check that the engine is installed and has them."""
-    for name in settings:
-        if name not in engines:
-            raise UnknownNameError(
-                f"settings are given for {shown(name)}, which does not run{nearest(name, engines)}"
-            )
-    for name in engines:
-        kind = world_class(name)
-        kind.require_engine()
-        checked_settings(name, kind.settings, settings.get(name, {}))
-    return {name: dict(settings.get(name, {})) for name in engines}
-
-
-def _checked_steps(steps: Sequence[float]) -> tuple[float, ...]:
-    sizes = sorted({positive_seconds("a step", step) for step in steps}, reverse=True)
-    if not sizes:
-        raise ArgumentError("steps is empty; wanted at least one step [s]")
-    return tuple(sizes)
-
-
-def _found(cases: Sequence[str | Case] | None) -> tuple[Case, ...]:
-    if cases is None:
-        return find_cases()
-    found = tuple(each if isinstance(each, Case) else find_cases([each])[0] for each in cases)
-    for each in found:
-        if type(each).__module__ == "__main__":
-            raise ArgumentError(
-                f"the case {shown(each.name)} is defined in the program that runs; it has to be in a module "
-                "of its own, which worker processes import"
-            )
-    return found

@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+import sys
+import traceback
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from dynx.contacts.case import Case, Figure
-from dynx.errors import DynxError, EngineLimitError, NotInstalledError, UnsupportedFeatureError
+from dynx.errors import (
+    ArgumentError,
+    DynxError,
+    EngineLimitError,
+    NotInstalledError,
+    UnsupportedFeatureError,
+    located,
+    shown,
+)
 from dynx.world import World
 from dynx.world.engine import WorldEngine
 from dynx.world.registry import register, world_names
@@ -47,20 +58,52 @@ class Unmeasured:
 
 def carry_out(run: Run) -> Measured | Unmeasured:
     """Open the world of a run, and measure."""
-    parameters = run.case.trials[run.trial]
-    scene = run.case.scene(parameters)
     if run.kind is not None and run.engine not in world_names():
         kind = run.kind
         register(run.engine, lambda: kind)
     try:
+        parameters = run.case.trials[run.trial]
+        scene = run.case.scene(parameters)
         with World(scene, run.engine, run.dt, **run.settings) as world:
             version = world.version
             lacking = {each.quantity: str(each) for each in world.inexact_materials()}
-            figures = tuple(run.case.measure(world, parameters))
+            figures = checked_figures(run.case.measure(world, parameters))
     except NotInstalledError:
         raise
     except (UnsupportedFeatureError, EngineLimitError) as error:
         return Unmeasured("refused", str(error))
-    except DynxError as error:
-        return Unmeasured("error", f"{type(error).__name__}: {error}")
+    except Exception as error:
+        where = place_in(run.case, error)
+        if where is None and not isinstance(error, DynxError):
+            raise
+        return Unmeasured("error", located(f"{type(error).__name__}: {error}", where, None))
     return Measured(figures, version, lacking)
+
+
+def checked_figures(figures: object) -> tuple[Figure, ...]:
+    """Return what a case measured; ArgumentError where it is not at least one figure, each with its name."""
+    found = tuple(figures) if isinstance(figures, Iterable) else ()
+    if not found or not all(isinstance(each, Figure) for each in found):
+        raise ArgumentError("measure returned no figures; wanted at least one Figure")
+    names = [each.name for each in found]
+    for name in names:
+        if names.count(name) > 1:
+            raise ArgumentError(f"measure returned two figures of the name {shown(name)}")
+    for each in found:
+        if not math.isfinite(each.measured):
+            raise ArgumentError(f"the figure {shown(each.name)} is {each.measured}; wanted a finite number")
+    return found
+
+
+def place_in(case: Case, error: BaseException) -> str | None:
+    """Return file and line of the last call in the module of a case that led to an error; None for a case of
+    dynx itself."""
+    module = sys.modules[type(case).__module__]
+    if module.__name__.startswith("dynx."):
+        return None
+    lines = [
+        f"{frame.filename}:{frame.lineno}"
+        for frame in traceback.extract_tb(error.__traceback__)
+        if frame.filename == getattr(module, "__file__", None)
+    ]
+    return lines[-1] if lines else None

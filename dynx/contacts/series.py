@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from dynx.contacts.case import Case, Figure
 from dynx.contacts.run import Measured, Run, Unmeasured
+from dynx.errors import ArgumentError, shown
 from dynx.world.registry import world_class
 
 
@@ -61,6 +62,13 @@ def collect(trial: TrialOfEngine, outcomes: Sequence[Measured | Unmeasured | Non
     measured = [outcome for outcome in outcomes if isinstance(outcome, Measured)]
     if len(measured) < len(outcomes):
         return []
+    names = [[figure.name for figure in outcome.figures] for outcome in measured]
+    if any(each != names[0] for each in names):
+        differing = next(each for each in names if each != names[0])
+        raise ArgumentError(
+            f"the case {shown(trial.case.name)} has the figures {', '.join(names[0])} at one step and "
+            f"{', '.join(differing)} at another; wanted the same at every step"
+        )
     # An engine may have a coefficient in short steps only.
     lacking = measured[-1].lacking
     series = []

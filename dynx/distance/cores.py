@@ -29,7 +29,7 @@ class Hull:
     points: Floats
 
     def __post_init__(self) -> None:
-        points = checked_array("points of a hull", self.points, 3)
+        points = checked_array("points", self.points, 3)
         if points.ndim != 2 or not len(points):
             raise ShapeError(f"points of a hull have shape {points.shape}; wanted (n, 3)")
         if np.abs(points).max() >= MAX_MAGNITUDE:

@@ -15,7 +15,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.errors import UnsupportedFeatureError
+from dynx.errors import UnsupportedFeatureError, shown
 from dynx.spatial.scalar import Floats
 from dynx.world.layout import Layout
 from dynx.world.settings import Setting
@@ -45,10 +45,10 @@ class InexactMaterial:
 
     def __str__(self) -> str:
         (a, b), more = self.pairs[0], len(self.pairs) - 1
-        others = f" and {more} more pair{'s' * (more > 1)}" if more else ""
+        others = f", and of {more} more pair{'s' * (more > 1)}," if more else ""
         return (
-            f"{self.quantity} of {a} and {b}{others} is {self.effective:.4g}, not {self.wanted:.4g}: "
-            f"{self.reason}"
+            f"{self.quantity} of {shown(a)} and {shown(b)}{others} is {self.effective:.4g}, "
+            f"not {self.wanted:.4g}: {self.reason}"
         )
 
 

@@ -63,6 +63,8 @@ class Queries:
         if not is_real(within) or not 0.0 <= within < MAX_MAGNITUDE:
             raise ArgumentError(f"within is {shown(within)}; wanted a number of at least 0 [m]")
         first, second = self._colliders(a), self._colliders(b)
+        if len({*first, *second}) == 1:
+            raise ArgumentError(f"{shown(a)} and {shown(b)} are one shape, which has no distance from itself")
         points: list[ClosestPoints] = []
         if native:
             for i, j in product(first, second):
@@ -76,7 +78,9 @@ class Queries:
 
     def _nearest(self, i: int, j: int, found: TouchingPoint | Distance) -> ClosestPoints:
         names = self._names[i], self._names[j]
-        return ClosestPoints(*names, found.point_a, found.point_b, found.normal, found.distance)
+        return ClosestPoints(
+            *names, found.point_a, found.point_b, found.normal, found.distance + 0.0
+        )  # not -0
 
     def aabb(self, state: WorldState, name: str) -> tuple[Floats, Floats]:
         """Return the corners of the smallest box that holds the boxes of all links of a part."""

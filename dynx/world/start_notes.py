@@ -26,9 +26,13 @@ GAP, ANGLE = 1e-4, 1e-3
 """Distance [m] and angle [rad] between the ends of a constraint from which it counts as violated."""
 
 
+LONG_STEP = 0.1
+"""Step of an engine [s] above which contacts are hardly noticed."""
+
+
 def notes_on_start(engine: WorldEngine, state: WorldState) -> tuple[str, ...]:
     """Return one sentence for each overlap, violated constraint and joint beyond its limits of an engine at a
-    state, and for each coefficient of contact that the engine does not have."""
+    state, for each coefficient of contact that the engine does not have, and for a long step."""
     drawn = "so that they are pulled together in the first steps"
     moved = "so that it is pushed back in the first steps"
     return (
@@ -36,7 +40,13 @@ def notes_on_start(engine: WorldEngine, state: WorldState) -> tuple[str, ...]:
         *(f"{each} at the start, {drawn}" for each in violations(engine.layout, state)),
         *(f"{each} at the start, {moved}" for each in joints_beyond_limits(engine.layout, state)),
         *map(str, inexact_materials(engine)),
+        *_long_step(engine),
     )
+
+
+def _long_step(engine: WorldEngine) -> Iterator[str]:
+    if engine.dt > LONG_STEP:
+        yield f"a step of {engine.dt:g} s is longer than {LONG_STEP:g} s: bodies may pass through one another"
 
 
 def _overlaps(engine: WorldEngine) -> Iterator[str]:

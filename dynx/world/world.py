@@ -100,8 +100,8 @@ class World:
         self._identity: str | None = None
         self._motion = Motion(self._layout, self._commands, self._build, self.dt, self.substeps)
         self.notes: tuple[str, ...] = notes_on_start(self._motion.engine, self._motion.state)
-        """Parts that overlap at the start, constraints that it violates, and joints beyond their limits, one
-        sentence each."""
+        """Parts that overlap at the start, constraints that it violates, joints beyond their limits,
+        coefficients of contact that the engine does not have, and a step that is long, one sentence each."""
 
     @property
     def version(self) -> str:

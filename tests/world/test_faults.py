@@ -145,6 +145,7 @@ CALLS: dict[str, tuple[Callable[[World], object], type[DynxError], str]] = {
     ),
     "snapshot of no world": (lambda w: w.restore(b"state"), ArgumentError, "World.save"),  # type: ignore[arg-type]
     "distance of nothing": (lambda w: w.closest_points("brick", "stone"), UnknownNameError, "stone"),
+    "distance from itself": (lambda w: w.closest_points("brick", "brick"), ArgumentError, "one shape"),
     "distance within NaN": (lambda w: w.closest_points("brick", "ground", NAN), ArgumentError, "within"),
     "box of nothing": (lambda w: w.aabb("stone"), UnknownNameError, "stone"),
     "overlap of an inverted box": (lambda w: w.overlapping([1, 0, 0], [0, 1, 1]), ArgumentError, "above"),

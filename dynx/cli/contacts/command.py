@@ -50,7 +50,8 @@ def steps(text: str) -> tuple[float, ...]:
         "steps",
         type=steps,
         metavar="A,B,C",
-        help="Steps [s], numbers or fractions such as 1/240 (default: 0.004,0.002,0.001).",
+        help="Steps of 1e-6 to 0.1 s, numbers or fractions such as 1/240 (default: 0.004,0.002,0.001). With "
+        "a single step no error can fall.",
     ),
     click.option(
         "--set",
@@ -58,8 +59,8 @@ def steps(text: str) -> tuple[float, ...]:
         type=name_value,
         multiple=True,
         metavar="NAME=VALUE",
-        help="Setting of an engine (docs/world.md), as name=value for all engines that have it or "
-        "engine.name=value; may be given several times.",
+        help="Setting of an engine (docs/world.md), or substeps, as name=value for all engines that have it "
+        "or engine.name=value; may be given several times.",
     ),
     click.option(
         "--jobs",
@@ -69,7 +70,9 @@ def steps(text: str) -> tuple[float, ...]:
 )
 @group(
     "Output",
-    click.option("--list", "only_list", is_flag=True, help="List of the cases, without running them."),
+    click.option(
+        "--list", "only_list", is_flag=True, help="List of the cases with their laws, without a run."
+    ),
     json_option,
     click.option(
         "--html", "html_path", metavar="FILE", help="File for the results as one HTML page with plots."
@@ -87,13 +90,13 @@ def contacts() -> None:
     engine: changing it removes the error, which is shown by running again. Errors are relative, and those of
     the table belong to the smallest step.
 
-    Exit code 0 if every error is explained, 1 if one is not or an engine failed, 2 for input that cannot be
-    used. Ctrl-C ends the run with the results so far and exit code 130.
+    Exit code 0 if every error is explained, 1 if one is not, if an engine failed or if nothing was measured,
+    2 for input that cannot be used. Ctrl-C ends the run with the results so far and exit code 130.
 
     \b
     Examples:
       dynx contacts
-      dynx contacts --engine mujoco --case slope --set impratio=100
+      dynx contacts --engine mujoco --case slope --set impratio=1000
       dynx contacts --dt 1/240,1/480,1/960 --html contacts.html --json contacts.json
       dynx contacts --list
     """

@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
+import textwrap
 import time
 from collections.abc import Sequence
 from functools import partial
 
+from rich.text import Text
+
 from dynx.cli.contacts.document import ContactsDocument, document
 from dynx.cli.contacts.page import contacts_page
 from dynx.cli.contacts.tables import show
-from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, failure_of
+from dynx.cli.shell.exits import BAD_INPUT, DONE, INTERRUPTED, NEGATIVE_RESULT, complain, failure_of, one_line
 from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.output_file import check_json, check_writable
 from dynx.cli.shell.progress import progress_bar
 from dynx.cli.shell.settings import settings_by_engine
-from dynx.cli.shell.tables import Table
 from dynx.cli.shell.terminal import command_line, console, counted, present
-from dynx.contacts import STEPS, Conformance, conform, find_cases
+from dynx.contacts import STEPS, Case, Conformance, conform, find_cases
+from dynx.contacts.candidates import SUBSTEPS
 from dynx.errors import ArgumentError
 from dynx.files.writing import write_text
 from dynx.world.registry import installed_worlds
+from dynx.world.settings import Setting
 
 
 def contacts(
@@ -36,10 +40,9 @@ def contacts(
     """Measure the engines; return the exit code."""
     chosen_cases = find_cases(cases)
     if only_list:
-        table = Table("case", "title")
-        for case in chosen_cases:
-            table.add_row(case.name, case.title)
-        console().print(table)
+        if json_path is not None or html_path is not None:
+            raise ArgumentError("--list runs nothing, so that it has no results for --json and --html")
+        _list_cases(chosen_cases)
         return DONE
     check_json(json_path)
     if html_path is not None:
@@ -47,7 +50,9 @@ def contacts(
         if html_path == json_path:
             raise ArgumentError(f"two formats would be written to {html_path!r}")
     chosen = engines or installed_worlds()
-    given = settings_by_engine(chosen, settings)
+    given = settings_by_engine(
+        chosen, settings, {SUBSTEPS: Setting(1, "steps of the engine in each step", 1)}
+    )
     started = time.perf_counter()
     with interruptible() as interruption:
         with progress_bar(len(chosen), enabled=not quiet) as advance:
@@ -62,7 +67,8 @@ def contacts(
             )
         interruption.finishing = True
         if found.not_done:
-            complain(f"interrupted: {counted(found.not_done, 'trial')} not done")
+            how = "interrupted" if interruption.code in (None, INTERRUPTED) else "terminated"
+            complain(f"{how}: {counted(found.not_done, 'trial')} not done")
         report = document(found, time.perf_counter() - started)
         code = _conclude(report, found, json_path, html_path, quiet=quiet, every_figure=cases is not None)
     return code if interruption.code is None else interruption.code
@@ -88,4 +94,17 @@ def _conclude(
             complain(str(error))
     if any(error is not None for error in errors):
         return BAD_INPUT
+    if not found.results and not found.not_done:
+        lost = (*found.failures, *found.refusals)
+        complain("nothing was measured" + (f"; {lost[0].engine}: {lost[0].message}" if lost else ""))
+        return NEGATIVE_RESULT
     return NEGATIVE_RESULT if found.unexplained or found.failures else DONE
+
+
+def _list_cases(cases: Sequence[Case]) -> None:
+    """Print name and title of each case, and its law below."""
+    out = console()
+    for case in cases:
+        out.print(Text.assemble((one_line(case.name), "bold"), f"  {one_line(case.title)}"))
+        for line in textwrap.wrap(one_line(case.law), max(out.width - 4, 40), break_long_words=False):
+            out.print(Text(f"    {line}"))

@@ -60,6 +60,12 @@ def show(out: Console, report: Entry, *, every_figure: bool = False) -> None:
             what = f"{lost['engine']}{where}: {lost['kind']}: {lost['message']}"
             out.print(f"  {short_line(what)}", style="yellow")
     _show_conclusion(out, report, layout.steps)
+    if len(report["steps"]) == 1:
+        out.print("a single step: no error can fall with it; --dt with several shows which do")
+    if not every_figure and sum(len(case["figures"]) for case in report["cases"]) > sum(
+        map(len, shown.values())
+    ):
+        out.print("of each engine and case one figure is shown; --case NAME shows all of a case")
 
 
 def worst_of_engines(case: Entry) -> list[Entry]:

@@ -13,14 +13,23 @@ WORDS = {"true": True, "yes": True, "on": True, "false": False, "no": False, "of
 """Words for truth values of settings."""
 
 
-def settings_by_engine(engines: Sequence[str], given: Sequence[tuple[str, str]]) -> dict[str, dict[str, Any]]:
-    """Return the settings of each engine from ``name=value`` and ``engine.name=value``.
+def settings_by_engine(
+    engines: Sequence[str], given: Sequence[tuple[str, str]], options: Mapping[str, Setting] | None = None
+) -> dict[str, dict[str, Any]]:
+    """Return the settings of each engine from ``name=value`` and ``engine.name=value``, which has precedence.
 
-    Raises UnknownNameError for a setting that no engine has, ArgumentError for a value of another type.
+    `options` are settings that every engine has besides its own. Raises UnknownNameError for a setting that
+    no engine has, ArgumentError for one that is given twice or has a value of another type.
     """
-    known: dict[str, Mapping[str, Setting]] = {name: world_class(name).settings for name in engines}
+    known: dict[str, Mapping[str, Setting]] = {
+        name: {**world_class(name).settings, **(options or {})} for name in engines
+    }
     found: dict[str, dict[str, Any]] = {name: {} for name in engines}
-    for full, text in given:
+    names = [name for name, _ in given]
+    for full in names:
+        if names.count(full) > 1:
+            raise ArgumentError(f"--set {shown(full)} is given twice")
+    for full, text in sorted(given, key=lambda each: "." in each[0]):
         engine, dot, name = full.rpartition(".")
         if dot and engine not in known:
             raise UnknownNameError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from importlib.util import find_spec
 from io import StringIO
 from pathlib import Path
@@ -18,6 +19,7 @@ from dynx.cli.contacts import run as contacts_run
 from dynx.cli.contacts.document import ContactsDocument
 from dynx.cli.contacts.tables import show
 from dynx.cli.shell.main import cli
+from dynx.contacts import NoResult
 from dynx.files.documents import json_schema, json_text
 from tests.cli.contacts.documents import conformance, example
 from tests.files.page import Page
@@ -115,6 +117,7 @@ def test_without_cases_each_engine_has_the_figure_that_deserves_a_look() -> None
     text = printed(200)
     assert text.count("acceleration, slow") == 2  # of the engines one and two
     assert text.count("acceleration, fast") == 1
+    assert "one figure is shown; --case NAME shows all" in text
 
 
 def test_an_unexplained_error_gives_exit_code_1(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -128,7 +131,28 @@ def test_an_unexplained_error_gives_exit_code_1(monkeypatch: pytest.MonkeyPatch)
 def test_the_cases_are_listed() -> None:
     result = run("--list")
     assert result.exit_code == 0
-    assert "slope" in result.output
+    assert "slope  A box on a slope: stick and slide\n    v = 0 where" in result.output
+    refused = run("--list", "--json")
+    assert refused.exit_code == 2
+    assert "--list runs nothing" in refused.output
+
+
+@needs_engine
+def test_nothing_measured_gives_exit_code_1_and_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    lost = NoResult("one", "sliding", "", 4e-3, "refused", "it has no friction")
+    empty = replace(conformance(), results=(), refusals=(lost,), failures=())
+    monkeypatch.setattr(contacts_run, "conform", lambda *_, **__: empty)
+    result = run("--engine", ENGINES[0])
+    assert result.exit_code == 1
+    assert "nothing was measured; one: it has no friction" in result.stderr
+
+
+@needs_engine
+def test_substeps_are_set_and_a_single_step_is_named() -> None:
+    result = run("--case", "resting_force", "--engine", ENGINES[0], "--dt", "0.004", "--set", "substeps=2")
+    assert result.exit_code == 0, result.output
+    assert f"{ENGINES[0]} with substeps=2" in result.output
+    assert "a single step: no error can fall" in result.output
 
 
 @needs_engine
@@ -139,6 +163,9 @@ def test_the_cases_are_listed() -> None:
         (["--case", "slop"], "did you mean 'slope'"),
         (["--set", "impratioo=100"], "no such setting"),
         (["--set", "impratio"], "name=value"),
+        (["--set", "substeps=1", "--set", "substeps=2"], "given twice"),
+        (["--dt", "1e-9"], "wanted 1e-06 to 0.1 s"),
+        (["--dt", "100"], "wanted 1e-06 to 0.1 s"),
         (["--dt", "-1"], "not positive"),
         (["--dt", "1/0"], "not a number"),
         (["--dt", "fast"], "not a number"),
