@@ -53,6 +53,16 @@ def test_reported_errors_equal_those_of_forward_kinematics(data: st.DataObject) 
     assert 0 <= result.restarts <= 3
 
 
+def test_a_position_without_its_rotation_is_not_a_success() -> None:
+    turned = np.diag([-1.0, -1.0, 1.0, 1.0])
+    with backend("pinocchio", load(MODELS / "pendulum.urdf")) as engine:
+        assert engine.inverse_kinematics(np.eye(4), "base").success
+        result = engine.inverse_kinematics(turned, "base")
+    assert result.position_error <= TOLERANCE
+    assert result.rotation_error > 1.0
+    assert not result.success
+
+
 @given(st.data())
 def test_a_start_on_the_target_is_returned(data: st.DataObject) -> None:
     model = data.draw(models(max_links=6))

@@ -97,6 +97,6 @@ def contacts() -> None:
     Examples:
       dynx contacts
       dynx contacts --engine mujoco --case slope --set impratio=1000
-      dynx contacts --dt 1/240,1/480,1/960 --html contacts.html --json contacts.json
+      dynx contacts --dt 1/240,1/480,1/960 --html page.html --json all.json
       dynx contacts --list
     """

@@ -48,7 +48,7 @@ def shape_box(shape: Shape, T: Floats) -> Corners:
         reach = shape.radius + np.abs(R[:, 2]) * shape.length / 2
     else:
         assert isinstance(shape, Cylinder)
-        across = np.sqrt(np.maximum(0.0, 1.0 - R[:, 2] ** 2))
+        across = np.hypot(R[:, 0], R[:, 1])
         reach = np.abs(R[:, 2]) * shape.length / 2 + shape.radius * across
     return p - reach, p + reach
 
