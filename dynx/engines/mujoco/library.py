@@ -1,7 +1,10 @@
-"""The only import of MuJoCo, as the module `mujoco`, and the silencing of its warnings."""
+"""The only import of MuJoCo, as the module `mujoco`, and the handling of its warnings."""
 
 from __future__ import annotations
 
+import re
+import sys
+import warnings
 from typing import Any
 
 from dynx.errors import NotInstalledError
@@ -25,8 +28,8 @@ reader is recursive and ends the process if the stack of the thread overflows (m
 def silent_data(model: Any) -> Any:
     """Return a new `MjData` of a model with warnings silenced.
 
-    MuJoCo prints the first warning of each kind and writes it to a log file in the working directory; it only
-    counts further ones. `mj_resetData` resets the counters: call `silence_warnings` after it.
+    MuJoCo reports the first warning of each kind and only counts further ones. `mj_resetData` resets the
+    counters: call `silence_warnings` after it.
     """
     data = mujoco.MjData(model)
     silence_warnings(data)
@@ -34,5 +37,32 @@ def silent_data(model: Any) -> Any:
 
 
 def silence_warnings(data: Any) -> None:
-    """Prevent MuJoCo from printing warnings, by setting their counters to 1."""
+    """Prevent MuJoCo from reporting warnings of data, by setting their counters to 1."""
     data.warning.number[:] = 1
+
+
+_KINDS: set[str] = set()
+"""Warnings that were passed on, without their numbers."""
+
+
+def _pass_on(message: str) -> None:
+    """Issue the first warning of MuJoCo of each kind as a Python warning.
+
+    MuJoCo calls it in the middle of a step, where an exception ends the process; so under a filter that turns
+    warnings into errors, the warning is printed.
+    """
+    kind = re.sub(r"[-+]?[\d.]+(e[-+]?\d+)?", "0", message)
+    if kind in _KINDS:
+        return
+    _KINDS.add(kind)
+    text = f"mujoco: {message}"
+    try:
+        warnings.warn(text, RuntimeWarning, stacklevel=2)
+    except Exception:
+        if sys.stderr is not None:
+            print(f"RuntimeWarning: {text}", file=sys.stderr)
+
+
+if mujoco.get_mju_user_warning() is None:
+    # Without a handler, MuJoCo appends its warnings to a file MUJOCO_LOG.TXT in the working directory.
+    mujoco.set_mju_user_warning(_pass_on)
