@@ -54,6 +54,20 @@ def checked_given(
     return {name: dict(settings.get(name, {})) for name in engines}
 
 
+def values_in_effect(
+    engine: str, given: Mapping[str, Any], steps: Sequence[float]
+) -> dict[str, tuple[float, ...]]:
+    """Return the values at each step of those settings given that the engine changes."""
+    kind, substeps = world_class(engine), given.get(SUBSTEPS, 1)
+    in_use = {name: setting.default for name, setting in kind.settings.items()} | dict(given)
+    found = [kind.settings_in_effect(in_use, dt / substeps) for dt in steps]
+    return {
+        name: tuple(float(each[name]) for each in found)
+        for name, value in given.items()
+        if name in found[0] and any(each[name] != value for each in found)
+    }
+
+
 def checked_steps(steps: Sequence[float]) -> tuple[float, ...]:
     """Return the steps [s], the largest first, each once."""
     _refuse_one("steps", steps, "steps [s]")

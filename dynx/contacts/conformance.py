@@ -5,10 +5,16 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
-from dynx.contacts.arguments import checked_cases, checked_engines, checked_given, checked_steps
+from dynx.contacts.arguments import (
+    checked_cases,
+    checked_engines,
+    checked_given,
+    checked_steps,
+    values_in_effect,
+)
 from dynx.contacts.attribution import attribute
 from dynx.contacts.candidates import CANDIDATES, Candidate
 from dynx.contacts.case import Case
@@ -82,6 +88,8 @@ class Conformance:
     """Version of each engine; empty for an engine without results."""
     not_done: int = 0
     """Number of trials of an engine that an interruption left without a verdict."""
+    in_effect: Mapping[str, Mapping[str, tuple[float, ...]]] = field(default_factory=dict)
+    """Values at each step, by engine, of settings given that the engine changes."""
 
     def count(self, kind: VerdictKind, engine: str | None = None) -> int:
         """Return the number of figures with a verdict, of one engine or of all."""
@@ -150,7 +158,8 @@ def conform(
     not_done = {trials[k // len(sizes)] for k, outcome in enumerate(outcomes) if outcome is None}
     not_done |= {each.trial for each in series if each not in verdicts}
     return Conformance(
-        sizes, chosen, found, given, results, refusals, failures, total, versions, len(not_done)
+        *(sizes, chosen, found, given, results, refusals, failures, total, versions, len(not_done)),
+        in_effect={name: values_in_effect(name, given[name], sizes) for name in chosen},
     )
 
 

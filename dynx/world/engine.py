@@ -69,6 +69,11 @@ class WorldEngine(ABC):
         """Raise NotInstalledError where the engine is not installed."""
         return
 
+    @classmethod
+    def settings_in_effect(cls, settings: Mapping[str, Any], dt: float) -> Mapping[str, Any]:
+        """Return the values in effect of those settings that the engine changes in steps of `dt` [s]."""
+        return {}
+
     def effective_materials(self) -> Mapping[str, EffectiveCoefficient]:
         """Return, by name, the coefficients of contact that the engine does not have for every pair of
         materials as `dynx.world.materials.combined` gives them."""

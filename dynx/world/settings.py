@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -75,6 +75,18 @@ def checked_settings(
         name: setting.checked(name, given[name]) if name in given else setting.default
         for name, setting in known.items()
     }
+
+
+def changed_settings(
+    given: Mapping[str, Any], in_use: Mapping[str, Any], in_effect: Mapping[str, Any]
+) -> Iterator[str]:
+    """Yield a sentence for each setting given of which the engine has another value in effect."""
+    for name in given:
+        if name in in_effect and in_effect[name] != in_use[name]:
+            yield (
+                f"setting {name} is {in_use[name]:g}, but {in_effect[name]:g} in effect: the least with "
+                "steps of this length"
+            )
 
 
 def checked_switches(**switches: object) -> dict[str, bool]:

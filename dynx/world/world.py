@@ -29,7 +29,7 @@ from dynx.world.scene import Scene
 from dynx.world.scene.paths import ScenePaths
 from dynx.world.scene.reading import scene_from_document
 from dynx.world.scene.writing import scene_document
-from dynx.world.settings import checked_settings, checked_switches
+from dynx.world.settings import changed_settings, checked_settings, checked_switches
 from dynx.world.snapshot import Snapshot, read_snapshot, write_snapshot
 from dynx.world.start_notes import notes_on_start
 from dynx.world.state import BodyState, RobotState, WorldState
@@ -99,9 +99,14 @@ class World:
         self._queries = Queries(scene, self._layout)
         self._identity: str | None = None
         self._motion = Motion(self._layout, self._commands, self._build, self.dt, self.substeps)
-        self.notes: tuple[str, ...] = notes_on_start(self._motion.engine, self._motion.state)
+        in_effect = self._kind.settings_in_effect(self.settings, self.dt / self.substeps)
+        self.notes: tuple[str, ...] = (
+            *notes_on_start(self._motion.engine, self._motion.state),
+            *changed_settings(settings, self.settings, in_effect),
+        )
         """Parts that overlap at the start, constraints that it violates, joints beyond their limits,
-        coefficients of contact that the engine does not have, and a step that is long, one sentence each."""
+        coefficients of contact that the engine does not have, a step that is long, and settings given that
+        the engine changes, one sentence each."""
 
     @property
     def version(self) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 from typing import Any
 
 import pytest
@@ -120,3 +121,12 @@ def test_what_a_case_measures_is_checked(figures: Callable[[World], Any], messag
 def test_figures_are_the_same_at_every_step() -> None:
     with pytest.raises(ArgumentError, match="'resting' has the figures speed at one step and speed, late"):
         conform(["exact"], [4e-3, 2e-3], [Resting(late)], jobs=0)
+
+
+@pytest.mark.skipif(find_spec("mujoco") is None, reason="needs MuJoCo")
+def test_settings_that_an_engine_raises_are_returned_with_those_in_effect() -> None:
+    given = {"mujoco": {"time_constant": 0.003, "impratio": 10.0, "slip_time_constant": 0.01}}
+    found = conform(["mujoco"], [4e-3, 1e-3], [Resting(still)], settings=given, jobs=0)
+    assert found.in_effect == {"mujoco": {"time_constant": (0.008, 0.003)}}
+    given["mujoco"]["substeps"] = 4
+    assert conform(["mujoco"], [4e-3], [Resting(still)], settings=given, jobs=0).in_effect["mujoco"] == {}

@@ -94,3 +94,22 @@ def test_joints_beyond_their_limits_at_the_start_are_noted(engine: str) -> None:
         assert note.startswith("'arm/elbow' is at -3, beyond its limits -2.6 to 2.6, at the start")
     with World(Scene("s", robots=(robot,)), engine, joint_limits=False) as world:
         assert world.notes == ()
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+def test_a_step_in_which_bodies_miss_each_other_is_noted(engine: str) -> None:
+    with World(Scene("s", bodies=(brick("a"),)), engine, dt=100.0) as world:
+        (note,) = world.notes
+        assert note.startswith("a step of 100 s is longer than 0.1 s")
+
+
+@pytest.mark.skipif("mujoco" not in WORLDS, reason="needs MuJoCo")
+def test_time_constants_that_mujoco_raises_are_noted_where_they_are_given() -> None:
+    scene = Scene("s", bodies=(brick("a"),))
+    with World(scene, "mujoco", dt=4e-3, time_constant=1e-3, slip_time_constant=4e-3) as world:
+        (note,) = world.notes
+        assert note.startswith("setting time_constant is 0.001, but 0.008 in effect")
+    with World(scene, "mujoco", dt=4e-3) as world:
+        assert world.notes == ()
+    with World(scene, "mujoco", dt=4e-3, substeps=8, time_constant=1e-3) as world:
+        assert world.notes == ()

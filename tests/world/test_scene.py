@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 import pickle
+from pathlib import Path
 
 import pytest
 
 import dynx
 from dynx.errors import ArgumentError, UnknownNameError
-from dynx.model.geometry import Box, Plane
-from dynx.world import Material, Scene, SceneBody, SceneRobot, Weld, box, ground, sphere
+from dynx.model.geometry import Box, Capsule, Cylinder, Mesh, Plane
+from dynx.world import (
+    Material,
+    Scene,
+    SceneBody,
+    SceneRobot,
+    Weld,
+    box,
+    capsule,
+    cylinder,
+    ground,
+    mesh,
+    sphere,
+)
 
 
 def arm(name: str = "arm", **options: object) -> SceneRobot:
@@ -109,3 +122,10 @@ def test_ignored_pairs_take_robots_and_groups() -> None:
     assert not made.may_collide("cube", "ball")
     with pytest.raises(UnknownNameError):
         made.may_collide("cube", "loose")
+
+
+def test_bodies_of_one_shape_are_made_by_their_names(tmp_path: Path) -> None:
+    assert cylinder("c", 0.1, 0.3, mass=1.0).shapes[0].shape == Cylinder(0.1, 0.3)
+    assert capsule("c", 0.1, 0.3).shapes[0].shape == Capsule(0.1, 0.3)
+    file = str(tmp_path / "thing.stl")
+    assert mesh("m", file, (1.0, 1.0, -1.0)).shapes[0].shape == Mesh(file, (1.0, 1.0, -1.0))

@@ -11,11 +11,15 @@ SCHEMA: Literal["dynx.contacts/1"] = "dynx.contacts/1"
 
 
 class EngineEntry(TypedDict):
-    """An engine, the settings given to it, and its number of figures with each verdict."""
+    """An engine, the settings given to it, and its number of figures with each verdict.
+
+    `in_effect` has the values in effect at each step of settings given that the engine changes.
+    """
 
     engine: str
     version: str
     settings: dict[str, Any]
+    in_effect: dict[str, list[float]]
     verdicts: dict[VerdictKind, int]
 
 
@@ -101,6 +105,7 @@ def document(found: Conformance, seconds: float) -> ContactsDocument:
                 "engine": name,
                 "version": found.versions[name],
                 "settings": dict(found.settings[name]),
+                "in_effect": {key: list(values) for key, values in found.in_effect.get(name, {}).items()},
                 "verdicts": found.counts(name),
             }
             for name in found.engines

@@ -42,6 +42,9 @@ def show(out: Console, report: Entry, *, every_figure: bool = False) -> None:
         if each["settings"]:
             given = ", ".join(f"{name}={value}" for name, value in each["settings"].items())
             out.print(f"{one_line(each['engine'])} with {one_line(given)}")
+        for name, values in each["in_effect"].items():
+            listed = ", ".join(f"{value:g}" for value in values)
+            out.print(f"{one_line(each['engine'])} has {one_line(name)} {listed} in effect at these steps")
     shown = {
         case["name"]: _by_name(case) if every_figure else worst_of_engines(case)
         for case in report["cases"]

@@ -1,6 +1,6 @@
 """`Scene`: a frozen description of a world, and its parts."""
 
-from dynx.world.scene.bodies import SceneBody, box, ground, sphere
+from dynx.world.scene.bodies import SceneBody, box, capsule, cylinder, ground, mesh, sphere
 from dynx.world.scene.body_urdf import body_to_urdf
 from dynx.world.scene.constraints import PointToPoint, Weld
 from dynx.world.scene.files import read_scene, scene_names, write_scene
@@ -18,8 +18,11 @@ __all__ = [
     "Weld",
     "body_to_urdf",
     "box",
+    "capsule",
     "contact_material",
+    "cylinder",
     "ground",
+    "mesh",
     "read_scene",
     "scene_names",
     "scene_to_mjcf",

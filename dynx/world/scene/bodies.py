@@ -14,7 +14,18 @@ from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.model import Inertial, Pose
 from dynx.model.configuration import checked_array, checked_pose
 from dynx.model.elements import IDENTITY, Vector
-from dynx.model.geometry import Box, Collision, HeightField, Plane, Shape, Sphere, solid_properties
+from dynx.model.geometry import (
+    Box,
+    Capsule,
+    Collision,
+    Cylinder,
+    HeightField,
+    Mesh,
+    Plane,
+    Shape,
+    Sphere,
+    solid_properties,
+)
 from dynx.model.geometry.sizes import finite_numbers, finite_vector, positive_number
 from dynx.model.urdf.links import inertia_fault
 from dynx.spatial.scalar import Floats
@@ -126,6 +137,23 @@ def box(name: str, size: ArrayLike, **options: object) -> SceneBody:
 def sphere(name: str, radius: float, **options: object) -> SceneBody:
     """Return a body with the shape of a ball; `options` are those of `SceneBody`."""
     return SceneBody(name, Sphere(radius), **options)  # type: ignore[arg-type]
+
+
+def cylinder(name: str, radius: float, length: float, **options: object) -> SceneBody:
+    """Return a body with the shape of a cylinder about z [m]; `options` are those of `SceneBody`."""
+    return SceneBody(name, Cylinder(radius, length), **options)  # type: ignore[arg-type]
+
+
+def capsule(name: str, radius: float, length: float, **options: object) -> SceneBody:
+    """Return a body with the shape of a capsule about z [m], whose ends are half balls beyond the length;
+    `options` are those of `SceneBody`."""
+    return SceneBody(name, Capsule(radius, length), **options)  # type: ignore[arg-type]
+
+
+def mesh(name: str, file: str, scale: ArrayLike = (1.0, 1.0, 1.0), **options: object) -> SceneBody:
+    """Return a body with the shape of the convex hull of a mesh in a file; `options` are those of
+    `SceneBody`."""
+    return SceneBody(name, Mesh(file, finite_vector("scale", scale)), **options)  # type: ignore[arg-type]
 
 
 def _placed_shapes(what: str, shapes: object) -> tuple[Collision, ...]:

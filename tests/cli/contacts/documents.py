@@ -80,6 +80,7 @@ def conformance(text: str = "word", *, not_done: int = 0) -> Conformance:
         99,
         dict.fromkeys(ENGINES, "1.0"),
         not_done,
+        {"one": {"impratio": (20.0, 15.0, 10.0)}},
     )
 
 

@@ -91,6 +91,7 @@ def test_every_verdict_is_explained_on_the_screen() -> None:
         "acceleration, slow  stiffness 1e+06 -> 1e+08: falls to 1.0e-03 (order 1.0)",
         "acceleration, slow  cannot: word",
         "not finite  acceleration, slow  unexplained",
+        "one has impratio 20, 15, 10 in effect at these steps",
         "three at 4 ms, upward: refused: word",
         "two at 4 ms, upward: crash: word",
         "9 figures at 1 ms: 4 exact, 1 falls, 1 cannot, 2 setting, 1 unexplained; 99 runs in 12.5 s",

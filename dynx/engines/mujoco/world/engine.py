@@ -17,7 +17,7 @@ from dynx.engines.mujoco.library import mujoco, silence_warnings
 from dynx.engines.mujoco.world.build import build_scene
 from dynx.engines.mujoco.world.coordinates import BodyCoordinates, RobotCoordinates
 from dynx.engines.mujoco.world.mimics import CoupledRobot
-from dynx.engines.mujoco.world.options import SETTINGS
+from dynx.engines.mujoco.world.options import LEAST_STEPS, SETTINGS, time_constant
 from dynx.engines.mujoco.world.shapes import FIELD_GROUP
 from dynx.engines.mujoco.world.touching import closest_of, read_contacts
 from dynx.errors import ClosedError, DynxError, EngineError, nonblank_lines, shown
@@ -103,6 +103,10 @@ class MujocoWorld(WorldEngine):
         # Height fields are left to dynx, because a ray through a point of the grid passes MuJoCo's.
         self._groups = np.ones(6, dtype=np.uint8)
         self._groups[FIELD_GROUP] = 0
+
+    @classmethod
+    def settings_in_effect(cls, settings: Mapping[str, Any], dt: float) -> Mapping[str, Any]:
+        return {name: time_constant(settings, name, dt) for name in LEAST_STEPS}
 
     def effective_materials(self) -> Mapping[str, EffectiveCoefficient]:
         return self._built.materials.effective()

@@ -95,9 +95,18 @@ def set_options(option: Any, settings: Mapping[str, Any], gravity: Floats, dt: f
     option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET | mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
 
 
+LEAST_STEPS = {"time_constant": 2.0, "slip_time_constant": 1.0, "constraint_time_constant": 2.0}
+"""Least number of steps of each time constant: MuJoCo's springs diverge with shorter ones."""
+
+
+def time_constant(settings: Mapping[str, Any], name: str, dt: float) -> float:
+    """Return a time constant in effect [s]."""
+    return max(float(settings[name]), LEAST_STEPS[name] * dt)
+
+
 def natural_frequency(settings: Mapping[str, Any], dt: float) -> float:
     """Return the natural frequency [rad/s] of contacts and joint limits."""
-    return 1.0 / max(float(settings["time_constant"]), 2.0 * dt)
+    return 1.0 / time_constant(settings, "time_constant", dt)
 
 
 def contact_reference(
@@ -125,7 +134,7 @@ def _ratio(settings: Mapping[str, Any], restitution: float, dt: float, slips: bo
 
 def slip_reference(settings: Mapping[str, Any], dt: float) -> tuple[float, float]:
     """Return MuJoCo's solreffriction (-k, -b) of contacts; slip has no spring, and MuJoCo ignores k."""
-    return -1.0, -1.0 / max(settings["slip_time_constant"], dt)
+    return -1.0, -1.0 / time_constant(settings, "slip_time_constant", dt)
 
 
 def limit_reference(settings: Mapping[str, Any], dt: float) -> tuple[float, float]:
@@ -136,4 +145,4 @@ def limit_reference(settings: Mapping[str, Any], dt: float) -> tuple[float, floa
 
 def constraint_reference(settings: Mapping[str, Any], dt: float) -> tuple[float, float]:
     """Return MuJoCo's solref of welds, point-to-point constraints, mimic joints and joint friction."""
-    return max(settings["constraint_time_constant"], 2.0 * dt), 1.0
+    return time_constant(settings, "constraint_time_constant", dt), 1.0
