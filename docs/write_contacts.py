@@ -19,7 +19,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from dynx.cli.contacts import wording
-from dynx.cli.contacts.page import cell_figure, removals
+from dynx.cli.contacts.page import causes, cell_figure
 from dynx.contacts import find_cases
 
 PAGE = Path(__file__).with_name("contacts.md")
@@ -69,15 +69,16 @@ def conditions(report: Entry) -> str:
     engines = ", ".join(f"{each['engine']} {each['version']}" for each in report["engines"])
     found = [each["verdict"] for case in report["cases"] for each in case["figures"]]
     counts = ", ".join(f"{found.count(each)} {each}" for each in wording.RANKS if each in found)
+    verdict_counts = {each: found.count(each) for each in wording.RANKS}
     return (
         f"Written by `python docs/write_contacts.py` for {engines}, at steps of "
         f"{wording.steps_text(report['steps'])}: {len(found)} figures of {len(report['cases'])} cases "
-        f"({counts}), {report['runs']} runs.\n"
+        f"({counts}), {report['runs']} runs. {wording.headline(verdict_counts)}\n"
     )
 
 
 def verdicts(report: Entry) -> str:
-    """The table of cases and engines: the verdict that deserves the first look, and its error."""
+    """The table of cases and engines: the verdict that deserves the first look, and its errors."""
     names = [each["engine"] for each in report["engines"]]
     rows = (
         (f"`{case['name']}`", *(cell(cell_figure(case, name)) for name in names)) for case in report["cases"]
@@ -86,24 +87,25 @@ def verdicts(report: Entry) -> str:
 
 
 def cell(figure: Entry | None) -> str:
-    """A verdict with the relative error at the smallest step."""
+    """A verdict with the relative errors at the largest and the smallest step."""
     if figure is None:
         return ""
     order = f" ({wording.order_text(figure['order'])})" if figure["verdict"] == "falls" else ""
-    return f"{figure['verdict']}{order}, {wording.error_text(wording.last_error(figure))}"
+    return f"{figure['verdict']}{order}, {wording.span_text(figure['errors'])}"
 
 
 def settings(report: Entry) -> str:
-    """The table of settings that remove errors, with the largest error of a case before and after."""
+    """The table of settings that are causes, with the largest errors of a case before and after."""
     rows = [
         (
             *(removal.engine, f"`{removal.change}`", f"`{each.case}`: {each.figures}"),
-            *(wording.error_text(each.before), wording.error_text(each.after)),
+            *(wording.span_text(each.before), wording.span_text(each.after), each.outcome),
+            wording.price_text(each.price) if each.price else "",
         )
-        for removal in removals(report["cases"])
+        for removal in causes(report["cases"])
         for each in removal.errors
     ]
-    return table(("engine", "setting", "case", "error", "with the setting"), rows)
+    return table(("engine", "setting", "case", "errors", "with the setting", "outcome", "price"), rows)
 
 
 def lacking(report: Entry) -> str:
@@ -139,23 +141,31 @@ def pairs(report: Entry) -> str:
 
 
 def effective(figure: Entry | None) -> str:
-    """The measured value at the smallest step, with a verdict that is neither exact nor falls."""
+    """The measured value at the smallest step, with a verdict that is neither within nor falls."""
     if figure is None:
         return ""
-    verdict = "" if figure["verdict"] in ("exact", "falls") else f" ({figure['verdict']})"
+    verdict = "" if figure["verdict"] in ("within", "falls") else f" ({figure['verdict']})"
     return wording.coefficient_text(figure["measured"][-1]) + verdict
 
 
 def figures(report: Entry) -> str:
-    """The table of every figure: the error of each engine at the smallest step."""
+    """The table of every figure: its tolerance and the errors of each engine."""
     names = [each["engine"] for each in report["engines"]]
     rows = []
     for case in report["cases"]:
         for name, found in wording.figures_by_name(case).items():
             first = next(iter(found.values()))
             exact = wording.quantity_text(first["exact"], first["unit"])
-            rows.append((f"`{case['name']}`", name, exact, *(cell(found.get(each)) for each in names)))
-    return table(("case", "figure", "exact", *names), rows)
+            rows.append(
+                (
+                    f"`{case['name']}`",
+                    name,
+                    exact,
+                    f"{first['tolerance']:.0e}",
+                    *(cell(found.get(each)) for each in names),
+                )
+            )
+    return table(("case", "figure", "exact", "tolerance", *names), rows)
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

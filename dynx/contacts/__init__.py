@@ -1,7 +1,7 @@
 """Contact conformance: how far each engine is from mechanics where bodies touch.
 
 A `Case` is a scene with a closed form. `conform` runs every case in every engine at several steps and gives
-each measured `Figure` a verdict: it is exact, its error falls with the step, the error is attributed to a
+each measured `Figure` a verdict: it is within the tolerance, its error falls with the step, the error is attributed to a
 setting of the engine (proved by running again with the setting changed), the engine lacks the coefficient,
 or the error is unexplained::
 
@@ -28,7 +28,7 @@ from dynx.contacts.conformance import STEPS, Conformance, FigureResult, NoResult
 from dynx.contacts.registry import case_names, find_case, find_cases
 from dynx.contacts.registry import register as register_case
 from dynx.contacts.registry import unregister as unregister_case
-from dynx.contacts.verdict import VERDICTS, Attribution, Verdict, VerdictKind
+from dynx.contacts.verdict import VERDICTS, Attribution, Outcome, Price, Verdict, VerdictKind
 
 __all__ = [
     "CANDIDATES",
@@ -41,6 +41,8 @@ __all__ = [
     "Figure",
     "FigureResult",
     "NoResult",
+    "Outcome",
+    "Price",
     "Verdict",
     "VerdictKind",
     "case_names",

@@ -1,20 +1,23 @@
 """Attribution of errors that stay: each candidate setting is changed, and the trial is run again.
 
-An error is attributed to the first candidate that at least halves it at the smallest step, and under which it
-is within the tolerance or falls with the step, or in proportion to which it falls, as `dynx.contacts.trend`
-judges. Where the error is within the tolerance at the smallest step, the step of the largest error counts.
+An error is attributed to the first candidate that at least halves it at the smallest step, makes it larger
+at no step, and under which it is within the tolerance or falls with the step, or in proportion to which it
+falls, as `dynx.contacts.trend` judges. Where the error is within the tolerance at the smallest step, the step
+of the largest error counts. Of several settings changed together, those are left out again without which the
+change does the same. The price of a change is measured by running the whole case with it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
 from dynx.contacts.candidates import SUBSTEPS, Candidate
-from dynx.contacts.run import Measured
+from dynx.contacts.reruns import Change, Reruns
 from dynx.contacts.runner import Runner
-from dynx.contacts.series import Series, TrialOfEngine
+from dynx.contacts.series import Series
 from dynx.contacts.trend import judge
 from dynx.contacts.verdict import Attribution, Verdict
 from dynx.world.registry import world_class
@@ -22,138 +25,181 @@ from dynx.world.registry import world_class
 LEAST_GAIN = 2.0
 """Factor by which a change has to reduce the error at the smallest step to be its cause."""
 
-Change = tuple[TrialOfEngine, int]
-"""A trial, and the number of a change of the candidate that is tried, from 0."""
 
-Errors = dict[str, tuple[float, ...]]
-"""Errors by the name of the figure, at every step or at the smallest alone."""
+class Attributor:
+    """Search for the causes of errors at these steps, among candidates by engine."""
 
+    def __init__(
+        self,
+        steps: tuple[float, ...],
+        settings: Mapping[str, Mapping[str, Any]],
+        candidates: Mapping[str, Sequence[Candidate]],
+        runner: Runner,
+    ) -> None:
+        self._steps = steps
+        self._settings = settings
+        self._candidates = candidates
+        self._runner = runner
+        self._reruns = Reruns(settings, runner)
 
-Used = Mapping[str, Any]
-"""Values of settings before a change."""
+    def attribute(self, open_series: Sequence[Series], series: Sequence[Series]) -> dict[Series, Verdict]:
+        """Return the verdict on every open series: a setting that is its cause, or none.
 
-
-def attribute(
-    series: Sequence[Series],
-    steps: tuple[float, ...],
-    settings: Mapping[str, Mapping[str, Any]],
-    candidates: Mapping[str, Sequence[Candidate]],
-    runner: Runner,
-) -> dict[Series, Verdict]:
-    """Return the verdict on every series: a setting that is its cause, or none.
-
-    Series are left out where the runner was interrupted before a cause was found.
-    """
-    left = list(series)
-    verdicts: dict[Series, Verdict] = {}
-    rounds = max((len(candidates.get(each.trial.engine, ())) for each in left), default=0)
-    for number in range(rounds):
-        tried = {
-            each.trial: candidates[each.trial.engine][number]
-            for each in left
-            if number < len(candidates.get(each.trial.engine, ()))
-        }
-        trial_series = [each for each in left if each.trial in tried]
-        finest, all_steps = _try(tried, trial_series, steps, settings, runner)
-        for each in trial_series:
-            candidate = tried[each.trial]
-            used = _settings_in_use(each, candidate, settings[each.trial.engine])
-            cause = _removal(each, candidate, all_steps, steps, used)
-            cause = cause or _proportion(each, candidate, finest, used)
-            if cause is not None:
-                verdicts[each] = Verdict("setting", attribution=cause)
-        left = [each for each in left if each not in verdicts]
-    return verdicts | ({} if runner.interrupted else {each: Verdict("unexplained") for each in left})
-
-
-def _try(
-    tried: Mapping[TrialOfEngine, Candidate],
-    series: Sequence[Series],
-    steps: tuple[float, ...],
-    settings: Mapping[str, Mapping[str, Any]],
-    runner: Runner,
-) -> tuple[dict[Change, Errors], dict[Change, Errors]]:
-    """Return the errors under every change: at the smallest step, and at all steps where it helps there."""
-    changed = {
-        (trial, k): {**settings[trial.engine], **change}
-        for trial, candidate in tried.items()
-        for k, change in enumerate(candidate.changes)
-    }
-    finest = _errors(changed, steps[-1:], runner)
-    helpful = {
-        (trial, k): changed[trial, k]
-        for (trial, k), found in finest.items()
-        if any(each.trial == trial and _may_help(each, found[each.name][-1]) for each in series)
-    }
-    coarser = _errors(helpful, steps[:-1], runner)
-    return finest, {
-        change: {name: (*found.get(name, ()), *last) for name, last in finest[change].items()}
-        for change, found in coarser.items()
-    }
-
-
-def _errors(
-    changed: Mapping[Change, Mapping[str, Any]], steps: tuple[float, ...], runner: Runner
-) -> dict[Change, Errors]:
-    """Return the errors under settings at these steps; changes under which a run failed are left out."""
-    runs = [trial.run(dt, given) for (trial, _), given in changed.items() for dt in steps]
-    outcomes = iter(runner.run(runs))
-    found: dict[Change, Errors] = {}
-    for change in changed:
-        measured = [outcome for outcome in (next(outcomes) for _ in steps) if isinstance(outcome, Measured)]
-        if len(measured) == len(steps):
-            names = [figure.name for figure in measured[0].figures] if measured else []
-            found[change] = {
-                name: tuple(outcome.figures[k].error for outcome in measured) for k, name in enumerate(names)
+        `series` are all that were measured, in which the price of a change is looked for. Series are left out
+        where the runner was interrupted before a cause was found.
+        """
+        left = list(open_series)
+        causes: dict[Series, Attribution] = {}
+        for number in range(max(map(len, self._candidates.values()), default=0)):
+            tried = {
+                each: self._candidates[each.trial.engine][number]
+                for each in left
+                if number < len(self._candidates.get(each.trial.engine, ()))
             }
-    return found
+            causes |= self._reduced(self._round(tried))
+            left = [each for each in left if each not in causes]
+        causes = self._priced(causes, series)
+        verdicts = {each: Verdict("setting", attribution=cause) for each, cause in causes.items()}
+        return verdicts | (
+            {} if self._runner.interrupted else {each: Verdict("unexplained") for each in left}
+        )
 
+    def _round(self, tried: Mapping[Series, Candidate]) -> dict[Series, Attribution]:
+        """Return the causes among one candidate for each series."""
+        changes = [(each, change) for each, candidate in tried.items() for change in candidate.changes]
+        self._reruns.carry_out([(each.trial, change) for each, change in changes], self._steps[-1:])
+        helpful = [(each.trial, change) for each, change in changes if self._may_help(each, change)]
+        self._reruns.carry_out(helpful, self._steps)
+        falling = {each: candidate for each, candidate in tried.items() if self._falls(each, candidate)}
+        removed = {each: self._removal(each, candidate) for each, candidate in tried.items()}
+        in_proportion = {each: falling[each] for each in falling if removed[each] is None}
+        rows = [(each.trial, change) for each, found in in_proportion.items() for change in found.changes]
+        self._reruns.carry_out(rows, self._steps)
+        removed |= {each: self._proportion(each, found) for each, found in in_proportion.items()}
+        return {each: cause for each, cause in removed.items() if cause is not None}
 
-def _may_help(series: Series, error: float) -> bool:
-    """Check whether a change with this error at the smallest step may remove the error of a series."""
-    return series.decisive < len(series.errors) - 1 or error * LEAST_GAIN <= series.errors[-1]
+    def _may_help(self, series: Series, change: Change) -> bool:
+        """Check whether a change may remove an error, by the smallest step."""
+        errors = self._reruns.errors(series.trial, change, self._steps[-1:], series.name)
+        early = series.decisive < len(series.errors) - 1
+        return errors is not None and (early or errors[0] * LEAST_GAIN <= series.errors[-1])
 
+    def _removal(self, series: Series, candidate: Candidate) -> Attribution | None:
+        """Return the candidate as the cause of an error that one of its changes removes, or None."""
+        for change in candidate.changes:
+            cause = self._caused(series, change, candidate.reason)
+            if cause is not None:
+                return cause
+        return None
 
-def _removal(
-    series: Series, candidate: Candidate, found: Mapping[Change, Errors], steps: tuple[float, ...], used: Used
-) -> Attribution | None:
-    """Return the candidate as the cause of an error that one of its changes removes, or None."""
-    for k, change in enumerate(candidate.changes):
-        errors = found.get((series.trial, k), {}).get(series.name)
+    def _caused(self, series: Series, change: Change, reason: str) -> Attribution | None:
+        """Return a change as the cause of an error that it removes or makes fall with the step, or None."""
+        errors = self._reruns.errors(series.trial, change, self._steps, series.name)
         at = series.decisive
-        if errors is None or errors[at] * LEAST_GAIN > series.errors[at]:
-            continue
-        if judge(steps, errors, series.tolerance).kind != "stays":
-            values = {name: (used[name], value) for name, value in change.items()}
-            return Attribution(values, candidate.reason, (series.errors, errors), None)
-    return None
+        if errors is None or errors[at] * LEAST_GAIN > series.errors[at] or _larger(series, errors):
+            return None
+        trend = judge(self._steps, errors, series.tolerance)
+        if trend.kind == "stays":
+            return None
+        used = self._in_use(series, change)
+        acting = {name: (used[name], value) for name, value in change.items() if used[name] != value}
+        outcome = "removed" if trend.kind == "within" else "falls"
+        return Attribution(acting, reason, (series.errors, errors), outcome, trend.order)
+
+    def _reduced(self, causes: dict[Series, Attribution]) -> dict[Series, Attribution]:
+        """Return the causes without the settings whose change does nothing."""
+        for place in range(max((len(each.values) for each in causes.values()), default=0)):
+            fewer: dict[Series, dict[str, Any]] = {}
+            for each, cause in causes.items():
+                if cause.outcome == "proportion" or len(cause.values) < 2:
+                    continue
+                change = {name: tried[-1] for name, tried in cause.values.items()}
+                # Settings that have been left out before move the others forward.
+                kept = len(cause.values) - 1 - place
+                if kept >= 0:
+                    del change[[*change][kept]]
+                    fewer[each] = change
+            self._reruns.carry_out([(each.trial, change) for each, change in fewer.items()], self._steps)
+            for each, change in fewer.items():
+                alone = self._caused(each, change, causes[each].reason)
+                if alone is not None and _as_good(each, alone, causes[each]):
+                    causes = causes | {each: alone}
+        return causes
+
+    def _falls(self, series: Series, candidate: Candidate) -> bool:
+        """Check whether an error at the smallest step falls along the values of a candidate."""
+        return self._along(series, candidate) is not None
+
+    def _along(self, series: Series, candidate: Candidate) -> float | None:
+        """Return the order at which an error at the smallest step falls along the values of the first setting
+        of a candidate, if that is numeric, or None."""
+        last = self._steps[-1:]
+        errors = [self._reruns.errors(series.trial, each, last, series.name) for each in candidate.changes]
+        used = self._in_use(series, candidate.values)
+        name, tried = next(iter(candidate.values.items()))
+        numbers = (used[name], *tried)
+        if len(errors) < 2 or not all(type(each) in (int, float) and each > 0 for each in numbers):
+            return None
+        sizes = numbers if numbers[-1] < numbers[0] else tuple(1.0 / number for number in numbers)
+        # A setting that the user has changed may be beyond values that are tried.
+        if any(after >= before for before, after in pairwise(sizes)):
+            return None
+        found = [series.errors[-1], *(each[0] for each in errors if each is not None)]
+        if len(found) < len(sizes) or found[-1] * LEAST_GAIN > found[0]:
+            return None
+        return judge(sizes, found, series.tolerance).order
+
+    def _proportion(self, series: Series, candidate: Candidate) -> Attribution | None:
+        """Return the candidate as the cause of an error that falls in proportion to it, or None."""
+        order = self._along(series, candidate)
+        rows = [
+            self._reruns.errors(series.trial, each, self._steps, series.name) for each in candidate.changes
+        ]
+        errors = tuple(each for each in rows if each is not None)
+        if order is None or len(errors) < len(rows) or _larger(series, errors[-1]):
+            return None
+        used = self._in_use(series, candidate.values)
+        values = {name: (used[name], *tried) for name, tried in candidate.values.items()}
+        acting = {name: each for name, each in values.items() if len(set(each)) > 1}
+        return Attribution(acting, candidate.reason, (series.errors, *errors), "proportion", order)
+
+    def _priced(
+        self, causes: Mapping[Series, Attribution], series: Sequence[Series]
+    ) -> dict[Series, Attribution]:
+        """Return the causes with their price: the errors in the same case that they make worse."""
+        around: dict[tuple[str, str], list[Series]] = {}
+        for each in series:
+            around.setdefault((each.trial.engine, each.trial.case.name), []).append(each)
+        changes = {
+            each: {name: tried[-1] for name, tried in cause.values.items()} for each, cause in causes.items()
+        }
+        others = {each: around[each.trial.engine, each.trial.case.name] for each in causes}
+        wanted = [(other.trial, changes[each]) for each in causes for other in others[each]]
+        self._reruns.carry_out(wanted, self._steps[-1:])
+        return {
+            each: replace(cause, price=self._reruns.price(others[each], each, changes[each], self._steps[-1]))
+            for each, cause in causes.items()
+        }
+
+    def _in_use(self, series: Series, names: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the values of settings before a change."""
+        known = world_class(series.trial.engine).settings
+        defaults = {name: setting.default for name, setting in known.items()} | {SUBSTEPS: 1}
+        given = self._settings[series.trial.engine]
+        return {name: given.get(name, defaults[name]) for name in names}
 
 
-def _proportion(
-    series: Series, candidate: Candidate, found: Mapping[Change, Errors], used: Used
-) -> Attribution | None:
-    """Return the candidate as the cause of an error that falls along the values of its first setting, if that
-    is numeric, or None."""
-    errors = [found.get((series.trial, k), {}).get(series.name) for k in range(len(candidate.changes))]
-    if len(errors) < 2 or None in errors:
-        return None
-    values = {name: (used[name], *tried) for name, tried in candidate.values.items()}
-    numbers = next(iter(values.values()))
-    if not all(type(number) in (int, float) and number > 0 for number in numbers):
-        return None
-    sizes = numbers if numbers[-1] < numbers[0] else tuple(1.0 / number for number in numbers)
-    # A setting that the user has changed may be beyond values that are tried.
-    if any(after >= before for before, after in pairwise(sizes)):
-        return None
-    falling = (series.errors[-1:], *(each for each in errors if each is not None))
-    trend = judge(sizes, [each[-1] for each in falling], series.tolerance)
-    if trend.kind != "falls" or falling[-1][-1] * LEAST_GAIN > series.errors[-1]:
-        return None
-    return Attribution(values, candidate.reason, falling, trend.order)
+def _larger(series: Series, errors: Sequence[float]) -> bool:
+    """Check whether an error is larger at some step than before, beyond the tolerance."""
+    return any(
+        not after <= max(before, series.tolerance)
+        for before, after in zip(series.errors, errors, strict=True)
+    )
 
 
-def _settings_in_use(series: Series, candidate: Candidate, given: Mapping[str, Any]) -> Used:
-    """Return the value of each setting of a candidate before its changes."""
-    known = world_class(series.trial.engine).settings
-    defaults = {name: setting.default for name, setting in known.items()} | {SUBSTEPS: 1}
-    return {name: given.get(name, defaults[name]) for name in candidate.values}
+def _as_good(series: Series, fewer: Attribution, cause: Attribution) -> bool:
+    """Check whether a change of fewer settings leaves no more of an error than the cause does."""
+    return fewer.outcome == cause.outcome and all(
+        one <= max(LEAST_GAIN * both, series.tolerance)
+        for one, both in zip(fewer.errors[-1], cause.errors[-1], strict=True)
+    )

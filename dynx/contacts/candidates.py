@@ -80,6 +80,10 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
             "Slip of a contact of MuJoCo decays with this time constant.",
         ),
         Candidate(
+            {SUBSTEPS: (8,)},
+            "The error falls with the step of the engine, too little between the steps that were run.",
+        ),
+        Candidate(
             {"slip_time_constant": (0.1, 1.0), SUBSTEPS: (1, 8)},
             "Friction of MuJoCo opposes slip within this time: the shorter it is, the more its contacts, "
             "which are convex problems, push bodies apart that slide.",

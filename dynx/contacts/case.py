@@ -25,7 +25,7 @@ class Figure:
     scale: float
     """Magnitude by which the error is divided: the exact value, or another one where that is 0."""
     tolerance: float = 1e-3
-    """Relative error below which an engine counts as exact."""
+    """Relative error below which an error counts as none."""
     rests_on: tuple[str, ...] = ()
     """Coefficients of `dynx.world.Material`, such as ``restitution``, without which the exact value would be
     another one: an engine that lacks one of them cannot give it."""

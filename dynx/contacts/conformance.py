@@ -15,7 +15,7 @@ from dynx.contacts.arguments import (
     checked_steps,
     values_in_effect,
 )
-from dynx.contacts.attribution import attribute
+from dynx.contacts.attribution import Attributor
 from dynx.contacts.candidates import CANDIDATES, Candidate
 from dynx.contacts.case import Case
 from dynx.contacts.run import Measured, Run, Unmeasured
@@ -46,7 +46,7 @@ class FigureResult:
     scale: float
     """Magnitude by which errors are divided."""
     tolerance: float
-    """Relative error below which the engine counts as exact."""
+    """Relative error below which an error counts as none."""
     measured: tuple[float, ...]
     """Measured value at each step."""
     errors: tuple[float, ...]
@@ -149,7 +149,7 @@ def conform(
         series, lost = _gather(trials, runs, outcomes, sizes)
         verdicts = _judged(series, sizes)
         open_series = [each for each in series if each not in verdicts]
-        verdicts |= attribute(open_series, sizes, given, candidates, runner)
+        verdicts |= Attributor(sizes, given, candidates, runner).attribute(open_series, series)
         total = runner.done
     results = tuple(_result(each, verdicts[each]) for each in series if each in verdicts)
     refusals = tuple(each for each in lost if each.kind == "refused")

@@ -40,7 +40,7 @@ class Series:
 
     @property
     def tolerance(self) -> float:
-        """Relative error below which the engine counts as exact."""
+        """Relative error below which an error counts as none."""
         return self.figures[0].tolerance
 
     @property

@@ -6,30 +6,53 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-VerdictKind = Literal["exact", "falls", "setting", "cannot", "unexplained"]
+VerdictKind = Literal["within", "falls", "setting", "cannot", "unexplained"]
 """Verdict on the errors of one figure of one engine over the steps.
 
-``exact``: within the tolerance at every step. ``falls``: falls with the step. ``setting``: stays, and falls
-or vanishes when a setting of the engine is changed. ``cannot``: the engine lacks a coefficient on which the
+``within``: within the tolerance at every step. ``falls``: falls with the step. ``setting``: stays, and is
+removed or falls when a setting of the engine is changed. ``cannot``: the engine lacks a coefficient on which the
 exact value rests. ``unexplained``: none of these.
 """
 
-VERDICTS: tuple[VerdictKind, ...] = ("exact", "falls", "setting", "cannot", "unexplained")
+VERDICTS: tuple[VerdictKind, ...] = ("within", "falls", "setting", "cannot", "unexplained")
+
+
+Outcome = Literal["removed", "falls", "proportion"]
+"""Effect of the last change on the error it is the cause of.
+
+``removed``: within the tolerance at every step. ``falls``: falls with the step. ``proportion``: falls at the
+smallest step from each value of the setting to the next.
+"""
+
+
+@dataclass(frozen=True)
+class Price:
+    """Another figure of the same case, whose error a change at least doubles at the smallest step."""
+
+    trial: str
+    figure: str
+    before: float
+    """Relative error with the setting in use."""
+    after: float
+    """Relative error with the last value tried; infinite where the engine then has no result."""
 
 
 @dataclass(frozen=True)
 class Attribution:
-    """A setting, or several changed together, whose change removes an error: proved by running again."""
+    """A setting, or several changed together, that are the cause of an error: proved by running again."""
 
     values: Mapping[str, tuple[Any, ...]]
     """Values by the name of the setting: the one in use, then those that were tried, in order."""
     reason: str
     """Part that the setting plays in the engine."""
     errors: tuple[tuple[float, ...], ...]
-    """Relative errors for each of the values in turn: at every step, or at the smallest step alone where the
-    error falls with the setting."""
+    """Relative errors at every step, for each of the values in turn."""
+    outcome: Outcome
     order: float | None
-    """Order at which the error falls with the setting; None where the last change removes it."""
+    """Order at which the error then falls with the step, under ``falls``, or with the setting, under
+    ``proportion``."""
+    price: tuple[Price, ...] = ()
+    """Errors of other figures of the case that the last change makes worse."""
 
     @property
     def before(self) -> float:

@@ -48,7 +48,7 @@ def test_exact_mechanics_is_exact() -> None:
     found = conformance(["slope"])
     assert found.engines == ("exact",)
     assert found.steps == STEPS
-    assert {result.verdict.kind for result in found.results} == {"exact"}
+    assert {result.verdict.kind for result in found.results} == {"within"}
     assert found.runs == 6
     assert found.unexplained == ()
 
@@ -74,7 +74,7 @@ def test_an_error_without_a_cause_is_unexplained() -> None:
     assert figure(found, "distance").verdict.kind == "unexplained"
     assert found.unexplained == (figure(found, "distance"),)
     # The speed at the end does not depend on friction.
-    assert figure(found, "speed").verdict.kind == "exact"
+    assert figure(found, "speed").verdict.kind == "within"
 
 
 def test_an_error_that_a_change_reduces_and_does_not_remove_is_unexplained() -> None:
@@ -140,7 +140,7 @@ def test_errors_that_fall_have_their_order() -> None:
         assert verdict.kind == "falls"
         assert verdict.order == pytest.approx(order)
     assert figure(found, "constant").verdict.kind == "unexplained"
-    assert found.counts() == {"exact": 0, "falls": 2, "setting": 0, "cannot": 0, "unexplained": 1}
+    assert found.counts() == {"within": 0, "falls": 2, "setting": 0, "cannot": 0, "unexplained": 1}
 
 
 class Fatal(Euler):

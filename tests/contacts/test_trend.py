@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -32,13 +33,21 @@ def test_errors_that_rise_somewhere_stay(errors: list[float]) -> None:
 
 @given(st.lists(st.floats(0.0, TOLERANCE), min_size=1, max_size=3))
 def test_errors_within_the_tolerance_are_none_whatever_their_order(errors: list[float]) -> None:
-    assert judge(STEPS[: len(errors)], errors, TOLERANCE).kind == "exact"
+    assert judge(STEPS[: len(errors)], errors, TOLERANCE).kind == "within"
 
 
 def test_noise_below_the_tolerance_hides_no_order() -> None:
     trend = judge((8e-3, *STEPS), [4e-3, 1e-3, 2e-7, 9e-7], TOLERANCE)
     assert trend.kind == "falls"
+    # The errors below the tolerance count as the tolerance in the slope of all.
+    sizes, logs = np.log((8e-3, *STEPS)), np.log([4e-3, 1e-3, TOLERANCE, TOLERANCE])
+    assert trend.order == pytest.approx(np.polyfit(sizes, logs, 1)[0])
     assert judge(STEPS, [1e-7, 1e-2, 1e-7], TOLERANCE).kind == "stays"
+
+
+def test_a_fall_to_the_tolerance_is_a_fall_whatever_its_order() -> None:
+    assert judge(STEPS, [4e-6, 1.1e-6, 0.0], TOLERANCE).kind == "falls"
+    assert judge(STEPS, [4e-6, 0.9e-6, 1.1e-6], TOLERANCE).kind == "stays"
 
 
 def test_an_error_that_stops_falling_stays() -> None:

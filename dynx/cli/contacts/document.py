@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Literal, TypedDict
 
-from dynx.contacts import Attribution, Case, Conformance, FigureResult, NoResult, VerdictKind
+from dynx.contacts import Attribution, Case, Conformance, FigureResult, NoResult, Outcome, VerdictKind
 
 SCHEMA: Literal["dynx.contacts/1"] = "dynx.contacts/1"
 
@@ -23,18 +23,30 @@ class EngineEntry(TypedDict):
     verdicts: dict[VerdictKind, int]
 
 
+class PriceEntry(TypedDict):
+    """Another figure of the case, whose error at the smallest step a change at least doubles."""
+
+    trial: str
+    figure: str
+    before: float
+    after: float
+
+
 class AttributionEntry(TypedDict):
-    """Settings whose change removes an error, proved by running again.
+    """Settings whose change removes an error or makes it fall, proved by running again.
 
     `settings` has the values of each setting: the one in use, then those that were tried. `errors` has the
-    errors for each of the values in turn, at every step or at the smallest alone. `order` is the order at
-    which the error falls with the setting; null where the last change removes it.
+    errors at every step for each of the values in turn. `outcome` is removed where the last of them are
+    within the tolerance at every step, falls where they fall with the step, and proportion where the error
+    at the smallest step falls with the setting; `order` is the order at which they fall, null under removed.
     """
 
     settings: dict[str, list[Any]]
     reason: str
     errors: list[list[float]]
+    outcome: Outcome
     order: float | None
+    price: list[PriceEntry]
 
 
 class FigureEntry(TypedDict):
@@ -155,7 +167,12 @@ def _attribution(attribution: Attribution) -> AttributionEntry:
         "settings": {name: [_plain(each) for each in tried] for name, tried in values.items()},
         "reason": attribution.reason,
         "errors": [list(each) for each in attribution.errors],
+        "outcome": attribution.outcome,
         "order": attribution.order,
+        "price": [
+            {"trial": each.trial, "figure": each.figure, "before": each.before, "after": each.after}
+            for each in attribution.price
+        ],
     }
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dynx._version import __version__
 from dynx.cli.contacts import wording
-from dynx.cli.contacts.plots import HEIGHT, WIDTH, all_exact, plots
+from dynx.cli.contacts.plots import HEIGHT, WIDTH, all_within, plots
 from dynx.errors import escaped
 from dynx.files.pages import page_environment, page_text
 
@@ -29,25 +29,26 @@ ENGINE_STYLES = 6
 """Number of colours and markers of engines in the style sheet; more engines repeat them."""
 
 
-class RemovedErrors(NamedTuple):
-    """Errors of figures of one case, the largest before and after the change of a setting."""
+class CausedErrors(NamedTuple):
+    """Errors of figures of one case before and after the change of a setting: the largest at each step."""
 
     case: str
     figures: str
-    before: float
-    after: float
-    order: float | None
-    """Order at which the error of a single figure falls with the setting; None where that removes it."""
+    before: tuple[float, ...]
+    after: tuple[float, ...]
+    outcome: str
+    price: tuple[Entry, ...]
+    """Errors of the case that the change makes worse."""
 
 
 @dataclass(frozen=True)
-class Removal:
-    """A change of an engine's settings, and the errors that it removes, by case."""
+class Cause:
+    """A change of an engine's settings, and the errors that it removes or makes fall, by case."""
 
     engine: str
     change: str
     reason: str
-    errors: tuple[RemovedErrors, ...]
+    errors: tuple[CausedErrors, ...]
 
 
 def contacts_page(report: Entry, *, command: str | None = None) -> str:
@@ -62,14 +63,14 @@ def contacts_page(report: Entry, *, command: str | None = None) -> str:
         cases=cases,
         plots={case["name"]: plots(case, report["steps"], engines) for case in cases},
         counts={verdict: sum(each["verdict"] == verdict for each in figures) for verdict in wording.RANKS},
-        removals=removals(cases),
+        causes=causes(cases),
         pairs=[case for case in cases if case["name"] in wording.PAIR_CASES and case["figures"]],
         command=command,
         footer=_footer(report),
     )
 
 
-def removals(cases: Sequence[Entry]) -> list[Removal]:
+def causes(cases: Sequence[Entry]) -> list[Cause]:
     """Return the changes of settings to which errors are attributed."""
     found: dict[tuple[str, str, str], dict[str, list[Entry]]] = defaultdict(lambda: defaultdict(list))
     for case in cases:
@@ -79,17 +80,42 @@ def removals(cases: Sequence[Entry]) -> list[Removal]:
                 change = wording.change_text(cause["settings"], arrow="\N{RIGHTWARDS ARROW}")
                 found[figure["engine"], change, cause["reason"]][case["name"]].append(figure)
     return [
-        Removal(*key, tuple(_removed(name, figures) for name, figures in by_case.items()))
+        Cause(
+            *key,
+            tuple(each for name, figures in by_case.items() for each in _caused(name, figures)),
+        )
         for key, by_case in sorted(found.items())
     ]
 
 
-def _removed(case: str, figures: Sequence[Entry]) -> RemovedErrors:
-    causes = [each["attribution"] for each in figures]
-    before, after = (max(wording.as_number(each["errors"][k][-1]) for each in causes) for k in (0, -1))
-    if len(figures) > 1:
-        return RemovedErrors(case, f"{len(figures)} figures", before, after, None)
-    return RemovedErrors(case, wording.figure_name(figures[0]), before, after, causes[0]["order"])
+def _caused(case: str, figures: Sequence[Entry]) -> list[CausedErrors]:
+    """Return the errors of figures of a case, those with the same outcome together."""
+    by_outcome: dict[str, list[Entry]] = defaultdict(list)
+    for each in figures:
+        by_outcome[each["attribution"]["outcome"]].append(each)
+    return [_largest(case, found) for found in by_outcome.values()]
+
+
+def _largest(case: str, figures: Sequence[Entry]) -> CausedErrors:
+    found = [each["attribution"] for each in figures]
+    before, after = (
+        tuple(
+            max(map(wording.as_number, errors))
+            for errors in zip(*(each["errors"][k] for each in found), strict=True)
+        )
+        for k in (0, -1)
+    )
+    price = {(one["trial"], one["figure"]): one for each in found for one in each["price"]}
+    if len(figures) == 1:
+        outcome, name = wording.outcome_text(found[0]), wording.figure_name(figures[0])
+    else:
+        name = f"{len(figures)} figures"
+        outcome = {
+            "removed": "removed",
+            "falls": "fall with the step",
+            "proportion": "fall with the setting",
+        }[found[0]["outcome"]]
+    return CausedErrors(case, name, before, after, outcome, tuple(price.values()))
 
 
 def cell_figure(case: Entry, engine: str) -> Entry | None:
@@ -110,10 +136,13 @@ def template_environment() -> Environment:
         wording.coefficient_text,
         wording.last_error,
         wording.quantity_text,
+        wording.headline,
+        wording.price_text,
+        wording.span_text,
         wording.step_text,
         wording.steps_text,
         cell_figure,
-        all_exact,
+        all_within,
     )
     environment.globals.update(
         {each.__name__: each for each in more},

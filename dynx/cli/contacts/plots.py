@@ -64,7 +64,7 @@ class Triangle:
 class Line:
     """Errors of one engine: points in pixels, and the order triangle of a line that falls.
 
-    `changed` has the points with the setting that removes the error.
+    `changed` has the points with the setting that is the cause of the error.
     """
 
     engine: str
@@ -92,18 +92,18 @@ class Plot:
 
 
 def plots(case: Entry, steps: Sequence[float], engines: Sequence[str]) -> list[Plot]:
-    """Return the plots of a case, one for each figure that is not exact in every engine."""
+    """Return the plots of a case, one for each figure that is not within the tolerance in every engine."""
     named = figures_by_name(case).values()
-    return [_plot([*found.values()], steps, engines) for found in named if not _is_exact(found)]
+    return [_plot([*found.values()], steps, engines) for found in named if not _is_within(found)]
 
 
-def all_exact(case: Entry) -> list[str]:
-    """Return the names of the figures that are exact in every engine."""
-    return [name for name, found in figures_by_name(case).items() if _is_exact(found)]
+def all_within(case: Entry) -> list[str]:
+    """Return the names of the figures that are within the tolerance in every engine."""
+    return [name for name, found in figures_by_name(case).items() if _is_within(found)]
 
 
-def _is_exact(figures: Mapping[str, Entry]) -> bool:
-    return all(each["verdict"] == "exact" for each in figures.values())
+def _is_within(figures: Mapping[str, Entry]) -> bool:
+    return all(each["verdict"] == "within" for each in figures.values())
 
 
 def _plot(figures: Sequence[Entry], steps: Sequence[float], engines: Sequence[str]) -> Plot:

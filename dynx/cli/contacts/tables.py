@@ -11,11 +11,10 @@ from rich.text import Text
 
 from dynx.cli.contacts.wording import (
     RANKS,
-    error_text,
     figure_name,
     figures_by_name,
-    last_error,
     step_text,
+    span_text,
     steps_text,
     verdict_text,
     worst_figure,
@@ -25,7 +24,7 @@ from dynx.cli.shell.terminal import counted
 
 Entry = Mapping[str, Any]
 
-STYLES = {"unexplained": "bold red", "setting": "yellow", "cannot": "yellow", "falls": "", "exact": "green"}
+STYLES = {"unexplained": "bold red", "setting": "yellow", "cannot": "yellow", "falls": "", "within": "green"}
 """Style of each verdict."""
 
 MIN_VERDICT_WIDTH = 24
@@ -50,7 +49,10 @@ def show(out: Console, report: Entry, *, every_figure: bool = False) -> None:
         for case in report["cases"]
         if case["figures"] or case["no_results"]
     }
-    layout = _Layout(out, report["steps"], [each for rows in shown.values() for each in rows])
+    ends = " .. ".join(step_text(each) for each in dict.fromkeys((report["steps"][0], report["steps"][-1])))
+    out.print(f"relative errors at {ends}")
+    rows = [each for found in shown.values() for each in found]
+    layout = _Layout(out, report["steps"], rows, tolerances=every_figure)
     for case in report["cases"]:
         if case["name"] not in shown:
             continue
@@ -87,20 +89,25 @@ def _by_name(case: Entry) -> list[Entry]:
 class _Layout:
     """Columns of the lines of figures: engine, errors, name of the figure, verdict."""
 
-    def __init__(self, out: Console, steps: Sequence[float], figures: Sequence[Entry]) -> None:
+    def __init__(
+        self, out: Console, steps: Sequence[float], figures: Sequence[Entry], *, tolerances: bool
+    ) -> None:
+        self._tolerances = tolerances
         self.steps = steps
         self._out = out
         self._engine = max((len(one_line(each["engine"])) for each in figures), default=0)
-        self._error = max((len(error_text(last_error(each))) for each in figures), default=0)
+        self._error = max((len(span_text(each["errors"])) for each in figures), default=0)
         self._name = max((len(one_line(figure_name(each))) for each in figures), default=0)
 
     def show(self, figure: Entry) -> None:
         """Print a figure in one line, or more where the verdict is too long for the terminal."""
         name, engine = one_line(figure_name(figure)), one_line(figure["engine"])
-        error = error_text(last_error(figure))
+        error = span_text(figure["errors"])
         head = f"  {engine:<{self._engine}}  {error:>{self._error}}  {name:<{self._name}}  "
         room = self._out.width - len(head)
         verdict = one_line(verdict_text(figure))
+        if self._tolerances:
+            verdict = f"{verdict} (tolerance {figure['tolerance']:.0e})"
         lines = [verdict]
         if room < len(verdict):
             lines = textwrap.wrap(verdict, max(room, MIN_VERDICT_WIDTH), break_long_words=False)

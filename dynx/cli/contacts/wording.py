@@ -8,13 +8,13 @@ from typing import Any
 
 Entry = Mapping[str, Any]
 
-RANKS = ("exact", "falls", "cannot", "setting", "unexplained")
+RANKS = ("within", "falls", "cannot", "setting", "unexplained")
 """Verdicts in the order in which they deserve a look."""
 
 VERDICT_MEANINGS = {
-    "exact": "the error is within the tolerance at every step",
+    "within": "the error is within the tolerance at every step",
     "falls": "the error falls with the step, at the order given",
-    "setting": "the error stays, and a setting of the engine removes it: shown by running again",
+    "setting": "the error stays, and a setting of the engine removes it or makes it fall: shown by running again",
     "cannot": "the engine lacks a parameter on which the exact value rests",
     "unexplained": "the error stays, and no setting that is known removes it",
 }
@@ -34,6 +34,29 @@ def worst_figure(figures: Sequence[Entry]) -> Entry:
 def last_error(figure: Entry) -> float:
     """Return the error at the smallest step; infinity where it is not finite."""
     return as_number(figure["errors"][-1])
+
+
+def span_text(errors: Sequence[float | None]) -> str:
+    """Write the errors at the largest and at the smallest step."""
+    first, last = error_text(errors[0]), error_text(errors[-1])
+    return f"{first} .. {last}" if len(errors) > 1 else last
+
+
+def headline(counts: Mapping[str, int]) -> str:
+    """Write how many errors are explained, and how."""
+    if counts["unexplained"]:
+        return f"{counts['unexplained']} of {sum(counts.values())} errors are unexplained."
+    causes = [
+        f"{counts[verdict]} {words}"
+        for verdict, words in (
+            ("within", "within the tolerance"),
+            ("falls", "that fall with the step"),
+            ("setting", "with a setting as the cause"),
+            ("cannot", "that the engine cannot avoid, because it lacks a coefficient"),
+        )
+        if counts[verdict]
+    ]
+    return f"No error is unexplained: {', '.join(causes) or 'there are none'}."
 
 
 def figures_by_name(case: Entry) -> dict[str, dict[str, Entry]]:
@@ -118,15 +141,31 @@ def verdict_text(figure: Entry) -> str:
         return setting_text(figure["attribution"])
     if verdict == "cannot":
         return f"cannot: {figure['reason']}"
-    return verdict
+    return "within the tolerance" if verdict == "within" else verdict
 
 
 def setting_text(attribution: Entry) -> str:
-    """Write the change of settings that removes an error, and what is left of it."""
-    left = error_text(attribution["errors"][-1][-1])
-    if attribution["order"] is not None:
-        left = f"falls to {left} ({order_text(attribution['order'])})"
-    return f"{change_text(attribution['settings'])}: {left}"
+    """Write the change of settings that is the cause of an error, what is left of it, and the price."""
+    left = span_text(attribution["errors"][-1])
+    text = f"{change_text(attribution['settings'])}: {outcome_text(attribution)}, {left}"
+    if attribution["price"]:
+        text += f"; at the price of {price_text(attribution['price'])}"
+    return text
+
+
+def outcome_text(attribution: Entry) -> str:
+    """Write what a change of settings does to an error."""
+    if attribution["outcome"] == "removed":
+        return "removed"
+    what = "step" if attribution["outcome"] == "falls" else "setting"
+    return f"falls with the {what} ({order_text(attribution['order'])})"
+
+
+def price_text(price: Sequence[Entry]) -> str:
+    """Write the error that a change makes worse by most, and the number of others."""
+    worst = max(price, key=lambda each: as_number(each["after"]))
+    text = f"{figure_name(worst)}, {error_text(worst['before'])} -> {error_text(worst['after'])}"
+    return f"{text}, and {len(price) - 1} more" if len(price) > 1 else text
 
 
 def _value(value: Any) -> str:

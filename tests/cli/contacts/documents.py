@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from dynx.cli.contacts.document import ContactsDocument, document
-from dynx.contacts import Attribution, Case, Conformance, Figure, FigureResult, NoResult, Verdict
+from dynx.contacts import Attribution, Case, Conformance, Figure, FigureResult, NoResult, Price, Verdict
 from dynx.world import Scene, World
 
 STEPS = (4e-3, 2e-3, 1e-3)
@@ -46,14 +46,17 @@ def softened() -> Verdict:
     """Return a verdict with a setting that is a list, of which one number changes."""
     values = {"impedance": ((0.9, 0.95), (0.99, 0.95)), "impratio": (1.0, 100.0), "substeps": (1, 1)}
     errors = ((3e-2,) * 3, (2e-3, 1e-3, 1e-4))
-    return Verdict("setting", attribution=Attribution(values, "Contacts are soft.", errors, None))
+    return Verdict("setting", attribution=Attribution(values, "Contacts are soft.", errors, "falls", 3.0))
 
 
 def stiffened() -> Verdict:
     """Return a verdict with a setting with which the error falls."""
     errors = ((1e-1,) * 3, (1e-2,) * 3, (1e-3,) * 3)
     values = {"stiffness": (1e6, 1e7, 1e8)}
-    return Verdict("setting", attribution=Attribution(values, "Contacts are springs.", errors, 1.0))
+    price = (Price("fast", "acceleration", 1e-3, 2e-1), Price("fast", "speed", 1e-3, math.inf))
+    return Verdict(
+        "setting", attribution=Attribution(values, "Contacts are springs.", errors, "proportion", 1.0, price)
+    )
 
 
 def conformance(text: str = "word", *, not_done: int = 0) -> Conformance:
@@ -61,13 +64,13 @@ def conformance(text: str = "word", *, not_done: int = 0) -> Conformance:
     case = Sliding()
     case.title, case.law = text, text  # type: ignore[misc]
     results = (
-        result("one", "fast", (1e-5, 1e-5, 0.0), verdict=Verdict("exact")),
+        result("one", "fast", (1e-5, 1e-5, 0.0), verdict=Verdict("within")),
         result("two", "fast"),
         result("three", "fast", (3e-2,) * 3, verdict=softened()),
         result("one", "slow", (1e-1,) * 3, verdict=stiffened()),
         result("two", "slow", (1.0, math.inf, math.nan), verdict=Verdict("unexplained")),
         result("three", "slow", (1.0,) * 3, verdict=Verdict("cannot", reason=text)),
-        *(result(engine, figure=text, errors=(0.0,) * 3, verdict=Verdict("exact")) for engine in ENGINES),
+        *(result(engine, figure=text, errors=(0.0,) * 3, verdict=Verdict("within")) for engine in ENGINES),
     )
     return Conformance(
         STEPS,

@@ -61,7 +61,7 @@ def test_a_case_is_measured_and_written_in_every_format(tmp_path: Path) -> None:
     found: dict[str, Any] = json.loads(document.read_text())
     assert [each["engine"] for each in found["engines"]] == ENGINES[:1]
     assert found["engines"][0]["version"]
-    assert {each["verdict"] for each in found["cases"][0]["figures"]} == {"exact"}
+    assert {each["verdict"] for each in found["cases"][0]["figures"]} == {"within"}
     assert not schema_errors(found)
     assert "resting_force" in Page(page.read_text()).text
 
@@ -86,15 +86,15 @@ def test_ctrl_c_keeps_what_was_measured(monkeypatch: pytest.MonkeyPatch) -> None
 def test_every_verdict_is_explained_on_the_screen() -> None:
     text = printed(200, every_figure=True, not_done=1)
     for words in (
-        "   1.0e-02  acceleration, fast  falls with the step (order 1.0)",
-        "acceleration, fast  impedance 0.9 -> 0.99, impratio 1 -> 100: 1.0e-04",
-        "acceleration, slow  stiffness 1e+06 -> 1e+08: falls to 1.0e-03 (order 1.0)",
+        "4.0e-02 .. 1.0e-02  acceleration, fast  falls with the step (order 1.0) (tolerance 1e-03)",
+        "acceleration, fast  impedance 0.9 -> 0.99, impratio 1 -> 100: falls with the step (order 3.0), 2.0e-03 .. 1.0e-04",
+        "stiffness 1e+06 -> 1e+08: falls with the setting (order 1.0), 1.0e-03 .. 1.0e-03",
         "acceleration, slow  cannot: word",
         "not finite  acceleration, slow  unexplained",
         "one has impratio 20, 15, 10 in effect at these steps",
         "three at 4 ms, upward: refused: word",
         "two at 4 ms, upward: crash: word",
-        "9 figures at 1 ms: 4 exact, 1 falls, 1 cannot, 2 setting, 1 unexplained; 99 runs in 12.5 s",
+        "9 figures at 1 ms: 4 within, 1 falls, 1 cannot, 2 setting, 1 unexplained; 99 runs in 12.5 s",
         "1 run failed",
         "1 trial not done",
     ):
@@ -111,7 +111,7 @@ def test_the_engines_of_a_figure_stand_together() -> None:
 @pytest.mark.parametrize("width", [60, 80, 100])
 def test_lines_fit_the_terminal_where_words_allow(width: int) -> None:
     lines = [line for line in printed(width).splitlines() if line.startswith("  ")]
-    assert max(map(len, lines)) <= max(width, 66)
+    assert max(map(len, lines)) <= max(width, 76)
 
 
 def test_without_cases_each_engine_has_the_figure_that_deserves_a_look() -> None:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from dynx.cli.contacts.page import ENGINE_STYLES, contacts_page
 from dynx.cli.contacts.plots import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, plots
+from dynx.cli.contacts.wording import headline
 from dynx.files.documents import json_text
 from tests.cli.contacts.documents import ENGINES, STEPS, example
 from tests.files.page import Page, contrast
@@ -37,11 +38,16 @@ def test_the_page_is_well_formed_and_needs_nothing_else() -> None:
 def test_the_page_says_everything() -> None:
     words = " ".join(Page(contacts_page(example(not_done=3), command="dynx contacts --jobs 2")).text.split())
     wanted = [
-        *("1 of 9 errors are unexplained, and 1 runs failed", "3 trials of an engine were not done"),
-        *("one ran with impratio=10.0", "sliding, acceleration, slow", "1.0e-01 \u2192 1.0e-03", "order 1.0"),
+        *("1 of 9 errors are unexplained. 1 runs failed.", "3 trials of an engine were not done"),
+        *(
+            "one ran with impratio=10.0",
+            "sliding, acceleration, slow",
+            "1.0e-01 .. 1.0e-01 \u2192 1.0e-03 .. 1.0e-03",
+            "order 1.0",
+        ),
         *("impedance 0.9 \u2192 0.99, impratio 1 \u2192 100", "Contacts are soft.", "Contacts are springs."),
         *("(exact: -2 m/s^2)", "not finite", "crash two at 4 ms, upward: word", "dynx contacts --jobs 2"),
-        *("exact in every engine: word, fast", "one 1.0", "99 runs, 12.5 s", "cannot: word"),
+        *("within the tolerance in every engine: word, fast", "one 1.0", "99 runs, 12.5 s", "cannot: word"),
     ]
     assert [each for each in wanted if each not in words] == []
 
@@ -87,3 +93,10 @@ def test_lines_can_be_seen_on_either_page() -> None:
     assert len(light) == len(dark) == ENGINE_STYLES
     for colours, ground in ((light, "#ffffff"), (dark, "#0f1317")):
         assert all(contrast(colour, ground) >= 3.0 for colour in colours.values())  # WCAG 2.1, graphics
+
+
+def test_the_headline_counts_what_an_engine_cannot_do_apart() -> None:
+    counts = {"within": 2, "falls": 3, "cannot": 4, "setting": 5, "unexplained": 0}
+    text = headline(counts)
+    assert text.startswith("No error is unexplained")
+    assert "4 that the engine cannot avoid" in text

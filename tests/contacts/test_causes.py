@@ -1,0 +1,88 @@
+"""Causes of errors: what acts in a change, what it leaves of the error, and what it costs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, ClassVar
+
+import pytest
+
+from dynx.contacts import Attribution, Candidate, Case, Figure, FigureResult, conform
+from dynx.world import Scene, World, register_world, unregister_world
+from tests.contacts.exact_world import ExactWorld
+
+STEPS = (4e-3, 2e-3, 1e-3)
+REASON = "A factor that this engine has for the tests."
+FRICTION, INERTIA = "friction_factor", "inertia_factor"
+
+
+@pytest.fixture(autouse=True)
+def exact() -> Iterator[None]:
+    register_world("exact", lambda: ExactWorld)
+    yield
+    unregister_world("exact")
+
+
+class Planned(Case):
+    """Two trials, whose figures have errors that follow from the settings alone."""
+
+    name: ClassVar[str] = "planned"
+    title: ClassVar[str] = "Figures with planned errors"
+    law: ClassVar[str] = "0"
+    source: ClassVar[str] = "none"
+    trials: ClassVar[dict[str, Any]] = {"one": 1, "other": 2}
+
+    def scene(self, parameters: int) -> Scene:
+        return Scene("nothing")
+
+    def measure(self, world: World, parameters: int) -> Sequence[Figure]:
+        friction, inertia = (world.settings[name] for name in (FRICTION, INERTIA))
+        step = world.dt / STEPS[0]
+        if parameters == 2:
+            return [Figure("victim", 0.01 if friction == 2.0 else 0.5, 0.0, "", 1.0)]
+        return [
+            Figure("removed", 0.1 if friction == 2.0 else 1e-5, 0.0, "", 1.0),
+            Figure("falls", 0.1 if friction == 2.0 else 0.1 * step, 0.0, "", 1.0),
+            Figure("trades", 0.1 if friction == 2.0 else 0.4 * step**2, 0.0, "", 1.0),
+            Figure("both", 0.1 if friction == 2.0 or inertia == 1.0 else 1e-5, 0.0, "", 1.0),
+        ]
+
+
+def results(*candidates: Candidate) -> dict[str, FigureResult]:
+    """Return the results by figure, of a world with the friction doubled."""
+    given, tried = {"exact": {FRICTION: 2.0}}, {"exact": candidates}
+    found = conform(["exact"], STEPS, [Planned()], settings=given, candidates=tried, jobs=0)
+    return {each.figure: each for each in found.results}
+
+
+def cause(result: FigureResult) -> Attribution:
+    """Return the cause of an error, which has to have one."""
+    assert result.verdict.attribution is not None
+    return result.verdict.attribution
+
+
+def test_only_the_settings_that_act_are_the_cause() -> None:
+    for change in ({FRICTION: (1.0,), INERTIA: (0.5,)}, {INERTIA: (0.5,), FRICTION: (1.0,)}):
+        found = results(Candidate(change, REASON))
+        assert cause(found["removed"]).values == {FRICTION: (2.0, 1.0)}
+        assert cause(found["both"]).values == {FRICTION: (2.0, 1.0), INERTIA: (1.0, 0.5)}
+
+
+def test_a_change_that_is_worse_at_some_step_is_no_cause() -> None:
+    trades = results(Candidate({FRICTION: (1.0,)}, REASON))["trades"]
+    assert trades.errors[0] < 0.4
+    assert trades.verdict.kind == "unexplained"
+
+
+def test_an_error_that_then_falls_is_told_from_one_that_is_removed() -> None:
+    found = results(Candidate({FRICTION: (1.0,)}, REASON))
+    assert (cause(found["removed"]).outcome, cause(found["removed"]).order) == ("removed", None)
+    falls = cause(found["falls"])
+    assert (falls.outcome, falls.order) == ("falls", pytest.approx(1.0))
+    assert falls.errors == (pytest.approx((0.1, 0.1, 0.1)), pytest.approx((0.1, 0.05, 0.025)))
+
+
+def test_other_errors_that_a_change_makes_worse_are_its_price() -> None:
+    found = results(Candidate({FRICTION: (1.0,)}, REASON))
+    (price,) = cause(found["removed"]).price
+    assert (price.trial, price.figure, price.before, price.after) == ("other", "victim", 0.01, 0.5)
