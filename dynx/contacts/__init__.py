@@ -1,9 +1,9 @@
 """Contact conformance: how far each engine is from mechanics where bodies touch.
 
 A `Case` is a scene with a closed form. `conform` runs every case in every engine at several steps and gives
-each measured `Figure` a verdict: it is within the tolerance, its error falls with the step, the error is attributed to a
-setting of the engine (proved by running again with the setting changed), the engine lacks the coefficient,
-or the error is unexplained::
+each measured `Figure` a verdict: it is within the tolerance, its error falls with the step, the error is
+attributed to a setting of the engine (proved by running again with the setting changed), the engine lacks the
+coefficient, or the error is unexplained::
 
     from dynx.contacts import conform
 

@@ -10,8 +10,8 @@ VerdictKind = Literal["within", "falls", "setting", "cannot", "unexplained"]
 """Verdict on the errors of one figure of one engine over the steps.
 
 ``within``: within the tolerance at every step. ``falls``: falls with the step. ``setting``: stays, and is
-removed or falls when a setting of the engine is changed. ``cannot``: the engine lacks a coefficient on which the
-exact value rests. ``unexplained``: none of these.
+removed or falls when a setting of the engine is changed. ``cannot``: the engine lacks a coefficient
+on which the exact value rests. ``unexplained``: none of these.
 """
 
 VERDICTS: tuple[VerdictKind, ...] = ("within", "falls", "setting", "cannot", "unexplained")

@@ -14,7 +14,7 @@ RANKS = ("within", "falls", "cannot", "setting", "unexplained")
 VERDICT_MEANINGS = {
     "within": "the error is within the tolerance at every step",
     "falls": "the error falls with the step, at the order given",
-    "setting": "the error stays, and a setting of the engine removes it or makes it fall: shown by running again",
+    "setting": "the error stays, and a setting of the engine is its cause: shown by running again",
     "cannot": "the engine lacks a parameter on which the exact value rests",
     "unexplained": "the error stays, and no setting that is known removes it",
 }

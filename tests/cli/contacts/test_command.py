@@ -87,7 +87,7 @@ def test_every_verdict_is_explained_on_the_screen() -> None:
     text = printed(200, every_figure=True, not_done=1)
     for words in (
         "4.0e-02 .. 1.0e-02  acceleration, fast  falls with the step (order 1.0) (tolerance 1e-03)",
-        "acceleration, fast  impedance 0.9 -> 0.99, impratio 1 -> 100: falls with the step (order 3.0), 2.0e-03 .. 1.0e-04",
+        "impedance 0.9 -> 0.99, impratio 1 -> 100: falls with the step (order 3.0), 2.0e-03 .. 1.0e-04",
         "stiffness 1e+06 -> 1e+08: falls with the setting (order 1.0), 1.0e-03 .. 1.0e-03",
         "acceleration, slow  cannot: word",
         "not finite  acceleration, slow  unexplained",
