@@ -45,14 +45,17 @@ def test_the_cases_of_contacts_are_listed_and_have_results() -> None:
 def test_tables_of_contacts_have_every_verdict() -> None:
     parts = runpy.run_path(str(DOCS / "write_contacts.py"))["results"](example("a | b"))
     assert (
-        "9 figures of 1 cases (4 exact, 1 falls, 1 cannot, 2 setting, 1 unexplained)" in parts["conditions"]
+        "9 figures of 1 cases (4 within, 1 falls, 1 cannot, 2 setting, 1 unexplained)" in parts["conditions"]
     )
     assert (
-        "| `sliding` | setting, 1.0e-01 | unexplained, not finite | setting, 3.0e-02 |" in parts["verdicts"]
+        "| `sliding` | setting, 1.0e-01 .. 1.0e-01 | unexplained, 1.0e+00 .. not finite "
+        "| setting, 3.0e-02 .. 3.0e-02 |"
+        in parts["verdicts"]
     )
     assert (
-        "| one | `stiffness 1e+06 \u2192 1e+08` | `sliding`: acceleration, slow | 1.0e-01 | 1.0e-03 |"
+        "| one | `stiffness 1e+06 \u2192 1e+08` | `sliding`: acceleration, slow "
+        "| 1.0e-01 .. 1.0e-01 | 1.0e-03 .. 1.0e-03 | falls with the setting (order 1.0) | speed, fast, "
         in parts["settings"]
     )
     assert "| three | `sliding` | a \\| b |" in parts["lacking"]
-    assert "falls (order 1.0), 1.0e-02" in parts["figures"]
+    assert "falls (order 1.0), 4.0e-02 .. 1.0e-02" in parts["figures"]
