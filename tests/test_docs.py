@@ -49,8 +49,7 @@ def test_tables_of_contacts_have_every_verdict() -> None:
     )
     assert (
         "| `sliding` | setting, 1.0e-01 .. 1.0e-01 | unexplained, 1.0e+00 .. not finite "
-        "| setting, 3.0e-02 .. 3.0e-02 |"
-        in parts["verdicts"]
+        "| setting, 3.0e-02 .. 3.0e-02 |" in parts["verdicts"]
     )
     assert (
         "| one | `stiffness 1e+06 \u2192 1e+08` | `sliding`: acceleration, slow "
