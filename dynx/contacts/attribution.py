@@ -19,7 +19,7 @@ from dynx.contacts.reruns import Change, Reruns
 from dynx.contacts.runner import Runner
 from dynx.contacts.series import Series
 from dynx.contacts.trend import judge
-from dynx.contacts.verdict import Attribution, Verdict
+from dynx.contacts.verdict import Attribution, Outcome, Verdict
 from dynx.world.registry import world_class
 
 LEAST_GAIN = 2.0
@@ -103,7 +103,7 @@ class Attributor:
             return None
         used = self._in_use(series, change)
         acting = {name: (used[name], value) for name, value in change.items() if used[name] != value}
-        outcome = "removed" if trend.kind == "within" else "falls"
+        outcome: Outcome = "removed" if trend.kind == "within" else "falls"
         return Attribution(acting, reason, (series.errors, errors), outcome, trend.order)
 
     def _reduced(self, causes: dict[Series, Attribution]) -> dict[Series, Attribution]:
