@@ -192,8 +192,7 @@ class Attributor:
 def _larger(series: Series, errors: Sequence[float]) -> bool:
     """Check whether an error is larger at some step than before, beyond the tolerance."""
     return any(
-        not after <= max(before, series.tolerance)
-        for before, after in zip(series.errors, errors, strict=True)
+        not after <= before + series.tolerance for before, after in zip(series.errors, errors, strict=True)
     )
 
 

@@ -44,6 +44,7 @@ class Planned(Case):
             Figure("removed", 0.1 if friction == 2.0 else 1e-5, 0.0, "", 1.0),
             Figure("falls", 0.1 if friction == 2.0 else 0.1 * step, 0.0, "", 1.0),
             Figure("trades", 0.1 if friction == 2.0 else 0.4 * step**2, 0.0, "", 1.0),
+            Figure("hardly", 0.1 if friction == 2.0 else 0.1005 * step, 0.0, "", 1.0),
             Figure("both", 0.1 if friction == 2.0 or inertia == 1.0 else 1e-5, 0.0, "", 1.0),
         ]
 
@@ -72,6 +73,12 @@ def test_a_change_that_is_worse_at_some_step_is_no_cause() -> None:
     trades = results(Candidate({FRICTION: (1.0,)}, REASON))["trades"]
     assert trades.errors[0] < 0.4
     assert trades.verdict.kind == "unexplained"
+
+
+def test_a_difference_within_the_tolerance_is_not_worse() -> None:
+    hardly = results(Candidate({FRICTION: (1.0,)}, REASON))["hardly"]
+    assert 0.0 < cause(hardly).errors[-1][0] - hardly.errors[0] < hardly.tolerance
+    assert cause(hardly).outcome == "falls"
 
 
 def test_an_error_that_then_falls_is_told_from_one_that_is_removed() -> None:

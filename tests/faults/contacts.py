@@ -40,8 +40,8 @@ CONTACTS_FAULTS = (
     Fault(
         "contacts_causes_that_are_worse_at_some_step",
         "dynx.contacts.attribution",
-        right="        not after <= max(before, series.tolerance)\n",
-        wrong="        after == before == -series.tolerance\n",
+        right="not after <= before + series.tolerance for",
+        wrong="after == before == -series.tolerance for",
         test_file="tests/contacts/test_causes.py",
         test="test_a_change_that_is_worse_at_some_step_is_no_cause",
     ),
