@@ -7,25 +7,43 @@ from __future__ import annotations
 
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import dynx
+from dynx.backends import backend
 from dynx.errors import DynxError
 from dynx.model.library import robots
 from dynx.model.model import Base
+from dynx.spatial.scalar import Floats
 from dynx.world import Scene, SceneRobot, World, ground
+from dynx.world.geometry.boxes import shape_box
 from tests.world.engines import WORLDS
 
 
 def on_the_ground(robot: str, base: Base) -> Scene:
-    """Return a robot on the ground; a floating one falls from 1 m."""
+    """Return a robot above the ground: a floating one falls from 1 m, a fixed one hangs 1 mm above it."""
     model = dynx.load(robot, base=base)
     q = model.clip(model.neutral())
+    floor = ground()
     if base == "floating":
         q[2] = 1.0
-    return Scene("ground", robots=(SceneRobot("robot", model, q=tuple(q)),), bodies=(ground(),))
+    else:
+        floor = replace(floor, pose=dynx.Pose((0.0, 0.0, lowest(model, q) - 1e-3)))
+    return Scene("ground", robots=(SceneRobot("robot", model, q=tuple(q)),), bodies=(floor,))
+
+
+def lowest(model: dynx.Model, q: Floats) -> float:
+    """Return the height [m] of the lowest point of the collision shapes of a fixed robot, or 0."""
+    with backend("reference", model) as engine:
+        boxes = [
+            shape_box(each.shape, engine.forward_kinematics(q, link.name) @ each.origin.matrix)
+            for link in model.links
+            for each in model.geometry.collisions(link.name)
+        ]
+    return float(min((lower[2] for lower, _ in boxes), default=0.0))
 
 
 @pytest.mark.parametrize("engine", WORLDS)
