@@ -86,9 +86,9 @@ def contacts() -> None:
     """Measure how far engines are from mechanics where bodies touch, and why.
 
     Each case is a scene whose motion or force is known in closed form. It is run by every engine at several
-    steps. An error either falls with the step, at the order printed, or is attributed to a setting of the
-    engine: changing it removes the error, which is shown by running again. Errors are relative, and those of
-    the table belong to the smallest step.
+    steps. An error falls with the step, at the order printed; or it is attributed to a setting of the engine,
+    under which it is removed or falls, as running again shows; or the engine lacks the coefficient; or it is
+    unexplained. Errors are relative, those of the table at the largest and the smallest step.
 
     Exit code 0 if every error is explained, 1 if one is not, if an engine failed or if nothing was measured,
     2 for input that cannot be used. Ctrl-C ends the run with the results so far and exit code 130.
