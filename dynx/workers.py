@@ -194,7 +194,7 @@ class _Worker:
 
     @property
     def ended(self) -> bool:
-        """Whether the process has ended or is being ended."""
+        """True if the process has ended or is being ended."""
         return self._expired or self._process.poll() is not None
 
     def compute(self, task: Any, timeout: float | None) -> tuple[Any] | Failure:

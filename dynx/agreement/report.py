@@ -74,7 +74,7 @@ class AgreementReport:
 
     @property
     def agree(self) -> bool:
-        """Whether the robot was compared and everything is within tolerance."""
+        """True if the robot was compared and everything is within tolerance."""
         rows: list[Comparison | IdentityCheck] = [*self.quantities, *self.identities]
         return self.error is None and all(row.agree for row in rows)
 

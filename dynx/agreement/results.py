@@ -27,7 +27,7 @@ class Refusal:
 
     @property
     def singular(self) -> bool:
-        """Whether the mass matrix is singular, so that no unique acceleration exists."""
+        """True if the mass matrix is singular, so that no unique acceleration exists."""
         return isinstance(self.error, SingularMassMatrixError)
 
     def __str__(self) -> str:

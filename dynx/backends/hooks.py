@@ -33,7 +33,7 @@ class EngineHooks(ABC):
     """The calls of an engine, in tree coordinates."""
 
     vectorized: ClassVar[bool] = False
-    """Whether the hooks take leading batch axes."""
+    """True if the hooks take leading batch axes."""
 
     model: Model
     _mechanism: Mechanism

@@ -73,14 +73,14 @@ class Quantity:
     """Keyword options of the method."""
 
     of_frame: bool = False
-    """Whether the quantity belongs to a frame. The details are then the number of the frame and, if the
+    """True if the quantity belongs to a frame. The details are then the number of the frame and, if the
     method has that option, the reference."""
 
     takes_poses: bool = True
-    """Whether the algorithm takes the poses of the bodies (`dynx.rbd.kinematics.Poses`) in place of q."""
+    """True if the algorithm takes the poses of the bodies (`dynx.rbd.kinematics.Poses`) in place of q."""
 
     solves: bool = False
-    """Whether the result is the solution of an equation with the mass matrix. Where the mass matrix is
+    """True if the result is the solution of an equation with the mass matrix. Where the mass matrix is
     singular there is no result; errors are backward errors; and mimic joints reduce the equation instead of
     the result."""
 
@@ -88,7 +88,7 @@ class Quantity:
     """Growth of the number of operations with the size of the robot."""
 
     refereed: bool = True
-    """Whether `dynx agree` compares it with 50 digits."""
+    """True if `dynx agree` compares it with 50 digits."""
 
     implied_details: Callable[[Model], tuple[Any, ...]] = no_details
     """Function that returns the details that follow from the model."""
@@ -100,12 +100,12 @@ class Quantity:
 
     @property
     def reduces_columns(self) -> bool:
-        """Whether mimic joints multiply a result by S from the right."""
+        """True if mimic joints multiply a result by S from the right."""
         return self.shape[-1:] == ("nv",) and not self.solves
 
     @property
     def reduces_rows(self) -> bool:
-        """Whether mimic joints multiply a result by S' from the left."""
+        """True if mimic joints multiply a result by S' from the left."""
         return len(self.shape) > 1 and self.shape[-2] == "nv"
 
     def shape_of(self, model: Model, nv: int | None = None) -> tuple[int, ...]:

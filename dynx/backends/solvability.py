@@ -44,7 +44,7 @@ def singular_coordinates(model: Model, joint_dynamics: bool = False) -> tuple[st
     """
     q = model.random(np.random.default_rng(0), 3)
     coupling = model.mechanism.coupling
-    M = np.asarray(mass_matrix(model.mechanism, q if coupling is None else coupling.expand_q(q)))
+    M = np.asarray(mass_matrix(model.mechanism, model.mechanism.tree_q(q)))
     if coupling is not None:
         S = coupling.matrix()
         M = S.T @ M @ S

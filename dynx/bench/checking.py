@@ -35,7 +35,7 @@ class Check:
 
     @property
     def right(self) -> bool:
-        """Whether the error is within the tolerance."""
+        """True if the error is within the tolerance."""
         return self.error <= self.tolerance
 
 

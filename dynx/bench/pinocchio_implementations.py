@@ -118,7 +118,7 @@ class PinocchioInside(PinocchioLoop):
     name = INSIDE
 
     def supports(self, case: BenchmarkCase) -> bool:
-        """Whether the batch has enough calls for a difference above the noise."""
+        """True if the batch has enough calls for a difference above the noise."""
         return case.batch >= MIN_CALLS and super().supports(case)
 
     def prepare(self, case: BenchmarkCase, batch: Batch, out: Floats) -> PreparedCall:

@@ -104,7 +104,7 @@ class ParametricDynamics:
 
     @property
     def has_joint_dynamics(self) -> bool:
-        """Whether damping, dry friction and armature of the joints are parameters."""
+        """True if damping, dry friction and armature of the joints are parameters."""
         return self._selection.joint_dynamics
 
     def dry_friction(self, parameters: Floats) -> Floats:

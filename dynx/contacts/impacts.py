@@ -44,7 +44,7 @@ class Throw(NamedTuple):
 
     @property
     def slips(self) -> bool:
-        """Whether the ball still slips when it leaves the ground."""
+        """True if the ball still slips when it leaves the ground."""
         return self.friction * (1.0 + self.restitution) * self.fall < self.grip
 
     @property

@@ -26,7 +26,7 @@ class Runner:
         self._progress = progress
         self._interruptible = interruptible
         self.interrupted = False
-        """Whether KeyboardInterrupt has ended the runs."""
+        """True once KeyboardInterrupt has ended the runs."""
         self.done = 0
         """Number of runs that have been carried out."""
 

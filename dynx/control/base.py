@@ -80,7 +80,7 @@ class Controller(ABC, Generic[ControllerState]):
     """Number of control steps by which the setpoint is ahead of the measurement."""
 
     needs_setpoint: bool = True
-    """Whether the controller uses its setpoint; one that does not runs without a reference."""
+    """True if the controller uses its setpoint; one that does not runs without a reference."""
 
     control_dt: float | None = None
     """The control step that the controller was made for [s], where it matters."""
@@ -93,7 +93,7 @@ class Controller(ABC, Generic[ControllerState]):
     """The robot as the controller knows it; the model of the plant may differ."""
 
     is_pure: bool = False
-    """Whether `torque` and `initial_state` are array code that depends on fields and arguments alone."""
+    """True if `torque` and `initial_state` are array code that depends on fields and arguments alone."""
 
     def __init_subclass__(cls, *, pure: bool = False, **options: Any) -> None:
         """Set `is_pure` for this class to `pure`. Subclasses do not inherit it: they may do anything."""

@@ -66,7 +66,7 @@ class JointFriction:
 
     @cached_property
     def present(self) -> bool:
-        """Whether any coefficient is not zero."""
+        """True if any coefficient is not zero."""
         return bool(self.damping.any()) or self._dry
 
     @cached_property

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynx.distance.vectors import Vector3
 from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.model.configuration import MAX_MAGNITUDE, checked_array
 from dynx.model.geometry import Box, Capsule, Cylinder, Mesh, Sphere
+from dynx.spatial.plain import Vector3
 from dynx.spatial.scalar import Floats
 
 

@@ -12,12 +12,12 @@ from dynx.distance.cores import ConvexShape, Core, core_of
 from dynx.distance.gjk import CorePair
 from dynx.distance.parallel_axes import penetration_of_parallel
 from dynx.distance.penetration import Penetration, penetration
-from dynx.distance.vectors import Vector3
 from dynx.errors import ArgumentError, NotFiniteError, ShapeError, shown
 from dynx.model import Pose
 from dynx.model.configuration import MAX_MAGNITUDE, checked_pose, checked_vector
 from dynx.model.elements import RIGIDITY_TOLERANCE
 from dynx.model.geometry import Plane
+from dynx.spatial.plain import Vector3
 from dynx.spatial.scalar import Floats
 
 

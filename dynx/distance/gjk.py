@@ -14,8 +14,9 @@ import math
 from dataclasses import dataclass
 
 from dynx.distance.cores import Core
-from dynx.distance.simplices import Nearest, nearest_to_origin
-from dynx.distance.vectors import Vector3, combination, dot, minus, norm
+from dynx.distance.simplices import nearest_to_origin
+from dynx.distance.vectors import combination, dot, minus, norm
+from dynx.spatial.plain import Vector3
 
 MAX_ITERATIONS = 200
 
@@ -46,7 +47,7 @@ class CorePair:
 
     @property
     def separated(self) -> bool:
-        """Whether a plane between the cores was found; otherwise they touch or overlap, and the upper bound
+        """True if a plane between the cores was found; otherwise they touch or overlap, and the upper bound
         and the points mean nothing."""
         return self.lower > 0.0
 
@@ -79,7 +80,7 @@ class CorePair:
             nearest = nearest_to_origin(simplex, outside=self.lower > 0.0)
             if nearest is None:
                 break
-            on_a, on_b, simplex = _kept(nearest, on_a), _kept(nearest, on_b), _kept(nearest, simplex)
+            on_a, on_b, simplex = ([points[k] for k in nearest.vertices] for points in (on_a, on_b, simplex))
             distance = norm(nearest.point)
             closer = distance < self.upper
             if closer:
@@ -93,7 +94,3 @@ class CorePair:
                 break
             direction = nearest.point
         return self
-
-
-def _kept(nearest: Nearest, points: list[Vector3]) -> list[Vector3]:
-    return [points[k] for k in nearest.vertices]

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from dynx.distance.vectors import Vector3, cross, dot, minus
+from dynx.distance.vectors import cross, dot, minus
+from dynx.spatial.plain import Vector3
 
 
 class Nearest(NamedTuple):

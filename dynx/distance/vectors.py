@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-Vector3 = tuple[float, float, float]
+from dynx.spatial.plain import Vector3
 
 
 def dot(a: Vector3, b: Vector3) -> float:
@@ -22,20 +22,9 @@ def minus(a: Vector3, b: Vector3) -> Vector3:
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-def plus(a: Vector3, scale: float, b: Vector3) -> Vector3:
-    """Return a + scale b."""
-    return a[0] + scale * b[0], a[1] + scale * b[1], a[2] + scale * b[2]
-
-
 def norm(a: Vector3) -> float:
     """Return the Euclidean length, also of vectors whose squares would overflow or vanish."""
     return math.hypot(*a)
-
-
-def unit(a: Vector3) -> Vector3 | None:
-    """Return the vector scaled to length 1; None for zero."""
-    length = math.hypot(*a)
-    return (a[0] / length, a[1] / length, a[2] / length) if length > 0.0 else None
 
 
 def combination(weights: tuple[float, ...], points: list[Vector3]) -> Vector3:

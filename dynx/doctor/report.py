@@ -207,7 +207,7 @@ class DoctorReport:
     total_mass: float | None = None
     """Sum of the masses of all links [kg], as the file states them; None where it was not examined."""
     kinematics_only: bool = False
-    """Whether the file has no inertial data (DX118), so that only the kinematics is compared."""
+    """True if the file has no inertial data (DX118), so that only the kinematics is compared."""
     engines: tuple[EngineResult, ...] = ()
     findings: tuple[Finding, ...] = ()
     unexplained: tuple[Unexplained, ...] = ()
@@ -245,7 +245,7 @@ class DoctorReport:
 
     @property
     def alike(self) -> bool:
-        """Whether every engine loads the file, with no error above the tolerance, in dynamics too.
+        """True if every engine loads the file, with no error above the tolerance, in dynamics too.
 
         `variants` do not count.
         """
@@ -268,7 +268,7 @@ class DoctorReport:
 
     @property
     def explained(self) -> bool:
-        """Whether no difference above `tolerance` remains, in what is compared, after the causes were
+        """True if no difference above `tolerance` remains, in what is compared, after the causes were
         removed."""
         return self.error is None and not self.unexplained and self.residual <= self.tolerance
 

@@ -22,7 +22,7 @@ class IKResult:
     q: Floats
     """Configurations (..., nq), within the position limits."""
     success: NDArray[np.bool_]
-    """Whether both errors are within the tolerances (...,)."""
+    """True where both errors are within the tolerances (...,)."""
     position_error: Floats
     """Distance from the target (...,) [m]; 0 if the position is free."""
     rotation_error: Floats

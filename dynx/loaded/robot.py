@@ -44,7 +44,7 @@ class LoadedRobot(ABC):
     whole description."""
 
     loads_meshes: ClassVar[bool] = False
-    """Whether mesh collision shapes change the dynamics of a link that states its inertia."""
+    """True if mesh collision shapes change the dynamics of a link that states its inertia."""
 
     @abstractmethod
     def __init__(self, path: Path, model: Model, calls: Collection[str] = ()) -> None:

@@ -154,7 +154,7 @@ class Joint:
 
     @property
     def moves(self) -> bool:
-        """Whether the joint can move, independently or by following another."""
+        """True if the joint can move, independently or by following another."""
         return self.type != "fixed"
 
     @property

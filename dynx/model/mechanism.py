@@ -54,7 +54,7 @@ class Body:
 
     @property
     def about_z(self) -> bool:
-        """Whether the body rotates about the z axis of its joint frame."""
+        """True if the body rotates about the z axis of its joint frame."""
         return self.revolute and all(self.axis == (0, 0, 1))
 
 
@@ -134,7 +134,7 @@ class Mechanism:
 
     @cached_property
     def has_mass(self) -> bool:
-        """Whether any body has mass."""
+        """True if any body has mass."""
         return any(inertia.mass != 0 for inertia in (self.root, *(b.inertia for b in self.bodies)))
 
     @property
@@ -146,6 +146,10 @@ class Mechanism:
     def nq(self) -> int:
         """Number of tree positions."""
         return len(self.bodies) + (7 if self.floating else 0)
+
+    def tree_q(self, q: Floats) -> Floats:
+        """Convert a model configuration (..., nq) to a tree configuration: with the mimic joints."""
+        return q if self.coupling is None else self.coupling.expand_q(q)
 
 
 def pose_arrays(pose: Pose, convert: ScalarConverter) -> tuple[Array, Array]:

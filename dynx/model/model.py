@@ -126,7 +126,7 @@ class Model:
 
     @cached_property
     def floating(self) -> bool:
-        """Whether the base moves freely."""
+        """True if the base moves freely."""
         return self.base == "floating"
 
     @cached_property

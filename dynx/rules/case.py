@@ -46,7 +46,7 @@ class Case:
 
     @property
     def readable(self) -> bool:
-        """Whether dynx can read the document."""
+        """True if dynx can read the document."""
         return isinstance(self.reading, Model)
 
     @cached_property

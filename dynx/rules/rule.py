@@ -120,7 +120,7 @@ class Rule(ABC):
     imperative."""
 
     unambiguous: ClassVar[bool] = False
-    """Whether text that dynx refuses for this cause can be read in one way only: then the remedy is safe."""
+    """True if text that dynx refuses for this cause can be read in one way only: then the remedy is safe."""
 
     trap_base: ClassVar[Base] = "fixed"
     """The base on which the trap shows the difference."""
@@ -130,7 +130,7 @@ class Rule(ABC):
     between shapes that overlap; empty for a rule whose effects have a size."""
 
     depends_on_state: ClassVar[bool] = False
-    """Whether the difference shows at some states only, so that its absence at others proves nothing."""
+    """True if the difference shows at some states only, so that its absence at others proves nothing."""
 
     def __init_subclass__(cls) -> None:
         """Take `id`, `name` and `title` from the heading of the page, where the module has one."""
@@ -203,7 +203,7 @@ class CallingRule(Rule):
     """The change, as in `Remedy.changed`."""
 
     per_joint: ClassVar[bool] = True
-    """Whether each call can also be made on single joints (`dynx.loaded.calls`), those of the detections."""
+    """True if each call can also be made on single joints (`dynx.loaded.calls`), those of the detections."""
 
     def detect(self, case: Case) -> Sequence[Detection]:
         """Return the occurrences in which the calls are not yet made."""

@@ -109,7 +109,7 @@ class NamedController:
     """Names of the fields of `Gains` that it takes."""
     make: Callable[[ControllerRequest], Controller[Any]]
     controls: Literal["joints", "frame"] = "joints"
-    """Whether it acts on the joints or on a frame."""
+    """Object of the control law: all joints, or one frame."""
 
 
 def joint_inertia(model: Model, q: Floats) -> Floats:

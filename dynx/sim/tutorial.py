@@ -51,7 +51,7 @@ class Outcome:
 
     @property
     def failed(self) -> bool:
-        """Whether a simulation ended early."""
+        """True if a simulation ended early."""
         return self.rollout is not None and self.problem is not None
 
     @property

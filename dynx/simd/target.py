@@ -19,7 +19,7 @@ class Target:
 
     @property
     def fma(self) -> bool:
-        """Whether the processor has fused multiply-add."""
+        """True if the processor has fused multiply-add."""
         return "+fma" in self.features.split(",") or self.triple.startswith(("aarch64", "arm64"))
 
     @property
@@ -32,7 +32,7 @@ class Target:
 
     @property
     def short_addresses(self) -> bool:
-        """Whether code may address its constants by 32-bit offsets, which makes it a tenth smaller.
+        """True if code may address its constants by 32-bit offsets, which makes it a tenth smaller.
 
         That needs LLVM's JITLink, which allocates an object in one block of memory. The older linker, which
         may place constants gigabytes away, is used where JITLink is not known to work.

@@ -49,9 +49,8 @@ ANGLES_PER_BATCH = 6
 ROUNDING_SHIFT = 6755399441055744.0
 """1.5 * 2^52: adding it to a double rounds that to an integer, which the last bits then hold."""
 
-
-_BEYOND = "beyond_limit_"
-"""Start of the names of the functions for lanes beyond the limit."""
+REPLACEMENTS = {"sin": "beyond_limit_sin", "cos": "beyond_limit_cos"}
+"""Names of the functions that replace lanes beyond `LIMIT`."""
 
 
 class SineCosine(NamedTuple):
@@ -176,8 +175,8 @@ def _reduce_without_fma(write: Writer, x: str, k: str) -> str:
 def _corrected(write: Writer, x: str, near: SineCosine) -> SineCosine:
     """Call the functions that replace lanes beyond the limit."""
     found = (
-        write.let(f"call {write.vector} @{_BEYOND}{function}({write.vector} {x}, {write.vector} {vector})")
-        for function, vector in zip(("sin", "cos"), near, strict=True)
+        write.let(f"call {write.vector} @{name}({write.vector} {x}, {write.vector} {vector})")
+        for name, vector in zip(REPLACEMENTS.values(), near, strict=True)
     )
     return SineCosine(*found)
 
@@ -199,16 +198,16 @@ def _replacement(function: str, lanes: int) -> str:
         chosen = write.let(f"select i1 {beyond}, double {exact}, double {kept}")
         found = write.let(f"insertelement {write.vector} {found}, double {chosen}, i32 {lane}")
     vector = write.vector
-    head = f"define internal {vector} @{_BEYOND}{function}({vector} %x, {vector} %near) cold noinline {{"
+    head = f"define internal {vector} @{REPLACEMENTS[function]}({vector} %x, {vector} %near) cold noinline {{"
     return "\n".join([head, *write.lines, f"  ret {vector} {found}", "}"])
 
 
 def replacements(functions: Sequence[str], lanes: int) -> list[str]:
     """Return the texts of the functions that sines and cosines in the texts `functions` call, if there are
     any."""
-    if not any(f"@{_BEYOND}" in text for text in functions):
+    if not any(f"@{name}(" in text for name in REPLACEMENTS.values() for text in functions):
         return []
-    return [_replacement(function, lanes) for function in ("sin", "cos")]
+    return [_replacement(function, lanes) for function in REPLACEMENTS]
 
 
 def declarations(lanes: int) -> list[str]:

@@ -1,4 +1,4 @@
-"""Rotations of single vectors in plain numbers.
+"""Single vectors and rotation matrices as tuples of floats.
 
 For one vector of three, NumPy's functions take ten times as long; steps of worlds are made of such vectors.
 """

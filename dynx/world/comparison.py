@@ -158,7 +158,7 @@ def _positions(scene: Scene, states: Sequence[WorldState]) -> tuple[list[str], F
     for robot in scene.robots:
         mechanism = robot.model.mechanism
         q = np.array([state.robots[robot.name].q for state in states])
-        poses = body_poses(mechanism, q if mechanism.coupling is None else mechanism.coupling.expand_q(q))
+        poses = body_poses(mechanism, mechanism.tree_q(q))
         if robot.model.floating:
             paths[f"{robot.name}/{robot.model.root}"] = poses[ROOT][1]
         moving = (joint.child for joint in robot.model.joints if joint.moves)

@@ -157,8 +157,7 @@ def _singular_robots(layout: Layout, state: WorldState) -> Iterator[str]:
         if not mechanism.bodies:
             continue
         moving = [joint.name for joint in robot.model.joints if joint.moves]
-        tree_q = q if mechanism.coupling is None else mechanism.coupling.expand_q(q)
-        M = np.asarray(mass_matrix(mechanism, tree_q), dtype=float)
+        M = np.asarray(mass_matrix(mechanism, mechanism.tree_q(q)), dtype=float)
         d = 1.0 / np.sqrt(np.maximum(M.diagonal(), np.finfo(float).tiny))
         sizes, directions = np.linalg.eigh(d[:, None] * M * d)
         base = len(M) - len(moving)

@@ -88,7 +88,7 @@ class BodyLayout:
 
     @property
     def fixed(self) -> bool:
-        """Whether the body is fixed in the world."""
+        """True if the body is fixed in the world."""
         return self.mass == 0.0
 
 
@@ -121,8 +121,8 @@ class Layout:
     colliders: tuple[Collider, ...]
     """Links and bodies that have shapes; empty if the world has no collisions."""
     collides: NDArray[np.bool_]
-    """Whether the colliders of each pair (n, n) may touch: symmetric, False on the diagonal, between
-    colliders of one owner, between fixed ones, and where the scene ignores the pair."""
+    """Matrix (n, n), True for colliders that may touch: symmetric, False on the diagonal, between colliders
+    of one owner, between fixed ones, and where the scene ignores the pair."""
     constraints: tuple[ConstraintLayout, ...]
 
     def is_fixed(self, owner: Owner) -> bool:

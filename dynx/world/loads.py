@@ -90,7 +90,7 @@ class RobotLoads:
 
     @property
     def has_motors(self) -> bool:
-        """Whether the robot has a motor in this call."""
+        """True if the robot has a motor in this call."""
         return bool(self._motors)
 
     @property

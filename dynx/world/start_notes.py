@@ -10,7 +10,7 @@ import numpy as np
 from dynx.errors import shown
 from dynx.spatial.so3 import quat_from_rotation, quat_log
 from dynx.world.engine import WorldEngine
-from dynx.world.geometry.boxes import owner_pose
+from dynx.world.geometry.owner_poses import owner_pose
 from dynx.world.layout import ConstraintLayout, Layout
 from dynx.world.materials import inexact_materials
 from dynx.world.overlaps import overlaps_of
@@ -19,12 +19,11 @@ from dynx.world.state import WorldState
 MAX_OVERLAPS = 5
 """Largest number of overlaps that are noted one by one."""
 
-BEYOND = 1e-3
+LIMIT_EXCESS = 1e-3
 """Distance [rad or m] beyond a limit from which a joint is noted."""
 
-GAP, ANGLE = 1e-4, 1e-3
+CONSTRAINT_GAP, CONSTRAINT_ANGLE = 1e-4, 1e-3
 """Distance [m] and angle [rad] between the ends of a constraint from which it counts as violated."""
-
 
 LONG_STEP = 0.1
 """Step of an engine [s] above which contacts are hardly noticed."""
@@ -64,8 +63,8 @@ def violations(layout: Layout, state: WorldState) -> Iterator[str]:
     """Yield each constraint whose ends are apart, and by how much."""
     for constraint in layout.constraints:
         gap, angle = _deviation(layout, constraint, state)
-        turned = constraint.kind == "weld" and angle > ANGLE
-        if gap > GAP or turned:
+        turned = constraint.kind == "weld" and angle > CONSTRAINT_ANGLE
+        if gap > CONSTRAINT_GAP or turned:
             kind = "weld" if constraint.kind == "weld" else "point-to-point constraint"
             ends = " and ".join(map(shown, constraint.names))
             more = f" and turned by {angle:.3g} rad" if turned else ""
@@ -76,12 +75,10 @@ def joints_beyond_limits(layout: Layout, state: WorldState) -> Iterator[str]:
     """Yield each joint that is beyond a limit, with both."""
     for robot in layout.robots:
         model, q = robot.model, state.robots[robot.name].q
-        coupling = model.mechanism.coupling
-        tree_q = q if coupling is None else coupling.expand_q(q)
-        positions = tree_q[7 if model.floating else 0 :]
+        positions = model.mechanism.tree_q(q)[7 if model.floating else 0 :]
         names = (joint.name for joint in model.joints if joint.moves)
         for name, x, lower, upper in zip(names, positions, robot.lower, robot.upper, strict=True):
-            if not lower - BEYOND <= x <= upper + BEYOND:
+            if not lower - LIMIT_EXCESS <= x <= upper + LIMIT_EXCESS:
                 joint = shown(f"{robot.name}/{name}")
                 yield f"{joint} is at {x:.4g}, beyond its limits {lower:.4g} to {upper:.4g},"
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from textwrap import dedent
@@ -12,6 +11,7 @@ import pytest
 from dynx.agreement import agree
 from dynx.backends import backend_class, backend_names, installed_backends, native_quantities, register
 from dynx.backends.registry import unregister
+from tests.architecture.packages import installed_package
 from tests.backends.robots import mixed_robot
 
 MODULE = '''
@@ -46,16 +46,10 @@ defective = third_party_engine:DefectiveBackend
 
 
 @pytest.fixture
-def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """Yield a folder on the path with the module and what an installer writes beside it."""
-    info = tmp_path / "third_party_engine-1.0.dist-info"
-    info.mkdir()
-    (tmp_path / "third_party_engine.py").write_text(dedent(MODULE), encoding="utf-8")
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: third-party-engine\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(ENTRY_POINTS, encoding="utf-8")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    yield tmp_path
-    sys.modules.pop("third_party_engine", None)
+def installed(tmp_path: Path) -> Iterator[Path]:
+    """Yield the folder of the package, which is on the import path."""
+    with installed_package(tmp_path, "third_party_engine", dedent(MODULE), ENTRY_POINTS) as folder:
+        yield folder
 
 
 @pytest.mark.usefixtures("installed")

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from dynx.cli.shell.main import COMMANDS
+from tests.architecture.packages import write_package
 
 MODULE = '''"""Mass of a robot."""
 
@@ -30,12 +31,8 @@ def weigh(robot, **options):
 
 @pytest.fixture
 def package(tmp_path: Path) -> Path:
-    """Return the folder in which the package is installed: a module, and metadata with the entry point."""
-    (tmp_path / "acme_weigh.py").write_text(MODULE)
-    metadata = tmp_path / "acme_weigh-1.0.dist-info"
-    metadata.mkdir()
-    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: acme-weigh\nVersion: 1.0\n")
-    (metadata / "entry_points.txt").write_text("[dynx.commands]\nweigh = acme_weigh:weigh\n")
+    """Return the folder of the package, for the import path of a process."""
+    write_package(tmp_path, "acme_weigh", MODULE, "[dynx.commands]\nweigh = acme_weigh:weigh\n")
     return tmp_path
 
 

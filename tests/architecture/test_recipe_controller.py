@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,6 +12,7 @@ import pytest
 import dynx
 from dynx import control
 from dynx.control.registry import controller_class
+from tests.architecture.packages import installed_package
 from tests.cli.sim.command import sim
 
 MODULE = '''
@@ -44,16 +44,10 @@ damper = third_party_controller:Damper
 
 
 @pytest.fixture(autouse=True)
-def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """Yield a folder on the path with the module and the metadata that an installer writes."""
-    info = tmp_path / "third_party_controller-1.0.dist-info"
-    info.mkdir()
-    (tmp_path / "third_party_controller.py").write_text(MODULE, encoding="utf-8")
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: third-party-controller\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(ENTRY_POINTS, encoding="utf-8")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    yield tmp_path
-    sys.modules.pop("third_party_controller", None)
+def installed(tmp_path: Path) -> Iterator[Path]:
+    """Yield the folder of the package, which is on the import path."""
+    with installed_package(tmp_path, "third_party_controller", MODULE, ENTRY_POINTS) as folder:
+        yield folder
 
 
 def test_it_simulates_alone_and_in_a_batch() -> None:

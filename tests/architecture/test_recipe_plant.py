@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,6 +11,7 @@ import pytest
 import dynx
 from dynx.errors import ArgumentError, UnsupportedFeatureError
 from dynx.sim.plants.registry import plant_names
+from tests.architecture.packages import installed_package
 
 MODULE = '''"""Explicit Euler: q' = q (+) h v, v' = v + h a(q, v)."""
 
@@ -40,19 +40,14 @@ class ExplicitEuler(Plant):
         self._engine.close()
 '''
 NAME = "explicit_euler"
+ENTRY_POINTS = f"[dynx.plants]\n{NAME} = acme_plant:ExplicitEuler\n"
 
 
 @pytest.fixture
-def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """Yield the folder in which the package is installed: a module, and metadata with the entry point."""
-    (tmp_path / "acme_plant.py").write_text(MODULE)
-    metadata = tmp_path / "acme_plant-1.0.dist-info"
-    metadata.mkdir()
-    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: acme-plant\nVersion: 1.0\n")
-    (metadata / "entry_points.txt").write_text(f"[dynx.plants]\n{NAME} = acme_plant:ExplicitEuler\n")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    yield tmp_path
-    sys.modules.pop("acme_plant", None)
+def package(tmp_path: Path) -> Iterator[Path]:
+    """Yield the folder of the package, which is on the import path."""
+    with installed_package(tmp_path, "acme_plant", MODULE, ENTRY_POINTS) as folder:
+        yield folder
 
 
 @pytest.mark.usefixtures("package")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Iterator
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -17,6 +16,7 @@ from dynx import Pose
 from dynx.cli.shell.main import cli
 from dynx.errors import ArgumentError, UnknownBackendError, UnknownNameError, UnsupportedFeatureError
 from dynx.world import Scene, World, Wrench, box, compare_worlds, sphere, world_names, write_scene
+from tests.architecture.packages import installed_package
 
 MODULE = '''"""Balls that fly through each other, on the exact solution of their equations of motion."""
 
@@ -111,20 +111,15 @@ class ExactFlight(WorldEngine):
         pass
 '''
 NAME = "exact_flight"
+ENTRY_POINTS = f"[dynx.worlds]\n{NAME} = acme_flight:ExactFlight\n"
 DT = 1e-2
 
 
 @pytest.fixture
-def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """Yield the folder in which the package is installed: a module, and metadata with the entry point."""
-    (tmp_path / "acme_flight.py").write_text(MODULE)
-    metadata = tmp_path / "acme_flight-1.0.dist-info"
-    metadata.mkdir()
-    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: acme-flight\nVersion: 1.0\n")
-    (metadata / "entry_points.txt").write_text(f"[dynx.worlds]\n{NAME} = acme_flight:ExactFlight\n")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    yield tmp_path
-    sys.modules.pop("acme_flight", None)
+def package(tmp_path: Path) -> Iterator[Path]:
+    """Yield the folder of the package, which is on the import path."""
+    with installed_package(tmp_path, "acme_flight", MODULE, ENTRY_POINTS) as folder:
+        yield folder
 
 
 def balls() -> Scene:

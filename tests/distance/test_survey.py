@@ -10,11 +10,12 @@ from tests.distance.survey_engines import ENGINES
 
 CAUSES = {
     "bullet": (("Box", "Hull", "separated"), 1e-5, 1e-12),
-    "mujoco": (("Box", "Cylinder", "touching"), 1e-9, 1e-8),
+    "mujoco": (("Cylinder", "Cylinder", "overlapping"), 1e-7, 1e-10),
     "coal": (("Cylinder", "Cylinder", "separated"), 1e-8, 1e-8),
-    "drake": (("Box", "Capsule", "touching"), 1e-8, 1e-3),
+    "drake": (("Box", "Capsule", "overlapping"), 1e-7, 1e-5),
 }
-"""For each engine a case with the least of its worst errors as it comes, and the largest after the change."""
+"""For each engine a case, the error that it exceeds as it comes, and the error that it stays below after the
+change, if there is one; no case of touching shapes, whose errors depend on the rounding of the processor."""
 
 
 @pytest.mark.parametrize("engine", ENGINES)

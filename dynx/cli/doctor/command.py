@@ -15,7 +15,7 @@ from dynx.cli.shell.options import choice_pair, json_option, name_list, run_opti
     type=click.Choice(["fixed", "floating", "both"]),
     default="fixed",
     show_default=True,
-    help="Whether the root link is fixed to the world or free; `both` examines each.",
+    help="Mount of the root link: fixed to the world, floating (free to move), or each in turn with `both`.",
 )
 @click.option(
     "--engines",

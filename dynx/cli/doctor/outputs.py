@@ -59,7 +59,7 @@ class Outputs:
 
     @property
     def on_stdout(self) -> bool:
-        """Whether standard output carries JSON, so that tables go elsewhere."""
+        """True if standard output carries JSON, so that tables go elsewhere."""
         return self.json == STDOUT
 
     def write(

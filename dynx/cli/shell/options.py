@@ -124,7 +124,7 @@ def model_options(command: F) -> F:
             type=click.Choice(["fixed", "floating"]),
             default="fixed",
             show_default=True,
-            help="Whether the root link is fixed to the world or free to move.",
+            help="Mount of the root link: fixed to the world, or floating (free to move).",
         ),
         click.option(
             "--base-pose",

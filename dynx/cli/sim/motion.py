@@ -61,12 +61,12 @@ class MotionInput:
 
     @property
     def has_target(self) -> bool:
-        """Whether a target is given."""
+        """True if a target is given."""
         return self.to is not None or self.to_pose is not None
 
     @property
     def needs_frame(self) -> bool:
-        """Whether the target or the controller refers to a frame."""
+        """True if the target or the controller refers to a frame."""
         controller = CONTROLLERS.get(self.controller)
         return self.to_pose is not None or (controller is not None and controller.controls == "frame")
 

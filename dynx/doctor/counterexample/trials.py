@@ -49,7 +49,7 @@ class Trials:
 
     @property
     def spent(self) -> bool:
-        """Whether the budget is spent."""
+        """True if the budget is spent."""
         return self._count >= MAX_TRIALS or perf_counter() >= self._until
 
     def holds(self, case: Case, state: ReducibleState) -> bool:

@@ -64,7 +64,7 @@ class Cause:
 
     @property
     def proved(self) -> bool:
-        """Whether every finding that has an effect was proved."""
+        """True if every finding that has an effect was proved."""
         return all(each.proved for each in self.findings if each.effect is not None)
 
     @property

@@ -269,7 +269,7 @@ class LoadedPyBullet(LoadedRobot):
 
     @property
     def _has_coordinates(self) -> bool:
-        """Whether there is any coordinate; Bullet returns None or an empty tuple where there is none."""
+        """True if there is any coordinate; Bullet returns None or an empty tuple where there is none."""
         return bool(self._client.moving) or self._model.floating
 
     def _extrapolate(self, quantity: Callable[[LoadedClient], Floats]) -> Floats:

@@ -84,7 +84,7 @@ class PyBulletBackend(Backend):
 
     @property
     def ballast(self) -> bool:
-        """Whether the model has an inertia that Bullet refuses, so that results are extrapolated.
+        """True if the model has an inertia that Bullet refuses, so that results are extrapolated.
 
         Inverse dynamics and mass matrix are then 2 f(I + s) - f(I + 2 s), exact because both are
         affine in the inertia, and forward dynamics is solved from them instead of by the stepper.

@@ -44,7 +44,7 @@ class BulletInertia:
 
     @property
     def zeroed(self) -> bool:
-        """Whether the loader prints "Bad inertia tensor properties" and uses zero instead."""
+        """True if the loader prints "Bad inertia tensor properties" and uses zero instead."""
         x, y, z = self.moments
         return bool(x < 0 or y < 0 or z < 0 or x > y + z or y > x + z or z > x + y)
 

@@ -52,7 +52,7 @@ class LoadedClient(BulletConnection):
         """`getJointInfo` of every joint, as loaded."""
         self.moving = [k for k, info in enumerate(self.joints) if info[2] != engine.JOINT_FIXED]
         self.floating = not fixed and self.dynamics(ROOT)[0] != 0.0
-        """Whether the base moves: Bullet holds a root without mass still."""
+        """True if the base moves: Bullet holds a root without mass still."""
 
     def apply(self, setting: Setting) -> None:
         """Change a setting now, and again whenever the client is reopened."""
@@ -90,7 +90,7 @@ class LoadedClient(BulletConnection):
 
     @property
     def refused(self) -> bool:
-        """Whether Bullet refused to make that tree."""
+        """True if Bullet refused to make that tree."""
         return self._refusal is not None
 
     def _reopen(self) -> None:

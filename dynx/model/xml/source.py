@@ -65,7 +65,7 @@ class SourceElement:
 
     @property
     def empty(self) -> bool:
-        """Whether it is written as one tag, ``<mass/>``."""
+        """True if it is written as one tag, ``<mass/>``."""
         return self.span == self.start_tag
 
     def all(self, tag: str) -> list[SourceElement]:

@@ -37,7 +37,7 @@ class Extent:
 
     @property
     def empty(self) -> bool:
-        """Whether there is no shape at all."""
+        """True if there is no shape at all."""
         return len(self.points) == 0
 
     def transform(self, T: Floats) -> Extent:

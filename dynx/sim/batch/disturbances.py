@@ -58,7 +58,7 @@ class BatchDisturbances:
 
     @property
     def sticks(self) -> bool:
-        """Whether joint friction is solved for at the end of each step."""
+        """True if joint friction is solved for at the end of each step."""
         return self.joint_friction.present and not self.joint_friction.slip
 
     def added_to(

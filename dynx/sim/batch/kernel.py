@@ -59,7 +59,7 @@ class FusedStep:
     plant: ParametricDynamics | None
     noisy: bool
     delayed: bool
-    """Whether measurements are delayed."""
+    """True if measurements are delayed."""
     limit: Floats | None
     disturbances: BatchDisturbances
 
@@ -241,7 +241,7 @@ class FusedStep:
 
     @property
     def sticks(self) -> bool:
-        """Whether joint friction is solved for at the end of each step."""
+        """True if joint friction is solved for at the end of each step."""
         slip = self.disturbances.joint_friction.slip
         of_plant = self.plant is not None and self.plant.has_joint_dynamics
         return self.disturbances.sticks or (of_plant and not slip)

@@ -32,7 +32,7 @@ class Sensors:
 
     @property
     def plain(self) -> bool:
-        """Whether measurements have no delay, no noise and no random numbers."""
+        """True if measurements have no delay, no noise and no random numbers."""
         return self.noise is None and self.random is None and not self._clock.delay_steps
 
     def __call__(self, step: int, q: Floats, v: Floats) -> Measurement:

@@ -115,12 +115,12 @@ class Disturbances:
 
     @cached_property
     def sticks(self) -> bool:
-        """Whether joint friction is solved for at the end of each step: there is some, and no slip speed."""
+        """True if joint friction is solved for at the end of each step: there is some, and no slip speed."""
         return self.friction.present and not self.friction.slip
 
     @property
     def has_torque(self) -> bool:
-        """Whether pushes or friction with a slip speed add a torque, a function of time and state."""
+        """True if pushes or friction with a slip speed add a torque, a function of time and state."""
         return (self.friction.present and not self.sticks) or bool(self.pushes)
 
     def friction_solver(self, h: float, *, damped: bool = True, armature: bool = True) -> FrictionSolver:
@@ -186,7 +186,7 @@ class DisturbedAcceleration:
 
     @property
     def is_undisturbed(self) -> bool:
-        """Whether there are no disturbances, so that it is the backend's forward dynamics alone."""
+        """True if there are no disturbances, so that it is the backend's forward dynamics alone."""
         return not (self._disturbances.has_torque or self._disturbances.has_armature)
 
     def __call__(self, q: Floats, v: Floats, tau: Floats, t: float = 0.0) -> Floats:

@@ -162,7 +162,7 @@ def _structure(model: Model) -> tuple[tuple[tuple[int, ...], ...], tuple[float, 
 def _inertias(model: Model) -> Floats:
     """Return 1 / (M^-1)_ii (nv,) in the neutral configuration; 0 where that is not a positive number."""
     coupling, q = model.mechanism.coupling, model.neutral()
-    M = mass_matrix(model.mechanism, q if coupling is None else coupling.expand_q(q))
+    M = mass_matrix(model.mechanism, model.mechanism.tree_q(q))
     if coupling is not None:
         S = coupling.matrix()
         M = S.T @ M @ S

@@ -92,7 +92,7 @@ class Plant(ABC):
 
 
 def is_own(kind: type[Plant]) -> bool:
-    """Whether a class of plants is one of dynx."""
+    """Return whether a class of plants is one of dynx."""
     return kind.__module__.partition(".")[0] == "dynx"
 
 

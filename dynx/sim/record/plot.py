@@ -43,7 +43,7 @@ class Column(NamedTuple):
     units: tuple[str, str]
     """Units of positions and of efforts."""
     of_base: bool = False
-    """Whether this is the column of a floating base: position in the world, all else in its own axes."""
+    """True if this is the column of a floating base: position in the world, all else in its own axes."""
 
 
 def plot(rollout: RolloutData, path: str | os.PathLike[str] | None = None) -> Any:

@@ -116,7 +116,7 @@ def drawn_shapes(scene: Scene, frames: dict[str, Floats]) -> Iterator[DrawnShape
 
 def _link_poses(robot: str, model: Model, q: Floats) -> Iterator[tuple[str, Floats]]:
     mechanism = model.mechanism
-    poses = body_poses(mechanism, q if mechanism.coupling is None else mechanism.coupling.expand_q(q))
+    poses = body_poses(mechanism, mechanism.tree_q(q))
     links = {link.name for link in model.links}
     for frame in mechanism.frames:
         if frame.name in links:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
-from dynx.rbd.kinematics import body_poses
 from dynx.spatial.scalar import Floats
-from dynx.spatial.se3 import homogeneous
-from dynx.world.layout import WORLD, Collider, Layout, Owner
+from dynx.world.geometry.owner_poses import owner_pose
+from dynx.world.layout import Collider, Layout
 from dynx.world.state import WorldState
 
 Corners = tuple[Floats, Floats]
@@ -19,17 +18,6 @@ def collider_box(layout: Layout, collider: Collider, state: WorldState) -> Corne
     T_world_owner = owner_pose(layout, collider.owner, state)
     corners = [shape_box(each.shape, T_world_owner @ each.T) for each in collider.shapes]
     return np.min([c[0] for c in corners], axis=0), np.max([c[1] for c in corners], axis=0)
-
-
-def owner_pose(layout: Layout, owner: Owner, state: WorldState) -> Floats:
-    """Return the pose (4, 4) in the world of a rigid body."""
-    robot, body = owner
-    if robot is None:
-        return np.eye(4) if body == WORLD else state.bodies[layout.bodies[body].name].T_world_body
-    model = layout.robots[robot].model
-    q, mechanism = state.robots[layout.robots[robot].name].q, model.mechanism
-    poses = body_poses(mechanism, q if mechanism.coupling is None else mechanism.coupling.expand_q(q))
-    return np.asarray(homogeneous(*poses[body]), dtype=np.float64)
 
 
 def shape_box(shape: Shape, T: Floats) -> Corners:

@@ -10,11 +10,10 @@ import numpy as np
 from dynx.distance.cores import Core, core_of
 from dynx.distance.distance import Distance, distance_of
 from dynx.model.geometry import HeightField, Mesh, Plane
-from dynx.rbd.kinematics import body_poses
 from dynx.spatial.scalar import Floats
-from dynx.spatial.se3 import homogeneous
 from dynx.world.geometry.height_field_distances import Field
-from dynx.world.layout import WORLD, Layout, Owner, PlacedShape
+from dynx.world.geometry.owner_poses import OwnerPoses
+from dynx.world.layout import Layout, PlacedShape
 from dynx.world.state import WorldState
 
 
@@ -35,7 +34,7 @@ class Solid:
             self._center = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
             self._reach = float(np.linalg.norm(vertices - self._center, axis=1).max())
 
-    def at(self, T_world_owner: Floats) -> tuple[Solid, Floats, list[float]]:
+    def place(self, T_world_owner: Floats) -> tuple[Solid, Floats, list[float]]:
         """Return the solid, its pose (4, 4), and the centre and radius of the ball around it."""
         T = T_world_owner @ self.T
         center: list[float] = (T[:3, :3] @ self._center + T[:3, 3]).tolist()
@@ -56,11 +55,8 @@ class Distances:
 
         Of colliders with several shapes it is the pair of shapes with the least signed distance.
         """
-        poses = _Poses(self._layout, state)
-        placed = {
-            number: [solid.at(poses[self._layout.colliders[number].owner]) for solid in self._of(number)]
-            for number in {*first, *second}
-        }
+        poses = OwnerPoses(self._layout, state)
+        placed = {number: self._placed(number, poses) for number in {*first, *second}}
         for i in first:
             for j in second:
                 if i == j:
@@ -77,32 +73,13 @@ class Distances:
                 if best is not None:
                     yield i, j, best
 
-    def _of(self, number: int) -> list[Solid]:
+    def _placed(self, number: int, poses: OwnerPoses) -> list[tuple[Solid, Floats, list[float]]]:
+        """Return the solids of a collider, each with its pose and the ball around it."""
+        collider = self._layout.colliders[number]
         if number not in self._solids:
-            self._solids[number] = [Solid(placed) for placed in self._layout.colliders[number].shapes]
-        return self._solids[number]
-
-
-class _Poses(dict[Owner, Floats]):
-    """Poses (4, 4) of the owners of colliders, each robot's computed once."""
-
-    def __init__(self, layout: Layout, state: WorldState) -> None:
-        super().__init__()
-        self._layout, self._state = layout, state
-
-    def __missing__(self, owner: Owner) -> Floats:
-        layout, state = self._layout, self._state
-        if owner.robot is None:
-            body = owner.body
-            self[owner] = np.eye(4) if body == WORLD else state.bodies[layout.bodies[body].name].T_world_body
-            return self[owner]
-        model = layout.robots[owner.robot].model
-        q, mechanism = state.robots[layout.robots[owner.robot].name].q, model.mechanism
-        poses = body_poses(mechanism, q if mechanism.coupling is None else mechanism.coupling.expand_q(q))
-        for collider in layout.colliders:
-            if collider.owner.robot == owner.robot:
-                self[collider.owner] = np.asarray(homogeneous(*poses[collider.owner.body]), dtype=np.float64)
-        return self[owner]
+            self._solids[number] = [Solid(placed) for placed in collider.shapes]
+        pose = poses[collider.owner]
+        return [solid.place(pose) for solid in self._solids[number]]
 
 
 def _distance(a: Solid, T_a: Floats, b: Solid, T_b: Floats, limit: float) -> Distance | None:

@@ -98,7 +98,7 @@ class SceneBody:
 
     @property
     def fixed(self) -> bool:
-        """Whether the body is fixed in the world."""
+        """True if the body is fixed in the world."""
         return self.mass is None
 
     @cached_property

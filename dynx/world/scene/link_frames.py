@@ -24,7 +24,6 @@ class LinkFrames:
 
     def pose(self, q: Floats, link: str) -> Floats:
         """Return T_world_link (4, 4) at the configuration `q` (nq,) of the model."""
-        coupling = self._mechanism.coupling
-        poses = body_poses(self._mechanism, q if coupling is None else coupling.expand_q(q))
+        poses = body_poses(self._mechanism, self._mechanism.tree_q(q))
         body, T = self[link]
         return np.asarray(homogeneous(*poses[body]) @ T)

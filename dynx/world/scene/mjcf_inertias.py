@@ -63,7 +63,7 @@ class PrincipalInertia:
 
     @property
     def suffices_to_move(self) -> bool:
-        """Whether MuJoCo lets a body with this inertia move."""
+        """True if MuJoCo lets a body with this inertia move."""
         return bool(self.mass >= LEAST_INERTIA and self.moments.min() >= LEAST_INERTIA)
 
     def add_to(self, body: Element) -> None:

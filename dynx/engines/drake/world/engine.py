@@ -255,7 +255,7 @@ class DrakeWorld(WorldEngine):
             return np.eye(4) if body == WORLD else self.body_state(body).T_world_body
         mechanism = self.layout.robots[robot].model.mechanism
         q = self.robot_state(robot).q
-        poses = body_poses(mechanism, q if mechanism.coupling is None else mechanism.coupling.expand_q(q))
+        poses = body_poses(mechanism, mechanism.tree_q(q))
         return np.asarray(homogeneous(*poses[body]))
 
     # -- end ----------------------------------------------------------------------------------

@@ -48,7 +48,7 @@ class ContactMaterials:
         for i, j in found.pairs:
             self._explicit[i, j] = self._explicit[j, i] = True
         self.complete = bool((self._explicit == layout.collides).all())
-        """Whether all that may touch are explicit pairs."""
+        """True if every pair of colliders that may touch is an explicit one."""
         self._geoms = [self._geom_options(row) for row in rows.tolist()]
         self._combination, self._priority = found.combination, found.priority
         of_pair = [self._pair_options(row) for row in rows.tolist()]

@@ -27,7 +27,7 @@ class ContactReader:
         self._places = places
         self._collider = {place: k for k, found in enumerate(places) for place in found}
         self.fresh = True
-        """Whether no step was taken since the state was set, so that there are no forces."""
+        """True if no step was taken since the state was set, so that there are no forces."""
 
     def contacts(self) -> list[TouchingPoint]:
         """Return the contacts that have a force, or overlap."""

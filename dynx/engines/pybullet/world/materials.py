@@ -49,7 +49,7 @@ class BulletMaterials:
     rolling: Floats
     restitution: Floats
     rebounds: NDArray[np.bool_]
-    """Whether the collider rebounds from any that it may touch."""
+    """True for colliders (n,) that rebound from any that they may touch."""
 
     def options(self, number: int, settings: Mapping[str, Any], dt: float) -> dict[str, float]:
         """Return the options of `changeDynamics` for a collider."""

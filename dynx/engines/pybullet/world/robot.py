@@ -70,7 +70,7 @@ class BulletRobot:
         self.near = [0.0, 0.0, 0.0, 1.0]
         """Quaternion (4,) of the last state read, whose sign the next one has."""
         self.loaded = False
-        """Whether `apply` is called before every step."""
+        """True if `apply` is called before every step."""
         self._wrench: Floats | None = None
         self._forces: list[float] | None = None
         # Looked up once, because every step applies torques.
@@ -79,7 +79,7 @@ class BulletRobot:
         self.motor: MotorCommand | None = None
         stiff = self._is_stiff(layout)
         self.corrected = self._coupling is not None or stiff
-        """Whether the robot has mimic joints or stiff damping, so that `before_step` and `after_step` must be
+        """True if the robot has mimic joints or stiff damping, so that `before_step` and `after_step` must be
         called."""
         base = np.zeros(self._base)
         self._damping = h * self._S.T @ np.diag(np.concatenate([base, layout.damping])) @ self._S
