@@ -11,12 +11,12 @@ MOMENTS = tuple(0.8e-3 * k for k in range(5))
 
 
 def farthest(measured: Iterable[float], exact: float) -> float:
-    """Return the number of several that is farthest from the exact one."""
+    """Return that one of several values which is farthest from the exact value."""
     return max(measured, key=lambda value: abs(value - exact))
 
 
 def rms_deviation(measured: Sequence[float], exact: float) -> float:
-    """Return the root mean square of the distances of several numbers from the exact one."""
+    """Return the root mean square of the errors of several values."""
     return math.sqrt(sum((value - exact) ** 2 for value in measured) / len(measured))
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from dynx.model import Pose
 from dynx.model.geometry import Box, Collision, Cylinder, Shape, Sphere
 from dynx.spatial.scalar import Floats
-from dynx.world import Scene, SceneBody, ground
+from dynx.world import Material, Scene, SceneBody, ground, sphere
 
 G = 9.81
 """Magnitude of gravity [m/s^2]."""
@@ -28,6 +29,37 @@ def resting_bodies() -> Scene:
         body_of(Cylinder(0.1, 0.2), "cylinder", (0.0, 1.0, 0.1), 2.0),
     )
     return Scene("resting", bodies=(ground(), *bodies))
+
+
+def ball_name(number: int) -> str:
+    """Return the name of a ball of `balls_above`."""
+    return f"ball {number}"
+
+
+def balls_above(
+    radius: float,
+    heights: Sequence[float],
+    material: Material,
+    *,
+    spacing: tuple[float, float] = (0.5, 0.0),
+    twist: Sequence[float] = (0.0,) * 6,
+) -> list[SceneBody]:
+    """Return a row of balls of 1 kg, each at the height of its lowest point [m].
+
+    `spacing` is the distance from one ball to the next along x and y [m]; all start with `twist` (6,).
+    """
+    dx, dy = spacing
+    return [
+        sphere(
+            ball_name(k),
+            radius,
+            mass=1.0,
+            pose=Pose((k * dx, k * dy, radius + height)),
+            twist=twist,
+            material=material,
+        )
+        for k, height in enumerate(heights)
+    ]
 
 
 def slope_axes(angle: float) -> tuple[Floats, Floats]:

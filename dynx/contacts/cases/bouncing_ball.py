@@ -11,10 +11,9 @@ import numpy as np
 from dynx.contacts.case import Case, Figure
 from dynx.contacts.impacts import rms_deviation
 from dynx.contacts.motion import record
-from dynx.contacts.scenes import G
-from dynx.model import Pose
+from dynx.contacts.scenes import G, ball_name, balls_above
 from dynx.spatial.scalar import Floats
-from dynx.world import Material, Scene, World, ground, sphere
+from dynx.world import Material, Scene, World, ground
 
 RADIUS = 0.05
 RESTITUTION = 0.5
@@ -39,17 +38,14 @@ class BouncingBall(Case):
 
     def scene(self, parameters: None) -> Scene:
         material = Material(restitution=RESTITUTION)
-        balls = [
-            sphere(f"ball {k}", RADIUS, mass=1.0, pose=Pose((0.5 * k, 0.0, RADIUS + h)), material=material)
-            for k, h in enumerate(HEIGHTS)
-        ]
+        balls = balls_above(RADIUS, HEIGHTS, material)
         return Scene("bouncing_ball", bodies=(ground(material=material), *balls))
 
     def measure(self, world: World, parameters: None) -> Sequence[Figure]:
         motion = record(world, impact_time(REBOUNDS + 1) * fall_time(max(HEIGHTS)))
         tops: list[list[float]] = [[] for _ in range(REBOUNDS)]
         for k, fall in enumerate(HEIGHTS):
-            heights = (motion.positions(f"ball {k}")[:, 2] - RADIUS) / fall
+            heights = (motion.positions(ball_name(k))[:, 2] - RADIUS) / fall
             flights = _flights(heights)[1:]
             for n, found in enumerate(tops):
                 found.append(float(heights[flights[n]].max()) if n < len(flights) else 0.0)

@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from dynx.contacts.case import Case, Figure
+from dynx.contacts.impacts import farthest
 from dynx.contacts.motion import acceleration, record
 from dynx.contacts.scenes import G
 from dynx.model import Pose
@@ -65,11 +66,10 @@ class FrictionIsotropy(Case):
             decelerations.append(-acceleration(motion.times, velocities @ ahead))
             moved = motion.positions(_name(direction))[-1] - motion.positions(_name(direction))[0]
             drifts.append(abs(float(np.cross(ahead, moved)[2])))
-        worst = max(decelerations, key=lambda each: abs(each - exact))
-        distance = SPEED * DURATION
+        found = farthest(decelerations, exact)
         return [
-            Figure("deceleration farthest from mu g", worst, exact, "m/s^2", exact),
-            Figure("largest drift to a side", max(drifts), 0.0, "m", distance),
+            Figure("deceleration farthest from mu g", found, exact, "m/s^2", exact),
+            Figure("largest drift to a side", max(drifts), 0.0, "m", SPEED * DURATION),
         ]
 
 

@@ -9,10 +9,10 @@ from typing import ClassVar
 import numpy as np
 
 from dynx.contacts.case import Case, Figure
+from dynx.contacts.impacts import farthest
 from dynx.contacts.motion import Motion, record
-from dynx.contacts.scenes import G
-from dynx.model import Pose
-from dynx.world import Material, Scene, World, ground, sphere
+from dynx.contacts.scenes import G, ball_name, balls_above
+from dynx.world import Material, Scene, World, ground
 
 RADIUS = 0.1
 HEIGHTS = tuple(0.5 + 0.01 * k for k in range(5))
@@ -30,20 +30,16 @@ class Rebound(Case):
 
     def scene(self, parameters: float) -> Scene:
         material = Material(restitution=parameters)
-        balls = (
-            sphere(name, RADIUS, mass=1.0, pose=Pose((0.5 * k, 0.0, RADIUS + height)), material=material)
-            for k, (name, height) in enumerate(_balls().items())
-        )
+        balls = balls_above(RADIUS, HEIGHTS, material)
         return Scene("rebound", bodies=(ground(material=material), *balls))
 
     def measure(self, world: World, parameters: float) -> Sequence[Figure]:
         fall = math.sqrt(2.0 * max(HEIGHTS) / G)
         # The highest ball reaches the top, and the lowest does not touch the ground again.
         motion = record(world, fall * (1.0 + 1.4 * parameters) + 0.05)
-        ratios = [rebound_height(motion, name) / height for name, height in _balls().items()]
+        ratios = [rebound_height(motion, ball_name(k)) / height for k, height in enumerate(HEIGHTS)]
         exact = parameters**2
-        worst = max(ratios, key=lambda ratio: abs(ratio - exact))
-        return [Figure("height", worst, exact, "", 1.0, rests_on=("restitution",))]
+        return [Figure("height", farthest(ratios, exact), exact, "", 1.0, rests_on=("restitution",))]
 
 
 def rebound_height(motion: Motion, ball: str) -> float:
@@ -52,7 +48,3 @@ def rebound_height(motion: Motion, ball: str) -> float:
     rises = np.flatnonzero(np.diff(height) >= 0.0)
     lowest = int(rises[0]) if rises.size else len(height) - 1
     return max(0.0, float(np.max(height[lowest:])))
-
-
-def _balls() -> dict[str, float]:
-    return {f"ball {k}": height for k, height in enumerate(HEIGHTS)}

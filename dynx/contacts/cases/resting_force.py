@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from dynx.contacts.case import Case, Figure
-from dynx.contacts.motion import mean_contact_force
-from dynx.contacts.scenes import resting_bodies
+from dynx.contacts.motion import mean_contact_forces
+from dynx.contacts.scenes import G, resting_bodies
 from dynx.world import Scene, World
 
 SETTLING = 0.8
@@ -30,13 +30,9 @@ class RestingForce(Case):
 
     def measure(self, world: World, parameters: None) -> Sequence[Figure]:
         world.run(SETTLING)
-        start = world.save()
-        g = -world.scene.gravity[2]
-        figures = []
-        for body in world.scene.bodies:
-            if body.mass is not None:
-                world.restore(start)
-                force = mean_contact_force(world, body.name, AVERAGING)
-                weight = body.mass * g
-                figures.append(Figure(f"force on the {body.name}", float(force[2]), weight, "N", weight))
-        return figures
+        weights = {body.name: body.mass * G for body in world.scene.bodies if body.mass is not None}
+        forces = mean_contact_forces(world, [*weights], AVERAGING)
+        return [
+            Figure(f"force on the {name}", float(forces[name][2]), weight, "N", weight)
+            for name, weight in weights.items()
+        ]

@@ -9,8 +9,9 @@ from typing import ClassVar, NamedTuple
 
 from dynx.contacts.case import Case, Figure
 from dynx.contacts.impacts import MOMENTS, farthest
+from dynx.contacts.scenes import ball_name, balls_above
 from dynx.model import Pose
-from dynx.world import Material, Scene, World, box, sphere
+from dynx.world import Material, Scene, World, box
 
 RADIUS = 0.05
 SPEED = 1.0
@@ -49,23 +50,13 @@ class RestitutionPairs(Case):
         slab = Material(friction=0.0, restitution=parameters.slab)
         ball = Material(friction=0.0, restitution=parameters.ball)
         twist = (0.0, 0.0, -SPEED, 0.0, 0.0, 0.0)
-        balls = [
-            sphere(
-                f"ball {k}",
-                RADIUS,
-                mass=1.0,
-                pose=Pose((0.2 * k, 0.0, RADIUS + height)),
-                twist=twist,
-                material=ball,
-            )
-            for k, height in enumerate(HEIGHTS)
-        ]
+        balls = balls_above(RADIUS, HEIGHTS, ball, spacing=(0.2, 0.0), twist=twist)
         ground = box("slab", (2.0, 1.0, 0.2), pose=Pose((0.4, 0.0, -0.1)), material=slab)
         return Scene("restitution_pairs", bodies=(ground, *balls), gravity=(0.0, 0.0, 0.0))
 
     def measure(self, world: World, parameters: Pair) -> Sequence[Figure]:
         world.run(DURATION)
-        speeds = [float(world.state.bodies[f"ball {k}"].twist[2]) / SPEED for k in range(len(HEIGHTS))]
+        speeds = [float(world.state.bodies[ball_name(k)].twist[2]) / SPEED for k in range(len(HEIGHTS))]
         exact = math.sqrt(parameters.slab * parameters.ball)
         rests_on = ("restitution",) if exact else ()
         return [Figure("restitution", farthest(speeds, exact), exact, "", 1.0, rests_on=rests_on)]

@@ -7,8 +7,8 @@ from typing import ClassVar
 
 from dynx.contacts.case import Case, Figure
 from dynx.contacts.impacts import MOMENTS, Throw, after_bounce, farthest
-from dynx.model import Pose
-from dynx.world import Material, Scene, World, ground, sphere
+from dynx.contacts.scenes import ball_name, balls_above
+from dynx.world import Material, Scene, World, ground
 
 RADIUS = 0.1
 TIME = 0.1
@@ -41,23 +41,14 @@ class SpinningBall(Case):
     def scene(self, parameters: Throw) -> Scene:
         material = Material(friction=parameters.friction, restitution=parameters.restitution)
         twist = (parameters.speed, 0.0, -parameters.fall, 0.0, -parameters.backspin / RADIUS, 0.0)
-        balls = [
-            sphere(
-                name,
-                RADIUS,
-                mass=1.0,
-                pose=Pose((0.0, 0.5 * k, RADIUS + parameters.fall * (TIME + MOMENTS[k]))),
-                twist=twist,
-                material=material,
-            )
-            for k, name in enumerate(_balls())
-        ]
+        heights = [parameters.fall * (TIME + moment) for moment in MOMENTS]
+        balls = balls_above(RADIUS, heights, material, spacing=(0.0, 0.5), twist=twist)
         # Without gravity a ball that does not rebound stays on the ground without a force.
         return Scene("spinning_ball", bodies=(ground(material=material), *balls), gravity=(0.0, 0.0, 0.0))
 
     def measure(self, world: World, parameters: Throw) -> Sequence[Figure]:
         world.run(DURATION)
-        twists = [world.state.bodies[name].twist.tolist() for name in _balls()]
+        twists = [world.state.bodies[ball_name(k)].twist.tolist() for k in range(len(MOMENTS))]
         rests_on = ("restitution",) if parameters.restitution else ()
         rebound = parameters.restitution * parameters.fall
         speed, backspin = after_bounce(parameters)
@@ -89,7 +80,3 @@ class SpinningBall(Case):
         scale = parameters.backspin + 2.5 * parameters.speed
         figures.append(Figure("angular momentum about the ground, by 2/5 m r", found, momentum, "m/s", scale))
         return figures
-
-
-def _balls() -> list[str]:
-    return [f"ball {k}" for k in range(len(MOMENTS))]

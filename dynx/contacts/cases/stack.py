@@ -9,6 +9,7 @@ import numpy as np
 
 from dynx.contacts.case import Case, Figure
 from dynx.contacts.impacts import farthest
+from dynx.contacts.motion import step_count
 from dynx.contacts.scenes import G
 from dynx.model import Pose
 from dynx.world import Scene, World, box, ground
@@ -40,8 +41,7 @@ class Stack(Case):
         return Scene("stack", bodies=(ground(), *boxes))
 
     def measure(self, world: World, parameters: None) -> Sequence[Figure]:
-        steps = max(1, round(DURATION / world.dt) - FORCES)
-        world.step(steps)
+        world.step(max(1, step_count(world, DURATION) - FORCES))
         forces = np.zeros(BOXES)
         number = {_name(k): k for k in range(BOXES)} | {"ground": -1}
         for _ in range(FORCES):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from dynx.contacts.case import Case, Figure
-from dynx.contacts.motion import step_count
+from dynx.contacts.motion import mean_contact_forces
 from dynx.contacts.scenes import G
 from dynx.model.loading import load
 from dynx.world import PositionMotor, Scene, SceneRobot, World, ground
@@ -52,12 +52,8 @@ class StandingRobot(Case):
     def measure(self, world: World, parameters: None) -> Sequence[Figure]:
         motors = {"robot": PositionMotor(LEG, kp=30000.0, kd=1500.0)}
         world.run(SETTLING, motors=motors)
-        forces = dict.fromkeys(FEET, 0.0)
-        steps = step_count(world, AVERAGING)
-        for _ in range(steps):
-            world.step(1, motors=motors)
-            for contact in world.contacts():
-                forces[contact.a.removeprefix("robot/")] += float(contact.force[2]) / steps
+        means = mean_contact_forces(world, [f"robot/{foot}" for foot in FEET], AVERAGING, motors=motors)
+        forces = {foot: float(means[f"robot/{foot}"][2]) for foot in FEET}
         weight, front = foot_forces()
         ahead = sum(force for foot, force in forces.items() if foot.startswith("front"))
         return [
