@@ -23,6 +23,9 @@ from dynx.backends.quantity_calls import Forces, Key
 from dynx.compiled.arguments import BatchArguments
 from dynx.compiled.call import CoupledCall, KernelCall, NumericCall, write_into
 from dynx.compiled.frames import chain_of, place_of
+from dynx.compiled.ik.kernels import applies, frame_solver
+from dynx.compiled.ik.solver import MAX_RESTARTS, FrameSolver
+from dynx.compiled.ik.step import TargetKind
 from dynx.compiled.kernels import (
     ON_CHAINS,
     chain_kernel,
@@ -32,6 +35,7 @@ from dynx.compiled.kernels import (
 )
 from dynx.compiled.looped.kernels import LOOPED, looped_kernel
 from dynx.compiled.simplification import has_physical_inertias, simplify_mechanism
+from dynx.ik import IKResult, Problem
 from dynx.model import Model
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
 from dynx.simd.image import COMPILE_LOCK
@@ -70,6 +74,7 @@ class CompiledBackend(Backend):
         self._eliminates = self._uncoupled or has_physical_inertias(self._mechanism)
         self._calls: dict[object, Call] = {}
         self._chain_kernels: dict[object, Kernel] = {}
+        self._ik_solvers: dict[tuple[str, TargetKind], FrameSolver] = {}
         # The same calls under the arguments of the public methods, which saves looking up names.
         self._public_calls: dict[object, Call] = {}
 
@@ -81,7 +86,7 @@ class CompiledBackend(Backend):
     def _release(self) -> None:
         # Calls in progress on other threads keep a reference to their kernels until they return.
         with COMPILE_LOCK:
-            self._public_calls, self._calls, self._chain_kernels = {}, {}, {}
+            self._public_calls, self._calls, self._chain_kernels, self._ik_solvers = {}, {}, {}, {}
 
     # -- with `out` ---------------------------------------------------------------------------
 
@@ -185,6 +190,22 @@ class CompiledBackend(Backend):
         if joint_dynamics:
             M += self._joint_terms.armature
         return M
+
+    def solve_inverse_kinematics(self, problem: Problem) -> IKResult | None:
+        """Solve a checked problem by a kernel; return None if none applies (`dynx.compiled.ik.kernels`)."""
+        self._arguments.refuse_closed()
+        key = (problem.frame, TargetKind.of(problem))
+        solver = self._ik_solvers.get(key)
+        if solver is None:
+            if not applies(self.model, problem):
+                return None
+            with COMPILE_LOCK:
+                solver = self._ik_solvers.get(key)
+                if solver is None:
+                    solver = self._ik_solvers[key] = frame_solver(self.model, *key, self._threads)
+        elif problem.limits.max_restarts > MAX_RESTARTS:
+            return None
+        return solver.solve(problem, self)
 
     # -- kernels ------------------------------------------------------------------------------
 

@@ -4,9 +4,18 @@ This package lies below `dynx.backends`: the solver depends only on a small prot
 so that every backend can offer `inverse_kinematics` as one of its quantities.
 """
 
+from dynx.ik.problem import Problem, improved
 from dynx.ik.result import IKResult
 from dynx.ik.search import Kinematics
 from dynx.ik.solver import inverse_kinematics
 from dynx.ik.targets import Targets, checked_targets
 
-__all__ = ["IKResult", "Kinematics", "Targets", "checked_targets", "inverse_kinematics"]
+__all__ = [
+    "IKResult",
+    "Kinematics",
+    "Problem",
+    "Targets",
+    "checked_targets",
+    "improved",
+    "inverse_kinematics",
+]

@@ -34,7 +34,9 @@ class FrameCoordinates:
         self._model = model
         self._base = 7 if model.floating else 0
         joints = _joints_on_path(model, frame)
-        self._in_q = _as_slice([self._base + k for k in joints])
+        self.indices = [self._base + k for k in joints]
+        """Indices in q of the joints' coordinates."""
+        self._in_q = _as_slice(self.indices)
         offset = 6 if model.floating else 0
         self.columns: Columns = _as_slice([*range(offset), *(offset + k for k in joints)])
         """The columns of the Jacobian, in the order of the coordinates."""
@@ -47,16 +49,21 @@ class FrameCoordinates:
         # A joint that drives mimic joints is not periodic, because those keep moving.
         rotates = np.array([j.type != "prismatic" and j.name not in drivers for j in kinds], dtype=bool)
         full_range = self._high - self._low >= FULL_TURN - _FULL_TURN_TOLERANCE
-        self._periodic = np.flatnonzero(rotates & full_range).tolist()
+        self.periodic: list[int] = np.flatnonzero(rotates & full_range).tolist()
+        """Positions, among the joints, of angles whose range is a full turn."""
 
         lower, upper = self._low.tolist(), self._high.tolist()
-        for k in self._periodic:
+        for k in self.periodic:
             lower[k], upper[k] = -math.inf, math.inf
         self.lower: list[float] = [-math.inf] * offset + lower
         """Lower bounds of the search."""
         self.upper: list[float] = [math.inf] * offset + upper
         """Upper bounds of the search."""
         self._default_range = np.array([_DEFAULT_RANGE.get(joint.type, math.pi) for joint in kinds])
+
+    def limits(self, k: int) -> tuple[float, float]:
+        """Return the position limits of joint number k of the path, which may be infinite."""
+        return float(self._low[k]), float(self._high[k])
 
     def values(self, q: Floats) -> list[float]:
         """Return the coordinates at configuration q (nq,)."""
@@ -86,12 +93,23 @@ class FrameCoordinates:
         drawn[self._in_q] = low + (high - low) * rng.random(len(low))
         return drawn
 
+    def starts(self, rng: np.random.Generator, count: int) -> Floats:
+        """Return values of the joints (count, n_joints), drawn uniformly within their limits.
+
+        Joint values are drawn one configuration after the other. A joint without limits is drawn from within
+        pi [rad] or 1 m of zero, or of its only limit.
+        """
+        default = self._default_range
+        low = np.where(np.isfinite(self._low), self._low, np.minimum(0.0, self._high) - default)
+        high = np.where(np.isfinite(self._high), self._high, np.maximum(0.0, self._low) + default)
+        return np.asarray(low + (high - low) * rng.random((count, len(low))))
+
     def nearest(self, q: Floats, q0: Floats) -> Floats:
         """Return q with its periodic angles shifted by full turns, within their limits and nearest to q0."""
-        if not self._periodic:
+        if not self.periodic:
             return q
         values, start = q[self._in_q].tolist(), q0[self._in_q].tolist()
-        for k in self._periodic:
+        for k in self.periodic:
             low, high = float(self._low[k]), float(self._high[k])
             value = start[k] + math.remainder(values[k] - start[k], FULL_TURN)
             value += FULL_TURN if value < low else -FULL_TURN if value > high else 0.0

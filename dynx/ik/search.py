@@ -25,13 +25,13 @@ from dynx.spatial.scalar import Floats
 
 # Chosen on UR5, Panda, iiwa and a Talos arm for the fewest evaluations; a factor of 3 in either
 # direction, or a window of 2 to 6 steps, costs at most a third more.
-_DAMPING = 0.1
+DAMPING = 0.1
 """Damping per unit of squared error (half the squared norm of the residual)."""
-_MIN_DAMPING = 1e-9
+MIN_DAMPING = 1e-9
 """Damping that keeps the system definite at a singular configuration on the target."""
-_WINDOW = 3
+WINDOW = 3
 """Number of steps over which progress is measured."""
-_REQUIRED_REDUCTION = 0.6
+REQUIRED_REDUCTION = 0.6
 """A start is abandoned unless the squared error falls below this fraction of itself over the window."""
 _MIN_RELATIVE_GAIN = 1e-12
 """Refinement of an unreached target ends when a step changes the squared error by a smaller fraction."""
@@ -115,12 +115,16 @@ class Search:
             if best.success:
                 return best
         assert best is not None
+        return self.improve(best, q0, residual)
+
+    def improve(self, best: Candidate, q0: Floats, residual: Residual) -> Candidate:
+        """Return the local minimum near the best configuration of all starts, or that if it is no better."""
         q, steps = self._refine(best.q, residual)
         refined = self.evaluate(self._coordinates.nearest(q, q0), residual)
+        refined.iterations, refined.restarts = best.iterations + steps, best.restarts
         if refined.success or refined.squared_error <= best.squared_error:
-            refined.restarts = best.restarts
-            best = refined
-        best.iterations = iterations + steps
+            return refined
+        best.iterations = refined.iterations
         return best
 
     def within_limits(self, q: Floats, q0: Floats) -> Floats:
@@ -143,7 +147,7 @@ class Search:
         position_tolerance = self._limits.position_tolerance
         rotation_tolerance = self._limits.rotation_tolerance
         best, least = q, float("inf")
-        recent: deque[float] = deque(maxlen=_WINDOW)
+        recent: deque[float] = deque(maxlen=WINDOW)
         for steps in range(self._limits.max_iterations + 1):
             error_vector, position_error, rotation_error = residual(forward_kinematics(q, frame))
             if position_error <= position_tolerance and rotation_error <= rotation_tolerance:
@@ -151,11 +155,11 @@ class Search:
             squared_error = _half_square(error_vector)
             if squared_error < least:
                 best, least = q, squared_error
-            stagnant = len(recent) == _WINDOW and squared_error > _REQUIRED_REDUCTION * recent[0]
+            stagnant = len(recent) == WINDOW and squared_error > REQUIRED_REDUCTION * recent[0]
             if stagnant or steps == self._limits.max_iterations:
                 break
             recent.append(squared_error)
-            q = self._step_from(q, error_vector, residual.rows, _DAMPING * squared_error + _MIN_DAMPING)
+            q = self._step_from(q, error_vector, residual.rows, DAMPING * squared_error + MIN_DAMPING)
         return best, steps
 
     def _refine(self, q: Floats, residual: Residual) -> tuple[Floats, int]:
@@ -165,10 +169,10 @@ class Search:
         rejected and the damping raised (Marquardt 1963).
         """
         error_vector, _, _ = residual(self._kinematics.forward_kinematics(q, self._frame))
-        squared_error, factor, steps = _half_square(error_vector), _DAMPING, 0
+        squared_error, factor, steps = _half_square(error_vector), DAMPING, 0
         while steps < self._limits.max_iterations:
             steps += 1
-            damping = factor * squared_error + _MIN_DAMPING
+            damping = factor * squared_error + MIN_DAMPING
             trial = self._step_from(q, error_vector, residual.rows, damping)
             trial_residual, _, _ = residual(self._kinematics.forward_kinematics(trial, self._frame))
             trial_error = _half_square(trial_residual)

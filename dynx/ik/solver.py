@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError, shown
+from dynx.ik.problem import Problem
 from dynx.ik.residual import Residual
 from dynx.ik.result import IKResult
 from dynx.ik.search import Candidate, Kinematics, Search, SearchLimits
@@ -16,6 +17,10 @@ from dynx.ik.targets import checked_targets
 from dynx.model import Model
 from dynx.model.configuration import checked_q, checked_vector, whole_number
 from dynx.spatial.scalar import Floats
+
+ProblemSolver = Callable[[Problem], "IKResult | None"]
+"""Method ``solve_inverse_kinematics`` of kinematics that solve many targets at once; it returns None for a
+problem that it does not apply to."""
 
 EngineSolver = Callable[[Floats, str, Floats], Floats]
 """Function from a pose T_world_target (4, 4), a frame and q0 (nq,) to the engine's solution q (nq,)."""
@@ -77,6 +82,12 @@ def inverse_kinematics(
             f"leading axes do not broadcast: target has {targets.batch}, q0 has {start.shape[:-1]}"
         ) from None
 
+    problem = Problem(frame, targets, at, start, q0 is not None, batch, limits, rng)
+    if method == "dynx":
+        solve_all: ProblemSolver | None = getattr(kinematics, "solve_inverse_kinematics", None)
+        found = None if solve_all is None else solve_all(problem)
+        if found is not None:
+            return found
     search = Search(kinematics, frame, at, limits)
     if method == "dynx":
 
@@ -106,8 +117,8 @@ def inverse_kinematics(
             one.q, np.asarray(one.success), errors[0, ...], errors[1, ...], steps[0, ...], steps[1, ...]
         )
     starts = np.broadcast_to(start, (*batch, model.nq)).reshape(math.prod(batch), model.nq)
-    found = [solve(p, R, q) for (p, R), q in zip(targets.rows(batch), starts, strict=True)]
-    return _result(found, batch, model.nq)
+    candidates = [solve(p, R, q) for (p, R), q in zip(targets.rows(batch), starts, strict=True)]
+    return _result(candidates, batch, model.nq)
 
 
 def _result(found: list[Candidate], batch: tuple[int, ...], nq: int) -> IKResult:

@@ -59,7 +59,7 @@ def load_kernel(
     """Load the kernel of `recipe` from the cache, or compile `program()` and store it there."""
     target = host() if target is None else target
     settings = Settings(target.lanes) if settings is None else settings
-    return _load(recipe, lambda: compile_image(program(), target, settings), target, settings, Kernel)
+    return load_code(recipe, lambda: compile_image(program(), target, settings), target, settings, Kernel)
 
 
 def load_routines(recipe: bytes, routines: RoutineSet) -> RoutineCode:
@@ -68,7 +68,7 @@ def load_routines(recipe: bytes, routines: RoutineSet) -> RoutineCode:
 
     def load(lanes: int) -> tuple[Image, Code]:
         settings = Settings(lanes)
-        return _load(
+        return load_code(
             recipe,
             lambda: compile_routines(routines, target, settings),
             target,
@@ -80,13 +80,14 @@ def load_routines(recipe: bytes, routines: RoutineSet) -> RoutineCode:
     return RoutineCode(single, several, image)
 
 
-def _load(
+def load_code(
     recipe: bytes,
     compiled: Callable[[], Image],
     target: Target,
     settings: Settings,
     link: Callable[[Image], T],
 ) -> T:
+    """Link the image of `recipe` from the cache, or that of `compiled()`, which is then stored there."""
     folder = _cache_folder()
     if folder is None:
         return link(compiled())

@@ -1,4 +1,7 @@
-"""Evaluation of a finished program on arrays of symbols, within another trace, or on arrays of numbers."""
+"""Evaluation of a finished program on arrays of symbols, within another trace, or on arrays of numbers.
+
+Here are also comparison and selection of numbers and symbols: traced code must not branch on values.
+"""
 
 from __future__ import annotations
 
@@ -35,42 +38,46 @@ def inline(program: Program, inputs: Mapping[str, Array]) -> dict[str, Array]:
     return outputs
 
 
-def _minimum(a: Any, b: Any) -> Any:
-    for first in (a, b):
-        if isinstance(first, Symbol):
-            return _symbol(first, a).minimum(b)
-    return a if a < b else b
+def less(a: Any, b: Any) -> Any:
+    """Return 1 where a < b, otherwise 0."""
+    return _apply("less", a, b) if _any_symbol(a, b) else float(a < b)
 
 
-def _maximum(a: Any, b: Any) -> Any:
-    for first in (a, b):
-        if isinstance(first, Symbol):
-            return _symbol(first, a).maximum(b)
-    return a if a > b else b
+def less_equal(a: Any, b: Any) -> Any:
+    """Return 1 where a <= b, otherwise 0."""
+    return _apply("less_equal", a, b) if _any_symbol(a, b) else float(a <= b)
 
 
-def _compared(op: Op, a: Any, b: Any) -> Any:
-    return _applied(op, lambda: float({"less": a < b, "less_equal": a <= b, "equal": a == b}[op]), a, b)
+def equal(a: Any, b: Any) -> Any:
+    """Return 1 where a == b, otherwise 0."""
+    return _apply("equal", a, b) if _any_symbol(a, b) else float(a == b)
 
 
-def _selected(c: Any, a: Any, b: Any) -> Any:
-    return _applied("select", lambda: a if c != 0.0 else b, c, a, b)
+def select(condition: Any, yes: Any, no: Any) -> Any:
+    """Return `yes` where `condition` is not 0, otherwise `no`."""
+    if _any_symbol(condition, yes, no):
+        return _apply("select", condition, yes, no)
+    return yes if condition != 0.0 else no
 
 
-def _applied(op: Op, evaluate: Callable[[], Any], *args: Any) -> Any:
-    """Return the symbol of an operation, or its value if no argument is a symbol."""
-    for arg in args:
-        if isinstance(arg, Symbol):
-            graph = arg.graph
-            return Symbol(graph, graph.apply(op, *(_symbol(arg, x).index for x in args)))
-    return evaluate()
+def minimum(a: Any, b: Any) -> Any:
+    """Return the smaller of two numbers; b if either is NaN."""
+    return _apply("min", a, b) if _any_symbol(a, b) else a if a < b else b
 
 
-def _symbol(other: Symbol, x: Any) -> Symbol:
-    """Return x as a symbol of the graph of `other`."""
-    if isinstance(x, Symbol):
-        return x
-    return Symbol(other.graph, other.graph.constant(float(x)))
+def maximum(a: Any, b: Any) -> Any:
+    """Return the larger of two numbers; b if either is NaN."""
+    return _apply("max", a, b) if _any_symbol(a, b) else a if a > b else b
+
+
+def _any_symbol(*args: Any) -> bool:
+    return any(isinstance(arg, Symbol) for arg in args)
+
+
+def _apply(op: Op, *args: Any) -> Symbol:
+    graph = next(arg.graph for arg in args if isinstance(arg, Symbol))
+    nodes = [arg.index if isinstance(arg, Symbol) else graph.constant(float(arg)) for arg in args]
+    return Symbol(graph, graph.apply(op, *nodes))
 
 
 def _elementary(function: Callable[[Array], Array]) -> Callable[[Any], Any]:
@@ -95,10 +102,10 @@ _OPERATIONS: dict[str, Callable[..., Any]] = {
     "exp": _elementary(exp),
     "tanh": _elementary(tanh),
     "arctan": _elementary(arctan),
-    "min": _minimum,
-    "max": _maximum,
-    "less": lambda a, b: _compared("less", a, b),
-    "less_equal": lambda a, b: _compared("less_equal", a, b),
-    "equal": lambda a, b: _compared("equal", a, b),
-    "select": _selected,
+    "min": minimum,
+    "max": maximum,
+    "less": less,
+    "less_equal": less_equal,
+    "equal": equal,
+    "select": select,
 }

@@ -88,7 +88,7 @@ class RoutineSet:
 def emit_routines(routines: RoutineSet, target: Target, settings: Settings) -> str:
     """Return the text of the LLVM module of a set of routines."""
     bodies = [
-        _RoutineBody(routine, target, settings, number).text()
+        RoutineBody(routine, target, settings, number).text()
         for number, routine in enumerate(routines.routines.values())
     ]
     parts = [f'target triple = "{target.triple}"', *bodies, _loop(routines, settings.lanes)]
@@ -97,7 +97,7 @@ def emit_routines(routines: RoutineSet, target: Target, settings: Settings) -> s
     return "\n".join(parts) + "\n"
 
 
-def _word(name: str, index: int, kind: str = "i64") -> list[str]:
+def argument_word(name: str, index: int, kind: str = "i64") -> list[str]:
     """Return the code that loads word number `index` of the arguments."""
     return [
         f"  %{name}_at = getelementptr inbounds i64, ptr %arguments, i64 {index}",
@@ -112,15 +112,15 @@ def _loop(routines: RoutineSet, lanes: int) -> str:
         f"define void @{ENTRY}(ptr noalias nocapture readonly %arguments) {{",
         "entry:",
         "  %n = load i64, ptr %arguments",
-        *_word("table", table, "ptr"),
-        *_word("constants", table + 2, "ptr"),
-        *_word("vectors", table + 4, "ptr"),
-        *_word("calls", table + 6),
+        *argument_word("table", table, "ptr"),
+        *argument_word("constants", table + 2, "ptr"),
+        *argument_word("vectors", table + 4, "ptr"),
+        *argument_word("calls", table + 6),
     ]
     for k, array in enumerate(routines.cleared):
-        lines += _word(f"base{k}", 1 + 2 * array, "ptr")
-        lines += _word(f"stride{k}", 2 + 2 * array)
-        lines += _word(f"bytes{k}", table + 8 + 2 * k)
+        lines += argument_word(f"base{k}", 1 + 2 * array, "ptr")
+        lines += argument_word(f"stride{k}", 2 + 2 * array)
+        lines += argument_word(f"bytes{k}", table + 8 + 2 * k)
     lines += [
         f"  %last = sub i64 %n, {lanes}",
         "  br label %group",
@@ -170,7 +170,7 @@ def _loop(routines: RoutineSet, lanes: int) -> str:
     return "\n".join(lines)
 
 
-class _RoutineBody(SegmentBody):
+class RoutineBody(SegmentBody):
     """One routine as a function of its operands."""
 
     def __init__(self, routine: Routine, target: Target, settings: Settings, number: int) -> None:
@@ -243,8 +243,8 @@ class _RoutineBody(SegmentBody):
             assert isinstance(array, int)
             lines = [
                 *self._operand(port),
-                *_word(f"base{port}", 1 + 2 * array, "ptr"),
-                *_word(f"stride{port}", 2 + 2 * array),
+                *argument_word(f"base{port}", 1 + 2 * array, "ptr"),
+                *argument_word(f"stride{port}", 2 + 2 * array),
                 f"  %samples{port} = mul i64 %first, %stride{port}",
                 f"  %sample{port} = getelementptr i8, ptr %base{port}, i64 %samples{port}",
                 f"  %p{port}_0 = getelementptr double, ptr %sample{port}, i64 %o{port}",

@@ -23,9 +23,9 @@ PROJECTIVE = np.eye(4) + np.eye(4, k=-3)
 TURN = rotation_from_rpy(np.array([0.3, -0.4, 2.0]))
 
 
-@pytest.fixture
-def engine() -> Iterator[Backend]:
-    with backend("pinocchio", load(MODELS / "six_axis_arm.urdf")) as engine:
+@pytest.fixture(params=["pinocchio", "compiled"])
+def engine(request: pytest.FixtureRequest) -> Iterator[Backend]:
+    with backend(request.param, load(MODELS / "six_axis_arm.urdf")) as engine:
         yield engine
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -20,6 +21,10 @@ SIX_AXIS_ARM = load(MODELS / "six_axis_arm.urdf")
 SEVEN_AXIS_ARM = load(MODELS / "seven_axis_arm.urdf")
 
 
+pytestmark = pytest.mark.parametrize("name", ["pinocchio", "compiled"])
+"""A backend that the solver asks for every pose, and one that solves in kernels."""
+
+
 def errors(T_world_target: Floats, T_world_frame: Floats) -> tuple[float, float]:
     """Return distance [m] and angle [rad], by other formulas than the solver's."""
     position, rotation = pose_error(T_world_target, T_world_frame)
@@ -32,11 +37,11 @@ def same_error(measured: float, reported: float) -> bool:
 
 
 @given(st.data())
-def test_reported_errors_equal_those_of_forward_kinematics(data: st.DataObject) -> None:
+def test_reported_errors_equal_those_of_forward_kinematics(name: str, data: st.DataObject) -> None:
     model = data.draw(models(max_links=6))
     frame = data.draw(st.sampled_from(model.frame_names))
     q_start = data.draw(configurations(model))
-    with backend("pinocchio", model) as engine:
+    with backend(name, model) as engine:
         if data.draw(st.booleans(), label="reachable"):
             target = engine.forward_kinematics(data.draw(configurations(model, within_limits=True)), frame)
         else:
@@ -53,9 +58,9 @@ def test_reported_errors_equal_those_of_forward_kinematics(data: st.DataObject) 
     assert 0 <= result.restarts <= 3
 
 
-def test_a_position_without_its_rotation_is_not_a_success() -> None:
+def test_a_position_without_its_rotation_is_not_a_success(name: str) -> None:
     turned = np.diag([-1.0, -1.0, 1.0, 1.0])
-    with backend("pinocchio", load(MODELS / "pendulum.urdf")) as engine:
+    with backend(name, load(MODELS / "pendulum.urdf")) as engine:
         assert engine.inverse_kinematics(np.eye(4), "base").success
         result = engine.inverse_kinematics(turned, "base")
     assert result.position_error <= TOLERANCE
@@ -64,11 +69,11 @@ def test_a_position_without_its_rotation_is_not_a_success() -> None:
 
 
 @given(st.data())
-def test_a_start_on_the_target_is_returned(data: st.DataObject) -> None:
+def test_a_start_on_the_target_is_returned(name: str, data: st.DataObject) -> None:
     model = data.draw(models(max_links=6))
     frame = data.draw(st.sampled_from(model.frame_names))
     q = data.draw(configurations(model, within_limits=True))
-    with backend("pinocchio", model) as engine:
+    with backend(name, model) as engine:
         result = engine.inverse_kinematics(engine.forward_kinematics(q, frame), frame, q)
     assert result.success
     assert result.iterations == 0
@@ -77,11 +82,11 @@ def test_a_start_on_the_target_is_returned(data: st.DataObject) -> None:
 
 
 @given(st.data())
-def test_coordinates_of_other_branches_stay(data: st.DataObject) -> None:
+def test_coordinates_of_other_branches_stay(name: str, data: st.DataObject) -> None:
     model = data.draw(models(min_links=3, max_links=7, base="fixed"))
     frame = data.draw(st.sampled_from(model.frame_names))
     q = data.draw(configurations(model, within_limits=True))
-    with backend("pinocchio", model) as engine:
+    with backend(name, model) as engine:
         moving = np.abs(engine.jacobian(model.random(0, 20), frame)).max(axis=(0, 1), initial=0.0) > 0.0
         result = engine.inverse_kinematics(data.draw(poses()), frame, q, max_restarts=2)
     changed = result.q != q
@@ -102,9 +107,9 @@ def _joints_above(model: Model, frame: str) -> np.ndarray[tuple[int, ...], np.dt
 
 
 @given(configurations(SEVEN_AXIS_ARM, within_limits=True))
-def test_a_target_reachable_within_limits_is_reached(q: Floats) -> None:
+def test_a_target_reachable_within_limits_is_reached(name: str, q: Floats) -> None:
     frame = SEVEN_AXIS_ARM.frame_names[-1]
-    with backend("pinocchio", SEVEN_AXIS_ARM) as engine:
+    with backend(name, SEVEN_AXIS_ARM) as engine:
         target = engine.forward_kinematics(q, frame)
         result = engine.inverse_kinematics(target, frame)
         assert result.success, result.message
@@ -113,10 +118,10 @@ def test_a_target_reachable_within_limits_is_reached(q: Floats) -> None:
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_a_start_near_a_solution_stays_near_it(seed: int) -> None:
+def test_a_start_near_a_solution_stays_near_it(name: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     frame = "flange"
-    with backend("pinocchio", SIX_AXIS_ARM) as engine:
+    with backend(name, SIX_AXIS_ARM) as engine:
         q = SIX_AXIS_ARM.random(rng)
         near = SIX_AXIS_ARM.clip(q + 1e-3 * rng.uniform(-1.0, 1.0, SIX_AXIS_ARM.nv))
         smallest = np.linalg.svd(engine.jacobian(near, frame), compute_uv=False)[-1]
@@ -129,10 +134,10 @@ def test_a_start_near_a_solution_stays_near_it(seed: int) -> None:
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_a_batch_equals_its_samples_solved_alone(seed: int) -> None:
+def test_a_batch_equals_its_samples_solved_alone(name: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     frame = "flange"
-    with backend("pinocchio", SIX_AXIS_ARM) as engine:
+    with backend(name, SIX_AXIS_ARM) as engine:
         targets = engine.forward_kinematics(SIX_AXIS_ARM.random(rng, (2, 1)), frame)
         starts = SIX_AXIS_ARM.random(rng, 3)
         together = engine.inverse_kinematics(targets, frame, starts, rng=seed)
@@ -147,9 +152,9 @@ def test_a_batch_equals_its_samples_solved_alone(seed: int) -> None:
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_equal_seeds_give_equal_results(seed: int) -> None:
+def test_equal_seeds_give_equal_results(name: str, seed: int) -> None:
     frame = "flange"
-    with backend("pinocchio", SIX_AXIS_ARM) as engine:
+    with backend(name, SIX_AXIS_ARM) as engine:
         target = engine.forward_kinematics(SIX_AXIS_ARM.random(seed), frame)
         by_seed = [engine.inverse_kinematics(target, frame, rng=seed) for _ in range(2)]
         generator = np.random.default_rng(seed)
@@ -159,10 +164,10 @@ def test_equal_seeds_give_equal_results(seed: int) -> None:
 
 
 @given(configurations(SIX_AXIS_ARM, within_limits=True), st.integers(0, 2**32 - 1))
-def test_position_targets_and_points_of_the_frame(q: Floats, seed: int) -> None:
+def test_position_targets_and_points_of_the_frame(name: str, q: Floats, seed: int) -> None:
     frame = "flange"
     point = np.random.default_rng(seed).uniform(-0.2, 0.2, 3)
-    with backend("pinocchio", SIX_AXIS_ARM) as engine:
+    with backend(name, SIX_AXIS_ARM) as engine:
 
         def place(q: Floats) -> Floats:
             T = engine.forward_kinematics(q, frame)
@@ -180,10 +185,10 @@ def test_position_targets_and_points_of_the_frame(q: Floats, seed: int) -> None:
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_rotation_targets(seed: int) -> None:
+def test_rotation_targets(name: str, seed: int) -> None:
     frame, wanted = "flange", SIX_AXIS_ARM.random(seed, (2, 1))
     starts = SIX_AXIS_ARM.random(seed + 1, 3)
-    with backend("pinocchio", SIX_AXIS_ARM) as engine:
+    with backend(name, SIX_AXIS_ARM) as engine:
         targets = engine.forward_kinematics(wanted, frame)
         found = engine.inverse_kinematics(targets[..., :3, :3], frame, starts, free="position")
         assert found.success.all()
@@ -200,8 +205,8 @@ def test_rotation_targets(seed: int) -> None:
 
 
 @given(configurations(SIX_AXIS_ARM, within_limits=True))
-def test_the_position_of_a_pose_with_free_rotation(q: Floats) -> None:
-    with backend("pinocchio", SIX_AXIS_ARM) as engine:
+def test_the_position_of_a_pose_with_free_rotation(name: str, q: Floats) -> None:
+    with backend(name, SIX_AXIS_ARM) as engine:
         target = engine.forward_kinematics(q, "flange")
         by_pose = engine.inverse_kinematics(target, "flange", free="rotation")
         by_position = engine.inverse_kinematics(target[:3, 3], "flange")
@@ -209,11 +214,11 @@ def test_the_position_of_a_pose_with_free_rotation(q: Floats) -> None:
 
 
 @given(st.data())
-def test_angles_are_returned_nearest_to_the_start(data: st.DataObject) -> None:
+def test_angles_are_returned_nearest_to_the_start(name: str, data: st.DataObject) -> None:
     turns = [data.draw(st.integers(-3, 3)) for _ in range(2)]
     model = _two_turning_joints()
     q_start = 2.0 * np.pi * np.array(turns)
-    with backend("pinocchio", model) as engine:
+    with backend(name, model) as engine:
         target = engine.forward_kinematics(np.array([2.0, -1.5]), "tip")
         result = engine.inverse_kinematics(target, "tip", q_start)
     assert result.success
@@ -233,7 +238,7 @@ def _two_turning_joints() -> Model:
     )
 
 
-def test_a_joint_that_drives_others_is_not_shifted_by_a_turn() -> None:
+def test_a_joint_that_drives_others_is_not_shifted_by_a_turn(name: str) -> None:
     """A full turn of the driver is half a turn of its follower, which is another pose."""
     limits = Limits(-4.0, 8.0)
     model = Model.build(
@@ -248,7 +253,7 @@ def test_a_joint_that_drives_others_is_not_shifted_by_a_turn() -> None:
             Joint("tool", "fixed", "follower", "tip", Pose((1.0, 0.0, 0.0))),
         ],
     )  # fmt: skip
-    with backend("pinocchio", model) as engine:
+    with backend(name, model) as engine:
         for q in np.linspace(-4.0, 8.0, 25):
             target = engine.forward_kinematics(np.array([q]), "tip")
             result = engine.inverse_kinematics(target, "tip", [2.0])
@@ -257,10 +262,10 @@ def test_a_joint_that_drives_others_is_not_shifted_by_a_turn() -> None:
 
 
 @given(st.integers(0, 2**32 - 1), poses())
-def test_a_floating_base_reaches_any_pose(seed: int, target: Floats) -> None:
+def test_a_floating_base_reaches_any_pose(name: str, seed: int, target: Floats) -> None:
     model = SIX_AXIS_ARM.with_base("floating")
     q_start = model.random(seed)
-    with backend("pinocchio", model) as engine:
+    with backend(name, model) as engine:
         result = engine.inverse_kinematics(target, "flange", q_start)
     assert result.success, result.message
     assert abs(float(np.linalg.norm(result.q[3:7])) - 1.0) <= 4 * np.finfo(float).eps

@@ -1,0 +1,57 @@
+"""Kernels of inverse kinematics: compiled for one frame of one robot, or loaded from the cache."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+import dynx.compiled.ik
+import dynx.ik.coordinates
+import dynx.ik.search
+import dynx.model.mechanism
+import dynx.rbd
+import dynx.spatial
+from dynx._version import __version__
+from dynx.compiled.ik.solver import MAX_RESTARTS, FrameSolver
+from dynx.compiled.ik.step import TargetKind, solver_iteration
+from dynx.compiled.simplification import simplify_mechanism
+from dynx.ik import Problem
+from dynx.ik.coordinates import FrameCoordinates
+from dynx.model import Model
+from dynx.simd.cache import source_hash
+from dynx.simd.iteration import load_iteration
+
+MAX_JOINTS = 24
+"""Most joints between root and frame for which a kernel is compiled, in some seconds."""
+
+
+def applies(model: Model, problem: Problem) -> bool:
+    """Check whether a kernel solves a problem: for a fixed base, and a frame that 1 to `MAX_JOINTS` joints
+    move."""
+    if model.floating or problem.limits.max_restarts > MAX_RESTARTS:
+        return False
+    return 0 < FrameCoordinates(model, problem.frame).count <= MAX_JOINTS
+
+
+def frame_solver(model: Model, frame: str, kind: TargetKind, threads: int) -> FrameSolver:
+    """Return the solver for targets of this kind, whose kernel comes from the cache if it is there."""
+    coordinates = FrameCoordinates(model, frame)
+    number = model.frame_index(frame)
+    content = (model.links, model.joints, model.extra_frames, model.base_pose, number, kind)
+    recipe = repr((_algorithms(), content)).encode()
+    kernel = load_iteration(
+        recipe, lambda: solver_iteration(simplify_mechanism(model.mechanism), number, coordinates, kind)
+    )
+    return FrameSolver(kernel, coordinates, kind, threads)
+
+
+@cache
+def _algorithms() -> str:
+    """Return the hash of the source of everything that is traced."""
+    packages = (dynx.rbd, dynx.spatial, dynx.compiled.ik)
+    modules = (dynx.ik.coordinates, dynx.ik.search, dynx.model.mechanism)
+    sources = [Path(str(package.__file__)).parent for package in packages]
+    sources += [Path(str(module.__file__)) for module in modules]
+    return f"{__version__} {np.__version__} {source_hash(*sources)}"

@@ -1,0 +1,238 @@
+"""One step of Levenberg-Marquardt within limits, traced for one frame: the iteration of the IK kernel.
+
+The descent is that of `dynx.ik.search`: the damping is proportional to the squared error (Sugihara 2011), and
+a start is abandoned when the squared error has not fallen enough over a few steps. Limits are kept by
+projection (Bertsekas, Projected Newton methods for optimization problems with simple constraints, SIAM J.
+Control and Optimization 20(2), 1982): a coordinate at a limit does not move if the error would decrease
+beyond it, the step is solved for the others, and then clipped to the limits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from dynx.compiled.ik.residual import TracedResidual
+from dynx.ik import Problem
+from dynx.ik.coordinates import FULL_TURN, FrameCoordinates
+from dynx.ik.search import DAMPING, MIN_DAMPING, REQUIRED_REDUCTION, WINDOW
+from dynx.model import Mechanism
+from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, frame_jacobian
+from dynx.rbd.kinematics import ancestry, body_poses, frame_pose
+from dynx.rbd.linear import solve_positive_definite
+from dynx.simd.inlining import less, less_equal, maximum, minimum, select
+from dynx.simd.iteration import GIVEN_UP, NO_RESTART, REACHED, RUNNING, Iteration
+from dynx.simd.trace import trace
+from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.so3 import rotate
+
+_ROUNDING_SHIFT = 6755399441055744.0
+"""1.5 * 2^52: adding it to a double and subtracting it again rounds the double to an integer."""
+
+_HUGE = 1e300
+"""Squared error before the first step."""
+
+SETTINGS = ("position_tolerance", "rotation_tolerance", "max_iterations", "max_restarts")
+"""Constants of the kernel, in order."""
+
+
+@dataclass(frozen=True)
+class TargetKind:
+    """Parts of a target that are prescribed, and whether a point of the frame is placed."""
+
+    position: bool
+    rotation: bool
+    point: bool
+
+    @classmethod
+    def of(cls, problem: Problem) -> TargetKind:
+        """Return the kind of the targets of a problem."""
+        targets = problem.targets
+        return cls(targets.positions is not None, targets.rotations is not None, problem.point is not None)
+
+    @property
+    def size(self) -> int:
+        """Number of entries of a target."""
+        return 3 * self.position + 9 * self.rotation
+
+    def parts(self, target: Array) -> tuple[Array | None, Array | None]:
+        """Return position (3,) and rotation (3, 3) of a target, or None for a part that is free."""
+        if self.position and self.rotation:
+            rows = target.reshape(3, 4)
+            return rows[:, 3], rows[:, :3]
+        return (target, None) if self.position else (None, target.reshape(3, 3))
+
+    def rows(self, problem: Problem) -> Floats:
+        """Return the targets (n, size) of all samples of a problem."""
+        positions, rotations = problem.targets.positions, problem.targets.rotations
+        if positions is not None and rotations is not None:
+            targets = np.empty((*problem.targets.batch, 3, 4))
+            targets[..., :3], targets[..., 3] = rotations, positions
+        else:
+            targets = np.asarray(rotations if positions is None else positions)
+        flat = targets.reshape(*problem.targets.batch, self.size)
+        return np.ascontiguousarray(np.broadcast_to(flat, (*problem.batch, self.size))).reshape(-1, self.size)
+
+
+@dataclass(frozen=True)
+class Memory:
+    """Layout of the variables of a task: result, then what the next steps need."""
+
+    n: int
+    """Number of coordinates."""
+
+    @property
+    def n_results(self) -> int:
+        """Size of the result: coordinates, distance, angle, success, iterations, restarts, squared error."""
+        return self.n + 6
+
+    @property
+    def initial(self) -> Floats:
+        """Variables of a new task."""
+        return np.array([0.0] * (self.n + 5) + [_HUGE] * (1 + WINDOW) + [0.0])
+
+
+def solver_iteration(
+    mechanism: Mechanism, frame: int, coordinates: FrameCoordinates, kind: TargetKind
+) -> Iteration:
+    """Return the iteration that solves for the coordinates that move frame number `frame`.
+
+    Tasks have the arrays ``x``, the first start (n,); ``memory`` (`Memory`); ``target``, the first three rows
+    of a pose (12,), a position (3,) or a rotation (9,); ``near`` (n,), to which periodic angles are shifted;
+    and ``point`` (3,) if there is one. The table of starts holds start number k in row k.
+    """
+    n = coordinates.count
+    path = _Path.of(mechanism, frame, coordinates)
+
+    def step(
+        x: Array, memory: Array, target: Array, near: Array, settings: Array, point: Array | None = None
+    ) -> dict[str, Any]:
+        R, p, J = path.pose(x)
+        if point is not None:
+            lever = rotate(R, point)
+            p = p + lever
+            J = np.concatenate([J[:3] + np.cross(J[3:].T, lever).T, J[3:]])
+        position, rotation = kind.parts(target)
+        residual = TracedResidual.of(
+            None if position is None else position - p, None if rotation is None else rotation @ R.T
+        )
+        rows = J[0 if kind.position else 3 : 6 if kind.rotation else 3]
+        squared = 0.5 * _dot(residual.vector, residual.vector)
+        new = _bounded_step(rows, residual.vector, x, coordinates, DAMPING * squared + MIN_DAMPING)
+        next_x = _shifted(new, near, coordinates)
+        return {"x": next_x, **_bookkeeping(x, memory, residual, squared, settings)}
+
+    sizes = {"x": n, "memory": len(Memory(n).initial), "target": kind.size, "near": n}
+    sizes["settings"] = len(SETTINGS)
+    if kind.point:
+        sizes["point"] = 3
+    shapes = {name: (size,) for name, size in sizes.items()}
+    return Iteration(trace(step, shapes), ("settings",), Memory(n).n_results)
+
+
+def _bookkeeping(
+    x: Array, memory: Array, residual: TracedResidual, squared: Any, settings: Array
+) -> dict[str, Any]:
+    """Return the memory after a step, the status and the restart."""
+    n = len(x)
+    position_tolerance, rotation_tolerance, max_iterations, max_restarts = settings
+    iterations, restarts, least = memory[n + 3 : n + 6]
+    recent, own_steps = list(memory[n + 6 : n + 6 + WINDOW]), memory[-1]
+    reached = less_equal(residual.distance, position_tolerance) * less_equal(
+        residual.angle, rotation_tolerance
+    )
+    better = maximum(less(squared, least), reached)
+    found = [*x, residual.distance, residual.angle]
+    best = [select(better, a, b) for a, b in zip(found, memory[: n + 2], strict=True)]
+    least = select(better, squared, least)
+    stagnant = less(REQUIRED_REDUCTION * recent[0], squared)
+    ends = maximum(stagnant, less_equal(max_iterations, own_steps))
+    exhausted = less_equal(max_restarts, restarts)
+    again = ends * (1.0 - exhausted) * (1.0 - reached)
+    status = select(reached, REACHED, select(ends * exhausted, GIVEN_UP, RUNNING))
+    goes_on = 1.0 - maximum(ends, reached)
+    recent = [select(again, _HUGE, value) for value in (*recent[1:], squared)]
+    own_steps = select(again, 0.0, own_steps + 1.0)
+    after = [
+        *best, reached, iterations + goes_on, restarts + again, least, *recent, own_steps
+    ]  # fmt: skip
+    restart = select(again, restarts + 1.0, NO_RESTART)
+    return {"memory": np.array(after, dtype=object), "status": status, "restart": restart}
+
+
+def _bounded_step(J: Array, error: Array, x: Array, coordinates: FrameCoordinates, damping: Any) -> list[Any]:
+    """Return the coordinates (n,) after a projected step."""
+    m, n = J.shape
+    gradient = error @ J
+    free: list[Any] = []
+    for k in range(n):
+        low, high = coordinates.lower[k], coordinates.upper[k]
+        moves: Any = 1.0
+        if np.isfinite(low):
+            moves = 1.0 - less_equal(x[k], low) * less(gradient[k], 0.0)
+        if np.isfinite(high):
+            moves = moves * (1.0 - less_equal(high, x[k]) * less(0.0, gradient[k]))
+        free.append(moves)
+    masked = J * np.array(free, dtype=object)
+    if m <= n:
+        dx = solve_positive_definite(masked @ J.T + damping * np.eye(m), error) @ masked
+    else:
+        dx = solve_positive_definite(masked.T @ masked + damping * np.eye(n), error @ masked)
+    found: list[Any] = []
+    for value, low, high in zip(x + dx, coordinates.lower, coordinates.upper, strict=True):
+        bounded = maximum(low, value) if np.isfinite(low) else value
+        found.append(minimum(high, bounded) if np.isfinite(high) else bounded)
+    return found
+
+
+def _shifted(x: Sequence[Any], near: Array, coordinates: FrameCoordinates) -> Array:
+    """Return x with its periodic angles shifted by full turns, within their limits and nearest to `near`."""
+    shifted = list(x)
+    for k in coordinates.periodic:
+        turns = (x[k] - near[k]) * (1.0 / FULL_TURN)
+        value = x[k] - FULL_TURN * ((turns + _ROUNDING_SHIFT) - _ROUNDING_SHIFT)
+        low, high = coordinates.limits(k)
+        if np.isfinite(low):
+            value = value + FULL_TURN * less(value, low)
+        if np.isfinite(high):
+            value = value - FULL_TURN * less(high, value)
+        if np.isfinite(low):
+            value = maximum(low, value)
+        shifted[k] = minimum(high, value) if np.isfinite(high) else value
+    return np.array(shifted, dtype=object)
+
+
+@dataclass(frozen=True)
+class _Path:
+    """The bodies between root and frame, and their joint positions as an affine map of the coordinates."""
+
+    mechanism: Mechanism
+    A: Floats
+    b: Floats
+
+    @classmethod
+    def of(cls, mechanism: Mechanism, frame: int, coordinates: FrameCoordinates) -> _Path:
+        placed = mechanism.frames[frame]
+        bodies = tuple(reversed(ancestry(mechanism, placed.body)))
+        chain = tuple(replace(mechanism.bodies[body], parent=k - 1) for k, body in enumerate(bodies))
+        path = replace(mechanism, bodies=chain, frames=(replace(placed, body=len(chain) - 1),), coupling=None)
+        n = len(mechanism.bodies)
+        if mechanism.coupling is None:
+            A, b = np.eye(n), np.zeros(n)
+        else:
+            A, b = mechanism.coupling.affine_map()
+        return cls(path, A[np.ix_(bodies, coordinates.indices)], b[list(bodies)])
+
+    def pose(self, x: Array) -> tuple[Array, Array, Array]:
+        """Return rotation, position and Jacobian (6, n) of the frame in world axes."""
+        poses = body_poses(self.mechanism, self.A @ x + self.b)
+        R, p = frame_pose(self.mechanism, poses, 0)
+        J = frame_jacobian(self.mechanism, poses, 0, LOCAL_WORLD_ALIGNED) @ self.A
+        return np.asarray(R), np.asarray(p), np.asarray(J)
+
+
+def _dot(a: Array, b: Array) -> Any:
+    return sum(u * v for u, v in zip(a[1:], b[1:], strict=True)) + a[0] * b[0]
