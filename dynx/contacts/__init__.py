@@ -1,4 +1,4 @@
-"""Contact conformance: how far each engine is from mechanics where bodies touch.
+"""Contact conformance: errors of each engine where bodies touch, against closed forms of mechanics.
 
 A `Case` is a scene with a closed form. `conform` runs every case in every engine at several steps and gives
 each measured `Figure` a verdict: it is within the tolerance, its error falls with the step, the error is
@@ -14,12 +14,14 @@ coefficient, or the error is unexplained::
 A case is a module in `dynx.contacts.cases` with a subclass of `Case`, and a line in
 `dynx.contacts.registry.BUILT_IN`; a package offers its cases by entry points in the group
 ``dynx.contact_cases``. Its `trials` are independent scenes, which `measure` steps in a world of any engine,
-with the help of `dynx.contacts.motion`. A case names no engine and writes down no verdict: tolerances state
-below which error a figure counts as exact, `Figure.rests_on` the coefficients without which no engine can
-give it. Settings to which errors are attributed are listed in `dynx.contacts.candidates`, with a reason each.
+with the help of `dynx.contacts.motion`. A case names no engine and contains no verdict. It states for each
+figure the tolerance below which an error counts as none, and in `Figure.rests_on` the coefficients without
+which no engine can give the exact value. `dynx.contacts.candidates` lists the settings to which errors may be
+attributed, each with a reason.
 
-A result depends on the moment within a step at which bodies touch. A case whose figure does so has several
-bodies that touch at different moments and gives the largest error, which then falls with the step.
+The result of an impact depends on the moment within a step at which the bodies touch. A case with an impact
+therefore has several bodies, which touch at different moments, and its figure is the one with the largest
+error, which then falls with the step.
 """
 
 from dynx.contacts.candidates import CANDIDATES, Candidate

@@ -13,17 +13,17 @@ from dynx.model.configuration import positive_seconds, whole_number
 from dynx.world.registry import installed_worlds, world_class
 from dynx.world.settings import checked_settings
 
-SHORTEST, LONGEST = 1e-6, 0.1
-"""Steps [s] between which cases are run: shorter ones do not end, in longer ones bodies miss each other."""
+MIN_STEP, MAX_STEP = 1e-6, 0.1
+"""Smallest and largest step [s]: runs at shorter steps take hours, and in longer ones bodies never touch."""
 
-MOST_SUBSTEPS = 500
+MAX_SUBSTEPS = 500
 
 
 def checked_engines(engines: Sequence[str] | None) -> tuple[str, ...]:
     """Return the engines, or all that are installed, each once."""
     if engines is None:
         return installed_worlds()
-    _refuse_one("engines", engines, "names")
+    _check_is_list("engines", engines, "names")
     return tuple(dict.fromkeys(engines))
 
 
@@ -49,7 +49,7 @@ def checked_given(
         kind.require_engine()
         given = dict(settings.get(name, {}))
         if SUBSTEPS in given:
-            whole_number(SUBSTEPS, given.pop(SUBSTEPS), 1, MOST_SUBSTEPS)
+            whole_number(SUBSTEPS, given.pop(SUBSTEPS), 1, MAX_SUBSTEPS)
         checked_settings(name, kind.settings, given)
     return {name: dict(settings.get(name, {})) for name in engines}
 
@@ -70,13 +70,13 @@ def values_in_effect(
 
 def checked_steps(steps: Sequence[float]) -> tuple[float, ...]:
     """Return the steps [s], the largest first, each once."""
-    _refuse_one("steps", steps, "steps [s]")
+    _check_is_list("steps", steps, "steps [s]")
     sizes = sorted({positive_seconds("a step", step) for step in steps}, reverse=True)
     if not sizes:
         raise ArgumentError("steps is empty; wanted at least one step [s]")
     for size in sizes:
-        if not SHORTEST <= size <= LONGEST:
-            raise ArgumentError(f"a step is {size:g} s; wanted {SHORTEST:g} to {LONGEST:g} s")
+        if not MIN_STEP <= size <= MAX_STEP:
+            raise ArgumentError(f"a step is {size:g} s; wanted {MIN_STEP:g} to {MAX_STEP:g} s")
     return tuple(sizes)
 
 
@@ -85,23 +85,23 @@ def checked_cases(cases: Sequence[str | Case] | None) -> tuple[Case, ...]:
     if cases is None:
         found = find_cases()
     else:
-        _refuse_one("cases", cases, "names and cases")
-        found = tuple(find_case(each) if isinstance(each, str) else _instance(each) for each in cases)
+        _check_is_list("cases", cases, "names and cases")
+        found = tuple(find_case(each) if isinstance(each, str) else _checked_case(each) for each in cases)
     for number, each in enumerate(found):
-        _check(each)
+        _check_attributes(each)
         if each.name in [other.name for other in found[:number]]:
             raise ArgumentError(f"two cases have the name {shown(each.name)}")
     return found
 
 
-def _refuse_one(name: str, value: object, what: str) -> None:
-    """Raise ArgumentError for a text, and for what is no sequence."""
+def _check_is_list(name: str, value: object, what: str) -> None:
+    """Raise ArgumentError for a text, and for anything that is neither a sequence nor a set."""
     if isinstance(value, str) or not isinstance(value, Sequence | set | frozenset):
         text = shown(value) if isinstance(value, str | int | float) else f"of type {type(value).__name__}"
         raise ArgumentError(f"{name} is {text}; wanted a list of {what}")
 
 
-def _instance(case: object) -> Case:
+def _checked_case(case: object) -> Case:
     if isinstance(case, type) and issubclass(case, Case):
         raise ArgumentError(f"a case is the class {case.__name__}; wanted an instance, {case.__name__}()")
     if not isinstance(case, Case):
@@ -109,7 +109,7 @@ def _instance(case: object) -> Case:
     return case
 
 
-def _check(case: Case) -> None:
+def _check_attributes(case: Case) -> None:
     """Raise ArgumentError for a case whose attributes cannot be used."""
     kind = type(case)
     where = f"{kind.__module__}.{kind.__qualname__}"

@@ -1,4 +1,4 @@
-"""`conform`: how far each engine is from mechanics in every case, with the cause of each error that stays."""
+"""`conform`: errors of each engine in every case, and the cause of each error that stays."""
 
 from __future__ import annotations
 
@@ -125,12 +125,12 @@ def conform(
     """Measure engines against mechanics: every trial of every case, in every engine, at every step.
 
     Engines and cases are all that are installed unless named. Steps are 1e-6 to 0.1 s; with a single one no
-    error can fall. `settings` are those of `World` by engine, `substeps` included;
-    `candidates` are the settings to which errors may be attributed. Runs take place in `jobs` processes (as
-    many as processors), and one that crashes or takes longer than `timeout` [s] is recorded as such; with 0
-    they take place in this process, which a crash ends.
-    `progress(done, total)` is called after each run; the total grows when errors have to be attributed.
-    With `interruptible`, KeyboardInterrupt ends the runs, and the results so far are returned.
+    error can fall. `settings` are those of `World` by engine, `substeps` included; `candidates` are the
+    settings to which errors may be attributed. Runs take place in `jobs` processes (default: one for each
+    processor), and a run that crashes or takes longer than `timeout` [s] is recorded as such; with 0 they
+    take place in this process, which a crash ends. `progress(done, total)` is called after each run; the
+    total grows when errors have to be attributed. With `interruptible`, KeyboardInterrupt ends the runs, and
+    the results so far are returned.
 
     Raises the errors of `World` for engines and settings, UnknownNameError for the name of a case,
     ArgumentError for steps and for a case that cannot be used.
@@ -147,7 +147,7 @@ def conform(
         runs = [each.run(dt, given[each.engine]) for each in trials for dt in sizes]
         outcomes = runner.run(runs)
         series, lost = _gather(trials, runs, outcomes, sizes)
-        verdicts = _judged(series, sizes)
+        verdicts = _verdicts_without_reruns(series, sizes)
         open_series = [each for each in series if each not in verdicts]
         verdicts |= Attributor(sizes, given, candidates, runner).attribute(open_series, series)
         total = runner.done
@@ -190,7 +190,7 @@ def _gather(
     return series, lost
 
 
-def _judged(series: Sequence[Series], steps: tuple[float, ...]) -> dict[Series, Verdict]:
+def _verdicts_without_reruns(series: Sequence[Series], steps: tuple[float, ...]) -> dict[Series, Verdict]:
     """Return the verdicts that need no further run."""
     verdicts: dict[Series, Verdict] = {}
     for each in series:

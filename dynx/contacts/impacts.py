@@ -1,4 +1,4 @@
-"""Closed forms of impacts, and the one of several repetitions that is farthest from them."""
+"""Closed forms of impacts, and the error of several repetitions."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-MOMENTS = tuple(0.8e-3 * k for k in range(5))
+CONTACT_DELAYS = tuple(0.8e-3 * k for k in range(5))
 """Delays [s] of bodies that touch at different moments, evenly spaced within steps of 4, 2 and 1 ms."""
 
 
@@ -45,11 +45,11 @@ class Throw(NamedTuple):
     @property
     def slips(self) -> bool:
         """True if the ball still slips when it leaves the ground."""
-        return self.friction * (1.0 + self.restitution) * self.fall < self.grip
+        return self.friction * (1.0 + self.restitution) * self.fall < self.sticking_impulse
 
     @property
-    def grip(self) -> float:
-        """Impulse of friction per mass that ends the slip [m/s]: 2/7 of it, for the moment of inertia
+    def sticking_impulse(self) -> float:
+        """Impulse of friction per mass that ends the slip [m/s]: 2/7 of the slip, for the moment of inertia
         2/5 m r^2 of a homogeneous ball."""
         return 2.0 / 7.0 * abs(self.speed + self.backspin)
 
@@ -60,6 +60,6 @@ def after_bounce(throw: Throw) -> tuple[float, float]:
     The normal impulse per mass is (1 + e) times the speed of the fall. Friction opposes the slip of the
     lowest point, in proportion to it, until the slip is zero.
     """
-    impulse = min(throw.friction * (1.0 + throw.restitution) * throw.fall, throw.grip)
+    impulse = min(throw.friction * (1.0 + throw.restitution) * throw.fall, throw.sticking_impulse)
     impulse = math.copysign(impulse, throw.speed + throw.backspin)
     return throw.speed - impulse, throw.backspin - 2.5 * impulse

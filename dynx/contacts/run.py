@@ -73,7 +73,7 @@ def carry_out(run: Run) -> Measured | Unmeasured:
     except (UnsupportedFeatureError, EngineLimitError) as error:
         return Unmeasured("refused", str(error))
     except Exception as error:
-        where = place_in(run.case, error)
+        where = line_in_case(run.case, error)
         if where is None and not isinstance(error, DynxError):
             raise
         return Unmeasured("error", located(f"{type(error).__name__}: {error}", where, None))
@@ -95,7 +95,7 @@ def checked_figures(figures: object) -> tuple[Figure, ...]:
     return found
 
 
-def place_in(case: Case, error: BaseException) -> str | None:
+def line_in_case(case: Case, error: BaseException) -> str | None:
     """Return file and line of the last call in the module of a case that led to an error; None for a case of
     dynx itself."""
     module = sys.modules[type(case).__module__]

@@ -50,7 +50,7 @@ class Series:
 
     @property
     def decisive(self) -> int:
-        """Number of the step at which a cause has to reduce the error: that of the smallest step, or of the
+        """Index of the step at which a cause has to reduce the error: the smallest step, or the step of the
         largest error where the error is within the tolerance at the smallest step."""
         errors = self.errors
         last = len(errors) - 1

@@ -1,7 +1,7 @@
 """Trend of an error along a series of steps, or of values of a setting: none, falling or staying.
 
 Errors below the tolerance may be rounding and count as the tolerance. An error falls if it does so in every
-interval of the series that begins above the tolerance: at an order of at least `LEAST_ORDER`, or to the
+interval of the series that begins above the tolerance: at an order of at least `MIN_ORDER`, or to the
 tolerance. The order is the slope of the straight line through the logarithms of all errors.
 """
 
@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-LEAST_ORDER = 0.5
+MIN_ORDER = 0.5
 """Least order at which an error counts as falling: half the step leaves at most 71 % of it."""
 
 TrendKind = Literal["within", "falls", "stays"]
@@ -42,6 +42,6 @@ def judge(steps: Sequence[float], errors: Sequence[float], tolerance: float) -> 
     sizes = [math.log(step) for step in steps]
     for (a, b), (s, t) in zip(pairwise(logs), pairwise(sizes), strict=True):
         to_tolerance = b == math.log(tolerance)
-        if not to_tolerance and a - b < LEAST_ORDER * (s - t):
+        if not to_tolerance and a - b < MIN_ORDER * (s - t):
             return Trend("stays")
     return Trend("falls", float(np.polyfit(sizes, logs, 1)[0]))

@@ -65,7 +65,7 @@ def distance(
     anything that is no convex shape, the errors of `Mesh.hull`, and those of invalid poses.
     """
     poses = _checked_pose("T_a", T_a), _checked_pose("T_b", T_b)
-    found = distance_of(_prepared(shape_a), poses[0], _prepared(shape_b), poses[1])
+    found = distance_of_cores(_core_of(shape_a), poses[0], _core_of(shape_b), poses[1])
     assert found is not None
     return found
 
@@ -79,7 +79,7 @@ def support(shape: ConvexShape | Plane, T: Pose | ArrayLike, direction: ArrayLik
     length = float(np.linalg.norm(n))
     if length == 0.0:
         raise ArgumentError("direction is zero; wanted a vector of any length above zero")
-    n, pose, core = n / length, _checked_pose("T", T), _prepared(shape)
+    n, pose, core = n / length, _checked_pose("T", T), _core_of(shape)
     if core is None:
         up, p = _normal(pose), pose[:3, 3]
         along = np.abs(n - up).max() <= NORMAL_ROUNDING
@@ -108,17 +108,17 @@ def separation(
     return -support(shape_a, near_a, -n)[0] - support(shape_b, near_b, n)[0]
 
 
-TOUCHING = 1e-12
-"""Distance of cores relative to their size below which the direction between their points is not used."""
+MIN_RESOLVED_DISTANCE = 1e-12
+"""Distance of cores, relative to their size, below which the direction between their points is rounding."""
 
-EXACT = 1e-12
-"""Gap of a closed form, relative to the size of the cores, that is not worth a polytope."""
+CLOSED_FORM_GAP = 1e-12
+"""Gap between the bounds of a closed form, relative to the size of the cores, that needs no polytope."""
 
 NORMAL_ROUNDING = 1e-15
 """Difference of a direction from the normal of a half-space that is rounding."""
 
 
-def distance_of(
+def distance_of_cores(
     a: Core | None, T_a: Floats, b: Core | None, T_b: Floats, limit: float = math.inf
 ) -> Distance | None:
     """Return the distance of two cores at checked poses (4, 4), where None is a half-space.
@@ -128,9 +128,9 @@ def distance_of(
     p_a, p_b = T_a[:3, 3], T_b[:3, 3]
     if a is None or b is None:
         if a is not None:
-            return _height(a, T_a, T_b)
+            return _distance_from_plane(a, T_a, T_b)
         if b is not None:
-            return _height(b, T_b, T_a).swapped()
+            return _distance_from_plane(b, T_b, T_a).swapped()
         raise ArgumentError("both shapes are planes; the distance of two half-spaces is not defined")
     between = _tuple(p_b - p_a)
     a.place(T_a[:3, :3], (0.0, 0.0, 0.0))
@@ -142,9 +142,8 @@ def distance_of(
     if pair.separated:
         normal = np.array(pair.normal)
         on_a, on_b = np.array(pair.point_a), np.array(pair.point_b)
-        # Along the line of the two points, so that their distance is that of the core's less the radii.
-        # The direction of points that touch is rounding.
-        resolved = pair.upper > TOUCHING * (a.extent + b.extent)
+        # Along the line of the two points, so that their distance is that of the cores less the radii.
+        resolved = pair.upper > MIN_RESOLVED_DISTANCE * (a.extent + b.extent)
         along = (on_a - on_b) / pair.upper if resolved else normal
         lower, upper = pair.lower, pair.upper
     else:
@@ -164,14 +163,14 @@ def distance_of(
 def _penetration(a: Core, b: Core) -> Penetration:
     """Return the depth in closed form where that is exact, otherwise with the better bounds."""
     parallel = penetration_of_parallel(a, b)
-    if parallel is not None and parallel.upper - parallel.lower <= EXACT * (a.extent + b.extent):
+    if parallel is not None and parallel.upper - parallel.lower <= CLOSED_FORM_GAP * (a.extent + b.extent):
         return parallel
     found = penetration(a, b)
     closer = parallel is None or found.upper - found.lower <= parallel.upper - parallel.lower
     return found if closer or parallel is None else parallel
 
 
-def _height(a: Core, T_a: Floats, T_plane: Floats) -> Distance:
+def _distance_from_plane(a: Core, T_a: Floats, T_plane: Floats) -> Distance:
     """Return the distance of a core from a half-space: the height of its lowest point, of either sign."""
     up = _normal(T_plane)
     a.place(T_a[:3, :3], (0.0, 0.0, 0.0))
@@ -186,7 +185,7 @@ def _normal(T_plane: Floats) -> Floats:
     return np.asarray(up / np.linalg.norm(up))
 
 
-def _prepared(shape: ConvexShape | Plane) -> Core | None:
+def _core_of(shape: ConvexShape | Plane) -> Core | None:
     return None if isinstance(shape, Plane) else core_of(shape)
 
 

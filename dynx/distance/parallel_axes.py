@@ -13,8 +13,8 @@ from dynx.distance.cores import Core, CylinderCore, PointCore, SegmentCore
 from dynx.distance.penetration import Penetration
 from dynx.distance.vectors import dot, minus
 
-PARALLEL = 1e-4
-"""Sine of the angle between axes below which the bounds may be better than those of a polytope."""
+MAX_SINE = 1e-4
+"""Largest sine of the angle between axes at which the bounds may be better than those of a polytope."""
 
 
 def penetration_of_parallel(a: Core, b: Core) -> Penetration | None:
@@ -29,7 +29,7 @@ def penetration_of_parallel(a: Core, b: Core) -> Penetration | None:
         axis_b = np.copysign(1.0, axis @ b.R[:, 2]) * b.R[:, 2]
         sine = float(np.linalg.norm(np.cross(axis, axis_b)))
         slack = sine * b.extent
-        if sine > PARALLEL:
+        if sine > MAX_SINE:
             return None
     (radius_a, half_a), (radius_b, half_b) = _sizes(a), _sizes(b)
     p_a, p_b = np.array(a.p), np.array(b.p)

@@ -1,11 +1,11 @@
 """Depth of two cores that touch or overlap, by expanding polytopes.
 
 G. van den Bergen, "Proximity queries and penetration depth computation on 3D game objects", Game Developers
-Conference (2001). With C = A - B and its support function h, the depth is the least h(n) over all unit n: so
-far must a move along -n to be free of b. A polytope of points of C contains the ball around the origin that
-reaches its nearest facet, which no translation shorter than that radius leaves: a lower bound of the depth.
-h along the normal of a facet is an upper bound. All facets nearer than the upper bound get their support
-points as new vertices, until none is left that is not a facet of C.
+Conference (2001). With C = A - B and its support function h, the depth is the least h(n) over all unit n:
+moved by h(n) along -n, a is free of b. The hull of points of C, a polytope, lies inside C. The distance of
+its nearest facet from the origin is a lower bound of the depth, because no shorter translation moves the
+origin out of C; h along the normal of any facet is an upper bound. The support point of each facet nearer
+than the upper bound becomes a vertex, until these facets belong to the surface of C.
 """
 
 from __future__ import annotations
@@ -73,8 +73,8 @@ class _Candidate(NamedTuple):
 def penetration(a: Core, b: Core) -> Penetration:
     """Return the depth of two cores that touch or overlap."""
     polytope = Polytope(a, b)
-    if polytope.thin is not None:
-        return polytope.flat_result(polytope.thin)
+    if polytope.flat_normal is not None:
+        return polytope.flat_result(polytope.flat_normal)
     for _ in range(MAX_EXPANSIONS):
         if not polytope.find_facets() or not polytope.expand() or len(polytope.on_a) > MAX_VERTICES:
             break
@@ -93,14 +93,14 @@ class Polytope:
         # Qhull's tolerances are absolute: a hull is the same in coordinates in which it is as thick as long.
         scaled = np.eye(3)
         for _ in range(ROUNDS_OF_SCALING):
-            self._add(_START @ scaled)
+            self._add(FIRST_DIRECTIONS @ scaled)
             self._center = self._points.mean(axis=0)
             _, _, axes = np.linalg.svd(self._points - self._center, full_matrices=False)
             thickness = np.ptp((self._points - self._center) @ axes.T, axis=0)
             scaled = axes / np.maximum(thickness, FLATNESS * self._size)[:, None]
             if thickness[2] > 0.1 * thickness[0]:
                 break
-        self.thin = axes[2] if thickness[2] <= FLATNESS * max(self._size, thickness[0]) else None
+        self.flat_normal = axes[2] if thickness[2] <= FLATNESS * max(self._size, thickness[0]) else None
         self._axes = scaled
         directions = np.concatenate([a.R.T, b.R.T, -a.R.T, -b.R.T])
         heights = np.einsum("ij,ij->i", self._add(directions), directions)
@@ -235,7 +235,7 @@ def _normals(corners: Floats) -> Floats:
     return np.asarray(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
 
 
-_START: Floats = np.array(
+FIRST_DIRECTIONS: Floats = np.array(
     [
         [x, y, z]
         for x in (-1.0, 0.0, 1.0)

@@ -22,16 +22,16 @@ from dynx.world.overlaps import overlaps_of
 from dynx.world.start_notes import joints_beyond_limits, violations
 from dynx.world.state import WorldState
 
-SPEED_CHANGE = 100.0
+MIN_SPEED_CHANGE = 100.0
 """Change of a velocity [rad/s or m/s] in one step from which a torque or force is a likely cause."""
 
-MASS_RATIO = 1e4
+MIN_MASS_RATIO = 1e4
 """Ratio of the masses of two bodies that touch from which it is a likely cause."""
 
-SINGULAR = 1e10
+MIN_SINGULAR_CONDITION = 1e10
 """Condition number of a mass matrix, with its diagonal scaled to 1, from which it is a likely cause."""
 
-MOST_CAUSES = 3
+MAX_CAUSES = 3
 """Largest number of causes in a message."""
 
 
@@ -73,12 +73,12 @@ def likely_causes(engine: WorldEngine, state: WorldState, loads: LastLoads, h: f
     except DynxError:
         # The message of the failure itself matters more than its explanation.
         causes = []
-    return causes[:MOST_CAUSES] or ["the step is too long for the motion; try a smaller dt or more substeps"]
+    return causes[:MAX_CAUSES] or ["the step is too long for the motion; try a smaller dt or more substeps"]
 
 
 def _gravity(layout: Layout, h: float) -> Iterator[str]:
     change = h * float(np.linalg.norm(layout.gravity))
-    if change > SPEED_CHANGE:
+    if change > MIN_SPEED_CHANGE:
         yield f"gravity changes velocities by {change:.3g} m/s in one step of {h:.3g} s"
 
 
@@ -93,7 +93,7 @@ def _gains_and_torques(layout: Layout, state: WorldState, loads: LastLoads, h: f
         if load.torque is not None and len(mobility):
             change = h * np.abs(load.torque) * mobility
             k = int(np.argmax(change))
-            if change[k] > SPEED_CHANGE:
+            if change[k] > MIN_SPEED_CHANGE:
                 where = shown(f"{robot.name}/{names[k - base]}") if k >= base else f"the base of {robot.name}"
                 yield (
                     f"the torque of {load.torque[k]:.3g} on {where} changes its velocity by "
@@ -125,7 +125,7 @@ def _wrenches(layout: Layout, loads: LastLoads, h: float) -> Iterator[str]:
     for k, wrench in loads.wrenches.items():
         body = layout.bodies[k]
         change = h * float(np.linalg.norm(wrench[:3])) / body.mass
-        if change > SPEED_CHANGE:
+        if change > MIN_SPEED_CHANGE:
             yield f"a force changes the velocity of {shown(body.name)} by {change:.3g} m/s in one step"
 
 
@@ -137,7 +137,7 @@ def _overlaps(engine: WorldEngine) -> Iterator[str]:
 def _light_parts(engine: WorldEngine) -> Iterator[str]:
     """Yield the pair of bodies in contact whose masses differ the most."""
     layout = engine.layout
-    worst = (MASS_RATIO, "", "")
+    worst = (MIN_MASS_RATIO, "", "")
     for point in engine.contacts():
         pair = [
             (mass, layout.colliders[k].name)
@@ -161,7 +161,7 @@ def _singular_robots(layout: Layout, state: WorldState) -> Iterator[str]:
         d = 1.0 / np.sqrt(np.maximum(M.diagonal(), np.finfo(float).tiny))
         sizes, directions = np.linalg.eigh(d[:, None] * M * d)
         base = len(M) - len(moving)
-        if sizes[-1] > SINGULAR * sizes[0]:
+        if sizes[-1] > MIN_SINGULAR_CONDITION * sizes[0]:
             share = np.abs(directions[base:, 0])
             names = [f"{robot.name}/{moving[k]}" for k in np.argsort(-share)[:2] if share[k] > 0.1]
             yield (

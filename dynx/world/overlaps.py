@@ -10,10 +10,10 @@ from dynx.world.engine import WorldEngine
 from dynx.world.geometry.boxes import shape_box
 from dynx.world.layout import Collider
 
-DEPTH = 1e-3
+MIN_DEPTH = 1e-3
 """Depth [m] from which two parts count as overlapping: at rest, parts sink into one another by less."""
 
-SHARE_OF_SIZE = 0.05
+MIN_DEPTH_SHARE = 0.05
 """Depth from which two smaller parts do, relative to the shortest edge of the smaller one's box."""
 
 
@@ -35,7 +35,7 @@ def overlaps_of(engine: WorldEngine) -> tuple[Overlap, ...]:
     found = [
         Overlap(colliders[a].name, colliders[b].name, depth)
         for (a, b), depth in deepest.items()
-        if depth > min(DEPTH, SHARE_OF_SIZE * min(_shortest_edge(colliders[k]) for k in (a, b)))
+        if depth > min(MIN_DEPTH, MIN_DEPTH_SHARE * min(_shortest_edge(colliders[k]) for k in (a, b)))
     ]
     return tuple(sorted(found, key=lambda overlap: -overlap.depth))
 

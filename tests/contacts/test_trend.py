@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.contacts.trend import LEAST_ORDER, judge
+from dynx.contacts.trend import MIN_ORDER, judge
 
 STEPS = (4e-3, 2e-3, 1e-3)
 TOLERANCE = 1e-6
@@ -52,7 +52,7 @@ def test_a_fall_to_the_tolerance_is_a_fall_whatever_its_order() -> None:
 
 def test_an_error_that_stops_falling_stays() -> None:
     assert judge(STEPS, [8e-2, 2e-2, 1.9e-2], TOLERANCE).kind == "stays"
-    assert judge(STEPS, [8e-2, 2e-2, 2e-2 / 2**LEAST_ORDER * 0.999], TOLERANCE).kind == "falls"
+    assert judge(STEPS, [8e-2, 2e-2, 2e-2 / 2**MIN_ORDER * 0.999], TOLERANCE).kind == "falls"
 
 
 def test_one_step_shows_no_order_and_nan_is_an_error() -> None:

@@ -1,1 +1,1 @@
-"""``dynx contacts``: how far each engine is from mechanics where bodies touch."""
+"""``dynx contacts``: errors of each engine where bodies touch, against closed forms, and their causes."""

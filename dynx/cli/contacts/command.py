@@ -42,8 +42,8 @@ def steps(text: str) -> tuple[float, ...]:
         "cases",
         type=name_list,
         metavar="A,B,C",
-        help="Cases to run, of which every figure is printed (default: all cases, with one figure of each "
-        "engine).",
+        help="Cases to run; all of their figures are printed (default: all cases, and of each case the worst "
+        "figure of every engine).",
     ),
     click.option(
         "--dt",
@@ -83,12 +83,13 @@ def steps(text: str) -> tuple[float, ...]:
 )
 @runs("dynx.cli.contacts.run:contacts")
 def contacts() -> None:
-    """Measure how far engines are from mechanics where bodies touch, and why.
+    """Measure the errors of engines where bodies touch, against closed forms, and find their causes.
 
-    Each case is a scene whose motion or force is known in closed form. It is run by every engine at several
-    steps. An error falls with the step, at the order printed; or it is attributed to a setting of the engine,
-    under which it is removed or falls, as running again shows; or the engine lacks the coefficient; or it is
-    unexplained. Errors are relative, those of the table at the largest and the smallest step.
+    Each case is a scene whose motion or forces are known in closed form. Every engine runs it at several
+    steps, and each figure gets a verdict: its error is within the tolerance; it falls with the step, at the
+    order printed; a rerun with another setting of the engine removes it or makes it fall; the engine cannot
+    avoid it, because it lacks the coefficient; or it is unexplained. The table has the relative errors at the
+    largest and at the smallest step.
 
     Exit code 0 if every error is explained, 1 if one is not, if an engine failed or if nothing was measured,
     2 for input that cannot be used. Ctrl-C ends the run with the results so far and exit code 130.

@@ -82,21 +82,22 @@ def causes(cases: Sequence[Entry]) -> list[Cause]:
     return [
         Cause(
             *key,
-            tuple(each for name, figures in by_case.items() for each in _caused(name, figures)),
+            tuple(each for name, figures in by_case.items() for each in _caused_errors(name, figures)),
         )
         for key, by_case in sorted(found.items())
     ]
 
 
-def _caused(case: str, figures: Sequence[Entry]) -> list[CausedErrors]:
+def _caused_errors(case: str, figures: Sequence[Entry]) -> list[CausedErrors]:
     """Return the errors of figures of a case, those with the same outcome together."""
     by_outcome: dict[str, list[Entry]] = defaultdict(list)
     for each in figures:
         by_outcome[each["attribution"]["outcome"]].append(each)
-    return [_largest(case, found) for found in by_outcome.values()]
+    return [_largest_errors(case, found) for found in by_outcome.values()]
 
 
-def _largest(case: str, figures: Sequence[Entry]) -> CausedErrors:
+def _largest_errors(case: str, figures: Sequence[Entry]) -> CausedErrors:
+    """Return the largest errors of figures of a case that have the same outcome."""
     found = [each["attribution"] for each in figures]
     before, after = (
         tuple(

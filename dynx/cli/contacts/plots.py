@@ -31,19 +31,19 @@ LEFT, RIGHT, TOP, BOTTOM = 46.0, 14.0, 8.0, 30.0
 DECADES_BELOW = 2
 """Decades below the tolerance that are drawn: smaller errors lie on the lower edge."""
 
-LARGEST = 1e3
+MAX_ERROR = 1e3
 """Error from which on errors lie on the upper edge, also those that are not finite."""
 
-INSIDE = 0.8
-"""Part of the axis of steps between the smallest and the largest."""
+STEP_AXIS_SHARE = 0.8
+"""Share of the length of the axis of steps that lies between the smallest and the largest step."""
 
-ASIDE = 5.0
-"""Distance from one engine to the next, so that equal errors do not cover each other [pixels]."""
+ENGINE_OFFSET = 5.0
+"""Shift of the line of one engine against the next, so that equal errors do not cover each other [pixels]."""
 
-BELOW = 10.0
+TRIANGLE_OFFSET = 10.0
 """Distance of an order triangle below its line [pixels]."""
 
-APART_X, APART_Y = 40.0, 14.0
+MIN_LABEL_DISTANCE_X, MIN_LABEL_DISTANCE_Y = 40.0, 14.0
 """Distances between the labels of two order triangles that do not touch [pixels]."""
 
 MAX_LABELS = 6
@@ -112,7 +112,7 @@ def _plot(figures: Sequence[Entry], steps: Sequence[float], engines: Sequence[st
     lines: list[Line] = []
     for figure in figures:
         number = engines.index(figure["engine"])
-        aside = ASIDE * (number - 0.5 * (len(engines) - 1))
+        aside = ENGINE_OFFSET * (number - 0.5 * (len(engines) - 1))
         points = axes.points(figure["errors"], aside)
         cause = figure["attribution"]
         changed = () if cause is None else axes.points(cause["errors"][-1], aside)
@@ -137,12 +137,15 @@ def _triangle(
     for (right, upper), (left, lower) in intervals if order <= MAX_ORDER else ():
         half = 0.25 * (right - left)
         rise = axes.slope(order) * 2.0 * half
-        x, y = 0.5 * (left + right), 0.5 * (upper + lower) + BELOW
+        x, y = 0.5 * (left + right), 0.5 * (upper + lower) + TRIANGLE_OFFSET
         corners = ((x - half, y + 0.5 * rise), (x + half, y - 0.5 * rise), (x + half, y + 0.5 * rise))
         found = Triangle(
             " ".join(f"{a:.1f},{b:.1f}" for a, b in corners), f"{order:.1f}", x + half + 3.0, y + 4.0
         )
-        free = all(abs(found.x - each.x) > APART_X or abs(found.y - each.y) > APART_Y for each in placed)
+        free = all(
+            abs(found.x - each.x) > MIN_LABEL_DISTANCE_X or abs(found.y - each.y) > MIN_LABEL_DISTANCE_Y
+            for each in placed
+        )
         if free and corners[0][1] <= HEIGHT - BOTTOM:
             return found
     return None
@@ -162,7 +165,7 @@ class _Axes:
         tolerance = min(each["tolerance"] for each in figures)
         rows = [each["errors"] for each in figures]
         rows += [each["attribution"]["errors"][-1] for each in figures if each["attribution"] is not None]
-        errors = [min(as_number(error), LARGEST) for row in rows for error in row]
+        errors = [min(as_number(error), MAX_ERROR) for row in rows for error in row]
         least = tolerance * 10.0**-DECADES_BELOW
         low = math.floor(math.log10(max(min([*errors, tolerance]), least)))
         high = math.ceil(math.log10(max([*errors, 10.0 * tolerance])))
@@ -175,7 +178,7 @@ class _Axes:
     def y(self, error: float | None) -> float:
         """Return the place of an error, on an edge where it lies outside [pixels]."""
         number = as_number(error)
-        power = self.high if number >= LARGEST else math.log10(max(number, 10.0**self.low))
+        power = self.high if number >= MAX_ERROR else math.log10(max(number, 10.0**self.low))
         part = (min(power, self.high) - self.low) / (self.high - self.low)
         return HEIGHT - BOTTOM - part * (HEIGHT - TOP - BOTTOM)
 
@@ -189,7 +192,7 @@ class _Axes:
 
     def slope(self, order: float) -> float:
         """Return the pixels by which a line of that order rises for each pixel to the right."""
-        decade_x = INSIDE * (WIDTH - LEFT - RIGHT) / self._span
+        decade_x = STEP_AXIS_SHARE * (WIDTH - LEFT - RIGHT) / self._span
         decade_y = (HEIGHT - TOP - BOTTOM) / (self.high - self.low)
         return order * decade_y / decade_x
 
@@ -204,4 +207,4 @@ class _Axes:
         return math.log10(max(self.steps) / min(self.steps))
 
     def _part(self, dt: float) -> float:
-        return 0.5 - 0.5 * INSIDE + INSIDE * math.log10(dt / min(self.steps)) / self._span
+        return 0.5 - 0.5 * STEP_AXIS_SHARE + STEP_AXIS_SHARE * math.log10(dt / min(self.steps)) / self._span

@@ -9,7 +9,7 @@ from typing import Any
 Entry = Mapping[str, Any]
 
 RANKS = ("within", "falls", "cannot", "setting", "unexplained")
-"""Verdicts in the order in which they deserve a look."""
+"""Verdicts in ascending order of how much they deserve a look."""
 
 VERDICT_MEANINGS = {
     "within": "the error is within the tolerance at every step",
@@ -23,7 +23,7 @@ PAIR_CASES = ("friction_pairs", "restitution_pairs")
 """Cases whose measured values are the effective coefficients of two materials."""
 
 MAX_ORDER = 9.0
-"""Largest order that is written as a number: beyond it an error vanishes from one step to the next."""
+"""Largest order that is written as a number: above it the error is gone from one step to the next."""
 
 
 def worst_figure(figures: Sequence[Entry]) -> Entry:

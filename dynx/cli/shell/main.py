@@ -26,7 +26,7 @@ COMMANDS = {
     ),
     "contacts": LazyCommand(
         "dynx.cli.contacts.command:contacts",
-        "Measure how far contacts of engines are from mechanics, and why.",
+        "Measure the errors of contacts against closed forms, and find their causes.",
     ),
     "bench": LazyCommand("dynx.cli.bench.command:bench", "Time the engines on a robot and this machine."),
     "explain": LazyCommand(

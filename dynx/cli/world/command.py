@@ -71,8 +71,8 @@ from dynx.cli.shell.options import GroupedCommand, group, json_option, name_list
         "--export",
         "export_path",
         metavar="FILE",
-        help="File for the scene in another format, which is not run then: .xml or .mjcf (MJCF), .toml, "
-        ".json, or .urdf, with a file for each robot and body, whose name stands before the suffix.",
+        help="File to which the scene is written in another format, instead of a run: .xml or .mjcf (MJCF), "
+        ".toml, .json, or .urdf, with a file for each robot and body, whose name stands before the suffix.",
     ),
     click.option(
         "--quiet", is_flag=True, help="No tables and no progress: only errors, files and the exit code."

@@ -1,1 +1,1 @@
-"""Cases of dynx, a module each."""
+"""Cases of dynx, one in each module."""

@@ -22,7 +22,7 @@ HEIGHTS = tuple(0.5 * G * (0.25 + 0.4e-3 * k) ** 2 for k in range(10))
 
 REBOUNDS = 3
 
-LEAST_HEIGHT = 0.007
+MIN_HEIGHT = 0.007
 """Height relative to that of the fall below which a ball is not counted as flying."""
 
 
@@ -52,6 +52,7 @@ class BouncingBall(Case):
         figures = []
         for n, found in enumerate(tops, 1):
             exact = RESTITUTION ** (2 * n)
+            # The RMS error of ten balls falls smoothly with the step, where that of a single one jumps.
             measured = exact + rms_deviation(found, exact)
             what = f"height of rebound {n}, relative to the fall"
             figures.append(Figure(what, measured, exact, "", exact, rests_on=("restitution",)))
@@ -69,6 +70,6 @@ def impact_time(n: int) -> float:
 
 
 def _flights(heights: Floats) -> list[slice]:
-    """Return the stretches in which a ball is higher than `LEAST_HEIGHT`."""
-    edges = np.flatnonzero(np.diff(heights > LEAST_HEIGHT, prepend=False, append=False))
+    """Return the stretches in which a ball is higher than `MIN_HEIGHT`."""
+    edges = np.flatnonzero(np.diff(heights > MIN_HEIGHT, prepend=False, append=False))
     return [slice(int(start), int(end)) for start, end in edges.reshape(-1, 2)]

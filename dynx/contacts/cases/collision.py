@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from dynx.contacts.case import Case, Figure
-from dynx.contacts.impacts import MOMENTS, farthest, speeds_after_collision
+from dynx.contacts.impacts import CONTACT_DELAYS, farthest, speeds_after_collision
 from dynx.model import Pose
 from dynx.world import Material, Scene, World, sphere
 
@@ -14,7 +14,7 @@ RADIUS = 0.05
 SPEED = 1.0
 """Speed of the moving ball [m/s]; the other is at rest, and its mass is 1 kg."""
 
-GAPS = tuple(0.1 + delay * SPEED for delay in MOMENTS)
+GAPS = tuple(0.1 + delay * SPEED for delay in CONTACT_DELAYS)
 """Distances [m] between the surfaces at the start."""
 
 DURATION = 0.25

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from dynx.contacts.case import Case, Figure
-from dynx.contacts.impacts import MOMENTS, farthest
+from dynx.contacts.impacts import CONTACT_DELAYS, farthest
 from dynx.model import Pose
 from dynx.world import Material, Scene, World, sphere
 
@@ -23,7 +23,7 @@ gaps the balls collide two at a time. The gaps are longer than the way of a ball
 hundredths of a second, so that contacts that are springs are separate as well.
 """
 
-ROWS = len(MOMENTS)
+ROWS = len(CONTACT_DELAYS)
 DURATION = 0.5
 """Time [s] by which the last ball has been hit and has left its neighbour."""
 
@@ -41,7 +41,7 @@ class NewtonsCradle(Case):
         bodies = []
         for row in range(ROWS):
             for k in range(BALLS):
-                x = k * (2.0 * RADIUS + GAP) - (MOMENTS[row] * SPEED if k == 0 else 0.0)
+                x = k * (2.0 * RADIUS + GAP) - (CONTACT_DELAYS[row] * SPEED if k == 0 else 0.0)
                 twist = (SPEED if k == 0 else 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
                 pose = Pose((x, 0.5 * row, 0.0))
                 bodies.append(

@@ -28,7 +28,7 @@ class RestingDepth(Case):
     def measure(self, world: World, parameters: None) -> Sequence[Figure]:
         world.run(SETTLING)
         bodies = world.state.bodies
-        # A hundred-thousandth of the height is far less than any machine is accurate to.
+        # A hundred-thousandth of the height is far less than the accuracy of any machine.
         return [
             Figure(
                 f"depth of the {body.name}",

@@ -8,7 +8,7 @@ from itertools import combinations_with_replacement
 from typing import ClassVar, NamedTuple
 
 from dynx.contacts.case import Case, Figure
-from dynx.contacts.impacts import MOMENTS, farthest
+from dynx.contacts.impacts import CONTACT_DELAYS, farthest
 from dynx.contacts.scenes import ball_name, balls_above
 from dynx.model import Pose
 from dynx.world import Material, Scene, World, box
@@ -17,7 +17,7 @@ RADIUS = 0.05
 SPEED = 1.0
 """Speed of the balls towards the slab [m/s]."""
 
-HEIGHTS = tuple(0.1 + delay * SPEED for delay in MOMENTS)
+HEIGHTS = tuple(0.1 + delay * SPEED for delay in CONTACT_DELAYS)
 """Heights of the lowest points at the start [m]."""
 
 DURATION = 0.25

@@ -1,4 +1,4 @@
-"""A spinning ball that meets the ground: sliding, gripping and coming back."""
+"""A spinning ball that meets the ground: it slides, sticks or comes back."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from dynx.contacts.case import Case, Figure
-from dynx.contacts.impacts import MOMENTS, Throw, after_bounce, farthest
+from dynx.contacts.impacts import CONTACT_DELAYS, Throw, after_bounce, farthest
 from dynx.contacts.scenes import ball_name, balls_above
 from dynx.world import Material, Scene, World, ground
 
@@ -41,14 +41,14 @@ class SpinningBall(Case):
     def scene(self, parameters: Throw) -> Scene:
         material = Material(friction=parameters.friction, restitution=parameters.restitution)
         twist = (parameters.speed, 0.0, -parameters.fall, 0.0, -parameters.backspin / RADIUS, 0.0)
-        heights = [parameters.fall * (TIME + moment) for moment in MOMENTS]
+        heights = [parameters.fall * (TIME + moment) for moment in CONTACT_DELAYS]
         balls = balls_above(RADIUS, heights, material, spacing=(0.0, 0.5), twist=twist)
         # Without gravity a ball that does not rebound stays on the ground without a force.
         return Scene("spinning_ball", bodies=(ground(material=material), *balls), gravity=(0.0, 0.0, 0.0))
 
     def measure(self, world: World, parameters: Throw) -> Sequence[Figure]:
         world.run(DURATION)
-        twists = [world.state.bodies[ball_name(k)].twist.tolist() for k in range(len(MOMENTS))]
+        twists = [world.state.bodies[ball_name(k)].twist.tolist() for k in range(len(CONTACT_DELAYS))]
         rests_on = ("restitution",) if parameters.restitution else ()
         rebound = parameters.restitution * parameters.fall
         speed, backspin = after_bounce(parameters)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from dynx.distance.cores import Core, core_of
-from dynx.distance.distance import Distance, distance_of
+from dynx.distance.distance import Distance, distance_of_cores
 from dynx.model.geometry import HeightField, Mesh, Plane
 from dynx.spatial.scalar import Floats
 from dynx.world.geometry.height_field_distances import Field
@@ -93,4 +93,4 @@ def _distance(a: Solid, T_a: Floats, b: Solid, T_b: Floats, limit: float) -> Dis
     if b.field is not None:
         assert a.core is not None
         return b.field.distance(T_b, a.core, T_a, limit)
-    return distance_of(a.core, T_a, b.core, T_b, limit)
+    return distance_of_cores(a.core, T_a, b.core, T_b, limit)

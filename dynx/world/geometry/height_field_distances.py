@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynx.distance.cores import Core, HullCore
-from dynx.distance.distance import Distance, distance_of
+from dynx.distance.distance import Distance, distance_of_cores
 from dynx.model.geometry import HeightField
 from dynx.spatial.scalar import Floats
 
@@ -36,7 +36,7 @@ class Field:
         for number in candidates[np.argsort(bounds[candidates])].tolist():
             if bounds[number] >= limit:
                 break
-            found = distance_of(core, near, HullCore(self._prism(number)), np.eye(4), limit)
+            found = distance_of_cores(core, near, HullCore(self._prism(number)), np.eye(4), limit)
             if found is not None and found.distance <= limit:
                 best, limit = found, found.distance
         if best is None:
