@@ -24,8 +24,9 @@ from dynx.compiled.arguments import BatchArguments
 from dynx.compiled.call import CoupledCall, KernelCall, NumericCall, write_into
 from dynx.compiled.frames import chain_of, place_of
 from dynx.compiled.ik.kernels import applies, frame_solver
+from dynx.compiled.ik.race import PoseCall
 from dynx.compiled.ik.solver import MAX_RESTARTS, FrameSolver
-from dynx.compiled.ik.step import TargetKind
+from dynx.compiled.ik.step import POSES, TargetKind
 from dynx.compiled.kernels import (
     ON_CHAINS,
     chain_kernel,
@@ -35,7 +36,7 @@ from dynx.compiled.kernels import (
 )
 from dynx.compiled.looped.kernels import LOOPED, looped_kernel
 from dynx.compiled.simplification import has_physical_inertias, simplify_mechanism
-from dynx.ik import IKResult, Problem
+from dynx.ik import IKResult, Problem, SearchLimits
 from dynx.model import Model
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
 from dynx.simd.image import COMPILE_LOCK
@@ -45,6 +46,9 @@ from dynx.simd.threads import checked_threads
 from dynx.spatial.scalar import Floats
 
 Call = Callable[..., Floats]
+
+MAX_POSE_CALLS = 16
+"""Most combinations of a frame and options for which single poses have a call of their own."""
 
 
 class CompiledBackend(Backend):
@@ -75,6 +79,7 @@ class CompiledBackend(Backend):
         self._calls: dict[object, Call] = {}
         self._chain_kernels: dict[object, Kernel] = {}
         self._ik_solvers: dict[tuple[str, TargetKind], FrameSolver] = {}
+        self._pose_calls: dict[object, PoseCall] = {}
         # The same calls under the arguments of the public methods, which saves looking up names.
         self._public_calls: dict[object, Call] = {}
 
@@ -86,7 +91,8 @@ class CompiledBackend(Backend):
     def _release(self) -> None:
         # Calls in progress on other threads keep a reference to their kernels until they return.
         with COMPILE_LOCK:
-            self._public_calls, self._calls, self._chain_kernels, self._ik_solvers = {}, {}, {}, {}
+            self._public_calls, self._calls, self._chain_kernels = {}, {}, {}
+            self._ik_solvers, self._pose_calls = {}, {}
 
     # -- with `out` ---------------------------------------------------------------------------
 
@@ -190,6 +196,62 @@ class CompiledBackend(Backend):
         if joint_dynamics:
             M += self._joint_terms.armature
         return M
+
+    def inverse_kinematics(
+        self,
+        target: ArrayLike,
+        frame: str,
+        q0: ArrayLike | None = None,
+        *,
+        free: str | None = None,
+        point: ArrayLike | None = None,
+        position_tolerance: float = 1e-6,
+        rotation_tolerance: float = 1e-6,
+        max_iterations: int = 50,
+        max_restarts: int = 200,
+        rng: np.random.Generator | int | None = 0,
+        method: str = "dynx",
+    ) -> IKResult:
+        """Return the configuration that brings `frame` to `target`: a pose (..., 4, 4) or position (..., 3).
+
+        `dynx.ik.inverse_kinematics` describes the options. A kernel solves for a frame that 1 to 24 joints
+        move, on a fixed base, with at most 10,000 restarts; otherwise the solver of the other backends does.
+        """
+        call: PoseCall | None = None
+        key = None
+        counts = (type(max_iterations), type(max_restarts))
+        if q0 is None and point is None and isinstance(rng, int) and counts == (int, int):
+            tolerances = (position_tolerance, rotation_tolerance)
+            # A truth value equals a number, but is no seed.
+            key = (frame, free, *tolerances, max_iterations, max_restarts, rng, type(rng), method)
+            try:
+                call = self._pose_calls.get(key)
+            except TypeError:
+                key = None
+            found = None if call is None else call(target)
+            if found is not None:
+                return found
+        found = super().inverse_kinematics(
+            target,
+            frame,
+            q0,
+            free=free,
+            point=point,
+            position_tolerance=position_tolerance,
+            rotation_tolerance=rotation_tolerance,
+            max_iterations=max_iterations,
+            max_restarts=max_restarts,
+            rng=rng,
+            method=method,
+        )
+        if key is not None and call is None and free is None and method == "dynx" and isinstance(rng, int):
+            solver = self._ik_solvers.get((frame, POSES))
+            if solver is not None:
+                if len(self._pose_calls) >= MAX_POSE_CALLS:
+                    self._pose_calls = {}
+                limits = SearchLimits(position_tolerance, rotation_tolerance, max_iterations, max_restarts)
+                self._pose_calls[key] = solver.pose_call(limits, rng)
+        return found
 
     def solve_inverse_kinematics(self, problem: Problem) -> IKResult | None:
         """Solve a checked problem by a kernel; return None if none applies (`dynx.compiled.ik.kernels`)."""

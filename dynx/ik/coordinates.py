@@ -65,6 +65,10 @@ class FrameCoordinates:
         """Return the position limits of joint number k of the path, which may be infinite."""
         return float(self._low[k]), float(self._high[k])
 
+    def initial(self) -> Floats:
+        """Return the neutral configuration (nq,), moved into the limits."""
+        return self._model.clip(self._model.neutral())
+
     def values(self, q: Floats) -> list[float]:
         """Return the coordinates at configuration q (nq,)."""
         joints: list[float] = q[self._in_q].tolist()

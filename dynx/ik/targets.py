@@ -71,7 +71,7 @@ def checked_targets(target: ArrayLike, free: str | None = None) -> Targets:
         type(target) is np.ndarray
         and target.dtype == np.float64
         and target.shape == (4, 4)
-        and _is_rigid(target.tolist())
+        and is_rigid(target.tolist())
     ):
         return Targets(target[:3, 3], target[:3, :3])
     array = checked_entries("target", real_array("target", target))
@@ -114,7 +114,7 @@ def _refuse_likeness(positions: Floats) -> None:
         )
 
 
-def _is_rigid(T: list[list[float]]) -> bool:
+def is_rigid(T: list[list[float]]) -> bool:
     """Return whether one pose is a rigid transform to rounding; on floats, ten times as fast as arrays."""
     a, b, c, bottom = T
     if bottom != [0.0, 0.0, 0.0, 1.0] or not math.hypot(a[3], b[3], c[3]) < MAX_MAGNITUDE:

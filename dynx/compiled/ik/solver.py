@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from dynx.compiled.ik.race import PoseCall, Race
 from dynx.compiled.ik.step import SETTINGS, Memory, TargetKind
-from dynx.ik import IKResult, Kinematics, Problem, improved
+from dynx.ik import IKResult, Kinematics, Problem, SearchLimits, checked_targets, improved
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.simd.iteration import IterationKernel
 from dynx.spatial.scalar import Floats
@@ -30,7 +31,7 @@ class FrameSolver:
         self._memory = Memory(coordinates.count)
         self._seeded: tuple[object, Floats] = (None, np.empty(0))
         # Workspaces of single targets that no call uses at the moment.
-        self._free: list[_Race] = []
+        self._free: list[Race] = []
 
     def solve(self, problem: Problem, kinematics: Kinematics) -> IKResult:
         """Solve all samples; `kinematics` improve what is best where a target is not reached."""
@@ -46,6 +47,13 @@ class FrameSolver:
             q, np.asarray(success), errors[0, ...], errors[1, ...], counts[0, ...], counts[1, ...]
         )
         return result if result else improved(result, problem, kinematics)
+
+    def pose_call(self, limits: SearchLimits, rng: int) -> PoseCall:
+        """Return a function of single poses without q0, with these options."""
+        q0 = self._coordinates.initial()
+        problem = Problem("", checked_targets(np.eye(4)), None, q0, False, (), limits, rng)
+        starts = self._starts(problem)
+        return PoseCall(self._kernel, self._memory, starts, problem, self._coordinates.indices)
 
     def _batch(self, problem: Problem, starts: Floats) -> Floats:
         """Return the memory's results (n, n_results) of all samples."""
@@ -71,7 +79,7 @@ class FrameSolver:
         except IndexError:
             race = None
         if race is None or race.starts is not starts:
-            race = _Race(self._kernel, self._kind, self._memory, starts)
+            race = Race(self._kernel, self._kind, self._memory, starts)
         found = race.solve(problem, self._coordinates.indices)
         self._free.append(race)
         return found
@@ -86,39 +94,3 @@ class FrameSolver:
             starts = self._coordinates.starts(np.random.default_rng(rng), count)
             self._seeded = (rng, count), starts
         return starts
-
-
-class _Race:
-    """Workspace for one target at a time, whose tasks are the starts; not safe for several threads."""
-
-    def __init__(self, kernel: IterationKernel, kind: TargetKind, memory: Memory, starts: Floats) -> None:
-        count, n = starts.shape
-        self.starts = starts
-        self._n, self._kind = n, kind
-        self._x = starts.copy()
-        self._target, self._near, self._point = np.zeros(kind.size), np.zeros(n), np.zeros(3)
-        self._settings = np.zeros(len(SETTINGS))
-        self._result = np.zeros((count, memory.n_results))
-        shared = [memory.initial, self._target, self._near] + [self._point] * kind.point
-        tasks = [self._x, *(np.broadcast_to(row, (count, len(row))) for row in shared)]
-        self._run = kernel.bind_race(tasks, self._result, self._settings, starts)
-
-    def solve(self, problem: Problem, indices: list[int]) -> Floats:
-        """Return the memory's results (1, n_results) of the first start that reaches the target, or of the
-        best one, with the iterations and restarts of all starts up to it."""
-        limits, n = problem.limits, self._n
-        q0 = problem.q0.reshape(-1)
-        self._near[:] = q0[indices]
-        self._x[0] = self._near if problem.begins_at_q0 else self.starts[0]
-        self._target[:] = self._kind.rows(problem)[0]
-        if problem.point is not None:
-            self._point[:] = problem.point
-        # A task that is a start does not restart.
-        self._settings[:3] = limits.position_tolerance, limits.rotation_tolerance, limits.max_iterations
-        completed = self._run()
-        last, done = completed - 1, self._result[:completed]
-        if not done[last, n + 2]:
-            last = int(np.argmin(done[:, -1]))
-        found: Floats = done[last : last + 1].copy()
-        found[0, n + 3], found[0, n + 4] = done[:, n + 3].sum(), completed - 1
-        return found

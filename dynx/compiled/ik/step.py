@@ -77,6 +77,10 @@ class TargetKind:
         return np.ascontiguousarray(np.broadcast_to(flat, (*problem.batch, self.size))).reshape(-1, self.size)
 
 
+POSES = TargetKind(position=True, rotation=True, point=False)
+"""Kind of the targets that are poses of the frame itself."""
+
+
 @dataclass(frozen=True)
 class Memory:
     """Layout of the variables of a task: result, then what the next steps need."""

@@ -1,0 +1,110 @@
+"""Inverse kinematics in kernels: the same results alone, in batches, on threads and for repeated calls."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from dynx.backends import Backend, backend
+from dynx.errors import ArgumentError, ClosedError
+from dynx.ik import IKResult
+from dynx.model import Model
+from dynx.model.loading import load
+from dynx.spatial.scalar import Floats
+from dynx.spatial.se3 import pose_error
+from dynx.testing.strategies import configurations, models
+from tests.oracles.closed_form import MODELS
+
+ARM = load(MODELS / "seven_axis_arm.urdf")
+FRAME = ARM.frame_names[-1]
+TOLERANCE = 1e-6
+FIELDS = ("q", "success", "position_error", "rotation_error", "iterations", "restarts")
+
+
+def reachable(engine: Backend, count: int, seed: int = 5) -> Floats:
+    return engine.forward_kinematics(engine.model.random(seed, count), FRAME)
+
+
+def assert_equal(found: IKResult, expected: IKResult, index: int | slice | tuple[()] = ()) -> None:
+    for field in FIELDS:
+        np.testing.assert_array_equal(getattr(found, field), getattr(expected, field)[index], field)
+
+
+def test_a_pose_of_a_batch_has_the_result_that_it_has_alone() -> None:
+    with backend("compiled", ARM, threads=1) as engine:
+        targets = reachable(engine, 40)
+        # Some targets out of reach.
+        targets[::7, :3, 3] += 10.0
+        together = engine.inverse_kinematics(targets, FRAME, max_restarts=20)
+        assert together.success.any()
+        assert not together.success[::7].any()
+        for _ in range(2):
+            for k in range(len(targets)):
+                alone = engine.inverse_kinematics(targets[k], FRAME, max_restarts=20)
+                assert_equal(alone, together, k)
+        part = engine.inverse_kinematics(targets[5:9], FRAME, max_restarts=20)
+        assert_equal(part, together, slice(5, 9))
+
+
+def test_results_do_not_depend_on_threads() -> None:
+    with backend("compiled", ARM, threads=1) as one, backend("compiled", ARM, threads=3) as three:
+        targets = reachable(one, 700)
+        assert_equal(three.inverse_kinematics(targets, FRAME), one.inverse_kinematics(targets, FRAME))
+
+
+def test_seeds_and_generators() -> None:
+    with backend("compiled", ARM) as engine:
+        target = reachable(engine, 1)[0]
+        by_seed = [engine.inverse_kinematics(target, FRAME, rng=3) for _ in range(3)]
+        for found in by_seed[1:]:
+            assert_equal(found, by_seed[0])
+        generator = np.random.default_rng(3)
+        assert_equal(engine.inverse_kinematics(target, FRAME, rng=generator), by_seed[0])
+        assert engine.inverse_kinematics(target, FRAME, rng=None).success
+        seeds = {engine.inverse_kinematics(target, FRAME, rng=seed).q.tobytes() for seed in range(30)}
+    assert len(seeds) > 1
+
+
+def test_options_of_an_earlier_call_do_not_count() -> None:
+    with backend("compiled", ARM) as engine:
+        target = reachable(engine, 1)[0]
+        for _ in range(2):
+            assert engine.inverse_kinematics(target, FRAME).success
+            assert engine.inverse_kinematics(target[:3, 3], FRAME).rotation_error == 0.0
+            coarse = engine.inverse_kinematics(target, FRAME, position_tolerance=0.1, rotation_tolerance=0.1)
+            assert coarse.position_error > TOLERANCE
+            for option in ({"rng": True}, {"max_restarts": True}, {"position_tolerance": [1.0]}):
+                with pytest.raises(ArgumentError):
+                    engine.inverse_kinematics(target, FRAME, **option)
+            with pytest.raises(ArgumentError):
+                engine.inverse_kinematics(np.diag([1.0, 1.0, -1.0, 1.0]), FRAME)
+    with pytest.raises(ClosedError):
+        engine.inverse_kinematics(target, FRAME)
+
+
+@settings(max_examples=15)
+@given(st.data())
+def test_random_robots_are_solved_within_limits(data: st.DataObject) -> None:
+    """A pose that a random configuration takes is reached, unless the generic solver fails as well."""
+    model = data.draw(models(max_links=7, base="fixed"))
+    frame = data.draw(st.sampled_from(model.frame_names))
+    q = np.stack([data.draw(configurations(model, within_limits=True)) for _ in range(3)])
+    with backend("compiled", model) as engine, backend("pinocchio", model) as other:
+        targets = other.forward_kinematics(q, frame)
+        found = engine.inverse_kinematics(targets, frame)
+        expected = other.inverse_kinematics(targets, frame)
+        assert (found.success | ~expected.success).all()
+        check(model, other.forward_kinematics(found.q, frame), targets, found)
+
+
+def check(model: Model, reached: Floats, targets: Floats, found: IKResult) -> None:
+    """Check errors and limits by the poses of another engine."""
+    rounding = 1e-9 * (1.0 + np.abs(targets[:, :3, 3]).max())
+    position, rotation = (np.linalg.norm(error, axis=-1) for error in pose_error(targets, reached))
+    assert (position[found.success] <= TOLERANCE + rounding).all()
+    # The cosine of a small angle is insensitive to it.
+    assert (rotation[found.success] <= TOLERANCE + np.sqrt(np.finfo(float).eps)).all()
+    assert (found.q >= model.lower).all()
+    assert (found.q <= model.upper).all()
