@@ -177,9 +177,7 @@ def checked_torques(
         raise ArgumentError(f"torques is of type {type(torques).__name__}; wanted a dict by robot")
     checked = {}
     for name, tau in torques.items():
-        number = robots.get(name)
-        if number is None:
-            number = robot_number(name, robots)
+        number = robots[name] if name in robots else robot_number(name, robots)
         nv = layouts[number].model.nv
         if type(tau) is not np.ndarray or tau.dtype is not _FLOAT64 or tau.shape != (nv,):
             tau = real_array(f"torque of {name}", tau)

@@ -34,6 +34,7 @@ class Motion:
         self._build = build
         self._dt = dt
         self._substeps = substeps
+        self._most = max(1, STEPS_BETWEEN_CHECKS // substeps)
         self._steps, self._start, self._unchecked = 0, 0.0, 0
         self._interrupted = False
         self._engine: WorldEngine | None = build()
@@ -72,16 +73,15 @@ class Motion:
         assert self._state is not None
         return self._state
 
-    def advance(self, n: int, act: Act | None) -> None:
-        """Take `n` steps of `dt`; `act` applies the loads before each step of the engine.
+    def advance(self, engine: WorldEngine, n: int, act: Act | None) -> None:
+        """Take `n` steps of `dt` in `engine`, the present one; `act` applies the loads before each step of
+        the engine.
 
         Raises DivergedError and the errors of the engine.
         """
-        engine = self.engine
-        most = max(1, STEPS_BETWEEN_CHECKS // self._substeps)
         try:
             while n:
-                part = min(n, most)
+                part = n if n < self._most else self._most
                 count = part * self._substeps
                 if act is None:
                     engine.step(count)

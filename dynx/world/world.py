@@ -138,14 +138,14 @@ class World:
         read, or at a later one at most 1,000 steps old.
         """
         engine = self._motion.engine
-        if not isinstance(wrenches, tuple | list):
+        if type(wrenches) is not tuple and not isinstance(wrenches, tuple | list):
             raise ArgumentError(f"wrenches is of type {type(wrenches).__name__}; wanted a list of Wrench")
         if type(n) is not int or n < 1:
             n = whole_number("n", n, 1)
         if self._scene_motors:
             motors = with_scene_motors(self._scene_motors, torques, motors)
         held = not motors and not wrenches and self._commands.hold(engine, torques, n * self.substeps)
-        self._motion.advance(n, None if held else self._commands.plan(torques, motors, wrenches))
+        self._motion.advance(engine, n, None if held else self._commands.plan(torques, motors, wrenches))
 
     def run(
         self,

@@ -76,6 +76,7 @@ class BulletRobot:
         # Looked up once, because every step applies torques.
         self._control = client.engine.setJointMotorControlArray
         self._torque_control = client.engine.TORQUE_CONTROL
+        self._body, self._links, self._number = self.object.body, self.object.links, client.number
         self.motor: MotorCommand | None = None
         stiff = self._is_stiff(layout)
         self.corrected = self._coupling is not None or stiff
@@ -133,10 +134,12 @@ class BulletRobot:
 
     def set_torques(self, tau: Floats) -> bool:
         """Keep the generalised force for `apply`; return whether it has an effect."""
-        numbers = tau.tolist()
-        base = self._base
-        self._wrench = np.array(tau[:6]) if base and any(numbers[:6]) else None
-        forces = numbers[base:]
+        forces = tau.tolist()
+        self._wrench = None
+        if self._base:
+            if any(forces[:6]):
+                self._wrench = np.array(tau[:6])
+            del forces[:6]
         if not any(forces):
             self._forces = None
             return self._wrench is not None
@@ -152,11 +155,11 @@ class BulletRobot:
         """Apply the generalised force during the next step. The engine's own errors are not translated."""
         if self._forces is not None:
             self._control(
-                self.object.body,
-                self.object.links,
+                self._body,
+                self._links,
                 self._torque_control,
                 forces=self._forces,
-                physicsClientId=self._client.number,
+                physicsClientId=self._number,
             )
         if self._wrench is not None:
             q, _ = self.object.root.coordinates(self.object.base_state(), self.near)
