@@ -14,7 +14,7 @@ from dynx.files.reading import printable, read_file
 from dynx.model.elements import IDENTITY, Pose
 from dynx.model.library import find, robots
 from dynx.model.model import STANDARD_GRAVITY, Base, Model
-from dynx.model.package_paths import StrPath
+from dynx.model.package_paths import StrPath, data_folders, environment_folders, resolve_package
 from dynx.model.urdf.geometry import urdf_geometry
 from dynx.model.urdf.reader import read_urdf
 from dynx.model.xacro_reading import expand_xacro
@@ -39,6 +39,8 @@ def load(
     - a path: any `os.PathLike`, or a `str` with a separator or with the suffix .urdf, .xacro or .xml (.xacro
       needs the extra ``xacro``, which evaluates expressions of a file as Python code: expand only files that
       you trust). Such a string is never looked up as a name;
+    - ``package://NAME/FILE``: a file of a package in `package_dirs`, in ROS_PACKAGE_PATH or
+      AMENT_PREFIX_PATH, or of the Python package ``pybullet_data``; never one outside the package;
     - the name of a robot in the library, see ``dynx robots``. It takes precedence over a file of that name in
       the working directory; write ``./name`` for the file. A name that is not in the library may be a file;
     - a `Model`, whose base, its pose and gravity are kept unless they are given.
@@ -87,16 +89,21 @@ def read_description(
         return x, "<string>", None
     if not isinstance(x, str | os.PathLike):
         raise ArgumentError(f"cannot load {type(x).__name__}; wanted a path, URDF text, a name or a Model")
-    path = _path_of(x)
+    path = _path_of(x, package_dirs)
     name = PurePath(path).name.split(".")[0]
     if path.endswith(".xacro"):
         return expand_xacro(path, package_dirs), printable(path), name
     return read_file(path), printable(path), name
 
 
-def _path_of(x: StrPath) -> str:
+def _path_of(x: StrPath, package_dirs: Iterable[StrPath]) -> str:
     if not isinstance(x, str):
         return os.fsdecode(os.fspath(x))
+    if x.startswith("package://"):
+        try:
+            return str(resolve_package(x, [*package_dirs, *environment_folders(), *data_folders()]))
+        except DescriptionError as error:
+            raise RobotNotFoundError(str(error)) from None
     separators = {os.sep, os.altsep or os.sep, "/"}
     if any(separator in x for separator in separators) or x.endswith(_SUFFIXES):
         path = os.path.expanduser(x)

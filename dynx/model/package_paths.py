@@ -1,14 +1,33 @@
-"""Resolution of ``package://`` paths within given folders."""
+"""Resolution of ``package://`` paths within given folders, and the folders in which packages are known."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterable
+from importlib.util import find_spec
 from pathlib import Path
 
 from dynx.errors import DescriptionError, shown
 
 StrPath = str | os.PathLike[str]
+
+DATA_PACKAGES = ("pybullet_data",)
+"""Python packages of robots and meshes, found without being imported."""
+
+_SEARCH_PATHS = (("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share"))
+"""Environment variables that list folders, and where packages lie in each of these."""
+
+
+def data_folders() -> list[Path]:
+    """Return the folders of `DATA_PACKAGES` that are installed."""
+    specs = (find_spec(name) for name in DATA_PACKAGES)
+    return [Path(os.path.realpath(spec.origin)).parent for spec in specs if spec is not None and spec.origin]
+
+
+def environment_folders() -> tuple[Path, ...]:
+    """Return the folders that hold packages by ROS_PACKAGE_PATH and AMENT_PREFIX_PATH."""
+    listed = ((os.environ.get(variable, "").split(os.pathsep), below) for variable, below in _SEARCH_PATHS)
+    return tuple(Path(entry, below) for entries, below in listed for entry in entries if entry)
 
 
 def find_package(name: str, roots: Iterable[StrPath]) -> Path:

@@ -13,11 +13,11 @@ from dynx.errors import ArgumentError, ShapeError, UnknownNameError, nearest, sh
 from dynx.model import Model
 from dynx.model.configuration import checked_array
 from dynx.spatial.scalar import Floats
-from dynx.world.divergence import LastLoads, RobotLoad
 from dynx.world.engine import WorldEngine
 from dynx.world.layout import Layout, RobotLayout
 from dynx.world.loads import RobotLoads, Wrench, checked_torques, robot_number
 from dynx.world.motors import Motor
+from dynx.world.notes.divergence import LastLoads, RobotLoad
 from dynx.world.snapshot import Memory
 
 MotorsOf = Mapping[str, "Motor | MotorCommand | Sequence[Motor]"]
@@ -217,13 +217,15 @@ class Commands:
 
 
 def with_scene_motors(
-    scene_motors: Mapping[str, Sequence[Motor]], torques: object, motors: MotorsOf | None
+    scene_motors: Mapping[str, Sequence[Motor]],
+    torques: Mapping[str, ArrayLike] | None,
+    motors: MotorsOf | None,
 ) -> MotorsOf:
     """Add the motors of the scene on robots that neither `torques` nor `motors` name."""
     for name, given in (("torques", torques), ("motors", motors)):
         if given is not None and not isinstance(given, Mapping):
             raise ArgumentError(f"{name} is of type {type(given).__name__}; wanted a dict by robot")
-    driven = {**(motors or {}), **(torques or {})}  # type: ignore[dict-item]
+    driven = {*(motors or ()), *(torques or ())}
     return {**{name: own for name, own in scene_motors.items() if name not in driven}, **(motors or {})}
 
 

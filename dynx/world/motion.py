@@ -8,9 +8,9 @@ from typing import NoReturn
 from dynx.errors import ClosedError, DivergedError, EngineError
 from dynx.model.configuration import DIVERGENCE_SPEED
 from dynx.world.commands import Act, Commands
-from dynx.world.divergence import likely_causes
 from dynx.world.engine import WorldEngine
 from dynx.world.layout import Layout
+from dynx.world.notes.divergence import likely_causes
 from dynx.world.state import WorldState, has_diverged
 from dynx.world.state_checks import apply_state
 
@@ -171,14 +171,14 @@ class Motion:
         """Return to the last state that was finite, and raise DivergedError."""
         failed_at, step = self.time, self._steps
         causes = self._recover_and_explain()
-        robots = self._good[0].robots
+        first = next(iter(self._good[0].robots.values()), None)
         raise DivergedError(
             f"the world of {self._layout.name} diverged in {self._kind} at {failed_at:.6g} s: "
             f"{reason}{causes}; "
             f"the world is at {self.time:.6g} s again",
             time=failed_at,
             step=step,
-            state=tuple(next(iter(robots.values()), (None, None))),  # type: ignore[arg-type]
+            state=(None, None) if first is None else (first.q, first.v),
         )
 
     def _recover_and_explain(self) -> str:

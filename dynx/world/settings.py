@@ -91,7 +91,9 @@ def changed_settings(
 
 def checked_switches(**switches: object) -> dict[str, bool]:
     """Return switches of a world by name; ArgumentError for one that is neither True nor False."""
+    checked = {}
     for name, value in switches.items():
         if not isinstance(value, bool):
             raise ArgumentError(f"{name} is {shown(value)}; wanted True or False")
-    return dict(switches)  # type: ignore[arg-type]
+        checked[name] = value
+    return checked

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -20,7 +20,8 @@ from dynx.world.identity import identity
 from dynx.world.loads import Wrench
 from dynx.world.materials import InexactMaterial, inexact_materials, open_engine
 from dynx.world.motion import Motion
-from dynx.world.overlaps import Overlap, overlaps_of
+from dynx.world.notes.overlaps import Overlap, overlaps_of
+from dynx.world.notes.start_notes import notes_on_engine, notes_on_start
 from dynx.world.preparation import prepare
 from dynx.world.queries import MAX_RAY_LENGTH, Queries
 from dynx.world.registry import renderer_of, world_class
@@ -31,7 +32,6 @@ from dynx.world.scene.reading import scene_from_document
 from dynx.world.scene.writing import scene_document
 from dynx.world.settings import changed_settings, checked_settings, checked_switches
 from dynx.world.snapshot import Snapshot, read_snapshot, write_snapshot
-from dynx.world.start_notes import notes_on_start
 from dynx.world.state import BodyState, RobotState, WorldState
 from dynx.world.state_checks import apply_state, checked_state
 
@@ -99,14 +99,11 @@ class World:
         self._queries = Queries(scene, self._layout)
         self._identity: str | None = None
         self._motion = Motion(self._layout, self._commands, self._build, self.dt, self.substeps)
-        in_effect = self._kind.settings_in_effect(self.settings, self.dt / self.substeps)
-        self.notes: tuple[str, ...] = (
-            *notes_on_start(self._motion.engine, self._motion.state),
-            *changed_settings(settings, self.settings, in_effect),
-        )
-        """Parts that overlap at the start, constraints that it violates, joints beyond their limits,
-        coefficients of contact that the engine does not have, a step that is long, and settings given that
-        the engine changes, one sentence each."""
+        at_start = notes_on_start(self._motion.engine, self._motion.state)
+        self.notes: tuple[str, ...] = (*at_start, *self._lasting_notes(settings))
+        """Parts that overlap at the start, constraints that it violates, joints beyond their limits, robots
+        whose accelerations have no bound, coefficients of contact that the engine does not have, a step that
+        is long, and settings given that the engine changes, one sentence each."""
 
     @property
     def version(self) -> str:
@@ -247,7 +244,7 @@ class World:
 
     @classmethod
     def read(cls, path: StrPath, *, package_dirs: Iterable[StrPath] = ()) -> World:
-        """Return the world of a file that `write` wrote, in its state.
+        """Return the world of a file that `write` wrote, in its state, without the notes on its start.
 
         Meshes are read in the libraries of robots and in `package_dirs` only. Read files that you trust: a
         changed state can end the process inside an engine. Raises ArgumentError for a file that is damaged,
@@ -258,6 +255,9 @@ class World:
         world = cls(scene, given["engine"], **given["options"], **given["settings"])
         try:
             world.restore(snapshot)
+            defaults = {name: setting.default for name, setting in world._kind.settings.items()}
+            chosen = {name: value for name, value in world.settings.items() if value != defaults[name]}
+            world.notes = tuple(world._lasting_notes(chosen))
         except BaseException:
             world.close()
             raise
@@ -330,6 +330,12 @@ class World:
     def __repr__(self) -> str:
         notes = f", {len(self.notes)} notes" if self.notes else ""
         return f"<World {self.scene.name} in {self.engine} at {self.time:.6g} s{notes}>"
+
+    def _lasting_notes(self, given: Mapping[str, object]) -> Iterator[str]:
+        """Yield the notes that hold at every state, with those on the settings `given`."""
+        yield from notes_on_engine(self._motion.engine)
+        in_effect = self._kind.settings_in_effect(self.settings, self.dt / self.substeps)
+        yield from changed_settings(given, self.settings, in_effect)
 
     def _build(self) -> WorldEngine:
         return open_engine(self._kind, self._layout, self.dt / self.substeps, self.settings)

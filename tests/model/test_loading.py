@@ -170,3 +170,39 @@ def test_loading_a_model_keeps_options_that_are_not_given() -> None:
 
 def test_a_path_of_the_library_and_its_name_give_equal_models() -> None:
     assert load(find("z1")) == load("z1")
+
+
+def test_a_package_path_is_found_in_the_folders_given_and_in_those_of_the_environment(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for variable in ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"):
+        monkeypatch.delenv(variable, raising=False)
+    for root in ("own", "ros", "ament/share"):
+        folder = here / root / f"{Path(root).parts[0]}_arm" / "urdf"
+        folder.mkdir(parents=True)
+        (folder / "arm.urdf").write_text(TEXT)
+    assert load("package://own_arm/urdf/arm.urdf", package_dirs=[here / "own"]) == load(TEXT)
+    with pytest.raises(RobotNotFoundError, match="package 'ros_arm' was not found; looked in"):
+        load("package://ros_arm/urdf/arm.urdf")
+    monkeypatch.setenv("ROS_PACKAGE_PATH", os.pathsep.join([str(here / "none"), str(here / "ros")]))
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(here / "ament"))
+    assert load("package://ros_arm/urdf/arm.urdf") == load("package://ament_arm/urdf/arm.urdf")
+
+
+def test_a_package_path_leads_to_no_file_outside_of_its_package(here: Path) -> None:
+    (here / "arm").mkdir()
+    (here / "secret.urdf").write_text(TEXT)
+    (here / "arm" / "link.urdf").symlink_to(here / "secret.urdf")
+    for inside in ("../secret.urdf", "link.urdf"):
+        with pytest.raises(RobotNotFoundError, match="leaves the package 'arm'"):
+            load(f"package://arm/{inside}", package_dirs=[here])
+    with pytest.raises(RobotNotFoundError, match=r"no file 'arm.urdf' in .*arm"):
+        load("package://arm/arm.urdf", package_dirs=[here])
+
+
+def test_the_robots_of_pybullet_data_are_found_without_a_folder() -> None:
+    data = pytest.importorskip("pybullet_data")
+    path = "a1/a1.urdf"
+    found = load(f"package://pybullet_data/{path}", base="floating")
+    assert found == load(Path(data.getDataPath()) / path, base="floating")
+    assert found.geometry.collisions(found.root)

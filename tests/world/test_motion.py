@@ -10,6 +10,7 @@ import dynx
 from dynx import Pose
 from dynx.control.open_loop import OpenLoop
 from dynx.model import configuration
+from dynx.model.elements import IDENTITY
 from dynx.model.geometry import Box, Collision
 from dynx.world import Scene, SceneBody, SceneRobot, World, Wrench, box
 from tests.world.engines import WORLDS
@@ -20,8 +21,8 @@ G = 9.81
 DT = 1e-3
 
 
-def falling(**options: object) -> Scene:
-    return Scene("falling", bodies=(box("brick", (0.3, 0.2, 0.1), mass=2.0, **options),))
+def falling(twist: tuple[float, ...], pose: Pose = IDENTITY) -> Scene:
+    return Scene("falling", bodies=(box("brick", (0.3, 0.2, 0.1), mass=2.0, twist=twist, pose=pose),))
 
 
 def test_a_projectile_moves_on_its_parabola(engine: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import pytest
 
@@ -24,8 +25,8 @@ from dynx.world import (
 from tests.world.engines import WORLDS
 
 
-def brick(name: str, x: float = 0.0, **options: object) -> SceneBody:
-    return box(name, (0.2, 0.2, 0.2), mass=1.0, pose=Pose((x, 0.0, 0.0)), **options)
+def brick(name: str, x: float = 0.0) -> SceneBody:
+    return box(name, (0.2, 0.2, 0.2), mass=1.0, pose=Pose((x, 0.0, 0.0)))
 
 
 @pytest.mark.parametrize("engine", WORLDS)
@@ -113,3 +114,13 @@ def test_time_constants_that_mujoco_raises_are_noted_where_they_are_given() -> N
         assert world.notes == ()
     with World(scene, "mujoco", dt=4e-3, substeps=8, time_constant=1e-3) as world:
         assert world.notes == ()
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+def test_a_world_read_from_a_file_has_the_notes_that_hold_past_its_start(engine: str, tmp_path: Path) -> None:
+    with World(Scene("s", bodies=(brick("a"), brick("b", 0.15))), engine, dt=0.2, substeps=1) as world:
+        assert len(world.notes) == 2
+        world.write(tmp_path / "saved.world")
+        with World.read(tmp_path / "saved.world") as read:
+            assert read.notes == world.notes[1:]
+            assert "longer than 0.1 s" in read.notes[0]

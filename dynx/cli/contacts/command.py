@@ -7,7 +7,16 @@ from fractions import Fraction
 import click
 
 from dynx.cli.shell.lazy import runs
-from dynx.cli.shell.options import GroupedCommand, finite_number, group, json_option, name_list, name_value
+from dynx.cli.shell.options import (
+    GroupedCommand,
+    engines_option,
+    finite_number,
+    group,
+    json_option,
+    name_list,
+    quiet_option,
+    settings_option,
+)
 from dynx.errors import shown
 
 
@@ -30,13 +39,7 @@ def steps(text: str) -> tuple[float, ...]:
 @click.command(cls=GroupedCommand)
 @group(
     "Measurement",
-    click.option(
-        "--engine",
-        "engines",
-        type=name_list,
-        metavar="A,B,C",
-        help="Engines to measure (default: all that are installed).",
-    ),
+    engines_option("Engines to measure"),
     click.option(
         "--case",
         "cases",
@@ -53,15 +56,7 @@ def steps(text: str) -> tuple[float, ...]:
         help="Steps of 1e-6 to 0.1 s, numbers or fractions such as 1/240 (default: 0.004,0.002,0.001). With "
         "a single step no error can fall.",
     ),
-    click.option(
-        "--set",
-        "settings",
-        type=name_value,
-        multiple=True,
-        metavar="NAME=VALUE",
-        help="Setting of an engine (docs/world.md), or substeps, as name=value for all engines that have it "
-        "or engine.name=value; may be given several times.",
-    ),
+    settings_option("Setting of an engine (docs/world.md), or substeps"),
     click.option(
         "--jobs",
         type=click.IntRange(min=1),
@@ -77,9 +72,7 @@ def steps(text: str) -> tuple[float, ...]:
     click.option(
         "--html", "html_path", metavar="FILE", help="File for the results as one HTML page with plots."
     ),
-    click.option(
-        "--quiet", is_flag=True, help="No tables and no progress: only errors, files and the exit code."
-    ),
+    quiet_option,
 )
 @runs("dynx.cli.contacts.run:contacts")
 def contacts() -> None:

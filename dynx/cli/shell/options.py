@@ -143,6 +143,11 @@ def model_options(command: F) -> F:
     )(command)
 
 
+quiet_option = click.option(
+    "--quiet", is_flag=True, help="No tables and no progress: only errors, files and the exit code."
+)
+
+
 def run_options(command: F) -> F:
     """Add ``--jobs``, ``--timeout`` and ``--quiet``, for commands that process robots in worker processes."""
     return stacked(
@@ -158,9 +163,7 @@ def run_options(command: F) -> F:
             show_default=True,
             help="Time limit for each robot [s]; 0 for none.",
         ),
-        click.option(
-            "--quiet", is_flag=True, help="No tables and no progress: only errors, files and the exit code."
-        ),
+        quiet_option,
     )(command)
 
 
@@ -172,6 +175,30 @@ json_option = click.option(
     metavar="[FILE]",
     help="File for the results as JSON; - (or no FILE, at the end of the line) is standard output.",
 )
+
+
+def engines_option(purpose: str) -> Callable[[F], F]:
+    """Return ``--engine``, whose value `engines` is the names of world engines, or None."""
+    return click.option(
+        "--engine",
+        "engines",
+        type=name_list,
+        metavar="A,B,C",
+        help=f"{purpose} (default: all that are installed).",
+    )
+
+
+def settings_option(subject: str) -> Callable[[F], F]:
+    """Return ``--set``, whose value `settings` is pairs of names and words."""
+    return click.option(
+        "--set",
+        "settings",
+        type=name_value,
+        multiple=True,
+        metavar="NAME=VALUE",
+        help=f"{subject}, as name=value for all engines that have it or engine.name=value; may be given "
+        "several times.",
+    )
 
 
 def robot_options(command: F) -> F:

@@ -5,20 +5,21 @@ from __future__ import annotations
 import click
 
 from dynx.cli.shell.lazy import runs
-from dynx.cli.shell.options import GroupedCommand, group, json_option, name_list, name_value
+from dynx.cli.shell.options import (
+    GroupedCommand,
+    engines_option,
+    group,
+    json_option,
+    quiet_option,
+    settings_option,
+)
 
 
 @click.command(cls=GroupedCommand)
 @click.argument("scene", metavar="SCENE")
 @group(
     "Run",
-    click.option(
-        "--engine",
-        "engines",
-        type=name_list,
-        metavar="A,B,C",
-        help="Engines that run the scene (default: all that are installed).",
-    ),
+    engines_option("Engines that run the scene"),
     click.option(
         "--duration",
         type=click.FloatRange(min=0.0, min_open=True),
@@ -40,15 +41,7 @@ from dynx.cli.shell.options import GroupedCommand, group, json_option, name_list
         show_default=True,
         help="Number of steps of the engine in each step.",
     ),
-    click.option(
-        "--set",
-        "settings",
-        type=name_value,
-        multiple=True,
-        metavar="NAME=VALUE",
-        help="Setting of an engine (docs/world.md), as name=value for all engines that have it or "
-        "engine.name=value; may be given several times.",
-    ),
+    settings_option("Setting of an engine (docs/world.md)"),
     click.option(
         "--within",
         type=click.FloatRange(min=0.0),
@@ -74,9 +67,7 @@ from dynx.cli.shell.options import GroupedCommand, group, json_option, name_list
         help="File to which the scene is written in another format, instead of a run: .xml or .mjcf (MJCF), "
         ".toml, .json, or .urdf, with a file for each robot and body, whose name stands before the suffix.",
     ),
-    click.option(
-        "--quiet", is_flag=True, help="No tables and no progress: only errors, files and the exit code."
-    ),
+    quiet_option,
 )
 @runs("dynx.cli.world.run:world")
 def world() -> None:

@@ -9,11 +9,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 from dynx.errors import DescriptionError, nearest, shown
-from dynx.model.package_paths import StrPath, find_package, resolve_package
-
-_SEARCH_PATHS = (("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share"))
-"""Environment variables that list folders, and where packages lie in each of these."""
-
+from dynx.model.package_paths import StrPath, environment_folders, find_package, resolve_package
 
 _PACKAGE_FILES = ("package.xml", "manifest.xml")
 """Files that mark the root folder of a ROS package."""
@@ -69,7 +65,7 @@ def reason_unknown(filename: str, source: str) -> str:
     if filename.startswith("package://"):
         name = filename.removeprefix("package://").partition("/")[0]
         try:
-            found = _package(name, Path(os.path.realpath(source)).parent, _listed_packages())
+            found = _package(name, Path(os.path.realpath(source)).parent, environment_folders())
         except (OSError, ValueError, RuntimeError):
             found = None
         outside = f"{shown(filename, 200)} is outside its package"
@@ -131,20 +127,15 @@ def _is_private(folder: Path) -> bool:
 
 def _in_package(uri: str, folder: Path) -> Path | None:
     name, _, inside = uri.removeprefix("package://").partition("/")
-    package = _package(name, folder, _listed_packages())
+    package = _package(name, folder, environment_folders())
     if package is None:
         return None
     return _existing(package / inside, package, f"{shown(inside, 200)} in package {shown(name)}")
 
 
-def _listed_packages() -> tuple[tuple[str, str], ...]:
-    """Return the value of each variable of `_SEARCH_PATHS`, and where packages lie in its folders."""
-    return tuple((os.environ.get(variable, ""), below) for variable, below in _SEARCH_PATHS)
-
-
 # Cached, because a description names its few packages hundreds of times.
 @lru_cache(maxsize=256)
-def _package(name: str, folder: Path, elsewhere: tuple[tuple[str, str], ...]) -> Path | None:
+def _package(name: str, folder: Path, elsewhere: tuple[Path, ...]) -> Path | None:
     """Find a package: a folder of the description, one above it or beside one of these if it is marked as a
     package or, above, has the usual parts of one, or in a folder of the environment.
 
@@ -159,11 +150,10 @@ def _package(name: str, folder: Path, elsewhere: tuple[tuple[str, str], ...]) ->
         above = folder.is_relative_to(found) and any((found / part).is_dir() for part in _PACKAGE_PARTS)
         if marked or above or found.is_relative_to(enclosing):
             return found
-    listed = [Path(entry, below) for all_, below in elsewhere for entry in all_.split(os.pathsep) if entry]
-    return _find(name, listed)
+    return _find(name, elsewhere)
 
 
-def _find(name: str, roots: list[Path]) -> Path | None:
+def _find(name: str, roots: Iterable[Path]) -> Path | None:
     try:
         return find_package(name, roots)
     except DescriptionError:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,7 +32,21 @@ from dynx.spatial.scalar import Floats
 from dynx.world.scene.material import DEFAULT_MATERIAL, Material, checked_material
 from dynx.world.scene.names import checked_name
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
 Tensor = tuple[Vector, Vector, Vector]
+
+
+class BodyOptions(TypedDict, total=False):
+    """Fields of `SceneBody` other than its name and its shapes."""
+
+    pose: Pose | ArrayLike
+    mass: float | None
+    inertia: ArrayLike | None
+    center_of_mass: ArrayLike | None
+    twist: ArrayLike
+    material: Material
 
 
 @dataclass(frozen=True)
@@ -129,31 +143,33 @@ def ground(
     return SceneBody(name, Plane(), checked_pose("pose", pose), material=material)
 
 
-def box(name: str, size: ArrayLike, **options: object) -> SceneBody:
+def box(name: str, size: ArrayLike, **options: Unpack[BodyOptions]) -> SceneBody:
     """Return a body with the shape of a box of that size (3,) [m]; `options` are those of `SceneBody`."""
-    return SceneBody(name, Box(size), **options)  # type: ignore[arg-type]
+    return SceneBody(name, Box(finite_vector("size of a box", size)), **options)
 
 
-def sphere(name: str, radius: float, **options: object) -> SceneBody:
+def sphere(name: str, radius: float, **options: Unpack[BodyOptions]) -> SceneBody:
     """Return a body with the shape of a ball; `options` are those of `SceneBody`."""
-    return SceneBody(name, Sphere(radius), **options)  # type: ignore[arg-type]
+    return SceneBody(name, Sphere(radius), **options)
 
 
-def cylinder(name: str, radius: float, length: float, **options: object) -> SceneBody:
+def cylinder(name: str, radius: float, length: float, **options: Unpack[BodyOptions]) -> SceneBody:
     """Return a body with the shape of a cylinder about z [m]; `options` are those of `SceneBody`."""
-    return SceneBody(name, Cylinder(radius, length), **options)  # type: ignore[arg-type]
+    return SceneBody(name, Cylinder(radius, length), **options)
 
 
-def capsule(name: str, radius: float, length: float, **options: object) -> SceneBody:
+def capsule(name: str, radius: float, length: float, **options: Unpack[BodyOptions]) -> SceneBody:
     """Return a body with the shape of a capsule about z [m], whose ends are half balls beyond the length;
     `options` are those of `SceneBody`."""
-    return SceneBody(name, Capsule(radius, length), **options)  # type: ignore[arg-type]
+    return SceneBody(name, Capsule(radius, length), **options)
 
 
-def mesh(name: str, file: str, scale: ArrayLike = (1.0, 1.0, 1.0), **options: object) -> SceneBody:
+def mesh(
+    name: str, file: str, scale: ArrayLike = (1.0, 1.0, 1.0), **options: Unpack[BodyOptions]
+) -> SceneBody:
     """Return a body with the shape of the convex hull of a mesh in a file; `options` are those of
     `SceneBody`."""
-    return SceneBody(name, Mesh(file, finite_vector("scale", scale)), **options)  # type: ignore[arg-type]
+    return SceneBody(name, Mesh(file, finite_vector("scale", scale)), **options)
 
 
 def _placed_shapes(what: str, shapes: object) -> tuple[Collision, ...]:
@@ -165,8 +181,8 @@ def _placed_shapes(what: str, shapes: object) -> tuple[Collision, ...]:
     return tuple(each if isinstance(each, Collision) else Collision(each) for each in listed)
 
 
-def _checked_inertia(what: str, inertia: object) -> Tensor:
-    array: Floats = checked_array(f"inertia of {what}", inertia, 3)  # type: ignore[arg-type]
+def _checked_inertia(what: str, inertia: ArrayLike) -> Tensor:
+    array: Floats = checked_array(f"inertia of {what}", inertia, 3)
     if array.shape != (3, 3):
         raise ShapeError(f"inertia of {what} has shape {array.shape}; wanted (3, 3)")
     largest = float(np.max(np.abs(array)))

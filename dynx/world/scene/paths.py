@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
-from importlib.util import find_spec
 from pathlib import Path
 
 from dynx.errors import DescriptionError, nearest, shown
 from dynx.model.geometry.mesh_files import enclosing_folder
 from dynx.model.library import example_roots, own_roots
-from dynx.model.package_paths import StrPath, resolve_package
-
-DATA_PACKAGES = ("pybullet_data",)
-"""Python packages of robots and meshes, found without being imported."""
+from dynx.model.package_paths import StrPath, data_folders, resolve_package
 
 
 class ScenePaths:
     """Paths from one scene's file. A file may come from anyone, so it leads to nothing outside of the folder
     that it lies in (of its repository or package, if it lies in one), of the library of robots, of
-    `DATA_PACKAGES`, and of the folders that the user names."""
+    the Python packages of `data_folders`, and of the folders that the user names."""
 
     def __init__(self, folder: StrPath | None, package_dirs: Iterable[StrPath] = ()) -> None:
         """`folder` is that of the scene's file; None for text."""
@@ -29,7 +25,7 @@ class ScenePaths:
     def find(self, name: str, what: str) -> str:
         """Return the full path of a file that a scene names; DescriptionError for one outside or missing."""
         if name.startswith("package://"):
-            return str(resolve_package(name, [*self.package_dirs, *_data_folders()]))
+            return str(resolve_package(name, [*self.package_dirs, *data_folders()]))
         if "://" in name:
             raise DescriptionError(f"{what} is {shown(name, 200)}; wanted a path or package://NAME/FILE")
         if self._folder is None and not os.path.isabs(name):
@@ -55,7 +51,7 @@ class ScenePaths:
     def write(self, path: str) -> str:
         """Return a path as the scene's file names it: relative where it lies with it, else full."""
         real = Path(os.path.realpath(path))
-        for folder in _data_folders():
+        for folder in data_folders():
             if real.is_relative_to(folder):
                 return f"package://{folder.name}/{real.relative_to(folder).as_posix()}"
         if self._folder is not None and real.is_relative_to(enclosing_folder(self._folder)):
@@ -65,13 +61,8 @@ class ScenePaths:
     def roots(self) -> list[Path]:
         """Return the folders in which the files of a scene may lie."""
         own = [] if self._folder is None else [enclosing_folder(self._folder)]
-        return [*own, *map(Path, self.package_dirs), *_library_folders(), *_data_folders()]
+        return [*own, *map(Path, self.package_dirs), *_library_folders(), *data_folders()]
 
 
 def _library_folders() -> list[Path]:
     return [Path(os.path.realpath(root)) for root in (*example_roots(), *own_roots())]
-
-
-def _data_folders() -> list[Path]:
-    specs = (find_spec(name) for name in DATA_PACKAGES)
-    return [Path(os.path.realpath(spec.origin)).parent for spec in specs if spec is not None and spec.origin]

@@ -14,7 +14,7 @@ from dynx.files.documents import convert_document
 from dynx.model import Model, Pose
 from dynx.model.elements import IDENTITY, ZERO
 from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
-from dynx.model.geometry.sizes import finite_numbers
+from dynx.model.geometry.sizes import finite_numbers, finite_vector
 from dynx.model.loading import load, read_model
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_quat
@@ -208,7 +208,7 @@ def _shape(given: ShapeDocument, paths: ScenePaths) -> Collision:
 
 def _solid(given: ShapeDocument, paths: ScenePaths) -> Shape:
     if given.box is not None:
-        return Box(given.box)  # type: ignore[arg-type]
+        return Box(finite_vector("size of a box", given.box))
     if given.sphere is not None:
         return Sphere(given.sphere)
     for name, kind in (("cylinder", Cylinder), ("capsule", Capsule)):
@@ -220,10 +220,11 @@ def _solid(given: ShapeDocument, paths: ScenePaths) -> Shape:
     if given.heights is not None:
         if given.size is None:
             raise ArgumentError("heights has no size; wanted the extent of the grid along x and y")
-        return HeightField(given.heights, given.size)  # type: ignore[arg-type]
+        x, y = finite_numbers("size of a height field", given.size, 2)
+        return HeightField(tuple(map(tuple, given.heights)), (x, y))
     if given.mesh is not None:
-        scale = (1.0, 1.0, 1.0) if given.scale is None else given.scale
-        return Mesh(paths.find(given.mesh, "mesh"), scale)  # type: ignore[arg-type]
+        scale = (1.0, 1.0, 1.0) if given.scale is None else finite_vector("scale of a mesh", given.scale)
+        return Mesh(paths.find(given.mesh, "mesh"), scale)
     return Plane()
 
 
@@ -261,4 +262,4 @@ def _pose(name: str, numbers: list[float] | None) -> Pose | None:
         return Pose.from_matrix(homogeneous(R, np.array(entries[:3])), name)
     if len(entries) not in (3, 6):
         raise ArgumentError(f"{name} has {len(entries)} numbers; wanted 3, 6 or 7")
-    return Pose(entries[:3], entries[3:] or ZERO)  # type: ignore[arg-type]
+    return Pose(finite_vector(name, entries[:3]), finite_vector(name, entries[3:] or ZERO))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from types import UnionType
 from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
@@ -169,14 +170,14 @@ class Scene:
             )
 
 
-def _instances(name: str, parts: object, kinds: type | object) -> tuple[object, ...]:
+def _instances(name: str, parts: object, kinds: type | UnionType) -> tuple[object, ...]:
     if isinstance(parts, str) or not isinstance(parts, Iterable):
-        single = not isinstance(parts, str) and isinstance(parts, kinds)  # type: ignore[arg-type]
+        single = not isinstance(parts, str) and isinstance(parts, kinds)
         hint = f", such as [{type(parts).__name__}(...)]" if single else ""
         raise ArgumentError(f"{name} of a scene is {shown(parts)}; wanted a sequence{hint}")
     found = tuple(parts)
     for each in found:
-        if not isinstance(each, kinds):  # type: ignore[arg-type]
+        if not isinstance(each, kinds):
             raise ArgumentError(f"{name} of a scene holds {shown(each)}; wanted {_spelled(kinds)}")
     return found
 

@@ -7,9 +7,8 @@ they are asked for.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import wraps
-from typing import Any, ClassVar, TypeVar
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -20,12 +19,12 @@ from dynx.engines.drake.world.contacts import read_contacts, touching_point
 from dynx.engines.drake.world.distances import closest_of_pair
 from dynx.engines.drake.world.materials import effective_materials
 from dynx.engines.drake.world.options import SETTINGS
-from dynx.errors import ClosedError, DynxError, EngineError, shown
 from dynx.model.geometry import HeightField, Plane
 from dynx.rbd.kinematics import body_poses
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.world.engine import RayHit, TouchingPoint, WorldEngine
+from dynx.world.engine_failures import translate_failures
 from dynx.world.geometry.ray_casting import cast_on_shape
 from dynx.world.layout import WORLD, Collider, Layout
 from dynx.world.materials import EffectiveCoefficient
@@ -35,26 +34,7 @@ from dynx.world.state import BodyState, RobotState
 LONGEST = 1.001
 """Squared length of a quaternion above which it is normalised."""
 
-Method = TypeVar("Method", bound=Callable[..., Any])
-
-
-def _engine_errors(method: Method) -> Method:
-    """Make a method raise EngineError in place of Drake's exceptions, ClosedError after `close`."""
-
-    @wraps(method)
-    def call(self: DrakeWorld, *args: Any) -> Any:
-        try:
-            return method(self, *args)
-        except DynxError:
-            raise
-        except DRAKE_FAILURES as error:
-            if self.closed:
-                raise ClosedError(f"this world of {shown(self.layout.name)} is closed") from error
-            raise EngineError(
-                f"drake failed on the scene {shown(self.layout.name)}: {error_message(error)}"
-            ) from error
-
-    return call  # type: ignore[return-value]
+_engine_errors = translate_failures(DRAKE_FAILURES, error_message)
 
 
 class DrakeWorld(WorldEngine):

@@ -32,6 +32,7 @@ from dynx.spatial.extended import longdouble
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.world.layout import WORLD, Layout, Owner, RobotLayout
+from dynx.world.notes.unbounded_motions import refuse_singular_start
 
 WELD_TORQUE_WEIGHT = 10
 """Index, in the data of a weld, of the weight of its torque."""
@@ -71,7 +72,7 @@ def build_scene(layout: Layout, dt: float, settings: Mapping[str, Any]) -> Built
     """Compile a scene.
 
     Raises EngineLimitError for a scene that is too large for MuJoCo, SingularMassMatrixError for a robot
-    without a unique acceleration.
+    without a unique acceleration, at every configuration or at the start.
     """
     total = sum(robot.model.mechanism.nv for robot in layout.robots)
     total += 6 * sum(not body.fixed for body in layout.bodies)
@@ -88,6 +89,9 @@ def build_scene(layout: Layout, dt: float, settings: Mapping[str, Any]) -> Built
     impedance = settings["constraint_impedance"]
     for number, robot in enumerate(layout.robots):
         Solvability(robot.model).refuse_singular(joint_dynamics=False)
+        if settings["solver"] != "pgs":
+            # The other solvers minimise a function that is not convex for such a mass matrix.
+            refuse_singular_start(robot, "use solver='pgs'")
         _add_robot(spec, number, robot, carriers)
         _couple_mimics(spec, number, robot, reference, impedance)
     for number, body in enumerate(layout.bodies):

@@ -7,9 +7,8 @@ for.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import wraps
-from typing import Any, ClassVar, TypeVar
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -20,10 +19,11 @@ from dynx.engines.mujoco.world.mimics import CoupledRobot
 from dynx.engines.mujoco.world.options import LEAST_STEPS, SETTINGS, time_constant
 from dynx.engines.mujoco.world.shapes import FIELD_GROUP
 from dynx.engines.mujoco.world.touching import closest_of, read_contacts
-from dynx.errors import ClosedError, DynxError, EngineError, nonblank_lines, shown
+from dynx.errors import EngineError, nonblank_lines, shown
 from dynx.model.geometry import HeightField
 from dynx.spatial.scalar import Floats
 from dynx.world.engine import RayHit, TouchingPoint, WorldEngine
+from dynx.world.engine_failures import translate_failures
 from dynx.world.geometry.ray_casting import cast_on_shape
 from dynx.world.layout import Layout
 from dynx.world.materials import EffectiveCoefficient
@@ -38,25 +38,7 @@ CONTACTS_LOST = int(mujoco.mjtWarning.mjWARN_CONTACTFULL)
 CONSTRAINTS_LOST = int(mujoco.mjtWarning.mjWARN_CNSTRFULL)
 """Numbers of MuJoCo's warnings that memory is too small, so that contacts or constraints were left out."""
 
-Method = TypeVar("Method", bound=Callable[..., Any])
-
-
-def _engine_errors(method: Method) -> Method:
-    """Make a method raise EngineError in place of MuJoCo's exceptions, ClosedError after `close`."""
-
-    @wraps(method)
-    def call(self: MujocoWorld, *args: Any) -> Any:
-        try:
-            return method(self, *args)
-        except DynxError:
-            raise
-        except Exception as error:
-            if self.closed:
-                raise ClosedError(f"this world of {self.layout.name} is closed") from error
-            message = (nonblank_lines(error) or ["no message"])[0]
-            raise EngineError(f"mujoco failed on the scene {shown(self.layout.name)}: {message}") from error
-
-    return call  # type: ignore[return-value]
+_engine_errors = translate_failures((Exception,), lambda error: (nonblank_lines(error) or ["no message"])[0])
 
 
 class MujocoWorld(WorldEngine):

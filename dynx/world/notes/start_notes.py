@@ -1,5 +1,5 @@
-"""Notes on the start of a world: overlaps, violated constraints, joints beyond their limits, and coefficients
-of contact that the engine does not have."""
+"""Notes on a world: overlaps at the start, violated constraints, joints beyond their limits, accelerations
+without a bound; coefficients of contact that the engine does not have."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from dynx.world.engine import WorldEngine
 from dynx.world.geometry.owner_poses import owner_pose
 from dynx.world.layout import ConstraintLayout, Layout
 from dynx.world.materials import inexact_materials
-from dynx.world.overlaps import overlaps_of
+from dynx.world.notes.overlaps import overlaps_of
+from dynx.world.notes.unbounded_motions import unbounded_motions
 from dynx.world.state import WorldState
 
 MAX_OVERLAPS = 5
@@ -31,19 +32,21 @@ LONG_STEP = 0.1
 
 def notes_on_start(engine: WorldEngine, state: WorldState) -> tuple[str, ...]:
     """Return one sentence for each overlap, violated constraint and joint beyond its limits of an engine at a
-    state, for each coefficient of contact that the engine does not have, and for a long step."""
+    state, and for each robot whose accelerations have no bound."""
     drawn = "so that they are pulled together in the first steps"
     moved = "so that it is pushed back in the first steps"
     return (
         *_overlaps(engine),
         *(f"{each} at the start, {drawn}" for each in violations(engine.layout, state)),
         *(f"{each} at the start, {moved}" for each in joints_beyond_limits(engine.layout, state)),
-        *map(str, inexact_materials(engine)),
-        *_long_step(engine),
+        *unbounded_motions(engine.layout, state),
     )
 
 
-def _long_step(engine: WorldEngine) -> Iterator[str]:
+def notes_on_engine(engine: WorldEngine) -> Iterator[str]:
+    """Yield one sentence for each coefficient of contact that the engine does not have, and for a long step:
+    they hold at every state."""
+    yield from map(str, inexact_materials(engine))
     if engine.dt > LONG_STEP:
         yield f"a step of {engine.dt:g} s is longer than {LONG_STEP:g} s: bodies may pass through one another"
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import NamedTuple
@@ -12,14 +11,13 @@ import numpy as np
 from dynx.backends import Backend
 from dynx.errors import DynxError, shown
 from dynx.model import Model
-from dynx.model.mechanism import ROOT, Mechanism
-from dynx.rbd.crba import mass_matrix
 from dynx.spatial.scalar import Floats
 from dynx.world.engine import WorldEngine
 from dynx.world.layout import Layout, Owner
 from dynx.world.motors import JointLaw
-from dynx.world.overlaps import overlaps_of
-from dynx.world.start_notes import joints_beyond_limits, violations
+from dynx.world.notes.overlaps import overlaps_of
+from dynx.world.notes.start_notes import joints_beyond_limits, violations
+from dynx.world.notes.unbounded_motions import unbounded_motions
 from dynx.world.state import WorldState
 
 MIN_SPEED_CHANGE = 100.0
@@ -27,9 +25,6 @@ MIN_SPEED_CHANGE = 100.0
 
 MIN_MASS_RATIO = 1e4
 """Ratio of the masses of two bodies that touch from which it is a likely cause."""
-
-MIN_SINGULAR_CONDITION = 1e10
-"""Condition number of a mass matrix, with its diagonal scaled to 1, from which it is a likely cause."""
 
 MAX_CAUSES = 3
 """Largest number of causes in a message."""
@@ -68,7 +63,7 @@ def likely_causes(engine: WorldEngine, state: WorldState, loads: LastLoads, h: f
             *islice(violations(layout, state), 1),
             *islice((each.rstrip(",") for each in joints_beyond_limits(layout, state)), 1),
             *_light_parts(engine),
-            *_singular_robots(layout, state),
+            *unbounded_motions(layout, state),
         ]
     except DynxError:
         # The message of the failure itself matters more than its explanation.
@@ -149,48 +144,6 @@ def _light_parts(engine: WorldEngine) -> Iterator[str]:
     ratio, light, heavy = worst
     if light:
         yield f"{shown(light)} touches {shown(heavy)}, which is {ratio:.2g} times as heavy"
-
-
-def _singular_robots(layout: Layout, state: WorldState) -> Iterator[str]:
-    for robot in layout.robots:
-        mechanism, q = robot.model.mechanism, state.robots[robot.name].q
-        if not mechanism.bodies:
-            continue
-        moving = [joint.name for joint in robot.model.joints if joint.moves]
-        M = np.asarray(mass_matrix(mechanism, mechanism.tree_q(q)), dtype=float)
-        d = 1.0 / np.sqrt(np.maximum(M.diagonal(), np.finfo(float).tiny))
-        sizes, directions = np.linalg.eigh(d[:, None] * M * d)
-        base = len(M) - len(moving)
-        if sizes[-1] > MIN_SINGULAR_CONDITION * sizes[0]:
-            share = np.abs(directions[base:, 0])
-            names = [f"{robot.name}/{moving[k]}" for k in np.argsort(-share)[:2] if share[k] > 0.1]
-            yield (
-                f"the mass matrix of {shown(robot.name)} is singular to rounding, because its links have "
-                f"almost no inertia about {' and '.join(map(shown, names)) or 'its base'}"
-            )
-        elif (axes := _massless_gimbal(mechanism)) is not None:
-            first, last = (shown(f"{robot.name}/{moving[k]}") for k in axes)
-            yield (
-                f"the links between {first} and {last} have no mass, so that the motion has no bound where "
-                "the axes of these two joints align"
-            )
-
-
-def _massless_gimbal(mechanism: Mechanism) -> tuple[int, int] | None:
-    """Return the first and the last of three revolute joints in series without mass between them."""
-    children = Counter(body.parent for body in mechanism.bodies)
-    for last, body in enumerate(mechanism.bodies):
-        chain = [last]
-        while len(chain) < 3 and (parent := mechanism.bodies[chain[-1]].parent) != ROOT:
-            inertia = mechanism.bodies[parent].inertia
-            if float(inertia.mass) != 0.0 or np.any(inertia.rotational_inertia != 0.0):
-                break
-            if children[parent] > 1:
-                break
-            chain.append(parent)
-        if len(chain) == 3 and body.revolute and all(mechanism.bodies[k].revolute for k in chain):
-            return chain[-1], last
-    return None
 
 
 def _mass(layout: Layout, owner: Owner) -> float | None:
