@@ -41,6 +41,10 @@ ConvexShape = Box | Sphere | Cylinder | Capsule | Mesh | Hull
 """Bounded convex shapes; a mesh stands for its convex hull."""
 
 
+IDENTITY: Floats = np.eye(3)
+IDENTITY.flags.writeable = False
+
+
 class Core(ABC):
     """The core of a shape at a pose, whose origin is `p` and whose axes are the columns of `R`."""
 
@@ -49,7 +53,7 @@ class Core(ABC):
         self.extent = extent
         """Bound on the distance of the points of the core from its origin."""
         self.p: Vector3 = (0.0, 0.0, 0.0)
-        self.R: Floats = np.eye(3)
+        self.R = IDENTITY
 
     def place(self, R: Floats, p: Vector3) -> Core:
         """Move the core to the pose (R, p); return it."""
@@ -103,7 +107,7 @@ class BoxCore(Core):
     """A box."""
 
     def __init__(self, halves: Floats) -> None:
-        super().__init__(0.0, float(np.linalg.norm(halves)))
+        super().__init__(0.0, math.hypot(*halves.tolist()))
         self._halves = halves
 
     def place(self, R: Floats, p: Vector3) -> Core:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +13,7 @@ from dynx.distance.cores import ConvexShape, Core, core_of
 from dynx.distance.gjk import CorePair
 from dynx.distance.parallel_axes import penetration_of_parallel
 from dynx.distance.penetration import Penetration, penetration
+from dynx.distance.vectors import cross, dot
 from dynx.errors import ArgumentError, NotFiniteError, ShapeError, shown
 from dynx.model import Pose
 from dynx.model.configuration import MAX_MAGNITUDE, checked_pose, checked_vector
@@ -204,10 +206,13 @@ def _checked_pose(name: str, T: Pose | ArrayLike) -> Floats:
         raise ArgumentError(f"{name} is {shown(T)}; wanted a Pose or a matrix (4, 4)") from None
     if array.shape != (4, 4):
         raise ShapeError(f"{name} has shape {array.shape}; wanted a Pose or a matrix (4, 4)")
-    if not np.isfinite(array).all():
+    rows: list[list[float]] = array.tolist()
+    if not all(map(math.isfinite, chain.from_iterable(rows))):
         raise NotFiniteError(f"{name} has an entry that is NaN or infinite")
-    R = array[:3, :3]
-    off = max(np.abs(R.T @ R - np.eye(3)).max(), np.abs(array[3] - [0, 0, 0, 1]).max())
-    if off > RIGIDITY_TOLERANCE or np.linalg.det(R) < 0.0 or np.abs(array[:3, 3]).max() >= MAX_MAGNITUDE:
+    *top, bottom = rows
+    x, y, z, p = ((row[0], row[1], row[2]) for row in zip(*top, strict=True))
+    products = (dot(x, x) - 1.0, dot(y, y) - 1.0, dot(z, z) - 1.0, dot(x, y), dot(y, z), dot(z, x))
+    off = max(map(abs, (*products, *bottom[:3], bottom[3] - 1.0)))
+    if off > RIGIDITY_TOLERANCE or dot(cross(x, y), z) < 0.0 or max(map(abs, p)) >= MAX_MAGNITUDE:
         raise ArgumentError(f"{name} is not a rigid transform: wanted [[R, p], [0, 1]] with R a rotation")
     return array

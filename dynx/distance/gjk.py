@@ -59,6 +59,7 @@ class CorePair:
         on_a: list[Vector3] = []
         on_b: list[Vector3] = []
         simplex: list[Vector3] = []
+        best: tuple[tuple[float, ...], list[Vector3], list[Vector3]] = (), [], []
         size = a.extent + b.extent
         stalled = 0
         for _ in range(MAX_ITERATIONS):
@@ -74,23 +75,22 @@ class CorePair:
             enough = TOLERANCE * self.upper + ROUNDING * size
             if (simplex and self.upper - self.lower <= enough) or w in simplex or self.lower > limit:
                 break
-            on_a.append(p)
-            on_b.append(q)
-            simplex.append(w)
-            nearest = nearest_to_origin(simplex, outside=self.lower > 0.0)
+            nearest = nearest_to_origin([*simplex, w], outside=self.lower > 0.0)
             if nearest is None:
                 break
-            on_a, on_b, simplex = ([points[k] for k in nearest.vertices] for points in (on_a, on_b, simplex))
+            on_a, on_b, simplex = (
+                [points[k] for k in nearest.vertices] for points in ([*on_a, p], [*on_b, q], [*simplex, w])
+            )
             distance = norm(nearest.point)
             closer = distance < self.upper
             if closer:
-                self.upper = distance
-                self.point_a = combination(nearest.weights, on_a)
-                self.point_b = combination(nearest.weights, on_b)
+                self.upper, best = distance, (nearest.weights, on_a, on_b)
             if distance <= ROUNDING * size:
                 break
             stalled = 0 if closer or better else stalled + 1
             if stalled >= STALLS:
                 break
             direction = nearest.point
+        weights, best_a, best_b = best
+        self.point_a, self.point_b = combination(weights, best_a), combination(weights, best_b)
         return self
