@@ -66,31 +66,40 @@ class Attributor:
 
     def _round(self, tried: Mapping[Series, Candidate]) -> dict[Series, Attribution]:
         """Return the causes among one candidate for each series."""
-        changes = [(each, change) for each, candidate in tried.items() for change in candidate.changes]
-        self._reruns.carry_out([(each.trial, change) for each, change in changes], self._steps[-1:])
-        helpful = [(each.trial, change) for each, change in changes if self._may_help(each, change)]
-        self._reruns.carry_out(helpful, self._steps)
-        falling = {each: candidate for each, candidate in tried.items() if self._falls(each, candidate)}
-        removed = {each: self._removal(each, candidate) for each, candidate in tried.items()}
-        in_proportion = {each: falling[each] for each in falling if removed[each] is None}
-        rows = [(each.trial, change) for each, found in in_proportion.items() for change in found.changes]
-        self._reruns.carry_out(rows, self._steps)
-        removed |= {each: self._proportion(each, found) for each, found in in_proportion.items()}
-        return {each: cause for each, cause in removed.items() if cause is not None}
+        causes: dict[Series, Attribution] = {}
+        for place in range(max((len(each.changes) for each in tried.values()), default=0)):
+            changes = {
+                each: candidate.changes[place]
+                for each, candidate in tried.items()
+                if each not in causes and place < len(candidate.changes)
+            }
+            causes |= self._causes(changes, {each: tried[each].reason for each in changes})
+        left = {each: candidate for each, candidate in tried.items() if each not in causes}
+        falling = {each: found for each, found in left.items() if self._along(each, found) is not None}
+        self._reruns.carry_out(
+            (each.trial, change, self._steps) for each, found in falling.items() for change in found.changes
+        )
+        in_proportion = {each: self._proportion(each, found) for each, found in falling.items()}
+        return causes | {each: cause for each, cause in in_proportion.items() if cause is not None}
+
+    def _causes(
+        self, changes: Mapping[Series, Change], reasons: Mapping[Series, str]
+    ) -> dict[Series, Attribution]:
+        """Return the causes among one change for each series, which is run at the decisive step first."""
+        self._reruns.carry_out((each.trial, change, self._decisive(each)) for each, change in changes.items())
+        helpful = {each: change for each, change in changes.items() if self._may_help(each, change)}
+        self._reruns.carry_out((each.trial, change, self._steps) for each, change in helpful.items())
+        found = {each: self._caused(each, change, reasons[each]) for each, change in helpful.items()}
+        return {each: cause for each, cause in found.items() if cause is not None}
 
     def _may_help(self, series: Series, change: Change) -> bool:
-        """Check whether a change may remove an error, by the smallest step."""
-        errors = self._reruns.errors(series.trial, change, self._steps[-1:], series.name)
-        early = series.decisive < len(series.errors) - 1
-        return errors is not None and (early or errors[0] * LEAST_GAIN <= series.errors[-1])
+        """Check whether a change reduces an error at the decisive step as far as a cause has to."""
+        errors = self._reruns.errors(series.trial, change, self._decisive(series), series.name)
+        return errors is not None and errors[0] * LEAST_GAIN <= series.errors[series.decisive]
 
-    def _removal(self, series: Series, candidate: Candidate) -> Attribution | None:
-        """Return the candidate as the cause of an error that one of its changes removes, or None."""
-        for change in candidate.changes:
-            cause = self._caused(series, change, candidate.reason)
-            if cause is not None:
-                return cause
-        return None
+    def _decisive(self, series: Series) -> Sequence[float]:
+        """Return the step at which a cause has to reduce an error."""
+        return (self._steps[series.decisive],)
 
     def _caused(self, series: Series, change: Change, reason: str) -> Attribution | None:
         """Return a change as the cause of an error that it removes or makes fall with the step, or None."""
@@ -119,16 +128,12 @@ class Attributor:
                 if kept >= 0:
                     del change[[*change][kept]]
                     fewer[each] = change
-            self._reruns.carry_out([(each.trial, change) for each, change in fewer.items()], self._steps)
+            self._reruns.carry_out((each.trial, change, self._steps) for each, change in fewer.items())
             for each, change in fewer.items():
                 alone = self._caused(each, change, causes[each].reason)
                 if alone is not None and _as_good(each, alone, causes[each]):
                     causes = causes | {each: alone}
         return causes
-
-    def _falls(self, series: Series, candidate: Candidate) -> bool:
-        """Check whether an error at the smallest step falls along the values of a candidate."""
-        return self._along(series, candidate) is not None
 
     def _along(self, series: Series, candidate: Candidate) -> float | None:
         """Return the order at which an error at the smallest step falls along the values of the first setting
@@ -174,8 +179,9 @@ class Attributor:
             each: {name: tried[-1] for name, tried in cause.values.items()} for each, cause in causes.items()
         }
         others = {each: around[each.trial.engine, each.trial.case.name] for each in causes}
-        wanted = [(other.trial, changes[each]) for each in causes for other in others[each]]
-        self._reruns.carry_out(wanted, self._steps[-1:])
+        self._reruns.carry_out(
+            (other.trial, changes[each], self._steps[-1:]) for each in causes for other in others[each]
+        )
         return {
             each: replace(cause, price=self._reruns.price(others[each], each, changes[each], self._steps[-1]))
             for each, cause in causes.items()

@@ -84,6 +84,15 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
             "The error falls with the step of the engine, too little between the steps that were run.",
         ),
         Candidate(
+            {
+                "impedance": ((0.02, 0.9, 1.0, 0.5, 2.0),),
+                "time_constant": (1e-6,),
+                SUBSTEPS: (8,),
+            },
+            "Friction of MuJoCo pushes bodies apart that slide, so that they hop and yaw on their corners, "
+            "unless contacts give way under the weight by more than this push.",
+        ),
+        Candidate(
             {"slip_time_constant": (0.1, 1.0), SUBSTEPS: (1, 8)},
             "Friction of MuJoCo opposes slip within this time: the shorter it is, the more its contacts, "
             "which are convex problems, push bodies apart that slide.",
@@ -122,6 +131,11 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
         Candidate(
             {"modulus": (1e9, 1e10)},
             "A surface contact of Drake has a pressure in proportion to this modulus.",
+        ),
+        Candidate(
+            {"modulus": (1e9, 1e10), SUBSTEPS: (4, 4)},
+            "A surface contact of Drake has a pressure in proportion to this modulus; a stiffer one needs "
+            "shorter steps.",
         ),
         Candidate(
             {"dissipation": (100.0, 1000.0)},

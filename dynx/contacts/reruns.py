@@ -14,8 +14,8 @@ from dynx.contacts.verdict import Price
 Change = Mapping[str, Any]
 """Settings that are changed together, with their new values."""
 
-Changed = tuple[TrialOfEngine, Change]
-"""A trial, and the settings that are changed in it."""
+Rerun = tuple[TrialOfEngine, Change, Sequence[float]]
+"""A trial, the settings that are changed in it, and the steps [s] at which it is run again."""
 
 WORSE = 2.0
 """Factor from which on an error that a change increases is part of its price."""
@@ -29,11 +29,11 @@ class Reruns:
         self._runner = runner
         self._outcomes: dict[tuple[TrialOfEngine, str, float], Measured | Unmeasured | None] = {}
 
-    def carry_out(self, wanted: Iterable[Changed], steps: Sequence[float]) -> None:
+    def carry_out(self, wanted: Iterable[Rerun]) -> None:
         """Carry out what has not been run yet, all together."""
         missing = {
             (trial, _key(change), dt): trial.run(dt, {**self._settings[trial.engine], **change})
-            for trial, change in wanted
+            for trial, change, steps in wanted
             for dt in steps
             if (trial, _key(change), dt) not in self._outcomes
         }

@@ -49,6 +49,16 @@ class Planned(Case):
         ]
 
 
+class OneFigure(Planned):
+    """A trial with one figure, whose error a change removes."""
+
+    name: ClassVar[str] = "one_figure"
+    trials: ClassVar[dict[str, Any]] = {"": None}
+
+    def measure(self, world: World, parameters: None) -> Sequence[Figure]:
+        return [Figure("removed", 0.1 if world.settings[FRICTION] == 2.0 else 1e-5, 0.0, "", 1.0)]
+
+
 def results(*candidates: Candidate) -> dict[str, FigureResult]:
     """Return the results by figure, of a world with the friction doubled."""
     given, tried = {"exact": {FRICTION: 2.0}}, {"exact": candidates}
@@ -94,3 +104,14 @@ def test_other_errors_that_a_change_makes_worse_are_its_price() -> None:
     found = results(Candidate({FRICTION: (1.0,)}, REASON))
     (price,) = cause(found["removed"]).price
     assert (price.trial, price.figure, price.before, price.after) == ("other", "victim", 0.01, 0.5)
+
+
+def test_values_beyond_the_first_that_is_a_cause_are_not_run() -> None:
+    given = {"exact": {FRICTION: 2.0}}
+    counts = []
+    for values in ((1.0,), (1.0, 0.5)):
+        tried = {"exact": [Candidate({FRICTION: values}, REASON)]}
+        found = conform(["exact"], STEPS, [OneFigure()], settings=given, candidates=tried, jobs=0)
+        assert cause(found.results[0]).values == {FRICTION: (2.0, 1.0)}
+        counts.append(found.runs)
+    assert counts == [6, 6]

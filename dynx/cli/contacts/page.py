@@ -148,6 +148,7 @@ def template_environment() -> Environment:
     environment.globals.update(
         {each.__name__: each for each in more},
         meanings=wording.VERDICT_MEANINGS,
+        single_step=wording.SINGLE_STEP,
         styles=ENGINE_STYLES,
         width=WIDTH,
         height=HEIGHT,

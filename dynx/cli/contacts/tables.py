@@ -11,6 +11,7 @@ from rich.text import Text
 
 from dynx.cli.contacts.wording import (
     RANKS,
+    SINGLE_STEP,
     figure_name,
     figures_by_name,
     span_text,
@@ -66,7 +67,7 @@ def show(out: Console, report: Entry, *, every_figure: bool = False) -> None:
             out.print(f"  {short_line(what)}", style="yellow")
     _show_conclusion(out, report, layout.steps)
     if len(report["steps"]) == 1:
-        out.print("a single step: no error can fall with it; --dt with several shows which do")
+        out.print(SINGLE_STEP)
     if not every_figure and sum(len(case["figures"]) for case in report["cases"]) > sum(
         map(len, shown.values())
     ):

@@ -19,6 +19,12 @@ VERDICT_MEANINGS = {
     "unexplained": "the error stays, and no setting that is known removes it",
 }
 
+SINGLE_STEP = (
+    "measured at a single step: no error can be judged as falling with it; --dt with several steps shows "
+    "which do"
+)
+"""Note on a run without a second step."""
+
 PAIR_CASES = ("friction_pairs", "restitution_pairs")
 """Cases whose measured values are the effective coefficients of two materials."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 from dynx.cli.contacts.document import ContactsDocument, document
@@ -90,3 +91,12 @@ def conformance(text: str = "word", *, not_done: int = 0) -> Conformance:
 def example(text: str = "word", *, not_done: int = 0) -> ContactsDocument:
     """Return the document of `conformance`."""
     return document(conformance(text, not_done=not_done), 12.5)
+
+
+def at_one_step(found: Conformance) -> Conformance:
+    """Return what is left of results where only the largest step is run."""
+    results = tuple(
+        replace(each, measured=each.measured[:1], errors=each.errors[:1], verdict=Verdict("unexplained"))
+        for each in found.results
+    )
+    return replace(found, steps=found.steps[:1], results=results)

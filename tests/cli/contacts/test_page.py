@@ -9,11 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dynx.cli.contacts.document import document
 from dynx.cli.contacts.page import ENGINE_STYLES, contacts_page
 from dynx.cli.contacts.plots import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, plots
 from dynx.cli.contacts.wording import headline
 from dynx.files.documents import json_text
-from tests.cli.contacts.documents import ENGINES, STEPS, example
+from tests.cli.contacts.documents import ENGINES, STEPS, at_one_step, conformance, example
 from tests.files.page import Page, contrast
 
 ALLOWED = {
@@ -59,6 +60,13 @@ def test_a_page_without_results_is_well_formed(number: int) -> None:
     for case in document["cases"]:
         case["figures"] = []
     assert "Cases and engines" in Page(contacts_page(document)).text
+
+
+def test_the_page_says_that_a_single_step_cannot_show_what_falls() -> None:
+    note = "Measured at a single step: no error can be judged as falling with it"
+    several = example()
+    single = document(at_one_step(conformance()), 12.5)
+    assert [note in Page(contacts_page(each)).text for each in (single, several)] == [True, False]
 
 
 @given(st.text(max_size=30))
