@@ -5,6 +5,9 @@ at no step, and under which it is within the tolerance or falls with the step, o
 falls, as `dynx.contacts.trend` judges. Where the error is within the tolerance at the smallest step, the step
 of the largest error counts. Of several settings changed together, those are left out again without which the
 change does the same. The price of a change is measured by running the whole case with it.
+
+Runs that cannot matter are left out: a change is run at all steps only if it reduces the error at that step,
+and further values of a candidate only if the one before changes the error and is not its cause.
 """
 
 from __future__ import annotations
@@ -67,14 +70,16 @@ class Attributor:
     def _round(self, tried: Mapping[Series, Candidate]) -> dict[Series, Attribution]:
         """Return the causes among one candidate for each series."""
         causes: dict[Series, Attribution] = {}
+        left = dict(tried)
         for place in range(max((len(each.changes) for each in tried.values()), default=0)):
             changes = {
                 each: candidate.changes[place]
-                for each, candidate in tried.items()
-                if each not in causes and place < len(candidate.changes)
+                for each, candidate in left.items()
+                if place < len(candidate.changes) and self._acting(each, candidate.changes[place])
             }
             causes |= self._causes(changes, {each: tried[each].reason for each in changes})
-        left = {each: candidate for each, candidate in tried.items() if each not in causes}
+            inert = {each for each, change in changes.items() if self._has_no_effect(each, change)}
+            left = {each: found for each, found in left.items() if each not in causes and each not in inert}
         falling = {each: found for each, found in left.items() if self._along(each, found) is not None}
         self._reruns.carry_out(
             (each.trial, change, self._steps) for each, found in falling.items() for change in found.changes
@@ -97,6 +102,11 @@ class Attributor:
         errors = self._reruns.errors(series.trial, change, self._decisive(series), series.name)
         return errors is not None and errors[0] * LEAST_GAIN <= series.errors[series.decisive]
 
+    def _has_no_effect(self, series: Series, change: Change) -> bool:
+        """Check whether a change leaves an error as it is, to the last digit."""
+        errors = self._reruns.errors(series.trial, change, self._decisive(series), series.name)
+        return errors == (series.errors[series.decisive],)
+
     def _decisive(self, series: Series) -> Sequence[float]:
         """Return the step at which a cause has to reduce an error."""
         return (self._steps[series.decisive],)
@@ -110,9 +120,8 @@ class Attributor:
         trend = judge(self._steps, errors, series.tolerance)
         if trend.kind == "stays":
             return None
-        used = self._in_use(series, change)
-        acting = {name: (used[name], value) for name, value in change.items() if used[name] != value}
         outcome: Outcome = "removed" if trend.kind == "within" else "falls"
+        acting = self._acting(series, change)
         return Attribution(acting, reason, (series.errors, errors), outcome, trend.order)
 
     def _reduced(self, causes: dict[Series, Attribution]) -> dict[Series, Attribution]:
@@ -186,6 +195,11 @@ class Attributor:
             each: replace(cause, price=self._reruns.price(others[each], each, changes[each], self._steps[-1]))
             for each, cause in causes.items()
         }
+
+    def _acting(self, series: Series, change: Change) -> dict[str, tuple[Any, Any]]:
+        """Return the settings that a change gives another value, each with both values."""
+        used = self._in_use(series, change)
+        return {name: (used[name], value) for name, value in change.items() if used[name] != value}
 
     def _in_use(self, series: Series, names: Mapping[str, Any]) -> dict[str, Any]:
         """Return the values of settings before a change."""

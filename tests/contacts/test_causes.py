@@ -106,12 +106,28 @@ def test_other_errors_that_a_change_makes_worse_are_its_price() -> None:
     assert (price.trial, price.figure, price.before, price.after) == ("other", "victim", 0.01, 0.5)
 
 
+def runs_and_cause(*candidates: Candidate) -> tuple[int, Attribution | None]:
+    """Return the number of runs that find the cause of one error, and the cause."""
+    given, tried = {"exact": {FRICTION: 2.0}}, {"exact": candidates}
+    found = conform(["exact"], STEPS, [OneFigure()], settings=given, candidates=tried, jobs=0)
+    return found.runs, found.results[0].verdict.attribution
+
+
 def test_values_beyond_the_first_that_is_a_cause_are_not_run() -> None:
-    given = {"exact": {FRICTION: 2.0}}
-    counts = []
     for values in ((1.0,), (1.0, 0.5)):
-        tried = {"exact": [Candidate({FRICTION: values}, REASON)]}
-        found = conform(["exact"], STEPS, [OneFigure()], settings=given, candidates=tried, jobs=0)
-        assert cause(found.results[0]).values == {FRICTION: (2.0, 1.0)}
-        counts.append(found.runs)
-    assert counts == [6, 6]
+        runs, found = runs_and_cause(Candidate({FRICTION: values}, REASON))
+        assert runs == 2 * len(STEPS)
+        assert found is not None
+        assert found.values == {FRICTION: (2.0, 1.0)}
+
+
+def test_values_beyond_one_without_effect_are_not_run() -> None:
+    runs, found = runs_and_cause(Candidate({INERTIA: (0.5, 0.25)}, REASON))
+    assert (runs, found) == (len(STEPS) + 1, None)
+
+
+def test_values_beyond_the_one_in_use_are_run() -> None:
+    runs, found = runs_and_cause(Candidate({FRICTION: (2.0, 1.0)}, REASON))
+    assert runs == 2 * len(STEPS)
+    assert found is not None
+    assert found.values == {FRICTION: (2.0, 1.0)}
