@@ -133,11 +133,6 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
             "A surface contact of Drake has a pressure in proportion to this modulus.",
         ),
         Candidate(
-            {"modulus": (1e9, 1e10), SUBSTEPS: (4, 4)},
-            "A surface contact of Drake has a pressure in proportion to this modulus; a stiffer one needs "
-            "shorter steps.",
-        ),
-        Candidate(
             {"dissipation": (100.0, 1000.0)},
             "Contacts of Drake dissipate in proportion to this factor: the less, the more a body rebounds.",
         ),
@@ -158,6 +153,11 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
         Candidate(
             {"contact_approximation": ("sap",)},
             "Drake approximates friction and dissipation within a step in this manner.",
+        ),
+        Candidate(
+            {"modulus": (1e9, 1e10), SUBSTEPS: (4, 4)},
+            "A surface contact of Drake has a pressure in proportion to this modulus; a stiffer one needs "
+            "shorter steps.",
         ),
     ),
 }
