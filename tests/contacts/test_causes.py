@@ -53,9 +53,9 @@ class OneFigure(Planned):
     """A trial with one figure, whose error a change removes."""
 
     name: ClassVar[str] = "one_figure"
-    trials: ClassVar[dict[str, Any]] = {"": None}
+    trials: ClassVar[dict[str, Any]] = {"": 1}
 
-    def measure(self, world: World, parameters: None) -> Sequence[Figure]:
+    def measure(self, world: World, parameters: int) -> Sequence[Figure]:
         return [Figure("removed", 0.1 if world.settings[FRICTION] == 2.0 else 1e-5, 0.0, "", 1.0)]
 
 
