@@ -65,6 +65,14 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
             "Bullet slows shapes before they touch, pushes those apart that penetrate, and lets them "
             "approach to the slop; all three change the speed of a rebound.",
         ),
+        Candidate(
+            {SUBSTEPS: (8,)},
+            "The error falls with the step of the engine, too little between the steps that were run.",
+        ),
+        Candidate(
+            {"contact_slop": (0.0,), SUBSTEPS: (8,)},
+            "Bullet leaves penetrations that are no deeper than the slop, and deeper ones in long steps.",
+        ),
     ),
     "mujoco": (
         Candidate(
@@ -155,7 +163,7 @@ CANDIDATES: Mapping[str, tuple[Candidate, ...]] = {
             "Drake approximates friction and dissipation within a step in this manner.",
         ),
         Candidate(
-            {"modulus": (1e9, 1e10), SUBSTEPS: (4, 4)},
+            {"modulus": (1e9, 1e10), SUBSTEPS: (4, 16)},
             "A surface contact of Drake has a pressure in proportion to this modulus; a stiffer one needs "
             "shorter steps.",
         ),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -77,6 +78,24 @@ def test_bounces_are_those_of_a_ball_whose_flights_are_integrated() -> None:
     unit = bouncing_ball.fall_time(1.0)
     assert np.allclose([bouncing_ball.impact_time(n) for n in range(1, 5)], np.array(impacts) / unit)
     assert np.allclose(tops, [bouncing_ball.RESTITUTION ** (2 * n) for n in range(1, 5)])
+
+
+@pytest.mark.parametrize("dt", [1e-2, 1e-3])
+def test_flights_are_told_apart_where_no_sample_is_near_the_ground(dt: float) -> None:
+    g, merged = 9.81, 0
+    for fall in bouncing_ball.HEIGHTS:
+        unit = bouncing_ball.fall_time(fall)
+        ends = np.array([bouncing_ball.impact_time(n) for n in range(1, 6)]) * unit
+        times = np.arange(0.0, ends[3], dt)
+        number = np.searchsorted(ends, times)
+        launch = bouncing_ball.RESTITUTION**number * np.where(number, math.sqrt(2.0 * g * fall), 0.0)
+        since = times - np.where(number, ends[number - 1], 0.0)
+        heights = np.where(number, launch * since, fall) - 0.5 * g * since**2
+        merged += int(np.any(np.diff(number)[heights[1:] > bouncing_ball.MIN_HEIGHT * fall]))
+        found = bouncing_ball.rebound_heights(heights / fall, launch - g * since)
+        wanted = [bouncing_ball.RESTITUTION ** (2 * n) for n in range(1, 4)]
+        assert np.allclose(found, wanted, rtol=0.0, atol=g * dt**2 / 8.0 / fall + 1e-12)
+    assert (merged > 0) == (dt > 5e-3)
 
 
 def test_all_bounces_take_as_long_as_their_geometric_series() -> None:

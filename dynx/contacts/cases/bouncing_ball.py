@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
@@ -46,9 +47,9 @@ class BouncingBall(Case):
         tops: list[list[float]] = [[] for _ in range(REBOUNDS)]
         for k, fall in enumerate(HEIGHTS):
             heights = (motion.positions(ball_name(k))[:, 2] - RADIUS) / fall
-            flights = _flights(heights)[1:]
+            reached = rebound_heights(heights, motion.velocities(ball_name(k))[:, 2])
             for n, found in enumerate(tops):
-                found.append(float(heights[flights[n]].max()) if n < len(flights) else 0.0)
+                found.append(reached[n] if n < len(reached) else 0.0)
         figures = []
         for n, found in enumerate(tops, 1):
             exact = RESTITUTION ** (2 * n)
@@ -69,7 +70,13 @@ def impact_time(n: int) -> float:
     return 1.0 + sum(2.0 * RESTITUTION**k for k in range(1, n))
 
 
-def _flights(heights: Floats) -> list[slice]:
-    """Return the stretches in which a ball is higher than `MIN_HEIGHT`."""
-    edges = np.flatnonzero(np.diff(heights > MIN_HEIGHT, prepend=False, append=False))
-    return [slice(int(start), int(end)) for start, end in edges.reshape(-1, 2)]
+def rebound_heights(heights: Floats, speeds: Floats) -> list[float]:
+    """Return the largest height of each flight after an impact, of heights (n,) and upward speeds (n,).
+
+    A flight begins where a ball that falls has begun to rise: an impact may be over within a step, so that no
+    height is that of the ground.
+    """
+    rises = speeds > 0.0
+    starts = (np.flatnonzero(~rises[:-1] & rises[1:]) + 1).tolist()
+    tops = [float(heights[a:b].max()) for a, b in pairwise([*starts, len(heights)])]
+    return [top for top in tops if top > MIN_HEIGHT]
