@@ -24,6 +24,15 @@ Kind = TypeVar("Kind")
 DEFAULT_ENGINE = "compiled" if find_spec("pinocchio") is None else "pinocchio"
 """Backend and plant where none is named: Pinocchio, or dynx's own where it has no wheels (Windows)."""
 
+_VIEW = "dynx.viewer.viewer", "view"
+
+
+def view(shown: object, **options: Any) -> Any:
+    """Open the viewer of `dynx.viewer` on a model, a rollout or a world; it is imported by its name, because
+    the rooms of these lie below it."""
+    module, name = _VIEW
+    return getattr(import_module(module), name)(shown, **options)
+
 
 class ClassRegistry(Generic[Kind]):
     """The subclasses of one base class, by name."""

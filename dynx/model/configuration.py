@@ -229,7 +229,7 @@ def random(
     base = 7 if model.floating else 0
     for k, joint in enumerate(model.coordinate_joints, start=base):
         default_range = 1.0 if joint.type == "prismatic" else np.pi
-        low, high = _sampling_range(float(model.lower[k]), float(model.upper[k]), default_range)
+        low, high = sampling_range(float(model.lower[k]), float(model.upper[k]), default_range)
         q[..., k] = rng.uniform(low, high, shape)
     if model.floating:
         q[..., :3] = rng.uniform(-1.0, 1.0, (*shape, 3))
@@ -277,7 +277,7 @@ def clip(model: Model, q: ArrayLike) -> Floats:
     return array
 
 
-def _sampling_range(low: float, high: float, default_range: float) -> tuple[float, float]:
+def sampling_range(low: float, high: float, default_range: float) -> tuple[float, float]:
     """Return the range to sample: the limits; with one limit, twice `default_range` from it; with none, from
     minus to plus `default_range`."""
     bounded_below, bounded_above = low > -MAX_MAGNITUDE, high < MAX_MAGNITUDE

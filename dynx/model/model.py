@@ -17,6 +17,7 @@ from dynx.model.geometry import Geometry
 from dynx.model.mechanism import Mechanism, build_mechanism
 from dynx.model.number_bounds import refuse_unbounded_numbers
 from dynx.model.urdf.writer import write_urdf
+from dynx.registry import view
 from dynx.spatial.scalar import Floats
 
 Base = Literal["fixed", "floating"]
@@ -242,6 +243,13 @@ class Model:
     def inertial(self, link: str) -> Inertial:
         """Return the inertial of a link; a link without one has no mass."""
         return self.link(link).inertial or Inertial()
+
+    def view(self, **options: Any) -> Any:
+        """Show the robot in the browser; return the `dynx.viewer.Viewer`, which takes the options.
+
+        Raises NotInstalledError without the extra ``viewer``.
+        """
+        return view(self, **options)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Model) and self._content == other._content

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from dynx.errors import DescriptionError, nearest, shown
@@ -170,3 +170,17 @@ def _cycle(start: str, parent_joint: dict[str, Joint], source: str) -> Descripti
         source=source,
         line=parent_joint[loop[0]].line,
     )
+
+
+def longest_chain_end(links: Sequence[Link], joints: Sequence[Joint]) -> str:
+    """Return the link that ends the longest chain of moving joints; of several, the last in `links`.
+
+    Both are in depth-first order.
+    """
+    root = links[0].name
+    moving, number = {root: 0}, {root: 0}
+    for joint in joints:
+        moving[joint.child] = moving[joint.parent] + joint.moves
+        number[joint.child] = number[joint.parent] + 1
+    order = {link.name: k for k, link in enumerate(links)}
+    return max(order, key=lambda link: (moving[link], number[link], order[link]))

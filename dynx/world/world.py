@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from dynx.errors import ArgumentError
 from dynx.model.configuration import positive_seconds, whole_number
 from dynx.model.package_paths import StrPath
+from dynx.registry import view
 from dynx.spatial.scalar import Floats
 from dynx.world.camera import Camera, Picture, cast_rays, draw_picture
 from dynx.world.commands import Commands, MotorsOf, with_scene_motors
@@ -314,6 +315,14 @@ class World:
         """Return what a camera sees, drawn by dynx or by the renderer of an engine (``"pybullet"``)."""
         draw = cast_rays if renderer is None else renderer_of(renderer)
         return draw_picture(self.scene, self.state, camera, draw)
+
+    def view(self, **options: Any) -> Any:
+        """Show the world in the browser, which steps it; return the `dynx.viewer.Viewer`, which takes the
+        options.
+
+        Raises NotInstalledError without the extra ``viewer``.
+        """
+        return view(self, **options)
 
     # -- end ----------------------------------------------------------------------------------
 

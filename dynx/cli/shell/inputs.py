@@ -14,6 +14,7 @@ from dynx.model import Model, Pose
 from dynx.model.configuration import checked_array, checked_q
 from dynx.model.loading import load
 from dynx.model.model import Base
+from dynx.model.topology import longest_chain_end
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_quat, rotation_from_rpy
@@ -133,13 +134,8 @@ def default_frame_note(frame: str) -> str:
 
 
 def default_frame(model: Model) -> str:
-    """Return the end of the longest chain of moving joints; of several, the last in `frame_names`."""
-    moving, joints = {model.root: 0}, {model.root: 0}
-    for joint in model.joints:
-        moving[joint.child] = moving[joint.parent] + joint.moves
-        joints[joint.child] = joints[joint.parent] + 1
-    order = {link.name: k for k, link in enumerate(model.links)}
-    return max(order, key=lambda link: (moving[link], joints[link], order[link]))
+    """Return the end of the longest chain of moving joints."""
+    return longest_chain_end(model.links, model.joints)
 
 
 def _base_velocity(model: Model) -> list[str]:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+from typing import Any
 
+from dynx.registry import view
 from dynx.sim.record.formats import load, save
 from dynx.sim.record.plot import plot
 from dynx.sim.record.rollout_data import RolloutData
@@ -14,6 +16,13 @@ class Rollout(RolloutData):
 
     save = save
     plot = plot
+
+    def view(self, **options: Any) -> Any:
+        """Play the rollout in the browser; return the `dynx.viewer.Viewer`, which takes the options.
+
+        Raises NotInstalledError without the extra ``viewer``.
+        """
+        return view(self, **options)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Rollout:

@@ -95,7 +95,8 @@ def draw_picture(scene: Scene, state: WorldState, camera: Camera, draw: Draw = c
 def part_poses(scene: Scene, state: WorldState) -> Iterator[tuple[str, Floats]]:
     """Yield every body and every link, as ``robot/link``, with its pose in the world (4, 4)."""
     for robot in scene.robots:
-        yield from _link_poses(robot.name, robot.model, state.robots[robot.name].q)
+        for link, T in link_poses(robot.model, state.robots[robot.name].q):
+            yield f"{robot.name}/{link}", T
     for name, body in state.bodies.items():
         yield name, body.T_world_body
 
@@ -106,7 +107,7 @@ def drawn_shapes(scene: Scene, frames: dict[str, Floats]) -> Iterator[DrawnShape
     for robot in scene.robots:
         for link in robot.model.links:
             name = f"{robot.name}/{link.name}"
-            for shape, rgba, T in _link_shapes(robot.model, link.name):
+            for shape, rgba, T in link_shapes(robot.model, link.name):
                 yield DrawnShape(number[name], shape, rgba, frames[name] @ T)
     for body in scene.bodies:
         for placed in body.shapes:
@@ -114,19 +115,21 @@ def drawn_shapes(scene: Scene, frames: dict[str, Floats]) -> Iterator[DrawnShape
             yield DrawnShape(number[body.name], placed.shape, body.material.rgba, T)
 
 
-def _link_poses(robot: str, model: Model, q: Floats) -> Iterator[tuple[str, Floats]]:
+def link_poses(model: Model, q: Floats) -> Iterator[tuple[str, Floats]]:
+    """Yield every link with its pose in the world (..., 4, 4) at the configuration q (..., nq)."""
     mechanism = model.mechanism
     poses = body_poses(mechanism, mechanism.tree_q(q))
     links = {link.name for link in model.links}
     for frame in mechanism.frames:
         if frame.name in links:
             T = homogeneous(*poses[frame.body]) @ homogeneous(frame.R, frame.p)
-            yield f"{robot}/{frame.name}", np.asarray(T, dtype=np.float64)
+            yield frame.name, np.asarray(T, dtype=np.float64)
 
 
-def _link_shapes(
+def link_shapes(
     model: Model, link: str
 ) -> Iterator[tuple[Shape, tuple[float, float, float, float], Floats]]:
+    """Yield the shapes by which a link is drawn, each with its colour and its pose in the link (4, 4)."""
     visuals = _readable_visuals(model, link)
     for each in visuals or model.geometry.collisions(link):
         material = each.material if isinstance(each, Visual) else None

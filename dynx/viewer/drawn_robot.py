@@ -1,0 +1,205 @@
+"""The links of a robot as nodes of the page: placed by configuration, with visual and collision shapes."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dynx.errors import DynxError
+from dynx.model import Model
+from dynx.model.geometry import Mesh, Shape
+from dynx.model.geometry.links import Colour
+from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import quat_from_rotation
+from dynx.viewer.colours import ORANGE, RGB
+from dynx.viewer.triangles import TRIANGLE_BUDGET, Triangles, budgets, hull_of, triangles_of
+from dynx.world.camera.drawing import link_poses, link_shapes
+
+COLLISION_OPACITY = 0.4
+GHOST_OPACITY = 0.3
+
+Quaternion = tuple[float, float, float, float]
+
+
+class Look(NamedTuple):
+    """How a robot is drawn."""
+
+    colour: RGB | None = None
+    """One colour for all links instead of their own."""
+    opacity: float | None = None
+    """Opacity from 0 to 1; None for that of each shape."""
+    triangles: int | None = TRIANGLE_BUDGET
+    """Largest number of triangles of all visual meshes; None draws them whole."""
+
+
+AS_DESCRIBED = Look()
+"""Shapes in their own colours, heavy meshes reduced."""
+
+
+class DrawnRobot:
+    """A robot on the page, at a configuration; each link is a node that carries its shapes.
+
+    Nodes are named by numbers: a name from a file could contain a slash, which separates nodes.
+    """
+
+    def __init__(self, scene: Any, path: str, model: Model, look: Look = AS_DESCRIBED) -> None:
+        """`scene` is that of a viser server, and `path` the node of the robot, such as ``/robot``."""
+        self.model = model
+        self.faults: tuple[str, ...] = ()
+        """Shapes that cannot be drawn, one sentence each."""
+        self._scene, self._path, self._look = scene, path, look
+        self._root = scene.add_frame(path, show_axes=False)
+        self.links = {
+            link.name: scene.add_frame(f"{path}/link{k}", show_axes=False)
+            for k, link in enumerate(model.links)
+        }
+        """The node of each link."""
+        self.visuals: dict[str, list[Any]] = {}
+        """The nodes of the visual shapes of each link."""
+        self._collisions: list[Any] | None = None
+        self._add_visuals()
+        self.move(model.neutral())
+
+    def move(self, q: Floats) -> None:
+        """Place the links at the configuration q (nq,)."""
+        self.place(dict(link_poses(self.model, q)))
+
+    def place(self, poses: dict[str, Floats]) -> None:
+        """Place the links at the poses (4, 4) in the world given."""
+        for name, T in poses.items():
+            node = self.links[name]
+            node.wxyz, node.position = wxyz(T[:3, :3]), T[:3, 3]
+
+    def show(self, *, visuals: bool, collisions: bool) -> None:
+        """Show or hide the visual shapes and the collision shapes."""
+        for nodes in self.visuals.values():
+            for node in nodes:
+                node.visible = visuals
+        if collisions and self._collisions is None:
+            self._collisions = self._add_collisions()
+        for node in self._collisions or ():
+            node.visible = collisions
+
+    @property
+    def visible(self) -> bool:
+        """True while the robot is shown."""
+        return bool(self._root.visible)
+
+    @visible.setter
+    def visible(self, shown: bool) -> None:
+        self._root.visible = shown
+
+    def _add_visuals(self) -> None:
+        shapes = {link.name: self._visible_shapes(link.name) for link in self.model.links}
+        share = self._shares(shape for placed in shapes.values() for shape, _, _ in placed)
+        for name, placed in shapes.items():
+            nodes = self.visuals[name] = []
+            for k, (shape, rgba, T) in enumerate(placed):
+                if rgba[3] == 0.0:
+                    continue
+                budget = share.get(shape) if isinstance(shape, Mesh) else None
+                opacity = self._look.opacity or (None if rgba[3] == 1.0 else rgba[3])
+                nodes.append(
+                    add_triangles(
+                        self._scene,
+                        f"{self.links[name].name}/visual{k}",
+                        triangles_of(shape, budget),
+                        T,
+                        self._look.colour or rgb_of(rgba),
+                        opacity,
+                        flat=budget is not None,
+                    )
+                )
+
+    def _visible_shapes(self, link: str) -> list[tuple[Shape, Colour, Floats]]:
+        """Return the shapes by which a link is drawn, without those that cannot be read."""
+        try:
+            for each in self.model.geometry.visuals(link):
+                _readable(each.shape)
+        except DynxError as error:
+            self.faults = (*self.faults, f"{link}: {error}")
+        try:
+            return [(_readable(shape), rgba, T) for shape, rgba, T in link_shapes(self.model, link)]
+        except DynxError:
+            return []
+
+    def _shares(self, shapes: Any) -> dict[Mesh, int]:
+        count = Counter(shape for shape in shapes if isinstance(shape, Mesh))
+        if self._look.triangles is None:
+            return {}
+        parts = budgets(count, self._look.triangles)
+        return {mesh: part for mesh, part in parts.items() if part < len(mesh.triangles[1])}
+
+    def _add_collisions(self) -> list[Any]:
+        return [
+            add_triangles(
+                self._scene,
+                f"{self.links[link.name].name}/collision{k}",
+                triangles,
+                T,
+                ORANGE,
+                COLLISION_OPACITY,
+                flat=flat,
+            )
+            for link in self.model.links
+            for k, (triangles, T, flat) in enumerate(self._colliding_shapes(link.name))
+        ]
+
+    def _colliding_shapes(self, link: str) -> list[tuple[Triangles, Floats, bool]]:
+        """Return the collision shapes of a link, where all can be read, with their poses in the link, and
+        whether they are flat between edges."""
+        try:
+            return [
+                (hull_of(each.shape), each.origin.matrix, isinstance(each.shape, Mesh))
+                for each in self.model.geometry.collisions(link)
+            ]
+        except DynxError as error:
+            self.faults = (*self.faults, f"{link}: {error}")
+            return []
+
+
+def _readable(shape: Shape) -> Shape:
+    """Return a shape; DescriptionError for a mesh that cannot be read."""
+    if isinstance(shape, Mesh):
+        _ = shape.triangles
+    return shape
+
+
+def add_triangles(
+    scene: Any, path: str, triangles: Triangles, T: Floats, colour: RGB, opacity: float | None, *, flat: bool
+) -> Any:
+    """Add a node with triangles at the pose T (4, 4) in its parent, and return it."""
+    return scene.add_mesh_simple(
+        path,
+        triangles.vertices,
+        triangles.faces,
+        color=colour,
+        opacity=opacity,
+        flat_shading=flat,
+        # The triangles of many files are turned inside out.
+        side="double",
+        cast_shadow=False,
+        receive_shadow=False,
+        wxyz=wxyz(T[:3, :3]),
+        position=T[:3, 3],
+    )
+
+
+def wxyz(R: Floats) -> Quaternion:
+    """Return the unit quaternion (w, x, y, z) of a rotation (3, 3), as viser writes it."""
+    x, y, z, w = quat_from_rotation(R).tolist()
+    return (w, x, y, z)
+
+
+def rgb_of(rgba: Colour) -> RGB:
+    """Return a colour of a description as three numbers from 0 to 255."""
+    return (round(255 * rgba[0]), round(255 * rgba[1]), round(255 * rgba[2]))
+
+
+def size_of(model: Model) -> float:
+    """Return a length [m] to which marks are scaled: the diagonal of the box around the joints, or 0.3."""
+    origins = np.array([T[:3, 3] for _, T in link_poses(model, model.neutral())])
+    extent = float(np.linalg.norm(origins.max(axis=0) - origins.min(axis=0)))
+    return extent if extent > 0.0 else 0.3

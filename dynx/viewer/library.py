@@ -1,0 +1,22 @@
+"""The only imports of viser, which serves the page, and of fast-simplification, which reduces meshes."""
+
+from __future__ import annotations
+
+from dynx.errors import NotInstalledError
+
+try:
+    import viser
+    from fast_simplification import simplify
+    from viser import uplot
+except ImportError as error:
+    raise NotInstalledError(f"the viewer needs viser: pip install 'dynx[viewer]' ({error})") from error
+
+__all__ = ["HOTKEYS", "simplify", "uplot", "viser"]
+
+HOTKEYS = (
+    *(chr(code) for code in range(ord("A"), ord("Z") + 1)),
+    *(str(digit) for digit in range(10)),
+    *("space", "enter", "escape", "tab", "backspace", "delete", "insert", "home", "end"),
+    *("pageup", "pagedown", "arrowup", "arrowdown", "arrowleft", "arrowright"),
+)
+"""Keys of which viser's page tells."""

@@ -1,0 +1,148 @@
+"""`Motion`: a recorded motion as frames of a film, and how far two of them are apart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dynx.errors import ArgumentError
+from dynx.model import Model
+from dynx.sim import Rollout, ScenePlant
+from dynx.spatial.scalar import Floats
+from dynx.world.camera.drawing import link_poses, part_poses
+from dynx.world.comparison import EngineRun
+from dynx.world.scene import Scene, SceneBody
+
+FRAME_RATE = 60.0
+"""Largest number of frames a second of the motion."""
+
+MAX_FRAMES = 6000
+"""Largest number of frames."""
+
+PARTED = 1e-3
+"""Distance [m] from which two motions count as parted."""
+
+
+class Arrows(NamedTuple):
+    """Contact forces: the points (m, 3) [m] at which they act, and the forces (m, 3) [N], in world axes."""
+
+    points: Floats
+    forces: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Poses of parts at n times; a part is a body, or a link as ``robot/link``."""
+
+    name: str
+    t: Floats
+    """Times (n,) [s], ascending."""
+    poses: Mapping[str, Floats]
+    """Pose in the world (n, 4, 4) of each part that moves."""
+    robots: Mapping[str, Model]
+    bodies: tuple[SceneBody, ...] = ()
+    contacts: tuple[Arrows, ...] = ()
+    """Contact forces at each time; empty where none were recorded."""
+
+    def frame_at(self, time: float) -> int:
+        """Return the number of the last frame whose time is not after `time`."""
+        return max(int(np.searchsorted(self.t, time + 1e-9, side="right")) - 1, 0)
+
+    def at(self, k: int) -> dict[str, Floats]:
+        """Return the pose (4, 4) of each part that moves in frame k."""
+        return {name: rows[k] for name, rows in self.poses.items()}
+
+
+def motion_of_rollout(rollout: Rollout, name: str = "") -> Motion:
+    """Return the motion of a rollout, with the other robots and the bodies of its scene.
+
+    Raises ArgumentError for a state that is not finite.
+    """
+    frames = _frames(rollout.t)
+    _require_finite(rollout.q[frames], name or rollout.model.name)
+    plant = rollout.scenario.plant if rollout.scenario is not None else None
+    around = rollout.surroundings
+    simulated = str(plant.robot) if isinstance(plant, ScenePlant) else rollout.model.name
+    robots = {simulated: rollout.model}
+    bodies: tuple[SceneBody, ...] = ()
+    poses = dict(_poses(simulated, rollout.model, rollout.q[frames]))
+    contacts: tuple[Arrows, ...] = ()
+    if isinstance(plant, ScenePlant) and around is not None:
+        bodies = plant.scene.bodies
+        for robot in plant.scene.robots:
+            if robot.name in around.robots:
+                robots[robot.name] = robot.model
+                poses |= _poses(robot.name, robot.model, around.robots[robot.name][frames])
+        poses |= {body: rows[frames] for body, rows in around.bodies.items()}
+        table = around.contacts
+        force = table.normal_force[:, None] * table.normal + table.friction_force
+        point = 0.5 * (table.point_a + table.point_b)
+        # Contacts belong to steps, of which there is one fewer than states.
+        steps = np.minimum(frames, table.n_steps - 1)
+        first, end = np.searchsorted(table.step, steps, "left"), np.searchsorted(table.step, steps, "right")
+        contacts = tuple(Arrows(point[a:b], force[a:b]) for a, b in zip(first, end, strict=True))
+    return Motion(name or rollout.model.name, rollout.t[frames], poses, robots, bodies, contacts)
+
+
+def motion_of_reference(rollout: Rollout) -> Motion | None:
+    """Return the motion that the robot of a rollout should have followed; None without a reference."""
+    if rollout.reference is None:
+        return None
+    frames = _frames(rollout.t)
+    plant = rollout.scenario.plant if rollout.scenario is not None else None
+    name = str(plant.robot) if isinstance(plant, ScenePlant) else rollout.model.name
+    poses = dict(_poses(name, rollout.model, rollout.reference.q[frames]))
+    return Motion("reference", rollout.t[frames], poses, {name: rollout.model})
+
+
+def motion_of_run(scene: Scene, run: EngineRun) -> Motion:
+    """Return the motion of a scene in one engine."""
+    frames = [dict(part_poses(scene, state)) for state in run.states]
+    poses = {name: np.array([frame[name] for frame in frames]) for name in frames[0]}
+    robots = {robot.name: robot.model for robot in scene.robots}
+    return Motion(run.engine, run.times[: len(frames)], poses, robots, scene.bodies)
+
+
+def separation(a: Motion, b: Motion) -> tuple[Floats, tuple[str, ...]]:
+    """Return the largest distance (n,) [m] between a part in two motions at the times of `a`, and its name.
+
+    Raises ArgumentError for motions without a common part.
+    """
+    common = [name for name in a.poses if name in b.poses]
+    if not common:
+        raise ArgumentError(
+            f"{a.name} and {b.name} have no part in common: {_some(a.poses)}; {_some(b.poses)}"
+        )
+    frames = [b.frame_at(float(time)) for time in a.t]
+    apart = np.array(
+        [np.linalg.norm(a.poses[name][:, :3, 3] - b.poses[name][frames, :3, 3], axis=1) for name in common]
+    )
+    largest = apart.argmax(axis=0)
+    return apart[largest, np.arange(len(frames))], tuple(common[k] for k in largest.tolist())
+
+
+def _frames(t: Floats) -> NDArray[np.intp]:
+    """Return the indices of the states that are shown, the last among them."""
+    duration = float(t[-1] - t[0])
+    count = min(len(t), MAX_FRAMES, max(2, round(duration * FRAME_RATE) + 1))
+    return np.unique(np.linspace(0, len(t) - 1, count).round().astype(np.intp))
+
+
+def _poses(robot: str, model: Model, q: Floats) -> dict[str, Floats]:
+    n = len(q)
+    return {f"{robot}/{link}": np.broadcast_to(T, (n, 4, 4)) for link, T in link_poses(model, q)}
+
+
+def _require_finite(q: Floats, name: str) -> None:
+    bad = np.flatnonzero(~np.isfinite(q).all(axis=1))
+    if bad.size:
+        raise ArgumentError(f"{name} cannot be shown: its configuration number {bad[0]} is not finite")
+
+
+def _some(names: Mapping[str, Floats]) -> str:
+    listed = list(names)[:3]
+    return ", ".join(listed) + (", ..." if len(names) > 3 else "")

@@ -1,0 +1,178 @@
+"""Recorded motions on the page: one with its reference, or two laid over each other, with a timeline."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from dynx.spatial.scalar import Floats
+from dynx.viewer.colours import GREEN, SKY_BLUE, css
+from dynx.viewer.contact_arrows import ContactArrows
+from dynx.viewer.curves import Curves
+from dynx.viewer.drawn_robot import AS_DESCRIBED, GHOST_OPACITY, Look
+from dynx.viewer.drawn_scene import DrawnScene
+from dynx.viewer.motion import PARTED, Motion, separation
+from dynx.viewer.page import Page
+from dynx.viewer.timeline import Timeline
+
+_NO_PART = "none"
+
+_LONGEST_ARROW = 0.3
+"""Length of the largest contact force, as a share of the size of the motion."""
+
+
+class Series(NamedTuple):
+    """Values (n, m) of m quantities over times (n,) [s], for a plot."""
+
+    title: str
+    t: Floats
+    values: Floats
+    names: Sequence[str]
+
+
+class MotionView:
+    """A motion, solid, and possibly a second one, see-through in one colour, on one timeline."""
+
+    def __init__(
+        self,
+        page: Page,
+        motion: Motion,
+        ghost: Motion | None = None,
+        *,
+        curves: Sequence[Series] = (),
+        look: Look = AS_DESCRIBED,
+        compare: bool = False,
+        play: bool = False,
+    ) -> None:
+        """With `compare` the distance between the two motions is drawn below, and a button jumps to where
+        they part; otherwise the second is a reference, which can be hidden."""
+        self._page, self.motion, self.ghost = page, motion, ghost
+        self._start = float(motion.t[0])
+        low, high = _extent(motion)
+        self._size = max(float(np.linalg.norm(high - low)), 0.3)
+        page.scene.add_grid("/ground", 20.0, 20.0, cell_size=0.1, section_size=1.0)
+        with page.together():
+            self.drawn = DrawnScene(page.scene, "/motion", motion.robots, motion.bodies, look)
+            self._ghost_drawn = None if ghost is None else self._draw_ghost(ghost, look)
+        self.notes = self.drawn.faults
+        """Shapes that cannot be drawn, one sentence each."""
+        largest = max(
+            (float(np.linalg.norm(a.forces, axis=1).max(initial=0.0)) for a in motion.contacts), default=0.0
+        )
+        self._arrows = ContactArrows(
+            page.scene, _LONGEST_ARROW * self._size / (largest or 1.0), 0.006 * self._size
+        )
+        self._trace: Any = None
+        self._curves: list[Curves] = []
+        self._add_switches(compare=compare)
+        step = float(np.median(np.diff(motion.t))) if len(motion.t) > 1 else 1e-3
+        self.timeline = Timeline(page, float(motion.t[-1]) - self._start, step, self._show, play=play)
+        self._add_curves(curves, compare=compare)
+        page.look_at(0.5 * (low + high), 1.3 * self._size)
+
+    def _draw_ghost(self, ghost: Motion, look: Look) -> DrawnScene:
+        # What never moves is the same in both.
+        moving = [body for body in ghost.bodies if body.name in ghost.poses and not body.fixed]
+        seen_through = look._replace(colour=SKY_BLUE, opacity=GHOST_OPACITY)
+        return DrawnScene(self._page.scene, "/second", ghost.robots, moving, seen_through)
+
+    def _show(self, time: float) -> None:
+        now = time + self._start
+        k = self.motion.frame_at(now)
+        self.drawn.place(self.motion.at(k))
+        if self.ghost is not None and self._ghost_drawn is not None:
+            moved = self.ghost.at(self.ghost.frame_at(now))
+            self._ghost_drawn.place({n: T for n, T in moved.items() if n in self._ghost_drawn.parts})
+        if self.motion.contacts:
+            self._arrows.put(*self.motion.contacts[k])
+        for curves in self._curves:
+            curves.put(now, at_once=not self.timeline.playing)
+
+    # -- controls -----------------------------------------------------------------------------
+
+    def _add_switches(self, *, compare: bool) -> None:
+        gui = self._page.gui
+        with gui.add_folder("show"):
+            if compare and self.ghost is not None:
+                gui.add_html(_legend(self.motion.name, self.ghost.name))
+            collisions = gui.add_checkbox("collision shapes", initial_value=False)
+            ghost = None
+            if self.ghost is not None:
+                ghost = gui.add_checkbox("second motion" if compare else "reference", initial_value=compare)
+            forces = (
+                gui.add_checkbox("contact forces", True)
+                if any(len(a.points) for a in self.motion.contacts)
+                else None
+            )
+            trace = gui.add_dropdown("trace of", (_NO_PART, *self.motion.poses), initial_value=_NO_PART)
+
+        def show(_: Any = None) -> None:
+            with self._page.lock, self._page.together():
+                self.drawn.show(visuals=not collisions.value, collisions=collisions.value)
+                if ghost is not None and self._ghost_drawn is not None:
+                    self._ghost_drawn.visible = ghost.value
+                if forces is not None:
+                    self._arrows.shown = forces.value
+                    self._show(self.timeline.time)
+
+        def draw_trace(_: Any) -> None:
+            with self._page.lock, self._page.together():
+                if self._trace is not None:
+                    self._trace.remove()
+                    self._trace = None
+                if trace.value != _NO_PART:
+                    self._trace = self._line(self.motion.poses[trace.value][:, :3, 3])
+
+        for box in (collisions, ghost, forces):
+            if box is not None:
+                box.on_update(show)
+        trace.on_update(draw_trace)
+        if self._ghost_drawn is not None:
+            self._ghost_drawn.visible = compare
+
+    def _line(self, points: Floats) -> Any:
+        return self._page.scene.add_line_segments(
+            "/trace",
+            np.stack([points[:-1], points[1:]], axis=1).astype(np.float32),
+            GREEN,
+            thickness=0.006 * self._size,
+        )
+
+    def _jump_to(self, time: float) -> None:
+        self.timeline.pause()
+        self.timeline.go_to(time)
+
+    def _add_curves(self, curves: Sequence[Series], *, compare: bool) -> None:
+        gui = self._page.gui
+        if compare and self.ghost is not None:
+            distance, farthest = separation(self.motion, self.ghost)
+            beyond = np.flatnonzero(distance > PARTED)
+            with gui.add_folder("difference"):
+                text = "never more than"
+                if beyond.size:
+                    first = int(beyond[0])
+                    text = f"from {self.motion.t[first]:.4g} s, {farthest[first]} by more than"
+                    jump = gui.add_button("jump to where they part")
+                    at = float(self.motion.t[first]) - self._start
+                    jump.on_click(lambda _: self._jump_to(at))
+                gui.add_text("they part", f"{text} {1e3 * PARTED:g} mm", disabled=True)
+                self._curves.append(
+                    Curves(gui, "distance [m]", self.motion.t, distance[:, None], ["largest distance"])
+                )
+        for each in curves:
+            with gui.add_folder(each.title, expand_by_default=False):
+                self._curves.append(Curves(gui, each.title, each.t, each.values, each.names))
+
+
+def _extent(motion: Motion) -> tuple[Floats, Floats]:
+    """Return the corners (3,) of the box around the origins of everything that moves."""
+    origins = [T[..., :3, 3].reshape(-1, 3) for T in motion.poses.values()]
+    points = np.concatenate(origins) if origins else np.zeros((1, 3))
+    return points.min(axis=0), points.max(axis=0)
+
+
+def _legend(solid: str, ghost: str) -> str:
+    return f"<p>solid: {escape(solid)}<br><b style='color: {css(SKY_BLUE)}'>&#9632;</b> {escape(ghost)}</p>"

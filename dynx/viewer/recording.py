@@ -1,0 +1,41 @@
+"""A page that plays a motion without a server: one HTML file that needs no network."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+
+from dynx.errors import ArgumentError, shown
+from dynx.files.reading import checked_path
+from dynx.files.writing import write_bytes
+from dynx.viewer.page import Page
+
+UPDATES_PER_SECOND = 30.0
+"""Rate at which the recorded page moves."""
+
+
+def write_recording(
+    path: str | os.PathLike[str],
+    page: Page,
+    show: Callable[[float], None],
+    duration: float,
+    *,
+    dark: bool = False,
+) -> None:
+    """Write an HTML file in which the scene of the page plays as `show(time)` places it, for `duration` [s].
+
+    A duration of 0 gives a still scene. Raises ArgumentError for a file that cannot be written.
+    """
+    if not checked_path(path).lower().endswith((".html", ".htm")):
+        raise ArgumentError(f"a page is written as .html, not as {shown(os.path.basename(path))}")
+    with page.lock:
+        show(0.0)
+        recorder = page.server.get_scene_serializer()
+        count = round(duration * UPDATES_PER_SECOND)
+        for k in range(1, count + 1):
+            recorder.insert_sleep(duration / count)
+            show(duration * k / count)
+        # The last picture stays for a moment before the recording begins again.
+        recorder.insert_sleep(1.0 if count else 0.0)
+        text = recorder.as_html(dark)
+    write_bytes(path, text.encode())

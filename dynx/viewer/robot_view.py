@@ -1,0 +1,154 @@
+"""A robot on the page: what is shown of it, sliders, a handle for inverse kinematics, its configuration."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dynx.backends import backend
+from dynx.model import Model
+from dynx.model.configuration import checked_q
+from dynx.model.topology import longest_chain_end
+from dynx.registry import DEFAULT_ENGINE
+from dynx.spatial.scalar import Floats
+from dynx.viewer.drawn_robot import AS_DESCRIBED, DrawnRobot, Look, size_of
+from dynx.viewer.frame_handle import FrameHandle
+from dynx.viewer.joint_sliders import JointSliders
+from dynx.viewer.marks import Marks
+from dynx.viewer.page import Page
+from dynx.viewer.robot_quantities import GravityTorques, Manipulability
+
+_FREE = {"pose": None, "position": "rotation", "rotation": "position"}
+"""What the handle keeps of a frame, and what `inverse_kinematics` then leaves free."""
+
+
+class RobotView:
+    """One robot, which the sliders and the handle of the page move."""
+
+    def __init__(
+        self,
+        page: Page,
+        model: Model,
+        q: Floats | None = None,
+        *,
+        engine: str = DEFAULT_ENGINE,
+        look: Look = AS_DESCRIBED,
+        collisions: bool = False,
+    ) -> None:
+        """`engine` computes inverse kinematics, torques and Jacobians; `collisions` are shown at once."""
+        self.model = model
+        self._page = page
+        self._engine = backend(engine, model)
+        page.at_end(self._engine.close)
+        start = model.clip(model.neutral()) if q is None else checked_q(model, q, "q")
+        page.scene.add_grid("/ground", 4.0, 4.0, cell_size=0.1, section_size=0.5)
+        with page.together():
+            self.robot = DrawnRobot(page.scene, "/robot", model, look)
+            self.robot.move(start)
+        self.notes = self.robot.faults
+        """Shapes that cannot be drawn, one sentence each."""
+        self._marks = Marks(page.scene, self.robot)
+        self._torques = GravityTorques(page.scene, self._engine)
+        self._ellipsoid = Manipulability(page.scene, self._engine)
+        size = size_of(model)
+        tip = longest_chain_end(model.links, model.joints)
+        self._handle = FrameHandle(page.scene, self._engine, tip, 0.25 * size, self._dragged)
+        self._add_switches(collisions=collisions)
+        self._add_frame_controls()
+        self._sliders = JointSliders(page.gui, model, start, self._slid)
+        self._add_configuration()
+        self._handle.put(start)
+        self._show(start)
+        origins = np.array([node.position for node in self.robot.links.values()])
+        page.look_at(0.5 * (origins.min(axis=0) + origins.max(axis=0)), 1.5 * size)
+
+    @property
+    def q(self) -> Floats:
+        """The configuration that is shown (nq,)."""
+        return self._sliders.q
+
+    def put(self, q: Floats) -> None:
+        """Show a configuration (nq,)."""
+        checked = checked_q(self.model, q, "q")
+        with self._page.lock, self._page.together():
+            self._sliders.put(checked)
+            self._handle.put(checked)
+            self._show(checked)
+
+    def _show(self, q: Floats) -> None:
+        self.robot.move(q)
+        self._torques.move(q)
+        self._ellipsoid.move(q, self._handle.frame)
+        self._code.value = f"q = np.array({q.tolist()})"
+
+    def _slid(self, q: Floats) -> None:
+        with self._page.lock, self._page.together():
+            self._handle.put(q)
+            self._show(q)
+
+    def _dragged(self, q: Floats, message: str) -> None:
+        with self._page.lock, self._page.together():
+            self._sliders.put(q)
+            self._show(q)
+            self._message.value = message
+
+    # -- controls -----------------------------------------------------------------------------
+
+    def _add_switches(self, *, collisions: bool) -> None:
+        gui = self._page.gui
+        with gui.add_folder("show"):
+            visual = gui.add_checkbox("visual shapes", initial_value=not collisions)
+            colliding = gui.add_checkbox("collision shapes", initial_value=collisions)
+            for kind in Marks.kinds:
+                box = gui.add_checkbox(kind, initial_value=False)
+                box.on_update(lambda _, kind=kind, box=box: self._mark(kind, box))
+            torques = gui.add_checkbox("gravity torques", initial_value=False)
+            ellipsoid = gui.add_checkbox("manipulability", initial_value=False)
+
+        def shapes(_: Any = None) -> None:
+            with self._page.lock, self._page.together():
+                self.robot.show(visuals=visual.value, collisions=colliding.value)
+
+        def quantities(_: Any) -> None:
+            with self._page.lock, self._page.together():
+                self._torques.shown, self._ellipsoid.shown = torques.value, ellipsoid.value
+                self._show(self.q)
+
+        visual.on_update(shapes)
+        colliding.on_update(shapes)
+        torques.on_update(quantities)
+        ellipsoid.on_update(quantities)
+        shapes()
+
+    def _mark(self, kind: str, box: Any) -> None:
+        with self._page.lock, self._page.together():
+            self._marks.show(kind, box.value)
+
+    def _add_frame_controls(self) -> None:
+        gui = self._page.gui
+        with gui.add_folder("frame"):
+            frame = gui.add_dropdown("frame", self.model.frame_names, initial_value=self._handle.frame)
+            drag = gui.add_checkbox("drag it", initial_value=False)
+            kept = gui.add_dropdown("its", tuple(_FREE), initial_value="pose")
+            self._message = gui.add_text("result", "", disabled=True)
+
+        def changed(_: Any) -> None:
+            with self._page.lock, self._page.together():
+                self._handle.frame, self._handle.free = frame.value, _FREE[kept.value]
+                self._handle.visible = drag.value
+                self._handle.put(self.q)
+                self._show(self.q)
+
+        for control in (frame, drag, kept):
+            control.on_update(changed)
+
+    def _add_configuration(self) -> None:
+        gui = self._page.gui
+        with gui.add_folder("configuration"):
+            neutral = gui.add_button("neutral")
+            drawn = gui.add_button("random")
+            self._code = gui.add_text("as code", "", multiline=True)
+        rng = np.random.default_rng(0)
+        neutral.on_click(lambda _: self.put(self.model.clip(self.model.neutral())))
+        drawn.on_click(lambda _: self.put(self.model.random(rng)))

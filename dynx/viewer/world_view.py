@@ -1,0 +1,224 @@
+"""A world on the page, which steps while it is seen: play, pause, step, reset, drag and push."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from dynx.errors import DynxError
+from dynx.model.geometry import HeightField, Plane
+from dynx.spatial.scalar import Floats
+from dynx.viewer.contact_arrows import ContactArrows
+from dynx.viewer.drawn_robot import AS_DESCRIBED, Look
+from dynx.viewer.drawn_scene import DrawnScene
+from dynx.viewer.page import Page
+from dynx.viewer.spring import Spring
+from dynx.world import World, Wrench
+from dynx.world.camera.drawing import part_poses
+from dynx.world.scene import SceneBody
+
+UPDATES_PER_SECOND = 30.0
+"""Rate at which the page is moved."""
+
+STANDARD_WEIGHT = 9.81
+"""Force [N] on a mass of 1 kg, for the scale of the arrows."""
+
+_NO_PART = "none"
+
+LoadsOf = Callable[[World], Mapping[str, Any]]
+
+
+class WorldView:
+    """A world and its controls.
+
+    The page steps the world in a thread of its own, in real time where the machine can. A program that steps
+    the world itself passes ``steps=False`` and calls `draw`.
+    """
+
+    def __init__(
+        self,
+        page: Page,
+        world: World,
+        *,
+        loads: LoadsOf | None = None,
+        look: Look = AS_DESCRIBED,
+        play: bool = False,
+        steps: bool = True,
+    ) -> None:
+        """`loads(world)` returns the arguments of `World.step` that act in the next step."""
+        self._page, self.world, self._loads = page, world, loads
+        scene = world.scene
+        with page.together():
+            robots = {robot.name: robot.model for robot in scene.robots}
+            self.drawn = DrawnScene(page.scene, "/world", robots, scene.bodies, look)
+        self.notes = (*world.notes, *self.drawn.faults)
+        """Notes on the start, and shapes that cannot be drawn, one sentence each."""
+        poses = dict(part_poses(scene, world.state))
+        moving = [*(f"{r.name}/{link.name}" for r in scene.robots for link in r.model.links)]
+        moving += [body.name for body in scene.bodies if not body.fixed]
+        points = np.array([poses[name][:3, 3] for name in moving]) if moving else np.zeros((1, 3))
+        low, high = points.min(axis=0), points.max(axis=0)
+        self._size = max(float(np.linalg.norm(high - low)), 0.5)
+        mass = sum(r.model.total_mass for r in scene.robots) + sum(b.mass or 0.0 for b in scene.bodies)
+        self._arrows = ContactArrows(
+            page.scene, 0.3 * self._size / (STANDARD_WEIGHT * (mass or 1.0)), 0.006 * self._size
+        )
+        self._spring = Spring(page.scene, 0.3 * self._size)
+        self._push: Floats | None = None
+        self._running = threading.Event()
+        if not any(_is_ground(body) for body in scene.bodies):
+            page.scene.add_grid("/ground", 20.0, 20.0, cell_size=0.1, section_size=1.0)
+        self._add_controls(moving, steps=steps)
+        self.draw()
+        page.look_at(0.5 * (low + high), 1.5 * self._size)
+        page.at_end(self._running.set)
+        if steps:
+            self._thread = threading.Thread(target=self._run, name="dynx world", daemon=True)
+            self._thread.start()
+            if play:
+                self.play()
+
+    @property
+    def playing(self) -> bool:
+        """True while the page steps the world."""
+        return self._running.is_set()
+
+    def play(self) -> None:
+        """Let the page step the world."""
+        self._button.label = "pause"
+        self._running.set()
+
+    def pause(self) -> None:
+        """Stop stepping."""
+        self._running.clear()
+        self._button.label = "play"
+
+    def draw(self) -> None:
+        """Show the present state of the world."""
+        with self._page.lock, self._page.together():
+            state = self.world.state
+            self.drawn.place(dict(part_poses(self.world.scene, state)))
+            self._clock.value = f"{state.time:.3f} s"
+            if self._arrows.shown:
+                found = self.world.contacts()
+                self._arrows.put(
+                    np.array([c.point for c in found]).reshape(-1, 3),
+                    np.array([c.force for c in found]).reshape(-1, 3),
+                )
+
+    def step(self, n: int = 1) -> None:
+        """Take `n` steps under the loads, the spring and a push, and draw. Errors are shown in the page."""
+        with self._page.lock:
+            if self._page.closed:
+                return
+            try:
+                if self._loads is None and self._spring.part is None and self._push is None:
+                    self.world.step(n)
+                    n = 0
+                for _ in range(n):
+                    given = {} if self._loads is None else dict(self._loads(self.world))
+                    wrenches = [*given.pop("wrenches", ()), *self._spring.wrenches(self.world)]
+                    if self._push is not None and self._part.value != _NO_PART:
+                        wrenches.append(Wrench(self._part.value, self._push / self.world.dt))
+                        self._push = None
+                    self.world.step(1, wrenches=wrenches, **given)
+            except DynxError as error:
+                self.pause()
+                self._message.value = str(error)
+            self.draw()
+
+    def reset(self) -> None:
+        """Return to the start."""
+        with self._page.lock:
+            self.world.reset()
+            self._message.value = ""
+            self._spring.hold(self.world, self._held())
+            self.draw()
+
+    # -- controls -----------------------------------------------------------------------------
+
+    def _add_controls(self, moving: list[str], *, steps: bool) -> None:
+        gui = self._page.gui
+        with gui.add_folder("world"):
+            gui.add_text("engine", f"{self.world.engine} {self.world.version}", disabled=True)
+            self._clock = gui.add_text("time", "", disabled=True)
+            self._rate = gui.add_text("speed reached", "", disabled=True, visible=steps)
+            self._button = gui.add_button("play", visible=steps)
+            once = gui.add_button("one step", visible=steps)
+            reset = gui.add_button("reset", visible=steps)
+            self._factor = gui.add_slider("speed", 0.05, 2.0, step=0.05, initial_value=1.0, visible=steps)
+            self._message = gui.add_text("error", "", disabled=True)
+        with gui.add_folder("show"):
+            collisions = gui.add_checkbox("collision shapes", initial_value=False)
+            forces = gui.add_checkbox("contact forces", initial_value=True)
+        with gui.add_folder("pull and push", visible=steps):
+            self._part = gui.add_dropdown("part", (_NO_PART, *moving), initial_value=_NO_PART)
+            self._pull = gui.add_checkbox("pull by a spring", initial_value=False)
+            impulse = gui.add_vector3("push [N s]", initial_value=(1.0, 0.0, 0.0), step=0.1)
+            push = gui.add_button("push")
+        self._button.on_click(lambda _: self.pause() if self.playing else self.play())
+        once.on_click(lambda _: self._step_once())
+        reset.on_click(lambda _: self.reset())
+        gui.add_command("play or pause", hotkey="P").on_trigger(
+            lambda _: self.pause() if self.playing else self.play()
+        )
+
+        def show(_: Any) -> None:
+            with self._page.lock:
+                self.drawn.show(visuals=not collisions.value, collisions=collisions.value)
+                self._arrows.shown = forces.value
+                if not forces.value:
+                    self._arrows.put(np.zeros((0, 3)), np.zeros((0, 3)))
+                self.draw()
+
+        def hold(_: Any) -> None:
+            with self._page.lock:
+                self._spring.hold(self.world, self._held())
+
+        def pushed(_: Any) -> None:
+            with self._page.lock:
+                self._push = np.array(impulse.value, dtype=np.float64)
+
+        collisions.on_update(show)
+        forces.on_update(show)
+        self._part.on_update(hold)
+        self._pull.on_update(hold)
+        push.on_click(pushed)
+
+    def _step_once(self) -> None:
+        self.pause()
+        self.step()
+
+    def _held(self) -> str | None:
+        return self._part.value if self._pull.value and self._part.value != _NO_PART else None
+
+    def _run(self) -> None:
+        period = 1.0 / UPDATES_PER_SECOND
+        while not self._page.closed:
+            self._running.wait()
+            began, start = time.monotonic(), self.world.time
+            while self._running.is_set() and not self._page.closed:
+                factor = float(self._factor.value)
+                behind = start + (time.monotonic() - began) * factor - self.world.time
+                n = round(behind / self.world.dt)
+                # Where the machine is too slow, the world falls behind instead of the page standing still.
+                if n > 3.0 * period * factor / self.world.dt:
+                    n = max(1, round(period * factor / self.world.dt))
+                    began, start = time.monotonic(), self.world.time
+                before, clock = self.world.time, time.monotonic()
+                if n > 0:
+                    self.step(n)
+                if self._page.wait(max(period - (time.monotonic() - clock), 0.001)):
+                    return
+                spent = time.monotonic() - clock
+                if self._page.closed:
+                    return
+                self._rate.value = f"{(self.world.time - before) / spent:.2f}"
+
+
+def _is_ground(body: SceneBody) -> bool:
+    return any(isinstance(placed.shape, Plane | HeightField) for placed in body.shapes)

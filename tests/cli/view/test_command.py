@@ -1,0 +1,108 @@
+"""``dynx view``: what it takes, what it refuses, and its exported pages."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+import dynx
+from dynx.cli.shell.main import cli
+
+BAD_INPUT = 2
+
+
+def run(*arguments: str) -> tuple[int, str]:
+    """Run the command; return the exit code and everything printed."""
+    result = CliRunner().invoke(cli, ["view", *arguments])
+    return result.exit_code, " ".join(result.output.split())
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A short rollout in a file."""
+    path = tmp_path_factory.mktemp("rollouts") / "run.npz"
+    dynx.simulate(dynx.load("six_axis_arm"), duration=0.1).save(path)
+    return str(path)
+
+
+def test_a_rollout_a_robot_and_two_rollouts_are_exported(saved: str, tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    for arguments in ((saved,), ("pendulum",), ("--compare", saved, saved)):
+        code, output = run(*arguments, "--export", str(page))
+        assert code == 0, output
+        assert "wrote" in output
+        assert page.read_bytes().startswith(b"<!")
+        page.unlink()
+
+
+def test_a_scene_is_compared_in_two_engines(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    pytest.importorskip("pybullet")
+    page = tmp_path / "page.html"
+    code, output = run(
+        "--compare", "slope", "--engine", "pybullet,mujoco", "--duration", "0.1", "--export", str(page)
+    )
+    assert code == 0, output
+    assert page.is_file()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("no_such_robot",), "no_such_robot"),
+        (("nowhere.npz",), "no file"),
+        (("run.mcap",), "shown from .npz"),
+        (("pendulum", "pendulum"), "2 targets"),
+        (("--compare", "pendulum"), "not a robot"),
+        (("--compare", "a.npz"), "wanted two"),
+        (("--compare", "a.npz", "b.npz"), "no file"),
+        (("pendulum", "--engine", "a,b"), "wanted one"),
+        (("pendulum", "--engine", "pinochio"), "pinocchio"),
+        (("slope", "--engine", "nothing"), "nothing"),
+        (("pendulum", "--port", "70000"), "70000"),
+        (("pendulum", "--host", "203.0.113.1", "--no-browser"), "cannot be listened on"),
+        (("pendulum", "--export", "page.png"), ".html"),
+        (("pendulum", "--export", "nowhere/page.html"), "nowhere"),
+        (("nowhere.toml",), "nowhere.toml"),
+    ],
+)
+def test_input_that_cannot_be_shown_is_told(arguments: tuple[str, ...], message: str) -> None:
+    code, output = run(*arguments)
+    assert code == BAD_INPUT, output
+    assert message in output
+    assert "Traceback" not in output
+
+
+def test_damaged_rollouts_are_told(saved: str, tmp_path: Path) -> None:
+    damaged = tmp_path / "damaged.npz"
+    damaged.write_bytes(Path(saved).read_bytes()[:-100])
+    code, output = run(str(damaged))
+    assert code == BAD_INPUT
+    assert "damaged.npz" in output
+
+
+def test_a_port_that_is_taken_is_told() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        code, output = run("pendulum", "--port", str(taken.getsockname()[1]), "--no-browser")
+    assert code == BAD_INPUT
+    assert "choose another port" in output
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_the_page_ends_with_ctrl_c() -> None:
+    command = [sys.executable, "-m", "dynx.cli.shell.main", "view", "pendulum", "--port", "0", "--no-browser"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    assert process.stdout is not None
+    assert "http://127.0.0.1:" in process.stdout.readline()
+    process.send_signal(signal.SIGTERM)
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 0, output
+    assert "Traceback" not in output

@@ -1,0 +1,88 @@
+"""A browser for the tests of the page, where one is installed."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from dynx.viewer import Viewer
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+
+SOFTWARE = (
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--ignore-gpu-blocklist",
+)
+"""Options with which Chromium draws WebGL without a graphics processor."""
+
+PATIENCE = 180.0
+"""Longest wait for the page [s]: software draws slowly beside other tests."""
+
+
+class Opened:
+    """A page of a viewer that is open in the browser, with everything it printed and asked for."""
+
+    def __init__(self, page: Any) -> None:
+        self.page = page
+        self.errors: list[str] = []
+        self.requests: list[str] = []
+        page.on("console", lambda m: self.errors.append(m.text) if m.type == "error" else None)
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+        page.on("request", lambda request: self.requests.append(request.url))
+
+    def go_to(self, url: str) -> None:
+        """Open an address and wait until the page draws."""
+        self.page.goto(url)
+        self.page.wait_for_selector("canvas[data-engine]", timeout=1e3 * PATIENCE)
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    """Headless Chromium; the test is skipped where there is none."""
+    found = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if found is None:
+        pytest.skip(f"needs a browser: {' or '.join(BROWSERS)} (apt-get install chromium)")
+    api = pytest.importorskip("playwright.sync_api")
+    with api.sync_playwright() as playwright:
+        running = playwright.chromium.launch(executable_path=found, args=list(SOFTWARE))
+        yield running
+        running.close()
+
+
+@pytest.fixture
+def open_page(browser: Any) -> Iterator[Callable[[str], Opened]]:
+    """Open addresses in pages of 640 x 400 pixels, which are closed after the test."""
+    pages = []
+
+    def opened(url: str) -> Opened:
+        page = browser.new_page(viewport={"width": 640, "height": 400})
+        page.set_default_timeout(1e3 * PATIENCE)
+        pages.append(page)
+        found = Opened(page)
+        found.go_to(url)
+        return found
+
+    yield opened
+    for page in pages:
+        page.close()
+
+
+def until(condition: Callable[[], object], what: str) -> None:
+    """Wait until a condition holds; fail after `PATIENCE`."""
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end, f"waited {PATIENCE:g} s for {what}"
+        time.sleep(0.05)
+
+
+def connected(viewer: Viewer, count: int = 1) -> list[Any]:
+    """Return the open pages of a viewer once there are `count`."""
+    until(lambda: len(viewer.page.server.get_clients()) >= count, f"{count} connected pages")
+    clients = viewer.page.server.get_clients()
+    return [clients[k] for k in sorted(clients)]

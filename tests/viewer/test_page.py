@@ -1,0 +1,189 @@
+"""The page in a browser: drawn as the world's camera draws; moved by sliders, handles, buttons and keys."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import dynx
+from dynx.errors import ArgumentError
+from dynx.model import Model, Pose
+from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import quat_from_rotation
+from dynx.viewer import Viewer, view
+from dynx.world import Scene
+from dynx.world.camera import Camera, draw_picture
+from dynx.world.scene import SceneRobot
+from dynx.world.state import RobotState, WorldState
+from tests.conftest import needs_examples
+from tests.viewer.conftest import PATIENCE, Opened, connected, until
+
+OpenPage = Callable[[str], Opened]
+
+SAME = 0.93
+"""Share of the pixels of a silhouette that two renderers have in common; edges differ by a pixel."""
+
+
+def rendered_silhouette(viewer: Viewer, camera: Camera) -> Any:
+    """Return where the page, drawn from a camera's place, shows something (height, width)."""
+    (client,) = connected(viewer)
+    T = camera.pose.matrix
+    x, y, z, w = quat_from_rotation(T[:3, :3])
+    width, height = camera.size
+    picture = client.get_render(
+        height=height,
+        width=width,
+        wxyz=(w, x, y, z),
+        position=tuple(T[:3, 3]),
+        fov=camera.field_of_view,
+        transport_format="png",
+        timeout=PATIENCE,
+    )
+    return picture[..., 3] > 127
+
+
+def drawn_silhouette(model: Model, q: Floats, camera: Camera) -> Any:
+    """Return where the world's camera sees the robot (height, width)."""
+    scene = Scene("robot", robots=[SceneRobot("robot", model)])
+    state = WorldState(0.0, {"robot": RobotState(q, np.zeros(model.nv))}, {})
+    return draw_picture(scene, state, camera).segmentation >= 0
+
+
+@needs_examples
+def test_the_page_shows_what_the_camera_of_the_world_sees(open_page: OpenPage) -> None:
+    model = dynx.load("ur5")
+    camera = Camera.look_at((1.3, -1.3, 0.8), (0.2, 0.0, 0.3), size=(320, 240))
+    with view(model, whole_meshes=True) as viewer:
+        viewer.page.scene.remove_by_name("/ground")
+        page = open_page(viewer.url)
+        for seed in (0, 1):
+            q = model.random(seed)
+            viewer.view.put(q)
+            expected = drawn_silhouette(model, q, camera)
+            assert expected.sum() > 1000
+
+            def common(expected: Any = expected) -> float:
+                found = rendered_silhouette(viewer, camera)
+                return float((found & expected).sum() / (found | expected).sum())
+
+            until(lambda: common() > SAME, "the picture of the configuration")
+        assert not page.errors
+
+
+def test_sliders_buttons_and_keys_reach_the_program(open_page: OpenPage) -> None:
+    model = dynx.load("six_axis_arm")
+    with view(model) as viewer:
+        page, again = open_page(viewer.url), open_page(viewer.url)
+        connected(viewer, 2)
+        start = viewer.view.q
+        page.page.locator("[role=slider]").first.focus()
+        page.page.keyboard.press("ArrowRight")
+        until(lambda: viewer.view.q[0] > start[0], "the slider to move the joint")
+        assert np.array_equal(viewer.view.q[1:], start[1:])
+        moved = viewer.view.q
+        again.page.get_by_role("button", name="random").click()
+        until(lambda: not np.array_equal(viewer.view.q, moved), "the button")
+
+        pressed: list[str] = []
+        viewer.on_key("k", lambda: pressed.append("k"))
+        viewer.button("press me", lambda: pressed.append("button"))
+        page.page.get_by_role("button", name="press me").click()
+        page.page.mouse.click(40, 350)  # The key goes to the scene, not to a control.
+        page.page.keyboard.press("k")
+        until(lambda: sorted(pressed) == ["button", "k"], "the button and the key of the program")
+
+        page.page.reload()
+        page.page.wait_for_selector("canvas[data-engine]")
+        again.page.close()
+        until(lambda: len(viewer.page.server.get_clients()) == 1, "one page after the other closed")
+        assert not page.errors
+        assert not again.errors
+
+
+def test_dragging_the_handle_solves_inverse_kinematics(open_page: OpenPage) -> None:
+    model = dynx.load("six_axis_arm")
+    with view(model, q=[0.3, -0.4, 0.6, 0.2, 0.5, 0.1]) as viewer:
+        page = open_page(viewer.url)
+        (client,) = connected(viewer)
+        page.page.get_by_label("drag it").check()
+        until(lambda: viewer.view._handle.visible, "the handle")
+        frame, before = viewer.view._handle.frame, viewer.view.q
+        with dynx.backend("reference", model) as engine:
+            T = engine.forward_kinematics(before, frame)
+            scale = float(viewer.view._handle._node.scale)
+            # The arrow along z ends at the scale of the handle; it is held a little before its end.
+            held, towards = (_pixel(client, (T @ [0.0, 0.0, s * scale, 1.0])[:3]) for s in (0.85, 1.1))
+            mouse = page.page.mouse
+            mouse.move(*held)
+            mouse.down()
+            for share in np.linspace(0.1, 1.0, 10):
+                mouse.move(*(held + share * (towards - held)))
+            mouse.up()
+            until(lambda: not np.array_equal(viewer.view.q, before), "the robot to follow the handle")
+            moved = engine.forward_kinematics(viewer.view.q, frame)
+        shift = T[:3, :3].T @ (moved[:3, 3] - T[:3, 3])
+        assert shift[2] > 0.02 * scale
+        assert np.abs(shift[:2]).max() < 1e-3 * scale
+        assert np.abs(moved[:3, :3] - T[:3, :3]).max() < 1e-5
+        assert not page.errors
+
+
+@needs_examples
+def test_an_exported_page_plays_without_a_network(open_page: OpenPage, tmp_path: Path) -> None:
+    arm = dynx.load("six_axis_arm")
+    motion = dynx.trajectory.cycloidal(np.zeros(6), [0.5, -0.4, 0.3, 0.2, -0.3, 0.4], duration=0.5)
+    rollout = dynx.simulate(arm, dynx.control.ComputedTorque(arm, kp=100.0, kd=20.0), motion)
+    path = tmp_path / "run.html"
+    with rollout.view() as viewer:
+        viewer.export(path)
+    page = open_page(path.as_uri())
+    assert [url for url in page.requests if not url.startswith(("file:", "data:", "blob:"))] == []
+    assert not page.errors
+
+
+def test_names_of_a_file_are_shown_and_not_run(open_page: OpenPage, tmp_path: Path) -> None:
+    name = "&lt;img src=x onerror=&quot;window.ran=1&quot;&gt;"
+    path = tmp_path / "robot.urdf"
+    link = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    path.write_text(
+        f'<robot name="{name}"><link name="{name}">{link}</link><link name="b/c">{link}</link>'
+        f'<joint name="{name}" type="revolute"><parent link="{name}"/><child link="b/c"/>'
+        '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+    )
+    with view(dynx.load(path)) as viewer:
+        viewer.view._marks.show("names", True)
+        viewer.text("<script>window.ran = 1</script>", (0.0, 0.0, 0.5))
+        page = open_page(viewer.url)
+        connected(viewer)
+        page.page.get_by_label("joint axes").check()
+        page.page.wait_for_timeout(500.0)
+        assert page.page.evaluate("window.ran") is None
+        assert not page.errors
+
+
+def test_a_screenshot_needs_an_open_page(open_page: OpenPage) -> None:
+    with view(dynx.load("pendulum")) as viewer:
+        with pytest.raises(ArgumentError, match="no page is open"):
+            viewer.screenshot()
+        open_page(viewer.url)
+        connected(viewer)
+        picture = viewer.screenshot((160, 100), timeout=PATIENCE)
+        assert picture.shape == (100, 160, 3)
+        assert len(np.unique(picture)) > 1
+
+
+def _pixel(client: Any, point: Floats) -> Floats:
+    """Return where the camera of a page sees a point (3,) of the world (2,) [pixels]."""
+    camera = client.camera
+    w, x, y, z = camera.wxyz
+    T = Pose.from_matrix(np.eye(4)).matrix
+    T[:3, :3] = dynx.rotation_from_quat([x, y, z, w])
+    T[:3, 3] = camera.position
+    seen = np.linalg.inv(T) @ [*point, 1.0]
+    height, width = camera.image_height, camera.image_width
+    focal = 0.5 * height / np.tan(0.5 * camera.fov)
+    return np.array([0.5 * width + focal * seen[0] / seen[2], 0.5 * height + focal * seen[1] / seen[2]])

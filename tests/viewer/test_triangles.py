@@ -1,0 +1,83 @@
+"""Shapes as triangles: closed, turned outwards, of the right volume, and reduced to a budget."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import dynx
+from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Shape, Sphere, solid_properties
+from dynx.viewer.triangles import FEWEST_TRIANGLES, Triangles, budgets, hull_of, triangles_of
+from tests.conftest import needs_examples
+
+SOLIDS: list[Shape] = [Box((0.1, 0.2, 0.3)), Sphere(0.4), Cylinder(0.2, 0.5), Capsule(0.1, 0.3)]
+
+
+def volume(triangles: Triangles) -> float:
+    """Return the volume that outward triangles enclose (divergence theorem)."""
+    a, b, c = np.moveaxis(triangles.vertices[triangles.faces].astype(float), 1, 0)
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
+
+
+def edges_in_one_direction_only(triangles: Triangles) -> bool:
+    """Check that each edge is passed once in each direction: the surface is closed and turned one way."""
+    _, number = np.unique(np.round(triangles.vertices, 6), axis=0, return_inverse=True)
+    faces = number.reshape(-1)[triangles.faces]
+    edges = [tuple(edge) for k in range(3) for edge in zip(faces[:, k], faces[:, (k + 1) % 3], strict=True)]
+    return len(set(edges)) == len(edges) and {(b, a) for a, b in edges} == set(edges)
+
+
+@pytest.mark.parametrize("shape", SOLIDS, ids=lambda shape: type(shape).__name__)
+def test_solids_are_closed_and_turned_outwards(shape: Shape) -> None:
+    triangles = triangles_of(shape)
+    assert edges_in_one_direction_only(triangles)
+    exact = solid_properties(shape).volume
+    # Of a circle's area 32 sides leave out this share, of a ball's volume less than three times that.
+    missing = 3.0 * (1.0 - math.sin(2.0 * math.pi / 32) / (2.0 * math.pi / 32))
+    assert exact * (1.0 - missing) <= volume(triangles) <= exact * (1.0 + 1e-6)
+
+
+def test_a_height_field_has_two_triangles_a_cell() -> None:
+    triangles = triangles_of(HeightField(((0.0, 1.0, 0.0), (0.0, 0.0, 0.0)), (2.0, 1.0)))
+    assert len(triangles.faces) == 4
+    assert triangles.vertices[:, 2].max() == 1.0
+
+
+@needs_examples
+@pytest.mark.parametrize("robot", ["ur5", "anymal_c"])
+def test_reduced_meshes_keep_their_box_and_their_budget(robot: str) -> None:
+    model = dynx.load(robot)
+    meshes = [
+        visual.shape
+        for link in model.links
+        for visual in model.geometry.visuals(link.name)
+        if isinstance(visual.shape, Mesh)
+    ]
+    parts = budgets({mesh: meshes.count(mesh) for mesh in meshes}, total=5000)
+    wanted = sum(min(parts[mesh], len(mesh.triangles[1])) for mesh in meshes)
+    assert wanted <= 5000 + FEWEST_TRIANGLES * len(meshes)
+    reduced = {mesh: triangles_of(mesh, parts[mesh]) for mesh in meshes}
+    assert sum(len(reduced[mesh].faces) for mesh in meshes) <= 1.3 * wanted
+    moved = []
+    for mesh, triangles in reduced.items():
+        corners = mesh.triangles[0][np.unique(mesh.triangles[1])]
+        size = np.ptp(corners, axis=0).max()
+        for corner in (np.min, np.max):
+            moved.extend(np.abs(corner(triangles.vertices, axis=0) - corner(corners, axis=0)) / size)
+    assert np.mean(moved) < 0.02
+
+
+@needs_examples
+def test_a_mesh_collides_as_its_hull() -> None:
+    model = dynx.load("ur5")
+    mesh = model.geometry.collisions("forearm_link")[0].shape
+    assert isinstance(mesh, Mesh)
+    hull = hull_of(mesh)
+    assert edges_in_one_direction_only(hull)
+    assert volume(hull) >= volume(triangles_of(mesh)) > 0.0
+
+
+def test_budgets_leave_light_robots_whole() -> None:
+    assert budgets({}) == {}

@@ -1,0 +1,184 @@
+"""The viewer without a browser: what it shows, its errors, its controls, and its exported pages."""
+
+from __future__ import annotations
+
+import socket
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import dynx
+from dynx.errors import ArgumentError
+from dynx.model import Model
+from dynx.viewer import Viewer, view
+from dynx.world import World
+from dynx.world.scene import read_scene
+from tests.conftest import needs_examples
+from tests.viewer.conftest import until
+
+LARGEST_PAGE = 15_000_000
+"""Largest size of an exported page of a rollout of 10 s [bytes]."""
+
+
+@pytest.fixture(scope="module")
+def arm() -> Model:
+    return dynx.load("six_axis_arm")
+
+
+def test_a_robot_is_shown_at_the_configuration_given(arm: Model) -> None:
+    q = arm.random(0)
+    with view(arm, q=q) as viewer:
+        assert np.array_equal(viewer.view.q, q)
+        other = arm.random(1)
+        viewer.view.put(other)
+        assert np.array_equal(viewer.view.q, other)
+        with dynx.backend("reference", arm) as engine:
+            for link, node in viewer.view.robot.links.items():
+                T = engine.forward_kinematics(other, link)
+                assert np.abs(node.position - T[:3, 3]).max() < 1e-6
+    assert viewer.page.closed
+
+
+def test_every_object_has_its_view(arm: Model, tmp_path: Path) -> None:
+    rollout = dynx.simulate(arm, duration=0.1)
+    with arm.view() as first, rollout.view() as second:
+        assert first.page.port != second.page.port
+    scene = read_scene("stack")
+    with World(scene) as world, world.view() as viewer:
+        viewer.view.step(3)
+        assert world.time == pytest.approx(3 * world.dt)
+
+
+def test_a_port_that_is_taken_is_told(arm: Model) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(ArgumentError, match=f"port {port} of '127.0.0.1' cannot be listened on"):
+            Viewer(arm, port=port)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"port": 70_000}, "wanted 0 to 65535"),
+        ({"port": -1}, "port"),
+        ({"port": 0, "host": ""}, "wanted an address of this machine"),
+        ({"port": 0, "host": "203.0.113.1"}, "cannot be listened on"),
+        ({"port": 0, "q": [np.nan] * 6}, "finite"),
+        ({"port": 0, "q": [0.0] * 3}, "shape"),
+    ],
+)
+def test_wrong_arguments_are_told(arm: Model, options: dict[str, Any], message: str) -> None:
+    with pytest.raises(ArgumentError, match=message):
+        Viewer(arm, **options)
+
+
+@pytest.mark.parametrize("shown", [None, 3, [1, 2], (dynx, dynx, dynx)])
+def test_what_cannot_be_shown_is_told(shown: object) -> None:
+    with pytest.raises(ArgumentError, match="wanted"):
+        view(shown)
+
+
+def test_wrong_controls_are_told(arm: Model) -> None:
+    with view(arm) as viewer:
+        wrong = [
+            lambda: viewer.slider("x", 1.0, 0.0),
+            lambda: viewer.slider("", 0.0, 1.0),
+            lambda: viewer.slider("x", 0.0, np.nan),
+            lambda: viewer.slider("x", 0.0, 1.0, changed=3),  # type: ignore[arg-type]
+            lambda: viewer.button("x", None),  # type: ignore[arg-type]
+            lambda: viewer.on_key("no key", print),
+            lambda: viewer.text("x", [0.0, 1.0]),
+            lambda: viewer.line([[0.0, 0.0, 0.0]]),
+            lambda: viewer.line([[0.0] * 3, [1.0] * 3], colour=(1, 2, 300)),
+            lambda: viewer.screenshot(),
+        ]
+        for call in wrong:
+            with pytest.raises(ArgumentError):
+                call()
+
+
+def test_controls_of_a_program_have_values(arm: Model) -> None:
+    with view(arm) as viewer:
+        slider = viewer.slider("gain", 0.0, 10.0)
+        assert slider.value == 5.0
+        slider.value = 12.0
+        assert slider.value == 10.0
+        viewer.text("here", (0.0, 0.0, 1.0)).remove()
+        viewer.line([[0.0] * 3, [1.0] * 3]).remove()
+        slider.remove()
+
+
+def test_a_rollout_plays_to_its_end(arm: Model) -> None:
+    rollout = dynx.simulate(arm, duration=0.2)
+    with rollout.view(play=True) as viewer:
+        until(lambda: not viewer.view.timeline.playing, "the end of the motion")
+        assert viewer.view.timeline.time == pytest.approx(0.2)
+        shown = [node.position for node in viewer.view.drawn.parts.values()]
+        last = viewer.view.motion.at(-1)
+        assert np.allclose(shown, [last[name][:3, 3] for name in viewer.view.drawn.parts], atol=1e-6)
+
+
+def test_a_world_is_stepped_in_its_own_time() -> None:
+    with World(read_scene("stack")) as world, world.view(play=True) as viewer:
+        until(lambda: world.time > 0.1, "the world to move")
+        viewer.view.pause()
+        viewer.view.reset()
+        assert world.time == 0.0
+
+
+def test_a_spring_pulls_a_body_to_its_handle() -> None:
+    scene = read_scene("slope")
+    body = next(each for each in scene.bodies if not each.fixed)
+    with World(scene) as world, world.view() as viewer:
+        before = world.state.bodies[body.name].position.copy()
+        viewer.view._spring.hold(world, body.name)
+        viewer.view._spring._node.position = before + np.array([0.0, 0.0, 1.0])
+        viewer.view.step(300)
+        assert world.state.bodies[body.name].position[2] > before[2] + 0.1
+
+
+@needs_examples
+def test_an_exported_rollout_is_small_and_names_no_server(tmp_path: Path) -> None:
+    arm = dynx.load("ur5")
+    motion = dynx.trajectory.cycloidal(np.zeros(6), [-1.5, -1.0, 1.0, -1.5, -1.5, 1.5], duration=10.0)
+    controller = dynx.control.ComputedTorque(arm, kp=100.0, kd=20.0)
+    rollout = dynx.simulate(arm, controller, motion, dt=2e-3)
+    path = tmp_path / "run.html"
+    with rollout.view() as viewer:
+        viewer.export(path)
+    text = path.read_text()
+    assert len(text) < LARGEST_PAGE
+    assert 'src="http' not in text
+    assert 'href="http' not in text
+
+
+def test_an_export_needs_a_name_of_a_page(arm: Model, tmp_path: Path) -> None:
+    with view(arm) as viewer:
+        with pytest.raises(ArgumentError, match=r"\.html"):
+            viewer.export(tmp_path / "run.png")
+        with pytest.raises(ArgumentError, match="cannot be written"):
+            viewer.export(tmp_path / "nowhere" / "run.html")
+    with (
+        World(read_scene("stack")) as world,
+        world.view() as viewer,
+        pytest.raises(ArgumentError, match="live"),
+    ):
+        viewer.export(tmp_path / "run.html")
+
+
+def test_meshes_that_are_missing_are_told_and_the_rest_is_shown(tmp_path: Path) -> None:
+    path = tmp_path / "robot.urdf"
+    path.write_text(
+        '<robot name="r"><link name="a"><visual><geometry><mesh filename="none.stl"/></geometry></visual>'
+        '</link><link name="b"><visual><geometry><sphere radius="0.1"/></geometry></visual></link>'
+        '<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
+        '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+    )
+    with view(dynx.load(path)) as viewer:
+        assert len(viewer.notes) == 1
+        assert "none.stl" in viewer.notes[0]
+        assert viewer.view.robot.visuals["b"]
