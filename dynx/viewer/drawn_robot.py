@@ -13,7 +13,7 @@ from dynx.model.geometry import Mesh, Shape
 from dynx.model.geometry.links import Colour
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
-from dynx.viewer.colours import ORANGE, RGB
+from dynx.viewer.colours import GREY, ORANGE, RGB
 from dynx.viewer.triangles import TRIANGLE_BUDGET, Triangles, budgets, hull_of, triangles_of
 from dynx.world.camera.drawing import link_poses, link_shapes
 
@@ -93,6 +93,8 @@ class DrawnRobot:
 
     def _add_visuals(self) -> None:
         shapes = {link.name: self._visible_shapes(link.name) for link in self.model.links}
+        if not any(shapes.values()):
+            self._add_sticks()
         share = self._shares(shape for placed in shapes.values() for shape, _, _ in placed)
         for name, placed in shapes.items():
             nodes = self.visuals[name] = []
@@ -112,6 +114,16 @@ class DrawnRobot:
                         flat=budget is not None,
                     )
                 )
+
+    def _add_sticks(self) -> None:
+        """Draw a robot without shapes as lines from each link frame to the frames of its children."""
+        size = size_of(self.model)
+        for k, joint in enumerate(self.model.joints):
+            end = joint.origin.matrix[:3, 3]
+            parent = self.links[joint.parent].name
+            segment = np.array([[[0.0, 0.0, 0.0], end]], dtype=np.float32)
+            colour = self._look.colour or GREY
+            self._scene.add_line_segments(f"{parent}/stick{k}", segment, colour, thickness=0.03 * size)
 
     def _visible_shapes(self, link: str) -> list[tuple[Shape, Colour, Floats]]:
         """Return the shapes by which a link is drawn, without those that cannot be read."""

@@ -46,6 +46,8 @@ class Page:
         self._server.gui.configure_theme(
             dark_mode=dark, show_logo=False, show_share_button=False, control_width="medium"
         )
+        # Beside the picture, not over it.
+        self._server.gui.main_panel.dock_right()
         self._server.scene.set_up_direction("+z")
         self.lock = threading.RLock()
         """Held by whoever changes what the page shows."""

@@ -57,11 +57,11 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture
 def open_page(browser: Any) -> Iterator[Callable[[str], Opened]]:
-    """Open addresses in pages of 640 x 400 pixels, which are closed after the test."""
+    """Open addresses in pages of 900 x 450 pixels, which are closed after the test."""
     pages = []
 
     def opened(url: str) -> Opened:
-        page = browser.new_page(viewport={"width": 640, "height": 400})
+        page = browser.new_page(viewport={"width": 900, "height": 450})
         page.set_default_timeout(1e3 * PATIENCE)
         pages.append(page)
         found = Opened(page)

@@ -24,6 +24,9 @@ from tests.viewer.conftest import PATIENCE, Opened, connected, until
 
 OpenPage = Callable[[str], Opened]
 
+PICTURE = 2000.0
+"""Time in which software draws a picture beside other tests [ms]."""
+
 SAME = 0.93
 """Share of the pixels of a silhouette that two renderers have in common; edges differ by a pixel."""
 
@@ -115,13 +118,16 @@ def test_dragging_the_handle_solves_inverse_kinematics(open_page: OpenPage) -> N
         with dynx.backend("reference", model) as engine:
             T = engine.forward_kinematics(before, frame)
             scale = float(viewer.view._handle._node.scale)
-            # The arrow along z ends at the scale of the handle; it is held a little before its end.
-            held, towards = (_pixel(client, (T @ [0.0, 0.0, s * scale, 1.0])[:3]) for s in (0.85, 1.1))
+            # The arrow along z is held at a point of its shaft.
+            held, towards = (_pixel(client, (T @ [0.0, 0.0, s * scale, 1.0])[:3]) for s in (0.6, 1.0))
             mouse = page.page.mouse
-            mouse.move(*held)
-            mouse.down()
-            for share in np.linspace(0.1, 1.0, 10):
+            # The arrow is found under the pointer when a picture has been drawn.
+            for action in (lambda: mouse.move(*held), mouse.down):
+                action()
+                page.page.wait_for_timeout(PICTURE)
+            for share in np.linspace(0.2, 1.0, 5):
                 mouse.move(*(held + share * (towards - held)))
+                page.page.wait_for_timeout(0.3 * PICTURE)
             mouse.up()
             until(lambda: not np.array_equal(viewer.view.q, before), "the robot to follow the handle")
             moved = engine.forward_kinematics(viewer.view.q, frame)
