@@ -83,7 +83,7 @@ class JointSliders:
         rows = zip(names, units, self._values(), self._factors(), self._ranges(), strict=True)
         with self._folder:
             for k, (name, unit, value, factor, (low, high)) in enumerate(rows):
-                low, high = low * factor, high * factor
+                low, high = _rounded_inward(low * factor, high * factor)
                 shown = "deg" if unit == "rad" and self._degrees else unit
                 self._handles.append(
                     self._gui.add_slider(
@@ -113,3 +113,12 @@ class JointSliders:
             handle.remove()
         self._handles.clear()
         self._add()
+
+
+def _rounded_inward(low: float, high: float) -> tuple[float, float]:
+    """Return a range with few digits, for the page, that lies within the range given."""
+    unit = 10.0 ** math.floor(math.log10(high - low) - 3.0) if high > low else 1.0
+    rounded = math.ceil(low / unit - 1e-6) * unit, math.floor(high / unit + 1e-6) * unit
+    digits = max(0, round(-math.log10(unit)))
+    inner = round(rounded[0], digits), round(rounded[1], digits)
+    return inner if low <= inner[0] < inner[1] <= high else (low, high)
