@@ -93,9 +93,10 @@ def _reduced(mesh: Mesh, budget: int) -> Triangles:
     distinct = (
         (joined[:, 0] != joined[:, 1]) & (joined[:, 1] != joined[:, 2]) & (joined[:, 0] != joined[:, 2])
     )
-    found, kept = simplify(
-        points.astype(np.float32), joined[distinct].astype(np.int32), target_count=max(budget, 4)
-    )
+    remaining = joined[distinct]
+    if len(remaining) <= budget:
+        return _triangles(points, remaining)
+    found, kept = simplify(points.astype(np.float32), remaining.astype(np.int32), target_count=max(budget, 4))
     return _triangles(found, kept) if len(kept) else _triangles(vertices, faces)
 
 

@@ -26,8 +26,6 @@ from dynx.viewer.world_view import WorldView
 from dynx.world import Scene, World
 from dynx.world.comparison import WorldComparison
 
-View = RobotView | MotionView | WorldView
-
 
 class Viewer(Controls):
     """A page in the browser that shows one robot, motion or world.
@@ -66,7 +64,8 @@ class Viewer(Controls):
         self.page = Page(host, port, title=f"dynx: {_title(opened)}", dark=dark)
         try:
             super().__init__(self.page)
-            self.view = _view(self.page, opened, look, options)
+            self.view: Any = _view(self.page, opened, look, options)
+            """A `RobotView`, `MotionView` or `WorldView`: what is shown, to be moved by the program."""
         except BaseException:
             self.page.close()
             raise
@@ -83,7 +82,8 @@ class Viewer(Controls):
     @property
     def notes(self) -> tuple[str, ...]:
         """What cannot be drawn, and what is notable at the start of a world, one sentence each."""
-        return self.view.notes
+        notes: tuple[str, ...] = self.view.notes
+        return notes
 
     def on_part_clicked(self, clicked: Any) -> None:
         """Call `clicked(part, origin, direction)` when a part is clicked: its name, and the ray (3,), (3,)
@@ -170,7 +170,9 @@ def _opened(shown_object: object) -> object:
     )
 
 
-def _view(page: Page, opened: object, look: Look, options: dict[str, Any]) -> View:
+def _view(
+    page: Page, opened: object, look: Look, options: dict[str, Any]
+) -> RobotView | MotionView | WorldView:
     if isinstance(opened, Model):
         return RobotView(page, opened, look=look, **options)
     if isinstance(opened, World):
@@ -201,7 +203,7 @@ def _curves(rollout: Rollout) -> list[Series]:
     return curves
 
 
-def _clickable(view: View) -> dict[str, list[Any]]:
+def _clickable(view: RobotView | MotionView | WorldView) -> dict[str, list[Any]]:
     if isinstance(view, RobotView):
         return view.robot.visuals
     drawn: DrawnScene = view.drawn

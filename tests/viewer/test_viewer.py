@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -84,7 +85,7 @@ def test_what_cannot_be_shown_is_told(shown: object) -> None:
 
 def test_wrong_controls_are_told(arm: Model) -> None:
     with view(arm) as viewer:
-        wrong = [
+        wrong: list[Callable[[], object]] = [
             lambda: viewer.slider("x", 1.0, 0.0),
             lambda: viewer.slider("", 0.0, 1.0),
             lambda: viewer.slider("x", 0.0, np.nan),

@@ -24,9 +24,7 @@ COMMANDS = {
     "world": LazyCommand(
         "dynx.cli.world.command:world", "Run a scene with contacts on several engines, and compare them."
     ),
-    "view": LazyCommand(
-        "dynx.cli.view.command:view", "Show a robot, a rollout or a scene in the browser."
-    ),
+    "view": LazyCommand("dynx.cli.view.command:view", "Show a robot, a rollout or a scene in the browser."),
     "contacts": LazyCommand(
         "dynx.cli.contacts.command:contacts",
         "Measure the errors of contacts against closed forms, and find their causes.",

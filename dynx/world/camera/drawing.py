@@ -126,9 +126,7 @@ def link_poses(model: Model, q: Floats) -> Iterator[tuple[str, Floats]]:
             yield frame.name, np.asarray(T, dtype=np.float64)
 
 
-def link_shapes(
-    model: Model, link: str
-) -> Iterator[tuple[Shape, tuple[float, float, float, float], Floats]]:
+def link_shapes(model: Model, link: str) -> Iterator[tuple[Shape, tuple[float, float, float, float], Floats]]:
     """Yield the shapes by which a link is drawn, each with its colour and its pose in the link (4, 4)."""
     visuals = _readable_visuals(model, link)
     for each in visuals or model.geometry.collisions(link):
