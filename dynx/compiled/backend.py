@@ -264,7 +264,7 @@ class CompiledBackend(Backend):
             with COMPILE_LOCK:
                 solver = self._ik_solvers.get(key)
                 if solver is None:
-                    solver = self._ik_solvers[key] = frame_solver(self.model, *key, self._threads)
+                    solver = self._ik_solvers[key] = frame_solver(self, *key, self._threads)
         elif problem.limits.max_restarts > MAX_RESTARTS:
             return None
         return solver.solve(problem, self)

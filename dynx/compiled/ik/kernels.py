@@ -15,9 +15,10 @@ import dynx.rbd
 import dynx.spatial
 from dynx._version import __version__
 from dynx.compiled.ik.solver import MAX_RESTARTS, FrameSolver
-from dynx.compiled.ik.step import TargetKind, solver_iteration
+from dynx.compiled.ik.starts import StartTable
+from dynx.compiled.ik.step import POSES, TargetKind, solver_iteration
 from dynx.compiled.simplification import simplify_mechanism
-from dynx.ik import Problem
+from dynx.ik import Kinematics, Problem
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.model import Model
 from dynx.simd.cache import source_hash
@@ -35,8 +36,9 @@ def applies(model: Model, problem: Problem) -> bool:
     return 0 < FrameCoordinates(model, problem.frame).count <= MAX_JOINTS
 
 
-def frame_solver(model: Model, frame: str, kind: TargetKind, threads: int) -> FrameSolver:
+def frame_solver(kinematics: Kinematics, frame: str, kind: TargetKind, threads: int) -> FrameSolver:
     """Return the solver for targets of this kind, whose kernel comes from the cache if it is there."""
+    model = kinematics.model
     coordinates = FrameCoordinates(model, frame)
     number = model.frame_index(frame)
     content = (model.links, model.joints, model.extra_frames, model.base_pose, number, kind)
@@ -44,7 +46,8 @@ def frame_solver(model: Model, frame: str, kind: TargetKind, threads: int) -> Fr
     kernel = load_iteration(
         recipe, lambda: solver_iteration(simplify_mechanism(model.mechanism), number, coordinates, kind)
     )
-    return FrameSolver(kernel, coordinates, kind, threads)
+    table = StartTable.of(coordinates, kinematics, frame) if kind == POSES else None
+    return FrameSolver(kernel, coordinates, kind, table, threads)
 
 
 @cache

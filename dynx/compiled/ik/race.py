@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from dynx.compiled.ik.starts import STARTS_OF_CELL, Starts
 from dynx.compiled.ik.step import SETTINGS, Memory, TargetKind
 from dynx.ik import IKResult, Problem, is_rigid
 from dynx.simd.iteration import IterationKernel
@@ -19,33 +20,39 @@ _FLOAT64 = np.dtype(np.float64)
 class Race:
     """Workspace for one target at a time, whose tasks are the starts; not safe for several threads."""
 
-    def __init__(self, kernel: IterationKernel, kind: TargetKind, memory: Memory, starts: Floats) -> None:
-        count, n = starts.shape
+    def __init__(self, kernel: IterationKernel, kind: TargetKind, memory: Memory, starts: Starts) -> None:
+        count, n = starts.random.shape
         self.starts = starts
         self._n, self._kind = n, kind
-        self._x = starts.copy()
+        self.x = starts.random.copy()
         self.target, self._near, self._point = np.zeros(kind.size), np.zeros(n), np.zeros(3)
-        self._settings = np.zeros(len(SETTINGS))
+        # A task that is a start does not restart.
+        self._settings = np.zeros(len(SETTINGS) + 3)
         self.result = np.zeros((count, memory.n_results))
-        shared = [memory.initial, self.target, self._near] + [self._point] * kind.point
-        tasks = [self._x, *(np.broadcast_to(row, (count, len(row))) for row in shared)]
-        self.run = kernel.bind_race(tasks, self.result, self._settings, starts)
+        shared = [memory.initial, self.target, self._near, np.zeros(1)] + [self._point] * kind.point
+        tasks = [self.x, *(np.broadcast_to(row, (count, len(row))) for row in shared)]
+        self.run = kernel.bind_race(tasks, self.result, self._settings, starts.rows)
         """Function that solves for the present target and returns the number of completed starts."""
 
     def prepare(self, problem: Problem, indices: list[int]) -> None:
         """Set everything but the target; `indices` are those of the coordinates in q."""
         limits = problem.limits
         self._near[:] = problem.q0.reshape(-1)[indices]
-        self._x[0] = self._near if problem.begins_at_q0 else self.starts[0]
         if problem.point is not None:
             self._point[:] = problem.point
-        # A task that is a start does not restart.
         self._settings[:3] = limits.position_tolerance, limits.rotation_tolerance, limits.max_iterations
 
     def solve(self, problem: Problem, indices: list[int]) -> Floats:
         """Return the memory's results (1, n_results) of the first start that reaches the target, or of the
         best one, with the iterations and restarts of all starts up to it."""
         self.prepare(problem, indices)
+        starts = self.starts
+        if starts.near:
+            starts.copy_near(self.x, int(starts.first_rows(problem)[0]))
+        else:
+            self.x[0] = starts.rows[0]
+        if problem.begins_at_q0:
+            self.x[0] = self._near
         self.target[:] = self._kind.rows(problem)[0]
         n, completed = self._n, self.run()
         last, done = completed - 1, self.result[:completed]
@@ -63,7 +70,7 @@ class PoseCall:
     """
 
     def __init__(
-        self, kernel: IterationKernel, memory: Memory, starts: Floats, problem: Problem, indices: list[int]
+        self, kernel: IterationKernel, memory: Memory, starts: Starts, problem: Problem, indices: list[int]
     ) -> None:
         """`problem` has the options, and any pose as target."""
         self._kernel, self._memory, self._starts = kernel, memory, starts
@@ -72,6 +79,8 @@ class PoseCall:
         self._places_all = indices == list(range(len(self._q0)))
         # Workspaces that no call uses at the moment.
         self._free: list[tuple[Race, Any]] = []
+        assert starts.cells is not None
+        self._cells = starts.cells
 
     def __call__(self, target: Any) -> IKResult | None:
         """Return the result for a pose (4, 4), or None if it is not a valid pose or is not reached."""
@@ -85,6 +94,7 @@ class PoseCall:
         except IndexError:
             workspace = self._workspace()
         race, view = workspace
+        self._starts.copy_near(race.x, STARTS_OF_CELL * self._cells.of_one(rows))
         _POSE.pack_into(view, 0, *rows[0], *rows[1], *rows[2])
         completed, n = race.run(), self._n
         row = race.result[completed - 1]

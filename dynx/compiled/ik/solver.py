@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynx.compiled.ik.race import PoseCall, Race
+from dynx.compiled.ik.starts import Starts, StartTable
 from dynx.compiled.ik.step import SETTINGS, Memory, TargetKind
 from dynx.ik import IKResult, Kinematics, Problem, SearchLimits, checked_targets, improved
 from dynx.ik.coordinates import FrameCoordinates
@@ -25,11 +26,16 @@ class FrameSolver:
     """Solver for targets of one frame that are of one kind. Safe to use from several threads."""
 
     def __init__(
-        self, kernel: IterationKernel, coordinates: FrameCoordinates, kind: TargetKind, threads: int
+        self,
+        kernel: IterationKernel,
+        coordinates: FrameCoordinates,
+        kind: TargetKind,
+        table: StartTable | None,
+        threads: int,
     ) -> None:
         self._kernel, self._coordinates, self._kind, self._threads = kernel, coordinates, kind, threads
-        self._memory = Memory(coordinates.count)
-        self._seeded: tuple[object, Floats] = (None, np.empty(0))
+        self._memory, self._table = Memory(coordinates.count), table
+        self._seeded: tuple[object, Starts | None] = (None, None)
         # Workspaces of single targets that no call uses at the moment.
         self._free: list[Race] = []
 
@@ -55,24 +61,26 @@ class FrameSolver:
         starts = self._starts(problem)
         return PoseCall(self._kernel, self._memory, starts, problem, self._coordinates.indices)
 
-    def _batch(self, problem: Problem, starts: Floats) -> Floats:
+    def _batch(self, problem: Problem, starts: Starts) -> Floats:
         """Return the memory's results (n, n_results) of all samples."""
         n, size = problem.count, self._coordinates.count
         near = problem.q0[..., self._coordinates.indices]
         near = np.broadcast_to(near, (*problem.batch, size)).reshape(n, size)
-        first = near if problem.begins_at_q0 else np.broadcast_to(starts[0], near.shape)
+        cell = starts.first_rows(problem)
+        first = near if problem.begins_at_q0 else starts.rows[cell + starts.offset]
         memory = np.broadcast_to(self._memory.initial, (n, len(self._memory.initial)))
         target = self._kind.rows(problem)
-        tasks = [first, memory, target, near]
+        tasks = [first, memory, target, near, cell[:, None].astype(np.float64)]
         if problem.point is not None:
             tasks.append(np.broadcast_to(problem.point, (n, 3)))
         rows = np.empty((n, self._memory.n_results))
         limits = problem.limits
-        settings = np.array([getattr(limits, name) for name in SETTINGS], dtype=np.float64)
-        self._kernel(tasks, rows, settings, starts, threads=self._threads)
+        settings = [float(getattr(limits, name)) for name in SETTINGS]
+        constants = np.concatenate([settings, starts.constants])
+        self._kernel(tasks, rows, constants, starts.rows, threads=self._threads)
         return rows
 
-    def _race(self, problem: Problem, starts: Floats) -> Floats:
+    def _race(self, problem: Problem, starts: Starts) -> Floats:
         """Return the memory's results (1, n_results) of the only sample."""
         try:
             race = self._free.pop()
@@ -84,13 +92,13 @@ class FrameSolver:
         self._free.append(race)
         return found
 
-    def _starts(self, problem: Problem) -> Floats:
-        """Return the table of starts (max_restarts + 1, n)."""
+    def _starts(self, problem: Problem) -> Starts:
+        """Return the starts of all targets."""
         rng, count = problem.rng, problem.limits.max_restarts + 1
         if not isinstance(rng, int):
-            return self._coordinates.starts(np.random.default_rng(rng), count)
+            return Starts.of(self._coordinates, self._table, np.random.default_rng(rng), count)
         key, starts = self._seeded
-        if key != (rng, count):
-            starts = self._coordinates.starts(np.random.default_rng(rng), count)
+        if starts is None or key != (rng, count):
+            starts = Starts.of(self._coordinates, self._table, np.random.default_rng(rng), count)
             self._seeded = (rng, count), starts
         return starts

@@ -106,13 +106,21 @@ def solver_iteration(
 
     Tasks have the arrays ``x``, the first start (n,); ``memory`` (`Memory`); ``target``, the first three rows
     of a pose (12,), a position (3,) or a rotation (9,); ``near`` (n,), to which periodic angles are shifted;
-    and ``point`` (3,) if there is one. The table of starts holds start number k in row k.
+    ``cell``, the first row of starts near the target; and ``point`` (3,) if there is one. The constants are
+    those of `SETTINGS`, then the numbers that the rows of starts follow from (`dynx.compiled.ik.starts`).
     """
     n = coordinates.count
     path = _Path.of(mechanism, frame, coordinates)
 
     def step(
-        x: Array, memory: Array, target: Array, near: Array, settings: Array, point: Array | None = None
+        x: Array,
+        memory: Array,
+        target: Array,
+        near: Array,
+        cell: Array,
+        settings: Array,
+        starts: Array,
+        point: Array | None = None,
     ) -> dict[str, Any]:
         R, p, J = path.pose(x)
         if point is not None:
@@ -127,18 +135,21 @@ def solver_iteration(
         squared = 0.5 * _dot(residual.vector, residual.vector)
         new = _bounded_step(rows, residual.vector, x, coordinates, DAMPING * squared + MIN_DAMPING)
         next_x = _shifted(new, near, coordinates)
-        return {"x": next_x, **_bookkeeping(x, memory, residual, squared, settings)}
+        return {
+            "x": next_x,
+            **_bookkeeping(x, memory, residual, squared, settings, _row(memory, cell, starts)),
+        }
 
     sizes = {"x": n, "memory": len(Memory(n).initial), "target": kind.size, "near": n}
-    sizes["settings"] = len(SETTINGS)
+    sizes |= {"cell": 1, "settings": len(SETTINGS), "starts": 3}
     if kind.point:
         sizes["point"] = 3
     shapes = {name: (size,) for name, size in sizes.items()}
-    return Iteration(trace(step, shapes), ("settings",), Memory(n).n_results)
+    return Iteration(trace(step, shapes), ("settings", "starts"), Memory(n).n_results)
 
 
 def _bookkeeping(
-    x: Array, memory: Array, residual: TracedResidual, squared: Any, settings: Array
+    x: Array, memory: Array, residual: TracedResidual, squared: Any, settings: Array, next_row: Any
 ) -> dict[str, Any]:
     """Return the memory after a step, the status and the restart."""
     n = len(x)
@@ -163,8 +174,17 @@ def _bookkeeping(
     after = [
         *best, reached, iterations + goes_on, restarts + again, least, *recent, own_steps
     ]  # fmt: skip
-    restart = select(again, restarts + 1.0, NO_RESTART)
+    restart = select(again, next_row, NO_RESTART)
     return {"memory": np.array(after, dtype=object), "status": status, "restart": restart}
+
+
+def _row(memory: Array, cell: Array, starts: Array) -> Any:
+    """Return the row of the next start."""
+    near, offset, base = starts
+    number = memory[-WINDOW - 3] + 1.0
+    turned = number + offset
+    turned = turned - near * less_equal(near, turned)
+    return select(less(number, near), cell[0] + turned, base + number)
 
 
 def _bounded_step(J: Array, error: Array, x: Array, coordinates: FrameCoordinates, damping: Any) -> list[Any]:
