@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dynx.backends import Backend, backend
+from dynx.compiled.ik.starts import BOXES, ROTATIONS, Cells
 from dynx.errors import ArgumentError, ClosedError
 from dynx.ik import IKResult
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import pose_error
+from dynx.spatial.so3 import rotation_from_rpy
 from dynx.testing.strategies import configurations, models
 from tests.oracles.closed_form import MODELS
 
@@ -108,3 +112,18 @@ def check(model: Model, reached: Floats, targets: Floats, found: IKResult) -> No
     assert (rotation[found.success] <= TOLERANCE + np.sqrt(np.finfo(float).eps)).all()
     assert (found.q >= model.lower).all()
     assert (found.q <= model.upper).all()
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_the_cell_of_one_pose_is_that_of_a_batch(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    positions = rng.uniform(-1.5, 1.5, (30, 3))
+    cells = Cells.around(positions[:20])
+    quarter_turns = np.array([np.eye(3)[list(p)] * s for p in permutations(range(3)) for s in (1, -1)])
+    random = rotation_from_rpy(rng.uniform(-3.0, 3.0, (18, 3)))
+    rotations = np.concatenate([random, quarter_turns])
+    together = cells.of(positions, rotations)
+    poses = np.concatenate([rotations, positions[:, :, None]], axis=2)
+    np.testing.assert_array_equal(together, [cells.of_one(rows.tolist()) for rows in poses])
+    assert (together >= 0).all()
+    assert (together < BOXES**3 * ROTATIONS).all()

@@ -48,7 +48,7 @@ class Race:
         self.prepare(problem, indices)
         starts = self.starts
         if starts.near:
-            starts.copy_near(self.x, int(starts.first_rows(problem)[0]))
+            starts.copy_near(self.x.reshape(-1).data, int(starts.first_rows(problem)[0]))
         else:
             self.x[0] = starts.rows[0]
         if problem.begins_at_q0:
@@ -78,7 +78,7 @@ class PoseCall:
         self._q0 = problem.q0.reshape(-1)
         self._places_all = indices == list(range(len(self._q0)))
         # Workspaces that no call uses at the moment.
-        self._free: list[tuple[Race, Any]] = []
+        self._free: list[tuple[Race, memoryview, memoryview]] = []
         assert starts.cells is not None
         self._cells = starts.cells
 
@@ -93,9 +93,9 @@ class PoseCall:
             workspace = self._free.pop()
         except IndexError:
             workspace = self._workspace()
-        race, view = workspace
-        self._starts.copy_near(race.x, STARTS_OF_CELL * self._cells.of_one(rows))
-        _POSE.pack_into(view, 0, *rows[0], *rows[1], *rows[2])
+        race, target_view, x_view = workspace
+        self._starts.copy_near(x_view, STARTS_OF_CELL * self._cells.of_one(rows))
+        _POSE.pack_into(target_view, 0, *rows[0], *rows[1], *rows[2])
         completed, n = race.run(), self._n
         row = race.result[completed - 1]
         q = row[:n].copy()
@@ -117,7 +117,7 @@ class PoseCall:
             np.array(completed - 1),
         )
 
-    def _workspace(self) -> tuple[Race, Any]:
+    def _workspace(self) -> tuple[Race, memoryview, memoryview]:
         race = Race(self._kernel, TargetKind.of(self._problem), self._memory, self._starts)
         race.prepare(self._problem, self._indices)
-        return race, race.target.data
+        return race, race.target.data, race.x.reshape(-1).data

@@ -156,9 +156,19 @@ class Starts:
         found = np.broadcast_to(cell.reshape(targets.batch), problem.batch).reshape(-1)
         return np.asarray(STARTS_OF_CELL * found)
 
-    def copy_near(self, x: Floats, first: int) -> None:
-        """Write the starts of a cell, in order, given its first row, to the first rows of x (k, n)."""
-        near, turned = self.near, self.near - self.offset
-        x[:turned] = self.rows[first + self.offset : first + near][: len(x)]
-        if self.offset and len(x) > turned:
-            x[turned:near] = self.rows[first : first + self.offset][: len(x) - turned]
+    def copy_near(self, x: memoryview, first: int) -> None:
+        """Write the starts of a cell, in order, given its first row, to the first rows of a flat x (k n,)."""
+        size, rows = self.rows.shape[1], self._flat
+        turned = size * (self.near - self.offset)
+        start, end = size * first, size * (first + self.near)
+        room = len(x)
+        if room >= size * self.near:
+            x[:turned] = rows[end - turned : end]
+            x[turned : end - start] = rows[start : end - turned]
+        else:
+            found = np.concatenate([rows[end - turned : end], rows[start : end - turned]])
+            x[:] = found[:room].data
+
+    @cached_property
+    def _flat(self) -> memoryview:
+        return self.rows.reshape(-1).data
