@@ -14,6 +14,9 @@ from dynx.world.geometry.ray_casting import cast_on_shape
 MAX_PAIRS = 1_000_000
 """Largest number of pairs of a triangle and a pixel that are computed at once."""
 
+PIXEL_MARGIN = 1e-6
+"""Distance [pixels] from a triangle in the picture within which rounding may place a pixel's centre."""
+
 Whole = NDArray[np.intp]
 
 
@@ -73,19 +76,40 @@ class DepthBuffer:
         return first, last
 
     def _draw_triangles(self, number: int, vertices: Floats, faces: Whole) -> None:
-        corners = vertices[faces]
-        first, last = self._window(corners.min(axis=1), corners.max(axis=1))
-        sides = np.maximum(last - first + 1, 0)
-        pairs = sides[:, 0] * sides[:, 1]
-        seen = np.flatnonzero(pairs)
-        total = np.cumsum(pairs[seen])
+        first, last = self._triangle_windows(vertices, faces)
+        seen = np.flatnonzero((last >= first).all(axis=1))
+        faces, first, sides = faces[seen], first[seen], (last - first + 1)[seen]
+        total = np.cumsum(sides[:, 0] * sides[:, 1])
         begin = 0
-        while begin < len(seen):
+        while begin < len(faces):
             done = total[begin - 1] if begin else 0
             end = max(begin + 1, int(np.searchsorted(total, done + MAX_PAIRS, side="right")))
-            part = seen[begin:end]
-            self._draw_some(number, corners[part], first[part], sides[part])
+            part = slice(begin, end)
+            self._draw_some(number, vertices[faces[part]], first[part], sides[part])
             begin = end
+
+    def _triangle_windows(self, vertices: Floats, faces: Whole) -> tuple[Whole, Whole]:
+        """Return the first and last column and row (m, 2) of the pixels whose centres triangles can cover;
+        the last is before the first for a triangle that is not seen."""
+        corners = np.ascontiguousarray(faces.T)
+        z = vertices[:, 2]
+        behind = z < self._camera.near
+        side = np.array(self._camera.size)
+        first, last = np.empty((2, len(faces), 2), np.intp)
+        for axis in range(2):
+            with np.errstate(divide="ignore", invalid="ignore"):
+                image = self._camera.focal_length * vertices[:, axis] / z + (0.5 * side[axis] - 0.5)
+            a, b, c = image[corners]
+            least, most = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+            with np.errstate(invalid="ignore"):
+                first[:, axis] = np.ceil(np.clip(least - PIXEL_MARGIN, 0, side[axis]))
+                last[:, axis] = np.floor(np.clip(most + PIXEL_MARGIN, -1, side[axis] - 1))
+        hidden = behind[corners]
+        crossing = np.flatnonzero(hidden.any(axis=0))
+        if len(crossing):
+            points = vertices[faces[crossing]]
+            first[crossing], last[crossing] = self._window(points.min(axis=1), points.max(axis=1))
+        return first, last
 
     def _draw_some(self, number: int, corners: Floats, first: Whole, sides: Whole) -> None:
         a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
