@@ -64,6 +64,10 @@ class BulletRobot:
         self._client = client
         self._coupling = model.mechanism.coupling
         self._S = np.eye(model.nv) if self._coupling is None else self._coupling.matrix()
+        joints = self._S[self._base :, self._base :]
+        # A driver shares its torque with its followers, at the same power: the contacts of a step, which
+        # Bullet solves with all joints free, then press as those of the coupled joints do.
+        self._shares = joints @ np.linalg.inv(joints.T @ joints)
         owns = [joint.mimic is None for joint in model.joints if joint.moves]
         self._owners: list[int] = np.flatnonzero(owns).tolist()
         self._friction = layout.friction
@@ -144,10 +148,7 @@ class BulletRobot:
             self._forces = None
             return self._wrench is not None
         if self._coupling is not None:
-            # On the driver alone: the torque on its followers that has the same power.
-            tree = np.zeros(len(self.object.links))
-            tree[self._owners] = forces
-            forces = tree.tolist()
+            forces = (self._shares @ forces).tolist()
         self._forces = forces
         return True
 
