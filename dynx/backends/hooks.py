@@ -42,7 +42,8 @@ class EngineHooks(ABC):
         """Return the unchecked callable for `quantity` bound to the calling thread, or None if the engine has
         none.
 
-        It saves microseconds in loops of one thread. Exceptions of the engine are not translated.
+        It takes one sample, in the coordinates of the model, and saves microseconds in loops of one thread.
+        Exceptions of the engine are not translated, and a call may overwrite the result of the one before.
         """
         return None
 

@@ -6,6 +6,8 @@ every backend of dynx raises the same error.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from dynx.backends.joint_dynamics import JointDynamicsTerms
@@ -36,11 +38,13 @@ class Solvability:
             )
 
 
+@lru_cache(maxsize=64)
 def singular_coordinates(model: Model, joint_dynamics: bool = False) -> tuple[str, ...]:
     """Return the names of the coordinates in the null space of M at every configuration: joints, or ``base``.
 
     Determined at three random configurations, where M scaled to a unit diagonal has an eigenvalue below nv
-    times the rounding error of its entries.
+    times the rounding error of its entries. The result is cached, because it takes as long as some hundred
+    steps of a simulation.
     """
     q = model.random(np.random.default_rng(0), 3)
     coupling = model.mechanism.coupling

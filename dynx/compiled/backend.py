@@ -76,7 +76,7 @@ class CompiledBackend(Backend):
         self._simplified = simplify_mechanism(self._mechanism)
         self._all_frames = tuple(range(len(self._frame_index)))
         self._eliminates = self._uncoupled or has_physical_inertias(self._mechanism)
-        self._calls: dict[object, Call] = {}
+        self._calls: dict[object, KernelCall | NumericCall | CoupledCall] = {}
         self._chain_kernels: dict[object, Kernel] = {}
         self._ik_solvers: dict[tuple[str, TargetKind], FrameSolver] = {}
         self._pose_calls: dict[object, PoseCall] = {}
@@ -300,8 +300,20 @@ class CompiledBackend(Backend):
             self._public_calls[key] = call
         return call
 
+    def _unchecked_callable(self, quantity: str) -> Call | None:
+        if not self._uncoupled:
+            return None
+        self._arguments.refuse_closed()
+        call = self._found_call(quantity)
+        return call.for_one_sample() if isinstance(call, KernelCall) else None
+
     def _call_for(self, quantity: str, details: tuple[Any, ...] = (), *, tree: bool = False) -> Call:
         """Return the call of a quantity, whose kernel is compiled the first time."""
+        return self._found_call(quantity, details, tree=tree).evaluate
+
+    def _found_call(
+        self, quantity: str, details: tuple[Any, ...] = (), *, tree: bool = False
+    ) -> KernelCall | NumericCall | CoupledCall:
         tree = tree and not self._uncoupled
         key = (quantity, details, tree)
         call = self._calls.get(key)
@@ -314,7 +326,9 @@ class CompiledBackend(Backend):
                     call = self._calls[key] = self._make_call(quantity, details, tree)
         return call
 
-    def _make_call(self, quantity: str, details: tuple[Any, ...], tree: bool) -> Call:
+    def _make_call(
+        self, quantity: str, details: tuple[Any, ...], tree: bool
+    ) -> KernelCall | NumericCall | CoupledCall:
         described = kernel_quantity(quantity)
         checks = tuple(self._check(argument, tree) for argument in described.arguments)
         check_result = self._arguments.finite_acceleration if described.solves and not tree else None
@@ -326,24 +340,24 @@ class CompiledBackend(Backend):
         }
         if not compiles(mechanism, quantity):
             if quantity not in LOOPED or (described.solves and mechanism.coupling is not None):
-                return NumericCall(mechanism, quantity, details, checks, check_result=check_result).evaluate
+                return NumericCall(mechanism, quantity, details, checks, check_result=check_result)
             in_tree = replace(mechanism, coupling=None)
             if mechanism.coupling is None:
-                return KernelCall(looped_kernel(in_tree, quantity, details), checks, **options).evaluate
+                return KernelCall(looped_kernel(in_tree, quantity, details), checks, **options)
             options["validate"] = False
             looped = KernelCall(
                 looped_kernel(in_tree, quantity, details), (np.asarray,) * len(checks), **options
             )
-            return CoupledCall(mechanism, quantity, looped.evaluate, checks).evaluate
+            return CoupledCall(mechanism, quantity, looped.evaluate, checks)
         if quantity not in ON_CHAINS:
             kernel = quantity_kernel(mechanism, quantity, details)
-            return KernelCall(kernel, checks, **options).evaluate
+            return KernelCall(kernel, checks, **options)
         chain = chain_of(mechanism, quantity, *details)
         key = (quantity, chain, tree)
         if key not in self._chain_kernels:
             self._chain_kernels[key] = chain_kernel(mechanism, quantity, chain)
         place = place_of(mechanism, chain, *details)
-        return KernelCall(self._chain_kernels[key], checks, place=place, **options).evaluate
+        return KernelCall(self._chain_kernels[key], checks, place=place, **options)
 
     def _check(self, argument: str, tree: bool) -> Callable[[Any], Floats]:
         if tree:

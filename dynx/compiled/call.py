@@ -148,6 +148,37 @@ class KernelCall:
         self._workspaces.append(workspace)
         return self._batch(_given(q, v, a), out)
 
+    def for_one_sample(self) -> Callable[..., Floats]:
+        """Return a function of one sample, contiguous float64 arrays, which it does not check.
+
+        It is for one thread, and returns the same array in every call. A sample whose defect is too large is
+        evaluated by `evaluate`.
+        """
+        # The functions keep the workspace alive, because `run` has only addresses of its arrays.
+        workspace = self._workspace()
+        inputs, run, result = workspace.inputs, workspace.run, workspace.results[0]
+        defects, place = workspace.output_values, self._defect
+        first, second, third = self._first, self._second, self._third
+        evaluate = self.evaluate
+
+        def of_one(q: Floats, _kept: object = workspace) -> Floats:
+            inputs[first] = q
+            run()
+            return result if defects[place] < MAX_DEFECT else evaluate(q)
+
+        def of_two(q: Floats, v: Floats, _kept: object = workspace) -> Floats:
+            inputs[first], inputs[second] = q, v
+            run()
+            return result if defects[place] < MAX_DEFECT else evaluate(q, v)
+
+        def of_three(q: Floats, v: Floats, a: Floats, _kept: object = workspace) -> Floats:
+            inputs[first], inputs[second], inputs[third] = q, v, a
+            run()
+            return result if defects[place] < MAX_DEFECT else evaluate(q, v, a)
+
+        functions: tuple[Callable[..., Floats], ...] = (of_one, of_two, of_three)
+        return functions[len(self._sizes) - 1]
+
     def _evaluate_rows(self, workspace: Workspace, arguments: tuple[Any, ...], out: Floats | None) -> Floats:
         """Evaluate a batch and return its results; arrays (n, size) take the fastest paths."""
         first = arguments[0]

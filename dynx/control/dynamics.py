@@ -76,8 +76,15 @@ class EngineDynamics(Dynamics):
         return hook if bare is hook else partial(bare, backend)
 
     def bound_to_thread(self, quantity: str) -> Evaluation:
-        """Return a callable for the calling thread alone, which some engines make faster."""
-        quick = self.backend._unchecked_callable(quantity) if self._calls_hook(quantity) else None
+        """Return a callable for the calling thread alone, which some engines make faster.
+
+        Its result may be overwritten by its next call.
+        """
+        backend = self.backend
+        replaced = any(name in vars(backend) for name in (quantity, f"_{quantity}"))
+        quick = None
+        if not replaced and _defines_first(type(backend), "_unchecked_callable", (quantity, f"_{quantity}")):
+            quick = backend._unchecked_callable(quantity)
         usual: Evaluation = getattr(self, quantity)
         return quick or usual
 

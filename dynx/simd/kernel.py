@@ -130,28 +130,33 @@ class Kernel:
         least as many samples as lanes, rows must be contiguous, and outputs must not share memory with any
         other array; otherwise raises ArgumentError. Raises also the errors of a plain call.
         """
-        call, words = self._bound(inputs, outputs)
-        return partial(call, words.ctypes.data)
+        code, words, arrays = self._bound(inputs, outputs)
+        entry, start = code.entry, words.ctypes.data
+
+        def call(_kept: object = (code, words, arrays)) -> None:
+            entry(start)
+
+        return call
 
     def bind_groups(self, inputs: Sequence[Floats], outputs: Sequence[Floats]) -> Callable[[int], None]:
         """Return a function that does the same for one group of samples: for as many as there are lanes, from
         the number that it is given. Raises as `bind`."""
-        call, words = self._bound(inputs, outputs)
+        code, words, arrays = self._bound(inputs, outputs)
         places, strides = words[1::2].copy(), words[2::2].copy()
         words[0] = self.image.lanes
         start, chosen = words.ctypes.data, words[1::2]
 
-        def call_group(first: int) -> None:
+        def call_group(first: int, _kept: object = (words, arrays)) -> None:
             np.multiply(strides, first, out=chosen)
             np.add(chosen, places, out=chosen)
-            call(start)
+            code.entry(start)
 
         return call_group
 
     def _bound(
         self, inputs: Sequence[Floats], outputs: Sequence[Floats]
-    ) -> tuple[Callable[[int], None], NDArray[np.int64]]:
-        """Return the code, and its arguments for these arrays, whose address it is called with."""
+    ) -> tuple[Code, NDArray[np.int64], tuple[Floats, ...]]:
+        """Return the code, its arguments, whose address it is called with, and the arrays."""
         code, arrays = self._open_code(), (*inputs, *outputs)
         n = check_arrays(self.inputs, self.outputs, inputs, outputs)
         if n < self.image.lanes:
@@ -165,12 +170,7 @@ class Kernel:
         words = [n]
         for array in arrays:
             words += [array.ctypes.data, array.strides[0]]
-        arguments = np.array(words, dtype=np.int64)
-
-        def call(start: int, _alive: object = (arrays, arguments)) -> None:
-            code.entry(start)
-
-        return call, arguments
+        return code, np.array(words, dtype=np.int64), arrays
 
     def workspace(self, samples: int = 1) -> Workspace:
         """Return a workspace for up to `samples` samples, for callers that evaluate few at a time."""

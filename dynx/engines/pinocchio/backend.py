@@ -182,8 +182,7 @@ class PinocchioBackend(Backend):
     def _unchecked_callable(self, quantity: str) -> Callable[..., Floats] | None:
         """Return the binding's function itself, with the `Data` of the calling thread."""
         function = _FUNCTIONS.get(quantity)
-        hook = f"_{quantity}"
-        if function is None or getattr(type(self), hook) is not getattr(PinocchioBackend, hook):
+        if function is None or self._mechanism.coupling is not None:
             return None
         return partial(function, self._engine, self._workspace.data)
 

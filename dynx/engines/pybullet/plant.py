@@ -150,7 +150,8 @@ class BulletPlant(Plant):
             tau = self._tree_torque(q, v, self._accelerate(q, v, tau, t))
         elif self.disturbances.has_torque:
             tau = tau + self.disturbances.torque(self._engine, t, q, v)
-        self._client.apply((tau[self._base_nv :] / self._unit).tolist())
+        torques = tau[self._base_nv :] if self._floating else tau
+        self._client.apply((torques / self._unit if self._unit != 1.0 else torques).tolist())
         return self._advance(tau, moves)
 
     def _motor_substep(self, t: float, command: MotorCommand) -> tuple[Floats, Floats]:
@@ -205,7 +206,8 @@ class BulletPlant(Plant):
 
     def _joints(self, sticking: Mask | None) -> tuple[Floats, Floats]:
         """Return the positions and rates of the joints that own a coordinate."""
-        positions, rates = (np.array(numbers) for numbers in self._client.joint_states())
+        angles, speeds = self._client.joint_states()
+        positions, rates = np.array(angles), np.array(speeds)
         if self._coupling is not None:
             positions, rates = positions[self._owners], rates[self._owners]
         if sticking is not None:

@@ -123,7 +123,8 @@ class FusedStep:
             else:
                 results = {name: given[name] for name in ("state", "steps_at_limit") if name in given}
             tau = results["tau"] if controlled else given["tau"]
-            commanded = results.pop("commanded") if controlled else tau
+            # An infinite torque makes the velocity infinite too, unless it was clamped.
+            commanded = results.pop("commanded", None)
             center = self._center(given) if self.model.floating else None
             scheme = SemiImplicitEuler(self.model, self.dt, center)
             q, v = given["q"], given["v"]
@@ -220,9 +221,10 @@ class FusedStep:
             raise UnsupportedFeatureError(
                 f"the torque of {own.name} has shape {np.shape(tau)}; wanted {given['v'].shape}"
             )
-        results = {"commanded": tau} if state is None else {"commanded": tau, "state": state}
+        results = {} if state is None else {"state": state}
         if self.limit is None:
             return {"tau": tau, **results}
+        results["commanded"] = tau
         tau = clamp(tau, self.limit)
         bounded = np.isfinite(self.limit)
         steps_at_limit = np.array(given["steps_at_limit"])
@@ -310,15 +312,16 @@ class FusedStep:
         return np.asarray(root.first_moment / mass)
 
 
-def _sound_steps(before: Array, v: Array, commanded: Array) -> Array:
+def _sound_steps(before: Array, v: Array, commanded: Array | None) -> Array:
     """Return the number of steps before divergence (1,) after a step to the velocity `v`, counted on from
     `before`; in and after the step k that leads to divergence it is -1 - k.
 
-    A torque that is not finite counts as divergence, even if effort limits would make it finite.
+    A torque `commanded` that is not finite counts as divergence, even if effort limits made it finite.
     """
     (steps,) = map(as_traced, before)
     sound = as_traced(sum(v * v)) < DIVERGENCE_SPEED**2  # not where it is NaN
     counted = select(sound, steps + 1.0, -1.0 - steps)
-    counted = select(as_traced(abs(sum(commanded + 0.0 * v))) <= MAX_FLOAT, counted, -1.0 - steps)
+    if commanded is not None:
+        counted = select(as_traced(abs(sum(commanded + 0.0 * v))) <= MAX_FLOAT, counted, -1.0 - steps)
     counted = select(steps < 0.0, steps, counted)
     return np.array([as_symbol(counted)], dtype=object)

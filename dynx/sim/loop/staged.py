@@ -254,7 +254,7 @@ class StagedLoop:
         finish, finishing = last.run, last.addresses
         defect: Any = places["defect"].reshape(1).data
         beyond: Any = places["beyond"].reshape(1).data
-        stop = self._stop
+        stop = self._stop if self._loop.stops is not None else None
 
         def take(begin: int, end: int, _kept: object = last) -> bool:
             k = begin - first
@@ -269,7 +269,7 @@ class StagedLoop:
                     if not defect[0] < DIVERGENCE_SPEED**2:
                         return False
                     defect[0] = 0.0
-                    if beyond[0] > 0.0:
+                    if stop is not None and beyond[0] > 0.0:
                         stop(record, first + k + 1)
                 k = end - first
             except Exception as error:

@@ -118,7 +118,7 @@ class Disturbances:
         """True if joint friction is solved for at the end of each step: there is some, and no slip speed."""
         return self.friction.present and not self.friction.slip
 
-    @property
+    @cached_property
     def has_torque(self) -> bool:
         """True if pushes or friction with a slip speed add a torque, a function of time and state."""
         return (self.friction.present and not self.sticks) or bool(self.pushes)

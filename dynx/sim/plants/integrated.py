@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from dynx.backends import Backend
 from dynx.backends.solvability import singular_coordinates
-from dynx.model import Model
 from dynx.sim.plants.disturbances import Disturbances, DisturbedAcceleration
 from dynx.sim.plants.integrators import Adaptive, RungeKutta4, SemiImplicitEuler, State
 from dynx.sim.plants.plant import Plant, StepResult
@@ -25,13 +23,6 @@ SCHEMES: dict[str, Callable[..., SemiImplicitEuler | RungeKutta4 | Adaptive]] = 
 
 RecordCall = Callable[..., Array]
 """Function of a call, the shape of its result and its arguments, which are symbols; returns symbols."""
-
-
-@lru_cache(maxsize=64)
-def _is_singular(model: Model) -> bool:
-    """Check whether the mass matrix is singular because nothing that a joint moves has inertia. The answer
-    is cached, because the check takes as long as some hundred steps."""
-    return bool(singular_coordinates(model))
 
 
 class IntegratedPlant(Plant):
@@ -60,7 +51,7 @@ class IntegratedPlant(Plant):
             damped = isinstance(self._scheme, SemiImplicitEuler)
             self._friction = disturbances.friction_solver(self._h, damped=damped)
             self._dry = list(self._friction.law.joints)
-        self._singular = not disturbances.has_armature and _is_singular(engine.model)
+        self._singular = not disturbances.has_armature and bool(singular_coordinates(engine.model))
 
     def reset(self, q: Floats, v: Floats) -> None:
         """Set the state. Raises SingularMassMatrixError where the acceleration is not unique."""
