@@ -8,6 +8,7 @@ import numpy as np
 
 from dynx.compiled.looped.routines import (
     INERTIA,
+    JOINT_KINDS,
     LOADING,
     PLACING,
     POSE,
@@ -18,9 +19,10 @@ from dynx.compiled.looped.routines import (
     check_arguments,
     checking,
     kind,
+    load_axes,
     pack_inertia,
     place_bodies,
-    read_row,
+    read_arguments,
     reading,
     unpack_inertia,
     unpack_pose,
@@ -32,8 +34,8 @@ from dynx.simd.call_table import CallTable
 from dynx.simd.routines import Routine, RoutineSet
 from dynx.spatial.scalar import Array
 
-Q, V, C, DEFECT = 0, 1, 2, 3
-"""Numbers of the arrays."""
+C, DEFECT = 2, 3
+"""Numbers of the results, after those of q and v."""
 
 _COMPOSITE, _RESPONSE, _STEP = (22,), (15,), (15,)
 
@@ -68,8 +70,7 @@ def routines() -> RoutineSet:
         ),
         "to root": Routine.of(_to_root, _RAISED, {"mirror": C, **{f"entry{k}": C for k in range(6)}}),
     }
-    for name, revolute in (("revolute", True), ("prismatic", False)):
-        axis: Inputs = {} if revolute else {"axis": ("constants", VECTOR)}
+    for name, revolute, axis in JOINT_KINDS:
         found[f"turn {name}"] = Routine.of(
             _turn(revolute=revolute),
             {
@@ -97,11 +98,12 @@ def call_table(mechanism: Mechanism, routines: RoutineSet) -> CallTable:
     """Return the calls for one robot, in tree coordinates."""
     calls, bodies, nv = CallTable(routines), mechanism.bodies, mechanism.nv
     base = nv - len(bodies)
-    q, v = read_row(calls, Q, mechanism.nq), read_row(calls, V, nv)
-    check_arguments(calls, mechanism, [(q, mechanism.nq), (v, nv)])
+    rows = read_arguments(calls, mechanism, 2)
+    check_arguments(calls, mechanism, rows)
+    q, v = (place for place, _ in rows)
     # The velocity of a body's origin follows its pose.
     steps = place_bodies(calls, mechanism, q, size=15)
-    axes = [() if body.revolute else (calls.constants(body.axis),) for body in bodies]
+    axes = load_axes(calls, bodies)
     omegas = [v + 3]
     if not mechanism.floating:
         omegas = [calls.reserve(3)]

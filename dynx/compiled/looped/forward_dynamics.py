@@ -8,6 +8,7 @@ import numpy as np
 
 from dynx.compiled.looped.routines import (
     INERTIA,
+    JOINT_KINDS,
     MATRIX,
     MOTION,
     POSE,
@@ -21,8 +22,9 @@ from dynx.compiled.looped.routines import (
     checking,
     compute_root_motion,
     kind,
+    load_axes,
     pack_inertia,
-    read_row,
+    read_arguments,
     reading,
     unpack_inertia,
     unpack_motion,
@@ -39,8 +41,8 @@ from dynx.simd.routines import Routine, RoutineSet
 from dynx.spatial.inertia import symmetric_from_upper
 from dynx.spatial.scalar import Array
 
-Q, V, TAU, A, DEFECT = 0, 1, 2, 3, 4
-"""Numbers of the arrays."""
+A, DEFECT = 3, 4
+"""Numbers of the results, after those of q, v and tau."""
 
 _ARTICULATED, _SPATIAL = (21,), (6,)
 _UPPER = np.triu_indices(3)
@@ -74,8 +76,7 @@ def routines() -> RoutineSet:
             {"acceleration": "vectors", "found": "vectors", "a": A},
         ),
     }
-    for name, revolute in (("revolute", True), ("prismatic", False)):
-        axis: Inputs = {} if revolute else {"axis": ("constants", VECTOR)}
+    for name, revolute, axis in JOINT_KINDS:
         found[f"outward {name}"] = Routine.of(
             _outward(revolute=revolute),
             {
@@ -120,11 +121,12 @@ def call_table(mechanism: Mechanism, routines: RoutineSet) -> CallTable:
     """Return the calls for one robot without mimic joints."""
     calls, bodies, nv = CallTable(routines), mechanism.bodies, mechanism.nv
     base = nv - len(bodies)
-    q, v, tau = (read_row(calls, array, n) for array, n in ((Q, mechanism.nq), (V, nv), (TAU, nv)))
+    rows = read_arguments(calls, mechanism, 3)
+    q, v, tau = (place for place, _ in rows)
     zeros = calls.reserve(6)
     calls.call("zeros", zeros)
     root = compute_root_motion(calls, mechanism, q, v, zeros)
-    axes = [() if body.revolute else (calls.constants(body.axis),) for body in bodies]
+    axes = load_axes(calls, bodies)
     omegas, poses, products = [root], [], []
     for index, body in enumerate(bodies):
         places = calls.reserve(12), calls.reserve(3), calls.reserve(6)
@@ -156,7 +158,7 @@ def call_table(mechanism: Mechanism, routines: RoutineSet) -> CallTable:
         given = poses[index], products[index], terms[index], accelerations[body.parent + 1]
         results = accelerations[-1], found + base + index, base + index
         calls.call(f"accelerate {kind(body)}", *given, *axes[index], *results)
-    check_arguments(calls, mechanism, [(q, mechanism.nq), (v, nv), (tau, nv)], [found + k for k in range(nv)])
+    check_arguments(calls, mechanism, rows, [found + k for k in range(nv)])
     return calls
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from dynx.compiled.looped.routines import (
+    JOINT_KINDS,
     MATRIX,
     SCALAR,
     VECTOR,
@@ -15,7 +16,8 @@ from dynx.compiled.looped.routines import (
     check_arguments,
     checking,
     kind,
-    read_row,
+    load_axes,
+    read_arguments,
     reading,
 )
 from dynx.model.mechanism import ROOT, Mechanism, joint_motion
@@ -32,8 +34,8 @@ from dynx.simd.routines import Routine, RoutineSet
 from dynx.spatial.scalar import Array
 from dynx.spatial.so3 import cross, rotate, rotate_back, rotation_from_quat
 
-Q, V, A, Y, DEFECT = 0, 1, 2, 3, 4
-"""Numbers of the arrays."""
+Y, DEFECT = 3, 4
+"""Numbers of the results, after those of q, v and a."""
 
 _STATE, _LINK = (24,), (42,)
 """Shapes of the state of a body (`_pack_state`) and of the wrench regressor of a link with its pose."""
@@ -62,8 +64,7 @@ def routines() -> RoutineSet:
             {f"row{k}": Y for k in range(6)},
         ),
     }
-    for name, revolute in (("revolute", True), ("prismatic", False)):
-        axis: Inputs = {} if revolute else {"axis": ("constants", VECTOR)}
+    for name, revolute, axis in JOINT_KINDS:
         joint: Inputs = dict.fromkeys(("q", "v", "a"), ("vectors", SCALAR))
         found[f"outward {name}"] = Routine.of(
             _outward(revolute=revolute),
@@ -82,9 +83,10 @@ def call_table(mechanism: Mechanism, routines: RoutineSet, frames: Sequence[int]
     """Return the calls for rigid bodies fixed to `frames` of one robot, in tree coordinates."""
     calls, bodies, nv = CallTable(routines), mechanism.bodies, mechanism.nv
     base, width = nv - len(bodies), 10 * len(frames)
-    q, v, a = (read_row(calls, array, n) for array, n in ((Q, mechanism.nq), (V, nv), (A, nv)))
-    check_arguments(calls, mechanism, [(q, mechanism.nq), (v, nv), (a, nv)])
-    states = [calls.reserve(24)]
+    rows = read_arguments(calls, mechanism, 3)
+    q, v, a = (place for place, _ in rows)
+    check_arguments(calls, mechanism, rows)
+    states, axes = [calls.reserve(24)], load_axes(calls, bodies)
     if mechanism.floating:
         calls.call("floating base", q, v, a, states[0])
     else:
@@ -92,9 +94,10 @@ def call_table(mechanism: Mechanism, routines: RoutineSet, frames: Sequence[int]
     for index, body in enumerate(bodies):
         states.append(calls.reserve(24))
         values = q + mechanism.nq - len(bodies) + index, v + base + index, a + base + index
-        axis = () if body.revolute else (calls.constants(body.axis),)
         pose = calls.constants(body.R), calls.constants(body.p)
-        calls.call(f"outward {kind(body)}", *pose, *values, states[body.parent + 1], *axis, states[index + 1])
+        calls.call(
+            f"outward {kind(body)}", *pose, *values, states[body.parent + 1], *axes[index], states[index + 1]
+        )
     gravity, link = calls.constants(mechanism.gravity), calls.reserve(42)
     for number, index in enumerate(frames):
         frame = mechanism.frames[index]

@@ -8,6 +8,7 @@ import numpy as np
 
 from dynx.compiled.looped.routines import (
     INERTIA,
+    JOINT_KINDS,
     MATRIX,
     MOTION,
     POSE,
@@ -15,15 +16,15 @@ from dynx.compiled.looped.routines import (
     SCALAR,
     VECTOR,
     WRENCH,
-    Inputs,
     body_like,
     check_arguments,
     checking,
     compute_root_motion,
     kind,
+    load_axes,
     pack_inertia,
     pack_motion,
-    read_row,
+    read_arguments,
     reading,
     unpack_inertia,
     unpack_motion,
@@ -52,8 +53,7 @@ def routines(n_inputs: int) -> RoutineSet:
         ),
         "write wrench": Routine.of(lambda x: {"x": x}, {"x": ("vectors", WRENCH)}, {"x": tau}),
     }
-    for name, revolute in (("revolute", True), ("prismatic", False)):
-        axis: Inputs = {} if revolute else {"axis": ("constants", VECTOR)}
+    for name, revolute, axis in JOINT_KINDS:
         found[f"outward {name}"] = Routine.of(
             _outward(revolute=revolute),
             {
@@ -80,12 +80,11 @@ def call_table(mechanism: Mechanism, routines: RoutineSet) -> CallTable:
     """Return the calls for one robot, in tree coordinates."""
     calls, bodies, nv = CallTable(routines), mechanism.bodies, mechanism.nv
     base, n_inputs = nv - len(bodies), routines.n_arrays - 2
-    sizes = (mechanism.nq, nv, nv)
-    rows = [read_row(calls, array, sizes[array]) for array in range(n_inputs)]
-    check_arguments(calls, mechanism, list(zip(rows, sizes, strict=False)))
+    rows = read_arguments(calls, mechanism, n_inputs)
+    check_arguments(calls, mechanism, rows)
     zeros = calls.reserve(6)
     calls.call("zeros", zeros)
-    q, *rates = rows
+    q, *rates = (place for place, _ in rows)
     # A rate that is no argument is zero: one number for every joint, six for the base.
     starts = [*rates, *[zeros] * (2 - len(rates))]
     v, a = ([start + k if start != zeros else zeros for k in range(nv)] for start in starts)
@@ -93,7 +92,7 @@ def call_table(mechanism: Mechanism, routines: RoutineSet) -> CallTable:
     wrenches = [calls.reserve(6)]
     calls.call("wrench", calls.constants(pack_inertia(mechanism.root)), motions[0], wrenches[0])
     poses = []
-    axes = [() if body.revolute else (calls.constants(body.axis),) for body in bodies]
+    axes = load_axes(calls, bodies)
     for index, body in enumerate(bodies):
         numbers = [calls.constants(x) for x in (body.R, body.p, pack_inertia(body.inertia))]
         state = q + mechanism.nq - len(bodies) + index, v[base + index], a[base + index]

@@ -8,14 +8,16 @@ import numpy as np
 
 from dynx.compiled.looped.routines import (
     INERTIA,
+    JOINT_KINDS,
     MATRIX,
     SCALAR,
     VECTOR,
     Inputs,
     body_like,
     kind,
+    load_axes,
     pack_inertia,
-    read_row,
+    read_arguments,
     reading,
     unpack_inertia,
 )
@@ -41,9 +43,8 @@ from dynx.simd.call_table import CallTable
 from dynx.simd.routines import Place, Routine, RoutineSet
 from dynx.spatial.scalar import Array
 
-Q, V, A = 0, 1, 2
 MATRICES = BY_Q, BY_V, BY_A = 3, 4, 5
-"""Numbers of the arrays."""
+"""Numbers of the results, after those of q, v and a."""
 
 _MOTION, _JOINT, _SUBTREE, _RESPONSE, _BASE = (24,), (18,), (28,), (21,), (9,)
 _ROWS = ("by_q", "by_v", "by_a")
@@ -101,8 +102,7 @@ def routines() -> RoutineSet:
             {f"{name}{k}": rows[name] for name in _ROWS for k in range(6)},
         ),
     }
-    for name, revolute in (("revolute", True), ("prismatic", False)):
-        axis: Inputs = {} if revolute else {"axis": ("constants", VECTOR)}
+    for name, revolute, axis in JOINT_KINDS:
         found[f"outward {name}"] = Routine.of(
             _outward(revolute=revolute),
             {
@@ -122,7 +122,8 @@ def call_table(mechanism: Mechanism, routines: RoutineSet) -> CallTable:
     """Return the calls for one robot, in tree coordinates."""
     calls, bodies, nv = CallTable(routines), mechanism.bodies, mechanism.nv
     first = nv - len(bodies)
-    q, v, a = (read_row(calls, array, n) for array, n in ((Q, mechanism.nq), (V, nv), (A, nv)))
+    rows = read_arguments(calls, mechanism, 3)
+    q, v, a = (place for place, _ in rows)
     motions, subtrees, base = [calls.reserve(24)], [calls.reserve(28)], calls.reserve(9)
     gravity = calls.constants(mechanism.gravity)
     if mechanism.floating:
@@ -130,13 +131,12 @@ def call_table(mechanism: Mechanism, routines: RoutineSet) -> CallTable:
     else:
         calls.call("fixed root", gravity, motions[0])
     calls.call("root", calls.constants(pack_inertia(mechanism.root)), motions[0], subtrees[0])
-    joints = []
+    joints, axes = [], load_axes(calls, bodies)
     for index, body in enumerate(bodies):
         numbers = [calls.constants(x) for x in (body.R, body.p, pack_inertia(body.inertia))]
         state = q + mechanism.nq - len(bodies) + index, v + first + index, a + first + index
-        axis = () if body.revolute else (calls.constants(body.axis),)
         places = calls.reserve(24), calls.reserve(18), calls.reserve(28)
-        calls.call(f"outward {kind(body)}", *numbers, *state, motions[body.parent + 1], *axis, *places)
+        calls.call(f"outward {kind(body)}", *numbers, *state, motions[body.parent + 1], *axes[index], *places)
         motions.append(places[0])
         joints.append(places[1])
         subtrees.append(places[2])

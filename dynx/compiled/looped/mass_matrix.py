@@ -12,18 +12,19 @@ import numpy as np
 
 from dynx.compiled.looped.routines import (
     INERTIA,
+    JOINT_KINDS,
     LOADING,
     PLACING,
     POSE,
-    VECTOR,
     Inputs,
     check_arguments,
     checking,
     inertias_in_workspace,
     kind,
+    load_axes,
     pack_inertia,
     place_bodies,
-    read_row,
+    read_arguments,
     reading,
     unpack_inertia,
     unpack_pose,
@@ -35,8 +36,8 @@ from dynx.simd.routines import Routine, RoutineSet
 from dynx.spatial.scalar import Array
 from dynx.spatial.so3 import skew
 
-Q, M, DEFECT = 0, 1, 2
-"""Numbers of the arrays."""
+M, DEFECT = 1, 2
+"""Numbers of the results, after that of q."""
 
 
 def routines() -> RoutineSet:
@@ -54,8 +55,7 @@ def routines() -> RoutineSet:
         "root": Routine.of(_root, {"composite": ("vectors", INERTIA)}, {f"row{k}": M for k in range(6)}),
         "to root": Routine.of(_to_root, _WALK, {"row": M, **{f"entry{k}": M for k in range(6)}}),
     }
-    for name, revolute in (("revolute", True), ("prismatic", False)):
-        axis: Inputs = {} if revolute else {"axis": ("constants", VECTOR)}
+    for name, revolute, axis in JOINT_KINDS:
         found[f"momentum {name}"] = Routine.of(
             _momentum(revolute=revolute),
             {"composite": ("vectors", INERTIA), **axis},
@@ -73,15 +73,16 @@ _WALK: Inputs = {"pose": ("vectors", POSE), "wrench": ("vectors", (6,))}
 def call_table(mechanism: Mechanism, routines: RoutineSet) -> CallTable:
     """Return the calls for one robot, in tree coordinates."""
     calls, bodies, nv = CallTable(routines), mechanism.bodies, mechanism.nv
-    q = read_row(calls, Q, mechanism.nq)
-    check_arguments(calls, mechanism, [(q, mechanism.nq)])
+    rows = read_arguments(calls, mechanism, 1)
+    check_arguments(calls, mechanism, rows)
+    q, _ = rows[0]
     poses = place_bodies(calls, mechanism, q)
     composites = inertias_in_workspace(calls, mechanism)
     for index in reversed(range(len(bodies))):
         parent = composites[bodies[index].parent + 1]
         calls.call("add composite", poses[index], composites[index + 1], parent, parent)
     wrench, base = calls.reserve(6), nv - len(bodies)
-    axes = [() if body.revolute else (calls.constants(body.axis),) for body in bodies]
+    axes = load_axes(calls, bodies)
     for index, body in enumerate(bodies):
         own = base + index
         calls.call(f"momentum {kind(body)}", composites[index + 1], *axes[index], wrench, own * nv + own)

@@ -26,6 +26,13 @@ VECTOR, MATRIX, SCALAR = (3,), (3, 3), ()
 INERTIA = (10,)
 """Shape of mass, first moment and the upper triangle of the rotational inertia."""
 
+JOINT_KINDS: tuple[tuple[str, bool, Inputs], ...] = (
+    ("revolute", True, {}),
+    ("prismatic", False, {"axis": ("constants", VECTOR)}),
+)
+"""Types of joints by which routines are named: the name, whether it is revolute, and the input for its axis,
+which is z for revolute joints."""
+
 _UPPER = np.triu_indices(3)
 
 
@@ -72,6 +79,12 @@ def read_row(table: CallTable, array: int, size: int) -> int:
     return place
 
 
+def read_arguments(table: CallTable, mechanism: Mechanism, n: int) -> list[tuple[int, int]]:
+    """Copy the first n inputs, q and then vectors of nv, to the workspace; return their places and sizes."""
+    sizes = [mechanism.nq, *[mechanism.nv] * (n - 1)]
+    return [(read_row(table, array, size), size) for array, size in enumerate(sizes)]
+
+
 def _place_body(*, revolute: bool) -> Routine:
     def pose(R: Array, p: Array, axis: Array, q: Array) -> dict[str, Array]:
         placement = Placement.of(body_like(revolute, R, p, axis), q)
@@ -102,6 +115,11 @@ PLACING = {"place revolute": _place_body(revolute=True), "place prismatic": _pla
 def kind(body: Body) -> str:
     """Return the type of a joint, by which routines are named."""
     return "revolute" if body.revolute else "prismatic"
+
+
+def load_axes(table: CallTable, bodies: Sequence[Body]) -> list[tuple[int, ...]]:
+    """Return the operands of routines for the axis of each body's joint: its place, and none for z."""
+    return [() if body.revolute else (table.constants(body.axis),) for body in bodies]
 
 
 def place_bodies(table: CallTable, mechanism: Mechanism, q: int, *, size: int = 12) -> list[int]:
