@@ -12,7 +12,8 @@ from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.record.rollout import Rollout
 from dynx.sim.record.rollout_data import Summary
 from dynx.sim.scenario.scenario import Scenario
-from dynx.sim.simulation import Simulation, Snapshot, State
+from dynx.sim.simulation import Simulation
+from dynx.sim.snapshot import Snapshot, State
 
 __all__ = [
     "BatchInterrupted",

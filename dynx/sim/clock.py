@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -61,6 +62,12 @@ class Clock:
     def control_dt(self) -> float:
         """Time between two control steps [s]."""
         return self.steps_per_control * self.dt
+
+    def measured_step(self, step: Any) -> Any:
+        """Return the step whose state a controller measures at `step`, or at each of several (n,): an earlier
+        one with a delay, and the initial state while the delay has not passed."""
+        seen = step - self.delay_steps
+        return seen * (seen > 0)
 
     def times(self) -> Floats:
         """Return the times (n_steps + 1,) [s] of all steps, including the end."""

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,6 +27,8 @@ from dynx.sim.record.rollout import Rollout
 from dynx.sim.resuming import changed_parts, refuse_other_scenario, refuse_scene, require_rollout
 from dynx.sim.scenario.scenario import Scenario
 from dynx.sim.setup import Setup, step_bytes
+from dynx.sim.snapshot import Snapshot, State
+from dynx.sim.step import at_limit
 from dynx.simd.machine import require_memory
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory
@@ -37,32 +38,6 @@ Progress = Callable[[int, int], object]
 
 MIN_BUFFER_STEPS = 1024
 """Number of steps that fit into the first buffers of a simulation without a duration."""
-
-
-class State(NamedTuple):
-    """The state of a robot at time `t` [s]: configuration `q` (nq,) and velocity `v` (nv,)."""
-
-    t: float
-    q: Floats
-    v: Floats
-
-
-@dataclass(frozen=True, eq=False)
-class Snapshot:
-    """State and record of a simulation at one moment, to which `Simulation.restore` returns."""
-
-    scenario: Scenario
-    record: Record
-    loop_state: LoopState
-    executor: tuple[str, ...]
-    departures: tuple[str, ...]
-    plant_memory: Any = None
-    """All that the plant needs besides the state, such as the world around the robot."""
-
-    @property
-    def time(self) -> float:
-        """Simulated time [s]."""
-        return self.record.steps * self.scenario.dt
 
 
 class Simulation:
@@ -282,7 +257,7 @@ class Simulation:
         record, setup, n = self._record.copy(), self._setup, self._record.steps
         times = self._loop.clock.times()[: n + 1]
         limit, tau = setup.limit, record.tau
-        at_limit = np.zeros(tau.shape, dtype=bool) if limit is None else np.abs(tau) >= limit
+        saturated = np.zeros(tau.shape, dtype=bool) if limit is None else at_limit(tau, limit) > 0.0
         return Rollout(
             setup.model,
             times,
@@ -290,7 +265,7 @@ class Simulation:
             record.v,
             record.a,
             tau,
-            at_limit,
+            saturated,
             None if setup.setpoint_of is None else setup.setpoint_of(times),
             setup.disturbances.armature,
             self.scenario,

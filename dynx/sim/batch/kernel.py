@@ -17,7 +17,7 @@ from dynx.compiled.kernels import evaluate_quantity
 from dynx.compiled.mass_factors import factorize_mass_matrix, solve_with_factors
 from dynx.compiled.parametric import ParametricDynamics
 from dynx.compiled.simplification import simplify_mechanism
-from dynx.control.base import Controller, Measurement, chain_of, gains_of
+from dynx.control.base import Controller, chain_of, gains_of
 from dynx.control.content import content_of
 from dynx.errors import ArgumentError, TraceError, UnsupportedFeatureError, shown
 from dynx.model import Mechanism, Model
@@ -29,11 +29,12 @@ from dynx.sim.loop.own_controllers import refuse_irreproducible, traced_torque
 from dynx.sim.plants.friction_law import FrictionLaw, FrictionStep
 from dynx.sim.plants.friction_solver import CORRECTIONS, MAX_CORRECTED_OPERATIONS
 from dynx.sim.plants.integrators import SemiImplicitEuler
+from dynx.sim.step import at_limit, measure
 from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.kernel import Kernel
 from dynx.simd.trace import trace
 from dynx.simd.user_code.numbers import as_symbol, as_traced, select
-from dynx.spatial.branchless import difference, integrate
+from dynx.spatial.branchless import difference
 from dynx.spatial.scalar import Array, Floats, clamp, sign, tanh
 from dynx.trajectory.base import Setpoint
 
@@ -198,14 +199,14 @@ class FusedStep:
     def _commanded(self, controller: Controller[Any], given: Mapping[str, Array]) -> dict[str, Array]:
         """Return the torque of the controller and within limits, the controller state, and the number of
         steps at effort limits."""
-        q, v = (given["q_measured"], given["v_measured"]) if self.delayed else (given["q"], given["v"])
-        if self.noisy:
-            off = given["noise_q"]
-            q, v = integrate(q, off) if self.model.floating else q + off, v + given["noise_v"]
+        names = ("q_measured", "v_measured") if self.delayed else ("q", "v")
+        noise = (given["noise_q"], given["noise_v"]) if self.noisy else None
+        measurement = measure(
+            self.model, given["t"][0], *(given[name] for name in names), noise, given.get("random")
+        )
         setpoint = Setpoint(given["q_wanted"], given["v_wanted"], given["a_wanted"])
         own = traced_controller(controller, {name: given[f"gain_{name}"] for name in self.gains})
         watch = ControllerWatch(own)
-        measurement = Measurement(given["t"][0], q, v).with_random(given.get("random", Measurement.random))
         outcome = traced_torque(own, measurement, setpoint, given.get("state"))
         defect = defect_of_outcome(outcome)
         if defect:
@@ -229,8 +230,8 @@ class FusedStep:
         bounded = np.isfinite(self.limit)
         steps_at_limit = np.array(given["steps_at_limit"])
         # A controller may return plain numbers; the kernel needs symbols.
-        left = self.limit[bounded] - abs(tau[bounded] + 0.0 * steps_at_limit[bounded])
-        steps_at_limit[bounded] = steps_at_limit[bounded] + given["steps_held"] * (1.0 - sign(left))
+        reached = at_limit(tau[bounded] + 0.0 * steps_at_limit[bounded], self.limit[bounded])
+        steps_at_limit[bounded] = steps_at_limit[bounded] + given["steps_held"] * reached
         return {"tau": tau, "steps_at_limit": steps_at_limit, **results}
 
     @cached_property

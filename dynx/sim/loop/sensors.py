@@ -8,6 +8,7 @@ from dynx.control.base import Controller, Measurement
 from dynx.model import Model
 from dynx.sim.clock import Clock
 from dynx.sim.loop.noise import Noise, Purpose
+from dynx.sim.step import measure
 from dynx.spatial.scalar import Floats
 
 
@@ -36,15 +37,9 @@ class Sensors:
         return self.noise is None and self.random is None and not self._clock.delay_steps
 
     def __call__(self, step: int, q: Floats, v: Floats) -> Measurement:
-        """Return the measurement at physics step `step`, from the states (n, nq), (n, nv) until then.
-
-        With a delay it is the state at the earlier time, or the initial state while the delay has not passed.
-        """
-        seen = max(step - self._clock.delay_steps, 0)
-        measurement = Measurement(step * self._clock.dt, q[seen], v[seen])
-        number = step // self._clock.steps_per_control
-        if self.noise is not None:
-            t, q, v = measurement
-            off_q, off_v = self.noise[0][number], self.noise[1][number]
-            measurement = Measurement(t, self._model.integrate(q, off_q), v + off_v)
-        return measurement if self.random is None else measurement.with_random(self.random[number])
+        """Return the measurement at physics step `step`, from the states (n, nq), (n, nv) until then."""
+        clock = self._clock
+        seen, number = clock.measured_step(step), step // clock.steps_per_control
+        noise = None if self.noise is None else (self.noise[0][number], self.noise[1][number])
+        random = None if self.random is None else self.random[number]
+        return measure(self._model, step * clock.dt, q[seen], v[seen], noise, random)

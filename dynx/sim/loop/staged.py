@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.control.base import Measurement
 from dynx.control.engine_motors import EngineMotor
 from dynx.errors import CompileError, TraceError
 from dynx.model.configuration import DIVERGENCE_SPEED
@@ -25,6 +24,7 @@ from dynx.sim.loop.plain import Loop, LoopState
 from dynx.sim.loop.record import Record
 from dynx.sim.loop.stages import EngineCall, EngineCallTracer, StagedStep, refuse_impure, traced_controller
 from dynx.sim.plants.integrated import IntegratedPlant
+from dynx.sim.step import measure
 from dynx.simd.call_sequence import CallSequence, StridedRows, prepare_calls
 from dynx.simd.kernel import Kernel
 from dynx.spatial.scalar import Array, Floats, clamp
@@ -140,10 +140,14 @@ class StagedLoop:
         if loop.controller is None:
             tau = np.zeros(len(tau), dtype=object)
         elif controlled:
-            q, v = given["measured_q"], given["measured_v"]
-            if loop.sensors.noise is not None:
-                q, v = q + given["noise_q"], v + given["noise_v"]
-            measurement = Measurement(given["t"][0], q, v).with_random(given["random"])
+            measurement = measure(
+                self._plant.model,
+                given["t"][0],
+                given["measured_q"],
+                given["measured_v"],
+                None if loop.sensors.noise is None else (given["noise_q"], given["noise_v"]),
+                given["random"],
+            )
             setpoint = Setpoint(*(given[name] for name in SETPOINT))
             controller = traced_controller(loop.controller, tracer)
             tau, state = traced_torque(controller, measurement, setpoint, state)
@@ -202,7 +206,7 @@ class StagedLoop:
         if name == "last_tau":
             return np.maximum(steps - 1, 0)
         if name in ("measured_q", "measured_v"):
-            return np.maximum(steps - clock.delay_steps, 0)
+            return np.asarray(clock.measured_step(steps))
         if name in SETPOINT or name in NOISE:
             return steps // clock.steps_per_control
         return steps
