@@ -199,11 +199,9 @@ class FusedStep:
     def _commanded(self, controller: Controller[Any], given: Mapping[str, Array]) -> dict[str, Array]:
         """Return the torque of the controller and within limits, the controller state, and the number of
         steps at effort limits."""
-        names = ("q_measured", "v_measured") if self.delayed else ("q", "v")
+        q, v = (given["q_measured"], given["v_measured"]) if self.delayed else (given["q"], given["v"])
         noise = (given["noise_q"], given["noise_v"]) if self.noisy else None
-        measurement = measure(
-            self.model, given["t"][0], *(given[name] for name in names), noise, given.get("random")
-        )
+        measurement = measure(self.model, given["t"][0], q, v, noise, given.get("random"))
         setpoint = Setpoint(given["q_wanted"], given["v_wanted"], given["a_wanted"])
         own = traced_controller(controller, {name: given[f"gain_{name}"] for name in self.gains})
         watch = ControllerWatch(own)
