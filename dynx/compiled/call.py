@@ -156,7 +156,8 @@ class KernelCall:
         """
         # The functions keep the workspace alive, because `run` has only addresses of its arrays.
         workspace = self._workspace()
-        inputs, run, result = workspace.inputs, workspace.run, workspace.results[0]
+        inputs: Any = workspace.inputs
+        run, result = workspace.run, workspace.results[0]
         defects, place = workspace.output_values, self._defect
         first, second, third = self._first, self._second, self._third
         evaluate = self.evaluate
