@@ -20,8 +20,8 @@ from dynx.world.scene import Scene
 from dynx.world.state import WorldState
 from dynx.world.world import World
 
-PARTED = (1e-3, 1e-2, 1e-1)
-"""Distances [m] of which a comparison gives the first time."""
+SEPARATIONS = (1e-3, 1e-2, 1e-1)
+"""Distances [m]; a comparison reports when each of them is first exceeded."""
 
 SAMPLES = 200
 """Number of times at which states are compared, unless there are fewer steps."""

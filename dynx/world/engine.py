@@ -119,7 +119,7 @@ class WorldEngine(ABC):
 
     @abstractmethod
     def set_robot_state(self, robot: int, q: Floats, v: Floats) -> None:
-        """Set the state of a robot; contacts and forces of the last step are those of no step."""
+        """Set the state of a robot; from then on there are no contacts and forces of a last step."""
 
     @abstractmethod
     def set_body_state(self, body: int, T: Floats, twist: Floats) -> None:

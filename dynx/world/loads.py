@@ -141,7 +141,7 @@ class RobotLoads:
         """Return the torque of motors whose law holds at the end of the step.
 
         With the torque `motor` for the acceleration 0, that for the acceleration a is motor - K a, where
-        (M + K) a = motor + all other forces. Those but `tau` are the ones of the step before.
+        (M + K) a = motor + all other forces. The other forces, except `tau`, are those of the step before.
         """
         M = self.dynamics.mass_matrix(q)
         if self.memory is None:

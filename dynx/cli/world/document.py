@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Literal, TypedDict
 
 from dynx.spatial.so3 import quat_from_rotation
-from dynx.world.comparison import PARTED, EngineRun, Separation, WorldComparison
+from dynx.world.comparison import SEPARATIONS, EngineRun, Separation, WorldComparison
 from dynx.world.contacts import Contact
 
 SCHEMA: Literal["dynx.world/1"] = "dynx.world/1"
@@ -149,5 +149,5 @@ def _separation(separation: Separation) -> SeparationEntry:
         "times": separation.times.tolist(),
         "distance": separation.distance.tolist(),
         "farthest": list(separation.farthest),
-        "parted": [{"distance": each, "time": separation.first_beyond(each)} for each in PARTED],
+        "parted": [{"distance": each, "time": separation.first_beyond(each)} for each in SEPARATIONS],
     }

@@ -39,7 +39,7 @@ def _require_short_chains(source: XmlSource) -> None:
     below: dict[str, list[str]] = {}
     for child, joint in carried.items():
         below.setdefault(_link(joint, "parent"), []).append(child)
-    # Links of a circle are below no root and are not reached.
+    # Links of a cycle are below no root, so that they are not reached.
     level = [name for name in below if name not in carried]
     for depth in count():
         if not level:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -80,6 +81,9 @@ class HeightField:
 
     heights: tuple[tuple[float, ...], ...]
     size: tuple[float, float]
+
+    DEPTH: ClassVar[float] = 1.0
+    """Depth [m] of the solid below the lowest point of every height field."""
 
     def __post_init__(self) -> None:
         array = checked_entries("heights", real_array("heights", self.heights))

@@ -9,9 +9,6 @@ from dynx.distance.distance import Distance, distance_of_cores
 from dynx.model.geometry import HeightField
 from dynx.spatial.scalar import Floats
 
-DEPTH = 1.0
-"""Depth [m] of the prisms below the lowest point of a height field, as on every engine."""
-
 
 class Field:
     """The triangles of a height field, each the top of a prism."""
@@ -21,7 +18,7 @@ class Field:
         self._tops: Floats = vertices[faces]
         normals = np.cross(self._tops[:, 1] - self._tops[:, 0], self._tops[:, 2] - self._tops[:, 0])
         self._normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-        self._bottom = float(vertices[:, 2].min()) - DEPTH
+        self._bottom = float(vertices[:, 2].min()) - shape.DEPTH
         self._lower, self._upper = self._tops.min(axis=1), self._tops.max(axis=1)
         self._lower[:, 2] = self._bottom
 

@@ -1,8 +1,9 @@
-"""Priorities by which MuJoCo's contacts have the coefficients of two materials.
+"""Priorities with which MuJoCo's contacts get the mean coefficients of their two materials.
 
-Of two geoms MuJoCo takes the coefficients of the one with the higher priority; explicit pairs of geoms have
-their own. A geom whose partners all want the same coefficients has these and a priority above theirs, so that
-a robot on a ground needs no pairs; only what remains becomes pairs, which take time in every step.
+MuJoCo knows no mean: a contact has the coefficients of the geom with the higher priority, or those of an
+explicit pair of geoms. Where the mean is the same for all partners of a geom, the geom gets it, with a
+priority above its partners, as a robot on a ground does. The contacts that remain become explicit pairs,
+which take time in every step.
 """
 
 from __future__ import annotations

@@ -12,11 +12,8 @@ from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, 
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
 
-LEAST_HEIGHT = 1e-6
+MIN_HEIGHT_RANGE = 1e-6
 """Range of heights [m] that a level height field is given, because MuJoCo requires one above zero."""
-
-BASE_HEIGHT = 1.0
-"""Depth [m] of the solid below the lowest point of a height field."""
 
 
 def text(values: Iterable[Any]) -> str:
@@ -80,7 +77,7 @@ class ShapeWriter:
     def _field(self, shape: HeightField) -> str:
         if shape not in self._names:
             heights = np.array(shape.heights)
-            span = max(float(np.ptp(heights)), LEAST_HEIGHT)
+            span = max(float(np.ptp(heights)), MIN_HEIGHT_RANGE)
             # MuJoCo reads the rows of a document from the highest y to the lowest.
             rows = heights[::-1] - heights.min()
             SubElement(
@@ -89,7 +86,7 @@ class ShapeWriter:
                 name=self._new_name("heights", shape),
                 nrow=str(heights.shape[0]),
                 ncol=str(heights.shape[1]),
-                size=text([0.5 * shape.size[0], 0.5 * shape.size[1], span, BASE_HEIGHT]),
+                size=text([0.5 * shape.size[0], 0.5 * shape.size[1], span, shape.DEPTH]),
                 elevation=text(rows.ravel()),
             )
         return self._names[shape]

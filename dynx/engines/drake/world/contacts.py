@@ -66,8 +66,11 @@ def _on_surface(
 
 
 def _center_of_pressure(surface: Any, normal: Floats, force: Floats, moment: Floats) -> Floats:
-    """Return the point of the surface about which the force, whose moment about the centroid is `moment`, has
-    none but that along the normal; the centroid where that point would be outside of the surface."""
+    """Return the point of the surface about which the contact force has no moment but one along the normal.
+
+    `moment` is the moment about the centroid, which is returned where the point would be outside of the
+    surface.
+    """
     centroid = np.array(surface.centroid())
     along = float(force @ normal)
     if along <= 0.0:

@@ -13,9 +13,6 @@ from dynx.spatial.scalar import Floats
 MAX_TRIANGLES = 20_000
 """Largest number of triangles of a height field, each of which is a shape of its own."""
 
-DEPTH = 1.0
-"""Depth [m] of the prisms below the lowest point of a height field."""
-
 
 def drake_shapes(shape: Shape) -> list[object]:
     """Return Drake's shape, or several with one frame. Raises EngineLimitError for too fine a height
@@ -44,7 +41,7 @@ def _prisms(shape: HeightField) -> list[object]:
         )
     tops = vertices[faces]
     bottoms = tops.copy()
-    bottoms[:, :, 2] = vertices[:, 2].min() - DEPTH
+    bottoms[:, :, 2] = vertices[:, 2].min() - shape.DEPTH
     prisms = np.concatenate([tops, bottoms], axis=1)
     return [_convex(points, "height field") for points in prisms]
 

@@ -11,12 +11,7 @@ from dynx.engines.mujoco.library import mujoco
 from dynx.engines.mujoco.tree import quat_wxyz
 from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
 from dynx.spatial.scalar import Floats
-
-LEAST_HEIGHT = 1e-6
-"""Range of heights [m] that a level height field is given, because MuJoCo requires one above zero."""
-
-BASE_HEIGHT = 1.0
-"""Depth [m] of the solid below the lowest point of a height field."""
+from dynx.world.scene.mjcf_shapes import MIN_HEIGHT_RANGE
 
 FIELD_GROUP = 5
 """MuJoCo's geom group of height fields, which `mj_ray` can leave out; others are in group 0."""
@@ -56,14 +51,14 @@ class ShapeBuilder:
     def _field(self, shape: HeightField) -> str:
         if shape not in self._assets:
             heights = np.array(shape.heights)
-            span = max(float(np.ptp(heights)), LEAST_HEIGHT)
+            span = max(float(np.ptp(heights)), MIN_HEIGHT_RANGE)
             rows, columns = heights.shape
             name = self._assets[shape] = str(len(self._assets))
             self._spec.add_hfield(
                 name=name,
                 nrow=rows,
                 ncol=columns,
-                size=[0.5 * shape.size[0], 0.5 * shape.size[1], span, BASE_HEIGHT],
+                size=[0.5 * shape.size[0], 0.5 * shape.size[1], span, shape.DEPTH],
                 userdata=(heights - heights.min()).ravel(),
             )
         return self._assets[shape]

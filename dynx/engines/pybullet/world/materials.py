@@ -35,9 +35,9 @@ STIFFNESS = 1e20
 """Stiffness [N/m] of contacts that rebound; from it and the damping Bullet derives the share of a penetration
 that it removes in a step."""
 
-TOUCHING = 0.1
-"""Gap below which a contact that rebounds is processed, in units of the way in a step at the least speed that
-rebounds: bodies at rest keep their contacts in spite of rounding."""
+REBOUND_GAP = 0.1
+"""Gap below which a contact that rebounds is processed, so that bodies at rest keep their contacts in spite
+of rounding. Its unit is the distance covered in a step at the least speed that rebounds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class BulletMaterials:
             "restitution": float(self.restitution[number]),
         }
         if self.rebounds[number]:
-            found["contactProcessingThreshold"] = TOUCHING * settings["restitution_speed"] * dt
+            found["contactProcessingThreshold"] = REBOUND_GAP * settings["restitution_speed"] * dt
             found["contactStiffness"] = STIFFNESS
             # Of two surfaces Bullet adds the damping and halves the stiffness.
             found["contactDamping"] = 0.25 * STIFFNESS * settings["rebound_time_constant"]

@@ -87,7 +87,7 @@ def binary_stl(triangles: Floats) -> bytes:
 
 
 def is_ground(placed: PlacedShape) -> bool:
-    """Check whether a shape belongs to fixed bodies only, and URDF has none of the kind."""
+    """Check whether a shape is a plane or a height field: only fixed bodies have one, and URDF has none."""
     return isinstance(placed.shape, Plane | HeightField)
 
 
