@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import chain
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,11 +12,10 @@ from dynx.distance.cores import ConvexShape, Core, core_of
 from dynx.distance.gjk import CorePair
 from dynx.distance.parallel_axes import penetration_of_parallel
 from dynx.distance.penetration import Penetration, penetration
-from dynx.distance.vectors import cross, dot
-from dynx.errors import ArgumentError, NotFiniteError, ShapeError, shown
+from dynx.errors import ArgumentError
 from dynx.model import Pose
 from dynx.model.configuration import MAX_MAGNITUDE, checked_pose, checked_vector
-from dynx.model.elements import RIGIDITY_TOLERANCE
+from dynx.model.elements import rigid_matrix
 from dynx.model.geometry import Plane
 from dynx.spatial.plain import Vector3
 from dynx.spatial.scalar import Floats
@@ -200,19 +198,7 @@ def _checked_pose(name: str, T: Pose | ArrayLike) -> Floats:
     """Return a pose as a matrix, as it is: not the nearest rotation."""
     if isinstance(T, Pose):
         return checked_pose(name, T).matrix
-    try:
-        array = np.asarray(T, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ArgumentError(f"{name} is {shown(T)}; wanted a Pose or a matrix (4, 4)") from None
-    if array.shape != (4, 4):
-        raise ShapeError(f"{name} has shape {array.shape}; wanted a Pose or a matrix (4, 4)")
-    rows: list[list[float]] = array.tolist()
-    if not all(map(math.isfinite, chain.from_iterable(rows))):
-        raise NotFiniteError(f"{name} has an entry that is NaN or infinite")
-    *top, bottom = rows
-    x, y, z, p = ((row[0], row[1], row[2]) for row in zip(*top, strict=True))
-    products = (dot(x, x) - 1.0, dot(y, y) - 1.0, dot(z, z) - 1.0, dot(x, y), dot(y, z), dot(z, x))
-    off = max(map(abs, (*products, *bottom[:3], bottom[3] - 1.0)))
-    if off > RIGIDITY_TOLERANCE or dot(cross(x, y), z) < 0.0 or max(map(abs, p)) >= MAX_MAGNITUDE:
-        raise ArgumentError(f"{name} is not a rigid transform: wanted [[R, p], [0, 1]] with R a rotation")
+    array = rigid_matrix(T, name)
+    if np.abs(array[:3, 3]).max() >= MAX_MAGNITUDE:
+        raise ArgumentError(f"the position of {name} is {array[:3, 3]}; wanted less than {MAX_MAGNITUDE:g}")
     return array

@@ -6,14 +6,16 @@ Values are those of the file, in SI units; inertias are neither merged nor diago
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import chain
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, ShapeError, shown
+from dynx.errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, shown
 from dynx.model.masks import refuse_mask
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
@@ -29,6 +31,38 @@ RIGIDITY_TOLERANCE = 1e-6
 """Largest accepted deviation from orthonormality of a rotation matrix."""
 
 
+def rigid_matrix(T: ArrayLike, name: str) -> Floats:
+    """Return a homogeneous matrix (4, 4) as a float64 array, as it is: not with the nearest rotation.
+
+    `name` is how errors call it. Raises ArgumentError unless T is a rigid transform to 1e-6.
+    """
+    refuse_mask(name, T)
+    try:
+        entries = np.asarray(T)
+        if entries.dtype.kind == "c":
+            raise DTypeError(f"{name} has dtype {entries.dtype}; wanted real numbers (float64)")
+        array = np.asarray(entries, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, DTypeError):
+            raise
+        raise ArgumentError(f"{name} is {shown(T)}; wanted a Pose or a matrix (4, 4)") from None
+    if array.shape != (4, 4):
+        position = ", ".join(f"{x:g}" for x in array.tolist()) if array.shape == (3,) else None
+        hint = f", such as Pose(({position}))" if position is not None else ""
+        raise ShapeError(f"{name} has shape {array.shape}; wanted a Pose or a matrix (4, 4){hint}")
+    rows: list[list[float]] = array.tolist()
+    if not all(map(math.isfinite, chain.from_iterable(rows))):
+        raise NotFiniteError(f"{name} has an entry that is NaN or infinite")
+    (a, b, c, _), (d, e, f, _), (g, h, i, _), bottom = rows
+    lengths = (a * a + d * d + g * g, b * b + e * e + h * h, c * c + f * f + i * i)
+    angles = (a * b + d * e + g * h, b * c + e * f + h * i, c * a + f * d + i * g)
+    off = max(map(abs, (*(x - 1.0 for x in lengths), *angles, *bottom[:3], bottom[3] - 1.0)))
+    determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    if not off < RIGIDITY_TOLERANCE or determinant < 0.0:
+        raise ArgumentError(f"{name} is not a rigid transform: wanted [[R, p], [0, 1]] with R a rotation")
+    return array
+
+
 @dataclass(frozen=True)
 class Pose:
     """URDF's ``<origin>``: translation `xyz` [m], then roll-pitch-yaw `rpy` [rad]."""
@@ -42,19 +76,8 @@ class Pose:
 
         `name` is how errors call it. Raises ArgumentError unless T is a rigid transform to 1e-6.
         """
-        refuse_mask(name, T)
-        try:
-            array = np.asarray(T, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise ArgumentError(f"{name} is {shown(T)}; wanted a Pose or a matrix (4, 4)") from None
-        if array.shape != (4, 4):
-            position = ", ".join(f"{x:g}" for x in array.tolist()) if array.shape == (3,) else None
-            hint = f", such as Pose(({position}))" if position is not None else ""
-            raise ShapeError(f"{name} has shape {array.shape}; wanted a Pose or a matrix (4, 4){hint}")
+        array = rigid_matrix(T, name)
         R = array[:3, :3]
-        off = max(float(np.max(np.abs(R.T @ R - np.eye(3)))), float(np.max(np.abs(array[3] - [0, 0, 0, 1]))))
-        if not off < RIGIDITY_TOLERANCE or np.linalg.det(R) < 0 or not np.isfinite(array).all():
-            raise ArgumentError(f"{name} is not a rigid transform: wanted [[R, p], [0, 1]] with R a rotation")
         x, y, z = (array[:3, 3] + 0.0).tolist()
         roll, pitch, yaw = (rpy_from_rotation(R) + 0.0).tolist()
         return cls((x, y, z), (roll, pitch, yaw))

@@ -28,6 +28,7 @@ FAULTS: dict[str, tuple[Callable[[], object], type[DynxError], str]] = {
     "size": (lambda: distance(BALL, HERE, BRICK, np.eye(3)), ShapeError, r"T_b has shape \(3, 3\)"),
     "mirrored": (lambda: distance(BALL, HERE, BRICK, MIRRORED), ArgumentError, "T_b is not a rigid"),
     "text": (lambda: distance(BALL, "here", BRICK, HERE), ArgumentError, "T_a is 'here'"),
+    "complex": (lambda: distance(BALL, np.eye(4) * 1j, BRICK, HERE), DTypeError, "T_a has dtype complex"),
     "far": (lambda: distance(BALL, Pose((1e70, 0, 0)), BRICK, HERE), ArgumentError, "1e"),
     "no direction": (lambda: support(BRICK, HERE, [0, 0, 0]), ArgumentError, "direction is zero"),
     "no normal": (lambda: separation(BRICK, HERE, BALL, HERE, [0, 0]), ShapeError, "normal"),

@@ -39,7 +39,7 @@ def settings_by_engine(
         if not having:
             names = sorted({each for settings in known.values() for each in settings})
             raise UnknownNameError(
-                f"--set {shown(full)}: {', '.join([engine] if dot else engines)} has no such setting"
+                f"--set {shown(full)}: no such setting of {', '.join([engine] if dot else engines)}"
                 f"{nearest(name, names)}"
             )
         for each in having:
