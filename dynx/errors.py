@@ -10,6 +10,7 @@
     |  |- DTypeError                not real numbers
     |  |- NotFiniteError            NaN or infinity where a finite number is needed
     |  |- UnknownNameError          no such frame, joint, reference, ...
+    |  |- NoClosedFormError         no closed form of the inverse kinematics (which condition fails)
     |  `- GainError                 invalid gains (negative, of the wrong length)
     |- BackendError                 an engine cannot be used
     |  |- UnknownBackendError       no backend of that name is registered
@@ -89,6 +90,10 @@ class NotFiniteError(ArgumentError):
 
 class UnknownNameError(ArgumentError, LookupError):
     """A name that does not exist; the message offers the nearest one."""
+
+
+class NoClosedFormError(ArgumentError):
+    """The inverse kinematics of the joints between world and frame has no closed form that dynx knows."""
 
 
 class GainError(ArgumentError):

@@ -5,7 +5,7 @@ Arguments are checked, and one sample goes straight to the engine's hook, in `Qu
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -164,6 +164,8 @@ class Backend(QuantityCalls):
         max_restarts: int = 200,
         rng: np.random.Generator | int | None = 0,
         method: str = "dynx",
+        all_solutions: bool = False,
+        given: Mapping[str, float] | None = None,
     ) -> IKResult:
         """Return the configuration that brings `frame` to `target`: a pose (..., 4, 4) or position (..., 3).
 
@@ -182,6 +184,8 @@ class Backend(QuantityCalls):
             max_restarts=max_restarts,
             rng=rng,
             method=method,
+            all_solutions=all_solutions,
+            given=given,
         )
 
     # -- dynamics -----------------------------------------------------------------------------

@@ -64,6 +64,7 @@ class CompiledBackend(Backend):
 
     name: ClassVar[str] = "compiled"
     vectorized: ClassVar[bool] = True
+    compiles: ClassVar[bool] = True
 
     _arguments: BatchArguments
 

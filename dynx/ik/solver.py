@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError, shown
+from dynx.ik.closed_form.checking import all_solutions as solve_closed_form
 from dynx.ik.problem import Problem
 from dynx.ik.residual import Residual
 from dynx.ik.result import IKResult
@@ -40,6 +41,8 @@ def inverse_kinematics(
     max_restarts: int = 200,
     rng: np.random.Generator | int | None = 0,
     method: str = "dynx",
+    all_solutions: bool = False,
+    given: Mapping[str, float] | None = None,
 ) -> IKResult:
     """Find a configuration within limits that brings `frame` to `target`.
 
@@ -63,11 +66,30 @@ def inverse_kinematics(
     The result of either is checked by forward kinematics. If the target is not reached, no error is raised;
     the result has `success` False and the best q found.
 
+    With ``all_solutions=True`` the result is an `IKSolutions` with every configuration within limits that
+    reaches a pose, and the names of its branches, from the closed form (`dynx.ik.closed_form`). It exists for
+    six revolute joints with a spherical wrist or three parallel axes; `given` holds positions [rad or m] of
+    further joints between root and frame, such as one of seven. Angles are those nearest to q0, or to 0. The
+    options of the search have no effect then.
+
     Raises UnknownNameError for the frame; ArgumentError (ShapeError, DTypeError, NotFiniteError) for an
-    invalid argument, and for method ``"engine"`` if the backend has no solver of its own.
+    invalid argument, and for method ``"engine"`` if the backend has no solver of its own; NoClosedFormError
+    if all solutions of an arm without a closed form are wanted, with what is missing.
     """
     model = kinematics.model
     model.frame_index(frame)
+    if all_solutions:
+        if free is not None or point is not None or method != "dynx":
+            raise ArgumentError(
+                "all_solutions takes poses (..., 4, 4) of a frame, without free, point or method"
+            )
+        # The tolerances are checked like those of a search.
+        _checked_limits(position_tolerance, rotation_tolerance, max_iterations, max_restarts)
+        return solve_closed_form(kinematics, target, frame, q0, given, position_tolerance, rotation_tolerance)
+    if given is not None:
+        raise ArgumentError(
+            "given has no effect without all_solutions=True; lock joints when loading instead"
+        )
     targets = checked_targets(target, free)
     limits = _checked_limits(position_tolerance, rotation_tolerance, max_iterations, max_restarts)
     rng = _checked_rng(rng)

@@ -201,6 +201,16 @@ class Symbol:
         """Return the sign: -1, 0 or 1."""
         return self.kind(self.graph, self.graph.sign(self.index))
 
+    # `dynx.spatial.scalar` selects by these: the mask is 1 where the symbol is less, or more, than a number.
+    less, more = _binary("less"), _binary("less", reflected=True)
+
+    def select(self, yes: Any, no: Any) -> Symbol:
+        """Return `yes` where this symbol, a mask, is not 0, and `no` where it is."""
+        sides = [self._index(each) for each in (yes, no)]
+        if sides[0] is None or sides[1] is None:
+            raise TraceError(f"{caller_location()} selects something other than a number")
+        return self.kind(self.graph, self.graph.apply("select", self.index, sides[0], sides[1]))
+
     def clamp(self, bound: Any) -> Symbol:
         """Clamp to [-bound, bound]; NaN stays NaN."""
         clamped: Symbol = _at_most(_at_least(self, -bound), bound)

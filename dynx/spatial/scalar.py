@@ -7,6 +7,7 @@ name, which 50-digit numbers lack. The functions here work on all of them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -59,7 +60,7 @@ sign = _elementwise("sign")
 """Sign of each element: -1, 0 or 1."""
 
 
-def clamp(x: Array, limit: Array) -> Array:
+def clamp(x: Array, limit: Array | float) -> Array:
     """Clamp each element of x (..., n) to [-limit, limit]; `limit`, (n,) or a scalar, may be infinite."""
     x = np.asarray(x)
     if x.dtype != object:
@@ -73,6 +74,37 @@ def clamp(x: Array, limit: Array) -> Array:
         return min(max(element, -bound), bound)
 
     return np.asarray(np.frompyfunc(clamp_one, 2, 1)(x, limit), dtype=object)
+
+
+def where_less(a: Array | float, b: Array | float, yes: Array | float, no: Array | float) -> Array:
+    """Return `yes` where a < b and `no` elsewhere, also where a or b is NaN; the arguments broadcast."""
+    numbers: list[Array] = [np.asarray(each) for each in (a, b, yes, no)]
+    if all(each.dtype != object for each in numbers):
+        return np.where(numbers[0] < numbers[1], numbers[2], numbers[3])
+    return np.asarray(_where_less_of_objects(*numbers), dtype=object)
+
+
+def _where_less_one(a: Any, b: Any, yes: Any, no: Any) -> Any:
+    # A traced symbol has methods instead of operators that compare.
+    mask = a.less(b) if hasattr(a, "less") else b.more(a) if hasattr(b, "more") else a < b
+    return mask.select(yes, no) if hasattr(mask, "select") else yes if mask else no
+
+
+_where_less_of_objects = np.frompyfunc(_where_less_one, 4, 1)
+
+
+def arctan2(y: Array, x: Array) -> Array:
+    """Return the angle [rad] of the point (x, y), between -pi and pi; 0 at the origin."""
+    y, x = np.asarray(y), np.asarray(x)
+    if y.dtype != object and x.dtype != object:
+        return np.asarray(np.arctan2(y, x))
+    width, height = abs(x), abs(y)
+    longer, shorter = where_less(width, height, height, width), where_less(width, height, width, height)
+    # The quotient is 0 at the origin.
+    angle = arctan(shorter / where_less(0.0, longer, longer, 1.0))
+    angle = where_less(width, height, 0.5 * math.pi - angle, angle)
+    angle = where_less(x, 0.0, math.pi - angle, angle)
+    return where_less(y, 0.0, -angle, angle)
 
 
 def append_axis(x: Any) -> Array:

@@ -1,0 +1,107 @@
+"""One candidate of a branch and its errors, in array code for any scalar: a kernel, or NumPy for batches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from dynx.ik.closed_form.polish import AxisFrames, errors_of, polished
+from dynx.ik.closed_form.recognition import Geometry
+from dynx.ik.closed_form.subproblems import Angle
+from dynx.spatial.scalar import Array, Floats, arctan2, cos, sin, where_less
+from dynx.spatial.so3 import rotate, rotate_back
+
+FULL_TURN = 2.0 * np.pi
+
+POSITION, ROTATION, VIOLATION, PIVOT, ARBITRARY = range(5)
+"""Columns of the measures of a candidate."""
+
+N_MEASURES = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Function from a pose and a branch to six angles, for one chain."""
+
+    geometry: Geometry
+    inverted: bool
+    frames: AxisFrames
+    R_zero: Floats
+    p_zero: Floats
+    """Pose of the frame at the zero configuration; lengths are relative."""
+    lower: Floats
+    upper: Floats
+    """Limits (6,) [rad]."""
+    steps: int
+    """Number of Newton steps."""
+
+    def __call__(self, pose: Array, signs: Array) -> dict[str, Array]:
+        """Return the angles `q` (..., 6) [rad] and `measures` (..., 5) for poses (..., 3, 4), with relative
+        lengths, and signs (..., 3).
+
+        The measures are the errors of position (relative) and rotation (`polish.errors_of`), the violation of
+        the limits [rad], the smallest pivot of J' J, and the sum of 2^k for the entries k of
+        `geometry.arbitrary` whose angles are arbitrary.
+        """
+        R, p = pose[..., :3], pose[..., 3]
+        return self._measured(R, p, self._closed_form(R, p, signs), self.steps)
+
+    def measured(self, pose: Array, q: Array, steps: int) -> dict[str, Array]:
+        """Return the same for angles q (..., 6), after some Newton steps; without steps the pivot is 0."""
+        angles = [Angle(cos(q[..., k]), sin(q[..., k])) for k in range(q.shape[-1])]
+        return self._measured(pose[..., :3], pose[..., 3], angles, steps)
+
+    @property
+    def content(self) -> tuple[object, ...]:
+        """Numbers and cases that determine the function."""
+        values = [
+            getattr(part, field.name) for part in (self.geometry, self.frames, self) for field in fields(part)
+        ]
+        arrays = [each for value in values for each in (value if isinstance(value, tuple) else (value,))]
+        numbers = [each.tolist() if isinstance(each, np.ndarray) else str(each) for each in arrays]
+        return type(self.geometry).__name__, *numbers
+
+    def _measured(self, R: Array, p: Array, angles: list[Angle], steps: int) -> dict[str, Array]:
+        angles, pivot = polished(self.frames, R, p, angles, steps)
+        position, rotation = errors_of(self.frames, R, p, angles)
+        within = [
+            _within(arctan2(q.sin, q.cos), float(low), float(high))
+            for q, low, high in zip(angles, self.lower, self.upper, strict=True)
+        ]
+        violation = within[0][1]
+        for _, each in within[1:]:
+            violation = where_less(violation, each, each, violation)
+        joints = [5 - k for k in self.geometry.arbitrary] if self.inverted else self.geometry.arbitrary
+        arbitrary = sum(2.0**place * np.asarray(angles[k].arbitrary) for place, k in enumerate(joints))
+        measures = np.broadcast_arrays(position, rotation, violation, pivot, np.asarray(arbitrary))
+        return {
+            "q": np.stack(np.broadcast_arrays(*(value for value, _ in within)), axis=-1),
+            "measures": np.stack(measures, axis=-1),
+        }
+
+    def _closed_form(self, R: Array, p: Array, signs: Array) -> list[Angle]:
+        R_G = R @ self.R_zero.T
+        p_G = p - rotate(R_G, self.p_zero)
+        if not self.inverted:
+            return self.geometry.angles(R_G, p_G, signs)
+        return self.geometry.angles(np.swapaxes(R_G, -1, -2), -rotate_back(R_G, p_G), signs)[::-1]
+
+
+def _within(value: Array, low: float, high: float) -> tuple[Array, Array]:
+    """Return an angle from -pi to pi moved by a full turn into its limits where possible, and by how much it
+    violates them."""
+    shifts = [s for s in (FULL_TURN, -FULL_TURN) if low <= np.pi + s and high >= s - np.pi]
+    turns = [value, *(value + shift for shift in shifts)]
+    found, least = turns[0], _excess(turns[0], low, high)
+    for each in turns[1:]:
+        excess = _excess(each, low, high)
+        found, least = where_less(excess, least, each, found), where_less(excess, least, excess, least)
+    return found, least
+
+
+def _excess(value: Array, low: float, high: float) -> Array:
+    below = low - value if np.isfinite(low) else -1.0 + 0.0 * value
+    above = value - high if np.isfinite(high) else -1.0 + 0.0 * value
+    most = where_less(below, above, above, below)
+    return where_less(0.0, most, most, 0.0)

@@ -1,0 +1,127 @@
+"""The joints between the world and a frame as screw axes at the zero configuration.
+
+With the pose T_zero of the frame there, the pose at any configuration is the product of exponentials
+E_1(q_1) ... E_n(q_n) T_zero (Murray, Li and Sastry, eq. 3.3), in which E_i rotates about the axis of joint i
+at the zero configuration.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from dynx.errors import ArgumentError, NoClosedFormError, UnknownNameError, nearest, shown
+from dynx.model import Model
+from dynx.model.configuration import MAX_MAGNITUDE, is_real
+from dynx.model.mechanism import joint_motion
+from dynx.rbd.kinematics import ancestry
+from dynx.spatial.scalar import Floats
+from dynx.spatial.se3 import homogeneous
+from dynx.spatial.so3 import rotate
+
+N_JOINTS = 6
+"""Number of joints of a closed form."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """Axes of the n joints that move a frame, at the zero configuration and in world axes.
+
+    Lengths are divided by `length`.
+    """
+
+    joints: tuple[str, ...]
+    """Names of the joints, from the world to the frame."""
+    columns: tuple[int, ...]
+    """Their indices in q."""
+    axes: Floats
+    """Unit directions (n, 3)."""
+    points: Floats
+    """A point on each axis (n, 3)."""
+    T_zero: Floats
+    """Pose of the frame (4, 4)."""
+    length: float
+    """Length [m] of the chain, from joint to joint and to the frame."""
+    given: Mapping[str, float]
+    """Positions [rad or m] of the joints that do not move."""
+
+
+def chain_to(model: Model, frame: str, given: Mapping[str, float]) -> Chain:
+    """Return the chain to a frame, in which the joints `given` are fixed at those positions [rad or m].
+
+    Raises NoClosedFormError for a floating base, and for a joint of the chain that is prismatic or coupled
+    to another; UnknownNameError or ArgumentError for `given`.
+    """
+    given = _checked_given(model, given)
+    if model.floating:
+        raise NoClosedFormError(f"{model.name} has a floating base; the closed form needs a fixed one")
+    mechanism = model.mechanism
+    placed = mechanism.frames[model.frame_index(frame)]
+    R, p = np.eye(3), np.zeros(3)
+    joints, axes, points = [], [], []
+    origins = []
+    for index in reversed(ancestry(mechanism, placed.body)):
+        body = mechanism.bodies[index]
+        value = _fixed_position(model, body.joint, given)
+        if value is None and not body.revolute:
+            raise NoClosedFormError(
+                f"joint {shown(body.joint)} is prismatic; the closed form covers revolute joints, and any "
+                f"joint whose position is given: given={{{body.joint!r}: ...}}"
+            )
+        origins.append(p + rotate(R, body.p))
+        if value is None:
+            joints.append(body.joint)
+            axes.append(rotate(R @ body.R, body.axis))
+            points.append(origins[-1])
+        R_joint, p_joint = joint_motion(body, np.asarray(0.0 if value is None else value))
+        R, p = R @ R_joint, p + rotate(R, p_joint)
+    T_zero = homogeneous(R @ placed.R, p + rotate(R, placed.p))
+    origins.append(T_zero[:3, 3])
+    length = float(sum(np.linalg.norm(b - a) for a, b in pairwise(origins))) or 1.0
+    T_zero[:3, 3] /= length
+    return Chain(
+        tuple(joints),
+        tuple(model.coordinate_index(joint) for joint in joints),
+        np.array(axes).reshape(-1, 3),
+        np.array(points).reshape(-1, 3) / length,
+        T_zero,
+        length,
+        given,
+    )
+
+
+def _fixed_position(model: Model, name: str, given: Mapping[str, float]) -> float | None:
+    """Return the position of a joint that does not move, or None."""
+    joint = model.joint(name)
+    if joint.mimic is None:
+        drives = [j.name for j in model.joints if j.mimic is not None and j.mimic.joint == name]
+        if name not in given and drives:
+            raise NoClosedFormError(
+                f"joint {shown(drives[0])} follows {shown(name)}, which moves the frame; give that: "
+                f"given={{{name!r}: ...}}"
+            )
+        return given.get(name)
+    driver = joint.mimic.joint
+    if driver not in given:
+        raise NoClosedFormError(
+            f"joint {shown(name)} follows {shown(driver)}; give that: given={{{driver!r}: ...}}"
+        )
+    return joint.mimic.multiplier * given[driver] + joint.mimic.offset
+
+
+def _checked_given(model: Model, given: Mapping[str, float]) -> dict[str, float]:
+    if not isinstance(given, Mapping):
+        raise ArgumentError(f"given is {shown(given)}; wanted positions by joint, such as {{'joint7': 0.3}}")
+    for name, value in given.items():
+        if name not in model.joint_names:
+            if isinstance(name, str):
+                model.coordinate_index(name)  # explains joints without a coordinate
+            raise UnknownNameError(
+                f"no joint {shown(name)} in {model.name}{nearest(str(name), model.joint_names)}"
+            )
+        if not is_real(value) or not abs(value) < MAX_MAGNITUDE:
+            raise ArgumentError(f"given[{name!r}] is {shown(value)}; wanted a finite number")
+    return {name: float(value) for name, value in given.items()}
