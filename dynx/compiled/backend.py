@@ -9,7 +9,7 @@ Several threads may share one backend and its kernels.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -212,6 +212,8 @@ class CompiledBackend(Backend):
         max_restarts: int = 200,
         rng: np.random.Generator | int | None = 0,
         method: str = "dynx",
+        all_solutions: bool = False,
+        given: Mapping[str, float] | None = None,
     ) -> IKResult:
         """Return the configuration that brings `frame` to `target`: a pose (..., 4, 4) or position (..., 3).
 
@@ -221,7 +223,8 @@ class CompiledBackend(Backend):
         call: PoseCall | None = None
         key = None
         counts = (type(max_iterations), type(max_restarts))
-        if q0 is None and point is None and isinstance(rng, int) and counts == (int, int):
+        searches = not all_solutions and given is None
+        if searches and q0 is None and point is None and isinstance(rng, int) and counts == (int, int):
             tolerances = (position_tolerance, rotation_tolerance)
             # A truth value equals a number, but is no seed.
             key = (frame, free, *tolerances, max_iterations, max_restarts, rng, type(rng), method)
@@ -244,6 +247,8 @@ class CompiledBackend(Backend):
             max_restarts=max_restarts,
             rng=rng,
             method=method,
+            all_solutions=all_solutions,
+            given=given,
         )
         if key is not None and call is None and free is None and method == "dynx" and isinstance(rng, int):
             solver = self._ik_solvers.get((frame, POSES))
