@@ -31,7 +31,7 @@ class Race:
         self.result = np.zeros((count, memory.n_results))
         shared = [memory.initial, self.target, self._near, np.zeros(1)] + [self._point] * kind.point
         tasks = [self.x, *(np.broadcast_to(row, (count, len(row))) for row in shared)]
-        self.run = kernel.bind_race(tasks, self.result, self._settings, starts.rows)
+        self.run = kernel.bind_race(tasks, self.result, self._settings, starts.random)
         """Function that solves for the present target and returns the number of completed starts."""
 
     def prepare(self, problem: Problem, indices: list[int]) -> None:
@@ -50,7 +50,7 @@ class Race:
         if starts.near:
             starts.copy_near(self.x.reshape(-1).data, int(starts.first_rows(problem)[0]))
         else:
-            self.x[0] = starts.rows[0]
+            self.x[0] = starts.random[0]
         if problem.begins_at_q0:
             self.x[0] = self._near
         self.target[:] = self._kind.rows(problem)[0]

@@ -119,11 +119,13 @@ class Starts:
     cell; another is row ``base + k``.
     """
 
-    rows: Floats
+    near_rows: Floats
+    """Rows of the table; none without one."""
+    random: Floats
+    """Random starts (count, n)."""
     cells: Cells | None
     near: int
     offset: int
-    base: int
 
     @classmethod
     def of(
@@ -133,14 +135,18 @@ class Starts:
         offset = int(rng.integers(STARTS_OF_CELL))
         random = coordinates.starts(rng, count)
         if table is None:
-            return cls(random, None, 0, 0, 0)
-        rows = np.concatenate([table.rows, random])
-        return cls(rows, table.cells, STARTS_OF_CELL, offset, len(table.rows))
+            return cls(random[:0], random, None, 0, 0)
+        return cls(table.rows, random, table.cells, STARTS_OF_CELL, offset)
 
     @property
-    def random(self) -> Floats:
-        """Rows of the random starts."""
-        return self.rows[self.base :]
+    def base(self) -> int:
+        """Row of the first random start."""
+        return len(self.near_rows)
+
+    @cached_property
+    def rows(self) -> Floats:
+        """All starts, copied: megabytes that a single target does not need."""
+        return np.concatenate([self.near_rows, self.random])
 
     @property
     def constants(self) -> Floats:
@@ -158,7 +164,7 @@ class Starts:
 
     def copy_near(self, x: memoryview, first: int) -> None:
         """Write the starts of a cell, in order, given its first row, to the first rows of a flat x (k n,)."""
-        size, rows = self.rows.shape[1], self._flat
+        size, rows = self.random.shape[1], self._flat
         turned = size * (self.near - self.offset)
         start, end = size * first, size * (first + self.near)
         room = len(x)
@@ -171,4 +177,4 @@ class Starts:
 
     @cached_property
     def _flat(self) -> memoryview:
-        return self.rows.reshape(-1).data
+        return self.near_rows.reshape(-1).data
