@@ -40,7 +40,7 @@ def test_simulators_are_right_and_timed() -> None:
 def test_poses_are_solved_in_kernels() -> None:
     finished = run("benchmarks.inverse_kinematics", "z1", "--poses", "200")
     assert finished.returncode == 0, finished.stdout + finished.stderr
-    assert finished.stdout.startswith("z1         100.00% solved")
+    assert finished.stdout.split()[:3] == ["z1", "100.00%", "solved;"]
 
 
 def test_integrators_are_of_their_order() -> None:
