@@ -31,7 +31,8 @@ class Contact:
     normal_force: float
     """Force along the normal, on `a` [N]; at least 0."""
     friction_force: Floats
-    """Force (3,) on `a` perpendicular to the normal [N]."""
+    """Force (3,) on `a` perpendicular to the normal [N]. On a bent surface, for which Drake has one contact,
+    friction may also pull along the mean normal."""
 
     @property
     def point(self) -> Floats:

@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 import dynx
 from dynx import Pose
 from dynx.engines.drake.world.build import build_scene
+from dynx.engines.drake.world.contacts import parts_of_force
 from dynx.engines.drake.world.engine import DrakeWorld
 from dynx.errors import SingularMassMatrixError, UnsupportedFeatureError
 from dynx.model.geometry import Box, Collision, HeightField
@@ -171,3 +172,11 @@ def test_a_long_spin_keeps_quaternions_near_unit_length() -> None:
     assert abs(float(q[:4] @ q[:4]) - 1.0) < 1e-2
     T = engine.body_state(0).T_world_body
     assert_allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-12)
+
+
+@pytest.mark.parametrize("force", [(1.0, 2.0, 3.0), (1.0, 2.0, -3.0)])
+def test_the_parts_of_a_contact_force_add_up_to_it(force: tuple[float, float, float]) -> None:
+    normal = np.array([0.0, 0.0, 1.0])
+    along, rest = parts_of_force(np.array(force), normal)
+    assert along == max(0.0, force[2])
+    assert_allclose(along * normal + rest, force)

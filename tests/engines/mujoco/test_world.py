@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -138,3 +140,28 @@ def test_a_robot_without_a_unique_acceleration_is_refused() -> None:
     robot = SceneRobot("r", dynx.load("romeo"))
     with pytest.raises(SingularMassMatrixError, match="LHand"):
         World(Scene("s", robots=(robot,)), "mujoco")
+
+
+@pytest.mark.parametrize("changed", [{}, {"time_constant": 1e-4}, {"slip_time_constant": 1.0}])
+@pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
+def test_references_are_of_one_format_which_mujoco_does_not_replace(
+    changed: dict[str, float], restitution: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = two_arms()
+    material = Material(restitution=restitution)
+    layout = layout_of(
+        replace(scene, bodies=tuple(replace(each, material=material) for each in scene.bodies))
+    )
+    for pairs in (2000, 0):
+        monkeypatch.setattr("dynx.engines.mujoco.world.materials.MAX_PAIRS", pairs)
+        model = build_scene(layout, 1e-3, {**DEFAULTS, **changed}).model
+        for name in (
+            "geom_solref",
+            "pair_solref",
+            "pair_solreffriction",
+            "jnt_solref",
+            "dof_solref",
+            "eq_solref",
+        ):
+            first, second = getattr(model, name).reshape(-1, 2).T
+            assert ((first > 0.0) == (second > 0.0)).all(), name

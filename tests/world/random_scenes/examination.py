@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +20,9 @@ from tests.world.random_scenes.laws import (
 from tests.world.random_scenes.mechanics import rigid_bodies
 
 STEPS = 150
-"""Steps of 1 ms of a run."""
+"""Steps of a run, of the length `DT`."""
+DT = 1e-3
+"""Length of a step [s]."""
 
 _IDENTITY = np.eye(4)
 
@@ -27,18 +30,20 @@ MOTION = Pose((0.4, -0.7, 0.2), (0.3, -0.4, 1.1))
 """The rigid motion by which scenes are moved."""
 
 
-def examine(scene: Scene, engine: str, steps: int = STEPS) -> dict[str, float]:
+def examine(
+    scene: Scene, engine: str, steps: int = STEPS, dt: float = DT, **settings: Any
+) -> dict[str, float]:
     """Return the largest ratio of error and bound of each law that holds for the scene: above 1 it is
     violated."""
     worst = dict.fromkeys(("linear momentum", "angular momentum", "energy"), 0.0)
     free = has_free_momentum(scene) and not (engine == "mujoco" and _coupled(scene))
     moments = reports_moments(scene, engine)
     gravity, robots = np.array(scene.gravity), bool(scene.robots)
-    with World(scene, engine) as world:
+    with World(scene, engine, dt, **settings) as world:
         start = rigid_bodies(scene, world.state)
         energy = start.kinetic_energy + start.potential_energy(gravity)
         before, before_free, allowed = start, rigid_bodies(scene, world.state, free_only=True), 0.0
-        for _ in range(steps):
+        for _ in range(round(steps * DT / dt)):
             world.step()
             state = world.state
             after, after_free = rigid_bodies(scene, state), rigid_bodies(scene, state, free_only=True)

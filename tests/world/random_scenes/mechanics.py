@@ -27,6 +27,9 @@ class RigidBodies:
     """Angular velocity (n, 3) [rad/s]."""
     inertia: Floats
     """Inertia (n, 3, 3) about the centre of mass [kg m^2]."""
+    arm: Floats
+    """Length (n,) [m] of the way from the base of a robot along its joints to the centre of mass; 0 for a
+    body."""
 
     @property
     def spin(self) -> Floats:
@@ -67,7 +70,7 @@ def rigid_bodies(scene: Scene, state: WorldState, *, free_only: bool = False) ->
             rows.append(_body(body, *state.bodies[body.name]))
     if not rows:
         none = np.zeros((0, 3))
-        return RigidBodies(np.zeros(0), none, none, none, np.zeros((0, 3, 3)))
+        return RigidBodies(np.zeros(0), none, none, none, np.zeros((0, 3, 3)), np.zeros(0))
     return RigidBodies(*(np.array(column, dtype=float) for column in zip(*rows, strict=True)))
 
 
@@ -75,7 +78,8 @@ def _body(body: SceneBody, T: Floats, twist: Floats) -> tuple[Floats, ...]:
     inertial, R = body.inertial, T[:3, :3]
     lever = R @ np.array(inertial.origin.xyz)
     velocity = twist[:3] + np.cross(twist[3:], lever)
-    return np.array(inertial.mass), T[:3, 3] + lever, velocity, twist[3:], R @ inertial.tensor @ R.T
+    turned = R @ inertial.tensor @ R.T
+    return np.array(inertial.mass), T[:3, 3] + lever, velocity, twist[3:], turned, np.array(0.0)
 
 
 def _links(robot: SceneRobot, q: Floats, v: Floats) -> list[tuple[Floats, ...]]:
@@ -85,18 +89,25 @@ def _links(robot: SceneRobot, q: Floats, v: Floats) -> list[tuple[Floats, ...]]:
     poses = body_poses(mechanism, q)
     twists = body_twists(mechanism, poses, v)
     inertias = [mechanism.root, *(each.inertia for each in mechanism.bodies)]
+    ways = {ROOT: 0.0}
+    for number, body in enumerate(mechanism.bodies):
+        step = float(np.linalg.norm(poses[number][1] - poses[body.parent][1]))
+        ways[number] = ways[body.parent] + step
     rows = []
     for number, inertia in enumerate(inertias, ROOT):
         if (number == ROOT and not mechanism.floating) or float(inertia.mass) == 0.0:
             continue
-        rows.append(_link(inertia, *poses[number], *twists[number]))
+        rows.append(_link(inertia, ways[number], *poses[number], *twists[number]))
     return rows
 
 
-def _link(inertia: RigidInertia, R: Floats, p: Floats, v: Floats, omega: Floats) -> tuple[Floats, ...]:
+def _link(
+    inertia: RigidInertia, way: float, R: Floats, p: Floats, v: Floats, omega: Floats
+) -> tuple[Floats, ...]:
     mass = float(inertia.mass)
     center = np.asarray(inertia.first_moment, dtype=float) / mass
     arm = skew(center)
     about_center = np.asarray(inertia.rotational_inertia, dtype=float) + mass * (arm @ arm)
     lever = R @ center
-    return np.array(mass), p + lever, v + np.cross(omega, lever), omega, R @ about_center @ R.T
+    length = np.array(way + float(np.linalg.norm(lever)))
+    return np.array(mass), p + lever, v + np.cross(omega, lever), omega, R @ about_center @ R.T, length

@@ -42,7 +42,7 @@ def touching_point(pair: Any, force: Floats, collider_of: Mapping[int, int]) -> 
         np.array(pair.p_WCb),
         normal,
         -float(pair.depth),
-        *_parts(force, normal),
+        *parts_of_force(force, normal),
     )
 
 
@@ -61,7 +61,13 @@ def _on_surface(
     center = _center_of_pressure(surface, normal, force, np.array(wrench.rotational()))
     half = 0.5 * depth * normal
     return TouchingPoint(
-        collider_of[a], collider_of[b], center - half, center + half, normal, -depth, *_parts(force, normal)
+        collider_of[a],
+        collider_of[b],
+        center - half,
+        center + half,
+        normal,
+        -depth,
+        *parts_of_force(force, normal),
     )
 
 
@@ -82,7 +88,10 @@ def _center_of_pressure(surface: Any, normal: Floats, force: Floats, moment: Flo
     return centroid + shift if float(np.linalg.norm(shift)) <= reach else centroid
 
 
-def _parts(force: Floats, normal: Floats) -> tuple[float, Floats]:
-    """Return the force along the normal, at least 0, and the rest."""
-    along = float(force @ normal)
-    return max(0.0, along), force - along * normal
+def parts_of_force(force: Floats, normal: Floats) -> tuple[float, Floats]:
+    """Return the force along the normal, at least 0, and the rest.
+
+    Friction on the parts of a bent surface is not orthogonal to the mean normal, and may pull along it.
+    """
+    along = max(0.0, float(force @ normal))
+    return along, force - along * normal
