@@ -176,8 +176,8 @@ SIMULATION_FAULTS = (
     Fault(
         "staged_loop_forgets_the_delay",
         "dynx.sim.loop.staged",
-        right="return np.maximum(steps - clock.delay_steps, 0)",
-        wrong="return steps",
+        right="return np.asarray(clock.measured_step(steps))",
+        wrong="return np.asarray(steps)",
         test_file="tests/sim/loop/test_staged.py",
         test="test_the_record_is_that_of_the_plain_loop",
     ),
@@ -215,9 +215,9 @@ SIMULATION_FAULTS = (
     ),
     Fault(
         "batch_noise_displaces_the_base_in_world_axes",
-        "dynx.sim.batch.kernel",
-        right="integrate(q, off) if self.model.floating",
-        wrong="np.concatenate([q[:3] + off[:3], integrate(q, off)[3:]]) if self.model.floating",
+        "dynx.sim.step",
+        right="return integrate(q, displacement) if",
+        wrong="return np.concatenate([q[:3] + displacement[:3], integrate(q, displacement)[3:]]) if",
         test_file="tests/sim/batch/test_floating.py",
         test="test_noise_displaces_the_base_along_its_own_axes",
     ),
