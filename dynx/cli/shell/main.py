@@ -27,7 +27,7 @@ COMMANDS = {
     "view": LazyCommand("dynx.cli.view.command:view", "Show a robot, a rollout or a scene in the browser."),
     "contacts": LazyCommand(
         "dynx.cli.contacts.command:contacts",
-        "Measure the errors of contacts against closed forms, and find their causes.",
+        "Measure errors of contacts against closed forms; find causes.",
     ),
     "bench": LazyCommand("dynx.cli.bench.command:bench", "Time the engines on a robot and this machine."),
     "explain": LazyCommand(
