@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynx.compiled.mass_factors import factorize_mass_matrix, solve_with_factors
 from dynx.compiled.model_coordinates import (
     argument_shapes,
     reduce_columns,
@@ -17,7 +16,7 @@ from dynx.compiled.model_coordinates import (
 from dynx.model import Mechanism
 from dynx.rbd import derivatives, kinematics, rnea
 from dynx.rbd.base_parameters import regroup_inertias
-from dynx.rbd.elimination import filled_entries
+from dynx.rbd.elimination import factorize_mass_matrix, filled_entries, solve_with_factors
 from dynx.simd.differentiate import differentiate
 from dynx.simd.inlining import inline
 from dynx.simd.program import Program

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike
 
 from dynx.backends.arguments import Arguments
 from dynx.backends.quantities import QUANTITIES
-from dynx.compiled.mass_factors import factorize_mass_matrix, solve_with_factors
 from dynx.compiled.model_coordinates import argument_shapes, reduce_columns, reduce_rows, tree_coordinates
 from dynx.compiled.parameters import JOINT, Parameters, Selection
 from dynx.compiled.robot_kernel import RobotKernels
@@ -25,6 +24,7 @@ from dynx.model import Mechanism, Model
 from dynx.model.configuration import checked_array
 from dynx.model.model import refuse_other_than_model
 from dynx.rbd import crba, rnea
+from dynx.rbd.elimination import factorize_mass_matrix, solve_with_factors
 from dynx.simd.program import Program
 from dynx.simd.trace import trace
 from dynx.spatial.inertia import RigidInertia

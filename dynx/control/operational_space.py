@@ -14,6 +14,7 @@ from dynx.control.computed_torque import commanded_acceleration
 from dynx.control.gains import checked_gain, feedback_gains
 from dynx.control.task_space import TaskSpace
 from dynx.model import Model
+from dynx.rbd.elimination import solve_mass_matrix
 from dynx.rbd.linear import solve_columns
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
@@ -71,7 +72,7 @@ class OperationalSpace(TaskSpace[None], pure=True):
         left = wanted - dynamics.jacobian_derivative(q, v, frame) @ v
         posture = commanded_acceleration(q, v, *setpoint, self.posture_kp, self.posture_kd)
         J = error.jacobian
-        inverse = solve_columns(dynamics.mass_matrix(q), J.T)
+        inverse = solve_mass_matrix(self.model.mechanism, dynamics.mass_matrix(q), J.T)
         a = (
             posture
             + inverse

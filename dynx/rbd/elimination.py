@@ -1,4 +1,8 @@
-"""Pattern of the factors of a mass matrix, eliminated from the tips of the tree to its root."""
+"""Equations with a mass matrix, eliminated from the tips of the tree to its root.
+
+Entries stay zero where two joints are on different branches (Featherstone 2008, section 6.5), so that no
+operation is spent on them.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +10,8 @@ import numpy as np
 
 from dynx.model import Mechanism
 from dynx.rbd.kinematics import ancestry
+from dynx.rbd.linear import Factors, ldl_factors, solve_ldl
+from dynx.spatial.scalar import Array
 
 
 def filled_entries(mechanism: Mechanism) -> tuple[int, list[tuple[int, int]]]:
@@ -24,3 +30,24 @@ def filled_entries(mechanism: Mechanism) -> tuple[int, list[tuple[int, int]]]:
         for j in range(i):
             A[i, j] = A[i, j] or np.any(A[i, :j] & A[j, :j])
     return nv, [(i, j) for i in range(nv) for j in range(i) if A[i, j]]
+
+
+def factorize_mass_matrix(mechanism: Mechanism, M: Array) -> Factors:
+    """Factorise M into L and D by elimination from the tips to the root."""
+    nv, filled = filled_entries(mechanism)
+    A = np.zeros((nv, nv), dtype=object)
+    for i, j in [*filled, *((i, i) for i in range(nv))]:
+        A[i, j] = M[nv - 1 - i, nv - 1 - j]
+    return ldl_factors(A, filled)
+
+
+def solve_with_factors(L: list[dict[int, Array]], D: list[Array], b: Array) -> Array:
+    """Solve M x = b for right-hand sides b (..., nv), from the factors of M."""
+    return solve_ldl(L, D, b[..., ::-1])[..., ::-1]
+
+
+def solve_mass_matrix(mechanism: Mechanism, M: Array, B: Array) -> Array:
+    """Return X (nv, m) with M X = B: floats by LAPACK, any other scalar by factors."""
+    if M.dtype != object:
+        return np.asarray(np.linalg.solve(M, B))
+    return np.asarray(solve_with_factors(*factorize_mass_matrix(mechanism, M), B.T).T)

@@ -26,7 +26,7 @@ SIMULATION_FAULTS = (
         "dynx.rbd.elimination",
         right="A[i, j] = A[i, j] or np.any(A[i, :j] & A[j, :j])",
         wrong="A[i, j] = A[i, j]",
-        test_file="tests/compiled/test_mass_factors.py",
+        test_file="tests/rbd/test_elimination.py",
         test="test_zeros_between_branches_stay_unless_a_mimic_joint_fills_them",
     ),
     Fault(

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from dynx.compiled.kernels import evaluate_quantity
-from dynx.compiled.mass_factors import factorize_mass_matrix, solve_with_factors
 from dynx.compiled.parametric import ParametricDynamics
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.control.base import Controller, chain_of, gains_of
@@ -22,6 +21,7 @@ from dynx.control.content import content_of
 from dynx.errors import ArgumentError, TraceError, UnsupportedFeatureError, shown
 from dynx.model import Mechanism, Model
 from dynx.model.configuration import DIVERGENCE_SPEED
+from dynx.rbd.elimination import factorize_mass_matrix, solve_with_factors
 from dynx.sim.batch.disturbances import BatchDisturbances
 from dynx.sim.batch.traced_controller import innermost, traced_controller
 from dynx.sim.loop.controller_checks import ControllerWatch, defect_of_outcome, is_row

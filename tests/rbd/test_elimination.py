@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 
 import dynx
-from dynx.compiled.mass_factors import factorize_mass_matrix, solve_with_factors
 from dynx.model import Model
 from dynx.model.model import Base
-from dynx.rbd.elimination import filled_entries
+from dynx.rbd.elimination import (
+    factorize_mass_matrix,
+    filled_entries,
+    solve_mass_matrix,
+    solve_with_factors,
+)
 from tests.rules.documents import joint, link
 
 
@@ -31,6 +35,10 @@ def test_solving_by_factors(base: Base, mimic: bool) -> None:
     b = np.arange(1.0, model.nv + 1.0)
     found = solve_with_factors(*factorize_mass_matrix(model.mechanism, M), b)
     np.testing.assert_allclose(np.array(found, dtype=float), np.linalg.solve(M, b), rtol=1e-12)
+    columns = np.stack([b, b[::-1]], axis=1)
+    for scalars in (M, M.astype(object)):
+        found = solve_mass_matrix(model.mechanism, scalars, columns)
+        np.testing.assert_allclose(found.astype(float), np.linalg.solve(M, columns), rtol=1e-12)
 
 
 @pytest.mark.parametrize("mimic", [False, True])
