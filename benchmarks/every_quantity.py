@@ -70,7 +70,7 @@ class Row:
 
     def __str__(self) -> str:
         return (
-            f"{self.robot:10}{self.quantity:26}{self.samples:8}{1e9 * self.compiled:12,.0f}"
+            f"{self.robot:20}{self.quantity:26}{self.samples:8}{1e9 * self.compiled:12,.0f}"
             f"{1e9 * self.others[self.best]:12,.0f}  {self.best:10}{self.ratio:7.2f}"
             f"{'  SLOWER' if self.ratio < 1.0 else ''}"
         )
@@ -104,7 +104,7 @@ def _joint(k: int, parent: str, kind: Any) -> Joint:
 
 
 def robots() -> dict[str, Model]:
-    """Return the robots by the names of the option ``--robot``."""
+    """Return the robots of the table by their names."""
     return {
         "ur5": load("ur5"),
         "panda": load("panda"),
@@ -115,10 +115,20 @@ def robots() -> dict[str, Model]:
     }
 
 
+def chosen_robot(name: str) -> Model:
+    """Return a robot of the table or of the library; ``NAME:floating`` is one with a floating base."""
+    found = robots().get(name)
+    library_name, _, base = name.partition(":")
+    return load(library_name, base="floating" if base == "floating" else "fixed") if found is None else found
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table; return 1 if another engine was faster than `compiled`, or their results differ."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.every_quantity", description=__doc__)
-    parser.add_argument("--robot", action="append", choices=list(robots()), help="default: all")
+    of_library = "or of the library: NAME or NAME:floating"
+    parser.add_argument(
+        "--robot", action="append", help=f"one of {', '.join(robots())} (default: all), {of_library}"
+    )
     parser.add_argument("--quantity", action="append", choices=list(QUANTITIES), help="default: all")
     parser.add_argument("--batch", type=int, default=1024, help="samples in a batch (default 1024)")
     parser.add_argument("--repetitions", type=int, default=7)
@@ -127,8 +137,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     chosen = parser.parse_args(arguments)
     known = recorded(chosen.record)
     rows: list[Row] = []
-    print(f"{'robot':10}{'quantity':26}{'samples':>8}{'compiled':>12}{'best other':>12}  {'':10}{'ratio':>7}")
-    models = {name: model for name, model in robots().items() if name in (chosen.robot or robots())}
+    print(f"{'robot':20}{'quantity':26}{'samples':>8}{'compiled':>12}{'best other':>12}  {'':10}{'ratio':>7}")
+    models = {name: chosen_robot(name) for name in chosen.robot or robots()}
     quantities = chosen.quantity or list(QUANTITIES)
     for name, model in models.items():
         for quantity in quantities:
