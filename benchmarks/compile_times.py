@@ -129,11 +129,11 @@ def _batch(model: Model, controller: control.Controller[Any], **options: Any) ->
     )
 
 
-def _controller(model: Model) -> control.Controller[Any]:
+def _controller(model: Model, backend: str = "reference") -> control.Controller[Any]:
     """Return computed torque, or a controller of the joints alone for a floating base."""
     if model.floating:
         return control.PD(model, kp=100.0, kd=10.0)
-    return control.ComputedTorque(model, kp=400.0, kd=40.0, backend="reference")
+    return control.ComputedTorque(model, kp=400.0, kd=40.0, backend=backend)
 
 
 def _batch_with(model: Model, **options: Any) -> object:
@@ -158,7 +158,8 @@ def _batch_in_operational_space(model: Model) -> object:
 def _simulation(model: Model, **options: Any) -> object:
     return simulate(
         model,
-        _controller(model),
+        # A controller in NumPy would take seconds for the steps of a large robot.
+        _controller(model, "compiled"),
         model.neutral(),
         plant="compiled",
         duration=LONG_ENOUGH * DT,

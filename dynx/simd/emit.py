@@ -11,15 +11,25 @@ linearly with the length of straight-line code. Values that a later segment need
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any, NamedTuple
 
 from dynx.simd.elementary import elementary
 from dynx.simd.expr import Op
 from dynx.simd.ir_writer import Writer
-from dynx.simd.program import Program
-from dynx.simd.rows import Rows
+from dynx.simd.program import Program, scalar_ranges
+from dynx.simd.rows import (
+    FILL,
+    LOAD,
+    STORE,
+    Rows,
+    Scratch,
+    lane_names,
+    row_pointers,
+    scratch_functions,
+)
 from dynx.simd.schedule import ELEMENTARY, Segment, TrigGroup, schedule, spill_slots
 from dynx.simd.target import Target
 from dynx.simd.trigonometry import declarations, replacements, sines_and_cosines
@@ -58,6 +68,13 @@ MAX_QUICK_MODULE = 200_000
 own for each segment takes a fifth longer; Ctrl-C takes effect between two modules."""
 
 
+class ModuleText(NamedTuple):
+    """The text of an LLVM module, and whether it is compiled without optimisation."""
+
+    text: str
+    quick: bool
+
+
 @dataclass(frozen=True)
 class Settings:
     """Options of code generation.
@@ -81,22 +98,22 @@ class Settings:
 
     @property
     def flags(self) -> str:
-        """LLVM's fast-math flags for every arithmetic instruction."""
-        return "contract nsz " if self.fast else ""
+        """LLVM's fast-math flags for every arithmetic instruction; none where nothing is optimised."""
+        return "contract nsz " if self.fast and not self.quick else ""
 
 
 def emit(program: Program, target: Target, settings: Settings) -> str:
     """Return the text of one LLVM module that evaluates a program."""
-    bodies, loop = _functions(program, target, settings, "internal")
-    return _module([*bodies, loop], target, settings)
+    bodies, rows, loop = _functions(program, target, settings, "internal")
+    return _module([*bodies, *rows, loop], target, settings)
 
 
-def emit_modules(program: Program, target: Target, settings: Settings) -> list[str]:
-    """Return the texts of LLVM modules that evaluate a program together: segments, each in a module of its
-    own if they are optimised, and the loop over the samples. Each is compiled in a fraction of a second."""
-    bodies, loop = _functions(program, target, settings, "")
-    if len(bodies) == 1:
-        return [emit(program, target, settings)]
+def emit_modules(program: Program, target: Target, settings: Settings) -> list[ModuleText]:
+    """Return the LLVM modules that evaluate a program together: segments, each in a module of its own if they
+    are optimised, and the loop over the samples. Each is compiled in a fraction of a second."""
+    bodies, rows, loop = _functions(program, target, settings, "")
+    if len(bodies) == 1 and not settings.quick:
+        return [ModuleText(emit(program, target, settings), quick=False)]
     groups: list[list[str]] = []
     room = 0
     for body in bodies:
@@ -105,20 +122,43 @@ def emit_modules(program: Program, target: Target, settings: Settings) -> list[s
             room = MAX_QUICK_MODULE
         groups[-1].append(body)
         room -= len(body)
-    declared = [f"declare void @segment{k}(ptr, i64, ptr)" for k in range(len(bodies))]
-    return [_module(texts, target, settings) for texts in (*groups, [*declared, loop])]
+    declared = [f"declare void @{name}(ptr, i64, ptr)" for name in _called(len(bodies), settings)]
+    if settings.quick:
+        declared.append(f"declare void @{FILL}(ptr)")
+    modules = [ModuleText(_module(texts, target, settings), settings.quick) for texts in groups]
+    if rows:
+        modules.append(ModuleText(_module(rows, target, settings), quick=False))
+    return [*modules, ModuleText(_module([*declared, loop], target, settings), settings.quick)]
 
 
-def _functions(program: Program, target: Target, settings: Settings, linkage: str) -> tuple[list[str], str]:
-    """Return the texts of the segments, whose symbols have this linkage, and of the entry function."""
+def _functions(
+    program: Program, target: Target, settings: Settings, linkage: str
+) -> tuple[list[str], list[str], str]:
+    """Return the texts of the segments, whose symbols have this linkage, of the functions for the scratch
+    memory, if there is one, and of the entry function."""
     segments = schedule(program, settings.lanes, settings.segment)
     check_schedule(program, segments, settings.lanes)
-    slots = spill_slots(program, segments)
+    spilled = spill_slots(program, segments)
+    made: Callable[..., SegmentBody]
+    rows: list[str] = []
+    if settings.quick:
+        scratch = Scratch.of(program, spilled)
+        made = partial(ScratchSegmentBody, first_result=scratch.first_result)
+        slots, size = scratch.slots, scratch.size
+        rows = scratch_functions(program, scratch, settings.lanes)
+    else:
+        made, slots, size = SegmentBody, spilled, max(spilled.values(), default=0) + 1
     bodies = [
-        SegmentBody(program, target, settings, segment, slots, number).text(linkage)
+        made(program, target, settings, segment, slots, number).text(linkage)
         for number, segment in enumerate(segments)
     ]
-    return bodies, _loop(program, settings, len(segments), max(slots.values(), default=0) + 1)
+    return bodies, rows, _loop(program, settings, len(segments), size)
+
+
+def _called(segments: int, settings: Settings) -> list[str]:
+    """Return the names of the functions that evaluate a group of samples, in their order."""
+    names = [f"segment{k}" for k in range(segments)]
+    return [LOAD, *names, STORE] if settings.quick else names
 
 
 def _module(functions: Sequence[str], target: Target, settings: Settings) -> str:
@@ -137,6 +177,7 @@ def _loop(program: Program, settings: Settings, segments: int, slots: int) -> st
         "  %n = load i64, ptr %arguments",
         f"  %last = sub i64 %n, {lanes}",
         *_prefetch_pointers(program),
+        *([f"  call void @{FILL}(ptr %kept)"] if settings.quick else []),
         "  br label %group",
         "group:",
         "  %i = phi i64 [0, %entry], [%next, %group]",
@@ -144,7 +185,8 @@ def _loop(program: Program, settings: Settings, segments: int, slots: int) -> st
         "  %first = select i1 %late, i64 %last, i64 %i",
     ]
     lines += _prefetch(program, lanes)
-    lines += [f"  call void @segment{k}(ptr %arguments, i64 %first, ptr %kept)" for k in range(segments)]
+    called = _called(segments, settings)
+    lines += [f"  call void @{name}(ptr %arguments, i64 %first, ptr %kept)" for name in called]
     lines += [
         f"  %next = add i64 %i, {lanes}",
         "  %more = icmp slt i64 %next, %n",
@@ -202,7 +244,7 @@ _COMPARISON: dict[Op, str] = {"less": "olt", "less_equal": "ole", "equal": "oeq"
 
 
 class SegmentBody:
-    """One segment as a function of the arguments, the first sample of the group, and the spilled values."""
+    """One segment as a function of the arguments, the first sample of the group, and the values in memory."""
 
     def __init__(
         self,
@@ -216,13 +258,14 @@ class SegmentBody:
         self._program, self._settings, self._segment = program, settings, segment
         self._slots = slots
         self._number = number
+        self._bytes = 8 * settings.lanes
         self._write = Writer(settings.lanes, fma=target.fma)
         self._values: dict[int, str] = {}
         ports = [*program.inputs, *program.outputs]
         self._rows = [
             Rows(self._write, port.size, partial(self._pointers, k)) for k, port in enumerate(ports)
         ]
-        self._lanes: dict[int, list[str]] = {}
+        self._loaded: set[int] = set()
         self._slot_port = [
             (k, column) for k, port in enumerate(program.inputs) for column in range(port.size)
         ]
@@ -235,7 +278,8 @@ class SegmentBody:
             f"define {linkage} void @segment{self._number}"
             "(ptr noalias nocapture readonly %arguments, i64 %first, ptr noalias nocapture %kept) {"
         )
-        heads = [line for index in sorted(self._lanes) for line in self._row_pointers[index]]
+        lanes = self._settings.lanes
+        heads = [line for number in sorted(self._loaded) for line in row_pointers(number, lanes)]
         return "\n".join([head, "entry:", *heads, *self._write.lines, "  ret void", "}"])
 
     # -- values -------------------------------------------------------------------------------------
@@ -248,17 +292,17 @@ class SegmentBody:
                 self._compute(step)
 
     def _value(self, index: int) -> str:
-        """Return the name of a node's vector: computed here, an input, spilled earlier, or constant."""
+        """Return the name of a node's vector: computed here, in memory, constant, or an input."""
         found = self._values.get(index)
         if found is not None:
             return found
         node = self._program.nodes[index]
-        if node.op == "constant":
+        if (slot := self._slots.get(index)) is not None:
+            name = self._write.let(f"load {self._write.vector}, ptr {self._at(slot)}, align {self._bytes}")
+        elif node.op == "constant":
             name = self._write.splat(node.value)
-        elif node.op == "input":
-            name = self._input(*self._slot_port[node.slot])
         else:
-            name = self._write.let(f"load {self._write.vector}, ptr {self._slot(index)}, align 64")
+            name = self._input(*self._slot_port[node.slot])
         self._values[index] = name
         return name
 
@@ -299,12 +343,14 @@ class SegmentBody:
     def _set(self, index: int, name: str) -> None:
         self._values[index] = name
         if index in self._segment.spilled:
-            self._write.do(f"store {self._write.vector} {name}, ptr {self._slot(index)}, align 64")
+            self._keep(name, self._slots[index])
 
-    def _slot(self, index: int) -> str:
-        return self._write.let(
-            f"getelementptr inbounds {self._write.vector}, ptr %kept, i64 {self._slots[index]}"
-        )
+    def _keep(self, name: str, slot: int) -> None:
+        """Write a vector to a slot of the memory."""
+        self._write.do(f"store {self._write.vector} {name}, ptr {self._at(slot)}, align {self._bytes}")
+
+    def _at(self, slot: int) -> str:
+        return self._write.let(f"getelementptr i8, ptr %kept, i64 {slot * self._bytes}")
 
     # -- rows ---------------------------------------------------------------------------------------
 
@@ -312,30 +358,22 @@ class SegmentBody:
         """Write the tiles of outputs that this segment completes."""
         for output, columns, nodes in self._segment.stores:
             rows = self._rows[len(self._program.inputs) + output]
-            rows.store(columns, [self._value(node) for node in nodes])
+            rows.store_tile(columns.start, [self._value(node) for node in nodes])
 
     def _pointers(self, port: int) -> list[str]:
         """Return the row pointers of one array, one per lane, which the head of the function computes."""
-        if port not in self._lanes:
-            self._lanes[port] = [f"%p{port}_{lane}" for lane in range(self._settings.lanes)]
-        return self._lanes[port]
+        self._loaded.add(port)
+        return lane_names(port, self._settings.lanes)
 
-    @property
-    def _row_pointers(self) -> dict[int, list[str]]:
-        heads = {}
-        for port in self._lanes:
-            base, stride = 1 + 2 * port, 2 + 2 * port
-            lines = [
-                f"  %a{port} = getelementptr inbounds i64, ptr %arguments, i64 {base}",
-                f"  %b{port} = load ptr, ptr %a{port}",
-                f"  %s{port}_ = getelementptr inbounds i64, ptr %arguments, i64 {stride}",
-                f"  %s{port} = load i64, ptr %s{port}_",
-                f"  %o{port} = mul i64 %first, %s{port}",
-                f"  %p{port}_0 = getelementptr inbounds i8, ptr %b{port}, i64 %o{port}",
-            ]
-            lines += [
-                f"  %p{port}_{lane} = getelementptr inbounds i8, ptr %p{port}_{lane - 1}, i64 %s{port}"
-                for lane in range(1, self._settings.lanes)
-            ]
-            heads[port] = lines
-        return heads
+
+class ScratchSegmentBody(SegmentBody):
+    """One segment that writes its results to the scratch memory (`dynx.simd.rows`)."""
+
+    def __init__(self, *arguments: Any, first_result: int) -> None:
+        super().__init__(*arguments)
+        self._first_results = [first_result + at.start for _, at in scalar_ranges(self._program.outputs)]
+
+    def _store_results(self) -> None:
+        for output, columns, nodes in self._segment.stores:
+            for column, node in zip(columns, nodes, strict=True):
+                self._keep(self._value(node), self._first_results[output] + column)

@@ -50,6 +50,13 @@ ARITY: Final[dict[Op, int]] = {
 }
 """Number of arguments of every operation. `Graph` documents their semantics."""
 
+Kind = Op | Literal["zero", "one", "minus one"]
+"""Operation of a node; or which constant it is, if it is 0 or -0, 1, or -1. Other constants are of kind
+``constant``."""
+
+_KIND_OF_CONSTANT: Final[dict[float, Kind]] = {0.0: "zero", 1.0: "one", -1.0: "minus one"}
+CONSTANT_KINDS: Final[tuple[Kind, ...]] = ("constant", *_KIND_OF_CONSTANT.values())
+
 SIGN_SCALE = 2.0**537
 """Factor whose square scales the smallest subnormal number, 2^-1074, to 1."""
 
@@ -89,6 +96,8 @@ class Graph:
 
     def __init__(self, simplify: Simplify | None = None) -> None:
         self.nodes: list[Node] = []
+        self.kinds: list[Kind] = []
+        """Kind of each node."""
         self._known: dict[object, int] = {}
         self._simplify = simplify
         self.reordered = ""
@@ -99,11 +108,18 @@ class Graph:
 
     def input(self, slot: int) -> int:
         """Return the node of input number `slot`."""
-        return self._node(("input", slot), Node("input", slot=slot))
+        key = "input", slot
+        found = self._known.get(key)
+        return self._append(key, Node("input", slot=slot), "input") if found is None else found
 
     def constant(self, value: float) -> int:
         """Return the node of a constant. 0.0 and -0.0 are distinct; all NaN are one."""
-        return self._node(constant_key(value), Node("constant", value=float(value)))
+        key = constant_key(value)
+        found = self._known.get(key)
+        if found is not None:
+            return found
+        value = float(value)
+        return self._append(key, Node("constant", value=value), _KIND_OF_CONSTANT.get(value, "constant"))
 
     def apply(self, op: Op, *args: int) -> int:
         """Return the node of `op` on earlier nodes, simplified by the rules of the graph."""
@@ -117,7 +133,9 @@ class Graph:
         """Return the node of `op` on earlier nodes, without simplification."""
         if op in COMMUTATIVE and args[0] > args[1]:
             args = args[::-1]
-        return self._node((op, args), Node(op, args))
+        key = op, args
+        found = self._known.get(key)
+        return self._append(key, Node(op, args), op) if found is None else found
 
     def sign(self, x: int) -> int:
         """Return the sign of x, composed of other operations: -1, 0 or 1 for every double, NaN for NaN.
@@ -131,12 +149,12 @@ class Graph:
             x = self.apply("max", self.constant(-1.0), self.apply("min", self.constant(1.0), scaled))
         return x
 
-    def _node(self, key: object, node: Node) -> int:
-        found = self._known.get(key)
-        if found is None:
-            found = self._known[key] = len(self.nodes)
-            self.nodes.append(node)
-        return found
+    def _append(self, key: object, node: Node, kind: Kind) -> int:
+        """Append a node, which will be known by this key, and return its index."""
+        index = self._known[key] = len(self.nodes)
+        self.nodes.append(node)
+        self.kinds.append(kind)
+        return index
 
 
 def _unary(op: Op) -> Callable[[Any], Symbol]:
@@ -155,12 +173,16 @@ def _binary(op: Op, *, reflected: bool = False) -> Callable[[Any, Any], Any]:
     """
 
     def apply(self: Symbol, other: Any) -> Any:
-        known = isinstance(other, Symbol) and other.graph is self.graph
-        index = other.index if known else self._index(other)
-        if index is None:
-            return NotImplemented
-        pair = (index, self.index) if reflected else (self.index, index)
-        return self.kind(self.graph, self.graph.apply(op, *pair))
+        graph = self.graph
+        index: int | None
+        if isinstance(other, Symbol) and other.graph is graph:
+            index = other.index
+        else:
+            index = graph.constant(other) if type(other) is float else self._index(other)
+            if index is None:
+                return NotImplemented
+        found = graph.apply(op, index, self.index) if reflected else graph.apply(op, self.index, index)
+        return self.kind(graph, found)
 
     return apply
 

@@ -60,8 +60,8 @@ def compile_image(program: Program, target: Target | None = None, settings: Sett
     settings = (Settings(target.lanes) if settings is None else settings).for_length(program_length(program))
     with collection_paused():
         # Python handles Ctrl-C between two modules.
-        texts = emit_modules(program, target, settings)
-        objects = tuple(compile_text(text, target, quick=settings.quick) for text in texts)
+        modules = emit_modules(program, target, settings)
+        objects = tuple(compile_text(text, target, quick=quick) for text, quick in modules)
     return Image(program.inputs, program.outputs, settings.lanes, target, objects)
 
 

@@ -23,12 +23,15 @@ class Writer:
         self.integers = f"<{lanes} x i64>"
         self.mask = f"<{lanes} x i1>"
         self.lines: list[str] = []
-        self._names = 0
+        self._values = self._blocks = 0
 
     def let(self, instruction: str) -> str:
-        """Write an instruction and return the new name of its value."""
-        self._names += 1
-        name = f"%v{self._names}"
+        """Write an instruction and return the name of its value: a number, which LLVM reads faster.
+
+        The values of a function must be numbered in the order of its text.
+        """
+        name = f"%{self._values}"
+        self._values += 1
         self.lines.append(f"  {name} = {instruction}")
         return name
 
@@ -42,8 +45,8 @@ class Writer:
 
     def fresh(self, stem: str) -> str:
         """Return a new, unique name for a basic block."""
-        self._names += 1
-        return f"{stem}{self._names}"
+        self._blocks += 1
+        return f"{stem}{self._blocks}"
 
     def splat(self, value: float) -> str:
         """Return the vector constant with `value` in every lane."""

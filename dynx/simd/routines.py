@@ -220,7 +220,7 @@ class RoutineBody(SegmentBody):
         for k, (port, scalars) in enumerate(scalar_ranges(program.outputs), start=len(program.inputs)):
             if isinstance(self._routine.places[k], int):
                 for tile in tiles(port.size, write.lanes):
-                    self._rows[k].store(tile, [results[scalars[column]] for column in tile])
+                    self._rows[k].store_tile(tile.start, [results[scalars[column]] for column in tile])
                 continue
             for column, scalar in enumerate(scalars):
                 at = write.let(f"getelementptr inbounds {write.vector}, ptr {self._start(k)}, i64 {column}")

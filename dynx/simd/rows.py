@@ -3,13 +3,23 @@
 A vector holds the same scalar of several samples, one per lane, but in memory the scalars of one sample are
 contiguous. Tiles of b by b numbers, b rows of b neighbouring columns, are therefore loaded row by row and
 transposed in registers by shuffles; stores do the reverse.
+
+Code that is not optimised has its inputs, constants, results and spilled values in a scratch memory, a vector
+each. LLVM selects the instructions of such code three times as fast if they are loads, stores and arithmetic
+only: after a single constant or shuffle it treats the whole block in the general way. Loops over the tiles of
+all rows therefore load the inputs into the scratch memory and store the results from it. They are optimised,
+and neither their code nor that of the segments repeats a tile that several segments use.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
 
-from dynx.simd.ir_writer import Writer
+from dynx.simd.ir_writer import Writer, hex_double
+from dynx.simd.program import Port, Program, scalar_ranges
 
 
 def tile_width(columns: int, lanes: int) -> int:
@@ -35,6 +45,30 @@ def tiles(columns: int, lanes: int) -> list[range]:
     ]
 
 
+def lane_names(number: int, lanes: int) -> list[str]:
+    """Return the names of the pointers to the rows of array `number`, one for each lane."""
+    return [f"%p{number}_{lane}" for lane in range(lanes)]
+
+
+def row_pointers(number: int, lanes: int) -> list[str]:
+    """Return the code that computes the pointers to the rows of array `number` from its address and its
+    stride in the arguments."""
+    names = lane_names(number, lanes)
+    lines = [
+        f"  %a{number} = getelementptr inbounds i64, ptr %arguments, i64 {1 + 2 * number}",
+        f"  %b{number} = load ptr, ptr %a{number}",
+        f"  %s{number}_ = getelementptr inbounds i64, ptr %arguments, i64 {2 + 2 * number}",
+        f"  %s{number} = load i64, ptr %s{number}_",
+        f"  %o{number} = mul i64 %first, %s{number}",
+        f"  {names[0]} = getelementptr inbounds i8, ptr %b{number}, i64 %o{number}",
+    ]
+    lines += [
+        f"  {name} = getelementptr inbounds i8, ptr {before}, i64 %s{number}"
+        for before, name in pairwise(names)
+    ]
+    return lines
+
+
 class Rows:
     """The rows of one array that belong to the samples in the lanes."""
 
@@ -49,11 +83,11 @@ class Rows:
         """Return the vector of one column, loading its tile if necessary."""
         start = tile_start(column, self._columns, self._width)
         if start not in self._loaded:
-            self._loaded[start] = self._load_tile(start)
+            self._loaded[start] = self.load_tile(start)
         return self._loaded[start][column - start]
 
-    def store(self, tile: range, columns: Sequence[str]) -> None:
-        """Write the vectors of all columns of a tile."""
+    def store_tile(self, start: int | str, columns: Sequence[str]) -> None:
+        """Write the vectors of all columns of the tile from a column, given as a number or by its name."""
         write, width = self._write, self._width
         for first in range(0, write.lanes, width):
             lanes = list(range(first, first + width))
@@ -61,9 +95,10 @@ class Rows:
             if width < write.lanes:
                 parts = [write.shuffle(c, "poison", lanes, write.lanes) for c in columns]
             for lane, row in zip(lanes, _transpose(write, parts), strict=True):
-                write.do(f"store <{width} x double> {row}, ptr {self._at(lane, tile.start)}, align 8")
+                write.do(f"store <{width} x double> {row}, ptr {self._at(lane, start)}, align 8")
 
-    def _load_tile(self, start: int) -> list[str]:
+    def load_tile(self, start: int | str) -> list[str]:
+        """Return the vectors of all columns of the tile from a column, given as a number or by its name."""
         write, width = self._write, self._width
         groups = []
         for first in range(0, write.lanes, width):
@@ -80,7 +115,7 @@ class Rows:
             ]
         return groups[0]
 
-    def _at(self, lane: int, column: int) -> str:
+    def _at(self, lane: int, column: int | str) -> str:
         row = self._pointers()[lane]
         return (
             row if column == 0 else self._write.let(f"getelementptr inbounds double, ptr {row}, i64 {column}")
@@ -101,3 +136,127 @@ def _transpose(write: Writer, rows: Sequence[str]) -> list[str]:
     ca, db = write.shuffle(a, c, high, 4), write.shuffle(b, d, high, 4)
     even, odd = (0, 4, 2, 6), (1, 5, 3, 7)
     return [write.shuffle(*pair, picks, 4) for pair in ((ac, bd), (ca, db)) for picks in (even, odd)]
+
+
+# -- scratch memory -----------------------------------------------------------------------------------
+
+LOAD, STORE = "load_rows", "store_rows"
+"""Names of the functions of the arguments, the first sample of the group, and the scratch memory."""
+
+FILL = "fill_constants"
+"""Name of the function that writes the constants into the scratch memory."""
+
+
+@dataclass(frozen=True)
+class Scratch:
+    """Layout of the scratch memory."""
+
+    slots: dict[int, int]
+    """Slot of each input, constant and spilled value, by node."""
+    first_result: int
+    """Slot of the first result; the others follow in the order of the program."""
+    first_constant: int
+    """Slot of the first constant; the others follow in the order of `constants`."""
+    constants: tuple[float, ...]
+    size: int
+    """Number of slots."""
+
+    @classmethod
+    def of(cls, program: Program, spilled: dict[int, int]) -> Scratch:
+        """Arrange inputs, results, constants and the `spilled` nodes, given with their slots among these."""
+        slots: dict[int, int] = {}
+        values: list[float] = []
+        first_result = program.n_inputs
+        first_constant = first_result + len(program.results)
+        for index, node in enumerate(program.nodes):
+            if node.op == "input":
+                slots[index] = node.slot
+            elif node.op == "constant":
+                slots[index] = first_constant + len(values)
+                values.append(node.value)
+        first_spilled = first_constant + len(values)
+        slots.update((node, first_spilled + slot) for node, slot in spilled.items())
+        size = first_spilled + max(spilled.values(), default=-1) + 1
+        return cls(slots, first_result, first_constant, tuple(values), size)
+
+
+def scratch_functions(program: Program, scratch: Scratch, lanes: int) -> list[str]:
+    """Return the texts of the functions that fill the scratch memory and store the results."""
+    used = {node.slot for node in program.nodes if node.op == "input"}
+    inputs, outputs = list(scalar_ranges(program.inputs)), list(scalar_ranges(program.outputs))
+    loaded = [(k, port, at.start) for k, (port, at) in enumerate(inputs) if not used.isdisjoint(at)]
+    stored = [
+        (len(inputs) + k, port, scratch.first_result + at.start)
+        for k, (port, at) in enumerate(outputs)
+        if port.size
+    ]
+    return [
+        _row_function(LOAD, loaded, lanes),
+        _row_function(STORE, stored, lanes),
+        *_fill_constants(scratch, lanes),
+    ]
+
+
+def _row_function(name: str, arrays: Sequence[tuple[int, Port, int]], lanes: int) -> str:
+    """Return the text of a function that loads or stores arrays, each given by its number, its port, and the
+    slot of its first column."""
+    write = Writer(lanes, fma=False)
+    heads = [line for number, _, _ in arrays for line in row_pointers(number, lanes)]
+    before = "entry"
+    for number, port, slot in arrays:
+        width, this = tile_width(port.size, lanes), f"tiles{number}"
+        write.do(f"br label %{this}")
+        write.label(this)
+        # The last tile may overlap the one before.
+        write.do(f"%c{number} = phi i64 [0, %{before}], [%n{number}, %{this}]")
+        late = write.let(f"icmp ugt i64 %c{number}, {port.size - width}")
+        column = write.let(f"select i1 {late}, i64 {port.size - width}, i64 %c{number}")
+        first = write.let(f"add i64 {column}, {slot}")
+        places = [
+            write.let(f"getelementptr {write.vector}, ptr %kept, i64 {write.let(f'add i64 {first}, {k}')}")
+            for k in range(width)
+        ]
+        rows = Rows(write, port.size, partial(lane_names, number, lanes))
+        if name == LOAD:
+            for place, vector in zip(places, rows.load_tile(column), strict=True):
+                write.do(f"store {write.vector} {vector}, ptr {place}, align {8 * lanes}")
+        else:
+            loads = [f"load {write.vector}, ptr {place}, align {8 * lanes}" for place in places]
+            rows.store_tile(column, [write.let(load) for load in loads])
+        write.do(f"%n{number} = add i64 %c{number}, {width}")
+        more = write.let(f"icmp ult i64 %n{number}, {port.size}")
+        before = f"end{number}"
+        write.do(f"br i1 {more}, label %{this}, label %{before}")
+        write.label(before)
+    parameters = "ptr noalias nocapture readonly %arguments, i64 %first, ptr noalias nocapture %kept"
+    head = f"define void @{name}({parameters}) {{"
+    return "\n".join([head, "entry:", *heads, *write.lines, "  ret void", "}"])
+
+
+def _fill_constants(scratch: Scratch, lanes: int) -> list[str]:
+    vector, n = f"<{lanes} x double>", len(scratch.constants)
+    zeros = ", ".join(["i32 0"] * lanes)
+    if not n:
+        return [f"define void @{FILL}(ptr %kept) {{", "  ret void", "}"]
+    values = ", ".join(f"double {hex_double(value)}" for value in scratch.constants)
+    return [
+        f"@constants = private unnamed_addr constant [{n} x double] [{values}]",
+        f"define void @{FILL}(ptr noalias nocapture %kept) {{",
+        "entry:",
+        f"  %start = getelementptr {vector}, ptr %kept, i64 {scratch.first_constant}",
+        "  br label %fill",
+        "fill:",
+        "  %k = phi i64 [0, %entry], [%next, %fill]",
+        "  %from = getelementptr double, ptr @constants, i64 %k",
+        "  %one = load double, ptr %from",
+        f"  %some = insertelement {vector} poison, double %one, i32 0",
+        f"  %all = shufflevector {vector} %some, {vector} poison, <{lanes} x i32> <{zeros}>",
+        f"  %to = getelementptr {vector}, ptr %start, i64 %k",
+        f"  store {vector} %all, ptr %to, align {8 * lanes}",
+        "  %next = add i64 %k, 1",
+        f"  %more = icmp ult i64 %next, {n}",
+        "  br i1 %more, label %fill, label %done",
+        "done:",
+        "  ret void",
+        "}",
+    ]

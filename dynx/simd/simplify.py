@@ -15,44 +15,57 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from dynx.simd.expr import ARITY, Graph, Op, Simplify
+from dynx.simd.expr import CONSTANT_KINDS, Graph, Kind, Op, Simplify
 
 Precondition = Literal["exact", "finite", "rounded"]
 Args = tuple[int, ...]
+Kinds = tuple[Kind, ...]
 Rewrite = Callable[[Graph, Op, Args], "int | None"]
+
+
+def _some(*kinds: Kind) -> Callable[[Kinds], bool]:
+    """Make the condition that an argument is of one of these kinds."""
+    return lambda arguments: not set(kinds).isdisjoint(arguments)
+
+
+def _every(*kinds: Kind) -> Callable[[Kinds], bool]:
+    """Make the condition that all arguments are of these kinds."""
+    return lambda arguments: set(kinds).issuperset(arguments)
+
+
+def _multiple_of_product(arguments: Kinds) -> bool:
+    return "mul" in arguments and not set(CONSTANT_KINDS).isdisjoint(arguments)
 
 
 @dataclass(frozen=True)
 class Rule:
     """A simplification of the operations `ops`, valid under its precondition.
 
-    It applies only if at least one argument is the result of one of the operations `argument_ops`.
+    It applies only if `condition` holds for the kinds of the arguments.
     """
 
     name: str
     ops: tuple[Op, ...]
     precondition: Precondition
     rewrite: Rewrite
-    argument_ops: tuple[Op, ...] = tuple(ARITY)
+    condition: Callable[[Kinds], bool] = lambda arguments: True
 
 
 def simplifier(rules: Iterable[Rule]) -> Simplify:
     """Combine rules into one function that applies the first rule that matches.
 
-    Candidates are looked up by the operation and the operations of its arguments.
+    Candidates are looked up by the operation and the kinds of its arguments.
     """
     every = tuple(rules)
-    known: dict[tuple[Op, ...], list[Rewrite]] = {}
+    known: dict[tuple[Op, Kinds], list[Rewrite]] = {}
 
     def simplify(graph: Graph, op: Op, args: Args) -> int | None:
-        nodes = graph.nodes
-        kinds = (op, *[nodes[arg].op for arg in args])
-        rewrites = known.get(kinds)
+        of = graph.kinds
+        kinds = (of[args[0]], of[args[1]]) if len(args) == 2 else tuple([of[arg] for arg in args])
+        rewrites = known.get((op, kinds))
         if rewrites is None:
-            rewrites = known[kinds] = [
-                rule.rewrite
-                for rule in every
-                if op in rule.ops and not set(rule.argument_ops).isdisjoint(kinds[1:])
+            rewrites = known[op, kinds] = [
+                rule.rewrite for rule in every if op in rule.ops and rule.condition(kinds)
             ]
         for rewrite in rewrites:
             found = rewrite(graph, op, args)
@@ -306,32 +319,32 @@ def _reciprocal(graph: Graph, op: Op, args: Args) -> int | None:
 
 
 EXACT: tuple[Rule, ...] = (
-    Rule("constants", tuple(_FOLD), "exact", _fold, ("constant",)),
-    Rule("factor-one", ("mul", "div"), "exact", _factor_one, ("constant",)),
-    Rule("factor-minus-one", ("mul", "div"), "exact", _minus_one, ("constant",)),
-    Rule("neutral-zero", ("add", "sub"), "exact", _neutral_zero, ("constant",)),
-    Rule("double-negation", ("neg",), "exact", _double_negation, ("neg",)),
-    Rule("negated-factor", ("mul", "div"), "exact", _negated_factor, ("neg",)),
-    Rule("negated-multiple", ("neg",), "exact", _negated_multiple, ("mul", "div")),
-    Rule("negated-term", ("add", "sub"), "exact", _negated_term, ("neg",)),
-    Rule("odd-and-even", ("sin", "cos", "tanh", "arctan", "abs"), "exact", _odd_and_even, ("neg",)),
-    Rule("power-of-two", ("div",), "exact", _power_of_two, ("constant",)),
+    Rule("constants", tuple(_FOLD), "exact", _fold, _every(*CONSTANT_KINDS)),
+    Rule("factor-one", ("mul", "div"), "exact", _factor_one, _some("one")),
+    Rule("factor-minus-one", ("mul", "div"), "exact", _minus_one, _some("minus one")),
+    Rule("neutral-zero", ("add", "sub"), "exact", _neutral_zero, _some("zero")),
+    Rule("double-negation", ("neg",), "exact", _double_negation, _some("neg")),
+    Rule("negated-factor", ("mul", "div"), "exact", _negated_factor, _some("neg")),
+    Rule("negated-multiple", ("neg",), "exact", _negated_multiple, _some("mul", "div")),
+    Rule("negated-term", ("add", "sub"), "exact", _negated_term, _some("neg")),
+    Rule("odd-and-even", ("sin", "cos", "tanh", "arctan", "abs"), "exact", _odd_and_even, _some("neg")),
+    Rule("power-of-two", ("div",), "exact", _power_of_two, _some(*CONSTANT_KINDS)),
     Rule("decided", ("select",), "exact", _decided),
 )
 
 FINITE: tuple[Rule, ...] = (
-    Rule("zero-factor", ("mul", "div"), "finite", _zero_factor, ("constant",)),
-    Rule("zero-term", ("add", "sub"), "finite", _zero_term, ("constant",)),
+    Rule("zero-factor", ("mul", "div"), "finite", _zero_factor, _some("zero")),
+    Rule("zero-term", ("add", "sub"), "finite", _zero_term, _some("zero")),
     Rule("same-terms", ("sub",), "finite", _same_terms),
-    Rule("negated-sum", ("sub",), "finite", _negated_sum, ("neg",)),
-    Rule("negated-difference", ("neg",), "finite", _negated_difference, ("sub",)),
+    Rule("negated-sum", ("sub",), "finite", _negated_sum, _some("neg")),
+    Rule("negated-difference", ("neg",), "finite", _negated_difference, _some("sub")),
 )
 
 ROUNDED: tuple[Rule, ...] = (
-    Rule("scaled-twice", ("mul",), "rounded", _scaled_twice, ("constant",)),
-    Rule("common-factor", ("add", "sub"), "rounded", _common_factor, ("mul",)),
-    Rule("division-by-constant", ("div",), "rounded", _division_by_constant, ("constant",)),
-    Rule("quotient-of-product", ("div",), "rounded", _quotient_of_product, ("mul",)),
+    Rule("scaled-twice", ("mul",), "rounded", _scaled_twice, _multiple_of_product),
+    Rule("common-factor", ("add", "sub"), "rounded", _common_factor, _every("mul")),
+    Rule("division-by-constant", ("div",), "rounded", _division_by_constant, _some(*CONSTANT_KINDS)),
+    Rule("quotient-of-product", ("div",), "rounded", _quotient_of_product, _some("mul")),
     Rule("reciprocal", ("div",), "rounded", _reciprocal),
 )
 

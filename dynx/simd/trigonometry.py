@@ -199,7 +199,7 @@ def _replacement(function: str, lanes: int) -> str:
         found = write.let(f"insertelement {write.vector} {found}, double {chosen}, i32 {lane}")
     vector = write.vector
     head = f"define internal {vector} @{REPLACEMENTS[function]}({vector} %x, {vector} %near) cold noinline {{"
-    return "\n".join([head, *write.lines, f"  ret {vector} {found}", "}"])
+    return "\n".join([head, "entry:", *write.lines, f"  ret {vector} {found}", "}"])
 
 
 def replacements(functions: Sequence[str], lanes: int) -> list[str]:

@@ -121,13 +121,13 @@ class Both:
         for slot in range(3):
             graph.input(slot)
         op, args = self._operation(graph, shape)
-        kinds = {graph.nodes[arg].op for arg in args}
-        found = rule.rewrite(graph, op, args) if op in rule.ops and kinds & set(rule.argument_ops) else None
+        applies = op in rule.ops and rule.condition(tuple(graph.kinds[arg] for arg in args))
+        found = rule.rewrite(graph, op, args) if applies else None
         self.fired = found is not None
         written = graph.apply_unsimplified(op, *args)
         self.written = self._program(graph, written)
         self.rewritten = self._program(graph, written if found is None else found)
-        # The lookup by operations of the arguments finds the rule too.
+        # The lookup by kinds of the arguments finds the rule too.
         by_table = simplifier([rule])(graph, op, args)
         assert by_table == found
 

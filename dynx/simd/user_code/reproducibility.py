@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from dynx.simd.expr import Graph, Node, caller_location
+from dynx.simd.expr import Graph, Kind, Node, caller_location
 
 
 class LocatedGraph(Graph):
@@ -15,11 +15,9 @@ class LocatedGraph(Graph):
         self.places: list[str] = []
         """File and line of each node."""
 
-    def _node(self, key: object, node: Node) -> int:
-        index = super()._node(key, node)
-        if index == len(self.places):
-            self.places.append(caller_location())
-        return index
+    def _append(self, key: object, node: Node, kind: Kind) -> int:
+        self.places.append(caller_location())
+        return super()._append(key, node, kind)
 
 
 def needed_nodes(graph: Graph, results: Sequence[int]) -> list[int]:
