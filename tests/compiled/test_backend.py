@@ -103,10 +103,6 @@ def test_every_quantity_is_native() -> None:
     assert native_quantities(CompiledBackend) == set(QUANTITIES)
 
 
-def owner(method: Any) -> object:
-    return method.__self__
-
-
 def test_mimic_joints_are_part_of_the_kernel() -> None:
     """A call in model coordinates makes one kernel, whose inputs are those coordinates."""
     engine = made(ROBOTS["mimic"])
@@ -114,8 +110,7 @@ def test_mimic_joints_are_part_of_the_kernel() -> None:
     engine.inverse_dynamics(q, v, a)
     engine.bias_torque(q, v)
     engine.forward_dynamics(q, v, a)
-    for result in engine._calls.values():
-        call = owner(result)
+    for call in engine._calls.values():
         assert isinstance(call, KernelCall)
         assert {port.shape for port in call._kernel.inputs} == {(engine.model.nv,)}
 
@@ -175,7 +170,7 @@ def test_quantities_that_are_not_compiled_are_evaluated_by_routines_or_numpy(
     for key, result in numbers._calls.items():
         name = key[0] if isinstance(key, tuple) else ""
         by_routines = name in LOOPED and not (mimics and name == "forward_dynamics")
-        assert isinstance(owner(result), looped if by_routines else NumericCall)
+        assert isinstance(getattr(result, "__self__", result), looped if by_routines else NumericCall)
     assert not kernels._calls
 
 
