@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -38,7 +39,31 @@ AS_DESCRIBED = Look()
 """Shapes in their own colours, heavy meshes reduced."""
 
 
-class DrawnRobot:
+class DrawnParts:
+    """Nodes of the page by the names of parts, below one root."""
+
+    def __init__(self, root: Any, parts: dict[str, Any]) -> None:
+        self._root = root
+        self.parts = parts
+        """The node of each part."""
+
+    def place(self, poses: Mapping[str, Floats]) -> None:
+        """Place parts at the poses (4, 4) in the world given."""
+        for name, T in poses.items():
+            node = self.parts[name]
+            node.wxyz, node.position = wxyz(T[:3, :3]), T[:3, 3]
+
+    @property
+    def visible(self) -> bool:
+        """True while the parts are shown."""
+        return bool(self._root.visible)
+
+    @visible.setter
+    def visible(self, shown: bool) -> None:
+        self._root.visible = shown
+
+
+class DrawnRobot(DrawnParts):
     """A robot on the page, at a configuration; each link is a node that carries its shapes.
 
     Nodes are named by numbers: a name from a file could contain a slash, which separates nodes.
@@ -50,12 +75,13 @@ class DrawnRobot:
         self.faults: tuple[str, ...] = ()
         """Shapes that cannot be drawn, one sentence each."""
         self._scene, self._path, self._look = scene, path, look
-        self._root = scene.add_frame(path, show_axes=False)
+        root = scene.add_frame(path, show_axes=False)
         self.links = {
             link.name: scene.add_frame(f"{path}/link{k}", show_axes=False)
             for k, link in enumerate(model.links)
         }
         """The node of each link."""
+        super().__init__(root, self.links)
         self.visuals: dict[str, list[Any]] = {}
         """The nodes of the visual shapes of each link."""
         self._collisions: list[Any] | None = None
@@ -66,12 +92,6 @@ class DrawnRobot:
         """Place the links at the configuration q (nq,)."""
         self.place(dict(link_poses(self.model, q)))
 
-    def place(self, poses: dict[str, Floats]) -> None:
-        """Place the links at the poses (4, 4) in the world given."""
-        for name, T in poses.items():
-            node = self.links[name]
-            node.wxyz, node.position = wxyz(T[:3, :3]), T[:3, 3]
-
     def show(self, *, visuals: bool, collisions: bool) -> None:
         """Show or hide the visual shapes and the collision shapes."""
         for nodes in self.visuals.values():
@@ -81,15 +101,6 @@ class DrawnRobot:
             self._collisions = self._add_collisions()
         for node in self._collisions or ():
             node.visible = collisions
-
-    @property
-    def visible(self) -> bool:
-        """True while the robot is shown."""
-        return bool(self._root.visible)
-
-    @visible.setter
-    def visible(self, shown: bool) -> None:
-        self._root.visible = shown
 
     def _add_visuals(self) -> None:
         shapes = {link.name: self._visible_shapes(link.name) for link in self.model.links}

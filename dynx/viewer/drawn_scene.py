@@ -8,13 +8,12 @@ from typing import Any
 from dynx.errors import DynxError
 from dynx.model import Model
 from dynx.model.geometry import Mesh
-from dynx.spatial.scalar import Floats
-from dynx.viewer.drawn_robot import AS_DESCRIBED, DrawnRobot, Look, add_triangles, rgb_of, wxyz
+from dynx.viewer.drawn_robot import AS_DESCRIBED, DrawnParts, DrawnRobot, Look, add_triangles, rgb_of, wxyz
 from dynx.viewer.triangles import triangles_of
 from dynx.world.scene import SceneBody
 
 
-class DrawnScene:
+class DrawnScene(DrawnParts):
     """Robots by name and bodies; a part is a body, or a link as ``robot/link``."""
 
     def __init__(
@@ -26,48 +25,33 @@ class DrawnScene:
         look: Look = AS_DESCRIBED,
     ) -> None:
         """`scene` is that of a viser server, and `path` the node of everything drawn here."""
-        self._root = scene.add_frame(path, show_axes=False)
+        root = scene.add_frame(path, show_axes=False)
         self.robots = {
             name: DrawnRobot(scene, f"{path}/robot{k}", model, look)
             for k, (name, model) in enumerate(robots.items())
         }
         """The robots by name."""
-        self.parts: dict[str, Any] = {
+        parts: dict[str, Any] = {
             f"{robot}/{link}": node
             for robot, drawn in self.robots.items()
             for link, node in drawn.links.items()
         }
-        """The node of each part."""
         faults = [f"{name}: {fault}" for name, drawn in self.robots.items() for fault in drawn.faults]
         for k, body in enumerate(bodies):
-            node = self.parts[body.name] = scene.add_frame(f"{path}/body{k}", show_axes=False)
+            node = parts[body.name] = scene.add_frame(f"{path}/body{k}", show_axes=False)
             try:
                 _add_body(scene, node, body, look)
             except DynxError as error:
                 faults.append(f"{body.name}: {error}")
             node.wxyz, node.position = wxyz(body.pose.matrix[:3, :3]), body.pose.matrix[:3, 3]
+        super().__init__(root, parts)
         self.faults = tuple(faults)
         """Shapes that cannot be drawn, one sentence each."""
-
-    def place(self, poses: Mapping[str, Floats]) -> None:
-        """Place parts at the poses (4, 4) in the world given."""
-        for name, T in poses.items():
-            node = self.parts[name]
-            node.wxyz, node.position = wxyz(T[:3, :3]), T[:3, 3]
 
     def show(self, *, visuals: bool, collisions: bool) -> None:
         """Show or hide the visual shapes and the collision shapes of the robots."""
         for robot in self.robots.values():
             robot.show(visuals=visuals, collisions=collisions)
-
-    @property
-    def visible(self) -> bool:
-        """True while everything drawn here is shown."""
-        return bool(self._root.visible)
-
-    @visible.setter
-    def visible(self, shown: bool) -> None:
-        self._root.visible = shown
 
 
 def _add_body(scene: Any, node: Any, body: SceneBody, look: Look) -> None:

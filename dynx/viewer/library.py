@@ -1,4 +1,4 @@
-"""The only imports of viser, which serves the page, and of fast-simplification, which reduces meshes."""
+"""The only imports of viser (the page), fast-simplification (reduced meshes) and Pillow (films)."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from dynx.errors import NotInstalledError
 try:
     import viser
     from fast_simplification import simplify
+    from PIL import Image
     from viser import uplot
 except ImportError as error:
     raise NotInstalledError(f"the viewer needs viser: pip install 'dynx[viewer]' ({error})") from error
 
-__all__ = ["HOTKEYS", "simplify", "uplot", "viser"]
+__all__ = ["HOTKEYS", "Image", "simplify", "uplot", "viser"]
 
 HOTKEYS = (
     *(chr(code) for code in range(ord("A"), ord("Z") + 1)),

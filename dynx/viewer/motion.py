@@ -16,6 +16,7 @@ from dynx.spatial.scalar import Floats
 from dynx.world.camera.drawing import link_poses, part_poses
 from dynx.world.comparison import EngineRun
 from dynx.world.scene import Scene, SceneBody
+from dynx.world.state import WorldState
 
 FRAME_RATE = 60.0
 """Largest number of frames a second of the motion."""
@@ -99,10 +100,22 @@ def motion_of_reference(rollout: Rollout) -> Motion | None:
     return Motion("reference", rollout.t[frames], poses, {name: rollout.model})
 
 
+def motion_of_robot(model: Model, q: Floats) -> Motion:
+    """Return the motion of a robot that stands still at the configuration q (nq,)."""
+    return Motion(model.name, np.zeros(1), _poses(model.name, model, q[None]), {model.name: model})
+
+
+def motion_of_state(scene: Scene, state: WorldState) -> Motion:
+    """Return the motion of a scene that stands still in a state."""
+    poses = {name: T[None] for name, T in part_poses(scene, state)}
+    return Motion(scene.name, np.zeros(1), poses, {r.name: r.model for r in scene.robots}, scene.bodies)
+
+
 def motion_of_run(scene: Scene, run: EngineRun) -> Motion:
     """Return the motion of a scene in one engine."""
     frames = [dict(part_poses(scene, state)) for state in run.states]
-    poses = {name: np.array([frame[name] for frame in frames]) for name in frames[0]}
+    fixed = {body.name for body in scene.bodies if body.fixed}
+    poses = {name: np.array([frame[name] for frame in frames]) for name in frames[0] if name not in fixed}
     robots = {robot.name: robot.model for robot in scene.robots}
     return Motion(run.engine, run.times[: len(frames)], poses, robots, scene.bodies)
 

@@ -73,9 +73,15 @@ class MotionView:
         self._add_curves(curves, compare=compare)
         page.look_at(0.5 * (low + high), 1.3 * self._size)
 
+    @property
+    def motions(self) -> tuple[Motion, ...]:
+        """The motions that are shown at present."""
+        seen = self.ghost is not None and self._ghost_drawn is not None and self._ghost_drawn.visible
+        return (self.motion, self.ghost) if seen and self.ghost is not None else (self.motion,)
+
     def _draw_ghost(self, ghost: Motion, look: Look) -> DrawnScene:
         # What never moves is the same in both.
-        moving = [body for body in ghost.bodies if body.name in ghost.poses and not body.fixed]
+        moving = [body for body in ghost.bodies if body.name in ghost.poses]
         seen_through = look._replace(colour=SKY_BLUE, opacity=GHOST_OPACITY)
         return DrawnScene(self._page.scene, "/second", ghost.robots, moving, seen_through)
 

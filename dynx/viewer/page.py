@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import socket
 import threading
 from collections.abc import Callable
@@ -20,8 +21,8 @@ from dynx.viewer.library import viser
 DEFAULT_HOST = "127.0.0.1"
 DEFAULT_PORT = 8080
 
-_VIEW = np.array([1.0, -1.0, 0.7])
-"""Direction from what is seen to the camera."""
+VIEW_DIRECTION = np.array([1.0, -1.0, 0.7]) / math.sqrt(2.49)
+"""Unit vector (3,) from what is seen to the camera."""
 
 
 class Page:
@@ -83,7 +84,7 @@ class Page:
     def look_at(self, target: ArrayLike, distance: float) -> None:
         """Begin with a camera that sees `target` (3,) from a distance [m]."""
         point = np.asarray(target, dtype=np.float64)
-        eye = point + distance * _VIEW / np.linalg.norm(_VIEW)
+        eye = point + distance * VIEW_DIRECTION
         self._server.initial_camera.position = tuple(eye.tolist())
         self._server.initial_camera.look_at = tuple(point.tolist())
 

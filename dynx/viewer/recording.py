@@ -27,7 +27,8 @@ def write_recording(
     A duration of 0 gives a still scene. Raises ArgumentError for a file that cannot be written.
     """
     if not checked_path(path).lower().endswith((".html", ".htm")):
-        raise ArgumentError(f"a page is written as .html, not as {shown(os.path.basename(path))}")
+        wanted = "wanted .html (a page), .gif (a film) or .png (a picture)"
+        raise ArgumentError(f"{shown(os.path.basename(path))} has no suffix of a page; {wanted}")
     with page.lock:
         show(0.0)
         recorder = page.server.get_scene_serializer()

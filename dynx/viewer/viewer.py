@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import os
 import webbrowser
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dynx.errors import ArgumentError, shown
+from dynx.files.reading import checked_path
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.sim import Rollout
@@ -16,7 +19,14 @@ from dynx.spatial.scalar import Floats
 from dynx.viewer.controls import Controls
 from dynx.viewer.drawn_robot import Look
 from dynx.viewer.drawn_scene import DrawnScene
-from dynx.viewer.motion import motion_of_reference, motion_of_rollout, motion_of_run
+from dynx.viewer.film import camera_for, picture_of, write_film, write_picture
+from dynx.viewer.motion import (
+    motion_of_reference,
+    motion_of_robot,
+    motion_of_rollout,
+    motion_of_run,
+    motion_of_state,
+)
 from dynx.viewer.motion_view import MotionView, Series
 from dynx.viewer.page import DEFAULT_HOST, DEFAULT_PORT, Page
 from dynx.viewer.recording import write_recording
@@ -25,6 +35,9 @@ from dynx.viewer.triangles import TRIANGLE_BUDGET, has_graphics_processor
 from dynx.viewer.world_view import WorldView
 from dynx.world import Scene, World
 from dynx.world.comparison import WorldComparison
+
+PICTURE_SIZE = (960, 720)
+"""Width and height of an exported picture [pixels]."""
 
 
 class Viewer(Controls):
@@ -107,13 +120,26 @@ class Viewer(Controls):
         opacity = picture[..., 3:] / 255.0
         return np.asarray(np.rint(picture[..., :3] * opacity + 255.0 * (1.0 - opacity)), dtype=np.uint8)
 
-    def export(self, path: str | os.PathLike[str]) -> None:
-        """Write an HTML file that shows the robot, or plays the motion, without a server and a network.
+    def export(
+        self, path: str | os.PathLike[str], progress: Callable[[int], object] = lambda _: None
+    ) -> None:
+        """Write what is shown to a file, by its suffix.
 
-        Raises ArgumentError for a world, whose motion is not known before it has happened, and for a file
-        that cannot be written.
+        ``.html`` shows the robot, or plays the motion, without a server and without a network; ``.gif`` is a
+        film of a motion, and ``.png`` a picture, both drawn without a browser (`progress` is called with the
+        number of pictures drawn). Raises ArgumentError for a live world, whose motion is not known before it
+        has happened, for another suffix, and for a file that cannot be written.
         """
         view = self.view
+        suffix = os.path.splitext(checked_path(path))[1].lower()
+        if suffix == ".png":
+            write_picture(path, self._picture())
+            return
+        if suffix == ".gif":
+            if not isinstance(view, MotionView):
+                raise ArgumentError("a film is made of a rollout, or of two motions; write a picture as .png")
+            write_film(path, view.motions, progress)
+            return
         if isinstance(view, WorldView):
             raise ArgumentError("a live world cannot be exported; simulate it, and export the rollout")
         if isinstance(view, MotionView):
@@ -121,6 +147,17 @@ class Viewer(Controls):
             write_recording(path, self.page, view.timeline.go_to, duration, dark=self._dark)
         else:
             write_recording(path, self.page, lambda _: None, 0.0, dark=self._dark)
+
+    def _picture(self) -> NDArray[np.uint8]:
+        view = self.view
+        if isinstance(view, MotionView):
+            time = float(view.motion.t[0]) + view.timeline.time
+            return picture_of(view.motions, time, camera_for(view.motion, PICTURE_SIZE))
+        if isinstance(view, WorldView):
+            motion = motion_of_state(view.world.scene, view.world.state)
+        else:
+            motion = motion_of_robot(view.model, view.q)
+        return picture_of((motion,), 0.0, camera_for(motion, PICTURE_SIZE))
 
     def wait(self, seconds: float | None = None) -> bool:
         """Wait until the page is closed, or for `seconds`; return True once it is."""

@@ -16,7 +16,7 @@ from dynx.model import Model
 from dynx.viewer import Viewer, view
 from dynx.world import World
 from dynx.world.scene import read_scene
-from tests.conftest import needs_examples
+from tests.conftest import EXAMPLES_INSTALLED, needs_examples
 from tests.viewer.conftest import until
 
 LARGEST_PAGE = 15_000_000
@@ -160,7 +160,7 @@ def test_an_exported_rollout_is_small_and_names_no_server(tmp_path: Path) -> Non
 def test_an_export_needs_a_name_of_a_page(arm: Model, tmp_path: Path) -> None:
     with view(arm) as viewer:
         with pytest.raises(ArgumentError, match=r"\.html"):
-            viewer.export(tmp_path / "run.png")
+            viewer.export(tmp_path / "run.jpg")
         with pytest.raises(ArgumentError, match="cannot be written"):
             viewer.export(tmp_path / "nowhere" / "run.html")
     with (
@@ -183,3 +183,27 @@ def test_meshes_that_are_missing_are_told_and_the_rest_is_shown(tmp_path: Path) 
         assert len(viewer.notes) == 1
         assert "none.stl" in viewer.notes[0]
         assert viewer.view.robot.visuals["b"]
+
+
+def test_pictures_and_films_are_drawn_without_a_browser(arm: Model, tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image")
+    scene = read_scene("stack")
+    with World(scene) as world, world.view() as viewer:
+        viewer.export(tmp_path / "world.png")
+        with pytest.raises(ArgumentError, match=r"written as|\.png"):
+            viewer.export(tmp_path / "world.gif")
+    with image.open(tmp_path / "world.png") as picture:
+        assert picture.size == (960, 720)
+        assert len(picture.getcolors(1_000_000)) > 10
+    model = dynx.load("panda" if EXAMPLES_INSTALLED else "six_axis_arm")
+    rollout = dynx.simulate(model, duration=0.4)
+    drawn: list[int] = []
+    with rollout.view() as viewer:
+        viewer.export(tmp_path / "run.gif", drawn.append)
+    with image.open(tmp_path / "run.gif") as film:
+        assert film.n_frames == 5
+        assert drawn == [1, 2, 3, 4, 5]
+        assert film.info["duration"] == pytest.approx(1e3 * 0.4 / 4, abs=10.0)
+    with model.view() as viewer:
+        viewer.export(tmp_path / "robot.png")
+    assert (tmp_path / "robot.png").stat().st_size > 1000

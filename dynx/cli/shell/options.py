@@ -188,6 +188,15 @@ def engines_option(purpose: str) -> Callable[[F], F]:
     )
 
 
+world_step_option = click.option(
+    "--dt",
+    type=click.FloatRange(min=0.0, min_open=True),
+    default=1e-3,
+    show_default=True,
+    help="Step of the world [s].",
+)
+
+
 def settings_option(subject: str) -> Callable[[F], F]:
     """Return ``--set``, whose value `settings` is pairs of names and words."""
     return click.option(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from dynx.cli.shell.lazy import runs
-from dynx.cli.shell.options import GroupedCommand, group, name_list
+from dynx.cli.shell.options import GroupedCommand, group, name_list, world_step_option
 
 
 @click.command(cls=GroupedCommand)
@@ -31,13 +31,7 @@ from dynx.cli.shell.options import GroupedCommand, group, name_list
         show_default=True,
         help="Time to simulate a scene with --compare or --export [s].",
     ),
-    click.option(
-        "--dt",
-        type=click.FloatRange(min=0.0, min_open=True),
-        default=1e-3,
-        show_default=True,
-        help="Step of a scene [s].",
-    ),
+    world_step_option,
     click.option(
         "--base", type=click.Choice(["fixed", "floating"]), default="fixed", help="Base of a robot."
     ),
@@ -70,7 +64,8 @@ from dynx.cli.shell.options import GroupedCommand, group, name_list
         "--export",
         "export_path",
         metavar="FILE",
-        help="Write an HTML file that plays without a server and without a network, and end.",
+        help="Write a file and end: .html plays without a server and without a network, .gif is a film, "
+        ".png a picture, both drawn without a browser.",
     ),
 )
 @runs("dynx.cli.view.run:view")
@@ -87,6 +82,7 @@ def view() -> None:
     Examples:
       dynx view panda
       dynx view run.npz --export run.html
+      dynx view run.npz --export run.gif
       dynx view stack --engine mujoco
       dynx view --compare a.npz b.npz
       dynx view --compare stack --engine pybullet,mujoco

@@ -9,6 +9,7 @@ from typing import Any
 from dynx.cli.shell.exits import DONE, one_line
 from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.output_file import check_writable
+from dynx.cli.shell.progress import progress_bar
 from dynx.cli.shell.terminal import console
 from dynx.errors import ArgumentError, RobotNotFoundError, shown
 from dynx.model.loading import load
@@ -16,6 +17,7 @@ from dynx.model.model import Base
 from dynx.registry import DEFAULT_ENGINE
 from dynx.sim import Rollout
 from dynx.viewer import Viewer
+from dynx.viewer.film import film_length
 from dynx.world import World
 from dynx.world.comparison import WorldComparison, compare_worlds
 from dynx.world.registry import installed_worlds
@@ -64,13 +66,20 @@ def view(
         for note in viewer.notes:
             out.print(f"note: {one_line(note)}", style="yellow")
         if export_path is not None:
-            viewer.export(export_path)
+            _export(viewer, export_path)
             out.print(f"wrote {one_line(export_path)}")
             return DONE
         with suppress(KeyboardInterrupt), interruptible():
             out.print(f"{one_line(repr(viewer)[1:-1])}; Ctrl-C ends it", soft_wrap=True)
             viewer.wait()
     return DONE
+
+
+def _export(viewer: Viewer, path: str) -> None:
+    motion = getattr(viewer.view, "motion", None)
+    total = film_length(motion) if motion is not None and path.lower().endswith(".gif") else 0
+    with progress_bar(total, words="pictures", enabled=total > 0) as advance:
+        viewer.export(path, lambda done: advance(done, "pictures"))
 
 
 def _opened(

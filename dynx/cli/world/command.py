@@ -12,6 +12,7 @@ from dynx.cli.shell.options import (
     json_option,
     quiet_option,
     settings_option,
+    world_step_option,
 )
 
 
@@ -27,13 +28,7 @@ from dynx.cli.shell.options import (
         show_default=True,
         help="Time to simulate [s].",
     ),
-    click.option(
-        "--dt",
-        type=click.FloatRange(min=0.0, min_open=True),
-        default=1e-3,
-        show_default=True,
-        help="Step of the world [s].",
-    ),
+    world_step_option,
     click.option(
         "--substeps",
         type=click.IntRange(min=1),

@@ -67,7 +67,7 @@ def test_a_scene_is_compared_in_two_engines(tmp_path: Path) -> None:
         (("slope", "--engine", "nothing"), "nothing"),
         (("pendulum", "--port", "70000"), "70000"),
         (("pendulum", "--host", "203.0.113.1", "--no-browser"), "cannot be listened on"),
-        (("pendulum", "--export", "page.png"), ".html"),
+        (("pendulum", "--export", "page.jpg"), ".html"),
         (("pendulum", "--export", "nowhere/page.html"), "nowhere"),
         (("nowhere.toml",), "nowhere.toml"),
     ],

@@ -1,0 +1,111 @@
+"""Pictures and films without a browser and without a display, drawn by the camera of `dynx.world`."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dynx.files.writing import write_bytes
+from dynx.model.geometry import Shape
+from dynx.model.geometry.links import Colour
+from dynx.spatial.scalar import Floats
+from dynx.viewer.colours import SKY_BLUE
+from dynx.viewer.library import Image
+from dynx.viewer.motion import Motion
+from dynx.viewer.page import VIEW_DIRECTION
+from dynx.world.camera import Camera, cast_rays
+from dynx.world.camera.drawing import DrawnShape, link_shapes
+from dynx.world.camera.picture import png_bytes
+
+PICTURES_PER_SECOND = 12.5
+"""Rate of the pictures of a film."""
+
+MAX_PICTURES = 500
+"""Largest number of pictures of a film; a longer motion has fewer a second."""
+
+SIZE = (480, 360)
+"""Width and height of a picture of a film [pixels]."""
+
+_DISTANCE = 1.1
+"""Distance of the camera, relative to the diagonal of the box around everything that moves."""
+
+Progress = Callable[[int], object]
+"""Called with the number of pictures that are drawn."""
+
+_OPAQUE_SKY_BLUE: Colour = (SKY_BLUE[0] / 255.0, SKY_BLUE[1] / 255.0, SKY_BLUE[2] / 255.0, 1.0)
+
+
+def picture_of(motions: tuple[Motion, ...], time: float, camera: Camera) -> NDArray[np.uint8]:
+    """Return colours (height, width, 3) of motions at a time [s]; all but the first are sky blue."""
+    shapes = []
+    for number, motion in enumerate(motions):
+        poses = motion.at(motion.frame_at(time))
+        for part, shape, rgba, T in _shapes(motion):
+            colour = rgba if number == 0 else _OPAQUE_SKY_BLUE
+            if rgba[3] > 0.0 and (part in poses or number == 0):
+                shapes.append(DrawnShape(0, shape, colour, poses.get(part, np.eye(4)) @ T))
+    drawing = cast_rays(shapes, camera.pose.matrix, camera)
+    return drawing.rgb.reshape(camera.size[1], camera.size[0], 3)
+
+
+def camera_for(motion: Motion, size: tuple[int, int] = SIZE) -> Camera:
+    """Return a camera that sees everything that moves, from where the page begins."""
+    points = np.concatenate([T[:, :3, 3] for T in motion.poses.values()] or [np.zeros((1, 3))])
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, diagonal = 0.5 * (low + high), max(float(np.linalg.norm(high - low)), 0.3)
+    eye = middle + _DISTANCE * diagonal * VIEW_DIRECTION
+    return Camera.look_at(eye, middle, size=size)
+
+
+def write_picture(path: str | os.PathLike[str], rgb: NDArray[np.uint8]) -> None:
+    """Write colours (height, width, 3) as a PNG file."""
+    write_bytes(path, png_bytes(rgb))
+
+
+def film_length(motion: Motion) -> int:
+    """Return the number of pictures of the film of a motion."""
+    duration = float(motion.t[-1] - motion.t[0])
+    return min(MAX_PICTURES, max(1, round(duration * PICTURES_PER_SECOND)))
+
+
+def write_film(
+    path: str | os.PathLike[str], motions: tuple[Motion, ...], progress: Progress = lambda _: None
+) -> None:
+    """Write motions as a GIF file that plays in the time of the first, again and again.
+
+    Raises ArgumentError for a file that cannot be written.
+    """
+    first = motions[0]
+    camera, count = camera_for(first), film_length(first)
+    pictures = []
+    for k, time in enumerate(np.linspace(first.t[0], first.t[-1], count).tolist()):
+        # One table of colours for all pictures would lose the shades of the later ones.
+        pictures.append(Image.fromarray(picture_of(motions, time, camera)).quantize(128))
+        progress(k + 1)
+    duration = float(first.t[-1] - first.t[0])
+    stream = io.BytesIO()
+    pictures[0].save(
+        stream,
+        format="GIF",
+        save_all=True,
+        append_images=pictures[1:],
+        duration=max(20, round(1e3 * duration / max(count - 1, 1))),
+        loop=0,
+    )
+    write_bytes(path, stream.getvalue())
+
+
+def _shapes(motion: Motion) -> Iterator[tuple[str, Shape, Colour, Floats]]:
+    """Yield the shapes of every part with the name of the part; those of a fixed body in the world."""
+    for robot, model in motion.robots.items():
+        for link in model.links:
+            for shape, rgba, T in link_shapes(model, link.name):
+                yield f"{robot}/{link.name}", shape, rgba, T
+    for body in motion.bodies:
+        pose = np.eye(4) if body.name in motion.poses else body.pose.matrix
+        for placed in body.shapes:
+            yield body.name, placed.shape, body.material.rgba, pose @ placed.origin.matrix
