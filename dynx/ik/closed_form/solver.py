@@ -25,7 +25,7 @@ from dynx.ik.closed_form.candidates import (
     Candidates,
 )
 from dynx.ik.closed_form.chain import N_JOINTS, Chain, chain_to
-from dynx.ik.closed_form.evaluation import CompiledEvaluation, Evaluation, NumpyEvaluation
+from dynx.ik.closed_form.evaluation import Evaluation, NumpyEvaluation
 from dynx.ik.closed_form.polish import AxisFrames
 from dynx.ik.closed_form.recognition import TOLERANCES, Recognised, recognise
 from dynx.ik.closed_form.solutions import IKSolutions
@@ -93,9 +93,12 @@ class ClosedForm:
             model.upper[self._columns],
             steps,
         )
-        self._evaluation: Evaluation = (
-            CompiledEvaluation(self._candidates) if compiled else NumpyEvaluation(self._candidates)
-        )
+        self._evaluation: Evaluation = NumpyEvaluation(self._candidates)
+        if compiled:
+            # Imported only here: every backend can solve in closed form, and LLVM is slow to import.
+            from dynx.ik.closed_form.compiled_evaluation import CompiledEvaluation
+
+            self._evaluation = CompiledEvaluation(self._candidates)
         self._start = model.neutral()
         for name, value in chain.given.items():
             self._start[model.coordinate_index(name)] = value
