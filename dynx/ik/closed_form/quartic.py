@@ -23,8 +23,9 @@ Conic = tuple[Array, Array, Array, Array, Array, Array]
 _DIRECTIONS = 7
 """Number of directions among which one is chosen where f is far from 0; more than f has roots."""
 
-_CUBIC_STEPS = 30
-"""Steps of bisection and Newton's method for a root of the resolvent cubic."""
+_CUBIC_STEPS = 60
+"""Steps of bisection and Newton's method for a root of the resolvent cubic: where two of its roots meet, each
+step only halves the error."""
 
 _NEWTON_STEPS = 3
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from dynx.ik.closed_form.branches import SIGNS
@@ -14,6 +14,8 @@ numbers = st.floats(-10.0, 10.0)
 
 
 @given(st.lists(angles, min_size=4, max_size=4), st.floats(0.01, 100.0))
+@example([0.0, -1.0, -0.75, -0.75], 1.0)
+@example([-2.0281937545415776, -0.876342042178837, -1.4200551607570175, -1.4200551607570175], 1.0)
 def test_four_real_roots_are_found(roots: list[float], scale: float) -> None:
     # The chords through two pairs of points on the circle are two factors of the polynomial.
     (a, b, c), (d, e, f) = (
