@@ -81,13 +81,16 @@ class Controls:
         )
         if changed is not None:
             call = _checked_function("changed", changed)
-            handle.on_update(lambda event: None if event.client is None else call(float(handle.value)))
+            handle.on_update(
+                lambda event: None if event.client is None else self._called(call, float(handle.value))
+            )
         return Slider(handle)
 
     def button(self, name: str, pressed: Callable[[], object]) -> None:
         """Add a button; `pressed()` is called when it is pressed."""
         call = _checked_function("pressed", pressed)
-        self._page.gui.add_button(_checked_label("name of a button", name)).on_click(lambda _: call())
+        handle = self._page.gui.add_button(_checked_label("name of a button", name))
+        handle.on_click(lambda _: self._called(call))
 
     def on_key(self, key: str, pressed: Callable[[], object]) -> None:
         """Call `pressed()` when a key is pressed in the page: such as ``"r"`` or ``"arrowup"``.
@@ -103,7 +106,7 @@ class Controls:
                 f"{', '.join(each for each in HOTKEYS if len(each) > 1)}"
             )
         command = self._page.gui.add_command(f"key {wanted}", hotkey=known[wanted.lower()])
-        command.on_trigger(lambda _: call())
+        command.on_trigger(lambda _: self._called(call))
 
     def text(self, text: str, position: ArrayLike) -> Mark:
         """Write text at a position (3,) [m] in the world."""
@@ -134,7 +137,16 @@ class Controls:
         call = _checked_function("clicked", clicked)
         for name, nodes in parts.items():
             for node in nodes:
-                node.on_click(lambda event, name=name: call(name, *_ray(event)))
+                node.on_click(lambda event, name=name: self._called(call, name, *_ray(event)))
+
+    def _called(self, function: Callable[..., object], *arguments: object) -> None:
+        """Call a function of the program; its error is raised, and shown in the page."""
+        try:
+            function(*arguments)
+        except Exception as error:
+            for client in self._page.server.get_clients().values():
+                client.add_notification(f"error: {type(error).__name__}", str(error), color="red")
+            raise
 
     def _path(self, kind: str) -> str:
         self._count += 1

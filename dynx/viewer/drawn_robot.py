@@ -92,6 +92,13 @@ class DrawnRobot(DrawnParts):
         """Place the links at the configuration q (nq,)."""
         self.place(dict(link_poses(self.model, q)))
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Shapes that cannot be drawn, and what is drawn instead, one sentence each."""
+        if any(self.visuals.values()) or self.faults:
+            return self.faults
+        return (f"{self.model.name} has no shapes; it is drawn as lines between its frames",)
+
     def show(self, *, visuals: bool, collisions: bool) -> None:
         """Show or hide the visual shapes and the collision shapes."""
         for nodes in self.visuals.values():

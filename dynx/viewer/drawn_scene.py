@@ -36,7 +36,7 @@ class DrawnScene(DrawnParts):
             for robot, drawn in self.robots.items()
             for link, node in drawn.links.items()
         }
-        faults = [f"{name}: {fault}" for name, drawn in self.robots.items() for fault in drawn.faults]
+        faults = [f"{name}: {fault}" for name, drawn in self.robots.items() for fault in drawn.notes]
         for k, body in enumerate(bodies):
             node = parts[body.name] = scene.add_frame(f"{path}/body{k}", show_axes=False)
             try:

@@ -46,7 +46,7 @@ class RobotView:
         with page.together():
             self.robot = DrawnRobot(page.scene, "/robot", model, look)
             self.robot.move(start)
-        self.notes = self.robot.faults
+        self.notes = self.robot.notes
         """Shapes that cannot be drawn, one sentence each."""
         self._marks = Marks(page.scene, self.robot)
         self._torques = GravityTorques(page.scene, self._engine)
@@ -130,7 +130,7 @@ class RobotView:
         with gui.add_folder("frame"):
             frame = gui.add_dropdown("frame", self.model.frame_names, initial_value=self._handle.frame)
             drag = gui.add_checkbox("drag it", initial_value=False)
-            kept = gui.add_dropdown("its", tuple(_FREE), initial_value="pose")
+            kept = gui.add_dropdown("target", tuple(_FREE), initial_value="pose")
             self._message = gui.add_text("result", "", disabled=True)
 
         def changed(_: Any) -> None:

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.errors import ArgumentError, shown
+from dynx.errors import ArgumentError, nearest, shown
 from dynx.files.reading import checked_path
 from dynx.model import Model
+from dynx.model.configuration import whole_number
 from dynx.model.loading import load
 from dynx.sim import Rollout
 from dynx.spatial.scalar import Floats
@@ -49,8 +50,8 @@ class Viewer(Controls):
 
     `shown` is a `Model` or what `dynx.load` takes, a `Rollout`, two rollouts of one robot or scene, a
     `WorldComparison`, a `World`, or a `Scene`, which is opened in PyBullet or the first engine installed.
-    `page` is given for a robot (`q`, `engine`, `collisions`), a motion (`play`) and a world (`loads`, `play`,
-    `steps`): see `RobotView`, `MotionView` and `WorldView`.
+    The `options` are those of its view: `q`, `engine` and `collisions` of a robot (`RobotView`), `play` of a
+    motion and `names` of two (`MotionView`), `loads`, `play` and `steps` of a world (`WorldView`).
     """
 
     def __init__(
@@ -112,10 +113,15 @@ class Viewer(Controls):
         if not clients:
             raise ArgumentError(f"no page is open at {self.url}; World.camera draws pictures without one")
         client = clients[min(clients)]
-        width, height = size
-        picture = client.camera.get_render(
-            height=height, width=width, transport_format="png", timeout=timeout
-        )
+        if not isinstance(size, tuple | list) or len(size) != 2:
+            raise ArgumentError(f"size is {shown(size)}; wanted width and height")
+        width, height = (whole_number(f"size[{k}]", side, 1) for k, side in enumerate(size))
+        try:
+            picture = client.camera.get_render(
+                height=height, width=width, transport_format="png", timeout=timeout
+            )
+        except (TimeoutError, RuntimeError) as error:
+            raise ArgumentError(f"the page at {self.url} sent no picture: {error}") from error
         # Nothing is seen where the picture is transparent.
         opacity = picture[..., 3:] / 255.0
         return np.asarray(np.rint(picture[..., :3] * opacity + 255.0 * (1.0 - opacity)), dtype=np.uint8)
@@ -211,22 +217,40 @@ def _view(
     page: Page, opened: object, look: Look, options: dict[str, Any]
 ) -> RobotView | MotionView | WorldView:
     if isinstance(opened, Model):
+        _check_options("a robot", options, ("q", "engine", "collisions"))
         return RobotView(page, opened, look=look, **options)
     if isinstance(opened, World):
+        _check_options("a world", options, ("loads", "play", "steps"))
         return WorldView(page, opened, look=look, **options)
+    pair = isinstance(opened, tuple)
+    _check_options("two rollouts" if pair else "a motion", options, ("play", "names") if pair else ("play",))
     if isinstance(opened, WorldComparison):
-        first, second = (motion_of_run(opened.scene, run) for run in opened.runs[:2])
-        return MotionView(page, first, second, look=look, compare=True, **options)
+        first, *others = (motion_of_run(opened.scene, run) for run in opened.runs[:2])
+        return MotionView(page, first, *others, look=look, compare=bool(others), **options)
     if isinstance(opened, Rollout):
         motion = motion_of_rollout(opened)
-        return MotionView(
-            page, motion, motion_of_reference(opened), curves=_curves(opened), look=look, **options
-        )
+        reference = motion_of_reference(opened)
+        return MotionView(page, motion, reference, curves=_curves(opened), look=look, **options)
     assert isinstance(opened, tuple)
-    first, second = (
-        motion_of_rollout(each, name) for each, name in zip(opened, ("first", "second"), strict=True)
-    )
+    names = options.pop("names", ("first", "second"))
+    first, second = (motion_of_rollout(each, name) for each, name in zip(opened, names, strict=True))
     return MotionView(page, first, second, look=look, compare=True, **options)
+
+
+def _check_options(subject: str, options: dict[str, Any], known: tuple[str, ...]) -> None:
+    """Raise ArgumentError for an option that the view of `subject` does not have, or of a wrong type."""
+    for name, value in options.items():
+        if name not in known:
+            hint = "; two rollouts are compared by Viewer((a, b))" if name == "compare" else ""
+            raise ArgumentError(
+                f"no option {shown(name)} of {subject}{nearest(name, known)}; it has {', '.join(known)}{hint}"
+            )
+        if name in ("collisions", "play", "steps") and not isinstance(value, bool):
+            raise ArgumentError(f"{name} is {shown(value)}; wanted True or False")
+        if name == "loads" and value is not None and not callable(value):
+            raise ArgumentError(f"loads is of type {type(value).__name__}; wanted a function of the world")
+        if name == "names" and not (isinstance(value, tuple | list) and len(value) == 2):
+            raise ArgumentError(f"names is {shown(value)}; wanted the names of two motions")
 
 
 def _curves(rollout: Rollout) -> list[Series]:

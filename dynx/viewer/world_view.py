@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dynx.errors import DynxError
+from dynx.errors import ArgumentError, ClosedError, DynxError, shown
 from dynx.model.geometry import HeightField, Plane
 from dynx.spatial.scalar import Floats
 from dynx.viewer.contact_arrows import ContactArrows
@@ -28,6 +28,8 @@ STANDARD_WEIGHT = 9.81
 """Force [N] on a mass of 1 kg, for the scale of the arrows."""
 
 _NO_PART = "none"
+
+_LOADS = ("motors", "torques", "wrenches")
 
 LoadsOf = Callable[[World], Mapping[str, Any]]
 
@@ -121,15 +123,28 @@ class WorldView:
                     n = 0
                 for _ in range(n):
                     given = {} if self._loads is None else dict(self._loads(self.world))
+                    for name in sorted(given.keys() - set(_LOADS)):
+                        raise ArgumentError(
+                            f"loads returned {shown(name)}; wanted {', '.join(sorted(_LOADS))}"
+                        )
                     wrenches = [*given.pop("wrenches", ()), *self._spring.wrenches(self.world)]
                     if self._push is not None and self._part.value != _NO_PART:
                         wrenches.append(Wrench(self._part.value, self._push / self.world.dt))
                         self._push = None
                     self.world.step(1, wrenches=wrenches, **given)
-            except DynxError as error:
+            except ClosedError:
+                self._end()
+                return
+            # Loads are the user's own code, which may raise anything; the page is where the user looks.
+            except Exception as error:
                 self.pause()
-                self._message.value = str(error)
+                kind = "" if isinstance(error, DynxError) else f"{type(error).__name__}: "
+                self._message.value = f"{kind}{error}"
             self.draw()
+
+    def _end(self) -> None:
+        self.pause()
+        self._message.value = "the world was closed"
 
     def reset(self) -> None:
         """Return to the start."""
@@ -193,6 +208,15 @@ class WorldView:
         self.pause()
         self.step()
 
+    def _closed(self) -> bool:
+        try:
+            _ = self.world.state
+        except ClosedError:
+            return True
+        except DynxError:
+            pass
+        return False
+
     def _held(self) -> str | None:
         return self._part.value if self._pull.value and self._part.value != _NO_PART else None
 
@@ -202,6 +226,9 @@ class WorldView:
             self._running.wait()
             began, start = time.monotonic(), self.world.time
             while self._running.is_set() and not self._page.closed:
+                if self._closed():
+                    self._end()
+                    break
                 factor = float(self._factor.value)
                 behind = start + (time.monotonic() - began) * factor - self.world.time
                 n = round(behind / self.world.dt)

@@ -70,6 +70,8 @@ def test_a_port_that_is_taken_is_told(arm: Model) -> None:
         ({"port": 0, "host": "203.0.113.1"}, "cannot be listened on"),
         ({"port": 0, "q": [np.nan] * 6}, "finite"),
         ({"port": 0, "q": [0.0] * 3}, "shape"),
+        ({"port": 0, "plays": True}, "no option 'plays' of a robot"),
+        ({"port": 0, "collisions": "yes"}, "wanted True or False"),
     ],
 )
 def test_wrong_arguments_are_told(arm: Model, options: dict[str, Any], message: str) -> None:
@@ -207,3 +209,32 @@ def test_pictures_and_films_are_drawn_without_a_browser(arm: Model, tmp_path: Pa
     with model.view() as viewer:
         viewer.export(tmp_path / "robot.png")
     assert (tmp_path / "robot.png").stat().st_size > 1000
+
+
+def test_errors_of_the_loads_are_shown_and_end_the_motion() -> None:
+    def failing(world: World) -> dict[str, Any]:
+        raise ValueError("no load")
+
+    for loads, message in ((failing, "ValueError: no load"), (lambda world: {"force": 1.0}, "'force'")):
+        with World(read_scene("slope")) as world, world.view(loads=loads, play=True) as viewer:
+            until(lambda: message in viewer.view._message.value, message)  # noqa: B023
+            assert not viewer.view.playing
+            assert world.time == 0.0
+    with World(read_scene("slope")) as world, pytest.raises(ArgumentError, match="wanted a function"):
+        world.view(loads=3)
+
+
+def test_a_world_that_was_closed_is_told() -> None:
+    world = World(read_scene("slope"))
+    with world.view(play=True) as viewer:
+        until(lambda: world.time > 0.0, "the world to move")
+        world.close()
+        until(lambda: "closed" in viewer.view._message.value, "the end of the world")
+
+
+def test_two_rollouts_are_compared_by_their_names(arm: Model) -> None:
+    rollout = dynx.simulate(arm, duration=0.1)
+    with view((rollout, rollout), names=("a", "b")) as viewer:
+        assert [motion.name for motion in viewer.view.motions] == ["a", "b"]
+    with pytest.raises(ArgumentError, match=r"Viewer\(\(a, b\)\)"):
+        rollout.view(compare=rollout)

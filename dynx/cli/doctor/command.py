@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from dynx.cli.shell.lazy import runs
-from dynx.cli.shell.options import choice_pair, json_option, name_list, run_options
+from dynx.cli.shell.options import FiniteRange, choice_pair, json_option, name_list, run_options
 
 
 @click.command
@@ -30,7 +30,7 @@ from dynx.cli.shell.options import choice_pair, json_option, name_list, run_opti
 )
 @click.option(
     "--tolerance",
-    type=click.FloatRange(min=0.0),
+    type=FiniteRange(min=0.0),
     default=1e-12,
     show_default=True,
     help="Relative error above which engines differ; 1e-6 ignores rounding.",

@@ -115,6 +115,17 @@ def finite_number(word: str) -> float:
     return number
 
 
+class FiniteRange(click.FloatRange):
+    """A range of finite numbers: NaN and infinity, which lie in `click.FloatRange`, are refused."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Read a number of the range."""
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{shown(value)} is not finite", param, ctx)
+        return number
+
+
 def model_options(command: F) -> F:
     """Add ``--base``, ``--base-pose`` and ``--lock``, as parameters `base`, `base_pose` (numbers) and `lock`
     (pairs)."""
@@ -158,7 +169,7 @@ def run_options(command: F) -> F:
         ),
         click.option(
             "--timeout",
-            type=click.FloatRange(min=0.0),
+            type=FiniteRange(min=0.0),
             default=600.0,
             show_default=True,
             help="Time limit for each robot [s]; 0 for none.",
@@ -186,15 +197,6 @@ def engines_option(purpose: str) -> Callable[[F], F]:
         metavar="A,B,C",
         help=f"{purpose} (default: all that are installed).",
     )
-
-
-world_step_option = click.option(
-    "--dt",
-    type=click.FloatRange(min=0.0, min_open=True),
-    default=1e-3,
-    show_default=True,
-    help="Step of the world [s].",
-)
 
 
 def settings_option(subject: str) -> Callable[[F], F]:

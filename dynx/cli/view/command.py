@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from dynx.cli.shell.lazy import runs
-from dynx.cli.shell.options import GroupedCommand, group, name_list, world_step_option
+from dynx.cli.shell.options import FiniteRange, GroupedCommand, group, name_list
 
 
 @click.command(cls=GroupedCommand)
@@ -26,14 +26,19 @@ from dynx.cli.shell.options import GroupedCommand, group, name_list, world_step_
     ),
     click.option(
         "--duration",
-        type=click.FloatRange(min=0.0, min_open=True),
-        default=2.0,
-        show_default=True,
-        help="Time to simulate a scene with --compare or --export [s].",
+        type=FiniteRange(min=0.0, min_open=True),
+        help="Time for which a scene is recorded, with --compare or --export [s] (default: 2).",
     ),
-    world_step_option,
     click.option(
-        "--base", type=click.Choice(["fixed", "floating"]), default="fixed", help="Base of a robot."
+        "--dt", type=FiniteRange(min=0.0, min_open=True), help="Step of a scene [s] (default: 0.001)."
+    ),
+    click.option(
+        "--base", type=click.Choice(["fixed", "floating"]), help="Base of a robot (default: fixed)."
+    ),
+    click.option(
+        "--shapes",
+        metavar="ROBOT",
+        help="Robot whose shapes a rollout is drawn with; a file of a rollout has none.",
     ),
     click.option("--collisions", is_flag=True, help="Begin with the collision shapes of a robot."),
     click.option(
@@ -74,14 +79,15 @@ def view() -> None:
 
     TARGET is a robot (a URDF or xacro file, or a name), a rollout (.npz of `dynx sim --save`), or a scene
     (TOML or JSON, or the name of a scene of dynx). A robot has sliders and a handle that moves a frame by
-    inverse kinematics; a rollout has a timeline; a scene is stepped live.
+    inverse kinematics; a rollout has a timeline; a scene is stepped live, or recorded first
+    for --compare and --export.
 
     The page is served until Ctrl-C. Exit code 0; 2 for input that cannot be shown, or a port that is taken.
 
     \b
     Examples:
       dynx view panda
-      dynx view run.npz --export run.html
+      dynx view run.npz --shapes panda --export run.html
       dynx view run.npz --export run.gif
       dynx view stack --engine mujoco
       dynx view --compare a.npz b.npz

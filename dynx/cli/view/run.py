@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 from dynx.cli.shell.exits import DONE, one_line
@@ -11,13 +12,16 @@ from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.output_file import check_writable
 from dynx.cli.shell.progress import progress_bar
 from dynx.cli.shell.terminal import console
-from dynx.errors import ArgumentError, RobotNotFoundError, shown
+from dynx.errors import ArgumentError, RobotNotFoundError, nearest, shown
+from dynx.model import Model
+from dynx.model.geometry import Geometry
 from dynx.model.loading import load
 from dynx.model.model import Base
 from dynx.registry import DEFAULT_ENGINE
 from dynx.sim import Rollout
 from dynx.viewer import Viewer
 from dynx.viewer.film import film_length
+from dynx.viewer.motion import FRAME_RATE, MAX_FRAMES
 from dynx.world import World
 from dynx.world.comparison import WorldComparison, compare_worlds
 from dynx.world.registry import installed_worlds
@@ -27,14 +31,28 @@ _SCENES = (".toml", ".json")
 _ROLLOUT = ".npz"
 _OTHER_RECORDS = (".mcap", ".csv")
 
+DEFAULT_STEP = 1e-3
+"""Step of a world [s]."""
+DEFAULT_DURATION = 2.0
+"""Time for which a scene is recorded [s]."""
+
+_OPTIONS = {
+    "robot": ("--engine", "--base", "--collisions"),
+    "rollout": ("--shapes", "--play"),
+    "comparison of rollouts": ("--shapes", "--play"),
+    "scene": ("--engine", "--duration", "--dt", "--play"),
+}
+"""Options that have an effect on each kind of target."""
+
 
 def view(
     targets: tuple[str, ...],
     compare: bool,
     engines: tuple[str, ...] | None,
-    duration: float,
-    dt: float,
-    base: Base,
+    duration: float | None,
+    dt: float | None,
+    base: Base | None,
+    shapes: str | None,
     collisions: bool,
     whole_meshes: bool,
     play: bool,
@@ -47,12 +65,32 @@ def view(
     """Show the targets until Ctrl-C, or export them; return the exit code."""
     if export_path is not None:
         check_writable(export_path)
-    recorded = export_path is not None
-    opened, options = _opened(targets, recorded, compare, engines, duration, dt, base)
-    if not isinstance(opened, Rollout | tuple | WorldComparison | World):
-        options["collisions"] = collisions
+    kind = _kind(targets, compare)
+    given = {
+        "--engine": engines,
+        "--duration": duration,
+        "--dt": dt,
+        "--base": base,
+        "--shapes": shapes,
+        "--collisions": collisions or None,
+        "--play": play or None,
+    }
+    for option, value in given.items():
+        if value is not None and option not in _OPTIONS[kind]:
+            raise ArgumentError(f"{option} has no effect on a {kind}; it takes {', '.join(_OPTIONS[kind])}")
+    moves = {"play": play and export_path is None}
+    opened: object
+    options: dict[str, Any]
+    if kind == "robot":
+        opened = _robot(targets[0], base or "fixed")
+        options = {"engine": _one(engines) or DEFAULT_ENGINE, "collisions": collisions}
+    elif kind == "scene":
+        opened = _scene(targets[0], export_path, compare, engines, duration, dt)
+        options = moves
     else:
-        options["play"] = play and export_path is None
+        opened = tuple(_rollout(target, shapes) for target in targets)
+        options = moves | {"names": tuple(map(os.path.basename, targets))} if compare else moves
+        opened = opened if compare else opened[0]
     with Viewer(
         opened,
         host=host,
@@ -82,55 +120,91 @@ def _export(viewer: Viewer, path: str) -> None:
         viewer.export(path, lambda done: advance(done, "pictures"))
 
 
-def _opened(
-    targets: tuple[str, ...],
-    moves: bool,
-    compare: bool,
-    engines: tuple[str, ...] | None,
-    duration: float,
-    dt: float,
-    base: Base,
-) -> tuple[object, dict[str, Any]]:
-    """Return what is shown, and the options of its view; a scene is simulated first if it `moves` later."""
-    if compare and len(targets) == 2:
-        return tuple(_rollout(target) for target in targets), {}
+def _kind(targets: tuple[str, ...], compare: bool) -> str:
+    """Return what the targets are, a key of `_OPTIONS`. Raises ArgumentError for targets that do not fit."""
+    kinds = [_kind_of(target) for target in targets]
+    if compare and kinds == ["rollout", "rollout"]:
+        return "comparison of rollouts"
+    if compare and kinds != ["scene"]:
+        found = " and ".join(f"{shown(t, 300)}, a {kind}" for t, kind in zip(targets, kinds, strict=True))
+        raise ArgumentError(f"--compare takes two rollouts (.npz), or one scene in two engines; got {found}")
     if len(targets) != 1:
         raise ArgumentError(f"{len(targets)} targets; wanted one, or two rollouts with --compare")
-    (target,) = targets
+    return kinds[0]
+
+
+def _kind_of(target: str) -> str:
     suffix = os.path.splitext(target)[1].lower()
-    if suffix == _ROLLOUT:
-        if compare:
-            raise ArgumentError("--compare with one rollout; wanted two")
-        return _rollout(target), {}
     if suffix in _OTHER_RECORDS:
         raise ArgumentError(
             f"{shown(target, 300)}: a rollout is shown from .npz, as dynx sim --save FILE.npz writes it: "
             "that has the robot and every digit"
         )
-    if suffix in _SCENES or target in scene_names():
-        return _scene(target, compare or moves, engines, duration, dt), {}
-    if compare:
-        raise ArgumentError("--compare shows two rollouts, or one scene in two engines; not a robot")
-    if engines is not None and len(engines) != 1:
-        raise ArgumentError(f"--engine names {len(engines)} engines; wanted one for a robot")
-    return load(target, base=base), {"engine": engines[0] if engines else DEFAULT_ENGINE}
+    if suffix == _ROLLOUT:
+        return "rollout"
+    return "scene" if suffix in _SCENES or target in scene_names() else "robot"
+
+
+def _robot(target: str, base: Base) -> Model:
+    try:
+        return load(target, base=base)
+    except RobotNotFoundError as error:
+        similar = nearest(target, scene_names())
+        if similar and os.sep not in target and "." not in target:
+            raise RobotNotFoundError(f"no robot and no scene {shown(target)}{similar}") from error
+        raise
 
 
 def _scene(
-    target: str, simulated: bool, engines: tuple[str, ...] | None, duration: float, dt: float
+    target: str,
+    export_path: str | None,
+    compare: bool,
+    engines: tuple[str, ...] | None,
+    duration: float | None,
+    dt: float | None,
 ) -> World | WorldComparison:
-    chosen = engines or installed_worlds()[: 2 if simulated else 1]
-    wanted = 2 if simulated else 1
-    if len(chosen) != wanted:
+    scene, step = read_scene(target), DEFAULT_STEP if dt is None else dt
+    if export_path is None and not compare:
+        if duration is not None:
+            raise ArgumentError("--duration is that of a recorded scene: with --compare or --export")
+        return World(scene, _one(engines) or installed_worlds()[0], step)
+    chosen = engines or installed_worlds()[: 2 if compare else 1]
+    if len(chosen) != (2 if compare else 1):
+        wanted = "two, with --compare" if compare else "one, or two with --compare"
         raise ArgumentError(f"--engine names {len(chosen)} engines; wanted {wanted}")
-    scene = read_scene(target)
-    if not simulated:
-        return World(scene, chosen[0], dt)
-    samples = max(2, round(60.0 * duration))
-    return compare_worlds(scene, chosen, duration, dt, samples=samples)
+    time = DEFAULT_DURATION if duration is None else duration
+    samples = min(MAX_FRAMES, max(2, round(FRAME_RATE * time)))
+    total = round(1e3 * time) * len(chosen)
+    before: dict[str, float] = {}
+    with progress_bar(total, words="simulated time [ms]") as advance:
+
+        def progress(engine: str, now: float) -> None:
+            before[engine] = now
+            advance(round(1e3 * sum(before.values())), f"{engine}, simulated time [ms]")
+
+        return compare_worlds(scene, chosen, time, step, samples=samples, progress=progress)
 
 
-def _rollout(path: str) -> Rollout:
+def _rollout(path: str, shapes: str | None) -> Rollout:
     if not os.path.isfile(path):
-        raise RobotNotFoundError(f"no file {shown(path, 300)}")
-    return Rollout.load(path)
+        what = "it is a folder" if os.path.isdir(path) else "there is none"
+        raise RobotNotFoundError(f"no file {shown(path, 300)}: {what}")
+    rollout = Rollout.load(path)
+    if shapes is None:
+        return rollout
+    links = [link.name for link in rollout.model.links]
+    robot = load(shapes)
+    missing = [name for name in links if name not in robot.geometry.links]
+    if missing:
+        raise ArgumentError(
+            f"{shown(shapes, 300)} has no link {shown(missing[0])}, which {rollout.model.name} has; --shapes "
+            "names the robot of the rollout"
+        )
+    geometry = Geometry({name: robot.geometry.links[name] for name in links})
+    return replace(rollout, model=replace(rollout.model, geometry=geometry))
+
+
+def _one(engines: tuple[str, ...] | None) -> str | None:
+    if engines is not None and len(engines) != 1:
+        raise ArgumentError(f"--engine names {len(engines)} engines; wanted one")
+    return engines[0] if engines else None

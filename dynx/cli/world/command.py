@@ -6,13 +6,13 @@ import click
 
 from dynx.cli.shell.lazy import runs
 from dynx.cli.shell.options import (
+    FiniteRange,
     GroupedCommand,
     engines_option,
     group,
     json_option,
     quiet_option,
     settings_option,
-    world_step_option,
 )
 
 
@@ -23,12 +23,18 @@ from dynx.cli.shell.options import (
     engines_option("Engines that run the scene"),
     click.option(
         "--duration",
-        type=click.FloatRange(min=0.0, min_open=True),
+        type=FiniteRange(min=0.0, min_open=True),
         default=1.0,
         show_default=True,
         help="Time to simulate [s].",
     ),
-    world_step_option,
+    click.option(
+        "--dt",
+        type=FiniteRange(min=0.0, min_open=True),
+        default=1e-3,
+        show_default=True,
+        help="Step of the world [s].",
+    ),
     click.option(
         "--substeps",
         type=click.IntRange(min=1),
@@ -39,7 +45,7 @@ from dynx.cli.shell.options import (
     settings_option("Setting of an engine (docs/world.md)"),
     click.option(
         "--within",
-        type=click.FloatRange(min=0.0),
+        type=FiniteRange(min=0.0),
         metavar="METRES",
         help="Largest distance between two engines' motions; beyond it the exit code is 1.",
     ),

@@ -55,7 +55,7 @@ def chain_to(model: Model, frame: str, given: Mapping[str, float]) -> Chain:
     Raises NoClosedFormError for a floating base, and for a joint of the chain that is prismatic or coupled
     to another; UnknownNameError or ArgumentError for `given`.
     """
-    given = _checked_given(model, given)
+    given = checked_given(model, given)
     if model.floating:
         raise NoClosedFormError(f"{model.name} has a floating base; the closed form needs a fixed one")
     mechanism = model.mechanism
@@ -112,7 +112,8 @@ def _fixed_position(model: Model, name: str, given: Mapping[str, float]) -> floa
     return joint.mimic.multiplier * given[driver] + joint.mimic.offset
 
 
-def _checked_given(model: Model, given: Mapping[str, float]) -> dict[str, float]:
+def checked_given(model: Model, given: Mapping[str, float]) -> dict[str, float]:
+    """Return positions [rad or m] by joint; UnknownNameError or ArgumentError for others."""
     if not isinstance(given, Mapping):
         raise ArgumentError(f"given is {shown(given)}; wanted positions by joint, such as {{'joint7': 0.3}}")
     for name, value in given.items():

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.ik.closed_form.chain import checked_given
 from dynx.ik.closed_form.solutions import IKSolutions
 from dynx.ik.closed_form.solver import stored_closed_form
 from dynx.ik.search import Kinematics
@@ -30,7 +31,7 @@ def all_solutions(
     position of theirs would be compiled anew.
     """
     compiled = bool(getattr(kinematics, "compiles", False)) and not given
-    positions = tuple(given.items()) if isinstance(given, Mapping) else ()
+    positions = () if given is None else tuple(checked_given(kinematics.model, given).items())
     form = stored_closed_form(kinematics.model, frame, positions, compiled)
     found = form.solve(target, q0)
     q = found.q[found.success]

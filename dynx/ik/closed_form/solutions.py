@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.errors import ArgumentError
 from dynx.files.notebook import html_table
 from dynx.ik.result import IKResult
+from dynx.spatial.scalar import Floats
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -25,6 +28,16 @@ class IKSolutions(IKResult):
     arbitrary: NDArray[np.bool_]
     """Coordinates (..., nq) that can have any value at a singular pose, if another follows: infinitely many
     configurations reach the pose, of which q is one."""
+
+    def __len__(self) -> int:
+        """Return the number of rows of q: the solutions of one pose, or the poses of a batch."""
+        return len(self.q)
+
+    def __iter__(self) -> Iterator[tuple[Floats, str]]:
+        """Yield each solution of one pose, with the name of its branch; ArgumentError for a batch."""
+        if self.success.ndim > 1:
+            raise ArgumentError("these are solutions of several poses; iterate over q and success")
+        return iter(zip(self.q, self.branches, strict=True))
 
     @property
     def counts(self) -> NDArray[np.int64]:

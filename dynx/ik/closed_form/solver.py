@@ -32,6 +32,7 @@ from dynx.ik.closed_form.solutions import IKSolutions
 from dynx.ik.targets import checked_targets
 from dynx.model import Model
 from dynx.model.configuration import checked_q
+from dynx.model.model import refuse_other_than_model
 from dynx.spatial.scalar import Floats
 
 ACCURACY = 1e-11
@@ -258,6 +259,7 @@ def closed_form(
     Raises NoClosedFormError, which says what is missing; UnknownNameError or ArgumentError for arguments.
     """
     model.frame_index(frame)
+    refuse_other_than_model(model)
     positions = {} if given is None else given
     chain = chain_to(model, frame, positions)
     if len(chain.joints) != N_JOINTS:

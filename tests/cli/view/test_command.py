@@ -13,6 +13,7 @@ from click.testing import CliRunner
 
 import dynx
 from dynx.cli.shell.main import cli
+from tests.conftest import needs_examples
 
 BAD_INPUT = 2
 
@@ -52,6 +53,32 @@ def test_a_scene_is_compared_in_two_engines(tmp_path: Path) -> None:
     assert page.is_file()
 
 
+def test_a_scene_is_recorded_in_one_engine(tmp_path: Path) -> None:
+    pytest.importorskip("pybullet")
+    page = tmp_path / "page.html"
+    arguments = ("slope", "--engine", "pybullet", "--duration", "0.1", "--export", str(page))
+    code, output = run(*arguments)
+    assert code == 0, output
+    assert page.is_file()
+
+
+@needs_examples
+def test_a_rollout_is_drawn_with_the_shapes_of_a_robot(tmp_path: Path) -> None:
+    path, page = tmp_path / "run.npz", tmp_path / "page.html"
+    dynx.simulate(dynx.load("ur5"), duration=0.05).save(path)
+    code, output = run(str(path), "--export", str(page))
+    assert code == 0, output
+    assert "has no shapes" in output
+    bare = page.stat().st_size
+    code, output = run(str(path), "--shapes", "ur5", "--export", str(page))
+    assert code == 0, output
+    assert "has no shapes" not in output
+    assert page.stat().st_size > bare + 50_000
+    code, output = run(str(path), "--shapes", "pendulum", "--export", str(page))
+    assert code == BAD_INPUT
+    assert "which ur5 has" in output
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -59,8 +86,14 @@ def test_a_scene_is_compared_in_two_engines(tmp_path: Path) -> None:
         (("nowhere.npz",), "no file"),
         (("run.mcap",), "shown from .npz"),
         (("pendulum", "pendulum"), "2 targets"),
-        (("--compare", "pendulum"), "not a robot"),
-        (("--compare", "a.npz"), "wanted two"),
+        (("--compare", "pendulum"), "'pendulum', a robot"),
+        (("--compare", "a.npz"), "takes two rollouts"),
+        (("--compare", "a.npz", "slope"), "'slope', a scene"),
+        (("a.npz", "--base", "floating"), "--base has no effect on a rollout"),
+        (("pendulum", "--dt", "0.1"), "--dt has no effect on a robot"),
+        (("slope", "--duration", "1"), "--compare or --export"),
+        (("slope", "--dt", "nan"), "not finite"),
+        (("slop",), "did you mean 'slope'"),
         (("--compare", "a.npz", "b.npz"), "no file"),
         (("pendulum", "--engine", "a,b"), "wanted one"),
         (("pendulum", "--engine", "pinochio"), "pinocchio"),
@@ -99,10 +132,12 @@ def test_a_port_that_is_taken_is_told() -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_the_page_ends_with_ctrl_c() -> None:
     command = [sys.executable, "-m", "dynx.cli.shell.main", "view", "pendulum", "--port", "0", "--no-browser"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-    assert process.stdout is not None
-    assert "http://127.0.0.1:" in process.stdout.readline()
-    process.send_signal(signal.SIGTERM)
-    output, _ = process.communicate(timeout=60)
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+        assert process.stdout is not None
+        first = process.stdout.readline()
+        address = process.stdout.readline() if first.startswith("note:") else first
+        process.send_signal(signal.SIGTERM)
+        output, _ = process.communicate(timeout=60)
+    assert "http://127.0.0.1:" in address
     assert process.returncode == 0, output
     assert "Traceback" not in output
