@@ -83,7 +83,7 @@ def view(
     options: dict[str, Any]
     if kind == "robot":
         opened = _robot(targets[0], base or "fixed")
-        options = {"engine": _one(engines) or DEFAULT_ENGINE, "collisions": collisions}
+        options = {"engine": _single_engine(engines) or DEFAULT_ENGINE, "collisions": collisions}
     elif kind == "scene":
         opened = _scene(targets[0], export_path, compare, engines, duration, dt)
         options = moves
@@ -167,7 +167,7 @@ def _scene(
     if export_path is None and not compare:
         if duration is not None:
             raise ArgumentError("--duration is that of a recorded scene: with --compare or --export")
-        return World(scene, _one(engines) or installed_worlds()[0], step)
+        return World(scene, _single_engine(engines) or installed_worlds()[0], step)
     chosen = engines or installed_worlds()[: 2 if compare else 1]
     if len(chosen) != (2 if compare else 1):
         wanted = "two, with --compare" if compare else "one, or two with --compare"
@@ -204,7 +204,8 @@ def _rollout(path: str, shapes: str | None) -> Rollout:
     return replace(rollout, model=replace(rollout.model, geometry=geometry))
 
 
-def _one(engines: tuple[str, ...] | None) -> str | None:
+def _single_engine(engines: tuple[str, ...] | None) -> str | None:
+    """Return the engine named, or None; ArgumentError for several."""
     if engines is not None and len(engines) != 1:
         raise ArgumentError(f"--engine names {len(engines)} engines; wanted one")
     return engines[0] if engines else None

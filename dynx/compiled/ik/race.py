@@ -94,7 +94,7 @@ class PoseCall:
         except IndexError:
             workspace = self._workspace()
         race, target_view, x_view = workspace
-        self._starts.copy_near(x_view, STARTS_OF_CELL * self._cells.of_one(rows))
+        self._starts.copy_near(x_view, STARTS_OF_CELL * self._cells.number_of_one(rows))
         _POSE.pack_into(target_view, 0, *rows[0], *rows[1], *rows[2])
         completed, n = race.run(), self._n
         row = race.result[completed - 1]

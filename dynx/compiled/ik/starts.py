@@ -52,8 +52,8 @@ class Cells:
     def _axes(self) -> tuple[list[float], list[float]]:
         return self.corner.tolist(), self.per_metre.tolist()
 
-    def of(self, positions: Floats, rotations: Floats) -> Integers:
-        """Return the cell (n,) of each pose (n, 3), (n, 3, 3)."""
+    def number(self, positions: Floats, rotations: Floats) -> Integers:
+        """Return the number (n,) of the cell of each pose (n, 3), (n, 3, 3)."""
         box = np.clip((positions - self.corner) * self.per_metre, 0.0, float(LAST_BOX)).astype(np.int64)
         x, z = rotations[:, :, 0], rotations[:, :, 2]
         rows = np.arange(len(z))
@@ -66,7 +66,7 @@ class Cells:
         face = 2 * up + (z[rows, up] < 0.0)
         return np.asarray(((box[:, 0] * BOXES + box[:, 1]) * BOXES + box[:, 2]) * ROTATIONS + 4 * face + turn)
 
-    def of_one(self, rows: list[list[float]]) -> int:
+    def number_of_one(self, rows: list[list[float]]) -> int:
         """Return the cell of one pose, as the first three rows of its matrix; faster than for arrays."""
         cell = 0
         x, y, z, *_ = rows
@@ -101,7 +101,7 @@ class StartTable:
         poses = kinematics.forward_kinematics(q, frame)
         positions, rotations = poses[:, :3, 3], poses[:, :3, :3]
         cells = Cells.around(positions)
-        cell = cells.of(positions, rotations)
+        cell = cells.number(positions, rotations)
         order = np.argsort(cell, kind="stable")
         first = np.searchsorted(cell[order], cell[order])
         place = np.arange(SAMPLES) - first
@@ -158,7 +158,7 @@ class Starts:
         targets = problem.targets
         if self.cells is None or targets.positions is None or targets.rotations is None:
             return np.zeros(problem.count, dtype=np.int64)
-        cell = self.cells.of(targets.positions.reshape(-1, 3), targets.rotations.reshape(-1, 3, 3))
+        cell = self.cells.number(targets.positions.reshape(-1, 3), targets.rotations.reshape(-1, 3, 3))
         found = np.broadcast_to(cell.reshape(targets.batch), problem.batch).reshape(-1)
         return np.asarray(STARTS_OF_CELL * found)
 

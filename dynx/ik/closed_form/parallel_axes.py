@@ -29,6 +29,7 @@ from dynx.ik.closed_form.subproblems import (
     solve_linear,
     turn,
     turn_back,
+    value_at,
 )
 from dynx.spatial.scalar import Array, Floats, append_axis, where_less
 from dynx.spatial.so3 import rotate, rotate_back
@@ -94,11 +95,11 @@ class ParallelAxes:
         if self.case == "intersecting_5_6":
             (known, *first), (of_5, *_) = by_point
             q1 = solve_linear(first[0], first[1], of_5 + offset - known, shoulder, self.preferred[0])
-            left, (constant, *right) = _at(by_axis[0], q1), by_axis[1]
+            left, (constant, *right) = value_at(by_axis[0], q1), by_axis[1]
         else:
             (known, *first), (of_5, *_) = by_axis
             q1 = solve_linear(first[0], first[1], of_5 - known, shoulder, self.preferred[0])
-            left, (constant, *right) = _at(by_point[0], q1) - offset, by_point[1]
+            left, (constant, *right) = value_at(by_point[0], q1) - offset, by_point[1]
         return q1, solve_linear(right[0], right[1], left - constant, wrist, 0.0)
 
     def _by_quartic(
@@ -118,7 +119,7 @@ class ParallelAxes:
         one = (1.0 + 0.0 * left[0], 0.0 * left[0], 0.0 * left[0])
         unit = combined((1.0, squared(cosine)), (1.0, squared(sine)), (-1.0, linear(one)))
         q1 = conic_root(unit, first, second)
-        c, s = _at(cosine, q1), _at(sine, q1)
+        c, s = value_at(cosine, q1), value_at(sine, q1)
         length = positive_root(c * c + s * s) + 1e-300
         return q1, Angle(c / length, s / length)
 
@@ -167,7 +168,3 @@ class ParallelAxes:
 def _turned_terms(direction: Floats, axis: Floats, a: Array) -> Terms:
     """Return (constant, cosine, sine): the terms of (R direction)' a, with R a rotation about `axis`."""
     return component_terms(a, axis, direction)
-
-
-def _at(terms: tuple[Array, ...], q: Angle) -> Array:
-    return np.asarray(terms[0] + terms[1] * q.cos + terms[2] * q.sin)

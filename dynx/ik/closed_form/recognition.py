@@ -35,7 +35,7 @@ class Recognised:
 
     geometry: Geometry
     inverted: bool
-    """Whether the geometry is that of the inverse chain: joint 1 of it is joint 6 of the chain."""
+    """True if the geometry is that of the inverse chain, whose joint 1 is joint 6 of the chain."""
     tolerance: float
     """Deviation of the chain from the geometry, relative to its length or [rad], at most."""
     description: str

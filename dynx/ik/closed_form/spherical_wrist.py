@@ -34,6 +34,7 @@ from dynx.ik.closed_form.subproblems import (
     solve_linear,
     turn,
     turn_back,
+    value_at,
 )
 from dynx.spatial.scalar import Array, Floats, append_axis
 from dynx.spatial.so3 import cross, rotate
@@ -61,7 +62,7 @@ class SphericalWrist:
     """Unit vectors normal to axis 2; h_1 = cos h_2 + sin u."""
     cos: float
     sin: float
-    """Of the angle from axis 2 to axis 1."""
+    """Cosine and sine of the angle from axis 2 to axis 1."""
     distance: float
     """Distance l between axes 1 and 2."""
     preferred: Floats
@@ -112,14 +113,14 @@ class SphericalWrist:
             return q3, k, zu, zv
         if self.case == "intersecting_1_2":
             q3 = solve_linear(S[1], S[2], b - S[0], elbow, 0.0)
-            k = _at(K, q3)
+            k = value_at(K, q3)
             zu = (a - self.cos * k) / self.sin
             return q3, k, zu, arm * positive_root(b - zu * zu - k * k)
         if self.case == "parallel_1_2":
             q3 = solve_linear(K[1], K[2], self.cos * a - K[0], elbow, 0.0)
         else:
             q3 = self._quartic(a, b, arm, elbow)
-        k, s = _at(K, q3), _at(S, q3)
+        k, s = value_at(K, q3), value_at(S, q3)
         zv = (b - s - distance * distance) / (2.0 * distance)
         if self.case == "parallel_1_2":
             return q3, k, arm * positive_root(s - k * k - zv * zv), zv
@@ -147,10 +148,6 @@ class SphericalWrist:
 def _scaled(factor: Array, *terms: float) -> tuple[Array, Array]:
     x, y = (factor * each for each in terms)
     return x, y
-
-
-def _at(terms: tuple[float, float, float], q: Angle) -> Array:
-    return np.asarray(terms[0] + terms[1] * q.cos + terms[2] * q.sin)
 
 
 def unit_normal(axis: Floats) -> Floats:

@@ -8,6 +8,7 @@ has no solution its nearest approach is returned, and where an angle is arbitrar
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,3 +95,8 @@ def component_terms(direction: Array, axis: Array, a: Array) -> tuple[Array, Arr
     """Return (constant, cosine, sine): the terms of direction' R a, with R a rotation about `axis`."""
     along = dot(direction, axis) * dot(axis, a)
     return along, dot(direction, a) - along, dot(direction, cross(axis, a))
+
+
+def value_at(terms: Sequence[Array | float], q: Angle) -> Array:
+    """Return ``terms[0] + terms[1] cos q + terms[2] sin q`` (...,)."""
+    return np.asarray(terms[0] + terms[1] * q.cos + terms[2] * q.sin)
