@@ -25,8 +25,11 @@ class StridedRows:
 
     @cached_property
     def addresses(self) -> NDArray[np.int64]:
-        """Address of the row of each call. Raises ArgumentError for rows out of range."""
+        """Address of the row of each call (n,), or the only one (1,) where the rows are one number that was
+        broadcast. Raises ArgumentError for rows out of range."""
         array, rows = self.array, self.rows
+        if rows.strides == (0,):
+            rows = rows[:1]
         if rows.size and not 0 <= rows.min() <= rows.max() < len(array):
             raise ArgumentError(
                 f"an array has {len(array)} rows; rows {rows.min()} to {rows.max()} were requested"

@@ -40,10 +40,10 @@ def test_each_call_uses_its_own_rows(data: st.DataObject) -> None:
 def test_a_call_reads_what_an_earlier_call_wrote() -> None:
     state = np.zeros((5, 3))
     steps = np.arange(4)
-    one = np.ones((1, 3))
+    one, repeated = np.ones((2, 3)), np.broadcast_to(np.int64(1), steps.shape)
     calls = prepare_calls(
         kernel(),
-        [StridedRows(state, steps), StridedRows(one, 0 * steps)],
+        [StridedRows(state, steps), StridedRows(one, repeated)],
         [StridedRows(state, steps + 1), StridedRows(np.zeros((1, 1)), 0 * steps)],
     )
     for address in calls.addresses:
@@ -65,6 +65,7 @@ def read_only() -> np.ndarray:
         ({"x": StridedRows(np.zeros((4, 6))[:, ::2], np.arange(4))}, "x is float64"),
         ({"x": StridedRows(np.zeros((4, 3)), np.arange(1, 5))}, "4 rows; rows 1 to 4"),
         ({"x": StridedRows(np.zeros((4, 3)), np.arange(-1, 3))}, "rows -1 to 2"),
+        ({"x": StridedRows(np.zeros((4, 3)), np.broadcast_to(np.int64(4), (4,)))}, "4 rows; rows 4 to 4"),
         ({"y": StridedRows(np.zeros((4, 3)), np.arange(3))}, r"at \(3,\) rows"),
         ({"sum": StridedRows(read_only(), np.arange(4))}, "sum is read-only"),
     ],

@@ -7,7 +7,7 @@ before that step; the plain executor then repeats the step and reports the error
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from time import perf_counter
 from typing import Any
@@ -111,7 +111,8 @@ class StagedLoop:
         begin = record.steps
         self._plant.reset(record.q[begin], record.v[begin])
         arrays = self._arrays(record, loop_state)
-        chunk = min(MIN_STEPS_TO_COMPILE, MAX_CHUNK_STEPS)
+        # The first chunk is short where it is timed, so that `progress` is called in time.
+        chunk = MAX_CHUNK_STEPS if self._loop.progress is None else MIN_STEPS_TO_COMPILE
         try:
             while record.steps < end:
                 first, started = record.steps, perf_counter()
@@ -119,8 +120,8 @@ class StagedLoop:
                     break
                 if self._loop.progress is not None:
                     self._loop.progress(record.steps)
-                each = (perf_counter() - started) / (record.steps - first)
-                chunk = min(max(int(PROGRESS_INTERVAL / each), 1), MAX_CHUNK_STEPS)
+                    each = (perf_counter() - started) / (record.steps - first)
+                    chunk = min(max(int(PROGRESS_INTERVAL / each), 1), MAX_CHUNK_STEPS)
         finally:
             k = record.steps
             if k > begin:
@@ -198,25 +199,21 @@ class StagedLoop:
             state[record.steps] = loop_state.controller_state
         return arrays
 
-    def _row(self, name: str, steps: Steps) -> Steps:
-        """Return the index of the row that each of `steps` uses in the array `name`."""
+    def _rows(self, names: Iterable[str], steps: Steps) -> dict[str, Steps]:
+        """Return the indices of the rows that `steps` use in the arrays of those names."""
         clock = self._loop.clock
-        if name.startswith("next_"):
-            return steps + 1
-        if name == "last_tau":
-            return np.maximum(steps - 1, 0)
-        if name in ("measured_q", "measured_v"):
-            return np.asarray(clock.measured_step(steps))
-        if name in SETPOINT or name in NOISE:
-            return steps // clock.steps_per_control
-        return steps
+        following, measured, control = steps + 1, clock.measured_step(steps), steps // clock.steps_per_control
+        rows = {name: following if name.startswith("next_") else steps for name in names}
+        rows |= {"last_tau": np.maximum(steps - 1, 0), "measured_q": measured, "measured_v": measured}
+        return rows | dict.fromkeys((*SETPOINT, *NOISE), control)
 
     def _take_chunk(self, record: Record, arrays: Mapping[str, Floats], end: int) -> bool:
         """Step to `end` and count the steps in the record; return False where a step has to be repeated by
         the plain executor."""
         first, per = record.steps, self._loop.clock.steps_per_control
         steps = np.arange(first, end)
-        by_step = {name: StridedRows(array, self._row(name, steps)) for name, array in arrays.items()}
+        rows = self._rows(arrays, steps)
+        by_step = {name: StridedRows(array, rows[name]) for name, array in arrays.items()}
         last = first + len(steps)
         controlled = self._prepared_steps(self._controlled, by_step, record)
         if self._holding_step is None:
@@ -233,7 +230,7 @@ class StagedLoop:
     ) -> TakeSteps:
         """Prepare kernel and engine calls of the next steps; `by_step` has the rows of arrays they use."""
         first = record.steps
-        first_rows = np.zeros(len(by_step["q"].rows), dtype=np.int64)
+        first_rows = np.broadcast_to(np.int64(0), by_step["q"].rows.shape)
         places = {
             name: np.zeros((1, size)) for name, size in (*step.sizes.items(), ("defect", 1), ("beyond", 1))
         }
