@@ -25,6 +25,7 @@
     |  |- DivergedError             the state is not finite, or too fast to be meaningful
     |  `- ControlError              a controller returned an invalid torque
     |- SingularMassMatrixError      forward dynamics has no unique solution
+    |- EpisodeError                 a step of an environment before its reset or after the end of an episode
     `- CompileError                 the SIMD compiler cannot compile a program
        `- TraceError                traced code branches on or converts a symbol
 
@@ -201,6 +202,10 @@ class ControlError(SimulationError):
 
 class SingularMassMatrixError(DynxError, ArithmeticError):
     """The mass matrix is singular, so no unique acceleration exists."""
+
+
+class EpisodeError(DynxError, RuntimeError):
+    """An environment was stepped before `reset`, or after the end of an episode."""
 
 
 class CompileError(DynxError, RuntimeError):

@@ -1,0 +1,29 @@
+"""Environments for reinforcement learning: one task on every engine, with Gymnasium's interface.
+
+    import gymnasium
+    import dynx.envs                                      # registers dynx/CartPole-v0, ...
+
+    env = gymnasium.make("dynx/CartPole-v0", engine="pinocchio")
+
+A task says what is observed, done and rewarded; the engine moves the robot. docs/environments.md shows a task
+of your own. Needs the extra ``envs``.
+"""
+
+from dynx.envs.environment import TaskEnvironment
+from dynx.envs.registration import make_environment, register_task, register_tasks
+from dynx.envs.robot.state import State
+from dynx.envs.robot.task import RobotTask
+from dynx.envs.task import Episodes, Outcome, Task
+
+__all__ = [
+    "Episodes",
+    "Outcome",
+    "RobotTask",
+    "State",
+    "Task",
+    "TaskEnvironment",
+    "make_environment",
+    "register_task",
+]
+
+register_tasks()

@@ -1,0 +1,136 @@
+"""`TaskEnvironment`: the Gymnasium environment made of a task and an engine."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dynx.envs.actions import checked_action
+from dynx.envs.library import Env
+from dynx.envs.task import Episodes, Task, checked_engine
+from dynx.errors import ArgumentError, ClosedError, EpisodeError, nearest, shown
+from dynx.model.configuration import whole_number
+
+RENDER_MODES = ("human", "rgb_array")
+
+MAX_SIDE = 8192
+"""Largest width and height of a picture [pixels]."""
+
+
+class TaskEnvironment(Env[Any, Any]):
+    """A task on one engine, with the interface of `gymnasium.Env`.
+
+    ``terminated`` is the task's; ``truncated`` is always False here, and set by the time limit that
+    `gymnasium.make` adds (`Task.max_episode_steps`). `render` returns the picture of the task's camera
+    (``"rgb_array"``); with ``"human"`` each step is shown in the browser, at most as fast as in reality. Not
+    safe for several threads.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES)}  # noqa: RUF012  (declared by `Env`)
+
+    def __init__(
+        self,
+        task: Task,
+        engine: str | None = None,
+        render_mode: str | None = None,
+        *,
+        width: int = 480,
+        height: int = 360,
+    ) -> None:
+        """`engine` is by default the first of ``task.engines()``; pictures have `width` x `height` pixels.
+
+        Raises ArgumentError for an engine or a render mode that does not exist, NotInstalledError for an
+        engine that is not installed.
+        """
+        if not isinstance(task, Task):
+            raise ArgumentError(f"task is of type {type(task).__name__}; wanted a dynx.envs.Task")
+        if render_mode is not None and render_mode not in RENDER_MODES:
+            raise ArgumentError(
+                f"render_mode is {shown(render_mode)}{nearest(str(render_mode), RENDER_MODES)}"
+            )
+        self.task = task
+        """The task."""
+        self.engine = checked_engine(type(task), engine)
+        """Name of the engine."""
+        self.render_mode = render_mode
+        self.metadata = {**self.metadata, "render_fps": round(1.0 / task.control_dt)}
+        self.observation_space = task.observation_space
+        self.action_space = task.action_space
+        self._size = (whole_number("width", width, 1, MAX_SIDE), whole_number("height", height, 1, MAX_SIDE))
+        self._phase = "before reset"
+        self._shown_at = -np.inf
+        self._episodes: Episodes | None = task.open(self.engine)
+
+    @property
+    def episodes(self) -> Episodes:
+        """The episodes of the task on the engine. Raises ClosedError after `close`."""
+        if self._episodes is None:
+            raise ClosedError("this environment was closed")
+        return self._episodes
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Start an episode; return its first observation, and info.
+
+        Episodes after a `seed` are the same in each run. `options` are those of the task's start, by name.
+        Raises UnknownNameError for an option that the task does not have.
+        """
+        episodes = self.episodes
+        super().reset(seed=seed)
+        if not isinstance(options, Mapping | None):
+            raise ArgumentError(f"options is {shown(options)}; wanted a dict of options by name")
+        found: tuple[Any, dict[str, Any]] = episodes.start(self.np_random, options or {})
+        self._phase = "running"
+        self._show()
+        return found
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Act for one control step; return observation, reward, terminated, truncated (False) and info.
+
+        Raises EpisodeError before the first `reset` and after the end of an episode, and ArgumentError (and
+        its kinds) for an action that is not in the action space; the episode is unchanged then.
+        """
+        episodes = self.episodes
+        if self._phase != "running":
+            raise EpisodeError(
+                "step was called before the first reset"
+                if self._phase == "before reset"
+                else "step was called after the episode ended (terminated): call reset"
+            )
+        outcome = episodes.step(checked_action(self.action_space, action))
+        if outcome.terminated:
+            self._phase = "ended"
+        self._show()
+        return outcome.observation, outcome.reward, outcome.terminated, False, outcome.info
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return the picture of the present state (height, width, 3) in mode ``"rgb_array"``, otherwise None.
+
+        Raises EpisodeError before the first `reset`, ArgumentError for an environment without a render mode.
+        """
+        episodes = self.episodes
+        if self._phase == "before reset":
+            raise EpisodeError("render was called before the first reset")
+        if self.render_mode is None:
+            raise ArgumentError("this environment has no render mode; make it with render_mode='rgb_array'")
+        return episodes.picture(*self._size) if self.render_mode == "rgb_array" else None
+
+    def close(self) -> None:
+        """Release engine and viewer; further calls raise ClosedError. Closing twice is harmless."""
+        if self._episodes is not None:
+            self._episodes.close()
+            self._episodes = None
+
+    def _show(self) -> None:
+        if self.render_mode != "human":
+            return
+        ahead = self._shown_at + self.task.control_dt - time.perf_counter()
+        if ahead > 0.0:
+            time.sleep(ahead)
+        self.episodes.view()
+        self._shown_at = time.perf_counter()

@@ -1,0 +1,110 @@
+"""Episodes of a task of one robot on a backend, in plain Python."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dynx.backends import backend
+from dynx.control.dynamics import EngineDynamics
+from dynx.envs.library import spaces
+from dynx.envs.robot.array_task import ArrayTask
+from dynx.envs.robot.state import State
+from dynx.envs.task import Episodes, Outcome
+from dynx.errors import DivergedError, ShapeError
+from dynx.model.configuration import DIVERGENCE_SPEED
+from dynx.spatial.scalar import Array, Floats
+from dynx.world import Scene, SceneRobot
+from dynx.world.camera import cast_rays, draw_picture
+from dynx.world.state import RobotState, WorldState
+
+ROBOT = "robot"
+"""Name of the robot in the scene that is drawn."""
+
+
+class RobotEpisodes(Episodes):
+    """Episodes of a task of one robot, whose dynamics a backend evaluates."""
+
+    def __init__(self, task: ArrayTask, engine: str) -> None:
+        self._task = task
+        self._backend = backend(engine, task.model, validate=False)
+        self._robot = EngineDynamics(self._backend)
+        self._forward = self._robot.forward_dynamics
+        self._discrete = isinstance(task.action_space, spaces.Discrete)
+        self._dtype, self._shape = task.observation_space.dtype, task.observation_space.shape
+        self._viewer: Any = None
+        self._steps = 0
+
+    @property
+    def state(self) -> State:
+        """The present state."""
+        return self._state
+
+    @state.setter
+    def state(self, state: State) -> None:
+        self._state = State(*(np.array(each, dtype=np.float64) for each in state))
+
+    def start(self, rng: np.random.Generator, options: Mapping[str, Any]) -> tuple[Any, dict[str, Any]]:
+        self._task.require_start_options(options)
+        self.state = self._task.start(rng.random(self._task.random_size), **options)
+        self._steps = 0
+        return self._observation(), self._task.info(self._robot, self._state)
+
+    def step(self, action: Any) -> Outcome:
+        task, robot, before = self._task, self._robot, self._state
+        given = np.asarray(float(action) if self._discrete else action, dtype=np.float64)
+        q, v, memory = before
+        for _ in range(task.substeps):
+            tau = task.torque(robot, State(q, v, memory), given)
+            q, v = task.advance(lambda q, v, tau=tau: self._forward(q, v, tau), q, v)  # type: ignore[misc]
+        self._steps += 1
+        self._refuse_divergence(q, v)
+        after = self._state = task.settle(State(q, v, memory))
+        reward = float(task.reward(robot, before, given, after))
+        terminated = bool(task.terminated(robot, after))
+        return Outcome(self._observation(), reward, terminated, task.info(robot, after))
+
+    def _observation(self) -> Array:
+        observation = np.array(self._task.observation(self._robot, self._state), dtype=self._dtype)
+        if observation.shape != self._shape:
+            raise ShapeError(
+                f"the observation of {type(self._task).__name__} has shape {observation.shape}; "
+                f"its observation space has {self._shape}"
+            )
+        return observation
+
+    def _refuse_divergence(self, q: Floats, v: Floats) -> None:
+        if not v @ v < DIVERGENCE_SPEED**2:
+            dt = self._task.control_dt
+            raise DivergedError(
+                f"the velocity after step {self._steps} ({self._steps * dt:.6g} s) is not finite or beyond "
+                f"{DIVERGENCE_SPEED:g}; smaller steps (substeps) or actions may help",
+                time=self._steps * dt,
+                step=self._steps,
+                state=(q, v),
+            )
+
+    def picture(self, width: int, height: int) -> NDArray[np.uint8]:
+        """Draw the robot by rays through the shapes of its description."""
+        model, (q, v, _) = self._task.model, self._state
+        scene = Scene(robots=(SceneRobot(ROBOT, model),))
+        state = WorldState(self._steps * self._task.control_dt, {ROBOT: RobotState(q, v)}, {})
+        camera = replace(self._task.camera, size=(width, height))
+        return draw_picture(scene, state, camera, cast_rays).rgb
+
+    def view(self) -> None:
+        """Show the robot in the browser."""
+        if self._viewer is None:
+            self._viewer = self._task.model.view(q=self._state.q)
+            print(f"{type(self._task).__name__} is shown at {self._viewer.url}", flush=True)
+        self._viewer.view.put(self._state.q)
+
+    def close(self) -> None:
+        self._backend.close()
+        if self._viewer is not None:
+            self._viewer.close()
+            self._viewer = None

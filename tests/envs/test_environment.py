@@ -1,0 +1,159 @@
+"""What every environment does: checks of actions and of the order of calls, names, seeds, pictures."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium import spaces
+from gymnasium.utils.env_checker import check_env
+
+import dynx.envs  # noqa: F401  (registers the environments)
+from dynx.backends import installed_backends
+from dynx.envs.actions import checked_action
+from dynx.envs.environment import TaskEnvironment
+from dynx.envs.tasks.cart_pole import CartPole
+from dynx.errors import (
+    ArgumentError,
+    ClosedError,
+    DTypeError,
+    EpisodeError,
+    NotFiniteError,
+    ShapeError,
+    UnknownNameError,
+)
+
+PAGE = Path(__file__).parents[2] / "docs" / "environments.md"
+
+
+@pytest.fixture
+def env() -> Iterator[TaskEnvironment]:
+    with TaskEnvironment(CartPole(), "reference") as made:
+        yield made
+
+
+def test_ids_are_registered_with_time_limits() -> None:
+    found = gymnasium.make("dynx/CartPole-v0", engine="reference", pole_mass=0.2)
+    assert found.spec is not None
+    assert found.spec.max_episode_steps == 500
+    task: Any = found.unwrapped.task  # type: ignore[attr-defined]
+    assert task.pole_mass == 0.2
+    found.close()
+
+
+@pytest.mark.parametrize("engine", installed_backends())
+def test_checkers_find_nothing(engine: str, recwarn: pytest.WarningsRecorder) -> None:
+    made = gymnasium.make("dynx/CartPole-v0", engine=engine).unwrapped
+    check_env(made, skip_render_check=True)
+    made.close()
+    assert not recwarn.list
+
+
+def test_pictures_are_drawn_without_a_display() -> None:
+    with TaskEnvironment(CartPole(), "reference", "rgb_array", width=64, height=48) as made:
+        made.reset(seed=0)
+        picture = made.render()
+    assert picture is not None
+    assert picture.shape == (48, 64, 3)
+    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 2
+
+
+def test_equal_seeds_give_equal_episodes(env: TaskEnvironment) -> None:
+    def episode(seed: int) -> list[Any]:
+        seen = [env.reset(seed=seed)[0].tolist()]
+        seen.extend(env.step(k % 2)[0].tolist() for k in range(8))
+        return [*seen, env.reset()[0].tolist()]
+
+    assert episode(3) == episode(3)
+    assert episode(3) != episode(4)
+
+
+@pytest.mark.parametrize(
+    ("action", "error"),
+    [
+        (2, ArgumentError),
+        (-1, ArgumentError),
+        (0.5, DTypeError),
+        (np.nan, DTypeError),
+        (None, DTypeError),
+        ([0, 1], ShapeError),
+        ("left", DTypeError),
+    ],
+)
+def test_wrong_choices_are_refused_and_leave_the_state(
+    env: TaskEnvironment, action: Any, error: type[Exception]
+) -> None:
+    env.reset(seed=0)
+    before = env.episodes.state  # type: ignore[attr-defined]
+    with pytest.raises(error, match="whole number"):
+        env.step(action)
+    assert env.episodes.state is before  # type: ignore[attr-defined]
+    assert env.step(np.int64(1))[1] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("action", "error", "message"),
+    [
+        ([0.0, np.nan], NotFiniteError, r"action\[1\] is nan; wanted numbers from -1 to 1"),
+        ([0.0, 1.5], ArgumentError, r"action\[1\] is 1.5; wanted numbers from -1 to 1"),
+        ([0.0], ShapeError, r"\(1,\); wanted \(2,\)"),
+        (["a", "b"], DTypeError, "wanted numbers"),
+    ],
+)
+def test_wrong_numbers_are_refused(action: Any, error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
+        checked_action(spaces.Box(-1.0, 1.0, (2,)), action)
+
+
+def test_calls_out_of_order_are_refused(env: TaskEnvironment) -> None:
+    with pytest.raises(EpisodeError, match="before the first reset"):
+        env.step(0)
+    env.reset(seed=0)
+    while not env.step(0)[2]:
+        pass
+    with pytest.raises(EpisodeError, match="after the episode ended"):
+        env.step(0)
+    env.reset()
+    env.step(0)
+    with pytest.raises(ArgumentError, match="no render mode"):
+        env.render()
+    env.close()
+    env.close()
+    with pytest.raises(ClosedError):
+        env.reset()
+
+
+def test_unknown_names_offer_the_nearest() -> None:
+    with pytest.raises(ArgumentError, match="did you mean 'pinocchio'"):
+        TaskEnvironment(CartPole(), "pinochio")
+    with pytest.raises(UnknownNameError, match="did you mean 'pole_mass'"):
+        gymnasium.make("dynx/CartPole-v0", pole_mas=1.0)
+    with pytest.raises(ArgumentError, match="did you mean 'human'"):
+        TaskEnvironment(CartPole(), "reference", "hman")
+    with TaskEnvironment(CartPole(), "reference") as made, pytest.raises(UnknownNameError, match="'low'"):
+        made.reset(options={"lo": 0.0})
+
+
+def test_options_of_the_start(env: TaskEnvironment) -> None:
+    observation, _ = env.reset(seed=0, options={"low": 0.01, "high": 0.01})
+    assert observation.tolist() == pytest.approx([0.01] * 4)
+
+
+def test_code_of_the_page_runs() -> None:
+    blocks = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), flags=re.DOTALL)
+    names: dict[str, Any] = {"__name__": __name__}
+    for block in blocks:
+        exec(compile(block, str(PAGE), "exec"), names)
+    made = names["env"]
+    observation, _ = made.reset(seed=1)
+    assert observation in made.observation_space
+    again, reward, terminated, truncated, _ = made.step(made.action_space.sample())
+    assert again in made.observation_space
+    assert reward < 0.0
+    assert (terminated, truncated) == (False, False)
+    assert gymnasium.spec("mine/Point-v0").max_episode_steps == 200
