@@ -22,6 +22,9 @@ DYNX_MODELS = "dynx"
 TRAPS = "traps"
 """Folder of dynx's models whose files each contain one cause of disagreement between engines."""
 
+SCENES = "scenes"
+"""Folder of the scenes among the models of dynx."""
+
 # Short names of loaders that differ from the stem of the file, by file.
 _LOADER_NAMES = {
     "alexander_description/urdf/alexander_v1.lowerBodyOnly.urdf": "alexander",
@@ -154,3 +157,8 @@ def own_roots() -> list[Path]:
         if root.is_dir():
             return [root]
     return []
+
+
+def scene_names() -> tuple[str, ...]:
+    """Return the names of the scenes that come with dynx."""
+    return tuple(sorted(path.stem for root in own_roots() for path in (root / SCENES).glob("*.toml")))

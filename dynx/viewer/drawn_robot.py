@@ -12,11 +12,12 @@ from dynx.errors import DynxError
 from dynx.model import Model
 from dynx.model.geometry import Mesh, Shape
 from dynx.model.geometry.links import Colour
+from dynx.model.geometry.visible_shapes import link_shapes
+from dynx.rbd.link_poses import link_poses
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
 from dynx.viewer.colours import GREY, ORANGE, RGB
 from dynx.viewer.triangles import TRIANGLE_BUDGET, Triangles, budgets, hull_of, triangles_of
-from dynx.world.camera.drawing import link_poses, link_shapes
 
 COLLISION_OPACITY = 0.4
 GHOST_OPACITY = 0.3
@@ -151,7 +152,7 @@ class DrawnRobot(DrawnParts):
         except DynxError as error:
             self.faults = (*self.faults, f"{link}: {error}")
         try:
-            return [(_readable(shape), rgba, T) for shape, rgba, T in link_shapes(self.model, link)]
+            return [(_readable(shape), rgba, T) for shape, rgba, T in link_shapes(self.model.geometry, link)]
         except DynxError:
             return []
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from dynx.errors import DynxError
@@ -37,10 +37,12 @@ class DrawnScene(DrawnParts):
             for link, node in drawn.links.items()
         }
         faults = [f"{name}: {fault}" for name, drawn in self.robots.items() for fault in drawn.notes]
+        self._bodies: dict[str, list[Any]] = {}
         for k, body in enumerate(bodies):
             node = parts[body.name] = scene.add_frame(f"{path}/body{k}", show_axes=False)
+            self._bodies[body.name] = []
             try:
-                _add_body(scene, node, body, look)
+                self._bodies[body.name] = list(_add_body(scene, node, body, look))
             except DynxError as error:
                 faults.append(f"{body.name}: {error}")
             node.wxyz, node.position = wxyz(body.pose.matrix[:3, :3]), body.pose.matrix[:3, 3]
@@ -48,18 +50,28 @@ class DrawnScene(DrawnParts):
         self.faults = tuple(faults)
         """Shapes that cannot be drawn, one sentence each."""
 
+    @property
+    def visuals(self) -> dict[str, list[Any]]:
+        """The nodes of the visual shapes of each link of the robots, and of each body."""
+        links = {
+            f"{name}/{link}": nodes
+            for name, robot in self.robots.items()
+            for link, nodes in robot.visuals.items()
+        }
+        return links | self._bodies
+
     def show(self, *, visuals: bool, collisions: bool) -> None:
         """Show or hide the visual shapes and the collision shapes of the robots."""
         for robot in self.robots.values():
             robot.show(visuals=visuals, collisions=collisions)
 
 
-def _add_body(scene: Any, node: Any, body: SceneBody, look: Look) -> None:
+def _add_body(scene: Any, node: Any, body: SceneBody, look: Look) -> Iterator[Any]:
     rgba = body.material.rgba
     opacity = look.opacity or (None if rgba[3] == 1.0 else rgba[3])
     for k, placed in enumerate(body.shapes):
         budget = look.triangles if isinstance(placed.shape, Mesh) else None
-        add_triangles(
+        yield add_triangles(
             scene,
             f"{node.name}/shape{k}",
             triangles_of(placed.shape, budget),

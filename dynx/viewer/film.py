@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from dynx.files.writing import write_bytes
 from dynx.model.geometry import Shape
 from dynx.model.geometry.links import Colour
+from dynx.model.geometry.visible_shapes import link_shapes
 from dynx.spatial.scalar import Floats
 from dynx.viewer.colours import SKY_BLUE
 from dynx.viewer.library import Image
 from dynx.viewer.motion import Motion
 from dynx.viewer.page import VIEW_DIRECTION
 from dynx.world.camera import Camera, cast_rays
-from dynx.world.camera.drawing import DrawnShape, link_shapes
+from dynx.world.camera.drawing import DrawnShape
 from dynx.world.camera.picture import png_bytes
 
 PICTURES_PER_SECOND = 12.5
@@ -103,7 +104,7 @@ def _shapes(motion: Motion) -> Iterator[tuple[str, Shape, Colour, Floats]]:
     """Yield the shapes of every part with the name of the part; those of a fixed body in the world."""
     for robot, model in motion.robots.items():
         for link in model.links:
-            for shape, rgba, T in link_shapes(model, link.name):
+            for shape, rgba, T in link_shapes(model.geometry, link.name):
                 yield f"{robot}/{link.name}", shape, rgba, T
     for body in motion.bodies:
         pose = np.eye(4) if body.name in motion.poses else body.pose.matrix

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dynx.backends import Backend
+from dynx.model import Model
+from dynx.rbd.link_poses import frame_poses
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_quat
 from dynx.viewer.drawn_robot import wxyz
+
+if TYPE_CHECKING:
+    from dynx.backends import Backend
 
 _RESTARTS_IN_A_DRAG = 0
 """Restarts of the solver while the handle moves: a restart would let the robot jump."""
@@ -22,14 +26,21 @@ class FrameHandle:
     """The handle on one frame; the frame, and what of its pose is kept, can be changed."""
 
     def __init__(
-        self, scene: Any, engine: Backend, frame: str, size: float, moved: Callable[[Floats, str], None]
+        self,
+        scene: Any,
+        model: Model,
+        engine: Callable[[], Backend],
+        frame: str,
+        size: float,
+        moved: Callable[[Floats, str], None],
     ) -> None:
-        """`moved(q, message)` is called with each configuration that a drag leads to."""
-        self._engine, self._moved = engine, moved
+        """`moved(q, message)` is called with each configuration that a drag leads to; `engine()` returns the
+        backend that solves for it."""
+        self._model, self._engine, self._moved = model, engine, moved
         self.frame = frame
         self.free: str | None = None
         """What of the pose is free: ``"rotation"``, ``"position"``, or None."""
-        self.q = engine.model.neutral()
+        self.q = model.neutral()
         """The configuration from which the next drag begins."""
         self._latest: Floats | None = None
         self._guard = threading.Lock()
@@ -49,7 +60,7 @@ class FrameHandle:
     def put(self, q: Floats) -> None:
         """Place the handle on the frame at a configuration (nq,)."""
         self.q = q
-        T = self._engine.forward_kinematics(q, self.frame)
+        T = dict(frame_poses(self._model, q))[self.frame]
         self._node.wxyz, self._node.position = wxyz(T[:3, :3]), T[:3, 3]
 
     def _dragged(self, event: Any) -> None:
@@ -78,7 +89,7 @@ class FrameHandle:
         return True
 
     def _solve(self, target: Floats) -> None:
-        found = self._engine.inverse_kinematics(
+        found = self._engine().inverse_kinematics(
             target, self.frame, self.q, free=self.free, max_restarts=_RESTARTS_IN_A_DRAG
         )
         self.q = found.q

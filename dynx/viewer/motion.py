@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from dynx.errors import ArgumentError
 from dynx.model import Model
+from dynx.rbd.link_poses import link_poses
 from dynx.sim import Rollout, ScenePlant
 from dynx.spatial.scalar import Floats
-from dynx.world.camera.drawing import link_poses, part_poses
+from dynx.world.camera.drawing import part_poses
 from dynx.world.comparison import EngineRun
 from dynx.world.scene import Scene, SceneBody
 from dynx.world.state import WorldState

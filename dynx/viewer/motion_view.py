@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any, NamedTuple
 
@@ -46,10 +46,13 @@ class MotionView:
         look: Look = AS_DESCRIBED,
         compare: bool = False,
         play: bool = False,
+        title: str = "",
     ) -> None:
         """With `compare` the distance between the two motions is drawn below, and a button jumps to where
         they part; otherwise the second is a reference, which can be hidden."""
         self._page, self.motion, self.ghost = page, motion, ghost
+        self.title = title or motion.name
+        """Name of what is shown."""
         self._start = float(motion.t[0])
         low, high = _extent(motion)
         self._size = max(float(np.linalg.norm(high - low)), 0.3)
@@ -78,6 +81,25 @@ class MotionView:
         """The motions that are shown at present."""
         seen = self.ghost is not None and self._ghost_drawn is not None and self._ghost_drawn.visible
         return (self.motion, self.ghost) if seen and self.ghost is not None else (self.motion,)
+
+    @property
+    def visuals(self) -> Mapping[str, Sequence[Any]]:
+        """The nodes of the visual shapes of each part of the first motion."""
+        return self.drawn.visuals
+
+    @property
+    def time(self) -> float:
+        """The time of the motions that is shown [s]."""
+        return self._start + self.timeline.time
+
+    @property
+    def duration(self) -> float | None:
+        """Length of the first motion [s]."""
+        return float(self.motion.t[-1]) - self._start
+
+    def go_to(self, time: float) -> None:
+        """Show the motions at a time after their start [s]."""
+        self.timeline.go_to(time)
 
     def _draw_ghost(self, ghost: Motion, look: Look) -> DrawnScene:
         # What never moves is the same in both.

@@ -24,6 +24,16 @@ DEFAULT_PORT = 8080
 VIEW_DIRECTION = np.array([1.0, -1.0, 0.7]) / math.sqrt(2.49)
 """Unit vector (3,) from what is seen to the camera."""
 
+_AMBIENT = 1.5
+"""Intensity of the light from all sides, where there is no light from surroundings."""
+
+NARROW = 600
+"""Width of a page below which viser lays the panel over the lower part of the picture [pixels]."""
+_COVERED = 0.6
+"""Share of the height of a narrow page that the panel covers."""
+_FARTHER = 1.25
+"""Factor of the camera's distance on a narrow page."""
+
 
 class Page:
     """A page in the browser, served until `close`.
@@ -32,9 +42,18 @@ class Page:
     """
 
     def __init__(
-        self, host: str = DEFAULT_HOST, port: int = DEFAULT_PORT, *, title: str = "dynx", dark: bool = False
+        self,
+        host: str = DEFAULT_HOST,
+        port: int = DEFAULT_PORT,
+        *,
+        title: str = "dynx",
+        dark: bool = False,
+        plain_light: bool = False,
     ) -> None:
-        """Raises ArgumentError for a port that is taken and a host that is not of this machine."""
+        """`plain_light` is what software draws fastest: two lamps and no shadows, instead of the surroundings
+        of viser, whose reflections take most of the time of a picture.
+
+        Raises ArgumentError for a port that is taken and a host that is not of this machine."""
         if not isinstance(host, str) or not host:
             raise ArgumentError(f"host is {shown(host)}; wanted an address of this machine")
         wanted = whole_number("port", port, 0)
@@ -50,6 +69,11 @@ class Page:
         # Beside the picture, not over it.
         self._server.gui.main_panel.dock_right()
         self._server.scene.set_up_direction("+z")
+        if plain_light:
+            self._server.scene.configure_environment_map(None)
+            self._server.scene.configure_default_lights(cast_shadow=False)
+            self._server.scene.add_light_ambient("/ambient_light", intensity=_AMBIENT)
+        self._server.on_client_connect(_make_room_on_narrow)
         self.lock = threading.RLock()
         """Held by whoever changes what the page shows."""
         self._ended = threading.Event()
@@ -126,6 +150,22 @@ class Page:
             f'<iframe src="{escape(self.url, quote=True)}" width="100%" height="500" '
             'style="border: 0"></iframe>'
         )
+
+
+def _make_room_on_narrow(client: Any) -> None:
+    """Move what a narrow page shows above its panel, which viser lays over the picture there."""
+    camera = client.camera
+    if camera.image_width >= NARROW:
+        return
+    target, eye = np.array(camera.look_at), np.array(camera.position)
+    away = _FARTHER * (eye - target)
+    up = np.array(camera.up_direction, dtype=np.float64)
+    up -= (up @ away) / (away @ away) * away
+    height = 2.0 * float(np.linalg.norm(away)) * math.tan(0.5 * camera.fov)
+    target = target - _COVERED * 0.5 * height * up / np.linalg.norm(up)
+    with client.atomic():
+        camera.position = tuple((target + away).tolist())
+        camera.look_at = tuple(target.tolist())
 
 
 def _free_port(host: str, port: int) -> int:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dynx.backends import Backend
+from dynx.model import Model
 from dynx.model.geometry import Sphere
+from dynx.rbd.link_poses import frame_poses, link_poses
 from dynx.spatial.scalar import Floats
 from dynx.viewer.colours import BLUE, VERMILION
 from dynx.viewer.drawn_robot import size_of, wxyz
 from dynx.viewer.triangles import triangles_of
-from dynx.world.camera.drawing import link_poses
+
+if TYPE_CHECKING:
+    from dynx.backends import Backend
 
 _LONGEST = 0.25
 """Length of the longest bar and of the longest half axis, as a share of the robot's size."""
@@ -25,9 +29,9 @@ class GravityTorques:
     for a positive torque.
     """
 
-    def __init__(self, scene: Any, engine: Backend) -> None:
-        self._engine, self._scene = engine, scene
-        self._size = size_of(engine.model)
+    def __init__(self, scene: Any, model: Model, engine: Callable[[], Backend]) -> None:
+        self._model, self._engine, self._scene = model, engine, scene
+        self._size = size_of(model)
         self._bars: Any = None
         self.shown = False
         """True while the bars are shown."""
@@ -53,8 +57,8 @@ class GravityTorques:
             self._bars.points = points
 
     def _points(self, q: Floats) -> Floats:
-        model = self._engine.model
-        tau = self._engine.gravity_torque(q)[model.nv - len(model.joint_names) :]
+        model = self._model
+        tau = self._engine().gravity_torque(q)[model.nv - len(model.joint_names) :]
         limit = model.effort_limit[model.nv - len(model.joint_names) :]
         unlimited = ~(np.isfinite(limit) & (limit > 0.0))
         largest = float(np.abs(tau[unlimited]).max(initial=0.0)) or 1.0
@@ -76,9 +80,9 @@ class Manipulability:
     same length always, so that the shape tells how far a singular configuration is.
     """
 
-    def __init__(self, scene: Any, engine: Backend) -> None:
-        self._engine, self._scene = engine, scene
-        self._size = size_of(engine.model)
+    def __init__(self, scene: Any, model: Model, engine: Callable[[], Backend]) -> None:
+        self._model, self._engine, self._scene = model, engine, scene
+        self._size = size_of(model)
         self._node: Any = None
         self.shown = False
         """True while the ellipsoid is shown."""
@@ -89,7 +93,7 @@ class Manipulability:
             self._node.visible = self.shown
         if not self.shown:
             return
-        J = self._engine.jacobian(q, frame)[:3, self._engine.model.nv - len(self._engine.model.joint_names) :]
+        J = self._engine().jacobian(q, frame)[:3, self._model.nv - len(self._model.joint_names) :]
         U, values, _ = np.linalg.svd(J)
         half = np.zeros(3)
         half[: len(values)] = values
@@ -104,4 +108,4 @@ class Manipulability:
             )
         self._node.scale = tuple((_LONGEST * self._size * np.maximum(half, 0.01)).tolist())
         self._node.wxyz = wxyz(U)
-        self._node.position = self._engine.forward_kinematics(q, frame)[:3, 3]
+        self._node.position = dict(frame_poses(self._model, q))[frame][:3, 3]

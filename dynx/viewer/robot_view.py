@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dynx.backends import backend
+from dynx.errors import DynxError
 from dynx.model import Model
 from dynx.model.configuration import checked_q
 from dynx.model.topology import longest_chain_end
@@ -18,6 +20,10 @@ from dynx.viewer.joint_sliders import JointSliders
 from dynx.viewer.marks import Marks
 from dynx.viewer.page import Page
 from dynx.viewer.robot_quantities import GravityTorques, Manipulability
+
+if TYPE_CHECKING:
+    from dynx.backends import Backend
+    from dynx.viewer.motion import Motion
 
 _FREE = {"pose": None, "position": "rotation", "rotation": "position"}
 """What the handle keeps of a frame, and what `inverse_kinematics` then leaves free."""
@@ -32,28 +38,31 @@ class RobotView:
         model: Model,
         q: Floats | None = None,
         *,
-        engine: str = DEFAULT_ENGINE,
+        engine: str | None = None,
         look: Look = AS_DESCRIBED,
         collisions: bool = False,
     ) -> None:
-        """`engine` computes inverse kinematics, torques and Jacobians; `collisions` are shown at once."""
+        """`engine` computes inverse kinematics, torques and Jacobians; `collisions` are shown at once.
+
+        The default backend is loaded when it first has to compute, so that the robot is seen sooner.
+        """
         self.model = model
         self._page = page
-        self._engine = backend(engine, model)
-        page.at_end(self._engine.close)
+        self._engine_name = engine or DEFAULT_ENGINE
+        if engine is not None:
+            _ = self._engine
         start = model.clip(model.neutral()) if q is None else checked_q(model, q, "q")
-        page.scene.add_grid("/ground", 4.0, 4.0, cell_size=0.1, section_size=0.5)
         with page.together():
             self.robot = DrawnRobot(page.scene, "/robot", model, look)
             self.robot.move(start)
         self.notes = self.robot.notes
         """Shapes that cannot be drawn, one sentence each."""
         self._marks = Marks(page.scene, self.robot)
-        self._torques = GravityTorques(page.scene, self._engine)
-        self._ellipsoid = Manipulability(page.scene, self._engine)
+        self._torques = GravityTorques(page.scene, model, lambda: self._engine)
+        self._ellipsoid = Manipulability(page.scene, model, lambda: self._engine)
         size = size_of(model)
         tip = longest_chain_end(model.links, model.joints)
-        self._handle = FrameHandle(page.scene, self._engine, tip, 0.25 * size, self._dragged)
+        self._handle = FrameHandle(page.scene, model, lambda: self._engine, tip, 0.25 * size, self._dragged)
         self._add_switches(collisions=collisions)
         self._add_frame_controls()
         self._sliders = JointSliders(page.gui, model, start, self._slid)
@@ -61,7 +70,38 @@ class RobotView:
         self._handle.put(start)
         self._show(start)
         origins = np.array([node.position for node in self.robot.links.values()])
+        # A humanoid whose base is its pelvis stands above the ground, too.
+        lowest = min(float(origins[:, 2].min()), 0.0)
+        page.scene.add_grid("/ground", 4.0, 4.0, cell_size=0.1, section_size=0.5, position=(0.0, 0.0, lowest))
         page.look_at(0.5 * (origins.min(axis=0) + origins.max(axis=0)), 1.5 * size)
+
+    @property
+    def title(self) -> str:
+        """Name of the robot."""
+        return self.model.name
+
+    @property
+    def visuals(self) -> Mapping[str, Sequence[Any]]:
+        """The nodes of the visual shapes of each link."""
+        return self.robot.visuals
+
+    @property
+    def motions(self) -> tuple[Motion, ...]:
+        """The robot as it stands."""
+        from dynx.viewer.motion import motion_of_robot
+
+        return (motion_of_robot(self.model, self.q),)
+
+    @property
+    def time(self) -> float:
+        """Zero: a robot stands still."""
+        return 0.0
+
+    duration: float | None = 0.0
+    """Zero: a robot stands still."""
+
+    def go_to(self, time: float) -> None:
+        """Show the robot as it stands."""
 
     @property
     def q(self) -> Floats:
@@ -76,10 +116,21 @@ class RobotView:
             self._handle.put(checked)
             self._show(checked)
 
+    @cached_property
+    def _engine(self) -> Backend:
+        from dynx.backends import backend
+
+        engine = backend(self._engine_name, self.model)
+        self._page.at_end(engine.close)
+        return engine
+
     def _show(self, q: Floats) -> None:
         self.robot.move(q)
-        self._torques.move(q)
-        self._ellipsoid.move(q, self._handle.frame)
+        try:
+            self._torques.move(q)
+            self._ellipsoid.move(q, self._handle.frame)
+        except DynxError as error:
+            self._message.value = str(error)
         self._code.value = f"q = np.array({q.tolist()})"
 
     def _slid(self, q: Floats) -> None:

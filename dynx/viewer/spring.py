@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from dynx.rbd.link_poses import link_poses
 from dynx.spatial.scalar import Floats
 from dynx.world import World, Wrench
-from dynx.world.camera.drawing import link_poses
 
 _FREQUENCY = 2.0 * math.pi * 1.0
 """Angular frequency [rad/s] at which a free body of the part's mass would swing on the spring."""

@@ -8,34 +8,16 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dynx.errors import ArgumentError, nearest, shown
+from dynx.errors import ArgumentError, shown
 from dynx.files.reading import checked_path
-from dynx.model import Model
 from dynx.model.configuration import whole_number
-from dynx.model.loading import load
-from dynx.sim import Rollout
 from dynx.spatial.scalar import Floats
 from dynx.viewer.controls import Controls
 from dynx.viewer.drawn_robot import Look
-from dynx.viewer.drawn_scene import DrawnScene
-from dynx.viewer.film import camera_for, picture_of, write_film, write_picture
-from dynx.viewer.motion import (
-    motion_of_reference,
-    motion_of_robot,
-    motion_of_rollout,
-    motion_of_run,
-    motion_of_state,
-)
-from dynx.viewer.motion_view import MotionView, Series
 from dynx.viewer.page import DEFAULT_HOST, DEFAULT_PORT, Page
-from dynx.viewer.recording import write_recording
-from dynx.viewer.robot_view import RobotView
+from dynx.viewer.subjects import check_options, is_world, open_subject, title_of, view_of
 from dynx.viewer.triangles import TRIANGLE_BUDGET, has_graphics_processor
-from dynx.viewer.world_view import WorldView
-from dynx.world import Scene, World
-from dynx.world.comparison import WorldComparison
 
 PICTURE_SIZE = (960, 720)
 """Width and height of an exported picture [pixels]."""
@@ -73,20 +55,22 @@ class Viewer(Controls):
         """
         whole = has_graphics_processor() if whole_meshes is None else whole_meshes
         look = Look(triangles=None if whole else TRIANGLE_BUDGET)
-        opened = _opened(shown)
+        opened: Any = open_subject(shown)
+        check_options(opened, options)
         self._dark = dark
-        self.page = Page(host, port, title=f"dynx: {_title(opened)}", dark=dark)
+        self.page = Page(host, port, title=f"dynx: {title_of(opened)}", dark=dark, plain_light=not whole)
+        if open_browser:
+            # The browser loads the page while the shapes are read.
+            webbrowser.open(self.url)
         try:
             super().__init__(self.page)
-            self.view: Any = _view(self.page, opened, look, options)
+            self.view: Any = view_of(self.page, opened, look, options)
             """A `RobotView`, `MotionView` or `WorldView`: what is shown, to be moved by the program."""
         except BaseException:
             self.page.close()
             raise
-        if isinstance(opened, World) and opened is not shown:
+        if is_world(opened) and opened is not shown:
             self.page.at_end(opened.close)
-        if open_browser:
-            webbrowser.open(self.url)
 
     @property
     def url(self) -> str:
@@ -102,7 +86,7 @@ class Viewer(Controls):
     def on_part_clicked(self, clicked: Any) -> None:
         """Call `clicked(part, origin, direction)` when a part is clicked: its name, and the ray (3,), (3,)
         from the camera through the pointer, in world axes."""
-        self.on_click(_clickable(self.view), clicked)
+        self.on_click(self.view.visuals, clicked)
 
     def screenshot(self, size: tuple[int, int] = (1280, 800), timeout: float = 60.0) -> Floats:
         """Return what the first open page shows, as colours (height, width, 3) from 0 to 255.
@@ -136,34 +120,23 @@ class Viewer(Controls):
         number of pictures drawn). Raises ArgumentError for a live world, whose motion is not known before it
         has happened, for another suffix, and for a file that cannot be written.
         """
+        from dynx.viewer.film import camera_for, picture_of, write_film, write_picture
+        from dynx.viewer.recording import write_recording
+
         view = self.view
         suffix = os.path.splitext(checked_path(path))[1].lower()
         if suffix == ".png":
-            write_picture(path, self._picture())
-            return
-        if suffix == ".gif":
-            if not isinstance(view, MotionView):
+            motions = view.motions
+            camera = camera_for(motions[0], PICTURE_SIZE)
+            write_picture(path, picture_of(motions, view.time, camera))
+        elif suffix == ".gif":
+            if not view.duration:
                 raise ArgumentError("a film is made of a rollout, or of two motions; write a picture as .png")
             write_film(path, view.motions, progress)
-            return
-        if isinstance(view, WorldView):
+        elif view.duration is None:
             raise ArgumentError("a live world cannot be exported; simulate it, and export the rollout")
-        if isinstance(view, MotionView):
-            duration = float(view.motion.t[-1] - view.motion.t[0])
-            write_recording(path, self.page, view.timeline.go_to, duration, dark=self._dark)
         else:
-            write_recording(path, self.page, lambda _: None, 0.0, dark=self._dark)
-
-    def _picture(self) -> NDArray[np.uint8]:
-        view = self.view
-        if isinstance(view, MotionView):
-            time = float(view.motion.t[0]) + view.timeline.time
-            return picture_of(view.motions, time, camera_for(view.motion, PICTURE_SIZE))
-        if isinstance(view, WorldView):
-            motion = motion_of_state(view.world.scene, view.world.state)
-        else:
-            motion = motion_of_robot(view.model, view.q)
-        return picture_of((motion,), 0.0, camera_for(motion, PICTURE_SIZE))
+            write_recording(path, self.page, view.go_to, view.duration, dark=self._dark)
 
     def wait(self, seconds: float | None = None) -> bool:
         """Wait until the page is closed, or for `seconds`; return True once it is."""
@@ -180,7 +153,7 @@ class Viewer(Controls):
         self.close()
 
     def __repr__(self) -> str:
-        return f"<Viewer of {_title(self.view)} at {self.url}{', closed' if self.page.closed else ''}>"
+        return f"<Viewer of {self.view.title} at {self.url}{', closed' if self.page.closed else ''}>"
 
     def _repr_html_(self) -> str:
         return self.page._repr_html_()
@@ -192,100 +165,3 @@ def view(shown: object, **options: Any) -> Viewer:
     The port is a free one unless `port` is given.
     """
     return Viewer(shown, **{"port": 0, **options})
-
-
-def _opened(shown_object: object) -> object:
-    if isinstance(shown_object, Model | Rollout | World | WorldComparison):
-        return shown_object
-    if isinstance(shown_object, Scene):
-        from dynx.world.registry import installed_worlds
-
-        return World(shown_object, installed_worlds()[0])
-    if isinstance(shown_object, tuple | list):
-        if len(shown_object) == 2 and all(isinstance(each, Rollout) for each in shown_object):
-            return tuple(shown_object)
-        raise ArgumentError(f"shown is {shown(shown_object)}; wanted one object, or two rollouts")
-    if isinstance(shown_object, str | os.PathLike | bytes):
-        return load(shown_object)
-    raise ArgumentError(
-        f"shown is of type {type(shown_object).__name__}; wanted a robot, a Rollout, two of them, a "
-        "WorldComparison, a World or a Scene"
-    )
-
-
-def _view(
-    page: Page, opened: object, look: Look, options: dict[str, Any]
-) -> RobotView | MotionView | WorldView:
-    if isinstance(opened, Model):
-        _check_options("a robot", options, ("q", "engine", "collisions"))
-        return RobotView(page, opened, look=look, **options)
-    if isinstance(opened, World):
-        _check_options("a world", options, ("loads", "play", "steps"))
-        return WorldView(page, opened, look=look, **options)
-    pair = isinstance(opened, tuple)
-    _check_options("two rollouts" if pair else "a motion", options, ("play", "names") if pair else ("play",))
-    if isinstance(opened, WorldComparison):
-        first, *others = (motion_of_run(opened.scene, run) for run in opened.runs[:2])
-        return MotionView(page, first, *others, look=look, compare=bool(others), **options)
-    if isinstance(opened, Rollout):
-        motion = motion_of_rollout(opened)
-        reference = motion_of_reference(opened)
-        return MotionView(page, motion, reference, curves=_curves(opened), look=look, **options)
-    assert isinstance(opened, tuple)
-    names = options.pop("names", ("first", "second"))
-    first, second = (motion_of_rollout(each, name) for each, name in zip(opened, names, strict=True))
-    return MotionView(page, first, second, look=look, compare=True, **options)
-
-
-def _check_options(subject: str, options: dict[str, Any], known: tuple[str, ...]) -> None:
-    """Raise ArgumentError for an option that the view of `subject` does not have, or of a wrong type."""
-    for name, value in options.items():
-        if name not in known:
-            hint = "; two rollouts are compared by Viewer((a, b))" if name == "compare" else ""
-            raise ArgumentError(
-                f"no option {shown(name)} of {subject}{nearest(name, known)}; it has {', '.join(known)}{hint}"
-            )
-        if name in ("collisions", "play", "steps") and not isinstance(value, bool):
-            raise ArgumentError(f"{name} is {shown(value)}; wanted True or False")
-        if name == "loads" and value is not None and not callable(value):
-            raise ArgumentError(f"loads is of type {type(value).__name__}; wanted a function of the world")
-        if name == "names" and not (isinstance(value, tuple | list) and len(value) == 2):
-            raise ArgumentError(f"names is {shown(value)}; wanted the names of two motions")
-
-
-def _curves(rollout: Rollout) -> list[Series]:
-    names = rollout.summary().coordinates
-    curves = []
-    if rollout.reference is not None:
-        curves.append(Series("tracking error [rad or m]", rollout.t, rollout.error, names))
-    if len(rollout):
-        curves.append(Series("torque [N m or N]", rollout.t[:-1], rollout.tau, names))
-    curves.append(Series("velocity [rad/s or m/s]", rollout.t, rollout.v, names))
-    return curves
-
-
-def _clickable(view: RobotView | MotionView | WorldView) -> dict[str, list[Any]]:
-    if isinstance(view, RobotView):
-        return view.robot.visuals
-    drawn: DrawnScene = view.drawn
-    return {
-        f"{name}/{link}": nodes
-        for name, robot in drawn.robots.items()
-        for link, nodes in robot.visuals.items()
-    }
-
-
-def _title(of: object) -> str:
-    if isinstance(of, Model):
-        return of.name
-    if isinstance(of, RobotView):
-        return of.model.name
-    if isinstance(of, World):
-        return of.scene.name
-    if isinstance(of, WorldView):
-        return of.world.scene.name
-    if isinstance(of, MotionView):
-        return of.motion.name
-    if isinstance(of, Rollout):
-        return of.model.name
-    return of.scene.name if isinstance(of, WorldComparison) else "two rollouts"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from dynx.spatial.scalar import Floats
 from dynx.viewer.contact_arrows import ContactArrows
 from dynx.viewer.drawn_robot import AS_DESCRIBED, Look
 from dynx.viewer.drawn_scene import DrawnScene
+from dynx.viewer.motion import Motion, motion_of_state
 from dynx.viewer.page import Page
 from dynx.viewer.spring import Spring
 from dynx.world import World, Wrench
@@ -83,6 +84,31 @@ class WorldView:
             self._thread.start()
             if play:
                 self.play()
+
+    @property
+    def title(self) -> str:
+        """Name of the scene."""
+        return self.world.scene.name
+
+    @property
+    def visuals(self) -> Mapping[str, Sequence[Any]]:
+        """The nodes of the shapes of each part."""
+        return self.drawn.visuals
+
+    @property
+    def motions(self) -> tuple[Motion, ...]:
+        """The world in its present state."""
+        return (motion_of_state(self.world.scene, self.world.state),)
+
+    time = 0.0
+    """Time of the only frame of `motions`."""
+
+    duration: float | None = None
+    """The motion of a world is not known before it has happened."""
+
+    def go_to(self, time: float) -> None:
+        """Show the present state."""
+        self.draw()
 
     @property
     def playing(self) -> bool:

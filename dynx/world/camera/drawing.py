@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.errors import ArgumentError, DynxError
-from dynx.model import Model
-from dynx.model.geometry import Mesh, Shape, Visual
-from dynx.rbd.kinematics import body_poses
+from dynx.errors import ArgumentError
+from dynx.model.geometry import Shape
+from dynx.model.geometry.visible_shapes import link_shapes
+from dynx.rbd.link_poses import link_poses
 from dynx.spatial.scalar import Floats
-from dynx.spatial.se3 import homogeneous, inverse
+from dynx.spatial.se3 import inverse
 from dynx.world.camera.buffer import DepthBuffer
 from dynx.world.camera.picture import Picture
 from dynx.world.camera.view import Camera
@@ -28,8 +28,6 @@ AMBIENT = 0.35
 
 LAMP = np.array([-0.36, -0.48, -0.8])
 """Unit vector (3,) towards the lamp, above and to the left of the camera, in the axes of the camera."""
-
-_GREY = (0.7, 0.7, 0.7, 1.0)
 
 
 class DrawnShape(NamedTuple):
@@ -107,44 +105,12 @@ def drawn_shapes(scene: Scene, frames: dict[str, Floats]) -> Iterator[DrawnShape
     for robot in scene.robots:
         for link in robot.model.links:
             name = f"{robot.name}/{link.name}"
-            for shape, rgba, T in link_shapes(robot.model, link.name):
+            for shape, rgba, T in link_shapes(robot.model.geometry, link.name):
                 yield DrawnShape(number[name], shape, rgba, frames[name] @ T)
     for body in scene.bodies:
         for placed in body.shapes:
             T = frames[body.name] @ placed.origin.matrix
             yield DrawnShape(number[body.name], placed.shape, body.material.rgba, T)
-
-
-def link_poses(model: Model, q: Floats) -> Iterator[tuple[str, Floats]]:
-    """Yield every link with its pose in the world (..., 4, 4) at the configuration q (..., nq)."""
-    mechanism = model.mechanism
-    poses = body_poses(mechanism, mechanism.tree_q(q))
-    links = {link.name for link in model.links}
-    for frame in mechanism.frames:
-        if frame.name in links:
-            T = homogeneous(*poses[frame.body]) @ homogeneous(frame.R, frame.p)
-            yield frame.name, np.asarray(T, dtype=np.float64)
-
-
-def link_shapes(model: Model, link: str) -> Iterator[tuple[Shape, tuple[float, float, float, float], Floats]]:
-    """Yield the shapes by which a link is drawn, each with its colour and its pose in the link (4, 4)."""
-    visuals = _readable_visuals(model, link)
-    for each in visuals or model.geometry.collisions(link):
-        material = each.material if isinstance(each, Visual) else None
-        rgba = _GREY if material is None or material.rgba is None else material.rgba
-        yield each.shape, rgba, each.origin.matrix
-
-
-def _readable_visuals(model: Model, link: str) -> tuple[Visual, ...]:
-    """Return the visual shapes of a link; none where one has a fault or a mesh that cannot be read."""
-    try:
-        visuals = model.geometry.visuals(link)
-        for each in visuals:
-            if isinstance(each.shape, Mesh):
-                _ = each.shape.triangles
-    except DynxError:
-        return ()
-    return visuals
 
 
 def _light(buffer: DepthBuffer, camera: Camera) -> Floats:

@@ -13,7 +13,7 @@ from typing import Any
 from dynx.errors import ArgumentError, DescriptionError, NotInstalledError, RobotNotFoundError, nearest, shown
 from dynx.files.reading import checked_path, printable, read_file
 from dynx.files.writing import write_bytes
-from dynx.model.library import own_roots, robots
+from dynx.model.library import SCENES, own_roots, robots, scene_names
 from dynx.model.package_paths import StrPath
 from dynx.world.scene.paths import ScenePaths
 from dynx.world.scene.reading import scene_from_document
@@ -21,9 +21,6 @@ from dynx.world.scene.scene import Scene
 from dynx.world.scene.writing import scene_document
 
 SUFFIXES = (".toml", ".json")
-
-SCENES = "scenes"
-"""Folder of the scenes among the models of dynx."""
 
 
 def read_scene(source: str | os.PathLike[str], *, package_dirs: Iterable[StrPath] = ()) -> Scene:
@@ -72,11 +69,6 @@ def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
     except ImportError as error:
         raise NotInstalledError("a scene in TOML needs tomli-w: pip install 'dynx[world]'") from error
     write_bytes(file, tomli_w.dumps(document, multiline_strings=True).encode())
-
-
-def scene_names() -> tuple[str, ...]:
-    """Return the names of the scenes that come with dynx."""
-    return tuple(sorted(path.stem for root in own_roots() for path in (root / SCENES).glob("*.toml")))
 
 
 def _named(name: str) -> Path:

@@ -43,8 +43,6 @@ _OF_BULLET = ("triangles", "polylist")
 _LAYOUT = (("stride", "1"), ("offset", "0"))
 """Attributes of an <accessor> with their defaults."""
 
-_NUMBER = re.compile(r"\S+")
-
 
 def collada_points(data: bytes, *, by_bullet: bool = False) -> Floats | None:
     """Return all points of the scene (n, 3) [m]; None where the file has elements that are not supported.
@@ -235,7 +233,7 @@ def _positions(source: Element) -> Floats:
 
 
 def _numbers(element: Element) -> Floats:
-    return np.fromiter((float(each.group()) for each in _NUMBER.finditer(element.text)), np.float64)
+    return np.fromiter(map(float, element.text.split()), np.float64)
 
 
 def _all_below(root: Element) -> Iterator[Element]:

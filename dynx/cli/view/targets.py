@@ -1,0 +1,74 @@
+"""Targets of ``dynx view``: what each is, and the options that have an effect on it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+
+from dynx.errors import ArgumentError, RobotNotFoundError, nearest, shown
+from dynx.model import Model
+from dynx.model.library import scene_names
+from dynx.model.loading import load
+from dynx.model.model import Base
+
+_SCENES = (".toml", ".json")
+_ROLLOUT = ".npz"
+_OTHER_RECORDS = (".mcap", ".csv")
+
+_OPTIONS = {
+    "robot": ("--engine", "--base", "--collisions"),
+    "rollout": ("--shapes", "--play"),
+    "comparison of rollouts": ("--shapes", "--play"),
+    "scene": ("--engine", "--duration", "--dt", "--play"),
+}
+"""Options that have an effect on each kind of target."""
+
+
+def check_options(kind: str, given: Mapping[str, object]) -> None:
+    """Raise ArgumentError for an option that is given (not None) and has no effect on a kind of target."""
+    for option, value in given.items():
+        if value is not None and option not in _OPTIONS[kind]:
+            raise ArgumentError(f"{option} has no effect on a {kind}; it takes {', '.join(_OPTIONS[kind])}")
+
+
+def kind_of_targets(targets: tuple[str, ...], compare: bool) -> str:
+    """Return what the targets are, a key of `_OPTIONS`. Raises ArgumentError for targets that do not fit."""
+    kinds = [_kind_of(target) for target in targets]
+    if compare and kinds == ["rollout", "rollout"]:
+        return "comparison of rollouts"
+    if compare and kinds != ["scene"]:
+        found = " and ".join(f"{shown(t, 300)}, a {kind}" for t, kind in zip(targets, kinds, strict=True))
+        raise ArgumentError(f"--compare takes two rollouts (.npz), or one scene in two engines; got {found}")
+    if len(targets) != 1:
+        raise ArgumentError(f"{len(targets)} targets; wanted one, or two rollouts with --compare")
+    return kinds[0]
+
+
+def _kind_of(target: str) -> str:
+    suffix = os.path.splitext(target)[1].lower()
+    if suffix in _OTHER_RECORDS:
+        raise ArgumentError(
+            f"{shown(target, 300)}: a rollout is shown from .npz, as dynx sim --save FILE.npz writes it: "
+            "that has the robot and every digit"
+        )
+    if suffix == _ROLLOUT:
+        return "rollout"
+    return "scene" if suffix in _SCENES or target in scene_names() else "robot"
+
+
+def load_robot(target: str, base: Base) -> Model:
+    """Load a robot; where there is none of that name, the error names a scene with a similar one."""
+    try:
+        return load(target, base=base)
+    except RobotNotFoundError as error:
+        similar = nearest(target, scene_names())
+        if similar and os.sep not in target and "." not in target:
+            raise RobotNotFoundError(f"no robot and no scene {shown(target)}{similar}") from error
+        raise
+
+
+def single_engine(engines: tuple[str, ...] | None) -> str | None:
+    """Return the engine named, or None; ArgumentError for several."""
+    if engines is not None and len(engines) != 1:
+        raise ArgumentError(f"--engine names {len(engines)} engines; wanted one")
+    return engines[0] if engines else None
