@@ -6,7 +6,7 @@ Arguments are checked, and one sample goes straight to the engine's hook, in `Qu
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,9 +14,12 @@ from numpy.typing import ArrayLike
 from dynx.backends.evaluation import common_batch
 from dynx.backends.hooks import apply_matrix, solve_mass_matrix
 from dynx.backends.quantity_calls import ALL_FRAMES, ONE_FRAME, Forces, QuantityCalls
-from dynx.ik import IKResult, inverse_kinematics
+from dynx.ik import FrameTarget, IKOptions, IKResult, inverse_kinematics, spells_options
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, shift_jacobian
 from dynx.spatial.scalar import Floats
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 
 class Backend(QuantityCalls):
@@ -150,43 +153,20 @@ class Backend(QuantityCalls):
         dJ = self.jacobian_derivative(q, v, frame, reference=reference, point=point)
         return apply_matrix(J, a) + apply_matrix(dJ, v)
 
+    @spells_options
     def inverse_kinematics(
         self,
-        target: ArrayLike,
-        frame: str,
+        target: ArrayLike | Mapping[str, ArrayLike] | Sequence[FrameTarget],
+        frame: str | None = None,
         q0: ArrayLike | None = None,
-        *,
-        free: str | None = None,
-        point: ArrayLike | None = None,
-        position_tolerance: float = 1e-6,
-        rotation_tolerance: float = 1e-6,
-        max_iterations: int = 50,
-        max_restarts: int = 200,
-        rng: np.random.Generator | int | None = 0,
-        method: str = "dynx",
-        all_solutions: bool = False,
-        given: Mapping[str, float] | None = None,
+        **options: Unpack[IKOptions],
     ) -> IKResult:
         """Return the configuration that brings `frame` to `target`: a pose (..., 4, 4) or position (..., 3).
 
-        `dynx.ik.inverse_kinematics` describes the options.
+        Several frames have targets ``{name: target}`` or a list of `dynx.ik.FrameTarget`.
+        `dynx.ik.inverse_kinematics` describes the targets, and `dynx.ik.Options` the options.
         """
-        return inverse_kinematics(
-            self,
-            target,
-            frame,
-            q0,
-            free=free,
-            point=point,
-            position_tolerance=position_tolerance,
-            rotation_tolerance=rotation_tolerance,
-            max_iterations=max_iterations,
-            max_restarts=max_restarts,
-            rng=rng,
-            method=method,
-            all_solutions=all_solutions,
-            given=given,
-        )
+        return inverse_kinematics(self, target, frame, q0, **options)
 
     # -- dynamics -----------------------------------------------------------------------------
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,10 +23,9 @@ from dynx.backends.quantity_calls import Forces, Key
 from dynx.compiled.arguments import BatchArguments
 from dynx.compiled.call import CoupledCall, KernelCall, NumericCall, write_into
 from dynx.compiled.frames import chain_of, place_of
-from dynx.compiled.ik.kernels import applies, frame_solver
-from dynx.compiled.ik.race import PoseCall
-from dynx.compiled.ik.solver import MAX_RESTARTS, FrameSolver
-from dynx.compiled.ik.step import POSES, TargetKind
+from dynx.compiled.ik.kernels import SolverKey, applies, frame_key, frame_solver, solver_key
+from dynx.compiled.ik.pose_calls import PoseCalls
+from dynx.compiled.ik.solver import FrameSolver
 from dynx.compiled.kernels import (
     ON_CHAINS,
     chain_kernel,
@@ -36,7 +35,7 @@ from dynx.compiled.kernels import (
 )
 from dynx.compiled.looped.kernels import LOOPED, looped_kernel
 from dynx.compiled.simplification import has_physical_inertias, simplify_mechanism
-from dynx.ik import IKResult, Problem, SearchLimits
+from dynx.ik import FrameTarget, IKOptions, IKResult, Problem, spells_options
 from dynx.model import Model
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
 from dynx.simd.image import COMPILE_LOCK
@@ -45,10 +44,10 @@ from dynx.simd.target import compiler_version, host
 from dynx.simd.threads import checked_threads
 from dynx.spatial.scalar import Floats
 
-Call = Callable[..., Floats]
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
-MAX_POSE_CALLS = 16
-"""Most combinations of a frame and options for which single poses have a call of their own."""
+Call = Callable[..., Floats]
 
 
 class CompiledBackend(Backend):
@@ -79,8 +78,8 @@ class CompiledBackend(Backend):
         self._eliminates = self._uncoupled or has_physical_inertias(self._mechanism)
         self._calls: dict[object, KernelCall | NumericCall | CoupledCall] = {}
         self._chain_kernels: dict[object, Kernel] = {}
-        self._ik_solvers: dict[tuple[str, TargetKind], FrameSolver] = {}
-        self._pose_calls: dict[object, PoseCall] = {}
+        self._ik_solvers: dict[SolverKey, FrameSolver] = {}
+        self._pose_calls = PoseCalls()
         # The same calls under the arguments of the public methods, which saves looking up names.
         self._public_calls: dict[object, Call] = {}
 
@@ -93,7 +92,7 @@ class CompiledBackend(Backend):
         # Calls in progress on other threads keep a reference to their kernels until they return.
         with COMPILE_LOCK:
             self._public_calls, self._calls, self._chain_kernels = {}, {}, {}
-            self._ik_solvers, self._pose_calls = {}, {}
+            self._ik_solvers, self._pose_calls = {}, PoseCalls()
 
     # -- with `out` ---------------------------------------------------------------------------
 
@@ -198,81 +197,42 @@ class CompiledBackend(Backend):
             M += self._joint_terms.armature
         return M
 
+    @spells_options
     def inverse_kinematics(
         self,
-        target: ArrayLike,
-        frame: str,
+        target: ArrayLike | Mapping[str, ArrayLike] | Sequence[FrameTarget],
+        frame: str | None = None,
         q0: ArrayLike | None = None,
-        *,
-        free: str | None = None,
-        point: ArrayLike | None = None,
-        position_tolerance: float = 1e-6,
-        rotation_tolerance: float = 1e-6,
-        max_iterations: int = 50,
-        max_restarts: int = 200,
-        rng: np.random.Generator | int | None = 0,
-        method: str = "dynx",
-        all_solutions: bool = False,
-        given: Mapping[str, float] | None = None,
+        **options: Unpack[IKOptions],
     ) -> IKResult:
         """Return the configuration that brings `frame` to `target`: a pose (..., 4, 4) or position (..., 3).
 
-        `dynx.ik.inverse_kinematics` describes the options. A kernel solves for a frame that 1 to 24 joints
-        move, on a fixed base, with at most 10,000 restarts; otherwise the solver of the other backends does.
+        `dynx.ik.inverse_kinematics` describes the targets, and `dynx.ik.Options` the options. A kernel solves
+        for one frame that 1 to 24 joints move, on a fixed base, with at most 10,000 restarts; otherwise the
+        solver of the other backends does.
         """
-        call: PoseCall | None = None
-        key = None
-        counts = (type(max_iterations), type(max_restarts))
-        searches = not all_solutions and given is None
-        if searches and q0 is None and point is None and isinstance(rng, int) and counts == (int, int):
-            tolerances = (position_tolerance, rotation_tolerance)
-            # A truth value equals a number, but is no seed.
-            key = (frame, free, *tolerances, max_iterations, max_restarts, rng, type(rng), method)
-            try:
-                call = self._pose_calls.get(key)
-            except TypeError:
-                key = None
-            found = None if call is None else call(target)
+        call = self._pose_calls.find(frame, options)
+        if call is not None:
+            found = call(target, q0)
             if found is not None:
                 return found
-        found = super().inverse_kinematics(
-            target,
-            frame,
-            q0,
-            free=free,
-            point=point,
-            position_tolerance=position_tolerance,
-            rotation_tolerance=rotation_tolerance,
-            max_iterations=max_iterations,
-            max_restarts=max_restarts,
-            rng=rng,
-            method=method,
-            all_solutions=all_solutions,
-            given=given,
-        )
-        if key is not None and call is None and free is None and method == "dynx" and isinstance(rng, int):
-            solver = self._ik_solvers.get((frame, POSES))
-            if solver is not None:
-                if len(self._pose_calls) >= MAX_POSE_CALLS:
-                    self._pose_calls = {}
-                limits = SearchLimits(position_tolerance, rotation_tolerance, max_iterations, max_restarts)
-                self._pose_calls[key] = solver.pose_call(limits, rng)
+        found = super().inverse_kinematics(target, frame, q0, **options)
+        if call is None and isinstance(frame, str):
+            self._pose_calls.store(frame, options, self._ik_solvers.get(frame_key(frame)), self.model)
         return found
 
     def solve_inverse_kinematics(self, problem: Problem) -> IKResult | None:
         """Solve a checked problem by a kernel; return None if none applies (`dynx.compiled.ik.kernels`)."""
         self._arguments.refuse_closed()
-        key = (problem.frame, TargetKind.of(problem))
+        if not applies(problem):
+            return None
+        key = solver_key(problem)
         solver = self._ik_solvers.get(key)
         if solver is None:
-            if not applies(self.model, problem):
-                return None
             with COMPILE_LOCK:
                 solver = self._ik_solvers.get(key)
                 if solver is None:
-                    solver = self._ik_solvers[key] = frame_solver(self, *key, self._threads)
-        elif problem.limits.max_restarts > MAX_RESTARTS:
-            return None
+                    solver = self._ik_solvers[key] = frame_solver(self, problem, self._threads)
         return solver.solve(problem, self)
 
     # -- kernels ------------------------------------------------------------------------------

@@ -5,18 +5,26 @@ so that every backend can offer `inverse_kinematics` as one of its quantities.
 """
 
 from dynx.ik.closed_form import ClosedForm, IKSolutions, closed_form
-from dynx.ik.problem import Problem, improved
+from dynx.ik.frame_target import FrameTarget
+from dynx.ik.options import IKOptions, Options, spells_options
+from dynx.ik.problem import Problem, Requirement, improved
+from dynx.ik.reach import proofs
 from dynx.ik.result import IKResult
-from dynx.ik.search import Kinematics, SearchLimits
+from dynx.ik.search import SearchLimits
 from dynx.ik.solver import inverse_kinematics
 from dynx.ik.targets import Targets, checked_targets, is_rigid
+from dynx.ik.tasks import Kinematics
 
 __all__ = [
     "ClosedForm",
+    "FrameTarget",
+    "IKOptions",
     "IKResult",
     "IKSolutions",
     "Kinematics",
+    "Options",
     "Problem",
+    "Requirement",
     "SearchLimits",
     "Targets",
     "checked_targets",
@@ -24,4 +32,6 @@ __all__ = [
     "improved",
     "inverse_kinematics",
     "is_rigid",
+    "proofs",
+    "spells_options",
 ]

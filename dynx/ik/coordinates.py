@@ -1,11 +1,13 @@
-"""Coordinates that move one frame: their indices, their bounds, and the periodicity of angles."""
+"""Coordinates that move one or several frames: their indices, bounds, and the periodicity of angles."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
+from dynx.errors import ArgumentError, shown
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
@@ -21,19 +23,26 @@ Columns = slice | list[int]
 
 
 class FrameCoordinates:
-    """The coordinates of the model that move a frame, as variables of the solver.
+    """The coordinates of the model that move one of the frames, as variables of the solver.
 
     Their values are a list of floats: first the six of a floating base, if there is one, as the body twist
-    that reaches its pose from the current one in unit time; then those of the joints between root and frame,
+    that reaches its pose from the current one in unit time; then those of the joints between root and frames,
     in the order of q. Angles whose range is a full
     turn have infinite bounds here; after the search they are shifted by full turns into their limits, as near
     as possible to the initial configuration. Coordinates of other branches of the tree never change.
     """
 
-    def __init__(self, model: Model, frame: str) -> None:
+    def __init__(self, model: Model, frames: str | Sequence[str], margin: Floats | None = None) -> None:
+        """`margin` (nq,) [rad or m] is the least distance from the position limits.
+
+        Raises ArgumentError if it leaves a joint no range.
+        """
         self._model = model
+        self.floating = model.floating
+        """Whether the first six coordinates are those of a floating base."""
         self._base = 7 if model.floating else 0
-        joints = _joints_on_path(model, frame)
+        names = [frames] if isinstance(frames, str) else frames
+        joints = sorted({k for frame in names for k in _joints_on_path(model, frame)})
         self.indices = [self._base + k for k in joints]
         """Indices in q of the joints' coordinates."""
         self._in_q = _as_slice(self.indices)
@@ -44,6 +53,8 @@ class FrameCoordinates:
         """Number of coordinates; 0 if nothing moves the frame."""
 
         self._low, self._high = model.lower[self._in_q], model.upper[self._in_q]
+        if margin is not None:
+            self._low, self._high = _reduced_range(model, self.indices, margin)
         drivers = {joint.mimic.joint for joint in model.joints if joint.mimic is not None}
         kinds = [model.coordinate_joints[k] for k in joints]
         # A joint that drives mimic joints is not periodic, because those keep moving.
@@ -67,7 +78,13 @@ class FrameCoordinates:
 
     def initial(self) -> Floats:
         """Return the neutral configuration (nq,), moved into the limits."""
-        return self._model.clip(self._model.neutral())
+        return self.clipped(self._model.clip(self._model.neutral()))
+
+    def clipped(self, q: Floats) -> Floats:
+        """Return configurations (..., nq) with these joints moved into their limits."""
+        q = np.array(q)
+        q[..., self._in_q] = np.clip(q[..., self._in_q], self._low, self._high)
+        return q
 
     def values(self, q: Floats) -> list[float]:
         """Return the coordinates at configuration q (nq,)."""
@@ -121,6 +138,20 @@ class FrameCoordinates:
         q = q.copy()
         q[self._in_q] = values
         return q
+
+
+def _reduced_range(model: Model, indices: list[int], margin: Floats) -> tuple[Floats, Floats]:
+    """Return the limits of the coordinates in q, moved inwards by the margin (nq,)."""
+    low, high = model.lower[indices] + margin[indices], model.upper[indices] - margin[indices]
+    for k in np.flatnonzero(low > high).tolist():
+        at = indices[k]
+        joint = model.coordinate_joints[at - (7 if model.floating else 0)]
+        unit = "m" if joint.type == "prismatic" else "rad"
+        raise ArgumentError(
+            f"limit_margin {margin[at]:.6g} {unit} leaves joint {shown(joint.name)} no range: its limits are "
+            f"{model.lower[at]:.6g} and {model.upper[at]:.6g} {unit}"
+        )
+    return low, high
 
 
 def _joints_on_path(model: Model, frame: str) -> list[int]:

@@ -3,25 +3,44 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from dynx.ik.residual import Residual
+from dynx.ik.axes import AxisRequirement
+from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.result import IKResult
-from dynx.ik.search import Kinematics, Search, SearchLimits
+from dynx.ik.search import Search, SearchLimits
 from dynx.ik.targets import Targets
+from dynx.ik.tasks import AxisTask, FrameTask, Kinematics, SeveralTasks, Task
 from dynx.spatial.scalar import Floats
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
-    """Targets of one frame, the starts, and the limits of the search, all checked."""
+class Requirement:
+    """Targets of one frame, and how they are to be reached."""
 
     frame: str
     targets: Targets
     point: Floats | None
     """Point (3,) of the frame that is placed, in its axes [m], or None for its origin."""
+    axes: AxisRequirement | None
+    """Weights and tolerances per axis, or None for bounds on both errors."""
+    tolerances: SearchLimits
+    """Bounds on the errors."""
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Requirements on one frame or several, the starts, and the limits of the search, all checked."""
+
+    requirements: tuple[Requirement, ...]
+    coordinates: FrameCoordinates
+    """The coordinates that move a frame, with their limits."""
+    margin: Floats | None
+    """Least distance (nq,) from the position limits [rad or m], or None."""
     q0: Floats
     """Configurations (..., nq) within limits."""
     begins_at_q0: bool
@@ -36,22 +55,62 @@ class Problem:
         """Number of samples."""
         return math.prod(self.batch)
 
+    @property
+    def frame(self) -> str:
+        """The first frame."""
+        return self.requirements[0].frame
+
+    @property
+    def targets(self) -> Targets:
+        """Targets of the first frame."""
+        return self.requirements[0].targets
+
+    @property
+    def point(self) -> Floats | None:
+        """Point of the first frame."""
+        return self.requirements[0].point
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether there is one frame, without requirements per axis."""
+        return len(self.requirements) == 1 and self.requirements[0].axes is None
+
+    def starts(self) -> Floats:
+        """Return the starts (count, nq) of all samples."""
+        q0 = self.q0
+        return np.broadcast_to(q0, (*self.batch, q0.shape[-1])).reshape(self.count, q0.shape[-1])
+
+    def tasks(
+        self, kinematics: Kinematics, chosen: NDArray[np.bool_] | None = None
+    ) -> Iterator[tuple[int, Task]]:
+        """Yield the index of each sample, or of the chosen ones (count,), and what it has to reach."""
+        rows = [requirement.targets.rows(self.batch) for requirement in self.requirements]
+        for k, sample in enumerate(zip(*rows, strict=True)):
+            if chosen is not None and not chosen[k]:
+                continue
+            tasks: list[Task] = []
+            for requirement, (position, rotation) in zip(self.requirements, sample, strict=True):
+                arguments = (
+                    kinematics, requirement.frame, requirement.point, self.coordinates,
+                    requirement.tolerances, position, rotation,
+                )  # fmt: skip
+                axes = requirement.axes
+                tasks.append(FrameTask(*arguments) if axes is None else AxisTask(*arguments, axes))
+            yield k, tasks[0] if len(tasks) == 1 else SeveralTasks(tasks)
+
 
 def improved(result: IKResult, problem: Problem, kinematics: Kinematics) -> IKResult:
     """Return the result with every target that was not reached refined to a local minimum of its error."""
-    search = Search(kinematics, problem.frame, problem.point, problem.limits)
+    search = Search(kinematics.model, problem.coordinates, problem.limits)
     nq = result.q.shape[-1]
     q, success = result.q.reshape(-1, nq).copy(), result.success.reshape(-1).copy()
     columns = (result.position_error, result.rotation_error, result.iterations, result.restarts)
     distances, angles, iterations, restarts = (column.reshape(-1).copy() for column in columns)
-    starts = np.broadcast_to(problem.q0, (*problem.batch, nq)).reshape(-1, nq)
-    targets = list(problem.targets.rows(problem.batch))
-    for k in np.flatnonzero(~success).tolist():
-        position, rotation = targets[k]
-        residual = Residual(position, rotation, problem.point)
-        best = search.evaluate(q[k], residual)
+    starts = problem.starts()
+    for k, task in problem.tasks(kinematics, ~success):
+        best = search.evaluate(q[k], task)
         best.iterations, best.restarts = int(iterations[k]), int(restarts[k])
-        found = search.improve(best, starts[k], residual)
+        found = search.improve(best, starts[k], task)
         q[k], success[k] = found.q, found.success
         distances[k], angles[k], iterations[k] = found.position_error, found.rotation_error, found.iterations
     batch = problem.batch

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dynx.files.notebook import html_table
 from dynx.spatial.scalar import Floats
+
+REACHED, UNREACHABLE, NOT_FOUND = "REACHED", "UNREACHABLE", "NOT_FOUND"
+"""Values of `IKResult.status`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +36,20 @@ class IKResult:
     """Number of solver steps, summed over all starts (...,)."""
     restarts: NDArray[np.int64]
     """Number of starts after the first (...,)."""
+    proof: NDArray[np.object_] | None = field(default=None, kw_only=True)
+    """Sentence (...,) that proves a target out of reach; empty where there is none. None stands for no
+    proof."""
+    by_frame: Mapping[str, tuple[Floats, Floats]] = field(default_factory=dict, kw_only=True)
+    """Position error (...,) [m] and rotation error (...,) [rad] of each frame, if there are several; those of
+    the result are the largest."""
+
+    @property
+    def status(self) -> Any:
+        """``"REACHED"``, ``"UNREACHABLE"`` (there is a `proof`) or ``"NOT_FOUND"``; an array (...,) of them
+        for a batch."""
+        proved = False if self.proof is None else self.proof != ""
+        found = np.where(self.success, REACHED, np.where(proved, UNREACHABLE, NOT_FOUND))
+        return found if found.ndim else str(found)
 
     @property
     def message(self) -> str:
@@ -40,15 +59,26 @@ class IKResult:
             f"and {float(np.max(self.rotation_error, initial=0.0)):.3g} rad off"
         )
         if self.success.ndim:
-            return f"{int(self.success.sum())} of {self.success.size} reached, {worst}"
+            beyond = 0 if self.proof is None else int((self.proof != "").sum())
+            proved = f", {beyond} proved out of reach" if beyond else ""
+            return f"{int(self.success.sum())} of {self.success.size} reached{proved}, {worst}"
         if self.success:
             restarts = "1 restart" if self.restarts == 1 else f"{int(self.restarts)} restarts"
             steps = "1 step" if self.iterations == 1 else f"{int(self.iterations)} steps"
             return f"reached, {worst}, after {steps} and {restarts}"
-        return (
-            f"not reached: the best of {int(self.restarts) + 1} starts is "
-            f"{float(self.position_error):.3g} m and {float(self.rotation_error):.3g} rad off"
-        )
+        why = "not found" if self.status == NOT_FOUND else "out of reach"
+        starts = "the start" if not self.restarts else f"the best of {int(self.restarts) + 1} starts"
+        off = f"{starts} is {float(self.position_error):.3g} m and {float(self.rotation_error):.3g} rad off"
+        proof = f"; {self.proof}" if self.status == UNREACHABLE else ""
+        return f"{why}: {off}{self._worst_frame()}{proof}"
+
+    def _worst_frame(self) -> str:
+        """Name the frames that are off the most."""
+        if not self.by_frame:
+            return ""
+        errors = self.by_frame.items()
+        names = [max(errors, key=lambda each: float(each[1][part]))[0] for part in (0, 1)]
+        return f" ({' and '.join(dict.fromkeys(names))})"
 
     def __repr__(self) -> str:
         shape = "" if self.success.ndim else f": q [{', '.join(f'{x:.6g}' for x in self.q)}]"

@@ -13,13 +13,12 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.levenberg_marquardt import BoundedStep
-from dynx.ik.residual import Residual
+from dynx.ik.tasks import Task, TaskError
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
@@ -35,20 +34,6 @@ REQUIRED_REDUCTION = 0.6
 """A start is abandoned unless the squared error falls below this fraction of itself over the window."""
 _MIN_RELATIVE_GAIN = 1e-12
 """Refinement of an unreached target ends when a step changes the squared error by a smaller fraction."""
-
-
-class Kinematics(Protocol):
-    """Methods of a backend that the solver uses, for one sample and a frame by name."""
-
-    @property
-    def model(self) -> Model:
-        """The robot."""
-
-    def forward_kinematics(self, q: Floats, frame: str) -> Floats:
-        """Return T_world_frame (4, 4)."""
-
-    def jacobian(self, q: Floats, frame: str, *, point: Floats | None = None) -> Floats:
-        """Return J (6, nv), linear rows first, at the frame (or a point of it) in world axes."""
 
 
 @dataclass(frozen=True)
@@ -75,52 +60,39 @@ class Candidate:
 
 
 class Search:
-    """Search for configurations that bring one frame (or a point of it) to targets."""
+    """Search for configurations that reduce the error of a task to its tolerances."""
 
-    def __init__(
-        self, kinematics: Kinematics, frame: str, point: Floats | None, limits: SearchLimits
-    ) -> None:
-        self._kinematics = kinematics
-        self._frame = frame
-        self._point = point
-        self._limits = limits
-        self._coordinates = FrameCoordinates(kinematics.model, frame)
-        self._step = BoundedStep(self._coordinates.lower, self._coordinates.upper)
+    def __init__(self, model: Model, coordinates: FrameCoordinates, limits: SearchLimits) -> None:
+        self._model, self._limits, self._coordinates = model, limits, coordinates
+        self._step = BoundedStep(coordinates.lower, coordinates.upper)
 
     def run(
-        self,
-        position: Floats | None,
-        rotation: Floats | None,
-        q0: Floats,
-        rng: np.random.Generator | int | None,
-        *,
-        begin_at_q0: bool,
+        self, task: Task, q0: Floats, rng: np.random.Generator | int | None, *, begin_at_q0: bool
     ) -> Candidate:
         """Reach the target from q0 (nq,) within limits, or from a random start; return the best result."""
-        residual = Residual(position, rotation, self._point)
         if self._coordinates.count == 0:
-            return self.evaluate(q0, residual)
+            return self.evaluate(q0, task)
         start, best, iterations = q0, None, 0
         for restarts in range(self._limits.max_restarts + 1):
             if restarts or not begin_at_q0:
                 # Created when first needed, since that takes longer than a step.
                 rng = np.random.default_rng(rng)
                 start = self._coordinates.random(q0, rng)
-            q, steps = self._descend(start, residual)
+            q, steps = self.descend(start, task)
             iterations += steps
-            found = self.evaluate(self._coordinates.nearest(q, q0), residual)
+            found = self.evaluate(self._coordinates.nearest(q, q0), task)
             if best is None or found.squared_error < best.squared_error or found.success:
                 best = found
             best.iterations, best.restarts = iterations, restarts
             if best.success:
                 return best
         assert best is not None
-        return self.improve(best, q0, residual)
+        return self.improve(best, q0, task)
 
-    def improve(self, best: Candidate, q0: Floats, residual: Residual) -> Candidate:
+    def improve(self, best: Candidate, q0: Floats, task: Task) -> Candidate:
         """Return the local minimum near the best configuration of all starts, or that if it is no better."""
-        q, steps = self._refine(best.q, residual)
-        refined = self.evaluate(self._coordinates.nearest(q, q0), residual)
+        q, steps = self._refine(best.q, task)
+        refined = self.evaluate(self._coordinates.nearest(q, q0), task)
         refined.iterations, refined.restarts = best.iterations + steps, best.restarts
         if refined.success or refined.squared_error <= best.squared_error:
             return refined
@@ -129,56 +101,47 @@ class Search:
 
     def within_limits(self, q: Floats, q0: Floats) -> Floats:
         """Return q with angles shifted by full turns to be near q0, then clipped to the limits."""
-        return self._kinematics.model.clip(self._coordinates.nearest(q, q0))
+        return self._coordinates.clipped(self._model.clip(self._coordinates.nearest(q, q0)))
 
-    def evaluate(self, q: Floats, residual: Residual) -> Candidate:
+    def evaluate(self, q: Floats, task: Task) -> Candidate:
         """Measure the errors at q by forward kinematics."""
-        placement = self._kinematics.forward_kinematics(q, self._frame)
-        error_vector, position_error, rotation_error = residual(placement)
-        success = (
-            position_error <= self._limits.position_tolerance
-            and rotation_error <= self._limits.rotation_tolerance
-        )
-        return Candidate(q, position_error, rotation_error, _half_square(error_vector), success)
+        error = task.error(q)
+        return Candidate(q, error.position, error.rotation, _half_square(error.vector), error.reached)
 
-    def _descend(self, q: Floats, residual: Residual) -> tuple[Floats, int]:
+    def descend(self, q: Floats, task: Task) -> tuple[Floats, int]:
         """Descend from one start; return (the best configuration found, the number of steps)."""
-        forward_kinematics, frame = self._kinematics.forward_kinematics, self._frame
-        position_tolerance = self._limits.position_tolerance
-        rotation_tolerance = self._limits.rotation_tolerance
         best, least = q, float("inf")
         recent: deque[float] = deque(maxlen=WINDOW)
         for steps in range(self._limits.max_iterations + 1):
-            error_vector, position_error, rotation_error = residual(forward_kinematics(q, frame))
-            if position_error <= position_tolerance and rotation_error <= rotation_tolerance:
+            error = task.error(q)
+            if error.reached:
                 return q, steps
-            squared_error = _half_square(error_vector)
+            squared_error = _half_square(error.vector)
             if squared_error < least:
                 best, least = q, squared_error
             stagnant = len(recent) == WINDOW and squared_error > REQUIRED_REDUCTION * recent[0]
             if stagnant or steps == self._limits.max_iterations:
                 break
             recent.append(squared_error)
-            q = self._step_from(q, error_vector, residual.rows, DAMPING * squared_error + MIN_DAMPING)
+            q = self._step_from(q, task, error, DAMPING * squared_error + MIN_DAMPING)
         return best, steps
 
-    def _refine(self, q: Floats, residual: Residual) -> tuple[Floats, int]:
+    def _refine(self, q: Floats, task: Task) -> tuple[Floats, int]:
         """Descend to a local minimum near q; return (the best configuration, the number of steps).
 
         Where the error stays large the full step overshoots, so a step that does not reduce the error is
         rejected and the damping raised (Marquardt 1963).
         """
-        error_vector, _, _ = residual(self._kinematics.forward_kinematics(q, self._frame))
-        squared_error, factor, steps = _half_square(error_vector), DAMPING, 0
+        error = task.error(q)
+        squared_error, factor, steps = _half_square(error.vector), DAMPING, 0
         while steps < self._limits.max_iterations:
             steps += 1
-            damping = factor * squared_error + MIN_DAMPING
-            trial = self._step_from(q, error_vector, residual.rows, damping)
-            trial_residual, _, _ = residual(self._kinematics.forward_kinematics(trial, self._frame))
-            trial_error = _half_square(trial_residual)
-            gain = squared_error - trial_error
+            trial = self._step_from(q, task, error, factor * squared_error + MIN_DAMPING)
+            trial_error = task.error(trial)
+            trial_square = _half_square(trial_error.vector)
+            gain = squared_error - trial_square
             if gain > 0.0:
-                q, error_vector, squared_error = trial, trial_residual, trial_error
+                q, error, squared_error = trial, trial_error, trial_square
                 factor *= 0.3
             else:
                 factor *= 4.0
@@ -186,14 +149,10 @@ class Search:
                 break
         return q, steps
 
-    def _step_from(self, q: Floats, error_vector: tuple[float, ...], rows: slice, damping: float) -> Floats:
+    def _step_from(self, q: Floats, task: Task, error: TaskError, damping: float) -> Floats:
         """Return the configuration after one step from q."""
-        if self._point is None:
-            J = self._kinematics.jacobian(q, self._frame)
-        else:
-            J = self._kinematics.jacobian(q, self._frame, point=self._point)
         coordinates = self._coordinates
-        y = self._step(J[rows, coordinates.columns], error_vector, coordinates.values(q), damping)
+        y = self._step(task.jacobian(q, error), error.vector, coordinates.values(q), damping)
         return coordinates.with_values(q, y)
 
 

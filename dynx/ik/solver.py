@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, ShapeError, shown
+from dynx.errors import ArgumentError, nearest, shown
+from dynx.ik.checking import checked_problem
 from dynx.ik.closed_form.checking import all_solutions as solve_closed_form
+from dynx.ik.options import IKOptions, Options, spells_options
 from dynx.ik.problem import Problem
-from dynx.ik.residual import Residual
+from dynx.ik.reach import proofs
 from dynx.ik.result import IKResult
-from dynx.ik.search import Candidate, Kinematics, Search, SearchLimits
-from dynx.ik.targets import checked_targets
-from dynx.model import Model
-from dynx.model.configuration import checked_q, checked_vector, whole_number
+from dynx.ik.search import Candidate, Search
+from dynx.ik.tasks import Kinematics
 from dynx.spatial.scalar import Floats
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from dynx.ik.frame_target import FrameTarget
 
 ProblemSolver = Callable[[Problem], "IKResult | None"]
 """Method ``solve_inverse_kinematics`` of kinematics that solve many targets at once; it returns None for a
@@ -26,45 +31,40 @@ problem that it does not apply to."""
 EngineSolver = Callable[[Floats, str, Floats], Floats]
 """Function from a pose T_world_target (4, 4), a frame and q0 (nq,) to the engine's solution q (nq,)."""
 
+METHODS = ("dynx", "engine")
+"""Values of the option `method`."""
 
+
+@spells_options
 def inverse_kinematics(
     kinematics: Kinematics,
-    target: ArrayLike,
-    frame: str,
+    target: ArrayLike | Mapping[str, ArrayLike] | Sequence[FrameTarget],
+    frame: str | None = None,
     q0: ArrayLike | None = None,
-    *,
-    free: str | None = None,
-    point: ArrayLike | None = None,
-    position_tolerance: float = 1e-6,
-    rotation_tolerance: float = 1e-6,
-    max_iterations: int = 50,
-    max_restarts: int = 200,
-    rng: np.random.Generator | int | None = 0,
-    method: str = "dynx",
-    all_solutions: bool = False,
-    given: Mapping[str, float] | None = None,
+    **options: Unpack[IKOptions],
 ) -> IKResult:
     """Find a configuration within limits that brings `frame` to `target`.
 
     `target` is a pose T_world_target (..., 4, 4), or a position (..., 3) [m] with free rotation. With
     ``free="position"`` it is a rotation (..., 3, 3), or that of a pose; with ``free="rotation"`` a position,
-    or that of a pose. `point` (3,) [m], in the axes of the frame, is the point that reaches the target
-    position instead of the origin of the frame.
+    or that of a pose. Several frames are reached at once with ``target={"left_hand": T_left, ...}``, or with
+    a list of `FrameTarget`, each with options of its own; `frame` is None then.
+
+    `dynx.ik.options.Options` describes each option, with its unit. With `free`, `weights` or tolerances along
+    axes a target need not be reached in every direction: ``free="rotation_z"`` leaves the rotation about the
+    target's z axis free (a welding torch), ``free=("position_x", "rotation")`` the position on a line.
 
     The search starts at `q0` (..., nq), moved into the limits, or at a random configuration if q0 is None.
-    Targets and q0 broadcast.
+    Targets and q0 broadcast. A start is abandoned after `max_iterations` steps, or sooner if it stagnates;
+    the search then restarts at a random configuration, up to `max_restarts` times. With a seed `rng` (the
+    default) equal calls return equal results, and each sample of a batch has the result that it has alone.
 
-    A target counts as reached within `position_tolerance` [m] and `rotation_tolerance` [rad]. A start is
-    abandoned after `max_iterations` steps, or sooner if it stagnates; the search then restarts at a random
-    configuration, up to `max_restarts` times. `rng` is a seed or a generator. With a seed (the default) equal
-    calls return equal results, and each sample of a batch has the result that it has alone.
+    Only the joints between root and frames move, and a floating base; the others stay at q0 (or at the
+    neutral configuration). Angles whose range is a full turn are returned nearest to q0.
 
-    Only the joints between root and frame move, and a floating base; the others stay at q0 (or at the neutral
-    configuration). Angles whose range is a full turn are returned nearest to q0.
-
-    `method` is ``"dynx"`` (see `dynx.ik.search`) or ``"engine"``: the backend's own solver, without restarts.
-    The result of either is checked by forward kinematics. If the target is not reached, no error is raised;
-    the result has `success` False and the best q found.
+    The result is checked by forward kinematics. If a target is not reached, no error is raised: the result
+    has the best q found, and the status UNREACHABLE if a bound on distances, heights or angles proves that no
+    configuration reaches it (`dynx.ik.reach`), otherwise NOT_FOUND.
 
     With ``all_solutions=True`` the result is an `IKSolutions` with every configuration within limits that
     reaches a pose, and the names of its branches, from the closed form (`dynx.ik.closed_form`). It exists for
@@ -72,95 +72,106 @@ def inverse_kinematics(
     further joints between root and frame, such as one of seven. Angles are those nearest to q0, or to 0. The
     options of the search have no effect then.
 
-    Raises UnknownNameError for the frame; ArgumentError (ShapeError, DTypeError, NotFiniteError) for an
-    invalid argument, and for method ``"engine"`` if the backend has no solver of its own; NoClosedFormError
-    if all solutions of an arm without a closed form are wanted, with what is missing.
+    Raises UnknownNameError for the frame or the name of an option; ArgumentError (ShapeError, DTypeError,
+    NotFiniteError) for an invalid argument, and for method ``"engine"`` if the backend has no solver of its
+    own; NoClosedFormError if all solutions of an arm without a closed form are wanted, with what is missing.
     """
-    model = kinematics.model
-    model.frame_index(frame)
-    if all_solutions:
-        if free is not None or point is not None or method != "dynx":
-            raise ArgumentError(
-                "all_solutions takes poses (..., 4, 4) of a frame, without free, point or method"
-            )
-        # The tolerances are checked like those of a search.
-        _checked_limits(position_tolerance, rotation_tolerance, max_iterations, max_restarts)
-        return solve_closed_form(kinematics, target, frame, q0, given, position_tolerance, rotation_tolerance)
-    if given is not None:
+    chosen = Options.of(options)
+    if chosen.all_solutions:
+        return _all_solutions(kinematics, target, frame, q0, chosen)
+    if chosen.given is not None:
         raise ArgumentError(
             "given has no effect without all_solutions=True; lock joints when loading instead"
         )
-    targets = checked_targets(target, free)
-    limits = _checked_limits(position_tolerance, rotation_tolerance, max_iterations, max_restarts)
-    rng = _checked_rng(rng)
-    at = None if point is None else checked_vector("point", point)
-    if at is not None and targets.positions is None:
-        raise ArgumentError("point is given in addition to free='position', with which it has no effect")
-    start = _start(model, q0)
-    try:
-        batch = np.broadcast_shapes(targets.batch, start.shape[:-1])
-    except ValueError:
-        raise ShapeError(
-            f"leading axes do not broadcast: target has {targets.batch}, q0 has {start.shape[:-1]}"
-        ) from None
-
-    problem = Problem(frame, targets, at, start, q0 is not None, batch, limits, rng)
-    if method == "dynx":
+    problem = checked_problem(kinematics.model, target, frame, q0, chosen)
+    if chosen.method == "dynx":
         solve_all: ProblemSolver | None = getattr(kinematics, "solve_inverse_kinematics", None)
         found = None if solve_all is None else solve_all(problem)
-        if found is not None:
-            return found
-    search = Search(kinematics, frame, at, limits)
-    if method == "dynx":
-
-        def solve(position: Floats | None, rotation: Floats | None, q: Floats) -> Candidate:
-            return search.run(position, rotation, q, rng, begin_at_q0=q0 is not None)
-
-    elif method == "engine":
-        is_pose = targets.positions is not None and targets.rotations is not None
-        engine_solve = _engine_solver(kinematics, not is_pose or at is not None)
-
-        def solve(position: Floats | None, rotation: Floats | None, q: Floats) -> Candidate:
-            T = np.eye(4)
-            T[:3, :3], T[:3, 3] = rotation, position
-            q_engine = engine_solve(T, frame, q)
-            # If the engine diverged, its start is the best configuration known.
-            within = search.within_limits(q_engine, q) if np.isfinite(q_engine).all() else q
-            return search.evaluate(within, Residual(position, rotation, None))
-
-    else:
-        raise ArgumentError(f"method is {shown(method)}; wanted 'dynx' or 'engine'")
-
-    if not batch:
-        one = solve(targets.positions, targets.rotations, start)
-        errors = np.array((one.position_error, one.rotation_error))
-        steps = np.array((one.iterations, one.restarts))
-        return IKResult(
-            one.q, np.asarray(one.success), errors[0, ...], errors[1, ...], steps[0, ...], steps[1, ...]
-        )
-    starts = np.broadcast_to(start, (*batch, model.nq)).reshape(math.prod(batch), model.nq)
-    candidates = [solve(p, R, q) for (p, R), q in zip(targets.rows(batch), starts, strict=True)]
-    return _result(candidates, batch, model.nq)
+        return _searched(kinematics, problem) if found is None else found
+    if chosen.method == "engine":
+        return _solved_by_engine(kinematics, problem)
+    raise ArgumentError(f"method is {shown(chosen.method)}{nearest(str(chosen.method), METHODS)}")
 
 
-def _result(found: list[Candidate], batch: tuple[int, ...], nq: int) -> IKResult:
+def _searched(kinematics: Kinematics, problem: Problem) -> IKResult:
+    """Search for each sample, one after the other."""
+    search, starts = Search(kinematics.model, problem.coordinates, problem.limits), problem.starts()
+    candidates = [
+        search.run(task, starts[k], problem.rng, begin_at_q0=problem.begins_at_q0)
+        for k, task in problem.tasks(kinematics)
+    ]
+    return _result(candidates, problem, kinematics)
+
+
+def _solved_by_engine(kinematics: Kinematics, problem: Problem) -> IKResult:
+    """Return the solutions of the engine's own solver, measured by forward kinematics."""
+    targets = problem.targets
+    is_pose = problem.is_plain and targets.positions is not None and targets.rotations is not None
+    solve = _engine_solver(kinematics, not is_pose or problem.point is not None)
+    search, starts = Search(kinematics.model, problem.coordinates, problem.limits), problem.starts()
+    candidates = []
+    for (k, task), (position, rotation) in zip(
+        problem.tasks(kinematics), targets.rows(problem.batch), strict=True
+    ):
+        T, q = np.eye(4), starts[k]
+        T[:3, :3], T[:3, 3] = rotation, position
+        q_engine = solve(T, problem.frame, q)
+        # If the engine diverged, its start is the best configuration known.
+        within = search.within_limits(q_engine, q) if np.isfinite(q_engine).all() else q
+        candidates.append(search.evaluate(within, task))
+    return _result(candidates, problem, kinematics)
+
+
+def _result(found: list[Candidate], problem: Problem, kinematics: Kinematics) -> IKResult:
+    batch = problem.batch
+    success = np.array([one.success for one in found], dtype=np.bool_).reshape(batch)
+    unreached = ~success.reshape(-1)
+    proof = proofs(problem, kinematics.model, unreached).reshape(batch) if unreached.any() else None
     return IKResult(
-        q=np.array([one.q for one in found], dtype=np.float64).reshape(*batch, nq),
-        success=np.array([one.success for one in found], dtype=np.bool_).reshape(batch),
+        q=np.array([one.q for one in found], dtype=np.float64).reshape(*batch, kinematics.model.nq),
+        success=success,
         position_error=np.array([one.position_error for one in found]).reshape(batch),
         rotation_error=np.array([one.rotation_error for one in found]).reshape(batch),
         iterations=np.array([one.iterations for one in found], dtype=np.int64).reshape(batch),
         restarts=np.array([one.restarts for one in found], dtype=np.int64).reshape(batch),
+        proof=proof,
+        by_frame=_errors_by_frame([one.q for one in found], problem, kinematics),
     )
 
 
-def _start(model: Model, q0: ArrayLike | None) -> Floats:
-    """Return q0, or the neutral configuration, moved into the limits and with a unit quaternion."""
-    q = model.neutral() if q0 is None else checked_q(model, q0, "q0")
-    q = np.minimum(np.maximum(q, model.lower), model.upper)
-    if model.floating:
-        q[..., 3:7] /= np.linalg.norm(q[..., 3:7], axis=-1, keepdims=True)
-    return q
+def _errors_by_frame(
+    q: list[Floats], problem: Problem, kinematics: Kinematics
+) -> dict[str, tuple[Floats, Floats]]:
+    """Return the errors of each frame, if there are several."""
+    if len(problem.requirements) == 1:
+        return {}
+    parts = [task.error(q[k]).rows for k, task in problem.tasks(kinematics)]
+    return {
+        requirement.frame: (
+            np.array([part[index].position for part in parts]).reshape(problem.batch),
+            np.array([part[index].rotation for part in parts]).reshape(problem.batch),
+        )
+        for index, requirement in enumerate(problem.requirements)
+    }
+
+
+def _all_solutions(
+    kinematics: Kinematics, target: Any, frame: str | None, q0: ArrayLike | None, options: Options
+) -> IKResult:
+    """Return every solution of poses of one frame, from the closed form."""
+    plain = Options(
+        position_tolerance=options.position_tolerance, rotation_tolerance=options.rotation_tolerance
+    )
+    names = ("free", "point", "weights", "axes", "limit_margin", "method")
+    if frame is None or any(getattr(options, name) is not getattr(plain, name) for name in names):
+        raise ArgumentError(
+            f"all_solutions takes poses (..., 4, 4) of a frame, without {', '.join(names[:-1])} or "
+            f"{names[-1]}"
+        )
+    kinematics.model.frame_index(frame)
+    limits = options.search_limits()
+    tolerances = (limits.position_tolerance, limits.rotation_tolerance)
+    return solve_closed_form(kinematics, target, frame, q0, options.given, *tolerances)
 
 
 def _engine_solver(kinematics: Kinematics, restricted: bool) -> EngineSolver:
@@ -174,24 +185,3 @@ def _engine_solver(kinematics: Kinematics, restricted: bool) -> EngineSolver:
         raise ArgumentError("method 'engine' takes poses (..., 4, 4) of a frame only; use method 'dynx'")
     engine_solve: EngineSolver = solver
     return engine_solve
-
-
-def _checked_limits(
-    position_tolerance: float, rotation_tolerance: float, max_iterations: int, max_restarts: int
-) -> SearchLimits:
-    for name, tolerance in (
-        ("position_tolerance", position_tolerance),
-        ("rotation_tolerance", rotation_tolerance),
-    ):
-        if not (isinstance(tolerance, int | float | np.number) and 0.0 < tolerance < math.inf):
-            raise ArgumentError(f"{name} is {shown(tolerance)}; wanted a positive number")
-    counts = whole_number("max_iterations", max_iterations, 0), whole_number("max_restarts", max_restarts, 0)
-    return SearchLimits(float(position_tolerance), float(rotation_tolerance), *counts)
-
-
-def _checked_rng(rng: np.random.Generator | int | None) -> np.random.Generator | int | None:
-    if rng is None or isinstance(rng, np.random.Generator):
-        return rng
-    if isinstance(rng, int | np.integer) and not isinstance(rng, bool) and rng >= 0:
-        return int(rng)
-    raise ArgumentError(f"rng is {shown(rng)}; wanted a generator, a seed (at least 0) or None")

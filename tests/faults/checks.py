@@ -7,10 +7,9 @@ from tests.faults.fault import Fault
 CHECKS_FAULTS = (
     Fault(
         "ik_success_by_position_alone",
-        "dynx.ik.search",
-        right="            position_error <= self._limits.position_tolerance\n"
-        "            and rotation_error <= self._limits.rotation_tolerance\n",
-        wrong="            position_error <= self._limits.position_tolerance\n",
+        "dynx.ik.tasks",
+        right="reached = distance <= position_tolerance and angle <= rotation_tolerance",
+        wrong="reached = distance <= position_tolerance",
         test_file="tests/ik/test_solutions.py",
         test="test_a_position_without_its_rotation_is_not_a_success",
     ),
@@ -24,9 +23,9 @@ CHECKS_FAULTS = (
     ),
     Fault(
         "ik_batch_starts_at_the_first_sample",
-        "dynx.ik.solver",
-        right="starts = np.broadcast_to(start, (*batch, model.nq)).reshape(math.prod(batch), model.nq)",
-        wrong="starts = np.resize(np.ravel(start)[: model.nq], (math.prod(batch), model.nq))",
+        "dynx.ik.problem",
+        right="return np.broadcast_to(q0, (*self.batch, q0.shape[-1])).reshape(self.count, q0.shape[-1])",
+        wrong="return np.resize(np.ravel(q0)[: q0.shape[-1]], (self.count, q0.shape[-1]))",
         test_file="tests/ik/test_solutions.py",
         test="test_a_batch_equals_its_samples_solved_alone",
     ),

@@ -70,7 +70,8 @@ def test_out_of_reach_the_nearest_position_is_found(beyond: float, direction: fl
         result = engine.inverse_kinematics(target, "tip", max_restarts=5)
     assert not result.success
     assert not result
-    assert "not reached" in result.message
+    assert result.status == "UNREACHABLE"
+    assert result.message.startswith("out of reach")
     assert abs(float(result.position_error) - beyond) <= TOLERANCE
 
 

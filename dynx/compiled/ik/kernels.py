@@ -19,8 +19,6 @@ from dynx.compiled.ik.starts import StartTable
 from dynx.compiled.ik.step import POSES, TargetKind, solver_iteration
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.ik import Kinematics, Problem
-from dynx.ik.coordinates import FrameCoordinates
-from dynx.model import Model
 from dynx.simd.cache import source_hash
 from dynx.simd.iteration import load_iteration
 
@@ -28,20 +26,36 @@ MAX_JOINTS = 24
 """Most joints between root and frame for which a kernel is compiled, in some seconds."""
 
 
-def applies(model: Model, problem: Problem) -> bool:
-    """Check whether a kernel solves a problem: for a fixed base, and a frame that 1 to `MAX_JOINTS` joints
-    move."""
-    if model.floating or problem.limits.max_restarts > MAX_RESTARTS:
+SolverKey = tuple[str, TargetKind, bytes]
+"""What a solver is made for: the frame, the kind of its targets, and the margin of the limits."""
+
+
+def applies(problem: Problem) -> bool:
+    """Check whether a kernel solves a problem: for one frame that 1 to `MAX_JOINTS` joints move, on a fixed
+    base."""
+    coordinates = problem.coordinates
+    if coordinates.floating or problem.limits.max_restarts > MAX_RESTARTS or not problem.is_plain:
         return False
-    return 0 < FrameCoordinates(model, problem.frame).count <= MAX_JOINTS
+    return 0 < coordinates.count <= MAX_JOINTS
 
 
-def frame_solver(kinematics: Kinematics, frame: str, kind: TargetKind, threads: int) -> FrameSolver:
-    """Return the solver for targets of this kind, whose kernel comes from the cache if it is there."""
-    model = kinematics.model
-    coordinates = FrameCoordinates(model, frame)
+def solver_key(problem: Problem) -> SolverKey:
+    """Return the key of the solver for a problem."""
+    margin = b"" if problem.margin is None else problem.margin.tobytes()
+    return problem.frame, TargetKind.of(problem), margin
+
+
+def frame_key(frame: str) -> SolverKey:
+    """Return the key of the solver for poses of a frame within the limits."""
+    return frame, POSES, b""
+
+
+def frame_solver(kinematics: Kinematics, problem: Problem, threads: int) -> FrameSolver:
+    """Return the solver for problems of this kind, whose kernel comes from the cache if it is there."""
+    model, coordinates = kinematics.model, problem.coordinates
+    frame, kind, margin = solver_key(problem)
     number = model.frame_index(frame)
-    content = (model.links, model.joints, model.extra_frames, model.base_pose, number, kind)
+    content = (model.links, model.joints, model.extra_frames, model.base_pose, number, kind, margin)
     recipe = repr((_algorithms(), content)).encode()
     kernel = load_iteration(
         recipe, lambda: solver_iteration(simplify_mechanism(model.mechanism), number, coordinates, kind)

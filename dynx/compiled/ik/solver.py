@@ -8,13 +8,26 @@ number of threads or the number of lanes.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from dynx.compiled.ik.race import PoseCall, Race
+from dynx.compiled.ik.pose_call import PoseCall
+from dynx.compiled.ik.race import Race
 from dynx.compiled.ik.starts import Starts, StartTable
 from dynx.compiled.ik.step import SETTINGS, Memory, TargetKind
-from dynx.ik import IKResult, Kinematics, Problem, SearchLimits, checked_targets, improved
+from dynx.ik import (
+    IKResult,
+    Kinematics,
+    Problem,
+    Requirement,
+    SearchLimits,
+    checked_targets,
+    improved,
+    proofs,
+)
 from dynx.ik.coordinates import FrameCoordinates
+from dynx.model import Model
 from dynx.simd.iteration import IterationKernel
 from dynx.spatial.scalar import Floats
 
@@ -52,14 +65,18 @@ class FrameSolver:
         result = IKResult(
             q, np.asarray(success), errors[0, ...], errors[1, ...], counts[0, ...], counts[1, ...]
         )
-        return result if result else improved(result, problem, kinematics)
+        if result:
+            return result
+        better = improved(result, problem, kinematics)
+        proof = proofs(problem, kinematics.model, ~better.success.reshape(-1))
+        return replace(better, proof=proof.reshape(batch))
 
-    def pose_call(self, limits: SearchLimits, rng: int) -> PoseCall:
-        """Return a function of single poses without q0, with these options."""
+    def pose_call(self, model: Model, limits: SearchLimits, rng: int) -> PoseCall:
+        """Return a function of single poses with these options."""
+        pose = Requirement("", checked_targets(np.eye(4)), None, None, limits)
         q0 = self._coordinates.initial()
-        problem = Problem("", checked_targets(np.eye(4)), None, q0, False, (), limits, rng)
-        starts = self._starts(problem)
-        return PoseCall(self._kernel, self._memory, starts, problem, self._coordinates.indices)
+        problem = Problem((pose,), self._coordinates, None, q0, False, (), limits, rng)
+        return PoseCall(self._kernel, self._memory, self._starts(problem), problem, model)
 
     def _batch(self, problem: Problem, starts: Starts) -> Floats:
         """Return the memory's results (n, n_results) of all samples."""

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from dynx.ik.closed_form.chain import checked_given
 from dynx.ik.closed_form.solutions import IKSolutions
 from dynx.ik.closed_form.solver import stored_closed_form
-from dynx.ik.search import Kinematics
+from dynx.ik.tasks import Kinematics
 from dynx.spatial.se3 import pose_error
 
 

@@ -1,0 +1,115 @@
+"""Checks of the arguments of `inverse_kinematics`, which give a `Problem`."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.errors import ArgumentError, ShapeError, shown
+from dynx.ik.axes import checked_axes
+from dynx.ik.coordinates import FrameCoordinates
+from dynx.ik.frame_target import frame_targets
+from dynx.ik.options import Options
+from dynx.ik.problem import Problem, Requirement
+from dynx.ik.targets import Targets, checked_targets
+from dynx.model import Model
+from dynx.model.configuration import checked_q, checked_vector, real_array
+from dynx.spatial.scalar import Floats
+
+
+def checked_problem(
+    model: Model, target: Any, frame: str | None, q0: ArrayLike | None, options: Options
+) -> Problem:
+    """Return the problem that arguments describe.
+
+    Raises UnknownNameError for a frame; ArgumentError, ShapeError, DTypeError or NotFiniteError for other
+    arguments.
+    """
+    wanted = frame_targets(target, frame, options)
+    for name, _, _ in wanted:
+        model.frame_index(name)
+    requirements = tuple(_requirement(name, value, each) for name, value, each in wanted)
+    limits, rng = options.search_limits(), options.checked_rng()
+    margin = _checked_margin(model, options.limit_margin)
+    frames = tuple(requirement.frame for requirement in requirements)
+    coordinates = stored_coordinates(model, frames, None if margin is None else tuple(margin.tolist()))
+    start = _start(model, q0)
+    if margin is not None:
+        start = coordinates.clipped(start)
+    shapes = [requirement.targets.batch for requirement in requirements]
+    try:
+        batch = np.broadcast_shapes(*shapes, start.shape[:-1])
+    except ValueError:
+        of_targets = shapes[0] if len(shapes) == 1 else shapes
+        raise ShapeError(
+            f"leading axes do not broadcast: target has {of_targets}, q0 has {start.shape[:-1]}"
+        ) from None
+    return Problem(requirements, coordinates, margin, start, q0 is not None, batch, limits, rng)
+
+
+def _requirement(frame: str, target: ArrayLike, options: Options) -> Requirement:
+    """Return the checked target of one frame."""
+    free, axes = checked_axes(
+        options.free, options.weights, options.position_tolerance, options.rotation_tolerance, options.axes
+    )
+    targets: Targets = checked_targets(target, _part_read(target, options) if axes is not None else free)
+    if axes is not None:
+        axes = axes.for_targets(targets)
+        if options.axes == "target" and targets.rotations is None and options.free != "rotation":
+            _refuse_axes_of_position(options)
+    point = None if options.point is None else checked_vector("point", options.point)
+    placed = targets.positions is not None and (axes is None or any(axes.weights[:3]))
+    if point is not None and not placed:
+        raise ArgumentError("point is given in addition to free='position', with which it has no effect")
+    return Requirement(frame, targets, point, axes, options.search_limits())
+
+
+def _part_read(target: ArrayLike, options: Options) -> str | None:
+    """Return what `free` says on how to read an array that may be positions or rotations."""
+    names = (options.free,) if isinstance(options.free, str) else tuple(options.free or ())
+    shape = np.shape(target)
+    if len(shape) >= 2 and shape[-2:] == (4, 4):
+        return None
+    return "position" if "position" in names else "rotation" if "rotation" in names else None
+
+
+def _refuse_axes_of_position(options: Options) -> None:
+    """Refuse rotation axes of a target that is a position."""
+    names = (options.free,) if isinstance(options.free, str) else tuple(options.free or ())
+    for name in names:
+        if name.startswith("rotation_"):
+            raise ArgumentError(
+                f"free has {shown(name)}, but the target is a position (..., 3), whose rotation is free"
+            )
+
+
+def _checked_margin(model: Model, margin: ArrayLike) -> Floats | None:
+    """Return the margin (nq,) [rad or m], or None if it is 0."""
+    if isinstance(margin, float) and margin == 0.0:
+        return None
+    array = real_array("limit_margin", margin)
+    if array.shape not in ((), (model.nq,)):
+        raise ShapeError(f"limit_margin has shape {array.shape}; wanted a number, or ({model.nq},)")
+    if not (np.isfinite(array).all() and (array >= 0.0).all()):
+        raise ArgumentError(f"limit_margin is {shown(margin)}; wanted a number of at least 0 [rad or m]")
+    return np.broadcast_to(array, (model.nq,)).copy() if array.any() else None
+
+
+def _start(model: Model, q0: ArrayLike | None) -> Floats:
+    """Return q0, or the neutral configuration, moved into the limits and with a unit quaternion."""
+    q = model.neutral() if q0 is None else checked_q(model, q0, "q0")
+    q = np.minimum(np.maximum(q, model.lower), model.upper)
+    if model.floating:
+        q[..., 3:7] /= np.linalg.norm(q[..., 3:7], axis=-1, keepdims=True)
+    return q
+
+
+@lru_cache(maxsize=64)
+def stored_coordinates(
+    model: Model, frames: tuple[str, ...], margin: tuple[float, ...] | None = None
+) -> FrameCoordinates:
+    """Return the coordinates that move frames, the same object for equal arguments."""
+    return FrameCoordinates(model, frames, None if margin is None else np.array(margin))

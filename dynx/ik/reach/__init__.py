@@ -1,0 +1,5 @@
+"""Proofs that a target is out of reach: bounds on distances and angles that hold at every configuration."""
+
+from dynx.ik.reach.proof import proofs
+
+__all__ = ["proofs"]
