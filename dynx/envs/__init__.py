@@ -14,14 +14,18 @@ from dynx.envs.registration import make_environment, register_task, register_tas
 from dynx.envs.robot.state import State
 from dynx.envs.robot.task import RobotTask
 from dynx.envs.task import Episodes, Outcome, Task
+from dynx.envs.world.scene_task import Episode
+from dynx.envs.world.task import WorldTask
 
 __all__ = [
+    "Episode",
     "Episodes",
     "Outcome",
     "RobotTask",
     "State",
     "Task",
     "TaskEnvironment",
+    "WorldTask",
     "make_environment",
     "register_task",
 ]

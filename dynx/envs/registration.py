@@ -14,6 +14,7 @@ NAMESPACE = "dynx"
 
 TASKS = {
     "CartPole-v0": "dynx.envs.tasks.cart_pole:CartPole",
+    "LunarLander-v0": "dynx.envs.tasks.lunar_lander.task:LunarLander",
 }
 """Tasks of dynx by the name of their environment, as ``"package.module:Class"``."""
 

@@ -8,7 +8,7 @@ frames, motors, the time and the check of every argument are those of `dynx.worl
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 from dynx.control.engine_motors import MotorCommand
@@ -144,6 +144,10 @@ class WorldEngine(ABC):
     def contacts(self) -> Sequence[TouchingPoint]:
         """Return the contacts of the last step with their forces; after a change of the state, those of the
         new state without forces. Pairs that do not collide are left out."""
+
+    def touching_pairs(self) -> Iterable[tuple[int, int]]:
+        """Return the pairs of colliders that have a contact in `contacts`, in any order, also repeated."""
+        return [(point.a, point.b) for point in self.contacts()]
 
     def closest(self, a: int, b: int, within: float) -> TouchingPoint | None:
         """Return the engine's own nearest points of two colliders, whether or not they may touch; None if

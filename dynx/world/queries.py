@@ -56,6 +56,13 @@ class Queries:
             for p in points
         )
 
+    def touching_pairs(self, engine: WorldEngine) -> frozenset[tuple[str, str]]:
+        """Return the names of the parts that touch, ordered by the parts of the scene."""
+        names = self._names
+        return frozenset(
+            (names[a], names[b]) if a <= b else (names[b], names[a]) for a, b in engine.touching_pairs()
+        )
+
     def closest_points(
         self, engine: WorldEngine, state: WorldState, a: str, b: str, within: float, native: bool
     ) -> tuple[ClosestPoints, ...]:

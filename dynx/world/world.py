@@ -282,6 +282,13 @@ class World:
         """
         return self._queries.contacts(self._motion.engine, part)
 
+    def touching_pairs(self) -> frozenset[tuple[str, str]]:
+        """Return the parts that have a contact in `contacts`, as pairs of names in the order of `Contact`.
+
+        This takes a fraction of the time of `contacts`, because it reads neither points nor forces.
+        """
+        return self._queries.touching_pairs(self._motion.engine)
+
     def overlaps(self) -> tuple[Overlap, ...]:
         """Return the parts that may touch and overlap at the present state by more than bodies at rest do,
         the deepest first; an engine pushes them apart, often violently."""

@@ -149,6 +149,18 @@ def test_contacts_of_one_part_are_those_of_all_that_name_it() -> None:
             world.contacts("dig")
 
 
+@pytest.mark.parametrize("engine", WORLDS)
+def test_touching_pairs_are_those_of_the_contacts(engine: str) -> None:
+    crate = box("crate", (0.2, 0.2, 0.2), mass=1.0, pose=Pose((0, 0, 0.1)))
+    ball = sphere("ball", 0.1, mass=0.5, pose=Pose((0, 0, 0.3)))
+    away = sphere("away", 0.1, mass=0.5, pose=Pose((2, 0, 1.0)))
+    with World(Scene("s", bodies=(ball, away, crate, ground())), engine) as world:
+        for _ in range(2):
+            assert world.touching_pairs() == {(contact.a, contact.b) for contact in world.contacts()}
+            world.step(20)
+        assert world.touching_pairs() == {("ball", "crate"), ("crate", "ground")}
+
+
 @pytest.mark.parametrize("base", ["fixed", "floating"])
 def test_a_robot_is_placed_by_a_pose(base: Base) -> None:
     pose = Pose((1.0, 2.0, 3.0), (0.3, -0.2, 0.5))

@@ -7,7 +7,7 @@ for.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -157,10 +157,20 @@ class MujocoWorld(WorldEngine):
 
     @_engine_errors
     def contacts(self) -> Sequence[TouchingPoint]:
+        self._find_contacts()
+        return read_contacts(self._model, self._data, self._built.geom_collider, forces=self._stepped)
+
+    @_engine_errors
+    def touching_pairs(self) -> Iterable[tuple[int, int]]:
+        self._find_contacts()
+        collider = self._built.geom_collider
+        return [(collider[a], collider[b]) for a, b in self._data.contact.geom.tolist()]
+
+    def _find_contacts(self) -> None:
+        """Find the contacts of a state that was set."""
         if not self._stepped:
             mujoco.mj_fwdPosition(self._model, self._data)
             self._placed = True
-        return read_contacts(self._model, self._data, self._built.geom_collider, forces=self._stepped)
 
     @_engine_errors
     def closest(self, a: int, b: int, within: float) -> TouchingPoint | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -31,15 +31,22 @@ class ContactReader:
 
     def contacts(self) -> list[TouchingPoint]:
         """Return the contacts that have a force, or overlap."""
-        points = self._client.call(self._client.engine.getContactPoints) or ()
         found = []
-        for point in points:
-            a, b = self._collider.get((point[1], point[3])), self._collider.get((point[2], point[4]))
-            if a is None or b is None or not (point[8] <= 0.0 or point[9] > 0.0):
-                continue
+        for a, b, point in self._touching_points():
             force, friction = (0.0, np.zeros(3)) if self.fresh else (point[9], _friction(point))
             found.append(_touching(a, b, point, force, friction))
         return found
+
+    def pairs(self) -> set[tuple[int, int]]:
+        """Return the colliders that have one of `contacts`."""
+        return {(a, b) for a, b, _ in self._touching_points()}
+
+    def _touching_points(self) -> Iterator[tuple[int, int, Sequence[Any]]]:
+        """Yield the colliders and Bullet's report of each contact."""
+        for point in self._client.call(self._client.engine.getContactPoints) or ():
+            a, b = self._collider.get((point[1], point[3])), self._collider.get((point[2], point[4]))
+            if a is not None and b is not None and (point[8] <= 0.0 or point[9] > 0.0):
+                yield a, b, point
 
     def closest(self, a: int, b: int, within: float) -> TouchingPoint | None:
         """Return the nearest points of two colliders."""

@@ -8,7 +8,7 @@ so that contacts are named by the links of the description.
 from __future__ import annotations
 
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, ClassVar
@@ -186,6 +186,10 @@ class BulletWorld(WorldEngine):
 
     def contacts(self) -> Sequence[TouchingPoint]:
         return [point for point in self._contacts.contacts() if self.layout.collides[point.a, point.b]]
+
+    def touching_pairs(self) -> Iterable[tuple[int, int]]:
+        collides = self.layout.collides
+        return [pair for pair in self._contacts.pairs() if collides[pair]]
 
     def closest(self, a: int, b: int, within: float) -> TouchingPoint | None:
         return self._contacts.closest(a, b, within)

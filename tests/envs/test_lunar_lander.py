@@ -1,0 +1,198 @@
+"""The lunar lander beside Gymnasium's: flights in Box2D, landings, rewards, and the order of its rules.
+
+``data/lunar_lander_flights.json`` has 45 steps each of ``LunarLander-v3`` (Gymnasium 1.4, Box2D 2.3.10) with
+its engines' noise, for some seeds, actions and options.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import dynx.envs  # noqa: F401  (registers the environments)
+from dynx.envs.environment import TaskEnvironment
+from dynx.envs.tasks.lunar_lander.craft import (
+    CENTER,
+    EDGES,
+    HULL_MASS,
+    LANDER,
+    LEG_LIMITS,
+    LEG_MASS,
+    clearance,
+    ground_heights,
+    lander_model,
+)
+from dynx.envs.tasks.lunar_lander.task import LunarLander
+from dynx.envs.tasks.lunar_lander.thrust import force_at_center, main_thrust, side_thrust
+from dynx.errors import ArgumentError
+from dynx.world.registry import installed_worlds
+
+FLIGHTS = json.loads((Path(__file__).parent / "data" / "lunar_lander_flights.json").read_text())
+FLIGHT_TOLERANCE = (0.001, 0.002, 0.005, 0.01, 0.005, 0.008, 0.0, 0.0)
+"""Largest difference of an observation from Gymnasium's in 45 steps. Box2D integrates in float32 and moves
+the lander when it corrects the hips; engines differ in the step in which the legs reach their limits."""
+ENGINES = installed_worlds()
+BENCH = ("pybullet", "mujoco")
+
+
+@pytest.fixture(params=ENGINES)
+def engine(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture
+def env(engine: str) -> Iterator[TaskEnvironment]:
+    with TaskEnvironment(LunarLander(), engine) as made:
+        yield made
+
+
+def land(env: TaskEnvironment, seed: int) -> tuple[float, bool]:
+    """Fly down with a controller of position and angle; return the return, and whether it terminated."""
+    observation, _ = env.reset(seed=seed)
+    total = 0.0
+    for _ in range(600):
+        x, z, vx, vz, angle, rate, right, left = (float(each) for each in observation)
+        lean = float(np.clip(0.5 * x + vx, -0.4, 0.4))
+        turn = 0.0 if right or left else 0.5 * (lean - angle) - rate
+        lift = -0.5 * vz if right or left else 0.5 * (0.55 * abs(x) - z) - 0.5 * vz
+        action = 0
+        if lift > max(abs(turn), 0.05):
+            action = 2
+        elif abs(turn) > 0.05:
+            action = 3 if turn < 0.0 else 1
+        observation, reward, terminated, _, _ = env.step(action)
+        total += reward
+        if terminated:
+            return total, True
+    return total, False
+
+
+@pytest.mark.parametrize("flight", FLIGHTS, ids=lambda each: f"seed {each['seed']}")
+def test_flights_are_those_of_gymnasium(flight: dict[str, Any], engine: str) -> None:
+    with TaskEnvironment(LunarLander(**flight["options"]), engine) as env:
+        seen = [env.reset(seed=flight["seed"])[0]]
+        for action in flight["actions"]:
+            given = action if isinstance(action, int) else np.array(action, dtype=np.float32)
+            seen.append(env.step(given)[0])
+    difference = np.abs(np.array(seen) - flight["observations"]).max(axis=0)
+    assert (difference <= FLIGHT_TOLERANCE).all(), difference
+
+
+def test_checkers_find_nothing(engine: str, recwarn: pytest.WarningsRecorder) -> None:
+    for continuous in (False, True):
+        made = gymnasium.make("dynx/LunarLander-v0", engine=engine, continuous=continuous).unwrapped
+        check_env(made, skip_render_check=True)
+        made.close()
+    assert not recwarn.list
+
+
+def test_equal_seeds_and_actions_give_the_same_bits(engine: str) -> None:
+    def episode(env: TaskEnvironment) -> list[Any]:
+        seen = [env.reset(seed=2)[0].tobytes()]
+        for k in range(110):
+            observation, reward, terminated, _, _ = env.step((0, 2, 0, 3)[k % 4])
+            seen += [observation.tobytes(), reward]
+            if terminated:
+                break
+        return seen
+
+    with TaskEnvironment(LunarLander(), engine) as first, TaskEnvironment(LunarLander(), engine) as second:
+        expected = episode(first)
+        first.reset(seed=5)
+        assert episode(first) == expected
+        assert episode(second) == expected
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_a_controller_lands_and_comes_to_rest(env: TaskEnvironment, seed: int) -> None:
+    total, terminated = land(env, seed)
+    assert terminated
+    assert total > 200.0
+
+
+def test_a_fall_is_a_crash(env: TaskEnvironment) -> None:
+    env.reset(seed=1)
+    for _ in range(300):
+        *_, reward, terminated, _, _ = env.step(1)
+        if terminated:
+            break
+    assert terminated
+    assert reward == -100.0
+
+
+def test_inertia_is_that_of_box2d() -> None:
+    """Box2D states the mass 4.81667, the centre 0.101307, the moment 0.833315 about the origin."""
+    assert pytest.approx(4.816667, abs=1e-6) == HULL_MASS
+    assert pytest.approx(0.101307, abs=1e-6) == CENTER
+    assert pytest.approx(0.0711111, abs=1e-7) == LEG_MASS
+    inertial = next(link for link in lander_model().links if link.name == "body").inertial
+    assert inertial is not None
+    assert inertial.iyy + HULL_MASS * CENTER**2 == pytest.approx(0.833315, abs=1e-6)
+
+
+def test_ground_is_flat_at_the_pad_and_bounded() -> None:
+    heights = ground_heights(np.random.default_rng(0).uniform(0.0, 20.0 / 3.0, EDGES + 2))
+    assert len(heights) == EDGES + 1
+    assert heights[4:7] == pytest.approx([-0.01 * 10.0 / 3.0] * 3)
+    assert max(heights) < 0.99 * 20.0 / 3.0 - 10.0 / 3.0
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4, -1.3])
+def test_forces_of_the_engines(angle: float) -> None:
+    up = np.array([-math.sin(angle), math.cos(angle)])
+    fx, fz, moment = main_thrust(angle, 0.5, (0.0, 0.0), 0.02)
+    assert moment == 0.0
+    assert [fx, fz] == pytest.approx(13.0 * 0.5 * 4.0 / 30.0 / 0.02 * up)
+    for power in (-1.0, 1.0):
+        fx, fz, _ = side_thrust(angle, power, (0.0, 0.0), 0.02)
+        across = power * 0.6 * 0.4 / 0.02 * np.array([math.cos(angle), math.sin(angle)])
+        assert [fx, fz] == pytest.approx(across)
+    # Upright, the side engine is above the origin: the left one turns to the left, the right one back.
+    assert side_thrust(0.0, 1.0, (0.0, 0.0), 0.02)[2] == pytest.approx(-12.0 * 14.0 / 30.0)
+    center = CENTER * up
+    assert force_at_center(angle, 3.0, -2.0)[2] == pytest.approx(center[0] * -2.0 - center[1] * 3.0)
+
+
+def test_throttles_have_thresholds() -> None:
+    task = LunarLander(continuous=True)
+    assert task.powers(np.array([0.0, 0.5], dtype=np.float32)) == (0.0, 0.0)
+    assert task.powers(np.array([1.0, -1.0], dtype=np.float32)) == (1.0, -1.0)
+    assert task.powers(np.array([0.5, 0.75], dtype=np.float32)) == (0.75, 0.75)
+    assert [LunarLander().powers(k) for k in range(4)] == [(0.0, 0.0), (0.0, -1.0), (1.0, 0.0), (0.0, 1.0)]
+
+
+def test_clearance_is_a_lower_bound() -> None:
+    rng = np.random.default_rng(3)
+    task = LunarLander()
+    with TaskEnvironment(task, BENCH[0]) as env:
+        env.reset(seed=7)
+        episodes: Any = env.episodes
+        memory, world = episodes.episode.memory, episodes.world
+        for _ in range(30):
+            hip = rng.uniform(*LEG_LIMITS, 2)
+            q = np.array([rng.uniform(-9, 9), rng.uniform(0.5, 4), rng.uniform(-2, 2), hip[0], -hip[1]])
+            world.set_state(robots={LANDER: (q, np.zeros(5))})
+            near = world.closest_points(LANDER, "moon", within=20.0)[0].distance
+            assert clearance(memory.heights, q.tolist(), 0.4) <= near + 1e-9
+
+
+def test_gravity_has_the_bounds_of_gymnasium() -> None:
+    with pytest.raises(ArgumentError, match="between -12 and 0"):
+        LunarLander(gravity=1.0)
+
+
+def test_pictures_show_lander_and_ground() -> None:
+    with TaskEnvironment(LunarLander(), BENCH[0], "rgb_array", width=90, height=60) as made:
+        made.reset(seed=0)
+        picture = made.render()
+    assert picture is not None
+    assert picture.shape == (60, 90, 3)
+    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 2
