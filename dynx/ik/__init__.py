@@ -7,7 +7,7 @@ so that every backend can offer `inverse_kinematics` as one of its quantities.
 from dynx.ik.closed_form import ClosedForm, IKSolutions, closed_form
 from dynx.ik.frame_target import FrameTarget
 from dynx.ik.options import IKOptions, Options, spells_options
-from dynx.ik.problem import Problem, Requirement, improved
+from dynx.ik.problem import Problem, Requirement
 from dynx.ik.reach import proofs
 from dynx.ik.result import IKResult
 from dynx.ik.search import SearchLimits
@@ -29,7 +29,6 @@ __all__ = [
     "Targets",
     "checked_targets",
     "closed_form",
-    "improved",
     "inverse_kinematics",
     "is_rigid",
     "proofs",

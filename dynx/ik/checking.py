@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, ShapeError, shown
+from dynx.errors import ArgumentError, ShapeError, nearest, shown
 from dynx.ik.axes import checked_axes
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.frame_target import frame_targets
 from dynx.ik.options import Options
 from dynx.ik.problem import Problem, Requirement
+from dynx.ik.secondary import MAXIMA, Secondary
 from dynx.ik.targets import Targets, checked_targets
 from dynx.model import Model
 from dynx.model.configuration import checked_q, checked_vector, real_array
@@ -36,10 +37,14 @@ def checked_problem(
     margin = _checked_margin(model, options.limit_margin)
     frames = tuple(requirement.frame for requirement in requirements)
     coordinates = stored_coordinates(model, frames, None if margin is None else tuple(margin.tolist()))
-    start = _start(model, q0)
+    secondary = _secondary(model, options)
+    goal = None if secondary is None else secondary.nearest
+    start = _start(model, goal if q0 is None else q0)
     if margin is not None:
         start = coordinates.clipped(start)
     shapes = [requirement.targets.batch for requirement in requirements]
+    if goal is not None:
+        shapes.append(goal.shape[:-1])
     try:
         batch = np.broadcast_shapes(*shapes, start.shape[:-1])
     except ValueError:
@@ -47,7 +52,25 @@ def checked_problem(
         raise ShapeError(
             f"leading axes do not broadcast: target has {of_targets}, q0 has {start.shape[:-1]}"
         ) from None
-    return Problem(requirements, coordinates, margin, start, q0 is not None, batch, limits, rng)
+    return Problem(requirements, coordinates, margin, start, q0 is not None, batch, limits, rng, secondary)
+
+
+def _secondary(model: Model, options: Options) -> Secondary | None:
+    """Return what solutions are chosen by, or None."""
+    goal = options.nearest
+    if goal is None and options.maximize is None:
+        return None
+    if goal is not None and options.maximize is not None:
+        raise ArgumentError("nearest and maximize are both given; a choice has one objective")
+    if options.method != "dynx":
+        raise ArgumentError("nearest and maximize need method 'dynx'")
+    if goal is None:
+        if options.maximize not in MAXIMA:
+            raise ArgumentError(
+                f"maximize is {shown(options.maximize)}{nearest(str(options.maximize), MAXIMA)}"
+            )
+        return Secondary(None, options.maximize)
+    return Secondary(checked_q(model, goal, "nearest"), None)
 
 
 def _requirement(frame: str, target: ArrayLike, options: Options) -> Requirement:

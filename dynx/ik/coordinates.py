@@ -102,6 +102,21 @@ class FrameCoordinates:
         changed[self._in_q] = to
         return changed
 
+    @property
+    def joint_limits(self) -> tuple[Floats, Floats]:
+        """Lower and upper limits of the joints, which may be infinite."""
+        return self._low, self._high
+
+    def joint_values(self, q: Floats) -> Floats:
+        """Return the values of the joints at configuration q (nq,)."""
+        return q[self._in_q]
+
+    def with_joints_of(self, q: Floats, other: Floats) -> Floats:
+        """Return the configuration q (nq,) with these joints at their values in `other`, within limits."""
+        changed: Floats = q.copy()
+        changed[self._in_q] = np.clip(other[self._in_q], self._low, self._high)
+        return changed
+
     def random(self, q0: Floats, rng: np.random.Generator) -> Floats:
         """Return q0 with its joints drawn uniformly within their limits; the base does not move.
 

@@ -28,6 +28,8 @@ class IKOptions(TypedDict, total=False):
     rotation_tolerance: ArrayLike
     axes: str
     limit_margin: ArrayLike
+    nearest: ArrayLike | None
+    maximize: str | None
     max_iterations: int
     max_restarts: int
     rng: np.random.Generator | int | None
@@ -57,6 +59,12 @@ class Options:
     coincide when it is reached, or of the ``"world"``, as always for positions (..., 3)."""
     limit_margin: ArrayLike = 0.0
     """Least distance from the position limits [rad or m]: one number, or one for each coordinate (nq,)."""
+    nearest: ArrayLike | None = None
+    """Configurations (..., nq): of several solutions the one whose joints have the least distance (root of
+    the sum of squares [rad, m]) is returned, and redundant joints come as near as the target permits."""
+    maximize: str | None = None
+    """``"manipulability"`` (square root of det J J') or ``"limit_distance"`` (joints at the middle of their
+    ranges): what the choice among solutions and the redundant joints make great."""
     max_iterations: int = 50
     """Most steps of each start."""
     max_restarts: int = 200

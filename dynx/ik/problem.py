@@ -7,12 +7,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dynx.ik.axes import AxisRequirement
 from dynx.ik.coordinates import FrameCoordinates
-from dynx.ik.result import IKResult
-from dynx.ik.search import Search, SearchLimits
+from dynx.ik.search import SearchLimits
+from dynx.ik.secondary import Secondary
 from dynx.ik.targets import Targets
 from dynx.ik.tasks import AxisTask, FrameTask, Kinematics, SeveralTasks, Task
 from dynx.spatial.scalar import Floats
@@ -49,6 +48,8 @@ class Problem:
     """Leading axes of targets and q0, broadcast."""
     limits: SearchLimits
     rng: np.random.Generator | int | None
+    secondary: Secondary | None = None
+    """What solutions are chosen by, if there is a choice."""
 
     @property
     def count(self) -> int:
@@ -80,14 +81,10 @@ class Problem:
         q0 = self.q0
         return np.broadcast_to(q0, (*self.batch, q0.shape[-1])).reshape(self.count, q0.shape[-1])
 
-    def tasks(
-        self, kinematics: Kinematics, chosen: NDArray[np.bool_] | None = None
-    ) -> Iterator[tuple[int, Task]]:
-        """Yield the index of each sample, or of the chosen ones (count,), and what it has to reach."""
+    def tasks(self, kinematics: Kinematics) -> Iterator[tuple[int, Task]]:
+        """Yield the index of each sample, and what it has to reach."""
         rows = [requirement.targets.rows(self.batch) for requirement in self.requirements]
         for k, sample in enumerate(zip(*rows, strict=True)):
-            if chosen is not None and not chosen[k]:
-                continue
             tasks: list[Task] = []
             for requirement, (position, rotation) in zip(self.requirements, sample, strict=True):
                 arguments = (
@@ -97,23 +94,3 @@ class Problem:
                 axes = requirement.axes
                 tasks.append(FrameTask(*arguments) if axes is None else AxisTask(*arguments, axes))
             yield k, tasks[0] if len(tasks) == 1 else SeveralTasks(tasks)
-
-
-def improved(result: IKResult, problem: Problem, kinematics: Kinematics) -> IKResult:
-    """Return the result with every target that was not reached refined to a local minimum of its error."""
-    search = Search(kinematics.model, problem.coordinates, problem.limits)
-    nq = result.q.shape[-1]
-    q, success = result.q.reshape(-1, nq).copy(), result.success.reshape(-1).copy()
-    columns = (result.position_error, result.rotation_error, result.iterations, result.restarts)
-    distances, angles, iterations, restarts = (column.reshape(-1).copy() for column in columns)
-    starts = problem.starts()
-    for k, task in problem.tasks(kinematics, ~success):
-        best = search.evaluate(q[k], task)
-        best.iterations, best.restarts = int(iterations[k]), int(restarts[k])
-        found = search.improve(best, starts[k], task)
-        q[k], success[k] = found.q, found.success
-        distances[k], angles[k], iterations[k] = found.position_error, found.rotation_error, found.iterations
-    batch = problem.batch
-    return IKResult(
-        q.reshape(*batch, nq), *(x.reshape(batch) for x in (success, distances, angles, iterations, restarts))
-    )

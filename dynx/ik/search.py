@@ -32,7 +32,7 @@ WINDOW = 3
 """Number of steps over which progress is measured."""
 REQUIRED_REDUCTION = 0.6
 """A start is abandoned unless the squared error falls below this fraction of itself over the window."""
-_MIN_RELATIVE_GAIN = 1e-12
+MIN_RELATIVE_GAIN = 1e-12
 """Refinement of an unreached target ends when a step changes the squared error by a smaller fraction."""
 
 
@@ -145,7 +145,7 @@ class Search:
                 factor *= 0.3
             else:
                 factor *= 4.0
-            if abs(gain) <= _MIN_RELATIVE_GAIN * squared_error:
+            if abs(gain) <= MIN_RELATIVE_GAIN * squared_error:
                 break
         return q, steps
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from dynx.errors import ArgumentError, nearest, shown
 from dynx.ik.checking import checked_problem
 from dynx.ik.closed_form.checking import all_solutions as solve_closed_form
 from dynx.ik.options import IKOptions, Options, spells_options
+from dynx.ik.preference import preferred_solutions
 from dynx.ik.problem import Problem
 from dynx.ik.reach import proofs
 from dynx.ik.result import IKResult
@@ -87,7 +89,13 @@ def inverse_kinematics(
     if chosen.method == "dynx":
         solve_all: ProblemSolver | None = getattr(kinematics, "solve_inverse_kinematics", None)
         found = None if solve_all is None else solve_all(problem)
-        return _searched(kinematics, problem) if found is None else found
+        if found is None:
+            found = _searched(kinematics, problem)
+        if problem.secondary is None:
+            return found
+        found = preferred_solutions(kinematics, problem, problem.secondary, found, solve_all)
+        errors = _errors_by_frame(list(found.q.reshape(problem.count, -1)), problem, kinematics)
+        return replace(found, by_frame=errors)
     if chosen.method == "engine":
         return _solved_by_engine(kinematics, problem)
     raise ArgumentError(f"method is {shown(chosen.method)}{nearest(str(chosen.method), METHODS)}")
@@ -162,7 +170,7 @@ def _all_solutions(
     plain = Options(
         position_tolerance=options.position_tolerance, rotation_tolerance=options.rotation_tolerance
     )
-    names = ("free", "point", "weights", "axes", "limit_margin", "method")
+    names = ("free", "point", "weights", "axes", "limit_margin", "nearest", "maximize", "method")
     if frame is None or any(getattr(options, name) is not getattr(plain, name) for name in names):
         raise ArgumentError(
             f"all_solutions takes poses (..., 4, 4) of a frame, without {', '.join(names[:-1])} or "

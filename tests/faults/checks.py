@@ -22,6 +22,14 @@ CHECKS_FAULTS = (
         test="test_a_target_reachable_within_limits_is_reached",
     ),
     Fault(
+        "reach_misses_an_extreme_within_the_limits",
+        "dynx.ik.reach.intervals",
+        right="    if _contains(turn, phase):\n        high = amplitude\n",
+        wrong="",
+        test_file="tests/ik/test_reach.py",
+        test="test_products_of_rotated_vectors",
+    ),
+    Fault(
         "ik_batch_starts_at_the_first_sample",
         "dynx.ik.problem",
         right="return np.broadcast_to(q0, (*self.batch, q0.shape[-1])).reshape(self.count, q0.shape[-1])",

@@ -68,10 +68,10 @@ def test_no_pose_of_a_configuration_is_proved_out_of_reach(data: st.DataObject) 
     distances, heights, angles = frame_bounds(model, frame, point)
     positions, rotations = T[:, :3, 3] + T[:, :3, :3] @ np.array(point), T[:, :3, :3]
     for distance in distances:
-        origins = T[:, :3, 3] if distance.needs_rotation else positions
-        assert_within(distance.measured(origins, rotations), distance, ROUNDING)
+        placed = positions + rotations @ distance.offset
+        assert_within(np.linalg.norm(placed - distance.start, axis=-1), distance, ROUNDING)
     for height in heights:
-        assert_within(height.measured(positions), height, ROUNDING)
+        assert_within(positions @ height.direction, height, ROUNDING)
     for angle in angles:
         assert_within(angle.measured(rotations), angle, ANGLE_ROUNDING)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 
@@ -14,17 +15,23 @@ import dynx.model.mechanism
 import dynx.rbd
 import dynx.spatial
 from dynx._version import __version__
+from dynx.compiled.ik.refinement import refinement_iteration
 from dynx.compiled.ik.solver import MAX_RESTARTS, FrameSolver
 from dynx.compiled.ik.starts import StartTable
 from dynx.compiled.ik.step import POSES, TargetKind, solver_iteration
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.ik import Kinematics, Problem
+from dynx.ik.coordinates import FrameCoordinates
+from dynx.model import Mechanism
 from dynx.simd.cache import source_hash
-from dynx.simd.iteration import load_iteration
+from dynx.simd.image import COMPILE_LOCK
+from dynx.simd.iteration import Iteration, IterationKernel, load_iteration
 
 MAX_JOINTS = 24
 """Most joints between root and frame for which a kernel is compiled, in some seconds."""
 
+
+IterationBuilder = Callable[[Mechanism, int, FrameCoordinates, TargetKind], Iteration]
 
 SolverKey = tuple[str, TargetKind, bytes]
 """What a solver is made for: the frame, the kind of its targets, and the margin of the limits."""
@@ -56,12 +63,20 @@ def frame_solver(kinematics: Kinematics, problem: Problem, threads: int) -> Fram
     frame, kind, margin = solver_key(problem)
     number = model.frame_index(frame)
     content = (model.links, model.joints, model.extra_frames, model.base_pose, number, kind, margin)
-    recipe = repr((_algorithms(), content)).encode()
-    kernel = load_iteration(
-        recipe, lambda: solver_iteration(simplify_mechanism(model.mechanism), number, coordinates, kind)
-    )
+
+    def load(iteration: IterationBuilder) -> IterationKernel:
+        recipe = repr((_algorithms(), iteration.__name__, content)).encode()
+        return load_iteration(
+            recipe, lambda: iteration(simplify_mechanism(model.mechanism), number, coordinates, kind)
+        )
+
+    @cache
+    def refinement() -> IterationKernel:
+        with COMPILE_LOCK:
+            return load(refinement_iteration)
+
     table = StartTable.of(coordinates, kinematics, frame) if kind == POSES else None
-    return FrameSolver(kernel, coordinates, kind, table, threads)
+    return FrameSolver(load(solver_iteration), refinement, coordinates, kind, table, threads)
 
 
 @cache

@@ -8,12 +8,15 @@ number of threads or the number of lanes.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dynx.compiled.ik.pose_call import PoseCall
 from dynx.compiled.ik.race import Race
+from dynx.compiled.ik.refinement import RefinementMemory
 from dynx.compiled.ik.starts import Starts, StartTable
 from dynx.compiled.ik.step import SETTINGS, Memory, TargetKind
 from dynx.ik import (
@@ -23,7 +26,6 @@ from dynx.ik import (
     Requirement,
     SearchLimits,
     checked_targets,
-    improved,
     proofs,
 )
 from dynx.ik.coordinates import FrameCoordinates
@@ -35,51 +37,86 @@ MAX_RESTARTS = 10_000
 """Most restarts for which a table of starts is made."""
 
 
+FIRST_RESTARTS = 8
+"""Restarts before a target that is not reached is compared with the bounds on the reach."""
+
+
 class FrameSolver:
     """Solver for targets of one frame that are of one kind. Safe to use from several threads."""
 
     def __init__(
         self,
         kernel: IterationKernel,
+        refinement: Callable[[], IterationKernel],
         coordinates: FrameCoordinates,
         kind: TargetKind,
         table: StartTable | None,
         threads: int,
     ) -> None:
+        """`refinement` returns the kernel for targets that are not reached, which is needed only then."""
         self._kernel, self._coordinates, self._kind, self._threads = kernel, coordinates, kind, threads
+        self._refinement = refinement
         self._memory, self._table = Memory(coordinates.count), table
         self._seeded: tuple[object, Starts | None] = (None, None)
         # Workspaces of single targets that no call uses at the moment.
         self._free: list[Race] = []
 
     def solve(self, problem: Problem, kinematics: Kinematics) -> IKResult:
-        """Solve all samples; `kinematics` improve what is best where a target is not reached."""
-        starts = self._starts(problem)
-        rows = self._race(problem, starts) if problem.count == 1 else self._batch(problem, starts)
+        """Solve all samples; the bounds on the reach of the robot of `kinematics` bound the effort.
+
+        A target that the bounds prove out of reach is not tried from more than `FIRST_RESTARTS` others.
+        """
+        starts, n, count = self._starts(problem), self._coordinates.count, problem.count
+        most, model = problem.limits.max_restarts, kinematics.model
+        unreached, proof = np.ones(count, dtype=bool), None
+        if count == 1:
+            proof = proofs(problem, model, unreached)
+        if proof is not None and not proof[0]:
+            rows = self._race(problem, starts)
+            unreached = rows[:, n + 2] == 0.0
+        else:
+            arrays = self._arrays(problem, starts)
+            first = min(most, FIRST_RESTARTS)
+            rows = self._batch(arrays, problem, starts, first)
+            unreached = rows[:, n + 2] == 0.0
+            if unreached.any():
+                proof = proofs(problem, model, unreached) if proof is None else proof
+                again = np.flatnonzero(unreached & (proof == "")) if first < most else np.array([], np.int64)
+                if len(again):
+                    chosen = [array[again] for array in arrays]
+                    rows[again] = self._batch(chosen, problem, starts, most)
+                    unreached = rows[:, n + 2] == 0.0
+        if unreached.any():
+            self._refine(rows, np.flatnonzero(unreached), problem, starts)
+        return self._result(rows, problem, proof)
+
+    def _result(self, rows: Floats, problem: Problem, proof: NDArray[np.object_] | None) -> IKResult:
         n, batch = self._coordinates.count, problem.batch
         q = np.array(np.broadcast_to(problem.q0, (*batch, problem.q0.shape[-1])))
         q[..., self._coordinates.indices] = rows[:, :n].reshape(*batch, n)
         columns = rows[:, n : n + 5].T.reshape(5, *batch)
         errors, counts = columns[:2].copy(), columns[3:].astype(np.int64)
-        success = columns[2] != 0.0
-        result = IKResult(
-            q, np.asarray(success), errors[0, ...], errors[1, ...], counts[0, ...], counts[1, ...]
+        success = np.asarray(columns[2] != 0.0)
+        return IKResult(
+            q,
+            success,
+            errors[0, ...],
+            errors[1, ...],
+            counts[0, ...],
+            counts[1, ...],
+            proof=None if success.all() or proof is None else proof.reshape(batch),
         )
-        if result:
-            return result
-        better = improved(result, problem, kinematics)
-        proof = proofs(problem, kinematics.model, ~better.success.reshape(-1))
-        return replace(better, proof=proof.reshape(batch))
 
     def pose_call(self, model: Model, limits: SearchLimits, rng: int) -> PoseCall:
-        """Return a function of single poses with these options."""
+        """Return a function of single poses with these options, which gives up after a few starts."""
+        limits = replace(limits, max_restarts=min(limits.max_restarts, FIRST_RESTARTS))
         pose = Requirement("", checked_targets(np.eye(4)), None, None, limits)
         q0 = self._coordinates.initial()
         problem = Problem((pose,), self._coordinates, None, q0, False, (), limits, rng)
         return PoseCall(self._kernel, self._memory, self._starts(problem), problem, model)
 
-    def _batch(self, problem: Problem, starts: Starts) -> Floats:
-        """Return the memory's results (n, n_results) of all samples."""
+    def _arrays(self, problem: Problem, starts: Starts) -> list[Floats]:
+        """Return the arrays (n, size) of all samples that the kernel takes."""
         n, size = problem.count, self._coordinates.count
         near = problem.q0[..., self._coordinates.indices]
         near = np.broadcast_to(near, (*problem.batch, size)).reshape(n, size)
@@ -87,15 +124,28 @@ class FrameSolver:
         first = near if problem.begins_at_q0 else starts.rows[cell + starts.offset]
         memory = np.broadcast_to(self._memory.initial, (n, len(self._memory.initial)))
         target = self._kind.rows(problem)
-        tasks = [first, memory, target, near, cell[:, None].astype(np.float64)]
+        arrays = [first, memory, target, near, cell[:, None].astype(np.float64)]
         if problem.point is not None:
-            tasks.append(np.broadcast_to(problem.point, (n, 3)))
-        rows = np.empty((n, self._memory.n_results))
-        limits = problem.limits
-        settings = [float(getattr(limits, name)) for name in SETTINGS]
-        constants = np.concatenate([settings, starts.constants])
-        self._kernel(tasks, rows, constants, starts.rows, threads=self._threads)
+            arrays.append(np.broadcast_to(problem.point, (n, 3)))
+        return arrays
+
+    def _batch(self, arrays: list[Floats], problem: Problem, starts: Starts, max_restarts: int) -> Floats:
+        """Return the memory's results (n, n_results) of the samples with these arrays."""
+        rows = np.empty((len(arrays[0]), self._memory.n_results))
+        constants = np.concatenate([_settings(problem, max_restarts), starts.constants])
+        self._kernel(arrays, rows, constants, starts.rows, threads=self._threads)
         return rows
+
+    def _refine(self, rows: Floats, at: NDArray[np.int64], problem: Problem, starts: Starts) -> None:
+        """Refine the results (n, n_results) of the samples `at` to local minima of their errors."""
+        memory = RefinementMemory(self._coordinates.count)
+        _, _, target, near, _, *point = (array[at] for array in self._arrays(problem, starts))
+        begin = np.ascontiguousarray(rows[at, : memory.n])
+        tasks = [begin, np.broadcast_to(memory.initial, (len(at), len(memory.initial))), target, near, *point]
+        refined = np.empty((len(at), memory.n_results))
+        self._refinement()(tasks, refined, _settings(problem, 0), begin, threads=self._threads)
+        refined[:, memory.n + 3] += rows[at, memory.n + 3]
+        rows[at, : memory.n_results] = refined
 
     def _race(self, problem: Problem, starts: Starts) -> Floats:
         """Return the memory's results (1, n_results) of the only sample."""
@@ -119,3 +169,9 @@ class FrameSolver:
             starts = Starts.of(self._coordinates, self._table, np.random.default_rng(rng), count)
             self._seeded = (rng, count), starts
         return starts
+
+
+def _settings(problem: Problem, max_restarts: int) -> Floats:
+    """Return the constants of the kernels, in the order of `SETTINGS`."""
+    limits = replace(problem.limits, max_restarts=max_restarts)
+    return np.array([float(getattr(limits, name)) for name in SETTINGS])

@@ -32,7 +32,7 @@ from dynx.spatial.so3 import rotate
 _ROUNDING_SHIFT = 6755399441055744.0
 """1.5 * 2^52: adding it to a double and subtracting it again rounds the double to an integer."""
 
-_HUGE = 1e300
+HUGE_ERROR = 1e300
 """Squared error before the first step."""
 
 SETTINGS = ("position_tolerance", "rotation_tolerance", "max_iterations", "max_restarts")
@@ -96,7 +96,7 @@ class Memory:
     @property
     def initial(self) -> Floats:
         """Variables of a new task."""
-        return np.array([0.0] * (self.n + 5) + [_HUGE] * (1 + WINDOW) + [0.0])
+        return np.array([0.0] * (self.n + 5) + [HUGE_ERROR] * (1 + WINDOW) + [0.0])
 
 
 def solver_iteration(
@@ -110,7 +110,7 @@ def solver_iteration(
     those of `SETTINGS`, then the numbers that the rows of starts follow from (`dynx.compiled.ik.starts`).
     """
     n = coordinates.count
-    path = _Path.of(mechanism, frame, coordinates)
+    path = FramePath.of(mechanism, frame, coordinates)
 
     def step(
         x: Array,
@@ -122,19 +122,9 @@ def solver_iteration(
         starts: Array,
         point: Array | None = None,
     ) -> dict[str, Any]:
-        R, p, J = path.pose(x)
-        if point is not None:
-            lever = rotate(R, point)
-            p = p + lever
-            J = np.concatenate([J[:3] + np.cross(J[3:].T, lever).T, J[3:]])
-        position, rotation = kind.parts(target)
-        residual = TracedResidual.of(
-            None if position is None else position - p, None if rotation is None else rotation @ R.T
-        )
-        rows = J[0 if kind.position else 3 : 6 if kind.rotation else 3]
-        squared = 0.5 * _dot(residual.vector, residual.vector)
-        new = _bounded_step(rows, residual.vector, x, coordinates, DAMPING * squared + MIN_DAMPING)
-        next_x = _shifted(new, near, coordinates)
+        residual, rows, squared = traced_residual(path, kind, x, target, point)
+        new = bounded_step(rows, residual.vector, x, coordinates, DAMPING * squared + MIN_DAMPING)
+        next_x = shifted_to(new, near, coordinates)
         return {
             "x": next_x,
             **_bookkeeping(x, memory, residual, squared, settings, _row(memory, cell, starts)),
@@ -146,6 +136,23 @@ def solver_iteration(
         sizes["point"] = 3
     shapes = {name: (size,) for name, size in sizes.items()}
     return Iteration(trace(step, shapes), ("settings", "starts"), Memory(n).n_results)
+
+
+def traced_residual(
+    path: FramePath, kind: TargetKind, x: Array, target: Array, point: Array | None
+) -> tuple[TracedResidual, Array, Any]:
+    """Return the error of the frame at x (n,), its Jacobian rows (m, n), and half its squared norm."""
+    R, p, J = path.pose(x)
+    if point is not None:
+        lever = rotate(R, point)
+        p = p + lever
+        J = np.concatenate([J[:3] + np.cross(J[3:].T, lever).T, J[3:]])
+    position, rotation = kind.parts(target)
+    residual = TracedResidual.of(
+        None if position is None else position - p, None if rotation is None else rotation @ R.T
+    )
+    rows = J[0 if kind.position else 3 : 6 if kind.rotation else 3]
+    return residual, rows, 0.5 * _dot(residual.vector, residual.vector)
 
 
 def _bookkeeping(
@@ -169,7 +176,7 @@ def _bookkeeping(
     again = ends * (1.0 - exhausted) * (1.0 - reached)
     status = select(reached, REACHED, select(ends * exhausted, GIVEN_UP, RUNNING))
     goes_on = 1.0 - maximum(ends, reached)
-    recent = [select(again, _HUGE, value) for value in (*recent[1:], squared)]
+    recent = [select(again, HUGE_ERROR, value) for value in (*recent[1:], squared)]
     own_steps = select(again, 0.0, own_steps + 1.0)
     after = [
         *best, reached, iterations + goes_on, restarts + again, least, *recent, own_steps
@@ -187,7 +194,7 @@ def _row(memory: Array, cell: Array, starts: Array) -> Any:
     return select(less(number, near), cell[0] + turned, base + number)
 
 
-def _bounded_step(J: Array, error: Array, x: Array, coordinates: FrameCoordinates, damping: Any) -> list[Any]:
+def bounded_step(J: Array, error: Array, x: Array, coordinates: FrameCoordinates, damping: Any) -> list[Any]:
     """Return the coordinates (n,) after a projected step."""
     m, n = J.shape
     gradient = error @ J
@@ -212,7 +219,7 @@ def _bounded_step(J: Array, error: Array, x: Array, coordinates: FrameCoordinate
     return found
 
 
-def _shifted(x: Sequence[Any], near: Array, coordinates: FrameCoordinates) -> Array:
+def shifted_to(x: Sequence[Any], near: Array, coordinates: FrameCoordinates) -> Array:
     """Return x with its periodic angles shifted by full turns, within their limits and nearest to `near`."""
     shifted = list(x)
     for k in coordinates.periodic:
@@ -230,7 +237,7 @@ def _shifted(x: Sequence[Any], near: Array, coordinates: FrameCoordinates) -> Ar
 
 
 @dataclass(frozen=True)
-class _Path:
+class FramePath:
     """The bodies between root and frame, and their joint positions as an affine map of the coordinates."""
 
     mechanism: Mechanism
@@ -238,7 +245,7 @@ class _Path:
     b: Floats
 
     @classmethod
-    def of(cls, mechanism: Mechanism, frame: int, coordinates: FrameCoordinates) -> _Path:
+    def of(cls, mechanism: Mechanism, frame: int, coordinates: FrameCoordinates) -> FramePath:
         placed = mechanism.frames[frame]
         bodies = tuple(reversed(ancestry(mechanism, placed.body)))
         chain = tuple(replace(mechanism.bodies[body], parent=k - 1) for k, body in enumerate(bodies))

@@ -30,6 +30,8 @@ class DistanceBound:
     start_name: str
     in_frame: Floats
     """The point in the axes of the frame (3,) [m]."""
+    placed: Floats
+    """The point (3,) [m] of the frame that the target places."""
     point_name: str
     """Name of the point; empty for the point that is placed, whose position the target prescribes."""
     allowed: Interval
@@ -39,16 +41,10 @@ class DistanceBound:
         """Whether the rotation of the target prescribes where the point is."""
         return bool(self.point_name)
 
-    def lever(self) -> float:
-        """Return by how much an error in rotation moves the point [m/rad]."""
-        return float(np.linalg.norm(self.in_frame)) if self.needs_rotation else 0.0
-
-    def measured(self, positions: Floats, rotations: Floats | None) -> Floats:
-        """Return the distance (n,) that each target prescribes."""
-        at = positions
-        if self.needs_rotation and rotations is not None:
-            at = positions + rotations @ self.in_frame
-        return np.asarray(np.linalg.norm(at - self.start, axis=-1))
+    @property
+    def offset(self) -> Floats:
+        """The point (3,) [m] from where the target places, in the axes of the frame."""
+        return self.in_frame - self.placed if self.needs_rotation else np.zeros(3)
 
     def sentence(self, value: float) -> str:
         """State the bound and what is wanted."""
@@ -67,10 +63,6 @@ class HeightBound:
     direction: Floats
     name: str
     allowed: Interval
-
-    def measured(self, positions: Floats) -> Floats:
-        """Return the coordinate (n,) of each target."""
-        return np.asarray(positions @ self.direction)
 
     def sentence(self, value: float) -> str:
         """State the bound and what is wanted."""
@@ -120,12 +112,16 @@ def distance_bounds(stations: Stations, in_frame: Floats) -> list[DistanceBound]
             travel = segment_lengths(np.zeros(3), list(stations.slides[0]))
             table = {pair: distance_sum(travel, each) for pair, each in table.items()}
             first = f"the point {_shown(chain[0])} m"
-        found.append(DistanceBound(chain[0], first, in_frame, "", table[0, n]))
+        found.append(DistanceBound(chain[0], first, in_frame, in_frame, "", table[0, n]))
         if n > 1 and not stations.slides[n]:
             last = stations.R_zero.T @ (chain[n - 1] - stations.p_zero)
             name = f"the axis of {stations.joints[-1]}"
-            found.append(DistanceBound(chain[0], first, last, name, table[0, n - 1]))
-    return found
+            found.append(DistanceBound(chain[0], first, last, in_frame, name, table[0, n - 1]))
+    distinct: dict[tuple[float, ...], DistanceBound] = {}
+    for bound in found:
+        numbers = (*bound.start, *bound.in_frame, bound.allowed.low, bound.allowed.high)
+        distinct.setdefault(tuple(round(float(x), 9) for x in numbers), bound)
+    return list(distinct.values())
 
 
 def _distances(stations: Stations, chain: Floats) -> dict[tuple[int, int], Interval]:

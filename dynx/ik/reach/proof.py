@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +19,6 @@ from dynx.ik.reach.bounds import (
     distance_bounds,
     height_bounds,
 )
-from dynx.ik.reach.intervals import Interval
 from dynx.ik.reach.stations import stations_to
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
@@ -28,7 +29,13 @@ _RELATIVE_ROUNDING = 1e-9
 _ANGLE_ROUNDING = 1e-7
 """Rounding of an angle near 0 [rad], where its cosine does not determine it."""
 
-Bounds = tuple[tuple[DistanceBound, ...], tuple[HeightBound, ...], tuple[AngleBound, ...]]
+
+class FrameBounds(NamedTuple):
+    """Bounds of one frame."""
+
+    distances: tuple[DistanceBound, ...]
+    heights: tuple[HeightBound, ...]
+    angles: tuple[AngleBound, ...]
 
 
 def proofs(problem: Problem, model: Model, unreached: NDArray[np.bool_]) -> NDArray[np.object_]:
@@ -54,41 +61,43 @@ def _of_frame(
 ) -> dict[int, str]:
     """Return sentences by index, for the targets with the indices `at`."""
     point = (0.0, 0.0, 0.0) if requirement.point is None else tuple(requirement.point.tolist())
-    distances, heights, angles = frame_bounds(model, requirement.frame, point)
+    bounds = frame_bounds(model, requirement.frame, point)
     position_slack, rotation_slack = _slacks(requirement)
     positions = _chosen(requirement.targets.positions, batch, (3,), at)
     rotations = _chosen(requirement.targets.rotations, batch, (3, 3), at)
-    excess = np.zeros(len(at))
-    sentences: dict[int, str] = {}
+    if not math.isfinite(rotation_slack):
+        rotations = None
+    excess, sentences = np.zeros(len(at)), {}
 
-    def examine(bound: DistanceBound | HeightBound | AngleBound, values: Floats, slack: float) -> None:
-        allowed: Interval = bound.allowed
-        beyond = np.maximum(values - allowed.high, allowed.low - values) - slack
-        for k in np.flatnonzero(beyond > excess).tolist():
-            excess[k] = beyond[k]
-            sentences[int(at[k])] = bound.sentence(float(values[k]))
+    def examine(
+        each: Sequence[DistanceBound | HeightBound | AngleBound], values: Floats, slack: Floats
+    ) -> None:
+        """Compare values (n, k) of the targets with k bounds, whose slacks are (k,) or (n, k)."""
+        low, high = (np.array([getattr(bound.allowed, end) for bound in each]) for end in ("low", "high"))
+        beyond = np.maximum(values - high, low - values) - slack
+        for k in np.flatnonzero((beyond > excess[:, None]).any(axis=1)).tolist():
+            worst = int(beyond[k].argmax())
+            excess[k] = beyond[k, worst]
+            sentences[int(at[k])] = each[worst].sentence(float(values[k, worst]))
 
     if positions is not None and math.isfinite(position_slack):
-        for bound in distances:
-            if not bound.needs_rotation:
-                values = bound.measured(positions, None)
-            elif rotations is not None and math.isfinite(rotation_slack):
-                values = bound.measured(positions, rotations)
-            else:
-                continue
-            turned = rotation_slack * bound.lever() if bound.needs_rotation else 0.0
-            examine(
-                bound,
-                values,
-                position_slack + turned + _RELATIVE_ROUNDING * (1.0 + float(values.max(initial=0.0))),
+        distances = [bound for bound in bounds.distances if rotations is not None or not bound.needs_rotation]
+        if distances:
+            starts, offsets = (
+                np.array([getattr(b, name) for b in distances]) for name in ("start", "offset")
             )
-        for height in heights:
-            values = height.measured(positions)
-            size = float(np.abs(values).max(initial=0.0))
-            examine(height, values, position_slack + _RELATIVE_ROUNDING * (1.0 + size))
-    if rotations is not None and math.isfinite(rotation_slack) and not sentences:
-        for angle in angles:
-            examine(angle, angle.measured(rotations), rotation_slack + _ANGLE_ROUNDING)
+            points = positions[:, None, :] - starts
+            if rotations is not None:
+                points = points + np.swapaxes(rotations @ offsets.T, 1, 2)
+            values = np.sqrt((points * points).sum(axis=-1))
+            levers = np.sqrt((offsets * offsets).sum(axis=-1)) if rotations is not None else np.zeros(1)
+            turned = levers * rotation_slack if rotations is not None else levers
+            examine(distances, values, position_slack + turned + _RELATIVE_ROUNDING * (1.0 + values))
+        values = positions @ np.array([height.direction for height in bounds.heights]).T
+        examine(bounds.heights, values, position_slack + _RELATIVE_ROUNDING * (1.0 + np.abs(values)))
+    if rotations is not None and not sentences:
+        values = np.stack([angle.measured(rotations) for angle in bounds.angles], axis=1)
+        examine(bounds.angles, values, np.asarray(rotation_slack + _ANGLE_ROUNDING))
     return sentences
 
 
@@ -116,10 +125,10 @@ def _slacks(requirement: Requirement) -> tuple[float, float]:
 
 
 @lru_cache(maxsize=64)
-def frame_bounds(model: Model, frame: str, point: tuple[float, float, float]) -> Bounds:
+def frame_bounds(model: Model, frame: str, point: tuple[float, float, float]) -> FrameBounds:
     """Return the bounds on distances, heights and angles of a frame with a point (3,) [m] in its axes."""
     stations, in_frame = stations_to(model, frame), np.array(point)
-    return (
+    return FrameBounds(
         tuple(distance_bounds(stations, in_frame)),
         tuple(height_bounds(stations, in_frame)),
         tuple(angle_bounds(stations)),

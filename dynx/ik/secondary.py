@@ -1,0 +1,156 @@
+"""Secondary objectives: being near to a configuration, manipulability, distance to the limits.
+
+Of several solutions the best is chosen, and then improved within the null space of the task (Siciliano et
+al., section 3.5.1): each step goes along the projected gradient, returns to the target by Newton steps, and
+counts only if the target is still reached and the objective is better. So the first objective never suffers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynx.ik.coordinates import FrameCoordinates
+from dynx.ik.search import Candidate, Search
+from dynx.ik.tasks import Task
+from dynx.spatial.scalar import Floats
+
+MAXIMA = ("manipulability", "limit_distance")
+"""Values of the option `maximize`."""
+
+MAX_STEPS = 60
+"""Most steps in the null space."""
+
+_LEAST_STEP = 1e-7
+"""Length of a step [rad or m] below which the objective counts as stationary."""
+
+_FIRST_STEP, _GREATEST_STEP = 0.1, 0.5
+"""Lengths of steps [rad or m]."""
+
+_DIFFERENCE = 1e-5
+"""Half the distance [rad or m] of central differences of the objective."""
+
+_RANK = 1e-6
+"""Singular values below this fraction of the largest count as zero."""
+
+Objective = Callable[[Floats], float]
+"""Function of q (nq,) that is to become small."""
+
+
+@dataclass(frozen=True, eq=False)
+class Secondary:
+    """What a solution is chosen by."""
+
+    nearest: Floats | None
+    """Configurations (..., nq) to which solutions are to be near, or None."""
+    maximize: str | None
+    """One of `MAXIMA`, or None."""
+
+    def objective(self, coordinates: FrameCoordinates, task: Task) -> Objective:
+        """Return the objective of one sample."""
+        if self.nearest is not None:
+            goal = coordinates.joint_values(self.nearest)
+            return lambda q: float(np.sum((coordinates.joint_values(q) - goal) ** 2))
+        if self.maximize == "manipulability":
+            return lambda q: -_log_manipulability(task, q)
+        low, high = coordinates.joint_limits
+        bounded = np.isfinite(low) & np.isfinite(high)
+        middle, half = 0.5 * (low + high)[bounded], 0.5 * (high - low)[bounded]
+
+        def distance_from_middle(q: Floats) -> float:
+            share = (coordinates.joint_values(q)[bounded] - middle) / np.maximum(half, 1e-12)
+            return float(np.sum(share * share))
+
+        return distance_from_middle
+
+
+def _log_manipulability(task: Task, q: Floats) -> float:
+    """Return the logarithm of Yoshikawa's measure sqrt(det(J J')) of the task at q."""
+    values = np.linalg.svd(task.jacobian(q, task.error(q)), compute_uv=False)
+    return float(np.log(np.maximum(values, 1e-12)).sum())
+
+
+def best_solution(
+    search: Search,
+    coordinates: FrameCoordinates,
+    task: Task,
+    starts: list[Floats],
+    secondary: Secondary,
+) -> Candidate:
+    """Return the best solution from starts (nq,), of which at least one reaches the target, improved."""
+    objective = secondary.objective(coordinates, task)
+    shift_to = starts[0] if secondary.nearest is None else secondary.nearest
+    solutions: list[tuple[float, Candidate]] = []
+    iterations = 0
+    for start in starts:
+        q, steps = search.descend(start, task)
+        iterations += steps
+        found = search.evaluate(coordinates.nearest(q, shift_to), task)
+        if found.success:
+            solutions.append((objective(found.q), found))
+    best = min(solutions, key=lambda each: each[0])[1]
+    found, steps = _improved(search, coordinates, task, best, objective)
+    found.iterations, found.restarts = iterations + steps, len(starts) - 1
+    return found
+
+
+def _improved(
+    search: Search, coordinates: FrameCoordinates, task: Task, begin: Candidate, objective: Objective
+) -> tuple[Candidate, int]:
+    """Return the solution after steps in the null space that lower the objective, and their number."""
+    best, value, length, steps = begin, objective(begin.q), _FIRST_STEP, 0
+    direction: Floats | None = None
+    while steps < MAX_STEPS and length > _LEAST_STEP:
+        steps += 1
+        if direction is None:
+            direction = _descent_direction(coordinates, task, best.q, objective)
+            if direction is None:
+                break
+        x = np.array(coordinates.values(best.q)) + length * direction
+        moved = np.clip(x, coordinates.lower, coordinates.upper).tolist()
+        q, _ = search.descend(coordinates.with_values(best.q, moved), task)
+        trial = search.evaluate(coordinates.nearest(q, best.q), task)
+        lower = objective(trial.q) if trial.success else np.inf
+        if lower < value:
+            best, value, direction = trial, lower, None
+            length = min(1.6 * length, _GREATEST_STEP)
+        else:
+            length *= 0.4
+    return best, steps
+
+
+def _descent_direction(
+    coordinates: FrameCoordinates, task: Task, q: Floats, objective: Objective
+) -> Floats | None:
+    """Return the unit direction (n,) of steepest descent among those that keep the task; None if there is
+    none."""
+    x = np.array(coordinates.values(q))
+    lower, upper = np.array(coordinates.lower), np.array(coordinates.upper)
+    J = task.jacobian(q, task.error(q))
+    free = np.ones(len(x), dtype=bool)
+    for _ in range(len(x)):
+        _, s, V_T = np.linalg.svd(J * free)
+        rank = int((s > _RANK * max(float(s[0]), 1e-300)).sum()) if len(s) else 0
+        null = V_T[rank:] * free
+        null = null[np.abs(null).max(axis=1) > _RANK]
+        if not len(null):
+            return None
+        slopes = [
+            objective(coordinates.with_values(q, (x + h * row).tolist()))
+            for row in null
+            for h in (_DIFFERENCE, -_DIFFERENCE)
+        ]
+        gradient = (np.array(slopes[::2]) - np.array(slopes[1::2])) / (2.0 * _DIFFERENCE)
+        direction = -gradient @ null
+        length = float(np.linalg.norm(direction))
+        if length < 1e-9:
+            return None
+        direction /= length
+        # A coordinate at a limit does not move beyond it.
+        blocked = free & (((x <= lower) & (direction < 0.0)) | ((x >= upper) & (direction > 0.0)))
+        if not blocked.any():
+            return np.asarray(direction)
+        free &= ~blocked
+    return None
