@@ -2,20 +2,27 @@
 
 Every kind is compiled in a process of its own with an empty cache, by the public function that needs it, and
 on small data. A time is that of the processors, of all threads together, so that other load on the machine
-changes it little; it includes tracing and one evaluation. The largest are printed first. A time above
-`MAX_SECONDS` ends the command with 1.
+changes it little; it includes tracing and one evaluation. Rows are printed as they are measured, robots with
+most joints first, and the `LONGEST` longest again at the end. A time above `MAX_SECONDS`, or an error other
+than dynx's refusal of a robot, ends the command with 1.
+
+``--record FILE`` adds each row to a file when it is measured. Rows that the file has are not measured again,
+so an interrupted run continues where it stopped; use it with one state of the source.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import multiprocessing
 import os
 import resource
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
 from functools import partial
+from math import ceil
+from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import process_time
 from typing import Any
@@ -29,6 +36,7 @@ from dynx.backends import backend
 from dynx.backends.quantities import QUANTITIES
 from dynx.compiled.derivatives import Derivatives
 from dynx.compiled.parametric import ParametricDynamics, parametric
+from dynx.errors import DescriptionError, DynxError
 from dynx.model import Model
 from dynx.model.library import robots
 from dynx.model.loading import load
@@ -37,6 +45,9 @@ from dynx.sim import Noise, Push, simulate, simulate_batch
 
 MAX_SECONDS = 10.0
 """Longest time that a compilation may take [s]."""
+
+LONGEST = 20
+"""Number of rows that are printed again at the end."""
 
 LARGEST_ROBOTS = (
     "tiago_dual",
@@ -71,13 +82,22 @@ Kind = Callable[[Model], object]
 
 @dataclass(frozen=True)
 class Compilation:
-    """A kind of kernel, a robot, and what its compilation took; seconds are None if it was ended."""
+    """A kind of kernel, a robot, and what its compilation took; seconds are None if it did not finish."""
 
     robot: str
     kind: str
     seconds: float | None
     mebibytes: float
     problem: str = ""
+
+    @property
+    def failed(self) -> bool:
+        """True if it took too long or did not finish."""
+        return self.seconds is None or self.seconds > MAX_SECONDS
+
+    def __str__(self) -> str:
+        taken = "ended" if self.seconds is None else f"{self.seconds:.2f}"
+        return f"{taken:>8} {self.mebibytes:6.0f}  {self.robot:36}{self.kind}  {self.problem}".rstrip()
 
 
 def _state(model: Model) -> dict[str, Any]:
@@ -192,69 +212,111 @@ KINDS: dict[str, Kind] = {
 
 
 def measure(robot: str, model: Model, kind: str, limit: float) -> Compilation:
-    """Compile a kind of kernel in a new process, which is ended after `limit` seconds."""
+    """Compile a kind of kernel in a new process, which is ended after `limit` seconds of processor time."""
     receiving, sending = multiprocessing.Pipe(duplex=False)
-    process = multiprocessing.Process(target=_compile, args=(model, kind, sending))
+    process = multiprocessing.Process(target=_compile, args=(model, kind, limit, sending))
     process.start()
     sending.close()
     try:
-        seconds, mebibytes, problem = receiving.recv() if receiving.poll(limit) else (None, 0.0, "ended")
+        seconds, mebibytes, problem = receiving.recv()
     except EOFError:
-        seconds, mebibytes, problem = None, 0.0, "the process ended without a result"
+        process.join()
+        seconds, mebibytes = None, 0.0
+        problem = f"ended after {limit:g} s, or by signal {-(process.exitcode or 0)}"
     finally:
         process.kill()
         process.join()
     return Compilation(robot, kind, seconds, mebibytes, problem)
 
 
-def _compile(model: Model, kind: str, results: Any) -> None:
+def _compile(model: Model, kind: str, limit: float, results: Any) -> None:
+    resource.setrlimit(resource.RLIMIT_CPU, (ceil(limit), ceil(limit)))
     with TemporaryDirectory() as folder:
         os.environ["DYNX_CACHE_DIR"] = folder
         start, problem = process_time(), ""
+        seconds: float | None = None
         try:
             KINDS[kind](model)
+            seconds = process_time() - start
+        except DynxError as error:
+            # The robot has no such quantity, a unique acceleration for example.
+            seconds, problem = process_time() - start, f"{type(error).__name__}: {error}"
         except Exception as error:
             problem = f"{type(error).__name__}: {error}"
-        seconds = process_time() - start
     results.send((seconds, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, problem))
 
 
-def chosen_robots(names: Sequence[str], bases: Sequence[Base]) -> Iterator[tuple[str, Model]]:
-    """Yield robots of the library with each base; ``tree:101`` and ``serial:64`` are trees and arms of so
-    many joints."""
+def chosen_robots(names: Sequence[str], bases: Sequence[Base]) -> list[tuple[str, Model]]:
+    """Return robots of the library with each base, those with most joints first; ``tree:101`` and
+    ``serial:64`` are trees and arms of so many joints."""
+    found: list[tuple[str, Model]] = []
     for name in names:
         kind, _, count = name.partition(":")
         if count:
-            yield name, (tree if kind == "tree" else serial_arm)(int(count))
-            continue
-        for base in bases:
-            yield f"{name}, {base}", load(name, base=base)
+            found.append((name, (tree if kind == "tree" else serial_arm)(int(count))))
+        else:
+            found += [(f"{name}, {base}", load(name, base=base)) for base in bases]
+    return sorted(found, key=lambda each: -each[1].nv)
+
+
+def usable_robots() -> list[str]:
+    """Return the names of all robots of the library but those whose files have no robot."""
+    return [robot.name for robot in robots() if _has_a_robot(robot.name)]
+
+
+def _has_a_robot(name: str) -> bool:
+    try:
+        load(name)
+    except DescriptionError as error:
+        print(f"{name} is left out: {error}", file=sys.stderr)
+        return False
+    return True
+
+
+def recorded(path: Path | None) -> dict[tuple[str, str], Compilation]:
+    """Return the rows of a file, if there is one."""
+    if path is None or not path.exists():
+        return {}
+    rows = [Compilation(**json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()]
+    return {(row.robot, row.kind): row for row in rows}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the table, the longest compilations first; return 1 if one takes longer than `MAX_SECONDS`."""
+    """Print the table; return 1 if a compilation takes longer than `MAX_SECONDS` or fails."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.compile_times", description=__doc__)
     parser.add_argument(
         "--robots", nargs="+", default=LARGEST_ROBOTS, metavar="ROBOT", help="names, tree:N, serial:N, or all"
     )
     parser.add_argument("--bases", nargs="+", default=BASES, choices=BASES)
     parser.add_argument("--kinds", nargs="+", metavar="TEXT", help="kinds whose names contain one of these")
-    parser.add_argument("--limit", type=float, default=120.0, help="time after which one is ended [s]")
+    parser.add_argument(
+        "--limit", type=float, default=120.0, help="processor time after which one is ended [s]"
+    )
+    parser.add_argument("--record", type=Path, metavar="FILE", help="rows measured so far, one in a line")
     chosen = parser.parse_args(arguments)
     kinds = [kind for kind in KINDS if not chosen.kinds or any(text in kind for text in chosen.kinds)]
-    names = [robot.name for robot in robots()] if chosen.robots == ["all"] else chosen.robots
+    models = chosen_robots(usable_robots() if chosen.robots == ["all"] else chosen.robots, chosen.bases)
+    known = recorded(chosen.record)
     done: list[Compilation] = []
-    for name, model in chosen_robots(names, chosen.bases):
+    print(f"{'seconds':>8} {'MiB':>6}  {'robot':36}kind")
+    for name, model in models:
         for kind in kinds:
-            tell(f"{name}: {kind}")
-            done.append(measure(name, model, kind, chosen.limit))
-    tell("")
-    done.sort(key=lambda each: (each.seconds is None, each.seconds), reverse=True)
-    print(f"{'seconds':>8} {'MiB':>6}  {'robot':30}{'kind'}")
-    for each in done:
-        taken = f">{chosen.limit:.0f}" if each.seconds is None else f"{each.seconds:.2f}"
-        print(f"{taken:>8} {each.mebibytes:6.0f}  {each.robot:30}{each.kind}  {each.problem}".rstrip())
-    return 1 if any(each.seconds is None or each.seconds > MAX_SECONDS for each in done) else 0
+            tell(f"{len(done)} of {len(models) * len(kinds)} rows; {name}: {kind}")
+            row = known.get((name, kind))
+            if row is None:
+                row = measure(name, model, kind, chosen.limit)
+                if chosen.record is not None:
+                    with chosen.record.open("a", encoding="utf-8") as file:
+                        print(json.dumps(asdict(row)), file=file)
+            tell("")
+            print(row, flush=True)
+            done.append(row)
+    failed = [row for row in done if row.failed]
+    if len(done) > LONGEST:
+        print(f"\n{len(done)} rows, {len(failed)} of them too long or not finished; the longest:")
+        done.sort(key=lambda row: chosen.limit if row.seconds is None else row.seconds, reverse=True)
+        print(*done[:LONGEST], sep="\n")
+    return 1 if failed else 0
 
 
 if __name__ == "__main__":

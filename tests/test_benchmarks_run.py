@@ -75,15 +75,24 @@ def test_the_table_of_every_quantity_compares_the_engines() -> None:
     assert len([line for line in finished.stdout.splitlines() if line.startswith("ur5")]) == 2
 
 
-def test_compile_times_are_measured_with_an_empty_cache() -> None:
-    finished = run(
-        "benchmarks.compile_times", "--robots", "pendulum", "--bases", "fixed", "--kinds", "mass_matrix"
-    )
+def test_compile_times_are_measured_with_an_empty_cache_and_kept(tmp_path: Path) -> None:
+    record = tmp_path / "rows.jsonl"
+    command = ["benchmarks.compile_times", "--robots", "pendulum", "--bases", "fixed"]
+    command += ["--kinds", "mass_matrix", "--record", str(record)]
+    finished = run(*command)
     assert finished.returncode == 0, finished.stdout + finished.stderr
     heading, *rows = finished.stdout.splitlines()
     assert heading.split() == ["seconds", "MiB", "robot", "kind"]
     assert {row.split("fixed")[1].strip() for row in rows} == {"mass_matrix", "parametric mass_matrix"}
     assert all(float(row.split()[0]) > 0.0 for row in rows)
+    # A row of the file is not measured again, and its time is judged all the same.
+    first, second = record.read_text(encoding="utf-8").splitlines()
+    record.write_text(json.dumps({**json.loads(first), "seconds": 77.0}) + "\n", encoding="utf-8")
+    resumed = run(*command)
+    assert resumed.returncode == 1, resumed.stdout + resumed.stderr
+    assert "77.00" in resumed.stdout
+    kinds = [json.loads(line)["kind"] for line in record.read_text(encoding="utf-8").splitlines()]
+    assert kinds == [json.loads(each)["kind"] for each in (first, second)]
 
 
 def run(*command: str) -> subprocess.CompletedProcess[str]:

@@ -211,7 +211,7 @@ class Backend(QuantityCalls):
         `get_generalized_acceleration_output_port`, MuJoCo `mj_forward`.
         """
         if external_forces is None and not joint_dynamics:
-            return self._arguments.finite_acceleration(self._evaluate("forward_dynamics", (q, v, tau)))
+            return self._evaluate("forward_dynamics", (q, v, tau))
         q, v = self._checked_q(q), self._checked_v(v)
         tau = self._checked_v(tau, "tau")
         common_batch(q, v, tau)
@@ -221,10 +221,9 @@ class Backend(QuantityCalls):
         if joint_dynamics:
             tau = tau - self._joint_terms.friction_torque(v)
         if not (joint_dynamics and self._joint_terms.has_armature):
-            a = self._evaluate("forward_dynamics", (q, v, tau))
-        else:
-            M = self.mass_matrix(q, joint_dynamics=joint_dynamics)
-            a = solve_mass_matrix(M, tau - self.bias_torque(q, v))
+            return self._evaluate("forward_dynamics", (q, v, tau))
+        M = self.mass_matrix(q, joint_dynamics=joint_dynamics)
+        a = solve_mass_matrix(M, tau - self.bias_torque(q, v))
         return self._arguments.finite_acceleration(a)
 
     def mass_matrix(self, q: ArrayLike, *, joint_dynamics: bool = False) -> Floats:

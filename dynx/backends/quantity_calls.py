@@ -67,7 +67,8 @@ class QuantityCalls(Lifecycle, EngineHooks):
         self._straight: dict[Key, StraightCall] = {}
 
     def _evaluate(self, key: Key, arguments: tuple[Any, ...]) -> Floats:
-        """Check the arguments of the quantity `key`, with any leading axes, and evaluate it."""
+        """Check the arguments of the quantity `key`, with any leading axes, and evaluate it; an acceleration
+        that is solved for is finite."""
         try:
             call = self._straight[key]
         except (KeyError, TypeError):
@@ -95,7 +96,7 @@ class QuantityCalls(Lifecycle, EngineHooks):
             common_batch(q, *rates)
             self._solvability.refuse_singular(False)
             if not self._uncoupled:
-                return self._solved_acceleration(q, *rates)
+                return self._arguments.finite_acceleration(self._solved_acceleration(q, *rates))
         hook: Callable[..., Any] | None = getattr(self, plan.hook, None)
         if hook is None:
             hook = partial(self._derive, name)
@@ -103,21 +104,27 @@ class QuantityCalls(Lifecycle, EngineHooks):
         elif plan.hook not in vars(self) and key not in self._straight:
             function = self._sample_hook(plan.hook, len(arguments), details)
             function = self._evaluation.of_sample(function, plan.reduction)
-            self._store_straight(key, function, len(arguments))
-        return self._evaluation(hook, plan.result_shape, q, *rates, args=details, reduce=plan.reduction)
+            self._store_straight(key, function, len(arguments), solves=plan.solves)
+        result = self._evaluation(hook, plan.result_shape, q, *rates, args=details, reduce=plan.reduction)
+        return self._arguments.finite_acceleration(result) if plan.solves else result
 
     def _solved_acceleration(self, q: Floats, v: Floats, tau: Floats) -> Floats:
         """Solve for the acceleration of a robot with mimic joints, which reduce the equation of motion."""
         hooks = ("_mass_matrix", "_bias_torque")
         if vars(self).keys().isdisjoint(hooks):
             functions = (untranslated(getattr(type(self), hook)) for hook in hooks)
-            self._store_straight("forward_dynamics", self._evaluation.solution_of_sample(*functions), 3)
+            function = self._evaluation.solution_of_sample(*functions)
+            self._store_straight("forward_dynamics", function, 3, solves=True)
         return solve_mass_matrix(
             self._evaluate("mass_matrix", (q,)), tau - self._evaluate("bias_torque", (q, v))
         )
 
-    def _store_straight(self, key: Key, function: Callable[..., Any], arguments: int) -> None:
-        self._straight[key] = straight_call(self.model, function, arguments, validate=self._validate)
+    def _store_straight(
+        self, key: Key, function: Callable[..., Any], arguments: int, *, solves: bool
+    ) -> None:
+        self._straight[key] = straight_call(
+            self.model, function, arguments, validate=self._validate, solves=solves
+        )
         if self._arguments.closed:
             # Another thread closed this backend meanwhile.
             self._straight.clear()

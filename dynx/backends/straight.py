@@ -7,7 +7,7 @@ or with ``*arguments`` takes longer than most of what they do.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import hypot
+from math import hypot, isfinite
 from typing import Any
 
 import numpy as np
@@ -32,20 +32,23 @@ MAX_LISTED_OF_ALL = 80
 _MAX_SQUARE = MAX_MAGNITUDE**2
 
 
-def straight_call(model: Model, hook: SampleHook, arguments: int, *, validate: bool) -> StraightCall:
+def straight_call(
+    model: Model, hook: SampleHook, arguments: int, *, validate: bool, solves: bool = False
+) -> StraightCall:
     """Return the function that checks q and `arguments` - 1 vectors (nv,) and calls a hook with them; without
-    `validate`, it checks that each has one axis.
+    `validate`, it checks that each has one axis. For a hook that `solves` for an acceleration it returns None
+    where the sum of the result is not finite, too.
 
     The norm of all entries is below a bound only if every entry is, and no entry is NaN. One C loop over
     lists computes it several times faster than NumPy at this size. If the norm is too large, the methods of
     `Arguments` check every entry.
     """
     if not validate:
-        return _call_of_arrays_with_one_axis(hook, arguments)
+        return _call_of_arrays_with_one_axis(hook, arguments, solves)
     entries_of_all = model.nq + (arguments - 1) * model.nv
     # An empty array may have two axes and no entry that shows it.
     if not model.nv or model.nq > MAX_LISTED or entries_of_all > MAX_LISTED_OF_ALL:
-        return _call_of_long_arrays(model, hook)
+        return _call_of_long_arrays(model, hook, solves)
     nq, nv, fixed = model.nq, model.nv, not model.floating
 
     # The entries of an array with two axes are lists, and those of one with none are no list: `hypot` and the
@@ -89,7 +92,8 @@ def straight_call(model: Model, hook: SampleHook, arguments: int, *, validate: b
             except TypeError:
                 return None
             if valid:
-                return hook(backend, q, v, a)
+                result = hook(backend, q, v, a)
+                return result if not solves or isfinite(sum(result.tolist())) else None
         return None
 
     return (of_one, of_two, of_three)[arguments - 1]
@@ -101,7 +105,7 @@ def _is_unit(entries: list[float]) -> bool:
     return abs(x * x + y * y + z * z + w * w - 1.0) <= UNIT_NORM_TOLERANCE
 
 
-def _call_of_long_arrays(model: Model, hook: SampleHook) -> StraightCall:
+def _call_of_long_arrays(model: Model, hook: SampleHook, solves: bool) -> StraightCall:
     q_shape, v_shape, fixed = (model.nq,), (model.nv,), not model.floating
 
     def call(backend: object, arguments: tuple[Any, ...]) -> Any:
@@ -112,12 +116,15 @@ def _call_of_long_arrays(model: Model, hook: SampleHook) -> StraightCall:
             if not np.vdot(array, array) < _MAX_SQUARE:
                 return None
             shape = v_shape
-        return hook(backend, *arguments) if fixed or _is_unit(arguments[0][:7].tolist()) else None
+        if not (fixed or _is_unit(arguments[0][:7].tolist())):
+            return None
+        result = hook(backend, *arguments)
+        return result if not solves or isfinite(np.vdot(result, result)) else None
 
     return call
 
 
-def _call_of_arrays_with_one_axis(hook: SampleHook, arguments: int) -> StraightCall:
+def _call_of_arrays_with_one_axis(hook: SampleHook, arguments: int, solves: bool) -> StraightCall:
     def of_one(backend: object, arguments: tuple[Any, ...]) -> Any:
         (q,) = arguments
         return hook(backend, q) if q.ndim == 1 else None
@@ -128,6 +135,9 @@ def _call_of_arrays_with_one_axis(hook: SampleHook, arguments: int) -> StraightC
 
     def of_three(backend: object, arguments: tuple[Any, ...]) -> Any:
         q, v, a = arguments
-        return hook(backend, q, v, a) if q.ndim == 1 and v.ndim == 1 and a.ndim == 1 else None
+        if not q.ndim == v.ndim == a.ndim == 1:
+            return None
+        result = hook(backend, q, v, a)
+        return result if not solves or isfinite(sum(result.tolist())) else None
 
     return (of_one, of_two, of_three)[arguments - 1]

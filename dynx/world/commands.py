@@ -15,7 +15,7 @@ from dynx.model.configuration import checked_array
 from dynx.spatial.scalar import Floats
 from dynx.world.engine import WorldEngine
 from dynx.world.layout import Layout, RobotLayout
-from dynx.world.loads import RobotLoads, Wrench, checked_torques, robot_number
+from dynx.world.loads import RobotLoads, Torque, Wrench, checked_torques, found_robot
 from dynx.world.motors import Motor
 from dynx.world.notes.divergence import LastLoads, RobotLoad
 from dynx.world.snapshot import Memory
@@ -25,7 +25,7 @@ MotorsOf = Mapping[str, "Motor | MotorCommand | Sequence[Motor]"]
 Act = Callable[[WorldEngine], bool]
 """Apply the loads of the next step to the engine; False if one of them is not finite."""
 
-_NOTHING: dict[int, Floats] = {}
+_NOTHING: list[Torque] = []
 
 
 class Commands:
@@ -38,10 +38,12 @@ class Commands:
         self._robots = robots
         self._bodies = bodies
         self._loads = [RobotLoads(robot, h) for robot in layout.robots]
-        self._zeros = [np.zeros(robot.model.nv) for robot in layout.robots]
+        shapes: list[tuple[int]] = [(robot.model.nv,) for robot in layout.robots]
+        self._torques = {name: (k, shapes[k]) for name, k in robots.items()}
+        self._zeros: list[Torque] = [(k, np.zeros(nv), [0.0] * nv) for k, (nv,) in enumerate(shapes)]
         self._floating = [robot.model.floating for robot in layout.robots]
         self._no_wrench = np.zeros((len(layout.bodies), 6))
-        self._held: Mapping[int, Floats] = _NOTHING
+        self._held: Sequence[Torque] = _NOTHING
         self._wrenches: Floats = self._no_wrench
         self.forget()
 
@@ -49,18 +51,19 @@ class Commands:
         """Forget all earlier steps: the engine is new, or its state was set."""
         # Everything is sent once more before the next step.
         self._loaded = set(range(len(self._loads)))
-        self._pushed = True
+        self._pushed = self._more_than_torques = True
         self._commanded: set[int] = set()
         self._forget_steps(frozenset())
 
     def last(self) -> LastLoads:
         """Return the loads of the last step."""
         pushed = np.flatnonzero(self._wrenches.any(axis=1)).tolist()
+        held = {k: tau for k, tau, _ in self._held}
         return LastLoads(
             [
-                RobotLoad(k, loads.dynamics, self._held.get(k), *loads.law)
+                RobotLoad(k, loads.dynamics, held.get(k), *loads.law)
                 for k, loads in enumerate(self._loads)
-                if loads.has_motors or k in self._held
+                if loads.has_motors or k in held
             ],
             {k: self._wrenches[k] for k in pushed},
         )
@@ -74,36 +77,40 @@ class Commands:
         """Restore what `memory` returned."""
         for loads, m in zip(self._loads, memory, strict=True):
             loads.memory = None if m is None else (np.array(m[0]), np.array(m[1]))
-        self._remembering = True
+        self._more_than_torques = True
 
     def hold(self, engine: WorldEngine, torques: Mapping[str, ArrayLike] | None, count: int) -> bool:
         """Make the engine apply these torques alone in the next `count` steps.
 
         Returns False, and does nothing, where they must be sent again before each of them.
         """
-        checked = (
-            checked_torques(torques, self._robots, self._layout.robots) if torques is not None else _NOTHING
-        )
-        if count > 1 and any(self._floating[k] and tau[:6].any() for k, tau in checked.items()):
+        held = _NOTHING if torques is None else checked_torques(torques, self._torques)
+        if count > 1 and any(self._floating[k] and any(entries[:6]) for k, _, entries in held):
             return False
-        self._held = checked
+        self._held = held
+        if self._more_than_torques:
+            self._end_other_loads(engine)
+        loaded = self._loaded
+        same = len(loaded) == len(held)
+        for k, tau, entries in held:
+            same = same and k in loaded
+            engine.set_torques(k, tau, entries)
+        if not same:
+            self._loaded = {k for k, _, _ in held}
+            for k in loaded - self._loaded:
+                engine.set_torques(*self._zeros[k])
+        return True
+
+    def _end_other_loads(self, engine: WorldEngine) -> None:
+        """End the wrenches on bodies and the engine's own motors, and forget what motors keep."""
+        self._more_than_torques = False
         if self._pushed:
             self._wrenches = self._no_wrench
             engine.set_wrenches(self._no_wrench)
             self._pushed = False
-        if self._remembering:
-            self._forget_steps(frozenset())
         if self._commanded:
             self._command(engine, {})
-        if self._loaded or checked:
-            loaded = checked.keys()
-            if self._loaded != loaded:
-                for k in self._loaded - loaded:
-                    engine.set_torques(k, self._zeros[k])
-                self._loaded = set(loaded)
-            for k, tau in checked.items():
-                engine.set_torques(k, tau)
-        return True
+        self._forget_steps(frozenset())
 
     def plan(
         self,
@@ -112,7 +119,9 @@ class Commands:
         wrenches: Sequence[Wrench],
     ) -> Act:
         """Check what acts in the next steps, and return the function that applies it before each of them."""
-        held = self._held = checked_torques(torques, self._robots, self._layout.robots)
+        self._more_than_torques = True
+        self._held = checked_torques({} if torques is None else torques, self._torques)
+        held = {torque[0]: torque for torque in self._held}
         commands = self._set_motors(motors or {})
         frames, pushes = self._sort_wrenches(wrenches)
         motored = frozenset(k for k, loads in enumerate(self._loads) if loads.has_motors)
@@ -126,15 +135,16 @@ class Commands:
                 begun = True
                 self._command(engine, commands)
                 for k in (self._loaded | held.keys()) - repeated:
-                    engine.set_torques(k, held.get(k, self._zeros[k]))
+                    engine.set_torques(*held.get(k, self._zeros[k]))
                 self._loaded = set(repeated | held.keys())
             for k in repeated:
                 q, v = engine.robot_state(k)
-                tau = self._loads[k].torque(q, v, held.get(k), frames.get(k, ()))
+                tau = self._loads[k].torque(q, v, held[k][1] if k in held else None, frames.get(k, ()))
+                entries = tau.tolist()
                 # A finite sum has finite entries; of few numbers, Python's is the fastest.
-                if not isfinite(sum(tau.tolist())) and not np.isfinite(tau).all():
+                if not isfinite(sum(entries)) and not np.isfinite(tau).all():
                     return False
-                engine.set_torques(k, tau)
+                engine.set_torques(k, tau, entries)
             if pushes or self._pushed:
                 self._push(engine, pushes)
             return True
@@ -148,7 +158,7 @@ class Commands:
         commands: dict[int, MotorCommand] = {}
         given: dict[int, list[Motor]] = {}
         for name, listed in motors.items():
-            k = robot_number(name, self._robots)
+            k = found_robot(name, self._robots)
             if isinstance(listed, MotorCommand):
                 commands[k] = checked_command(listed, self._layout.robots[k].model)
                 continue
@@ -213,7 +223,6 @@ class Commands:
         for k, loads in enumerate(self._loads):
             if k not in motored:
                 loads.memory = None
-        self._remembering = bool(motored)
 
 
 def with_scene_motors(

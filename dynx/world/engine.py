@@ -82,12 +82,12 @@ class WorldEngine(ABC):
     # -- motion -------------------------------------------------------------------------------
 
     @abstractmethod
-    def set_torques(self, robot: int, tau: Floats) -> None:
+    def set_torques(self, robot: int, tau: Floats, entries: list[float]) -> None:
         """Apply the generalised force `tau` (nv,) in all later steps, until the next call.
 
-        The array may change after the call. The first six entries of a floating base are force and moment
-        at the base frame, in its axes. The caller repeats the call before every step in which they are not
-        zero, so that they may be converted to axes of the world once.
+        The array may change after the call; `entries`, its numbers as a list, do not. The first six of a
+        floating base are force and moment at the base frame, in its axes. The caller repeats the call before
+        every step in which they are not zero, so that they may be converted to axes of the world once.
         """
 
     @abstractmethod

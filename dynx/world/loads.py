@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import hypot
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -164,34 +165,42 @@ def _acceleration(M: Floats, tau: Floats) -> Floats:
     return np.asarray(np.linalg.lstsq(M, tau)[0] if failed else a)
 
 
+Torque = tuple[int, Floats, list[float]]
+"""The number of a robot, a generalised force (nv,) on it, and a new list of its entries."""
+
+
 def checked_torques(
-    torques: Mapping[str, ArrayLike] | None, robots: Mapping[str, int], layouts: Sequence[RobotLayout]
-) -> dict[int, Floats]:
-    """Return the torque (nv,) of each robot named.
+    torques: Mapping[str, ArrayLike], robots: Mapping[str, tuple[int, tuple[int]]]
+) -> list[Torque]:
+    """Return the torque of each robot named; `robots` has the number of each and the shape of its torque.
 
     Raises UnknownNameError, ShapeError, DTypeError or NotFiniteError, naming the robot.
     """
-    if torques is None:
-        return {}
     if type(torques) is not dict and not isinstance(torques, Mapping):
         raise ArgumentError(f"torques is of type {type(torques).__name__}; wanted a dict by robot")
-    checked = {}
+    checked: list[Torque] = []
     for name, tau in torques.items():
-        number = robots[name] if name in robots else robot_number(name, robots)
-        nv = layouts[number].model.nv
-        if type(tau) is not np.ndarray or tau.dtype is not _FLOAT64 or tau.shape != (nv,):
+        try:
+            number, shape = robots[name]
+        except KeyError:
+            number, shape = found_robot(name, robots)
+        if type(tau) is not np.ndarray or tau.dtype is not _FLOAT64 or tau.shape != shape:
             tau = real_array(f"torque of {name}", tau)
-            if tau.shape != (nv,):
-                raise ShapeError(f"torque of {name} has shape {tau.shape}; wanted ({nv},)")
+            if tau.shape != shape:
+                raise ShapeError(f"torque of {name} has shape {tau.shape}; wanted {shape}")
+        entries: list[float] = tau.tolist()
         # Entries are below the bound where their norm is, which of few numbers Python computes fastest.
-        if not hypot(*tau.tolist()) < 1e50:
+        if not hypot(*entries) < 1e50:
             checked_entries(f"torque of {name}", tau)
-        checked[number] = tau
+        checked.append((number, tau, entries))
     return checked
 
 
-def robot_number(name: str, robots: Mapping[str, int]) -> int:
-    """Return the number of a robot; UnknownNameError for another name."""
+_T = TypeVar("_T")
+
+
+def found_robot(name: str, robots: Mapping[str, _T]) -> _T:
+    """Return the entry of a robot; UnknownNameError for another name."""
     try:
         return robots[name]
     except (KeyError, TypeError):

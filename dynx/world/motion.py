@@ -37,9 +37,12 @@ class Motion:
         self._most = max(1, STEPS_BETWEEN_CHECKS // substeps)
         self._steps, self._start, self._unchecked = 0, 0.0, 0
         self._interrupted = False
-        self._engine: WorldEngine | None = build()
-        self._kind = self._engine.name
-        self._good = self._read(self._engine), 0, 0.0
+        engine = build()
+        self._engine: WorldEngine | None = engine
+        self.ready: WorldEngine | None = engine
+        """The engine, or None where `engine` must be called: after an interruption, and after `close`."""
+        self._kind = engine.name
+        self._good = self._read(engine), 0, 0.0
         self._state: WorldState | None = self._good[0]
 
     @property
@@ -122,7 +125,7 @@ class Motion:
         before = self.engine
         engine = self._build()
         try:
-            self._engine = engine
+            self._engine = self.ready = engine
             before.close()
             self._commands.forget()
             self._start, self._steps, self._state = 0.0, 0, None
@@ -135,7 +138,7 @@ class Motion:
         """Release the engine; closing twice is harmless."""
         if self._engine is not None:
             self._engine.close()
-            self._engine = None
+            self._engine = self.ready = None
 
     # -- failures -----------------------------------------------------------------------------
 
@@ -147,7 +150,7 @@ class Motion:
         if isinstance(error, EngineError):
             causes = self._recover_and_explain()
             raise type(error)(f"{error}{causes}") from error.__cause__
-        self._interrupted = True
+        self._interrupted, self.ready = True, None
 
     def _note(self) -> None:
         """Read the state; keep it if it is finite, otherwise go back to the one kept before."""
@@ -190,12 +193,12 @@ class Motion:
 
     def _recover(self) -> None:
         """Rebuild the engine at the last state that was finite."""
-        self._interrupted = True
+        self._interrupted, self.ready = True, None
         engine = self._build()
         state, steps, start = self._good
         apply_state(engine, state)
         self._commands.forget()
-        before, self._engine = self._engine, engine
+        before, self._engine, self.ready = self._engine, engine, engine
         self._steps, self._start, self._state, self._unchecked = steps, start, state, 0
         self._interrupted = False
         if before is not None:

@@ -135,7 +135,7 @@ class World:
         with the likely cause. After that, and after Ctrl-C in a step, the world is at the last state that was
         read, or at a later one at most 1,000 steps old.
         """
-        engine = self._motion.engine
+        engine = self._motion.ready or self._motion.engine
         if type(wrenches) is not tuple and not isinstance(wrenches, tuple | list):
             raise ArgumentError(f"wrenches is of type {type(wrenches).__name__}; wanted a list of Wrench")
         if type(n) is not int or n < 1:

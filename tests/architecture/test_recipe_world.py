@@ -65,7 +65,7 @@ class ExactFlight(WorldEngine):
                 T[:3, :3] = rotation_from_quat(quat_exp(omega)) @ T[:3, :3]
             self._twist[:, 3:] += h * a[:, 3:]
 
-    def set_torques(self, robot, tau):
+    def set_torques(self, robot, tau, entries):
         raise AssertionError("a scene without robots")
 
     robot_state = set_robot_state = set_torques

@@ -279,7 +279,7 @@ class ExactWorld(WorldEngine):
     def set_wrenches(self, wrenches: Floats) -> None:
         assert not wrenches.any()
 
-    def set_torques(self, robot: int, tau: Floats) -> None:
+    def set_torques(self, robot: int, tau: Floats, entries: list[float]) -> None:
         raise NotImplementedError
 
     def robot_state(self, robot: int) -> RobotState:

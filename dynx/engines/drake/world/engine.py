@@ -74,7 +74,7 @@ class DrakeWorld(WorldEngine):
     # -- motion -------------------------------------------------------------------------------
 
     @_engine_errors
-    def set_torques(self, robot: int, tau: Floats) -> None:
+    def set_torques(self, robot: int, tau: Floats, entries: list[float]) -> None:
         q = self._plant.GetPositions(self._context)
         self._built.robots[robot].write_forces(tau, q, self._torques)
 

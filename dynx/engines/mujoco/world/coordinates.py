@@ -43,7 +43,8 @@ class RobotCoordinates:
         self._coupling = mechanism.coupling
         self._q: Floats = data.qpos[first[0] : first[0] + mechanism.nq]
         self._v: Floats = data.qvel[first[1] : first[1] + mechanism.nv]
-        self._force: Floats = data.qfrc_applied[first[1] : first[1] + mechanism.nv]
+        self.applied: Floats = data.qfrc_applied[first[1] : first[1] + mechanism.nv]
+        """Generalised forces of MuJoCo that act in the next steps, of the tree."""
         if self._coupling is not None:
             self._S = self._coupling.matrix()
             moving = [joint for joint in model.joints if joint.moves]
@@ -79,14 +80,10 @@ class RobotCoordinates:
             self._q[3], self._q[4:7] = q[6], q[3:6]
             self._v[:3] = R @ (v[:3] + cross(v[3:6], self._center))
 
-    def apply(self, tau: Floats) -> None:
-        """Apply the torque of a robot without mimic joints."""
-        self._force[:] = self.forces(tau)
-
-    def forces(self, tau: Floats) -> Floats:
+    def forces(self, tau: Floats, entries: list[float]) -> Floats:
         """Return a torque with the wrench on a floating base, `tau[:6]` at its origin in its axes, converted
-        to MuJoCo's."""
-        if not self._floating or not any(tau[:6].tolist()):
+        to MuJoCo's; `entries` are those of `tau`."""
+        if not self._floating or not any(entries[:6]):
             return tau
         R, force = self._rotation(), tau[:3]
         return np.concatenate([R @ force, tau[3:6] - cross(self._center, force), tau[6:]])

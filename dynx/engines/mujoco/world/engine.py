@@ -65,6 +65,10 @@ class MujocoWorld(WorldEngine):
             for number, robot in enumerate(layout.robots)
             if robot.model.mechanism.coupling is not None
         }
+        self._applied = [
+            self._coupled[number].tau if number in self._coupled else robot.applied
+            for number, robot in enumerate(self._robots)
+        ]
         self._bodies = {
             number: BodyCoordinates(built.model, data, built.bodies[number], body)
             for number, body in enumerate(layout.bodies)
@@ -95,12 +99,8 @@ class MujocoWorld(WorldEngine):
 
     # -- motion -------------------------------------------------------------------------------
 
-    def set_torques(self, robot: int, tau: Floats) -> None:
-        coupled = self._coupled.get(robot)
-        if coupled is None:
-            self._robots[robot].apply(tau)
-            return
-        coupled.tau[:] = self._robots[robot].forces(tau)
+    def set_torques(self, robot: int, tau: Floats, entries: list[float]) -> None:
+        self._applied[robot][:] = self._robots[robot].forces(tau, entries)
 
     def set_wrenches(self, wrenches: Floats) -> None:
         self._data.xfrc_applied[self._body_numbers] = wrenches
@@ -231,6 +231,7 @@ class MujocoWorld(WorldEngine):
                 self._robots,
                 self._bodies,
                 self._coupled,
+                self._applied,
                 self._warnings,
                 self._data,
                 self._model,

@@ -8,7 +8,7 @@ so that contacts are named by the links of the description.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, ClassVar
@@ -64,9 +64,9 @@ class BulletWorld(WorldEngine):
         except BaseException:
             client.close()
             raise
-        self._loaded_robots: list[BulletRobot] = []
         self._pushed: list[BulletBody] = []
         self._corrected = [robot for robot in self._robots if robot.corrected]
+        self._list_calls()
         self._touch()
 
     def _load(self, folder: Path, settings: Mapping[str, Any]) -> None:
@@ -109,12 +109,12 @@ class BulletWorld(WorldEngine):
 
     # -- motion -------------------------------------------------------------------------------
 
-    def set_torques(self, robot: int, tau: Floats) -> None:
+    def set_torques(self, robot: int, tau: Floats, entries: list[float]) -> None:
         found = self._robots[robot]
-        acts = found.set_torques(tau)
-        if acts != found.loaded:
-            found.loaded = acts
-            self._loaded_robots = [each for each in self._robots if each.loaded]
+        found.torques = entries
+        if any(entries) != found.loaded:
+            found.loaded = not found.loaded
+            self._list_calls()
 
     def set_wrenches(self, wrenches: Floats) -> None:
         self._pushed = []
@@ -122,6 +122,13 @@ class BulletWorld(WorldEngine):
             body.wrench = wrench.tolist()
             if wrench.any():
                 self._pushed.append(body)
+        self._list_calls()
+
+    def _list_calls(self) -> None:
+        """List what is called before and after every step of the engine."""
+        self._before: list[Callable[[], None]] = [robot.apply for robot in self._robots if robot.loaded]
+        self._before += [body.push for body in self._pushed]
+        self._before += [robot.before_step for robot in self._corrected]
 
     def command_motors(self, robot: int, command: MotorCommand | None) -> None:
         self._robots[robot].command(command)
@@ -130,13 +137,10 @@ class BulletWorld(WorldEngine):
         self._contacts.fresh = False
         step, number = self._step_simulation, self._number
         try:
-            for _ in range(n):
-                for robot in self._loaded_robots:
-                    robot.apply()
-                for body in self._pushed:
-                    body.push()
-                for robot in self._corrected:
-                    robot.before_step()
+            while n:
+                n -= 1
+                for call in self._before:
+                    call()
                 step(physicsClientId=number)
                 for robot in self._corrected:
                     robot.after_step()

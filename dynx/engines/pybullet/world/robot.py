@@ -74,9 +74,9 @@ class BulletRobot:
         self.near = [0.0, 0.0, 0.0, 1.0]
         """Quaternion (4,) of the last state read, whose sign the next one has."""
         self.loaded = False
-        """True if `apply` is called before every step."""
-        self._wrench: Floats | None = None
-        self._forces: list[float] | None = None
+        """True if `apply` is called before every step, because a torque is not zero."""
+        self.torques: list[float] = []
+        """Generalised force (nv,) of the next steps."""
         # Looked up once, because every step applies torques.
         self._control = client.engine.setJointMotorControlArray
         self._torque_control = client.engine.TORQUE_CONTROL
@@ -136,37 +136,27 @@ class BulletRobot:
 
     # -- forces -------------------------------------------------------------------------------
 
-    def set_torques(self, tau: Floats) -> bool:
-        """Keep the generalised force for `apply`; return whether it has an effect."""
-        forces = tau.tolist()
-        self._wrench = None
+    def apply(self) -> None:
+        """Apply `torques` during the next step. The engine's own errors are not translated."""
+        forces = self.torques
         if self._base:
             if any(forces[:6]):
-                self._wrench = np.array(tau[:6])
-            del forces[:6]
-        if not any(forces):
-            self._forces = None
-            return self._wrench is not None
+                self._push_base(forces)
+                if not any(forces[6:]):
+                    return
+            forces = forces[6:]
         if self._coupling is not None:
             forces = (self._shares @ forces).tolist()
-        self._forces = forces
-        return True
+        self._control(
+            self._body, self._links, self._torque_control, forces=forces, physicsClientId=self._number
+        )
 
-    def apply(self) -> None:
-        """Apply the generalised force during the next step. The engine's own errors are not translated."""
-        if self._forces is not None:
-            self._control(
-                self._body,
-                self._links,
-                self._torque_control,
-                forces=self._forces,
-                physicsClientId=self._number,
-            )
-        if self._wrench is not None:
-            q, _ = self.object.root.coordinates(self.object.base_state(), self.near)
-            R, force = rotation_from_quat(np.array(q[3:])), self._wrench[:3]
-            moment = self._wrench[3:] - cross(self.object.root.center, force)
-            self.object.push_base((R @ force).tolist(), (R @ moment).tolist())
+    def _push_base(self, tau: list[float]) -> None:
+        """Apply the wrench of a generalised force on a floating base during the next step."""
+        q, _ = self.object.root.coordinates(self.object.base_state(), self.near)
+        R, force, moment = rotation_from_quat(np.array(q[3:])), np.array(tau[:3]), np.array(tau[3:6])
+        moment -= cross(self.object.root.center, force)
+        self.object.push_base((R @ force).tolist(), (R @ moment).tolist())
 
     def command(self, command: MotorCommand | None) -> None:
         """Set Bullet's motors of all joints; None releases them."""
