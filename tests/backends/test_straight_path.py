@@ -21,6 +21,7 @@ from dynx.errors import (
     EngineError,
     NotFiniteError,
     ShapeError,
+    SingularMassMatrixError,
     UnknownNameError,
 )
 from dynx.model import Model
@@ -110,6 +111,29 @@ def test_what_is_no_valid_sample_is_refused_on_the_straight_path(size: int, base
     for quantity in QUANTITIES.values():
         with pytest.raises(ClosedError):
             call_of(engine, quantity, *sample)
+
+
+@pytest.mark.parametrize("validate", [True, False])
+@pytest.mark.parametrize("size", SIZES)
+def test_an_acceleration_of_the_straight_path_is_finite(
+    size: int, validate: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    entry = 1.0
+
+    def solved(self: PinocchioBackend, q: Floats, v: Floats, tau: Floats) -> Floats:
+        return np.full(size, entry)
+
+    monkeypatch.setattr(PinocchioBackend, "_forward_dynamics", solved)
+    model = chain(size)
+    engine = PinocchioBackend(model, validate=validate)
+    sample = motion(model)
+    engine.forward_dynamics(*sample)
+    for entry in (np.nan, np.inf, -np.inf):
+        with pytest.raises(SingularMassMatrixError):
+            engine.forward_dynamics(*sample)
+    # A sum that overflows is one of finite entries.
+    entry = 1e308
+    np.testing.assert_array_equal(engine.forward_dynamics(*sample), entry)
 
 
 @pytest.mark.parametrize("name", ["pinocchio", "compiled"])
