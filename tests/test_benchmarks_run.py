@@ -43,6 +43,12 @@ def test_poses_are_solved_in_kernels() -> None:
     assert finished.stdout.split()[:3] == ["z1", "100.00%", "solved;"]
 
 
+def test_paths_are_followed_in_kernels() -> None:
+    finished = run("benchmarks.tracking", "z1", "--paths", "2")
+    assert finished.returncode == 0, finished.stdout + finished.stderr
+    assert finished.stdout.splitlines()[-1].startswith("| z1 | 100 / 0 / 0 / 0 | 2 |")
+
+
 def test_integrators_are_of_their_order() -> None:
     finished = run("benchmarks.integrators", "--quick")
     assert finished.returncode == 0, finished.stdout + finished.stderr

@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike
 
 from dynx.backends.evaluation import common_batch
 from dynx.backends.hooks import apply_matrix, solve_mass_matrix
-from dynx.backends.quantity_calls import ALL_FRAMES, ONE_FRAME, Forces, QuantityCalls
+from dynx.backends.quantity_calls import ALL_FRAMES, ONE_FRAME, Forces
+from dynx.backends.tracking import PathCalls
 from dynx.ik import FrameTarget, IKOptions, IKResult, inverse_kinematics, spells_options
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, shift_jacobian
 from dynx.spatial.scalar import Floats
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
 
-class Backend(QuantityCalls):
+class Backend(PathCalls):
     """A robot in one engine, with the same methods, conventions and results for every engine.
 
     Arrays are float64 and take leading batch axes, which broadcast: q (..., nq), v, a, tau

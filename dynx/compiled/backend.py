@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx._version import __version__
-from dynx.backends.base import Backend
 from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.backends.quantity_calls import Forces, Key
 from dynx.compiled.arguments import BatchArguments
@@ -34,6 +33,7 @@ from dynx.compiled.kernels import (
     quantity_kernel,
 )
 from dynx.compiled.looped.kernels import LOOPED, looped_kernel
+from dynx.compiled.paths import PathKernels
 from dynx.compiled.simplification import has_physical_inertias, simplify_mechanism
 from dynx.ik import FrameTarget, IKOptions, IKResult, Problem, spells_options
 from dynx.model import Model
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 Call = Callable[..., Floats]
 
 
-class CompiledBackend(Backend):
+class CompiledBackend(PathKernels):
     """Kernels of `dynx.rbd` behind the interface of `Backend`.
 
     A batch is split over at most `threads` threads; None stands for one per processor. Results are the same
@@ -89,6 +89,7 @@ class CompiledBackend(Backend):
         return f"dynx {__version__}, {compiler_version()}, {host().cpu}"
 
     def _release(self) -> None:
+        super()._release()
         # Calls in progress on other threads keep a reference to their kernels until they return.
         with COMPILE_LOCK:
             self._public_calls, self._calls, self._chain_kernels = {}, {}, {}

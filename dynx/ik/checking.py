@@ -34,7 +34,7 @@ def checked_problem(
         model.frame_index(name)
     requirements = tuple(_requirement(name, value, each) for name, value, each in wanted)
     limits, rng = options.search_limits(), options.checked_rng()
-    margin = _checked_margin(model, options.limit_margin)
+    margin = checked_margin(model, options.limit_margin)
     frames = tuple(requirement.frame for requirement in requirements)
     coordinates = stored_coordinates(model, frames, None if margin is None else tuple(margin.tolist()))
     secondary = _secondary(model, options)
@@ -109,7 +109,7 @@ def _refuse_axes_of_position(options: Options) -> None:
             )
 
 
-def _checked_margin(model: Model, margin: ArrayLike) -> Floats | None:
+def checked_margin(model: Model, margin: ArrayLike) -> Floats | None:
     """Return the margin (nq,) [rad or m], or None if it is 0."""
     if isinstance(margin, float) and margin == 0.0:
         return None

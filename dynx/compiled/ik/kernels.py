@@ -11,6 +11,7 @@ import numpy as np
 import dynx.compiled.ik
 import dynx.ik.coordinates
 import dynx.ik.search
+import dynx.ik.tracking.descent
 import dynx.model.mechanism
 import dynx.rbd
 import dynx.spatial
@@ -19,10 +20,11 @@ from dynx.compiled.ik.refinement import refinement_iteration
 from dynx.compiled.ik.solver import MAX_RESTARTS, FrameSolver
 from dynx.compiled.ik.starts import StartTable
 from dynx.compiled.ik.step import POSES, TargetKind, solver_iteration
+from dynx.compiled.ik.tracking import tracking_iteration
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.ik import Kinematics, Problem
 from dynx.ik.coordinates import FrameCoordinates
-from dynx.model import Mechanism
+from dynx.model import Mechanism, Model
 from dynx.simd.cache import source_hash
 from dynx.simd.image import COMPILE_LOCK
 from dynx.simd.iteration import Iteration, IterationKernel, load_iteration
@@ -79,11 +81,23 @@ def frame_solver(kinematics: Kinematics, problem: Problem, threads: int) -> Fram
     return FrameSolver(load(solver_iteration), refinement, coordinates, kind, table, threads)
 
 
+def path_kernel(model: Model, frame: str, kind: TargetKind) -> IterationKernel:
+    """Return the kernel that follows targets of this kind one after the other, from the cache if possible."""
+    coordinates, number = FrameCoordinates(model, frame), model.frame_index(frame)
+    content = (model.links, model.joints, model.extra_frames, model.base_pose, number, kind)
+    mechanism = simplify_mechanism(model.mechanism)
+    return load_iteration(
+        repr(("path", _algorithms(), content)).encode(),
+        lambda: tracking_iteration(mechanism, number, coordinates, kind),
+        lanes=1,
+    )
+
+
 @cache
 def _algorithms() -> str:
     """Return the hash of the source of everything that is traced."""
     packages = (dynx.rbd, dynx.spatial, dynx.compiled.ik)
-    modules = (dynx.ik.coordinates, dynx.ik.search, dynx.model.mechanism)
+    modules = (dynx.ik.coordinates, dynx.ik.search, dynx.ik.tracking.descent, dynx.model.mechanism)
     sources = [Path(str(package.__file__)).parent for package in packages]
     sources += [Path(str(module.__file__)) for module in modules]
     return f"{__version__} {np.__version__} {source_hash(*sources)}"

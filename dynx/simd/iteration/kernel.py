@@ -113,10 +113,16 @@ def compile_iteration(iteration: Iteration, target: Target, settings: Settings) 
     return Image(iteration.arrays, (iteration.result,), settings.lanes, target, (code,))
 
 
-def load_iteration(recipe: bytes, iteration: Callable[[], Iteration]) -> IterationKernel:
-    """Load the kernel of an iteration, which `recipe` determines, from the cache, or compile and store it."""
+def load_iteration(
+    recipe: bytes, iteration: Callable[[], Iteration], lanes: int | None = None
+) -> IterationKernel:
+    """Load the kernel of an iteration, which `recipe` determines, from the cache, or compile and store it.
+
+    `lanes` tasks are computed at once, by default as many as the processor's vectors have lanes. With one
+    lane the tasks are computed in order, so that the array of a task may be the result of the one before.
+    """
     target = host()
-    settings = Settings(target.lanes)
+    settings = Settings(target.lanes if lanes is None else lanes)
 
     def compiled() -> Image:
         return compile_iteration(iteration(), target, settings)

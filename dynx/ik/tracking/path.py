@@ -1,0 +1,268 @@
+"""Tracking of one path: continuation from sample to sample, and what is done where that fails.
+
+A follower solves the samples one after the other, each within `StepBounds.reach` of the one before. Where it
+does not reach a sample:
+
+1. The way from the present pose to the target is divided into 2, 4, ... `MAX_DIVISIONS` parts, whose poses
+   are followed in turn: the predictor of a continuation method with a step that adapts (Allgower and Georg,
+   Introduction to numerical continuation methods, section 6.1). A sample whose parts are all reached
+   is continuous, however far the joints had to turn.
+2. Otherwise, if the path may jump, the nearest of the solutions that descents from many starts find.
+3. Otherwise the configuration within reach that has the least error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynx.ik.coordinates import FrameCoordinates
+from dynx.ik.residual import Residual
+from dynx.ik.targets import Targets
+from dynx.ik.tasks import Kinematics
+from dynx.ik.tracking.descent import Followed, Follower, StepBounds
+from dynx.ik.tracking.result import TrackStatus
+from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import quat_exp, quat_from_rotation, quat_log, rotation_from_quat
+
+MAX_DIVISIONS = 64
+"""Most parts into which the way from one sample to the next is divided."""
+
+AT_BOUND = 1e-9
+"""Distance from a bound [rad or m] below which a coordinate is at it."""
+
+PRESSING = 1e-6
+"""Cosine between the error and the motion of a coordinate above which its bound keeps the error large."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrackLimits:
+    """Bounds of a path, for the coordinates that move the frame (n,) [rad or m]."""
+
+    lower: Floats
+    upper: Floats
+    max_step: Floats
+    """Largest change in one descent."""
+    per_sample: Floats
+    """Largest change from one sample to the next, by the velocity limits; infinite without them."""
+
+    @property
+    def direct(self) -> StepBounds:
+        """Bounds of a descent from one sample to the next."""
+        return StepBounds(self.lower, self.upper, np.minimum(self.max_step, self.per_sample))
+
+    @property
+    def unbounded_steps(self) -> StepBounds:
+        """Bounds of a descent that may move any distance."""
+        return StepBounds(self.lower, self.upper, np.full(len(self.lower), np.inf))
+
+    @property
+    def divisible(self) -> bool:
+        """Whether several descents may change a coordinate by more than one."""
+        return bool((self.per_sample > self.max_step).any())
+
+
+@dataclass(eq=False)
+class TrackedPath:
+    """Arrays of one path of n samples, filled from the start (see `TrackResult`)."""
+
+    q: Floats
+    status: Floats
+    position_error: Floats
+    rotation_error: Floats
+    jump: Floats
+    iterations: Floats
+
+    @classmethod
+    def empty(cls, n: int, nq: int) -> TrackedPath:
+        """Make a path of which nothing is filled."""
+        return cls(np.empty((n, nq)), *(np.zeros(n) for _ in range(5)))
+
+    @property
+    def leading(self) -> int:
+        """Number of samples that are OK from the start without interruption."""
+        wrong = np.flatnonzero(self.status != TrackStatus.OK)
+        return int(wrong[0]) if wrong.size else len(self.status)
+
+    def is_ok_before(self, k: int) -> bool:
+        """Return whether the sample before number k is reached; the start counts as reached."""
+        return k == 0 or self.status[k - 1] in (TrackStatus.OK, TrackStatus.JUMPED)
+
+    def fill(self, first: int, found: Followed) -> None:
+        """Write samples from number `first`, as OK."""
+        to = slice(first, first + len(found))
+        self.q[to] = found.q
+        self.position_error[to], self.rotation_error[to] = found.position_error, found.rotation_error
+        self.iterations[to] += found.iterations
+
+
+class PathTracker:
+    """Tracker of paths of one frame."""
+
+    def __init__(
+        self,
+        kinematics: Kinematics,
+        follower: Follower,
+        frame: str,
+        point: Floats | None,
+        coordinates: FrameCoordinates,
+        limits: TrackLimits,
+        starts: Floats,
+    ) -> None:
+        """`starts` (k, n) are values of the joints, at which searches for another solution begin."""
+        self._kinematics, self._frame, self._point = kinematics, frame, point
+        self._follower, self._limits, self._starts = follower, limits, starts
+        self.coordinates = coordinates
+
+    def track(self, q: Floats, targets: Targets, *, jumps: bool) -> TrackedPath:
+        """Track targets (n,) from the configuration q (nq,) before the first, within the limits."""
+        limits, n = self._limits, targets.batch[0]
+        path = TrackedPath.empty(n, len(q))
+        bounds, before = limits.direct, q
+        # With velocity limits nothing more can be done for a sample that is not reached.
+        stop = jumps or limits.divisible
+        done = 0
+        while done < n:
+            found = self._follower.follow(q, part_of(targets, slice(done, n)), bounds, stop=stop)
+            path.fill(done, found)
+            failed = done + np.flatnonzero(~found.reached)
+            for k in failed.tolist():
+                start = path.q[k - 1] if k else before
+                if stop and self._recover(path, k, start, targets, jumps):
+                    continue
+                path.status[k] = self._cause(path.q[k], start, targets, k)
+            done += len(found)
+            q = path.q[done - 1]
+        return path
+
+    def solutions(self, q: Floats, target: Targets) -> Floats:
+        """Return configurations (k, nq) that reach a target (1,), each once; other joints are those of q."""
+        starts = np.tile(q, (len(self._starts) + 1, 1))
+        starts[1:, self.coordinates.indices] = self._starts
+        copies = _repeated(target, len(starts))
+        found = self._follower.descend(starts, copies, self._limits.unbounded_steps)
+        within: list[Floats] = []
+        for solution in found.q[found.reached]:
+            near = self.coordinates.nearest(solution, q)
+            if self._is_within_limits(near) and not any(self._distance(near, x) < AT_BOUND for x in within):
+                within.append(near)
+        return np.array(within).reshape(-1, len(q))
+
+    def _recover(self, path: TrackedPath, k: int, q: Floats, targets: Targets, jumps: bool) -> bool:
+        """Reach sample k from q over poses between, or by a jump; return whether that succeeded."""
+        target = part_of(targets, slice(k, k + 1))
+        limits = self._limits
+        if limits.divisible and (path.is_ok_before(k) or self._is_out_of_reach(q, path.q[k])):
+            found = self._divided(q, target)
+            if found is not None:
+                path.iterations[k] = 0.0
+                path.fill(k, found)
+                return True
+        if not jumps:
+            return False
+        others = self.solutions(q, target)
+        if not len(others):
+            return False
+        distances = [self._distance(q, other) for other in others]
+        nearest = int(np.argmin(distances))
+        found = self._follower.descend(others[nearest : nearest + 1], target, limits.unbounded_steps)
+        path.fill(k, found)
+        path.status[k], path.jump[k] = TrackStatus.JUMPED, self._distance(q, found.q[0])
+        return True
+
+    def _divided(self, q: Floats, target: Targets) -> Followed | None:
+        """Return the target's solution by continuation over poses between, or None."""
+        coordinates, limits = self.coordinates, self._limits
+        x = np.array(coordinates.values(q))
+        bounds = StepBounds(limits.lower, limits.upper, limits.per_sample).within_reach_of(x, limits.max_step)
+        between = _Between(self._kinematics.forward_kinematics(q, self._frame), self._point, target)
+        parts, steps = 2, 0
+        while parts <= MAX_DIVISIONS:
+            found = self._follower.follow(q, between.targets(parts), bounds, stop=True)
+            steps += int(found.iterations.sum())
+            if found.reached.all():
+                last = _last(found)
+                last.iterations[0] = steps
+                return last
+            parts *= 2
+        return None
+
+    def _cause(self, q: Floats, before: Floats, targets: Targets, k: int) -> TrackStatus:
+        """Return LIMITED if the error presses a coordinate against a limit at q, otherwise HELD."""
+        coordinates, limits = self.coordinates, self._limits
+        (position, rotation), *_ = part_of(targets, slice(k, k + 1)).rows((1,))
+        residual = Residual(position, rotation, self._point)
+        error = np.array(residual(self._kinematics.forward_kinematics(q, self._frame))[0])
+        place = {} if self._point is None else {"point": self._point}
+        J = self._kinematics.jacobian(q, self._frame, **place)[residual.rows, coordinates.columns]
+        pressure = error @ J / (np.linalg.norm(J, axis=0) * np.linalg.norm(error) + 1e-300)
+        x, x_before = np.array(coordinates.values(q)), np.array(coordinates.values(before))
+        bounds = StepBounds(limits.lower, limits.upper, limits.per_sample)
+        lower, upper = bounds.around(x_before)
+        limited = ((x <= lower + AT_BOUND) & (pressure < -PRESSING)) | (
+            (x >= upper - AT_BOUND) & (pressure > PRESSING)
+        )
+        return TrackStatus.LIMITED if limited.any() else TrackStatus.HELD
+
+    def _is_out_of_reach(self, q: Floats, found: Floats) -> bool:
+        """Return whether a descent from q ended because a coordinate changed by as much as it may."""
+        x, x_found = (np.array(self.coordinates.values(one)) for one in (q, found))
+        return bool((np.abs(x_found - x) >= self._limits.direct.reach - AT_BOUND).any())
+
+    def _distance(self, a: Floats, b: Floats) -> float:
+        """Return the largest difference of a joint [rad or m]."""
+        indices = self.coordinates.indices
+        return float(np.max(np.abs(a[indices] - b[indices]), initial=0.0))
+
+    def _is_within_limits(self, q: Floats) -> bool:
+        x = np.array(self.coordinates.values(q))
+        return bool(((x >= self._limits.lower) & (x <= self._limits.upper)).all())
+
+
+class _Between:
+    """Targets on the straight way from the present pose to a target, at a constant rotation axis."""
+
+    def __init__(self, T: Floats, point: Floats | None, target: Targets) -> None:
+        self._target = target
+        if target.positions is not None:
+            self._position = T[:3, 3] if point is None else T[:3, 3] + T[:3, :3] @ point
+            self._displacement = target.positions[0] - self._position
+        if target.rotations is not None:
+            self._rotation = T[:3, :3]
+            self._vector = quat_log(quat_from_rotation(self._rotation.T @ target.rotations[0]))
+
+    def targets(self, parts: int) -> Targets:
+        """Return the ends of this many equal parts; the last is exactly the target."""
+        s = np.linspace(0.0, 1.0, parts + 1)[1:, None]
+        positions = rotations = None
+        if self._target.positions is not None:
+            positions = self._position + s * self._displacement
+            positions[-1] = self._target.positions[0]
+        if self._target.rotations is not None:
+            rotations = self._rotation @ rotation_from_quat(quat_exp(s * self._vector))
+            rotations[-1] = self._target.rotations[0]
+        return Targets(positions, rotations)
+
+
+def part_of(targets: Targets, of: slice) -> Targets:
+    """Return some of the targets (n,)."""
+    return Targets(
+        None if targets.positions is None else targets.positions[of],
+        None if targets.rotations is None else targets.rotations[of],
+    )
+
+
+def _repeated(target: Targets, count: int) -> Targets:
+    """Return a target (1,) this many times."""
+    return Targets(
+        None if target.positions is None else np.repeat(target.positions, count, axis=0),
+        None if target.rotations is None else np.repeat(target.rotations, count, axis=0),
+    )
+
+
+def _last(found: Followed) -> Followed:
+    return Followed(
+        found.q[-1:], found.position_error[-1:], found.rotation_error[-1:], found.reached[-1:],
+        found.iterations[-1:].copy(),
+    )  # fmt: skip

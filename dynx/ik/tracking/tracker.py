@@ -1,0 +1,255 @@
+"""`track`: checks arguments, chooses the start of each path, and tracks paths one by one."""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.errors import ArgumentError, ShapeError, shown
+from dynx.ik.checking import checked_margin
+from dynx.ik.coordinates import FrameCoordinates
+from dynx.ik.search import SearchLimits
+from dynx.ik.targets import Targets, checked_targets
+from dynx.ik.tasks import Kinematics
+from dynx.ik.tracking.descent import Follower, SampleFollower
+from dynx.ik.tracking.path import PathTracker, TrackedPath, TrackLimits, part_of
+from dynx.ik.tracking.result import TrackResult
+from dynx.model import Model
+from dynx.model.configuration import (
+    checked_q,
+    checked_vector,
+    is_real,
+    positive_seconds,
+    real_array,
+    whole_number,
+)
+from dynx.spatial.scalar import Floats
+
+MAX_STEPS = 60
+"""Most steps of the solver to one target."""
+
+
+@runtime_checkable
+class Motion(Protocol):
+    """A motion of all coordinates over time, such as a `dynx.trajectory.Trajectory`."""
+
+    @property
+    def duration(self) -> float:
+        """Duration [s]."""
+
+    def __call__(self, t: ArrayLike, /) -> tuple[Floats, Floats, Floats]:
+        """Return q, v and a at times t [s]."""
+
+
+def track(
+    kinematics: Kinematics,
+    targets: ArrayLike | Motion,
+    frame: str,
+    q0: ArrayLike | None = None,
+    *,
+    dt: float | None = None,
+    velocity_limit: ArrayLike | None = None,
+    free: str | None = None,
+    point: ArrayLike | None = None,
+    position_tolerance: float = 1e-6,
+    rotation_tolerance: float = 1e-6,
+    limit_margin: ArrayLike = 0.0,
+    max_step: float = 0.2,
+    jumps: bool | None = None,
+    max_starts: int = 32,
+    rng: np.random.Generator | int = 0,
+) -> TrackResult:
+    """Follow a path of targets by a continuous sequence of configurations within limits.
+
+    `targets` are n poses T_world_target (..., n, 4, 4), n positions (..., n, 3) [m] whose rotation is free,
+    or with ``free="position"`` n rotations (..., n, 3, 3); `free` and `point` (3,) [m] are those of
+    `inverse_kinematics`. Leading axes are paths of their own. `targets` may also be a motion of this robot,
+    such as a `dynx.trajectory.Trajectory`, whose poses of `frame` are taken every `dt` [s].
+
+    `q0` (..., nq) is the configuration before the first sample, moved into the limits: a path may be tracked
+    in pieces, each from the last q of the piece before. Without q0 the start is chosen: of up to `max_starts`
+    configurations that reach the first target, the one farthest from position limits from which the whole
+    path is OK; if there is none, the one from which the path is OK longest.
+
+    With `dt` [s], the time between two samples, no coordinate moves faster than `velocity_limit` (one number
+    or (nv,) [rad/s or m/s], by default the model's limits), and samples that would need more are LIMITED. The
+    position limits are kept with `limit_margin` [rad or m], one number or (nq,).
+
+    A sample counts as reached within `position_tolerance` [m] and `rotation_tolerance` [rad]. It is
+    continuous with the one before if a descent from there reaches it and moves no coordinate by more than
+    `max_step` [rad or m], or if that holds between up to 64 poses on the straight way to it. Where no
+    continuous configuration reaches the target, q jumps to the nearest of the solutions found from
+    `max_starts` random starts and the status is JUMPED; without one, or with ``jumps=False`` (the
+    default with `dt`), q is the configuration with the least error that is continuous, and LIMITED or HELD
+    names the cause. Equal calls with a seed `rng` return equal results.
+
+    Raises UnknownNameError for the frame; ArgumentError (ShapeError, DTypeError, NotFiniteError) for an
+    invalid argument.
+    """
+    model = kinematics.model
+    model.frame_index(frame)
+    seconds = None if dt is None else positive_seconds("dt", dt)
+    for name, number in (
+        ("position_tolerance", position_tolerance),
+        ("rotation_tolerance", rotation_tolerance),
+    ):
+        if not (is_real(number) and 0.0 < number < math.inf):
+            raise ArgumentError(f"{name} is {shown(number)}; wanted a positive number")
+    if not (is_real(max_step) and 0.0 < max_step <= math.pi):
+        raise ArgumentError(f"max_step is {shown(max_step)}; wanted a number above 0, at most pi")
+    whole_number("max_starts", max_starts, 1)
+    at = None if point is None else checked_vector("point", point)
+    path = _checked_path(kinematics, targets, frame, free, seconds)
+    if at is not None and path.positions is None:
+        raise ArgumentError("point is given in addition to free='position', with which it has no effect")
+    coordinates = FrameCoordinates(model, frame, checked_margin(model, limit_margin))
+    may_jump = seconds is None if jumps is None else jumps
+    if not isinstance(may_jump, bool):
+        raise ArgumentError(f"jumps is {shown(jumps)}; wanted True, False or None")
+    if may_jump and seconds is not None:
+        raise ArgumentError("jumps=True is given with dt, whose velocity limits a jump would violate")
+    limits = _limits(model, coordinates, max_step, seconds, velocity_limit)
+    settings = SearchLimits(float(position_tolerance), float(rotation_tolerance), MAX_STEPS, 0)
+    make = getattr(kinematics, "path_follower", None)
+    follower: Follower | None = None if make is None else make(frame, path, at, settings)
+    if follower is None:
+        follower = SampleFollower(kinematics, frame, at, settings)
+    draws = coordinates.starts(_generator(rng), max_starts)
+    offset = coordinates.count - len(coordinates.indices)
+    starts = np.clip(draws, limits.lower[offset:], limits.upper[offset:])
+    tracker = PathTracker(kinematics, follower, frame, at, coordinates, limits, starts)
+
+    n = path.batch[-1]
+    start = _start(model, q0, coordinates)
+    try:
+        batch = np.broadcast_shapes(path.batch[:-1], start.shape[:-1])
+    except ValueError:
+        raise ShapeError(
+            f"leading axes do not broadcast: targets have {path.batch[:-1]}, q0 has {start.shape[:-1]}"
+        ) from None
+    count = math.prod(batch)
+    flat_starts = np.broadcast_to(start, (*batch, model.nq)).reshape(count, model.nq)
+    positions, rotations = path.positions, path.rotations
+    if positions is not None:
+        positions = np.broadcast_to(positions, (*batch, n, 3)).reshape(count, n, 3)
+    if rotations is not None:
+        rotations = np.broadcast_to(rotations, (*batch, n, 3, 3)).reshape(count, n, 3, 3)
+    found: list[TrackedPath] = []
+    for k in range(count):
+        of_path = Targets(
+            None if positions is None else positions[k], None if rotations is None else rotations[k]
+        )
+        if q0 is None:
+            found.append(_from_best_start(tracker, flat_starts[k], of_path, limits, may_jump))
+        else:
+            found.append(tracker.track(flat_starts[k], of_path, jumps=may_jump))
+
+    def gathered(name: str, *trailing: int) -> Floats:
+        return np.array([getattr(one, name) for one in found]).reshape(*batch, n, *trailing)
+
+    return TrackResult(
+        gathered("q", model.nq),
+        gathered("status").astype(np.int8),
+        gathered("position_error"),
+        gathered("rotation_error"),
+        gathered("jump"),
+        gathered("iterations").astype(np.int64),
+        seconds,
+    )
+
+
+def _generator(rng: np.random.Generator | int) -> np.random.Generator:
+    if isinstance(rng, np.random.Generator):
+        return rng
+    if isinstance(rng, int | np.integer) and not isinstance(rng, bool) and rng >= 0:
+        return np.random.default_rng(int(rng))
+    raise ArgumentError(f"rng is {shown(rng)}; wanted a generator or a seed (at least 0)")
+
+
+def _from_best_start(
+    tracker: PathTracker, q: Floats, targets: Targets, limits: TrackLimits, jumps: bool
+) -> TrackedPath:
+    """Track from the solution of the first target from which most samples are OK."""
+    starts = tracker.solutions(q, part_of(targets, slice(1)))
+    indices = tracker.coordinates.indices
+    offset = len(limits.lower) - len(indices)
+    low, high = limits.lower[offset:], limits.upper[offset:]
+    with np.errstate(invalid="ignore"):
+        extent = np.where(high > low, high - low, 1.0)
+        x = starts[:, indices]
+        clearance = np.min(np.minimum((x - low), (high - x)) / np.where(np.isfinite(extent), extent, 1.0),
+                           axis=-1, initial=0.5)  # fmt: skip
+    best: tuple[int, Floats, TrackedPath | None] = (-1, q, None)
+    for k in np.argsort(-clearance, kind="stable").tolist():
+        path = tracker.track(starts[k], targets, jumps=False)
+        if path.leading == targets.batch[0]:
+            return path
+        if path.leading > best[0]:
+            best = path.leading, starts[k], path
+    _, start, path_or_none = best
+    if path_or_none is None or jumps:
+        return tracker.track(start, targets, jumps=jumps)
+    return path_or_none
+
+
+def _checked_path(
+    kinematics: Kinematics, targets: ArrayLike | Motion, frame: str, free: str | None, dt: float | None
+) -> Targets:
+    """Return targets (..., n), n at least 1."""
+    if isinstance(targets, Motion):
+        if dt is None:
+            raise ArgumentError("targets are a motion over time; give dt, the time between two samples [s]")
+        count = math.floor(targets.duration / dt * (1.0 + 1e-12)) + 1
+        q = np.asarray(targets(np.minimum(np.arange(count) * dt, targets.duration))[0])
+        if q.shape[-1] != kinematics.model.nq:
+            raise ShapeError(
+                f"the motion has {q.shape[-1]} coordinates; wanted {kinematics.model.nq}, those of the robot"
+            )
+        poses: ArrayLike = kinematics.forward_kinematics(q, frame)
+    else:
+        poses = targets
+    path = checked_targets(poses, free)
+    if not path.batch or not path.batch[-1]:
+        raise ShapeError(
+            f"targets have shape {np.shape(poses)}; wanted a path, such as (..., n, 4, 4) with n at least 1"
+        )
+    return path
+
+
+def _limits(
+    model: Model,
+    coordinates: FrameCoordinates,
+    max_step: float,
+    dt: float | None,
+    velocity_limit: ArrayLike | None,
+) -> TrackLimits:
+    offset, n = coordinates.count - len(coordinates.indices), coordinates.count
+    lower, upper = np.full(n, -np.inf), np.full(n, np.inf)
+    ranges = np.array([coordinates.limits(k) for k in range(n - offset)]).reshape(-1, 2)
+    lower[offset:], upper[offset:] = ranges[:, 0], ranges[:, 1]
+    per_sample = np.full(n, np.inf)
+    if dt is None and velocity_limit is not None:
+        raise ArgumentError("velocity_limit is given without dt, the time between two samples [s]")
+    if dt is not None:
+        bound = real_array(
+            "velocity_limit", model.velocity_limit if velocity_limit is None else velocity_limit
+        )
+        if bound.shape not in ((), (model.nv,)):
+            raise ShapeError(f"velocity_limit has shape {bound.shape}; wanted one number, or ({model.nv},)")
+        if not (bound >= 0.0).all():
+            raise ArgumentError(f"velocity_limit has the least entry {np.min(bound):g}; wanted at least 0")
+        per_sample = np.array(np.broadcast_to(bound, (model.nv,))[coordinates.columns]) * dt
+    steps = np.full(n, float(max_step))
+    steps[:offset] = np.inf
+    return TrackLimits(lower, upper, steps, per_sample)
+
+
+def _start(model: Model, q0: ArrayLike | None, coordinates: FrameCoordinates) -> Floats:
+    """Return q0, or the neutral configuration, moved into the limits and with a unit quaternion."""
+    q = coordinates.clipped(model.clip(model.neutral() if q0 is None else checked_q(model, q0, "q0")))
+    if model.floating:
+        q[..., 3:7] /= np.linalg.norm(q[..., 3:7], axis=-1, keepdims=True)
+    return q

@@ -1,0 +1,83 @@
+"""Invalid arguments of `track` raise errors that name them; results print readably."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dynx import trajectory
+from dynx.backends import Backend, backend
+from dynx.errors import ArgumentError, ClosedError, NotFiniteError, ShapeError, UnknownNameError
+from dynx.model.loading import load
+from tests.oracles.closed_form import MODELS
+
+PATH = np.tile(np.eye(4), (3, 1, 1))
+MOTION = trajectory.cubic(np.zeros(2), np.ones(2), 1.0)
+
+
+@pytest.fixture(params=["pinocchio", "compiled"])
+def engine(request: pytest.FixtureRequest) -> Iterator[Backend]:
+    with backend(request.param, load(MODELS / "six_axis_arm.urdf")) as engine:
+        yield engine
+
+
+@pytest.mark.parametrize(
+    ("targets", "options", "error", "message"),
+    [
+        (np.eye(4), {}, ShapeError, r"\(4, 4\); wanted a path"),
+        (np.zeros((0, 4, 4)), {}, ShapeError, "n at least 1"),
+        (np.full((2, 3), np.nan), {}, NotFiniteError, "finite"),
+        (MOTION, {}, ArgumentError, "give dt"),
+        (MOTION, {"dt": 0.1}, ShapeError, "2 coordinates; wanted 6"),
+        (PATH, {"dt": 0.0}, ArgumentError, "dt is '0.0'; wanted a positive number"),
+        (PATH, {"velocity_limit": 1.0}, ArgumentError, "without dt"),
+        (PATH, {"dt": 0.1, "velocity_limit": [1.0]}, ShapeError, r"\(1,\); wanted one number, or \(6,\)"),
+        (PATH, {"dt": 0.1, "velocity_limit": -1.0}, ArgumentError, "least entry -1"),
+        (PATH, {"dt": 0.1, "jumps": True}, ArgumentError, "a jump would violate"),
+        (PATH, {"jumps": 1}, ArgumentError, "jumps is '1'"),
+        (PATH, {"max_step": 0.0}, ArgumentError, "max_step is '0.0'"),
+        (PATH, {"max_starts": 0}, ArgumentError, "max_starts is '0'"),
+        (PATH, {"limit_margin": -0.1}, ArgumentError, "margin is '-0.1'"),
+        (PATH, {"limit_margin": 100.0}, ArgumentError, "leaves joint 'joint1' no range"),
+        (PATH, {"position_tolerance": 0}, ArgumentError, "position_tolerance is '0'"),
+        (PATH, {"q0": np.zeros((2, 6))}, None, ""),
+        (
+            np.tile(PATH, (3, 1, 1, 1)),
+            {"q0": np.zeros((2, 6))},
+            ShapeError,
+            r"targets have \(3,\), q0 has \(2,\)",
+        ),
+        (PATH, {"q0": np.zeros(5)}, ShapeError, "q0"),
+        (PATH, {"free": "turn"}, ArgumentError, "free is 'turn'"),
+        (PATH, {"free": "position", "point": np.ones(3)}, ArgumentError, "no effect"),
+        (PATH, {"rng": "seed"}, ArgumentError, "rng is 'seed'"),
+    ],
+)
+def test_arguments(
+    engine: Backend, targets: Any, options: dict[str, Any], error: type[Exception] | None, message: str
+) -> None:
+    if error is None:
+        assert engine.track(targets, "flange", **options).q.shape == (2, 3, 6)
+        return
+    with pytest.raises(error, match=message):
+        engine.track(targets, "flange", **options)
+
+
+def test_an_unknown_frame_and_a_closed_backend_raise(engine: Backend) -> None:
+    with pytest.raises(UnknownNameError, match="flange"):
+        engine.track(PATH, "flang")
+    engine.close()
+    with pytest.raises(ClosedError):
+        engine.track(PATH, "flange")
+
+
+def test_results_print_their_statuses(engine: Backend) -> None:
+    T = engine.forward_kinematics(np.linspace(0.2, 0.4, 5)[:, None] * np.ones(6), "flange")
+    T[3:, 0, 3] += 10.0
+    result = engine.track(T, "flange", np.full(6, 0.2), jumps=False)
+    assert result.message.startswith("5 samples (3 OK, 2 ")
+    assert "the first that is not OK is number 3" in repr(result)
+    assert "tracking" in result._repr_html_()
