@@ -11,8 +11,8 @@ from dynx.errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, s
 
 
 def checked_action(space: Space[Any], action: Any) -> Any:
-    """Return an action of one environment: an int for a `Discrete` space, an array of the space's shape and
-    dtype for a `Box`.
+    """Return an action of one environment: an int for a `Discrete` space, an array of float64 in the space's
+    shape for a `Box`.
 
     A number of a Box beyond the bounds is refused, not clipped. Raises ShapeError, DTypeError, NotFiniteError
     or ArgumentError, each with what was got and what is wanted.
@@ -46,8 +46,9 @@ def _checked_numbers(space: spaces.Box, action: Any) -> Any:
         raise DTypeError(f"action is {shown(action)}; wanted numbers of shape {space.shape}")
     if array.shape != space.shape:
         raise ShapeError(f"action has shape {array.shape}; wanted {space.shape}")
-    array = array.astype(space.dtype, copy=False)
-    inside = (array >= space.low) & (array <= space.high)
+    # Bounds are of the space's dtype: 0.7 of float64 is within a bound of 0.7 of float32.
+    rounded = array.astype(space.dtype)
+    inside = (rounded >= space.low) & (rounded <= space.high)
     if not inside.all():
         place = tuple(int(k) for k in np.argwhere(~inside)[0])
         name = f"action[{', '.join(map(str, place))}]"
@@ -55,4 +56,4 @@ def _checked_numbers(space: spaces.Box, action: Any) -> Any:
         if not np.isfinite(value):
             raise NotFiniteError(f"{name} is {value}; wanted numbers from {low:g} to {high:g}")
         raise ArgumentError(f"{name} is {value:g}; wanted numbers from {low:g} to {high:g}")
-    return array
+    return array.astype(np.float64, copy=False)

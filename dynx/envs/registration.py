@@ -6,15 +6,23 @@ from importlib import import_module
 from typing import Any
 
 from dynx.envs.environment import TaskEnvironment
-from dynx.envs.library import register, registry
+from dynx.envs.library import AutoresetMode, register, registry
+from dynx.envs.robot.array_task import ArrayTask
 from dynx.envs.task import Task
+from dynx.envs.vector.environment import RobotVectorEnvironment
 from dynx.errors import ArgumentError, shown
 
+COMPILED = "compiled"
+"""The engine of vector environments, whose kernels are compiled."""
+
 NAMESPACE = "dynx"
+VECTOR_ENTRY_POINT = "dynx.envs.registration:make_vector_environment"
 
 TASKS = {
+    "Acrobot-v0": "dynx.envs.tasks.acrobot:Acrobot",
     "CartPole-v0": "dynx.envs.tasks.cart_pole:CartPole",
     "LunarLander-v0": "dynx.envs.tasks.lunar_lander.task:LunarLander",
+    "Pendulum-v0": "dynx.envs.tasks.pendulum:Pendulum",
 }
 """Tasks of dynx by the name of their environment, as ``"package.module:Class"``."""
 
@@ -47,6 +55,43 @@ def make_environment(
     return TaskEnvironment(made, engine, render_mode, width=width, height=height)
 
 
+def make_vector_environment(
+    task: str | type[Task],
+    num_envs: int = 1,
+    engine: str = COMPILED,
+    render_mode: str | None = None,
+    *,
+    max_episode_steps: int | None = None,
+    autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+    copy: bool = True,
+    width: int = 480,
+    height: int = 360,
+    **options: Any,
+) -> RobotVectorEnvironment:
+    """Return environments of a task that step in one compiled kernel; `gymnasium.make_vec` calls this.
+
+    Raises ArgumentError for another engine or a task that is no `ArrayTask`: those step one by one or in
+    processes, by ``vectorization_mode="sync"`` or ``"async"``.
+    """
+    made = task_class(task).with_options(options)
+    if engine != COMPILED or not isinstance(made, ArrayTask):
+        subject = type(made).__name__ if engine == COMPILED else f"engine {shown(engine)}"
+        raise ArgumentError(
+            f"{subject} does not step in a compiled kernel; wanted vectorization_mode='sync' or 'async', or "
+            f"a task of one robot on engine {COMPILED!r}"
+        )
+    return RobotVectorEnvironment(
+        made,
+        num_envs,
+        max_episode_steps=max_episode_steps,
+        autoreset_mode=autoreset_mode,
+        copy=copy,
+        render_mode=render_mode,
+        width=width,
+        height=height,
+    )
+
+
 def register_task(env_id: str, task: str | type[Task]) -> None:
     """Register a task, so that ``gymnasium.make(env_id, engine=...)`` makes its environment.
 
@@ -57,6 +102,7 @@ def register_task(env_id: str, task: str | type[Task]) -> None:
     register(
         env_id,
         entry_point="dynx.envs.registration:make_environment",
+        vector_entry_point=VECTOR_ENTRY_POINT if issubclass(kind, ArrayTask) else None,
         max_episode_steps=kind.max_episode_steps,
         reward_threshold=kind.reward_threshold,
         kwargs={"task": task},

@@ -17,6 +17,7 @@ import dynx.envs  # noqa: F401  (registers the environments)
 from dynx.backends import installed_backends
 from dynx.envs.actions import checked_action
 from dynx.envs.environment import TaskEnvironment
+from dynx.envs.robot.state import State
 from dynx.envs.tasks.cart_pole import CartPole
 from dynx.errors import (
     ArgumentError,
@@ -157,3 +158,9 @@ def test_code_of_the_page_runs() -> None:
     assert reward < 0.0
     assert (terminated, truncated) == (False, False)
     assert gymnasium.spec("mine/Point-v0").max_episode_steps == 200
+    envs: Any = gymnasium.make_vec("mine/Point-v0", num_envs=4, reach=0.4)
+    envs.reset(seed=1)
+    actions = np.full((4, 2), 0.3)
+    made.unwrapped.episodes.state = State(*np.split(envs.states[1], [2, 4]))
+    _, rewards, *_ = envs.step(actions)
+    assert rewards[1] == pytest.approx(made.step(actions[1])[1], rel=1e-9)

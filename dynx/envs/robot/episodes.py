@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,17 +12,13 @@ from dynx.backends import backend
 from dynx.control.dynamics import EngineDynamics
 from dynx.envs.library import spaces
 from dynx.envs.robot.array_task import ArrayTask
+from dynx.envs.robot.pictures import draw_robot
 from dynx.envs.robot.state import State
+from dynx.envs.robot.step import control_step
 from dynx.envs.task import Episodes, Outcome
 from dynx.errors import DivergedError, ShapeError
 from dynx.model.configuration import DIVERGENCE_SPEED
 from dynx.spatial.scalar import Array, Floats
-from dynx.world import Scene, SceneRobot
-from dynx.world.camera import cast_rays, draw_picture
-from dynx.world.state import RobotState, WorldState
-
-ROBOT = "robot"
-"""Name of the robot in the scene that is drawn."""
 
 
 class RobotEpisodes(Episodes):
@@ -57,13 +52,10 @@ class RobotEpisodes(Episodes):
     def step(self, action: Any) -> Outcome:
         task, robot, before = self._task, self._robot, self._state
         given = np.asarray(float(action) if self._discrete else action, dtype=np.float64)
-        q, v, memory = before
-        for _ in range(task.substeps):
-            tau = task.torque(robot, State(q, v, memory), given)
-            q, v = task.advance(lambda q, v, tau=tau: self._forward(q, v, tau), q, v)  # type: ignore[misc]
+        moved = control_step(task, robot, self._forward, before, given)
         self._steps += 1
-        self._refuse_divergence(q, v)
-        after = self._state = task.settle(State(q, v, memory))
+        self._refuse_divergence(moved.q, moved.v)
+        after = self._state = task.settle(moved)
         reward = float(task.reward(robot, before, given, after))
         terminated = bool(task.terminated(robot, after))
         return Outcome(self._observation(), reward, terminated, task.info(robot, after))
@@ -90,11 +82,7 @@ class RobotEpisodes(Episodes):
 
     def picture(self, width: int, height: int) -> NDArray[np.uint8]:
         """Draw the robot by rays through the shapes of its description."""
-        model, (q, v, _) = self._task.model, self._state
-        scene = Scene(robots=(SceneRobot(ROBOT, model),))
-        state = WorldState(self._steps * self._task.control_dt, {ROBOT: RobotState(q, v)}, {})
-        camera = replace(self._task.camera, size=(width, height))
-        return draw_picture(scene, state, camera, cast_rays).rgb
+        return draw_robot(self._task, self._state, width, height)
 
     def view(self) -> None:
         """Show the robot in the browser."""

@@ -1,0 +1,1 @@
+"""Environments of dynx beside Gymnasium's: equal steps (`exactness`) and their speed (`speed`)."""

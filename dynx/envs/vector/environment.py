@@ -1,0 +1,238 @@
+"""`RobotVectorEnvironment`: many environments of one task, which step in one compiled kernel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dynx.envs.library import AutoresetMode, VectorEnv, batch_space, spaces
+from dynx.envs.robot.array_task import ArrayTask
+from dynx.envs.robot.pictures import draw_robot
+from dynx.envs.vector.checks import checked_actions, checked_mode, checked_reset_mask, raise_defect
+from dynx.envs.vector.kernels import INVALID, VectorKernels
+from dynx.errors import ArgumentError, ClosedError, EpisodeError, ShapeError, nearest, shown
+from dynx.model.configuration import checked_array, whole_number
+from dynx.simd.target import host
+from dynx.spatial.scalar import Floats
+
+RENDER_MODES = ("rgb_array",)
+
+NONE_ENDED = np.zeros(0, dtype=np.intp)
+"""Numbers of the environments whose episode ended, where there are none."""
+
+
+class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
+    """Environments of one task, each in a lane of a compiled kernel, with the interface of
+    `gymnasium.vector.VectorEnv`.
+
+    Autoreset is that of Gymnasium: in mode NEXT_STEP the step after the end of an episode starts the next one
+    and ignores the action; in mode SAME_STEP the step that ends an episode returns the first observation of
+    the next one, and ``info["final_obs"]`` has the last; in mode DISABLED ``reset(options={"reset_mask":
+    mask})`` starts episodes. Random numbers are drawn for all environments in turn from `np_random`, so a run
+    is repeated by its seed, the number of environments and the actions.
+
+    With ``copy=False`` observations, rewards and flags are written into the same arrays in every step, which
+    is faster. Runs on one thread; not safe for several.
+    """
+
+    def __init__(
+        self,
+        task: ArrayTask,
+        num_envs: int = 1,
+        *,
+        max_episode_steps: int | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        copy: bool = True,
+        render_mode: str | None = None,
+        width: int = 480,
+        height: int = 360,
+    ) -> None:
+        """Raises ArgumentError for an option that cannot be used, UnsupportedFeatureError for a task that
+        cannot be compiled."""
+        if render_mode is not None and render_mode not in RENDER_MODES:
+            raise ArgumentError(
+                f"render_mode is {shown(render_mode)}{nearest(str(render_mode), RENDER_MODES)}"
+            )
+        n = self.num_envs = whole_number("num_envs", num_envs, 1)
+        self.task = task
+        """The task."""
+        mode = self._mode = checked_mode(autoreset_mode)
+        fps = round(1.0 / task.control_dt)
+        self.metadata = {
+            "render_modes": list(RENDER_MODES),
+            "render_fps": fps,
+            "autoreset_mode": mode,
+        }
+        self.render_mode = render_mode
+        self._size = (width, height)
+        self.single_observation_space, self.single_action_space = task.observation_space, task.action_space
+        self.observation_space = batch_space(task.observation_space, n)
+        self.action_space = batch_space(task.action_space, n)
+        self._discrete = isinstance(task.action_space, spaces.Discrete)
+        self._kinds = "iu" if self._discrete else "fiu"
+        self._kernels = VectorKernels(task, mode, max_episode_steps)
+        self._layout = self._kernels.layout
+        self._copy = copy
+        self._rows = max(n, host().lanes)
+        self._make_buffers()
+        self._running = False
+
+    def _make_buffers(self) -> None:
+        """Allocate the arrays of the kernel, and bind it to them: the state is read from one set and written
+        to another, in turn."""
+        kernels, rows, n = self._kernels, self._rows, self.num_envs
+        kernel = kernels.step()
+        sizes = {port.name: port.size for port in kernel.inputs + kernel.outputs}
+        sets = [{name: np.zeros((rows, sizes[name])) for name in ("state", "steps")} for _ in range(2)]
+        arrays = {name: np.zeros((rows, size)) for name, size in sizes.items()}
+        self._calls: list[Callable[[], None]] = [
+            kernel.bind(
+                [sets[turn].get(port.name, arrays[port.name]) for port in kernel.inputs],
+                [sets[1 - turn].get(port.name, arrays[port.name]) for port in kernel.outputs],
+            )
+            for turn in range(2)
+        ]
+        self._sets, self._turn = sets, 0
+        self._random, self._arrays = arrays["random"], arrays
+        self._actions = arrays["action"][:n, 0] if self._discrete else arrays["action"][:n]
+        if not self._discrete:
+            self._actions = self._actions.reshape(n, *(self.single_action_space.shape or ()))
+        self._found, self._rewards = arrays["observation"][:n], arrays["reward"][:n, 0]
+        self._flags = arrays["flags"][:n, 0].view(np.int64)
+        flags = self._flags.view(np.bool_).reshape(n, 8)
+        self._terminated, self._truncated = flags[:, 0], flags[:, 1]
+        dtype = self.single_observation_space.dtype
+        self._observations = np.zeros((n, kernels.observations), dtype=dtype)
+        self._ended = NONE_ENDED
+
+    @property
+    def states(self) -> Floats:
+        """Copy of q, v and memory of each environment (num_envs, nq + nv + k)."""
+        return np.array(self._sets[self._turn]["state"][: self.num_envs])
+
+    def set_states(self, states: ArrayLike) -> None:
+        """Set q, v and memory of each environment (num_envs, nq + nv + k), at the start of an episode."""
+        self._refuse_closed()
+        if not self._running:
+            raise EpisodeError("set_states was called before the first reset")
+        array = checked_array("states", states, self._layout.size)
+        if array.shape != (self.num_envs, self._layout.size):
+            raise ShapeError(f"states have shape {array.shape}; wanted {(self.num_envs, self._layout.size)}")
+        now = self._sets[self._turn]
+        now["state"][: self.num_envs] = array
+        now["steps"][...] = 0.0
+        self._ended = NONE_ENDED
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Start an episode in every environment, or in those of ``options["reset_mask"]``.
+
+        The other options are those of the task's start. Raises UnknownNameError for one that it does not
+        have.
+        """
+        self._refuse_closed()
+        super().reset(seed=seed)
+        if not isinstance(options, Mapping | None):
+            raise ArgumentError(f"options is {shown(options)}; wanted a dict of options by name")
+        given = dict(options or {})
+        mask = checked_reset_mask(given.pop("reset_mask", None), self.num_envs, started=self._running)
+        self.task.require_start_options(given)
+        n, now, found = self.num_envs, self._sets[self._turn], self._arrays["observation"]
+        rows = np.flatnonzero(mask)
+        self._renew(rows)
+        begun, observation = np.empty_like(now["state"]), np.empty_like(found)
+        self._kernels.start(given)([self._random], [begun, observation])
+        now["state"][rows], found[rows] = begun[rows], observation[rows]
+        now["steps"][rows] = 0.0
+        self._ended = self._ended[~mask[self._ended]]
+        if self._mode is not AutoresetMode.DISABLED:
+            self._random[:n] = self.np_random.random((n, self.task.random_size))
+        self._running = True
+        return self._found.astype(self.single_observation_space.dtype), {}
+
+    def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
+        """Act for one control step in each environment; return observations, rewards, terminations,
+        truncations and infos, arrays with one row for each.
+
+        Raises EpisodeError before the first `reset`, and in mode DISABLED after the end of an episode;
+        ArgumentError and its kinds for an invalid action, DivergedError where a state is not finite, all
+        of which leave every environment as it was.
+        """
+        if not self._running:
+            self._refuse_closed()
+            raise EpisodeError("step was called before the first reset")
+        mode, ended = self._mode, self._ended
+        if mode is AutoresetMode.DISABLED and len(ended):
+            raise EpisodeError(
+                f"step was called after the episode of environment {ended[0]} ended: call "
+                "reset(options={'reset_mask': mask})"
+            )
+        if (
+            type(actions) is not np.ndarray
+            or actions.shape != self._actions.shape
+            or actions.dtype.kind not in self._kinds
+        ):
+            actions = checked_actions(self._kinds, self._actions.shape, actions)
+        self._actions[...] = actions
+        turn = self._turn
+        self._calls[turn]()
+        flags = self._flags
+        largest = flags.max()
+        if largest >= INVALID:
+            raise_defect(self.single_action_space, self._actions, flags >= INVALID)
+        self._turn = 1 - turn
+        if mode is AutoresetMode.NEXT_STEP:
+            # The episodes that ended one step ago have started with these random numbers.
+            self._renew(ended)
+        self._ended = ended = flags.nonzero()[0] if largest else NONE_ENDED
+        rewards, terminated, truncated = self._rewards, self._terminated, self._truncated
+        if self._copy:
+            rewards, terminated, truncated = rewards.copy(), terminated.copy(), truncated.copy()
+            observations = self._found.astype(self._observations.dtype)
+        else:
+            observations = self._observations
+            observations[...] = self._found
+        infos: dict[str, Any] = {}
+        if mode is AutoresetMode.SAME_STEP and len(ended):
+            self._renew(ended)
+            infos = self._final_infos(ended)
+            self._ended = NONE_ENDED
+        return observations, rewards, terminated, truncated, infos
+
+    def _renew(self, rows: NDArray[np.intp]) -> None:
+        """Draw the random numbers of the next episodes of some environments."""
+        if len(rows):
+            self._random[rows] = self.np_random.random((len(rows), self.task.random_size))
+
+    def _final_infos(self, rows: NDArray[np.intp]) -> dict[str, Any]:
+        """Return the last observations of the episodes that ended, as Gymnasium returns them."""
+        found = np.full(self.num_envs, None, dtype=object)
+        last = self._arrays["final"][rows].astype(self.single_observation_space.dtype)
+        for row, observation in zip(rows.tolist(), last, strict=True):
+            found[row] = observation
+        mask = self._flags != 0
+        return {"final_obs": found, "_final_obs": mask, "final_info": {}, "_final_info": mask.copy()}
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """Return the pictures of all environments (height, width, 3)."""
+        self._refuse_closed()
+        if self.render_mode is None:
+            raise ArgumentError("these environments have no render mode; make them with 'rgb_array'")
+        if not self._running:
+            raise EpisodeError("render was called before the first reset")
+        width, height = self._size
+        rows = self.states
+        return tuple(draw_robot(self.task, self._layout.state(row), width, height) for row in rows)
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Release the kernels."""
+        self._running = False
+        self._calls = []
+
+    def _refuse_closed(self) -> None:
+        if self.closed:
+            raise ClosedError("this vector environment was closed")

@@ -1,0 +1,194 @@
+"""Kernels of a vector environment: a control step with autoreset, and the start of episodes.
+
+A kernel evaluates one environment in each lane of a vector register. Dynamics, integrator, observation,
+reward, the end of an episode and the start of the next are traced together; where an episode starts, all are
+computed and the start is selected.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from dynx.envs.library import AutoresetMode, spaces
+from dynx.envs.robot.array_task import ArrayTask
+from dynx.envs.robot.state import State
+from dynx.envs.robot.step import control_step
+from dynx.envs.vector.layout import Layout
+from dynx.errors import ArgumentError, ShapeError, TraceError, UnsupportedFeatureError
+from dynx.model.configuration import DIVERGENCE_SPEED
+from dynx.sim.batch.traced_controller import ArrayDynamics
+from dynx.simd.cache import load_kernel, program_recipe
+from dynx.simd.kernel import Kernel
+from dynx.simd.program import Program
+from dynx.simd.trace import trace
+from dynx.simd.user_code.arrays import symbol_array, traced_array
+from dynx.simd.user_code.numbers import select
+from dynx.spatial.scalar import Array
+
+TERMINATED, TRUNCATED, INVALID, DIVERGED = 1, 1 << 8, 1 << 16, 1 << 24
+"""Bits of the output ``flags``, an integer of 64 bits: one byte for each flag, so that the bytes are arrays
+of bool without any conversion. A kernel writes doubles; these have the bit patterns of the integers."""
+
+ENDED = -1.0
+"""Number of steps of an episode that ended, in mode NEXT_STEP: the step that starts the next makes it 0."""
+
+
+class VectorKernels:
+    """Kernels of one task, one autoreset mode and one time limit."""
+
+    def __init__(self, task: ArrayTask, mode: AutoresetMode, max_episode_steps: int | None) -> None:
+        space = task.action_space
+        if not isinstance(space, spaces.Discrete | spaces.Box):
+            raise UnsupportedFeatureError(
+                f"a vector environment takes actions of a Discrete or a Box space, not of {space}"
+            )
+        self._task, self._mode = task, mode
+        self._limit = math.inf if max_episode_steps is None else float(max_episode_steps)
+        self.layout = Layout.of(task)
+        self._robot = ArrayDynamics(task.model)
+        shape = task.observation_space.shape
+        if shape is None or len(shape) != 1:
+            raise UnsupportedFeatureError(
+                f"a vector environment has observations of shape (n,); those of {type(task).__name__} have "
+                f"{shape}"
+            )
+        self.observations = shape[0]
+        self.actions = 1 if isinstance(space, spaces.Discrete) else math.prod(space.shape)
+
+    def step(self) -> Kernel:
+        """Return the kernel of a step.
+
+        Inputs: ``state`` (layout), the number of ``steps``, ``action``, and ``random`` for the start of the
+        next episode. Outputs: ``state``, ``steps``, ``observation``, ``reward``, ``flags``, and in mode
+        SAME_STEP ``final``, the last observation of the episode.
+        """
+        sizes = {
+            "state": (self.layout.size,),
+            "steps": (1,),
+            "action": (self.actions,),
+            "random": (self._task.random_size,),
+        }
+        return self._compiled("step", sizes)
+
+    def start(self, options: Mapping[str, Any]) -> Kernel:
+        """Return the kernel that starts episodes with these options: ``state`` and ``observation`` of
+        ``random``."""
+        return self._compiled("start", {"random": (self._task.random_size,)}, options)
+
+    def _compiled(
+        self, purpose: str, sizes: Mapping[str, tuple[int, ...]], options: Mapping[str, Any] | None = None
+    ) -> Kernel:
+        def traced(**inputs: Array) -> dict[str, Array]:
+            given = {name: traced_array(array) for name, array in inputs.items()}
+            results = self._step(**given) if options is None else self._start(given["random"], options)
+            # Entries that do not depend on an input are numbers.
+            return {name: symbol_array(entries) for name, entries in results.items()}
+
+        try:
+            program: Program = trace(traced, sizes)
+        except TraceError as error:
+            raise UnsupportedFeatureError(
+                f"the {purpose} of {type(self._task).__name__} cannot be compiled: {error}"
+            ) from error
+        return load_kernel(program_recipe(program), lambda: program)
+
+    def _start(self, random: Array, options: Mapping[str, Any]) -> dict[str, Any]:
+        state = self._task.start(random, **options)
+        return {"state": self.layout.row(state), "observation": self._observation(state)}
+
+    def _step(self, state: Array, steps: Array, action: Array, random: Array) -> dict[str, Any]:
+        task, robot, layout = self._task, self._robot, self.layout
+        before, (count,) = layout.state(state), steps
+        space = task.action_space
+        given: Any = action[0] if isinstance(space, spaces.Discrete) else action.reshape(space.shape)
+        moved = control_step(task, robot, robot.forward_dynamics, before, given)
+        after = task.settle(moved)
+        reward = _number(task.reward(robot, before, given, after))
+        taken = count + 1.0
+        terminated, truncated = _mask(task.terminated(robot, after)), _mask(taken >= self._limit)
+        flags = _flags(terminated, truncated)
+        flags = select(np.sum(moved.v * moved.v) < DIVERGENCE_SPEED**2, flags, _bits(DIVERGED))
+        flags = select(_is_valid(space, action), flags, _bits(INVALID))
+        ends = np.maximum(terminated, truncated)
+        results: dict[str, Any] = {}
+        if self._mode is AutoresetMode.NEXT_STEP:
+            ended = count < 0.0
+            reward, flags = select(ended, 0.0, reward), select(ended, 0.0, flags)
+            taken = select(ended, 0.0, select(ends, ENDED, taken))
+            after = _selected(ended, task.start(random), after)
+        elif self._mode is AutoresetMode.SAME_STEP:
+            results["final"] = self._observation(after)
+            taken = select(ends, 0.0, taken)
+            after = _selected(ends, task.start(random), after)
+        return {
+            "state": layout.row(after),
+            "steps": [taken],
+            "observation": self._observation(after),
+            "reward": [reward],
+            "flags": [flags],
+            **results,
+        }
+
+    def _observation(self, state: State) -> Array:
+        found = np.asarray(self._task.observation(self._robot, state))
+        if found.shape != (self.observations,):
+            raise ShapeError(
+                f"the observation of {type(self._task).__name__} has shape {found.shape}; "
+                f"its observation space has {(self.observations,)}"
+            )
+        return found
+
+
+def _selected(condition: Any, yes: State, no: State) -> State:
+    """Return the state `yes` where the condition holds, otherwise `no`."""
+    for name, one, other in zip(State._fields, yes, no, strict=True):
+        if np.shape(one) != np.shape(other):
+            raise ArgumentError(
+                f"{name} of a state has shape {np.shape(one)} at the start and {np.shape(other)} after a step"
+            )
+    return State(
+        *(
+            traced_array([select(condition, a, b) for a, b in zip(one, other, strict=True)])
+            for one, other in zip(yes, no, strict=True)
+        )
+    )
+
+
+def _bits(integer: int) -> float:
+    """Return the double with the bit pattern of an integer."""
+    return float(np.array(integer, dtype=np.int64).view(np.float64))
+
+
+def _flags(terminated: Any, truncated: Any) -> Any:
+    # Selected and not added: a processor may be set to take numbers as small as these for 0 in arithmetic.
+    both, one = select(truncated, _bits(TERMINATED | TRUNCATED), _bits(TERMINATED)), _bits(TRUNCATED)
+    return select(terminated, both, select(truncated, one, 0.0))
+
+
+def _number(value: Any) -> Any:
+    """Return a number, also of an array with one entry."""
+    return value.item() if isinstance(value, np.ndarray) else value
+
+
+def _mask(condition: Any) -> Any:
+    """Return 1.0 where a condition holds, otherwise 0.0."""
+    return select(_number(condition), 1.0, 0.0)
+
+
+def _is_valid(space: Any, action: Array) -> Any:
+    """Return the condition that an action is in its space; False for NaN."""
+    if isinstance(space, spaces.Discrete):
+        low, high = np.array([float(space.start)]), np.array([float(space.start + space.n - 1)])
+    else:
+        # Numbers that the space's dtype rounds to a bound are within it.
+        low, high = (each.ravel().astype(np.float64) for each in (space.low, space.high))
+        slack = [0.5 * np.spacing(abs(each)).ravel() for each in (space.low, space.high)]
+        low, high = low - slack[0], high + slack[1]
+    conditions = [
+        (x >= least) & (x <= most) for x, least, most in zip(action, low.tolist(), high.tolist(), strict=True)
+    ]
+    return np.logical_and.reduce(traced_array(conditions))
