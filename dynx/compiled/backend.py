@@ -84,6 +84,11 @@ class CompiledBackend(PathKernels):
         self._public_calls: dict[object, Call] = {}
 
     @property
+    def threads(self) -> int:
+        """Most threads for a batch."""
+        return self._threads
+
+    @property
     def engine_version(self) -> str:
         """``dynx`` and its version, the compiler's, and the processor."""
         return f"dynx {__version__}, {compiler_version()}, {host().cpu}"
@@ -217,6 +222,7 @@ class CompiledBackend(PathKernels):
             found = call(target, q0)
             if found is not None:
                 return found
+        self._arguments.refuse_closed()
         found = super().inverse_kinematics(target, frame, q0, **options)
         if call is None and isinstance(frame, str):
             self._pose_calls.store(frame, options, self._ik_solvers.get(frame_key(frame)), self.model)

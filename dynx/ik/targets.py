@@ -17,7 +17,7 @@ from dynx.spatial.scalar import Floats
 ORTHONORMALITY_TOLERANCE = 1e-6
 """Largest accepted entry of R'R - 1, and of the last row minus (0, 0, 0, 1), in a pose."""
 
-_ROUNDING_TOLERANCE = 1e-12
+ROUNDING_TOLERANCE = 1e-12
 """Deviation from orthonormality above which the nearest rotation is used, as for a pose in float32."""
 
 
@@ -127,7 +127,7 @@ def is_rigid(T: list[list[float]]) -> bool:
         abs(a[2] * b[0] - a[0] * b[2] - c[1]),
         abs(a[0] * b[1] - a[1] * b[0] - c[2]),
     )
-    return deviation <= _ROUNDING_TOLERANCE
+    return deviation <= ROUNDING_TOLERANCE
 
 
 def _dot(a: list[float], b: list[float]) -> float:
@@ -143,7 +143,7 @@ def _checked_rotations(T: Floats) -> Floats:
         _refuse(bottom > ORTHONORMALITY_TOLERANCE, "its last row is not (0, 0, 0, 1)")
     _refuse(deviation > ORTHONORMALITY_TOLERANCE, "its rotation is not orthonormal to 1e-6")
     _refuse(determinant < 0.0, "its rotation has determinant -1 (a reflection)")
-    if (deviation > _ROUNDING_TOLERANCE).any():
+    if (deviation > ROUNDING_TOLERANCE).any():
         U, _, V_T = np.linalg.svd(R)
         R = U @ V_T
     return np.asarray(R)

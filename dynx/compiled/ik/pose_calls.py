@@ -2,28 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from dynx.compiled.ik.pose_call import PoseCall
 from dynx.compiled.ik.solver import FrameSolver
-from dynx.ik import Options
+from dynx.ik import IKResult, Options
+from dynx.ik.closed_form.single_pose import single_pose_call
 from dynx.model import Model
 
 MAX_POSE_CALLS = 16
 """Most combinations of a frame and options for which single poses have a call of their own."""
 
-_OPTIONS = {"position_tolerance", "rotation_tolerance", "max_iterations", "max_restarts", "rng"}
+_OPTIONS = frozenset(
+    ("position_tolerance", "rotation_tolerance", "max_iterations", "max_restarts", "rng", "all_solutions")
+)
 """Options of which each combination has a call of its own."""
+
+
+Call = Callable[[Any, Any], IKResult | None]
+"""Function of a target and q0 that returns None if it does not apply to them."""
 
 
 class PoseCalls:
     """Calls of single poses that were made for frames and options."""
 
     def __init__(self) -> None:
-        self._calls: dict[object, PoseCall] = {}
+        self._calls: dict[object, Call] = {}
 
-    def find(self, frame: Any, options: Mapping[str, Any]) -> PoseCall | None:
+    def find(self, frame: Any, options: Mapping[str, Any]) -> Call | None:
         """Return the call for a frame and options, or None."""
         try:
             return self._calls.get(_key(frame, options) if options else frame)
@@ -32,8 +38,8 @@ class PoseCalls:
             return None
 
     def store(self, frame: Any, options: Mapping[str, Any], solver: FrameSolver | None, model: Model) -> None:
-        """Make the call for a frame and options that were checked, if their solver is one of poses."""
-        if solver is None or not options.keys() <= _OPTIONS:
+        """Make the call for a frame and options that were checked, if it is for poses or all solutions."""
+        if not options.keys() <= _OPTIONS:
             return
         chosen = Options.of(options)
         tolerances = (chosen.position_tolerance, chosen.rotation_tolerance)
@@ -41,8 +47,13 @@ class PoseCalls:
             return
         if len(self._calls) >= MAX_POSE_CALLS:
             self._calls = {}
-        call = solver.pose_call(model, chosen.search_limits(), chosen.rng)
-        self._calls[_key(frame, options) if options else frame] = call
+        call: Call | None = None
+        if chosen.all_solutions:
+            call = single_pose_call(model, frame, chosen.search_limits())
+        elif solver is not None:
+            call = solver.pose_call(model, chosen.search_limits(), chosen.rng)
+        if call is not None:
+            self._calls[_key(frame, options) if options else frame] = call
 
 
 def _key(frame: Any, options: Mapping[str, Any]) -> object:

@@ -14,7 +14,7 @@ from dynx.spatial.so3 import rotate, rotate_back
 
 FULL_TURN = 2.0 * np.pi
 
-POSITION, ROTATION, VIOLATION, PIVOT, ARBITRARY = range(5)
+POSITION, ROTATION, VIOLATION, SEPARATION, ARBITRARY = range(5)
 """Columns of the measures of a candidate."""
 
 N_MEASURES = 5
@@ -41,14 +41,14 @@ class Candidates:
         lengths, and signs (..., 3).
 
         The measures are the errors of position (relative) and rotation (`polish.errors_of`), the violation of
-        the limits [rad], the smallest pivot of J' J, and the sum of 2^k for the entries k of
-        `geometry.arbitrary` whose angles are arbitrary.
+        the limits [rad], the least separation of the branches (`subproblems.Angle`), and the sum of 2^k for
+        the entries k of `geometry.arbitrary` whose angles are arbitrary.
         """
         R, p = pose[..., :3], pose[..., 3]
         return self._measured(R, p, self._closed_form(R, p, signs), self.steps)
 
     def measured(self, pose: Array, q: Array, steps: int) -> dict[str, Array]:
-        """Return the same for angles q (..., 6), after some Newton steps; without steps the pivot is 0."""
+        """Return the same for angles q (..., 6), after some Newton steps; the separation is 1."""
         angles = [Angle(cos(q[..., k]), sin(q[..., k])) for k in range(q.shape[-1])]
         return self._measured(pose[..., :3], pose[..., 3], angles, steps)
 
@@ -63,7 +63,7 @@ class Candidates:
         return type(self.geometry).__name__, *numbers
 
     def _measured(self, R: Array, p: Array, angles: list[Angle], steps: int) -> dict[str, Array]:
-        angles, pivot = polished(self.frames, R, p, angles, steps)
+        angles = polished(self.frames, R, p, angles, steps)
         position, rotation = errors_of(self.frames, R, p, angles)
         within = [
             _within(arctan2(q.sin, q.cos), float(low), float(high))
@@ -72,9 +72,12 @@ class Candidates:
         violation = within[0][1]
         for _, each in within[1:]:
             violation = where_less(violation, each, each, violation)
+        separation = np.asarray(angles[0].separation)
+        for q in angles[1:]:
+            separation = where_less(q.separation, separation, q.separation, separation)
         joints = [5 - k for k in self.geometry.arbitrary] if self.inverted else self.geometry.arbitrary
         arbitrary = sum(2.0**place * np.asarray(angles[k].arbitrary) for place, k in enumerate(joints))
-        measures = np.broadcast_arrays(position, rotation, violation, pivot, np.asarray(arbitrary))
+        measures = np.broadcast_arrays(position, rotation, violation, separation, np.asarray(arbitrary))
         return {
             "q": np.stack(np.broadcast_arrays(*(value for value, _ in within)), axis=-1),
             "measures": np.stack(measures, axis=-1),
@@ -91,6 +94,9 @@ class Candidates:
 def _within(value: Array, low: float, high: float) -> tuple[Array, Array]:
     """Return an angle from -pi to pi moved by a full turn into its limits where possible, and by how much it
     violates them."""
+    if low <= -np.pi and high >= np.pi:
+        # The angle itself is within the limits.
+        return value, 0.0 * value
     shifts = [s for s in (FULL_TURN, -FULL_TURN) if low <= np.pi + s and high >= s - np.pi]
     turns = [value, *(value + shift for shift in shifts)]
     found, least = turns[0], _excess(turns[0], low, high)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,27 +26,19 @@ def all_solutions(
     """Return the solutions of `ClosedForm.solve` that are within the tolerances [m], [rad] by the forward
     kinematics of the backend.
 
-    A backend that compiles (attribute ``compiles``) uses the compiled form, unless joints are given: each
-    position of theirs would be compiled anew.
+    A backend that compiles (attribute ``compiles``) uses the compiled form, whose kernel measures the
+    solutions, unless joints are given: each position of theirs would be compiled anew.
     """
     compiled = bool(getattr(kinematics, "compiles", False)) and not given
     positions = () if given is None else tuple(checked_given(kinematics.model, given).items())
     form = stored_closed_form(kinematics.model, frame, positions, compiled)
-    found = form.solve(target, q0)
-    q = found.q[found.success]
-    if not len(q):
+    found = form.solve(target, q0, threads=getattr(kinematics, "threads", 1))
+    if compiled and min(position_tolerance, rotation_tolerance) >= form.accuracy:
         return found
-    targets = np.asarray(target, dtype=np.float64)[..., None, :, :]
-    wanted = np.broadcast_to(targets, (*found.success.shape, 4, 4))[found.success]
-    position, rotation = pose_error(wanted, kinematics.forward_kinematics(q, frame))
-    position_error, rotation_error = found.position_error.copy(), found.rotation_error.copy()
-    position_error[found.success] = np.linalg.norm(position, axis=-1)
-    rotation_error[found.success] = np.linalg.norm(rotation, axis=-1)
-    within = (position_error <= position_tolerance) & (rotation_error <= rotation_tolerance)
-    measured = replace(
-        found,
-        success=found.success & within,
-        position_error=position_error,
-        rotation_error=rotation_error,
-    )
-    return measured if found.success.ndim > 1 or within.all() else measured.rows(np.flatnonzero(within))
+    errors, rows = np.stack([found.position_error, found.rotation_error], axis=-1), found.success
+    if not compiled:
+        wanted = np.broadcast_to(np.asarray(target, dtype=np.float64)[..., None, :, :], (*rows.shape, 4, 4))
+        parts = pose_error(wanted[rows], kinematics.forward_kinematics(found.q[rows], frame))
+        errors[rows] = np.stack([np.linalg.norm(part, axis=-1) for part in parts], axis=-1)
+    within = (errors <= (position_tolerance, rotation_tolerance)).all(axis=-1)
+    return found.measured(errors, rows & within)

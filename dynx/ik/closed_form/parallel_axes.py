@@ -121,7 +121,7 @@ class ParallelAxes:
         q1 = conic_root(unit, first, second)
         c, s = value_at(cosine, q1), value_at(sine, q1)
         length = positive_root(c * c + s * s) + 1e-300
-        return q1, Angle(c / length, s / length)
+        return q1, Angle(c / length, s / length, separation=q1.separation)
 
     def _axis_4(self, R: Array, p: Array, q1: Angle, q5: Angle, q6: Angle) -> Array:
         """Return where E_2 E_3 E_4 moves the point on axis 4."""

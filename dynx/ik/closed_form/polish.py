@@ -8,14 +8,14 @@ to be computed in between.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from dynx.ik.closed_form.chain import Chain
 from dynx.ik.closed_form.subproblems import Angle, dot
 from dynx.rbd.linear import ldl_factors, solve_ldl
-from dynx.spatial.scalar import Array, Floats, append_axis, clamp, sqrt, where_less
+from dynx.spatial.scalar import Array, Floats, append_axis, clamp, sqrt
 from dynx.spatial.so3 import cross, rotate
 
 DAMPING = 1e-13
@@ -50,11 +50,8 @@ class AxisFrames:
         return cls(tuple(Rs), tuple(ps))
 
 
-def polished(
-    frames: AxisFrames, R: Array, p: Array, angles: list[Angle], steps: int
-) -> tuple[list[Angle], Array]:
-    """Return the angles after some steps towards the pose (R, p), and the smallest pivot of J' J."""
-    pivot: Array = np.zeros(())
+def polished(frames: AxisFrames, R: Array, p: Array, angles: list[Angle], steps: int) -> list[Angle]:
+    """Return the angles after some steps towards the pose (R, p)."""
     for _ in range(steps):
         _, error, J = _error_and_jacobian(frames, R, p, angles)
         columns = np.stack(J, axis=-1)
@@ -62,11 +59,8 @@ def polished(
         b = (np.swapaxes(columns, -1, -2) @ error[..., None])[..., 0]
         L, D = ldl_factors(np.asarray(A))
         step = solve_ldl(L, D, np.asarray(b))
-        pivot = D[0]
-        for each in D[1:]:
-            pivot = where_less(each, pivot, each, pivot)
         angles = [_turned(q, step[..., k]) for k, q in enumerate(angles)]
-    return angles, pivot
+    return angles
 
 
 def errors_of(frames: AxisFrames, R: Array, p: Array, angles: list[Angle]) -> tuple[Array, Array]:
@@ -107,7 +101,7 @@ def _turned(q: Angle, step: Array) -> Angle:
     half = clamp(0.5 * step, MAX_HALF_STEP)
     w = 1.0 + half * half
     c, s = (1.0 - half * half) / w, 2.0 * half / w
-    return Angle(q.cos * c - q.sin * s, q.sin * c + q.cos * s, q.arbitrary)
+    return replace(q, cos=q.cos * c - q.sin * s, sin=q.sin * c + q.cos * s)
 
 
 def _frame_along(axis: Floats, R_before: Floats) -> Floats:

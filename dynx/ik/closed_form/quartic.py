@@ -29,6 +29,10 @@ step only halves the error."""
 
 _NEWTON_STEPS = 3
 
+_DOUBLE = 0.03
+"""Slope of f, whose coefficients add up to 1, below which two roots may be one in an arm whose axes deviate
+from those of the equation."""
+
 _SMALL = 1e-6
 """Relative size of the root of the resolvent below which it is not divided by."""
 
@@ -63,10 +67,15 @@ def conic_root(k: Conic, first: Array, second: Array) -> Angle:
     lead = where_less(abs(lead), 1e-300, 1.0, lead)
     b, c = 2.0 * (k2 - k4) / lead, 2.0 * (k0 - k3 + 2.0 * k5) / lead
     d, e = 2.0 * (k2 + k4) / lead, (k0 + k1 + k3) / lead
-    t = _quartic_root(b, c, d, e, first, second)
+    t, real = _quartic_root(b, c, d, e, first, second)
     w = 1.0 + t * t
     x, y = (1.0 - t * t) / w, 2.0 * t / w
-    return _polished(k, c0 * x - s0 * y, s0 * x + c0 * y)
+    c, s = _polished(k, c0 * x - s0 * y, s0 * x + c0 * y)
+    # The slope of f at a root vanishes with its distance from another. From the real part of a root that is
+    # not real Newton's method may reach one that is; if the slope is small there, both may be one.
+    slope = abs(_slope(k, c, s))
+    none = where_less(slope, _DOUBLE, 0.0, -1.0)
+    return Angle(c, s, separation=where_less(0.5, real, slope, none))
 
 
 def _value(k: Conic, c: Array | float, s: Array | float) -> Array:
@@ -97,8 +106,9 @@ def _rotated(k: Conic, c0: Array, s0: Array) -> Conic:
     )
 
 
-def _quartic_root(b: Array, c: Array, d: Array, e: Array, first: Array, second: Array) -> Array:
-    """Return a root of t^4 + b t^3 + c t^2 + d t + e, or the real part of one that is not real."""
+def _quartic_root(b: Array, c: Array, d: Array, e: Array, first: Array, second: Array) -> tuple[Array, Array]:
+    """Return a root of t^4 + b t^3 + c t^2 + d t + e, or the real part of one that is not real, and whether
+    (1 or 0) it is real."""
     h = 0.25 * b
     p = c - 6.0 * h * h
     q = d + h * (8.0 * h * h - 2.0 * c)
@@ -114,7 +124,9 @@ def _quartic_root(b: Array, c: Array, d: Array, e: Array, first: Array, second: 
     difference = where_less(m, _SMALL * size, signed, q / safe)
     beta = 0.5 * (total - first * difference)
     alpha = first * alpha
-    return 0.5 * (second * positive_root(alpha * alpha - 4.0 * beta) - alpha) - h
+    square = alpha * alpha - 4.0 * beta
+    real = where_less(square, 0.0, 0.0, 1.0)
+    return 0.5 * (second * positive_root(square) - alpha) - h, real
 
 
 def _resolvent_root(p: Array, q: Array, r: Array) -> Array:
@@ -138,13 +150,18 @@ def _resolvent_root(p: Array, q: Array, r: Array) -> Array:
     return m
 
 
-def _polished(k: Conic, c: Array, s: Array) -> Angle:
+def _slope(k: Conic, c: Array, s: Array) -> Array:
+    """Return the derivative of f by the angle."""
+    return np.asarray(c * (k[2] + c * k[4] + 2.0 * s * (k[5] - k[3])) - s * (k[1] + s * k[4]))
+
+
+def _polished(k: Conic, c: Array, s: Array) -> tuple[Array, Array]:
     for _ in range(_NEWTON_STEPS):
-        slope = c * (k[2] + c * k[4] + 2.0 * s * (k[5] - k[3])) - s * (k[1] + s * k[4])
+        slope = _slope(k, c, s)
         # Damped, so that a double root, where the slope vanishes, causes no large step.
         half = -0.5 * _value(k, c, s) * slope / (slope * slope + 1e-20)
         half = where_less(abs(half), 0.05, half, 0.0)
         w = 1.0 + half * half
         x, y = (1.0 - half * half) / w, 2.0 * half / w
         c, s = c * x - s * y, s * x + c * y
-    return Angle(c, s)
+    return c, s

@@ -38,6 +38,8 @@ class Recognised:
     """True if the geometry is that of the inverse chain, whose joint 1 is joint 6 of the chain."""
     tolerance: float
     """Deviation of the chain from the geometry, relative to its length or [rad], at most."""
+    deviation: float
+    """Largest deviation of its lines from those of the geometry."""
     description: str
 
 
@@ -55,12 +57,21 @@ def recognise(chain: Chain, preferred: Floats) -> Recognised:
             if wrist is not None:
                 end = "first" if inverted else "last"
                 text = f"axes of the {end} three joints meet in a point"
-                return Recognised(wrist, inverted, tolerance, text)
+                return Recognised(wrist, inverted, tolerance, _deviation(here, wrist), text)
             parallel = _parallel_axes(here, angles, tolerance)
             if parallel is not None:
                 numbers = "3, 4 and 5" if inverted else "2, 3 and 4"
-                return Recognised(parallel, inverted, tolerance, f"axes {numbers} are parallel")
+                text = f"axes {numbers} are parallel"
+                return Recognised(parallel, inverted, tolerance, _deviation(here, parallel), text)
     raise NoClosedFormError(_why_none(chain))
+
+
+def _deviation(lines: Lines, geometry: Geometry) -> float:
+    """Return the largest distance, at its point, or angle of a line from that of the geometry."""
+    angles = [angle_between(a, b) for a, b in zip(lines.axes, geometry.axes, strict=True)]
+    return float(
+        max(*angles, np.linalg.norm(cross(lines.axes, geometry.points - lines.points), axis=-1).max())
+    )
 
 
 def _spherical_wrist(lines: Lines, preferred: Floats, tolerance: float) -> SphericalWrist | None:

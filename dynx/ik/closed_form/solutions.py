@@ -2,32 +2,95 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dynx.errors import ArgumentError
 from dynx.files.notebook import html_table
-from dynx.ik.result import IKResult
+from dynx.ik.result import NOT_FOUND, REACHED, IKResult
 from dynx.spatial.scalar import Floats
 
+Mask = NDArray[np.bool_]
 
-@dataclass(frozen=True, eq=False, repr=False)
+
 class IKSolutions(IKResult):
     """All configurations that reach a pose.
 
     For one pose, q (k, nq) holds the k solutions, and `branches` their names; k may be 0. For a batch of
     poses (...), q (..., 8, nq) has one row for each branch; `success` (..., 8) says which rows are solutions,
     and rows that are none hold the initial configuration (`q0`).
+
+    What is not asked for is not computed: a pose takes a few microseconds.
     """
 
-    branches: tuple[str, ...]
-    """Name of the branch of each row (`dynx.ik.closed_form.branches` defines them)."""
-    arbitrary: NDArray[np.bool_]
-    """Coordinates (..., nq) that can have any value at a singular pose, if another follows: infinitely many
-    configurations reach the pose, of which q is one."""
+    by_frame: Mapping[str, tuple[Floats, Floats]] = MappingProxyType({})
+    """Empty: the solutions are those of one frame."""
+    _errors: Floats
+    _named: tuple[tuple[str, ...], int | None]
+
+    def __init__(
+        self,
+        q: Floats,
+        errors: Floats,
+        branches: tuple[str, ...],
+        bits: int | None = None,
+        *,
+        success: Mask | None = None,
+        arbitrary: Mask | None = None,
+    ) -> None:
+        """`errors` (..., 2) are those of position [m] and rotation [rad]. `branches` name the rows of q; if
+        `bits` are given, those whose bits are set do.
+
+        Without `success` all rows are solutions, and without `arbitrary` no coordinate is.
+        """
+        found = self.__dict__
+        found["q"], found["_errors"], found["_named"] = q, errors, (branches, bits)
+        if success is not None:
+            found["success"] = success
+        if arbitrary is not None:
+            found["arbitrary"] = arbitrary
+
+    @cached_property
+    def branches(self) -> tuple[str, ...]:
+        """Name of the branch of each row (`dynx.ik.closed_form.branches` defines them)."""
+        names, bits = self._named
+        return names if bits is None else tuple(name for k, name in enumerate(names) if bits >> k & 1)
+
+    @cached_property
+    def success(self) -> Mask:
+        """True for the rows of q that are solutions (...,)."""
+        return np.ones(self.q.shape[:-1], dtype=np.bool_)
+
+    @cached_property
+    def position_error(self) -> Floats:
+        """Distance from the target (...,) [m]."""
+        return self._errors[..., 0]
+
+    @cached_property
+    def rotation_error(self) -> Floats:
+        """Angle to the target (...,) [rad], between 0 and pi."""
+        return self._errors[..., 1]
+
+    @cached_property
+    def iterations(self) -> NDArray[np.int64]:
+        """Number of solver steps: 0 (...,)."""
+        return np.zeros(self.q.shape[:-1], dtype=np.int64)
+
+    @cached_property
+    def restarts(self) -> NDArray[np.int64]:
+        """Number of restarts: 0 (...,)."""
+        return np.zeros(self.q.shape[:-1], dtype=np.int64)
+
+    @cached_property
+    def arbitrary(self) -> Mask:
+        """Coordinates (..., nq) that can have any value at a singular pose, if another follows: infinitely
+        many configurations reach the pose, of which q is one."""
+        return np.zeros(self.q.shape, dtype=np.bool_)
 
     def __len__(self) -> int:
         """Return the number of rows of q: the solutions of one pose, or the poses of a batch."""
@@ -44,18 +107,19 @@ class IKSolutions(IKResult):
         """Number of solutions of each pose (...,)."""
         return np.asarray(self.success.sum(axis=-1))
 
-    def rows(self, numbers: NDArray[np.intp]) -> IKSolutions:
-        """Return some of the solutions of one pose."""
-        return IKSolutions(
-            self.q[numbers],
-            self.success[numbers],
-            self.position_error[numbers],
-            self.rotation_error[numbers],
-            self.iterations[numbers],
-            self.restarts[numbers],
-            tuple(self.branches[k] for k in numbers),
-            self.arbitrary[numbers],
-        )
+    def measured(self, errors: Floats, success: Mask) -> IKSolutions:
+        """Return these solutions with other `errors` (..., 2), of which those in `success` (...,) remain."""
+        if success.ndim > 1:
+            return IKSolutions(self.q, errors, self.branches, success=success, arbitrary=self.arbitrary)
+        names = tuple(name for name, remains in zip(self.branches, success.tolist(), strict=True) if remains)
+        return IKSolutions(self.q[success], errors[success], names, arbitrary=self.arbitrary[success])
+
+    @property
+    def status(self) -> Any:
+        """``"REACHED"`` for poses that have a solution, otherwise ``"NOT_FOUND"``; an array (...,) for a
+        batch."""
+        found = np.where(self.success.any(axis=-1), REACHED, NOT_FOUND)
+        return found if found.ndim else str(found)
 
     @property
     def message(self) -> str:

@@ -1,64 +1,42 @@
-"""`ClosedForm`: all solutions of one arm, from the candidates of its branches.
-
-A candidate is a solution if it reaches the pose and lies within the limits. Few need a second look: those
-near a singularity, where Newton's method takes more steps and two branches may be one, and those at a limit.
-"""
+"""`ClosedForm`: all solutions of one arm, from the candidates of its branches."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import lru_cache
 from math import prod
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dynx.errors import NoClosedFormError, ShapeError, shown
 from dynx.ik.closed_form.branches import N_BRANCHES, branch_names
-from dynx.ik.closed_form.candidates import (
-    ARBITRARY,
-    FULL_TURN,
-    PIVOT,
-    POSITION,
-    ROTATION,
-    VIOLATION,
-    Candidates,
-)
+from dynx.ik.closed_form.candidates import ARBITRARY, POSITION, ROTATION, Candidates
 from dynx.ik.closed_form.chain import N_JOINTS, Chain, chain_to
-from dynx.ik.closed_form.evaluation import Evaluation, NumpyEvaluation
 from dynx.ik.closed_form.polish import AxisFrames
 from dynx.ik.closed_form.recognition import TOLERANCES, Recognised, recognise
+from dynx.ik.closed_form.review import ACCURACY, Mask, Review, near_to
 from dynx.ik.closed_form.solutions import IKSolutions
 from dynx.ik.targets import checked_targets
 from dynx.model import Model
 from dynx.model.configuration import checked_q
 from dynx.model.model import refuse_other_than_model
 from dynx.spatial.scalar import Floats
+from dynx.spatial.se3 import homogeneous
 
-ACCURACY = 1e-11
-"""Largest error of a solution: of the position relative to the length of the chain, and of the rotation
-[rad]."""
-
-_ROUNDING = 1e-13
-"""Error above which a candidate is polished further."""
+if TYPE_CHECKING:
+    from dynx.ik.closed_form.branch_kernel import BranchKernel
 
 _NEARNESS = 1e-6, 100.0
 """Error above which a candidate is not near a solution: at least, and in units of the chain's tolerance."""
 
-_SINGULAR_PIVOT = 1e-9
-"""Pivot of J' J below which two candidates may be one solution."""
+_EXACT = 2e-15
+"""Deviation of a chain from the geometry that is rounding: its solutions need no polish."""
 
-_SAME = 1e-6
-"""Difference [rad] up to which two candidates are one solution. At a singularity rounding moves a solution by
-the square root of its error."""
-
-_AT_LIMIT = 1e-8
-"""Violation [rad] of a limit that counts as rounding: the solution is moved to the limit if it still reaches
-the pose."""
-
-_FURTHER_STEPS = 20
-
-Mask = NDArray[np.bool_]
+_SEPARATION = 1e-5, 10.0
+"""Separation of two branches below which they may be one solution: at least, and in units of the square root
+of the chain's deviation, by which solutions near a singularity move."""
 
 
 class ClosedForm:
@@ -77,13 +55,15 @@ class ClosedForm:
         """Tolerance [rad, or relative to the arm's length] to which the axes have that property."""
         self.branches = branch_names(recognised)
         """Names of the eight branches, in the order of the rows of a batch."""
-        # Roots of a quartic that are not real may lead Newton's method to one that is.
-        self._repeats = recognised.geometry.case == "general"
         self._columns = list(chain.columns)
-        self._all_columns = self._columns == list(range(model.nq))
+        self.covers_model = self._columns == list(range(model.nq))
+        """True if the model has no other joints."""
         self._length = chain.length
-        self._nearness = max(_NEARNESS[0], _NEARNESS[1] * recognised.tolerance)
-        steps = 1 + TOLERANCES.index(recognised.tolerance)
+        self.accuracy = ACCURACY * max(1.0, chain.length)
+        """Largest error [m, rad] of a solution."""
+        nearness = max(_NEARNESS[0], _NEARNESS[1] * recognised.tolerance)
+        separation = max(_SEPARATION[0], _SEPARATION[1] * recognised.deviation**0.5)
+        exact = recognised.deviation <= _EXACT
         self._candidates = Candidates(
             recognised.geometry,
             recognised.inverted,
@@ -92,31 +72,42 @@ class ClosedForm:
             chain.T_zero[:3, 3],
             model.lower[self._columns],
             model.upper[self._columns],
-            steps,
+            0 if exact else 1 + TOLERANCES.index(recognised.tolerance),
         )
-        self._evaluation: Evaluation = NumpyEvaluation(self._candidates)
-        if compiled:
-            # Imported only here: every backend can solve in closed form, and LLVM is slow to import.
-            from dynx.ik.closed_form.compiled_evaluation import CompiledEvaluation
-
-            self._evaluation = CompiledEvaluation(self._candidates)
         self._start = model.neutral()
         for name, value in chain.given.items():
             self._start[model.coordinate_index(name)] = value
+        # Roots of a quartic that are not real may lead Newton's method to one that is.
+        repeats = recognised.geometry.case == "general"
+        self._review = Review(self._candidates, nearness, separation, repeats)
+        self.kernel: BranchKernel | None = None
+        """The kernel that evaluates the branches, if the form is compiled."""
+        if compiled:
+            # Imported only here: every backend can solve in closed form, and LLVM is slow to import.
+            from dynx.ik.closed_form.branch_kernel import BranchKernel, Judgement
+
+            fill = self._start[self._columns]
+            self.kernel = BranchKernel(Judgement(self._candidates, self._length, nearness, separation, fill))
         joints = recognised.geometry.arbitrary
         self._arbitrary = [5 - k for k in joints] if recognised.inverted else list(joints)
 
     def solve(
-        self, target: ArrayLike, q0: ArrayLike | None = None, *, ignore_limits: bool = False
+        self,
+        target: ArrayLike,
+        q0: ArrayLike | None = None,
+        *,
+        ignore_limits: bool = False,
+        threads: int = 1,
     ) -> IKSolutions:
         """Return all solutions for poses T_world_target (..., 4, 4).
 
         Each solution has one value of each angle: the one within the limits that is nearest to 0, or to q0
         (..., nq) if that is given. Its other values that differ by full turns are not listed. Coordinates of
         other joints stay at q0, or at the neutral configuration. With `ignore_limits` solutions outside the
-        limits are included.
+        limits are included. If the form is compiled, a batch is split over at most `threads` threads, with
+        the same results for any number.
 
-        Every solution reaches its pose within `ACCURACY`. At a singular pose, where infinitely many
+        Every solution reaches its pose within `review.ACCURACY`. At a singular pose, where infinitely many
         configurations do, one stands for them (`IKSolutions.arbitrary`): its arbitrary angle is the one
         nearest to 0 within the limits, or for three parallel axes, if that puts the pose out of reach, the
         nearest within reach. Where the axes meet or are parallel only to `tolerance`, solutions may be missed
@@ -124,125 +115,116 @@ class ClosedForm:
 
         Raises ShapeError, DTypeError, NotFiniteError or ArgumentError for an invalid target or q0.
         """
-        targets = checked_targets(target)
-        if targets.positions is None or targets.rotations is None:
-            raise ShapeError("target is a position; the closed form needs poses (..., 4, 4)")
-        batch = targets.batch
-        n = prod(batch)
-        pose = np.empty((n, 3, 4))
-        pose[:, :, :3] = targets.rotations.reshape(n, 3, 3)
-        pose[:, :, 3] = targets.positions.reshape(n, 3)
-        pose[:, :, 3] /= self._length
+        # A kernel finds targets that are no poses in a fraction of the time that NumPy takes.
+        is_batch = (
+            isinstance(target, np.ndarray)
+            and target.dtype == np.float64
+            and target.ndim >= 2
+            and target.shape[-2:] == (4, 4)
+        )
+        T: Floats = np.asarray(target) if is_batch and self.kernel is not None else _checked_poses(target)
+        batch = T.shape[:-2]
         start = self._start if q0 is None else checked_q(self.model, q0, "q0")
-        angles, measures = self._evaluation(pose)
-        found = self._reviewed(pose, angles, measures, ignore_limits)
-        if q0 is not None or start.ndim > 1:
-            shape = np.broadcast_shapes(batch, start.shape[:-1])
-            if shape != batch:
-                raise ShapeError(f"q0 has leading axes {start.shape[:-1]}; wanted those of target, {batch}")
-            start = np.broadcast_to(start, (*batch, self.model.nq)).reshape(n, 1, self.model.nq)
-            self._move_near(angles, start[..., self._columns], ignore_limits)
-        return self._solutions(batch, angles, measures, found, start)
+        if q0 is not None and not _fits(start.shape[:-1], batch):
+            raise ShapeError(f"q0 has leading axes {start.shape[:-1]}; wanted those of target, {batch}")
+        rows = np.ascontiguousarray(T).reshape(prod(batch), 4, 4)
+        if self.kernel is None:
+            reviewed = self._review(self._relative(rows), ignore_limits)
+            angles, found = reviewed.angles, reviewed.found
+            errors, arbitrary = self._errors(reviewed.measures), self._marked(reviewed.measures, found)
+        else:
+            results = self.kernel(rows, not ignore_limits, threads)
+            if results.invalid.any():
+                rows = _checked_poses(target).reshape(-1, 4, 4)
+                results = self.kernel(rows, not ignore_limits, threads)
+            angles, errors, arbitrary = results.q, results.errors, None
+            found = np.unpackbits(results.found[:, None], axis=1, bitorder="little").view(np.bool_)
+            doubtful = np.flatnonzero(results.review | results.invalid)
+            if doubtful.size:
+                reviewed = self._review(self._relative(rows[doubtful]), ignore_limits)
+                kept = reviewed.found[..., None]
+                angles[doubtful] = np.where(kept, reviewed.angles, self._start[self._columns])
+                errors[doubtful], found[doubtful] = self._errors(reviewed.measures), reviewed.found
+                marked = self._marked(reviewed.measures, reviewed.found)
+                if marked is not None:
+                    arbitrary = np.zeros((*found.shape, self.model.nq), dtype=np.bool_)
+                    arbitrary[doubtful] = marked
+        if q0 is not None:
+            start = np.broadcast_to(start, (*batch, self.model.nq)).reshape(-1, 1, self.model.nq)
+            limits = (self._candidates.lower, self._candidates.upper)
+            angles = near_to(angles, start[..., self._columns], None if ignore_limits else limits)
+        if q0 is not None or self.kernel is None:
+            angles = np.where(found[..., None], angles, start[..., self._columns])
+        return self._solutions(batch, angles, errors, found, arbitrary, start)
 
     def _solutions(
-        self, batch: tuple[int, ...], angles: Floats, measures: Floats, found: Mask, start: Floats
+        self,
+        batch: tuple[int, ...],
+        angles: Floats,
+        errors: Floats,
+        found: Mask,
+        arbitrary: Mask | None,
+        start: Floats,
     ) -> IKSolutions:
-        n, nq = len(angles), self.model.nq
-        code = np.where(found, measures[..., ARBITRARY], 0.0)
-        if not batch:
-            rows = np.flatnonzero(found[0])
-            measures, code, angles = measures[:, rows], code[:, rows], angles[:, rows]
-            found = found[:, rows]
-        if self._all_columns and not batch:
+        nq = self.model.nq
+        if self.covers_model:
             q = angles
-        elif self._all_columns:
-            q = np.where(found[..., None], angles, start)
         else:
-            q = np.empty((n, found.shape[1], nq))
+            q = np.empty((*found.shape, nq))
             q[...] = start
-            q[..., self._columns] = np.where(found[..., None], angles, q[..., self._columns])
-        arbitrary = np.zeros((n, found.shape[1], nq), dtype=np.bool_)
-        if code.any():
-            for place, joint in enumerate(self._arbitrary):
-                arbitrary[..., self._columns[joint]] = (code.astype(np.int64) >> place) & 1 == 1
-        shape = (*batch, found.shape[1])
-        zeros = np.zeros(shape, dtype=np.int64)
-        names = self.branches if batch else tuple(self.branches[k] for k in rows)
+            q[..., self._columns] = angles
+        if not batch:
+            bits = int(np.packbits(found[0], bitorder="little")[0])
+            marked = None if arbitrary is None else arbitrary[found]
+            return IKSolutions(q[found], errors[found], self.branches, bits, arbitrary=marked)
+        shape = (*batch, N_BRANCHES)
         return IKSolutions(
             q.reshape(*shape, nq),
-            found.reshape(shape),
-            (measures[..., POSITION] * self._length).reshape(shape),
-            measures[..., ROTATION].reshape(shape),
-            zeros,
-            zeros,
-            names,
-            arbitrary.reshape(*shape, nq),
+            errors.reshape(*shape, 2),
+            self.branches,
+            success=found.reshape(shape),
+            arbitrary=None if arbitrary is None else arbitrary.reshape(*shape, nq),
         )
 
-    def _reviewed(self, pose: Floats, angles: Floats, measures: Floats, ignore_limits: bool) -> Mask:
-        """Return which candidates (n, 8) are distinct solutions; polish those that need it, in place."""
-        error = np.maximum(measures[..., POSITION], measures[..., ROTATION])
-        rough = (error > _ROUNDING) & (error < self._nearness)
-        if rough.any():
-            self._polish(pose, angles, measures, error, rough)
-        found: Mask = error <= ACCURACY
-        if not ignore_limits:
-            violation = measures[..., VIOLATION]
-            at_limit = found & (violation > 0.0) & (violation <= _AT_LIMIT)
-            if at_limit.any():
-                self._move_to_limits(pose, angles, measures, at_limit)
-                error = np.maximum(measures[..., POSITION], measures[..., ROTATION])
-            found &= (measures[..., VIOLATION] <= 0.0) & (error <= ACCURACY)
-        doubtful = found if self._repeats else found & (measures[..., PIVOT] < _SINGULAR_PIVOT)
-        poses = np.flatnonzero(doubtful.sum(axis=1) > 1)
-        if poses.size:
-            found[poses] = _distinct(angles[poses], found[poses])
-        return found
+    def _relative(self, T: Floats) -> Floats:
+        """Return poses (n, 3, 4) with lengths relative to that of the chain."""
+        pose = T[:, :3].copy()
+        pose[:, :, 3] /= self._length
+        return np.asarray(pose)
 
-    def _polish(self, pose: Floats, angles: Floats, measures: Floats, error: Floats, rough: Mask) -> None:
-        """Polish the candidates `rough` further, where that reduces their error."""
-        rows = np.nonzero(rough)
-        result = self._candidates.measured(pose[rows[0]], angles[rows], _FURTHER_STEPS)
-        after = result["measures"]
-        reached = np.maximum(after[..., POSITION], after[..., ROTATION])
-        better = reached < error[rows]
-        rows = tuple(each[better] for each in rows)
-        after[..., ARBITRARY] = measures[rough][..., ARBITRARY]
-        angles[rows], measures[rows], error[rows] = result["q"][better], after[better], reached[better]
+    def _errors(self, measures: Floats) -> Floats:
+        """Return the errors (n, 8, 2) of position [m] and rotation [rad]."""
+        return np.asarray(measures[..., [POSITION, ROTATION]] * (self._length, 1.0))
 
-    def _move_to_limits(self, pose: Floats, angles: Floats, measures: Floats, at_limit: Mask) -> None:
-        rows = np.nonzero(at_limit)
-        angles[rows] = np.clip(angles[rows], self._candidates.lower, self._candidates.upper)
-        result = self._candidates.measured(pose[rows[0]], angles[rows], 0)
-        measures[rows] = np.where(np.arange(measures.shape[-1]) < PIVOT, result["measures"], measures[rows])
-        measures[rows[0], rows[1], VIOLATION] = 0.0
-
-    def _move_near(self, angles: Floats, start: Floats, ignore_limits: bool) -> None:
-        """Shift angles by full turns to be near `start`, within the limits if they are."""
-        low, high = self._candidates.lower, self._candidates.upper
-        near = start + np.remainder(angles - start + np.pi, FULL_TURN) - np.pi
-        if not ignore_limits:
-            near += FULL_TURN * (near < low - _AT_LIMIT)
-            near -= FULL_TURN * (near > high + _AT_LIMIT)
-            clipped = np.clip(near, low, high)
-            near = np.where(np.abs(near - clipped) <= _AT_LIMIT, clipped, angles)
-        angles[...] = near
+    def _marked(self, measures: Floats, found: Mask) -> Mask | None:
+        """Return which coordinates (n, 8, nq) of solutions are arbitrary, or None if none is."""
+        code = np.where(found, measures[..., ARBITRARY], 0.0).astype(np.int64)
+        if not code.any():
+            return None
+        arbitrary = np.zeros((*found.shape, self.model.nq), dtype=np.bool_)
+        for place, joint in enumerate(self._arbitrary):
+            arbitrary[..., self._columns[joint]] = (code >> place) & 1 == 1
+        return arbitrary
 
     def __repr__(self) -> str:
         given = "".join(f", {name} given" for name in self.given)
         return f"<ClosedForm of {self.model.name}: {self.family}{given}>"
 
 
-def _distinct(angles: Floats, found: Mask) -> Mask:
-    """Return `found` (n, 8) without solutions that repeat an earlier one."""
-    found = found.copy()
-    for later in range(1, N_BRANCHES):
-        for earlier in range(later):
-            difference = angles[:, later] - angles[:, earlier]
-            difference -= FULL_TURN * np.round(difference / FULL_TURN)
-            same = np.abs(difference).max(axis=-1) < _SAME
-            found[:, later] &= ~(same & found[:, earlier])
-    return found
+def _fits(shape: tuple[int, ...], batch: tuple[int, ...]) -> bool:
+    """Return whether leading axes broadcast to those of a batch."""
+    try:
+        return np.broadcast_shapes(shape, batch) == batch
+    except ValueError:
+        return False
+
+
+def _checked_poses(target: ArrayLike) -> Floats:
+    """Return poses (..., 4, 4) as contiguous arrays; the errors of `checked_targets`, or ShapeError."""
+    targets = checked_targets(target)
+    if targets.positions is None or targets.rotations is None:
+        raise ShapeError("target is a position; the closed form needs poses (..., 4, 4)")
+    return np.asarray(homogeneous(targets.rotations, targets.positions))
 
 
 def closed_form(

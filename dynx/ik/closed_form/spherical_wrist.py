@@ -19,7 +19,7 @@ where k and s depend on q_3 alone, linearly in its cosine and sine. What determi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -75,10 +75,10 @@ class SphericalWrist:
         h, arm, elbow, flip = self.axes, signs[..., 0], signs[..., 1], signs[..., 2]
         x = rotate(R, self.centre) + p - self.p1
         a, b = dot(h[0], x), dot(x, x)
-        q3, k, zu, zv = self._elbow(a, b, arm, elbow)
+        q3, k, zu, zv, root = self._elbow(a, b, arm, elbow)
         z = self.p3 - self.p2 + turn(h[2], q3, self.centre - self.p3)
         placed = append_axis(zu) * self.u + append_axis(zv) * self.v + append_axis(k) * h[1]
-        q2 = angle_from_to(h[1], z, placed, self.preferred[1])
+        q2 = replace(angle_from_to(h[1], z, placed, self.preferred[1]), separation=root)
         q1 = angle_from_to(h[0], self.p2 - self.p1 + turn(h[1], q2, z), x, self.preferred[0])
 
         # Rotation of the wrist, by its effect on axis 6 and on a normal of it.
@@ -89,6 +89,11 @@ class SphericalWrist:
         q4 = angle_from_to(h[3], turn(h[4], q5, h[5]), tip, self.preferred[3])
         turned = turn_back(h[4], q5, turn_back(h[3], q4, side))
         return [q1, q2, q3, q4, q5, angle_from_to(h[5], normal, turned, 0.0)]
+
+    @property
+    def points(self) -> Floats:
+        """A point on each axis (6, 3)."""
+        return np.array([self.p1, self.p2, self.p3, self.centre, self.centre, self.centre])
 
     def reaches(self, least: float) -> bool:
         """Return whether every joint changes the terms that determine it by more than `least`."""
@@ -101,21 +106,25 @@ class SphericalWrist:
         h = self.axes
         return turn_back(h[2], q3, turn_back(h[1], q2, turn_back(h[0], q1, a)))
 
-    def _elbow(self, a: Array, b: Array, arm: Array, elbow: Array) -> tuple[Angle, Array, Array, Array]:
-        """Return q_3, k, zu and zv."""
+    def _elbow(
+        self, a: Array, b: Array, arm: Array, elbow: Array
+    ) -> tuple[Angle, Array, Array, Array, Array | float]:
+        """Return q_3, k, zu and zv, and the root of which `arm` is the sign, or 1."""
         distance = self.distance
         K, S = self._terms()
         if self.case == "parallel_2_3":
             k = K[0] + 0.0 * a
             zu = (a - self.cos * k) / self.sin
-            zv = arm * positive_root(b - zu * zu - k * k) - distance
+            root = positive_root(b - zu * zu - k * k)
+            zv = arm * root - distance
             q3 = solve_linear(S[1], S[2], zu * zu + zv * zv + k * k - S[0], elbow, 0.0)
-            return q3, k, zu, zv
+            return q3, k, zu, zv, root
         if self.case == "intersecting_1_2":
             q3 = solve_linear(S[1], S[2], b - S[0], elbow, 0.0)
             k = value_at(K, q3)
             zu = (a - self.cos * k) / self.sin
-            return q3, k, zu, arm * positive_root(b - zu * zu - k * k)
+            root = positive_root(b - zu * zu - k * k)
+            return q3, k, zu, arm * root, root
         if self.case == "parallel_1_2":
             q3 = solve_linear(K[1], K[2], self.cos * a - K[0], elbow, 0.0)
         else:
@@ -123,8 +132,9 @@ class SphericalWrist:
         k, s = value_at(K, q3), value_at(S, q3)
         zv = (b - s - distance * distance) / (2.0 * distance)
         if self.case == "parallel_1_2":
-            return q3, k, arm * positive_root(s - k * k - zv * zv), zv
-        return q3, k, (a - self.cos * k) / self.sin, zv
+            root = positive_root(s - k * k - zv * zv)
+            return q3, k, arm * root, zv, root
+        return q3, k, (a - self.cos * k) / self.sin, zv, 1.0
 
     def _quartic(self, a: Array, b: Array, first: Array, second: Array) -> Angle:
         """Return the root of sin^2 (b - l^2 - s)^2 + 4 l^2 (a^2 - 2 a k cos + k^2 - s sin^2), which is

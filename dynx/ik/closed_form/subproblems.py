@@ -9,7 +9,7 @@ has no solution its nearest approach is returned, and where an angle is arbitrar
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,6 +30,9 @@ class Angle:
     cos: Array
     sin: Array
     arbitrary: Array | float = 0.0
+    separation: Array | float = 1.0
+    """Measure, about half a difference of angles [rad], of how far the solution of the other sign is: 0 where
+    both are one, and negative where neither is real."""
 
 
 def dot(a: Array, b: Array) -> Array:
@@ -86,9 +89,10 @@ def solve_linear(A: Array | float, B: Array | float, D: Array, sign: Array, pref
     """
     length = sqrt(np.asarray(A * A + B * B + _TINY))
     d = clamp(D / length, 1.0)
-    root = sign * positive_root((1.0 - d) * (1.0 + d))
+    separation = positive_root((1.0 - d) * (1.0 + d))
+    root = sign * separation
     x, y = (A * d - B * root) / length, (B * d + A * root) / length
-    return normalised(x, y, 1.0, preferred)
+    return replace(normalised(x, y, 1.0, preferred), separation=separation)
 
 
 def component_terms(direction: Array, axis: Array, a: Array) -> tuple[Array, Array, Array]:

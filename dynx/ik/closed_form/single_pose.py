@@ -1,0 +1,72 @@
+"""All solutions of one pose in a few microseconds, by a compiled closed form."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from dynx.ik.closed_form.branches import N_BRANCHES
+from dynx.ik.closed_form.chain import N_JOINTS
+from dynx.ik.closed_form.solutions import IKSolutions
+from dynx.ik.closed_form.solver import ClosedForm, stored_closed_form
+from dynx.ik.search import SearchLimits
+from dynx.model import Model
+from dynx.simd.variants import BoundVariants
+from dynx.spatial.scalar import Floats
+
+_FLOAT64 = np.dtype(np.float64)
+
+_ROWS = [np.flatnonzero([bits >> k & 1 for k in range(N_BRANCHES)]) for bits in range(2**N_BRANCHES)]
+"""Numbers of the branches whose bits are set, for every byte."""
+
+
+class SinglePose:
+    """Function from one pose to its solutions, for an arm whose joints are those of the model.
+
+    Safe to use from several threads.
+    """
+
+    def __init__(self, form: ClosedForm) -> None:
+        assert form.kernel is not None
+        self._kernel, self._names = form.kernel, form.branches
+        # Workspaces that no call uses at the moment.
+        self._free: list[tuple[BoundVariants, Floats, Floats]] = [self._workspace()]
+
+    def __call__(self, target: Any, q0: Any = None) -> IKSolutions | None:
+        """Return the solutions for a pose (4, 4) without q0, or None for q0, and if the pose is not valid or
+        needs a review."""
+        if (
+            q0 is not None
+            or type(target) is not np.ndarray
+            or target.dtype is not _FLOAT64
+            or target.shape != (4, 4)
+        ):
+            return None
+        try:
+            workspace = self._free.pop()
+        except IndexError:
+            workspace = self._workspace()
+        bound, pose, block = workspace
+        pose[...] = target
+        bound.run()
+        found, review, invalid = bound.masks
+        bits = found[0]
+        if review[0] or invalid[0]:
+            self._free.append(workspace)
+            return None
+        rows = block.take(_ROWS[bits], 0)
+        self._free.append(workspace)
+        return IKSolutions(rows[:, :N_JOINTS], rows[:, N_JOINTS:], self._names, bits)
+
+    def _workspace(self) -> tuple[BoundVariants, Floats, Floats]:
+        block = np.empty((N_BRANCHES, N_JOINTS + 2))
+        bound = self._kernel.bind(block)
+        return bound, bound.inputs[0].reshape(4, 4), block
+
+
+def single_pose_call(model: Model, frame: str, limits: SearchLimits) -> SinglePose | None:
+    """Return the call for poses of a frame, or None if its solutions are to be checked or completed."""
+    form = stored_closed_form(model, frame, (), True)
+    tolerance = min(limits.position_tolerance, limits.rotation_tolerance)
+    return SinglePose(form) if form.covers_model and tolerance >= form.accuracy else None
