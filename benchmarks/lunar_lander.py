@@ -67,7 +67,7 @@ def main() -> None:
         for name, env in envs.items():
             fly(env, seed, records[name])
     own = np.array(records[BOX2D].returns)
-    print("| engine | mean return | median | above 200 | crashes | within 20 of Box2D's | us a step |")
+    print("| engine | mean return | median | above 200 | below 0 | within 20 of Box2D's | us a step |")
     print("|---|---|---|---|---|---|---|")
     for name, record in records.items():
         returns = np.array(record.returns)

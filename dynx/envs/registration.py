@@ -23,6 +23,9 @@ TASKS = {
     "CartPole-v0": "dynx.envs.tasks.cart_pole:CartPole",
     "LunarLander-v0": "dynx.envs.tasks.lunar_lander.task:LunarLander",
     "Pendulum-v0": "dynx.envs.tasks.pendulum:Pendulum",
+    "Push-v0": "dynx.envs.tasks.push:Push",
+    "Stand-v0": "dynx.envs.tasks.quadruped:Stand",
+    "Walk-v0": "dynx.envs.tasks.quadruped:Walk",
 }
 """Tasks of dynx by the name of their environment, as ``"package.module:Class"``."""
 

@@ -1,0 +1,135 @@
+"""Tasks in worlds: Push, Stand and Walk on every engine, and what `WorldTask` promises of all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import dynx.envs  # noqa: F401  (registers the environments)
+from dynx.envs.environment import TaskEnvironment
+from dynx.envs.tasks.push import NEAR, TIP_START, Push
+from dynx.envs.tasks.quadruped import POSTURE, Stand, Walk
+from dynx.envs.world.task import WorldTask
+from dynx.errors import ArgumentError, UnknownNameError
+from dynx.world.registry import installed_worlds
+
+ENGINES = installed_worlds()
+TASKS = (Push(), Stand(), Walk())
+
+
+@pytest.fixture(params=ENGINES)
+def engine(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture(params=TASKS, ids=lambda task: type(task).__name__)
+def env(request: pytest.FixtureRequest, engine: str) -> Iterator[TaskEnvironment]:
+    with TaskEnvironment(request.param, engine) as made:
+        yield made
+
+
+def test_checkers_find_nothing(env: TaskEnvironment, recwarn: pytest.WarningsRecorder) -> None:
+    name = f"dynx/{type(env.task).__name__}-v0"
+    made = gymnasium.make(name, engine=env.engine)
+    check_env(made.unwrapped, skip_render_check=True)
+    made.close()
+    assert not recwarn.list
+
+
+def test_episodes_after_a_seed_are_the_same_bits(env: TaskEnvironment) -> None:
+    rng = np.random.default_rng(0)
+    actions = rng.uniform(-1.0, 1.0, (4, *env.action_space.shape)).astype(np.float32)  # type: ignore[misc]
+
+    def episode() -> list[Any]:
+        seen: list[Any] = [env.reset(seed=3)[0].tobytes()]
+        for action in actions:
+            observation, reward, *_ = env.step(action)
+            seen += [observation.tobytes(), reward]
+        return seen
+
+    first = episode()
+    env.reset(seed=4)
+    env.step(actions[0])
+    assert episode() == first
+
+
+def test_a_straight_push_brings_the_cube_to_the_goal(engine: str) -> None:
+    with TaskEnvironment(Push(reward_kind="sparse"), engine) as env:
+        observation, _ = env.reset(seed=0, options={"cube": (0.46, 0.0), "goal": (0.56, 0.0)})
+        assert observation[:3] == pytest.approx(TIP_START, abs=1e-4)
+        rewards = []
+        for _ in range(25):
+            forward = np.clip(5.0 * (observation[21] - observation[6]), 0.0, 0.5)
+            observation, reward, _, _, info = env.step(np.array([forward, 0.0, 0.0], dtype=np.float32))
+            rewards.append(reward)
+    assert rewards[0] == -1.0
+    assert (rewards[-1], info["is_success"]) == (0.0, True)
+    assert abs(observation[6] - 0.56) < NEAR
+    assert abs(observation[7]) < 0.02
+
+
+def test_the_posture_stands_on_every_engine(engine: str) -> None:
+    with TaskEnvironment(Stand(), engine) as env:
+        env.reset(seed=1)
+        total = 0.0
+        for _ in range(90):
+            observation, reward, terminated, _, _ = env.step(np.zeros(len(POSTURE), dtype=np.float32))
+            assert not terminated
+            total += reward
+    assert total > 0.8 * 90
+    # The legs are springs, on which the trunk sways for some seconds.
+    assert np.abs(observation[:6]).max() < 0.1
+    assert observation[8] < -0.99
+
+
+def test_a_fall_ends_the_episode() -> None:
+    with TaskEnvironment(Stand(), ENGINES[0]) as env:
+        env.reset(seed=0)
+        folded = np.array([0.0, 1.0, -1.0] * 2 + [0.0, -1.0, 1.0] * 2, dtype=np.float32)
+        for _ in range(200):
+            *_, terminated, _, _ = env.step(folded)
+            if terminated:
+                return
+    pytest.fail("the robot did not fall")
+
+
+def test_walking_is_rewarded_by_the_velocity() -> None:
+    with TaskEnvironment(Walk(), ENGINES[0]) as env:
+        still = np.zeros(len(POSTURE), dtype=np.float32)
+        rewards = []
+        for velocity in ((0.0, 0.0, 0.0), (0.6, 0.0, 0.0)):
+            _, info = env.reset(seed=0, options={"velocity": velocity, "disturbance": 0.0})
+            assert info["velocity"].tolist() == list(velocity)
+            for _ in range(40):
+                observation, reward, *_ = env.step(still)
+            rewards.append(reward)
+    v = observation[:2].astype(float)
+    expected = np.exp(-(v @ v) / 0.25) - np.exp(-((v[0] - 0.6) ** 2 + v[1] ** 2) / 0.25)
+    assert rewards[0] == pytest.approx(1.5, abs=0.05)
+    assert rewards[0] - rewards[1] == pytest.approx(expected, abs=1e-5)
+
+
+def test_wrong_options_are_refused() -> None:
+    with pytest.raises(ArgumentError, match="did you mean 'sparse'"):
+        Push(reward_kind="sparce")
+    with pytest.raises(ArgumentError, match="max_speed is '-1'"):
+        Walk(max_speed=-1)
+    with pytest.raises(ArgumentError, match="did you mean 'mujoco'"):
+        TaskEnvironment(Stand(), "mujocco")
+    with TaskEnvironment(Push(), ENGINES[0]) as env:
+        with pytest.raises(ArgumentError, match="goal is"):
+            env.reset(options={"goal": (3.0, 0.0)})
+        with pytest.raises(UnknownNameError, match="'goal'"):
+            env.reset(options={"gaol": (0.5, 0.0)})
+    with TaskEnvironment(Walk(), ENGINES[0]) as env, pytest.raises(ArgumentError, match="three numbers"):
+        env.reset(options={"velocity": (1.0, np.nan, 0.0)})
+
+
+def test_a_task_is_a_world_task() -> None:
+    assert all(isinstance(task, WorldTask) for task in TASKS)
+    assert set(Push.engines()) >= set(ENGINES)
