@@ -1,9 +1,9 @@
 """Paths followed by `track` on the backend `compiled`: share of samples that are OK, and time of a sample.
 
-``python -m benchmarks.tracking`` follows, for each arm, paths of poses that a smooth motion of the joints within
-their limits passes through (so that a continuous solution exists), and straight lines between random reachable
-poses (of which some leave the workspace). Every sample that is OK is checked by Pinocchio, and no sample that
-is OK may differ from the one before by more than the motion allows. Times are processor time of one thread.
+``python -m benchmarks.tracking`` follows, for each arm, paths of poses that a smooth motion of the joints
+within their limits passes through (so that a continuous solution exists), and straight lines between random
+reachable poses (of which some leave the workspace). Every sample that is OK is checked by Pinocchio, and it
+may not differ from the one before by more than the motion allows. Times are processor time of one thread.
 """
 
 from __future__ import annotations
@@ -94,9 +94,10 @@ def main() -> None:
     parser.add_argument("arms", nargs="*", default=list(ARMS), help="names of arms")
     parser.add_argument("--paths", type=int, default=50, help="number of paths of each kind")
     options = parser.parse_args()
-    print("| robot | joint motions: OK / LIMITED / HELD / JUMPED [%] | whole | a sample [us] | lines | whole |"
-          " a sample [us] | whole with the start chosen | a path [ms] |")  # fmt: skip
-    print("|---|---|---|---|---|---|---|---|---|")
+    head = ["robot", "joint motions: OK / LIMITED / HELD / JUMPED [%]", "whole", "a sample [us]", "lines"]
+    head += ["whole", "a sample [us]", "whole with the start chosen", "a path [ms]"]
+    print("| " + " | ".join(head) + " |")
+    print("|" + "---|" * len(head))
     for name in options.arms:
         print(row(name, ARMS[name], options.paths), flush=True)
 

@@ -196,16 +196,29 @@ def mass() -> None:
 )
 @frame_option
 @sample_option("q", "Configuration at which the search starts (default: chosen by the solver)")
+@click.option(
+    "--all-solutions",
+    "every",
+    is_flag=True,
+    help="Show every solution of a pose and the name of its branch, for arms that have a closed form.",
+)
+@click.option(
+    "--given",
+    type=number_list,
+    metavar="JOINT=VALUE",
+    help="Positions [rad or m] of joints that --all-solutions takes as given, such as one of seven.",
+)
 @runs("dynx.cli.queries.ik:ik")
 def ik() -> None:
     """Compute inverse kinematics: a configuration, within limits, that brings a frame to a target.
 
     Exit code 0 if the frame reaches the target, which forward kinematics checks; 1 if not, and then the
-    best configuration found is shown.
+    best configuration found is shown. With --all-solutions, 1 if the pose has no solution.
 
     \b
     Examples:
       dynx ik ur5 --to-pose 0.4,0.2,0.3 --frame tool0
       dynx ik ur5 --to-pose 0.4,0.2,0.3,3.14,0,0 --frame tool0 --json
       dynx ik ur5 --to-pose 3.14,0,0 --free position --frame tool0
+      dynx ik ur5 --to-pose 0.4,0.2,0.3,3.14,0,0 --frame tool0 --all-solutions
     """

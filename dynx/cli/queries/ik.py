@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from dynx.cli.queries.all_solutions import all_solutions
 from dynx.cli.queries.evaluate import document_head, title
 from dynx.cli.shell.exits import DONE, NEGATIVE_RESULT, one_line
 from dynx.cli.shell.inputs import (
@@ -17,19 +18,36 @@ from dynx.cli.shell.inputs import (
 )
 from dynx.cli.shell.tables import Table
 from dynx.cli.shell.terminal import console, counted, number, write_json
+from dynx.errors import ArgumentError
 
 
 def ik(
-    target: Numbers, free: str | None, frame: str | None, q: Numbers, json_path: str | None, **robot: Any
+    target: Numbers,
+    free: str | None,
+    frame: str | None,
+    q: Numbers,
+    every: bool,
+    given: Numbers,
+    json_path: str | None,
+    **robot: Any,
 ) -> int:
     """Print the configuration found; return the exit code."""
     wanted = (target_rotation if free == "position" else target_pose)(target, "--to-pose")
+    if every and (free is not None or wanted.ndim == 1):
+        raise ArgumentError(
+            "--all-solutions wants a whole pose: a position and roll,pitch,yaw, without --free"
+        )
+    if given is not None and not every:
+        raise ArgumentError("--given has an effect only with --all-solutions; --lock fixes a joint otherwise")
     if wanted.ndim == 1:
         free = "rotation"
     with open_backend(**robot) as engine:
         model = engine.model
         name = chosen_frame(model, frame)
         start = None if q is None else configuration(model, q)
+        if every:
+            by_default = frame is None
+            return all_solutions(engine, wanted, name, start, given, json_path, frame_is_default=by_default)
         found = engine.inverse_kinematics(wanted, name, start, free=free)
         result = {
             **document_head(engine),

@@ -44,14 +44,14 @@ def load_robot(
 def open_backend(
     robot: str, base: Base, lock: Locks, base_pose: Sequence[float] | None, backend_name: str | None
 ) -> Backend:
-    """Open the backend of a robot by its name; None is Pinocchio if it is installed, else `reference`."""
+    """Open the backend of a robot by its name; None is Pinocchio if it is installed, else `compiled`."""
     model = load_robot(robot, base, lock, base_pose)
     if backend_name is not None:
         return backend(backend_name, model)
     try:
         return backend("pinocchio", model)
     except NotInstalledError:
-        return backend("reference", model)
+        return backend("compiled", model)
 
 
 def configuration(model: Model, given: Numbers, option: str = "--q", default: Floats | None = None) -> Floats:

@@ -220,7 +220,7 @@ def robot_options(command: F) -> F:
             "--backend",
             "backend_name",
             metavar="NAME",
-            help="Backend that computes (default: pinocchio if installed, else reference).",
+            help="Backend that computes (default: pinocchio if installed, else compiled).",
         ),
         model_options,
         json_option,

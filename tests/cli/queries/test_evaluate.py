@@ -17,6 +17,7 @@ from dynx.cli.shell.inputs import default_frame
 from dynx.cli.shell.main import COMMANDS, cli
 from dynx.cli.shell.options import number_list
 from dynx.cli.shell.terminal import counted
+from dynx.ik import IKSolutions
 from dynx.model.configuration import MAX_MAGNITUDE
 from dynx.model.loading import load
 from dynx.spatial.so3 import quat_from_rotation, rpy_from_rotation
@@ -104,6 +105,49 @@ def test_fk_jacobian_and_mass_are_the_backends() -> None:
     assert document("fk", *options)["T_world_frame"] == engine.forward_kinematics(Q, frame).tolist()
     assert document("jacobian", *options)["jacobian"] == engine.jacobian(Q, frame).tolist()
     assert document("mass", *options)["mass_matrix"] == engine.mass_matrix(Q).tolist()
+
+
+def test_every_solution_is_shown() -> None:
+    engine = backend("reference", load("ur5"))
+    T = engine.forward_kinematics(Q, "tool0")
+    pose = ",".join(map(repr, T.ravel().tolist()))
+    options = ["ur5", "--to-pose", pose, "--frame", "tool0", "--backend", "reference", "--all-solutions"]
+    expected = engine.inverse_kinematics(T, "tool0", all_solutions=True)
+    assert isinstance(expected, IKSolutions)
+    found = document("ik", *options)
+    assert [solution["q"] for solution in found["solutions"]] == expected.q.tolist()
+    assert [solution["branch"] for solution in found["solutions"]] == list(expected.branches)
+    shown = CliRunner().invoke(cli, ["ik", *options])
+    assert shown.exit_code == 0
+    assert all(branch in shown.stdout for branch in expected.branches)
+    far = CliRunner().invoke(
+        cli, ["ik", "ur5", "--to-pose", "9,0,0,0,0,0", "--frame", "tool0", "--all-solutions"]
+    )
+    assert far.exit_code == 1
+    assert "no solution" in far.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["panda", "--to-pose", "0.4,0,0.4,0,0,0", "--frame", "panda_link8"], "panda_joint"),
+        (["panda", "--to-pose", "0.4,0,0.4,0,0,0", "--frame", "panda_link8", "--given", "panda_join7=0"],
+         "panda_joint7"),
+        (["ur5", "--to-pose", "0.4,0,0.4"], "whole pose"),
+        (["ur5", "--to-pose", "0.4,0,0.4,0,0,0", "--free", "position"], "whole pose"),
+        (["ur5", "--to-pose", "0.4,0,0.4,0,0,0", "--given", "1,2"], "such as joint7=0.5"),
+    ],
+)  # fmt: skip
+def test_what_has_no_closed_form_is_refused(arguments: list[str], message: str) -> None:
+    refused = CliRunner().invoke(cli, ["ik", *arguments, "--backend", "reference", "--all-solutions"])
+    assert refused.exit_code == 2
+    assert message in refused.stderr
+
+
+def test_a_given_joint_needs_all_solutions() -> None:
+    refused = CliRunner().invoke(cli, ["ik", "panda", "--to-pose", "0.4,0,0.4", "--given", "panda_joint7=0"])
+    assert refused.exit_code == 2
+    assert "--all-solutions" in refused.stderr
 
 
 def test_ik_of_a_rotation_or_a_position_alone() -> None:
