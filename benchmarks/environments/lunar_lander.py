@@ -1,6 +1,6 @@
 """Returns and speed of Gymnasium's heuristic lander: Gymnasium's own LunarLander-v3 beside dynx's engines.
 
-    python -m benchmarks.lunar_lander --episodes 100 --engine pybullet --engine mujoco
+    python -m benchmarks.environments.lunar_lander --episodes 100 --engine pybullet --engine mujoco
 
 Each flies the same seeds. Processor time is that of whole episodes, resets and controller included; the
 environments take turns, an episode each. Needs ``gymnasium[box2d]``.
