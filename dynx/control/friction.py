@@ -69,6 +69,16 @@ class JointFriction:
         """True if any coefficient is not zero."""
         return bool(self.damping.any()) or self._dry
 
+    @property
+    def sticks(self) -> bool:
+        """True if joints stick: there is friction and no slip speed, so that each step is solved for it."""
+        return self.present and not self.slip
+
+    @property
+    def smooth(self) -> bool:
+        """True if there is friction with a slip speed, whose torque is a function of the velocity."""
+        return self.present and bool(self.slip)
+
     @cached_property
     def _dry(self) -> bool:
         return bool(self.friction.any())

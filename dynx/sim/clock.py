@@ -63,6 +63,18 @@ class Clock:
         """Time between two control steps [s]."""
         return self.steps_per_control * self.dt
 
+    def is_control_step(self, step: Any) -> Any:
+        """Check whether the controller is evaluated at the start of `step`, or of each of several (n,)."""
+        return step % self.steps_per_control == 0
+
+    def control_number(self, step: Any) -> Any:
+        """Return the number of the control step that `step`, or each of several (n,), belongs to."""
+        return step // self.steps_per_control
+
+    def next_control_step(self, step: int) -> int:
+        """Return the first step from `step` on at which the controller is evaluated."""
+        return -(-step // self.steps_per_control) * self.steps_per_control
+
     def measured_step(self, step: Any) -> Any:
         """Return the step whose state a controller measures at `step`, or at each of several (n,): an earlier
         one with a delay, and the initial state while the delay has not passed."""

@@ -2,19 +2,26 @@
 
 The plain executor evaluates them on floats; the staged executor and batches trace them on symbols. Other
 parts that they share are `clamp` (`dynx.spatial.scalar`), the law of friction and semi-implicit Euler
-(`dynx.sim.plants`), and the delay (`dynx.sim.clock`).
+(`dynx.sim.plants`), control steps and the delay (`dynx.sim.clock`), and the checks of what a controller
+returns (`dynx.sim.loop.controller_checks`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from math import hypot
 from typing import Any
 
 import numpy as np
 
 from dynx.control.base import Measurement
 from dynx.model import Model
+from dynx.model.configuration import DIVERGENCE_SPEED
 from dynx.spatial.branchless import integrate
-from dynx.spatial.scalar import Array, sign
+from dynx.spatial.scalar import Array, Floats, sign
+
+MAX_SQUARED_SPEED = DIVERGENCE_SPEED**2
+"""Sum of squared velocities from which on a simulation counts as diverged."""
 
 
 def measure(
@@ -47,3 +54,44 @@ def at_limit(tau: Array, limit: Array) -> Array:
     On symbols limits must be finite.
     """
     return np.asarray(1.0 - sign(limit - abs(tau)))
+
+
+def torque_sum(tau: Array) -> Any:
+    """Return the sum of torques (nv,), which is finite only if all of them are.
+
+    An overflowed torque is an error even if effort limits would make it finite.
+    """
+    return sum(tau.tolist())
+
+
+def squared_speed(v: Array) -> Any:
+    """Return the sum of squares of v (nv,), for symbols. The state diverged unless it is below
+    `MAX_SQUARED_SPEED`, which NaN is not."""
+    return v.dot(v)
+
+
+def is_diverged(v: Floats) -> bool:
+    """Check the same for floats, a microsecond faster and without a warning of an overflow."""
+    return not hypot(*v.tolist()) < DIVERGENCE_SPEED
+
+
+def with_disturbances(tau: Array, friction: Array | None, pushes: Iterable[tuple[Array, Array]]) -> Array:
+    """Return the torque `tau` (nv,) minus that of smoothed friction, plus that of pushes.
+
+    A push is the Jacobian (6, nv) of its frame and its wrench (6,).
+    """
+    if friction is not None:
+        tau = tau - friction
+    for J, wrench in pushes:
+        tau = tau + J.T @ wrench
+    return tau
+
+
+def held_at_limits(joints: Floats, speeds: Floats, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
+    """Return the positions of joints (..., n), set to limits that they passed, and the impacts on them.
+
+    An impact is the outward sign, 1 or -1, of a joint that passed a limit and moves outwards, otherwise 0.
+    """
+    held = np.clip(joints, lower, upper)
+    outward = np.sign(joints - held)
+    return held, outward * (outward * speeds > 0.0)

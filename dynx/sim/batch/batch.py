@@ -218,10 +218,7 @@ def simulate_batch(
     parts = [
         Part(
             kernels,
-            clock.steps_per_control,
-            min(clock.delay_steps, clock.n_steps),
-            clock.n_steps,
-            clock.dt,
+            clock,
             {name: array[first : first + PART] for name, array in start.items()},
             {name: array[first : first + PART] for name, array in fixed.items()},
             setpoints,
@@ -272,7 +269,7 @@ def _step_kernels(step: FusedStep, clock: Clock, wrenches: Floats) -> StepKernel
 
     For a large robot the steps without a push are steps with a push of zero.
     """
-    controlled = np.arange(clock.n_steps) % clock.steps_per_control == 0
+    controlled = clock.is_control_step(np.arange(clock.n_steps))
     pushed = pushing(wrenches)
     if step.model.nv > MAX_NV_WITHOUT_PUSHES:
         pushed = [any(pushed)] * clock.n_steps

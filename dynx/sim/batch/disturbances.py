@@ -16,6 +16,7 @@ from dynx.control.friction import JointFriction
 from dynx.model import Mechanism, Model
 from dynx.sim.clock import Clock
 from dynx.sim.plants.disturbances import Disturbances, Push
+from dynx.sim.step import with_disturbances
 from dynx.spatial.scalar import Array, Floats
 
 WRENCH = 6
@@ -59,7 +60,7 @@ class BatchDisturbances:
     @property
     def sticks(self) -> bool:
         """True if joint friction is solved for at the end of each step."""
-        return self.joint_friction.present and not self.joint_friction.slip
+        return self.joint_friction.sticks
 
     def added_to(
         self,
@@ -72,13 +73,13 @@ class BatchDisturbances:
         pushed: bool,
     ) -> Array:
         """Return `tau` minus the torque of friction with a slip speed plus the torque of the pushes (nv,)."""
-        if self.joint_friction.present and not self.sticks:
-            tau = tau - self.joint_friction.torque_for(v, *self._coefficients(given))
+        friction, pushes = self.joint_friction, []
         if pushed:
             for push, wrench in zip(self.pushes, given["wrenches"].reshape(-1, WRENCH), strict=True):
                 details = (self.model.frame_index(push.frame), push.reference)
-                tau = tau + evaluate_quantity(mechanism, "jacobian", details, q).T @ wrench
-        return tau
+                pushes.append((evaluate_quantity(mechanism, "jacobian", details, q), wrench))
+        smooth = friction.torque_for(v, *self._coefficients(given)) if friction.smooth else None
+        return with_disturbances(tau, smooth, pushes)
 
     def friction_of(self, given: Mapping[str, Array]) -> tuple[Array, Array]:
         """Return damping and dry friction (nv,) of the model's coordinates, where there is no slip speed."""
@@ -95,9 +96,9 @@ class BatchDisturbances:
             self._in_place("friction", own.friction, given),
         )
 
-    def armature_of(self, given: Mapping[str, Array]) -> Array | None:
-        """Return the armature (nv,), or None if it is zero."""
-        return self._in_place("armature", self.armature, given) if self.armature.any() else None
+    def armature_of(self, given: Mapping[str, Array]) -> Array:
+        """Return the armature (nv,)."""
+        return self._in_place("armature", self.armature, given)
 
     def _in_place(self, name: str, constant: Floats, given: Mapping[str, Array]) -> Array:
         """Replace placeholders by the coefficients of the rollout; constants stay."""

@@ -20,22 +20,26 @@ from dynx.control.base import Controller, chain_of, gains_of
 from dynx.control.content import content_of
 from dynx.errors import ArgumentError, TraceError, UnsupportedFeatureError, shown
 from dynx.model import Mechanism, Model
-from dynx.model.configuration import DIVERGENCE_SPEED
 from dynx.rbd.elimination import factorize_mass_matrix, solve_with_factors
 from dynx.sim.batch.disturbances import BatchDisturbances
 from dynx.sim.batch.traced_controller import innermost, traced_controller
-from dynx.sim.loop.controller_checks import ControllerWatch, defect_of_outcome, is_row
+from dynx.sim.loop.controller_checks import (
+    ControllerWatch,
+    defect_of_next_state,
+    defect_of_outcome,
+    defect_of_torque,
+    is_row,
+)
 from dynx.sim.loop.own_controllers import refuse_irreproducible, traced_torque
-from dynx.sim.plants.friction_law import FrictionLaw, FrictionStep
-from dynx.sim.plants.friction_solver import CORRECTIONS, MAX_CORRECTED_OPERATIONS
+from dynx.sim.plants.friction_law import FrictionLaw, FrictionStep, damped_equation
 from dynx.sim.plants.integrators import SemiImplicitEuler
-from dynx.sim.step import at_limit, measure
+from dynx.sim.step import MAX_SQUARED_SPEED, at_limit, measure, squared_speed, torque_sum
 from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.kernel import Kernel
 from dynx.simd.trace import trace
 from dynx.simd.user_code.numbers import as_symbol, as_traced, select
 from dynx.spatial.branchless import difference
-from dynx.spatial.scalar import Array, Floats, clamp, sign, tanh
+from dynx.spatial.scalar import Array, Floats, clamp, tanh
 from dynx.trajectory.base import Setpoint
 
 MAX_FLOAT = float(np.finfo(np.float64).max)
@@ -129,13 +133,12 @@ class FusedStep:
             center = self._center(given) if self.model.floating else None
             scheme = SemiImplicitEuler(self.model, self.dt, center)
             q, v = given["q"], given["v"]
-            slowed = self._slowed(mechanism, given, pushed, tau) if self.sticks else None
-            if slowed is None:
-                q, v, _ = scheme.moved(q, v, self._acceleration(mechanism, given, pushed, tau))
-            else:
+            if self.sticks:
+                slowed, settling = self._slowed(mechanism, given, pushed, tau)
                 q, v, _ = scheme.moved(q, v, slowed.a, slowed.moves)
-                if self._law.joints:
-                    results |= self._settling(slowed, given["v"])
+                results |= settling
+            else:
+                q, v, _ = scheme.moved(q, v, self._acceleration(mechanism, given, pushed, tau))
             q_reference = given["q_reference"]
             error = abs(difference(q, q_reference) if self.model.floating else q_reference - q)
             max_error = np.array([x.maximum(e) for x, e in zip(given["max_error"], error, strict=True)])
@@ -214,12 +217,10 @@ class FusedStep:
             raise UnsupportedFeatureError(
                 f"{watch.changed}; a batch would repeat only the first change: let torque return its state"
             )
-        if state is not None and "state" not in given:
-            raise UnsupportedFeatureError(f"{own.name} returns a state, but its initial_state() returns None")
-        if np.shape(tau) != given["v"].shape:
-            raise UnsupportedFeatureError(
-                f"the torque of {own.name} has shape {np.shape(tau)}; wanted {given['v'].shape}"
-            )
+        shape = given["v"].shape
+        defect = defect_of_torque(tau, shape) or defect_of_next_state(given.get("state"), state)
+        if defect:
+            raise UnsupportedFeatureError(f"{own.name} cannot be part of a batch: {defect}")
         results = {} if state is None else {"state": state}
         if self.limit is None:
             return {"tau": tau, **results}
@@ -249,36 +250,29 @@ class FusedStep:
 
     def _slowed(
         self, mechanism: Mechanism, given: Mapping[str, Array], pushed: bool, tau: Array
-    ) -> FrictionStep:
-        """Solve the law of friction, with `CORRECTIONS` corrections of the modes, or none for a large robot.
-
-        The first modes are the signs of the velocities, plus ``modes`` in a step that is repeated because it
+    ) -> tuple[FrictionStep, dict[str, Array]]:
+        """Solve the law of friction; ``modes`` shift the first modes in a step that is repeated because it
         was not settled (`dynx.sim.batch.settling`).
+
+        Also returns the next shift, and whether the step is to be repeated with it, for joints that stick.
         """
         law, v, h = self._law, given["v"], self.dt
         damping, friction = self.disturbances.friction_of(given)
-        M, r, own_damping, own_friction = self._equation(mechanism, given, pushed, tau)
+        M, r, armature, own_damping, own_friction = self._equation(mechanism, given, pushed, tau)
         if own_damping is not None and own_friction is not None:
             damping, friction = damping + own_damping, friction + own_friction
-        A, r, joints = M + np.diag(h * damping), r - damping * v, list(law.joints)
-        most = friction[joints].tolist()
-        if not joints:
-            return law.solve(A, r, v, most, h, [], 0.0)
-        single = given["one_by_one"][0]
-        found = law.solve(A, r, v, most, h, sign(v[joints]) + given["modes"], single)
-        for _ in range(CORRECTIONS if law.operations <= MAX_CORRECTED_OPERATIONS else 0):
-            found = law.solve(A, r, v, most, h, found.modes, single)
-        return found
-
-    def _settling(self, slowed: FrictionStep, v: Array) -> dict[str, Array]:
-        """Return the corrected modes, minus the signs of the velocities, and whether they are to be tried."""
-        modes = slowed.modes - sign(v[list(self._law.joints)])
-        return {"next_modes": modes, "unsettled": np.array([slowed.changes], dtype=object)}
+        A, r = damped_equation(M, r, v, h, damping, armature)
+        if not law.joints:
+            return law.solve(A, r, v, [], h, [], 0.0), {}
+        most = friction[list(law.joints)].tolist()
+        _, found, shift = law.step(A, r, v, most, h, given["modes"], given["one_by_one"][0])
+        return found, {"next_modes": shift, "unsettled": np.array([found.changes], dtype=object)}
 
     def _equation(
         self, mechanism: Mechanism, given: Mapping[str, Array], pushed: bool, tau: Array
-    ) -> tuple[Array, Array, Array | None, Array | None]:
-        """Return M, r, and damping and dry friction of the plant's parameters, of M a = r minus friction."""
+    ) -> tuple[Array, Array, Array, Array | None, Array | None]:
+        """Return M, r, armature, and damping and dry friction of the plant's parameters, of
+        (M + armature) a = r minus friction."""
         q, v = given["q"], given["v"]
         tau = self.disturbances.added_to(tau, mechanism, q, v, given, pushed=pushed)
         armature = self.disturbances.armature_of(given)
@@ -287,7 +281,7 @@ class FusedStep:
             r, damping, friction = tau - evaluate_quantity(mechanism, "bias_torque", (), q, v), None, None
         else:
             M, r, damping, friction = self.plant.equation(given["parameters"], q, v, tau)
-        return M if armature is None else M + np.diag(armature), r, damping, friction
+        return M, r, armature, damping, friction
 
     def _acceleration(
         self, mechanism: Mechanism, given: Mapping[str, Array], pushed: bool, tau: Array
@@ -296,11 +290,11 @@ class FusedStep:
             q, v = given["q"], given["v"]
             tau = self.disturbances.added_to(tau, mechanism, q, v, given, pushed=pushed)
             return evaluate_quantity(mechanism, "forward_dynamics", (), q, v, tau)
-        M, r, damping, friction = self._equation(mechanism, given, pushed, tau)
+        M, r, armature, damping, friction = self._equation(mechanism, given, pushed, tau)
         if damping is not None:
             slip = self.disturbances.joint_friction.slip
             r = r - damping * given["v"] - friction * tanh(given["v"] / slip)
-        return solve_with_factors(*factorize_mass_matrix(mechanism, M), r)
+        return solve_with_factors(*factorize_mass_matrix(mechanism, M + np.diag(armature)), r)
 
     def _center(self, given: Mapping[str, Array]) -> Array:
         """Return the centre of mass of the root (3,)."""
@@ -318,9 +312,9 @@ def _sound_steps(before: Array, v: Array, commanded: Array | None) -> Array:
     A torque `commanded` that is not finite counts as divergence, even if effort limits made it finite.
     """
     (steps,) = map(as_traced, before)
-    sound = as_traced(sum(v * v)) < DIVERGENCE_SPEED**2  # not where it is NaN
+    sound = as_traced(squared_speed(v)) < MAX_SQUARED_SPEED
     counted = select(sound, steps + 1.0, -1.0 - steps)
     if commanded is not None:
-        counted = select(as_traced(abs(sum(commanded + 0.0 * v))) <= MAX_FLOAT, counted, -1.0 - steps)
+        counted = select(as_traced(abs(torque_sum(commanded + 0.0 * v))) <= MAX_FLOAT, counted, -1.0 - steps)
     counted = select(steps < 0.0, steps, counted)
     return np.array([as_symbol(counted)], dtype=object)

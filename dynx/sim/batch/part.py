@@ -10,6 +10,7 @@ import numpy as np
 
 from dynx.sim.batch.settling import Settling
 from dynx.sim.batch.stopping import BatchStops
+from dynx.sim.clock import Clock
 from dynx.sim.loop.noise import BLOCK_STEPS, NoiseStream, Purpose
 from dynx.simd.kernel import Kernel
 from dynx.spatial.scalar import Floats
@@ -55,11 +56,7 @@ class Part:
     """Inputs of a part as arrays and machine code, so that it can be sent to another process."""
 
     kernels: StepKernels
-    steps_per_control: int
-    delay_steps: int
-    """Delay of the measurements [steps], for which as many states are kept."""
-    n_steps: int
-    dt: float
+    clock: Clock
     start: dict[str, Floats]
     """Initial state as arrays (count, size): q and v, maximum error and sum of squared errors of each
     coordinate (``max_error``, ``squared_errors``), the number of steps before divergence (``sound_steps``),
@@ -102,7 +99,8 @@ class _Run:
         start = {name: self._padded(array) for name, array in part.start.items()}
         # The rest of the state needs two sets, which alternate in step with the others if their number is
         # even.
-        sets = 2 * ((part.delay_steps + 3) // 2)
+        self._delay = min(part.clock.delay_steps, part.clock.n_steps)
+        sets = 2 * ((self._delay + 3) // 2)
         pair = (start, {name: array.copy() for name, array in start.items()})
         self._sets = [
             {**pair[k % 2], **({} if k < 2 else {name: start[name].copy() for name in ("q", "v")})}
@@ -113,7 +111,7 @@ class _Run:
         widths |= dict.fromkeys(("q_wanted", "q_reference"), int(part.references.shape[1]))
         widths["wrenches"] = int(part.wrenches.shape[1])
         always = all(pushed for _, pushed in part.kernels)
-        self._pushing = [True] * part.n_steps if always else pushing(part.wrenches)
+        self._pushing = [True] * part.clock.n_steps if always else pushing(part.wrenches)
         self._noise: dict[str, Floats] = {}
         self._drawn: dict[Purpose, Floats] = {}
         if part.noise is not None:
@@ -142,18 +140,18 @@ class _Run:
 
     def run(self) -> PartOutcome:
         """Take all steps."""
-        part, n = self._part, self._part.count
+        part, clock, n = self._part, self._part.clock, self._part.count
         sets, common = len(self._sets), self._common
         dry, settling, unsettled = self._dry, self._settling, self._settling.outputs["unsettled"]
-        for step in range(part.n_steps):
-            number, rest = divmod(step, part.steps_per_control)
-            if rest == 0:
-                self._set_control(number)
+        for step in range(clock.n_steps):
+            controlled = clock.is_control_step(step)
+            if controlled:
+                self._set_control(clock.control_number(step))
             common["q_reference"][0] = part.references[step]
             pushed = self._pushing[step]
             if pushed:
                 common["wrenches"][0] = part.wrenches[step]
-            key = rest == 0, pushed, step % sets
+            key = controlled, pushed, step % sets
             self._calls[key]()
             if dry and unsettled.any():
                 settling(self._groups[key], part.kernels[key[:2]].image.lanes)
@@ -163,7 +161,7 @@ class _Run:
             if part.record_every and (step + 1) % part.record_every == 0:
                 for kept, array in zip(self._records, (now["q"], now["v"], self._tau), strict=True):
                     kept.append(array[:n].copy())
-        last = self._sets[part.n_steps % sets]
+        last = self._sets[clock.n_steps % sets]
         q, v, tau = (
             np.stack(kept, axis=1) if kept else np.zeros((n, 0, array.shape[1]))
             for kept, array in zip(self._records, (last["q"], last["v"], self._tau), strict=True)
@@ -172,24 +170,24 @@ class _Run:
             q=last["q"][:n].copy(),
             v=last["v"][:n].copy(),
             max_error=last["max_error"][:n].copy(),
-            rms_error=np.sqrt(last["squared_errors"][:n] / part.n_steps),
+            rms_error=np.sqrt(last["squared_errors"][:n] / clock.n_steps),
             # In a rollout that diverged in step k the number of steps before divergence is -1 - k.
             diverged=np.maximum(-1.0 - last["sound_steps"][:n, 0], -1.0),
             q_record=q,
             v_record=v,
             tau_record=tau,
-            saturated=last["steps_at_limit"][:n] / part.n_steps
+            saturated=last["steps_at_limit"][:n] / clock.n_steps
             if "steps_at_limit" in last
             else np.zeros((n, self._tau.shape[1])),
         )
 
     def _set_control(self, number: int) -> None:
-        part = self._part
+        part, clock = self._part, self._part.clock
         for name, rows in zip(("q_wanted", "v_wanted", "a_wanted"), part.setpoints, strict=True):
             self._common[name][0] = rows[number]
-        first = number * part.steps_per_control
-        self._common["t"][0, 0] = first * part.dt
-        self._common["steps_held"][0, 0] = min(part.steps_per_control, part.n_steps - first)
+        first = number * clock.steps_per_control
+        self._common["t"][0, 0] = first * clock.dt
+        self._common["steps_held"][0, 0] = min(clock.steps_per_control, clock.n_steps - first)
         if part.noise is not None:
             self._draw(number, part.noise)
 
@@ -197,7 +195,7 @@ class _Run:
         """Set noise and random numbers of a control step; they are drawn for a block of steps at once."""
         step = number % BLOCK_STEPS
         if step == 0:
-            left = -(-self._part.n_steps // self._part.steps_per_control) - number
+            left = self._part.clock.n_controls - number
             for purpose, drawn in self._drawn.items():
                 for row in range(self._part.count):
                     self._stream.draw(noise.first + row, number, drawn[row, :left], purpose)
@@ -214,7 +212,8 @@ class _Run:
         """Return inputs and outputs of a kernel, from the set of buffers number `turn` to the next."""
         sets = len(self._sets)
         source, target = self._sets[turn], self._sets[(turn + 1) % sets]
-        measured = self._sets[(turn - self._part.delay_steps) % sets]
+        # As `Clock.measured_step`: sets that are not written yet have the initial state.
+        measured = self._sets[(turn - self._delay) % sets]
         known = {
             **self._fixed,
             **self._noise,

@@ -18,6 +18,7 @@ from dynx.compiled.kernels import evaluate_quantity
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.sim.batch.kernel import FusedStep
 from dynx.sim.plants.friction_law import FrictionLaw
+from dynx.sim.step import held_at_limits
 from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.kernel import Kernel
 from dynx.simd.trace import trace
@@ -69,11 +70,11 @@ class BatchStops:
         if not (below.any() or above.any()):
             return
         rows = np.flatnonzero((below | above).any(axis=1))
-        held = np.clip(joints[rows], self.lower[rows], self.upper[rows])
-        outward = np.sign(joints[rows] - held)
-        joints[rows] = held
         struck = np.zeros((len(rows), speeds.shape[1]))
-        struck[:, -n:] = outward * (outward * speeds[rows, -n:] > 0.0)
+        held, struck[:, -n:] = held_at_limits(
+            joints[rows], speeds[rows, -n:], self.lower[rows], self.upper[rows]
+        )
+        joints[rows] = held
         hit = struck.any(axis=1)
         if hit.any():
             self._strike(now, fixed, rows[hit], struck[hit])
@@ -119,9 +120,7 @@ def _impact_kernel(step: FusedStep) -> Kernel:
             M = evaluate_quantity(mechanism, "mass_matrix", (), given["q"])
         else:
             M = step.plant.inertia(given["parameters"], given["q"])
-        armature = disturbances.armature_of(given)
-        if armature is not None:
-            M = M + np.diag(armature)
+        M = M + np.diag(disturbances.armature_of(given))
         x, left = equation.accelerations(M, [0.0] * len(v), list(1.0 - stuck), list(-stuck * v))
         return {"v": v + np.array(x), "pull": -given["struck"] * np.array(left)}
 

@@ -39,7 +39,7 @@ class Store:
     def read(self, part: Part) -> PartOutcome | None:
         """Return the outcome of a part, or None if it is not stored, incomplete or damaged."""
         count, nq, nv = part.count, part.start["q"].shape[1], part.start["v"].shape[1]
-        kept = part.n_steps // part.record_every if part.record_every else 0
+        kept = part.clock.n_steps // part.record_every if part.record_every else 0
         shapes: dict[str, tuple[int, ...]] = {"q": (count, nq), "diverged": (count,)}
         shapes |= dict.fromkeys(("v", "max_error", "rms_error", "saturated"), (count, nv))
         shapes |= {"q_record": (count, kept, nq)}

@@ -90,6 +90,25 @@ def defect_of_outcome(outcome: Any) -> str | None:
     return f"torque must return (tau, state), with None for the state if there is none; it returned {kind}"
 
 
+def defect_of_torque(tau: Any, shape: tuple[int, ...]) -> str | None:
+    """Describe what is wrong with the shape of a torque; return None for `shape`."""
+    return None if np.shape(tau) == shape else f"its torque has shape {np.shape(tau)}; wanted {shape}"
+
+
+def defect_of_next_state(start: Any, state: Any) -> str | None:
+    """Describe why compiled steps cannot pass on the `state` that `torque` returned; return None if they can.
+
+    They keep an array of the shape of `start`, what `initial_state` returned, or no state at all.
+    """
+    if start is None:
+        return None if state is None else "it returns a state, but its initial_state() returns None"
+    if state is None:
+        return "it returns None as its state, but its initial_state() returns an array"
+    if np.shape(state) == start.shape:
+        return None
+    return f"it returns a state of shape {np.shape(state)}; that of initial_state() is {start.shape}"
+
+
 class ControllerWatch:
     """Detector of controllers that change their own attributes, so that their state is hidden."""
 

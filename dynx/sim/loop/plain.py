@@ -10,7 +10,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from math import hypot, isfinite
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -21,11 +21,12 @@ from dynx.errors import ControlError, DivergedError, SimulationError, shown
 from dynx.model.configuration import DIVERGENCE_SPEED
 from dynx.model.masks import refuse_mask
 from dynx.sim.clock import Clock
-from dynx.sim.loop.controller_checks import ControllerWatch, defect_of_outcome
+from dynx.sim.loop.controller_checks import ControllerWatch, defect_of_outcome, defect_of_torque
 from dynx.sim.loop.record import Record
 from dynx.sim.loop.sensors import Sensors
 from dynx.sim.loop.stops import Stops
 from dynx.sim.plants.plant import Plant, is_own, plant_errors
+from dynx.sim.step import is_diverged, torque_sum
 from dynx.spatial.scalar import Floats, clamp
 from dynx.trajectory.base import Setpoint
 
@@ -110,7 +111,7 @@ class Loop:
         limit, stops = self.limit, self.stops
         step, progress, next_call = plant.step, self.progress, begin
         # Number of the step at which the controller is evaluated next; -1 if it never is.
-        due = -1 if controller is None or given is not None else -(-begin // per_control) * per_control
+        due = -1 if controller is None or given is not None else self.clock.next_control_step(begin)
         if given is not None:
             tau, command = given if limit is None else clamp(given, limit), None
             loop_state.tau, loop_state.command = tau, None
@@ -133,7 +134,7 @@ class Loop:
                     tau, state = outcome
                     if type(tau) is not np.ndarray or tau.shape != shape or tau.dtype is not FLOAT64:
                         tau = self._as_torque(k, record, tau)
-                    if not isfinite(sum(tau.tolist())):
+                    if not isfinite(torque_sum(tau)):
                         raise self._control_failed(k, record, f"its torque is not finite: {shown(tau)}")
                     if limit is not None:
                         tau = clamp(tau, limit)
@@ -151,7 +152,7 @@ class Loop:
                 # This includes the engine's own exceptions, because its hooks are called directly
                 # (`dynx.control.dynamics`).
                 raise self._step_failed(k, record, error) from error
-            if not hypot(*v.tolist()) < DIVERGENCE_SPEED:
+            if is_diverged(v):
                 raise self._diverged(
                     k, record, f"the velocity is not finite, or its norm is above {DIVERGENCE_SPEED:g}"
                 )
@@ -183,8 +184,9 @@ class Loop:
                 record,
                 f"its torque is of type {type(given).__name__}, not numbers {wanted}: {shown(given)}",
             )
-        if array.shape != wanted:
-            raise self._control_failed(k, record, f"its torque has shape {array.shape}; wanted {wanted}")
+        defect = defect_of_torque(array, wanted)
+        if defect:
+            raise self._control_failed(k, record, defect)
         return np.array(array, dtype=np.float64)
 
     def refuse_self_changing(self, record: Record) -> None:
@@ -216,8 +218,7 @@ class Loop:
         state = self.controller.initial_state()
         if state is None or isinstance(self.controller, EngineMotor):
             return state
-        for number in range(-(-record.steps // self.clock.steps_per_control)):
-            step = number * self.clock.steps_per_control
+        for number, step in enumerate(range(0, record.steps, self.clock.steps_per_control)):
             measurement = self.sensors(step, record.q, record.v)
             outcome = self.controller.torque(measurement, self._setpoint(number), state)
             defect = defect_of_outcome(outcome)
@@ -233,10 +234,10 @@ class Loop:
         """Return the torque and motor command of the last control step before the last state of `record`."""
         begin = record.steps
         none = np.zeros(self.plant.model.nv)
-        if begin % self.clock.steps_per_control == 0:
+        if self.clock.is_control_step(begin):
             return none, None
         if isinstance(self.controller, EngineMotor):
-            number = begin // self.clock.steps_per_control
+            number = self.clock.control_number(begin)
             measurement = self.sensors(number * self.clock.steps_per_control, record.q, record.v)
             return none, self.controller.command(measurement, self._setpoint(number))
         return record.tau[begin - 1].copy(), None

@@ -39,7 +39,7 @@ class Sensors:
     def __call__(self, step: int, q: Floats, v: Floats) -> Measurement:
         """Return the measurement at physics step `step`, from the states (n, nq), (n, nv) until then."""
         clock = self._clock
-        seen, number = clock.measured_step(step), step // clock.steps_per_control
+        seen, number = clock.measured_step(step), clock.control_number(step)
         noise = None if self.noise is None else (self.noise[0][number], self.noise[1][number])
         random = None if self.random is None else self.random[number]
         return measure(self._model, step * clock.dt, q[seen], v[seen], noise, random)

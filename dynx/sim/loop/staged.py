@@ -17,14 +17,18 @@ from numpy.typing import NDArray
 
 from dynx.control.engine_motors import EngineMotor
 from dynx.errors import CompileError, TraceError
-from dynx.model.configuration import DIVERGENCE_SPEED
-from dynx.sim.loop.controller_checks import is_row
+from dynx.sim.loop.controller_checks import (
+    defect_of_next_state,
+    defect_of_outcome,
+    defect_of_torque,
+    is_row,
+)
 from dynx.sim.loop.own_controllers import refuse_irreproducible, traced_torque
 from dynx.sim.loop.plain import Loop, LoopState
 from dynx.sim.loop.record import Record
 from dynx.sim.loop.stages import EngineCall, EngineCallTracer, StagedStep, refuse_impure, traced_controller
 from dynx.sim.plants.integrated import IntegratedPlant
-from dynx.sim.step import measure
+from dynx.sim.step import MAX_SQUARED_SPEED, measure, squared_speed, torque_sum
 from dynx.simd.call_sequence import CallSequence, StridedRows, prepare_calls
 from dynx.simd.kernel import Kernel
 from dynx.spatial.scalar import Array, Floats, clamp
@@ -151,13 +155,15 @@ class StagedLoop:
             )
             setpoint = Setpoint(*(given[name] for name in SETPOINT))
             controller = traced_controller(loop.controller, tracer)
-            tau, state = traced_torque(controller, measurement, setpoint, state)
+            outcome = traced_torque(controller, measurement, setpoint, state)
             tracer.refuse_inexact_rounding()
-            if tau.shape != given["v"].shape:
-                raise TraceError(f"the torque has shape {tau.shape}")
-            # The plain loop tests the same sum: an overflowed torque is an error even if clamping would make
-            # it finite.
-            excess = 0.0 * sum(tau.tolist(), 0.0)
+            defect = defect_of_outcome(outcome)
+            if defect is None:
+                tau, state = outcome
+                defect = defect_of_torque(tau, given["v"].shape) or defect_of_next_state(self._start, state)
+            if defect:
+                raise TraceError(defect)
+            excess = 0.0 * torque_sum(tau)
             if loop.limit is not None:
                 tau = clamp(tau, loop.limit)
 
@@ -166,7 +172,7 @@ class StagedLoop:
         results |= {"tau": tau, "a": a, "next_q": q, "next_v": v}
         if self._state_size and state is not None:
             results["next_state"] = state
-        results["defect"] = np.array([v @ v + excess], dtype=object)
+        results["defect"] = np.array([squared_speed(v) + excess], dtype=object)
         if loop.stops is not None:
             results["beyond"] = np.array([loop.stops.excess(q)], dtype=object)
         return tracer.compile(results)
@@ -202,7 +208,7 @@ class StagedLoop:
     def _rows(self, names: Iterable[str], steps: Steps) -> dict[str, Steps]:
         """Return the indices of the rows that `steps` use in the arrays of those names."""
         clock = self._loop.clock
-        following, measured, control = steps + 1, clock.measured_step(steps), steps // clock.steps_per_control
+        following, measured, control = steps + 1, clock.measured_step(steps), clock.control_number(steps)
         rows = {name: following if name.startswith("next_") else steps for name in names}
         rows |= {"last_tau": np.maximum(steps - 1, 0), "measured_q": measured, "measured_v": measured}
         return rows | dict.fromkeys((*SETPOINT, *NOISE), control)
@@ -210,7 +216,7 @@ class StagedLoop:
     def _take_chunk(self, record: Record, arrays: Mapping[str, Floats], end: int) -> bool:
         """Step to `end` and count the steps in the record; return False where a step has to be repeated by
         the plain executor."""
-        first, per = record.steps, self._loop.clock.steps_per_control
+        first, clock = record.steps, self._loop.clock
         steps = np.arange(first, end)
         rows = self._rows(arrays, steps)
         by_step = {name: StridedRows(array, rows[name]) for name, array in arrays.items()}
@@ -220,8 +226,11 @@ class StagedLoop:
             return controlled(first, last)
         holding = self._prepared_steps(self._holding_step, by_step, record)
         while (k := record.steps) < last:
-            due = k % per == 0
-            if not (controlled if due else holding)(k, k + 1 if due else min(last, k - k % per + per)):
+            if clock.is_control_step(k):
+                taken = controlled(k, k + 1)
+            else:
+                taken = holding(k, min(last, clock.next_control_step(k)))
+            if not taken:
                 return False
         return True
 
@@ -267,7 +276,7 @@ class StagedLoop:
                             return False
                         result[:] = call(*arguments)
                     finish(finishing[k])
-                    if not defect[0] < DIVERGENCE_SPEED**2:
+                    if not defect[0] < MAX_SQUARED_SPEED:
                         return False
                     defect[0] = 0.0
                     if stop is not None and beyond[0] > 0.0:

@@ -14,6 +14,7 @@ from dynx.backends import Backend, backend
 from dynx.model import Model
 from dynx.sim.plants.integrated import IntegratedPlant
 from dynx.sim.plants.plant import Plant
+from dynx.sim.step import held_at_limits
 from dynx.spatial.scalar import Array, Floats
 
 
@@ -59,14 +60,11 @@ class Stops:
         values = q[self._q_joints].tolist()
         if all(map(le, self._lowest, values)) and all(map(le, values, self._highest)):
             return None
-        joints = q[self._q_joints]
-        held = np.clip(joints, self._lower, self._upper)
-        past = np.flatnonzero(joints != held)
+        held, impacts = held_at_limits(q[self._q_joints], v[self._base :], self._lower, self._upper)
         q = q.copy()
         q[self._q_joints] = held
-        outward, columns = np.sign(joints[past] - held[past]), past + self._base
-        struck = outward * v[columns] > 0.0
-        outward, columns = outward[struck], columns[struck]
+        struck = np.flatnonzero(impacts)
+        outward, columns = impacts[struck], struck + self._base
         if not columns.size:
             return q, v
         # Velocities after unit impulses on these joints.

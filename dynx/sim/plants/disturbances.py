@@ -26,6 +26,7 @@ from dynx.model.configuration import checked_entries, is_real, real_array
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, REFERENCES
 from dynx.sim.plants.friction_law import FrictionLaw
 from dynx.sim.plants.friction_solver import FrictionSolver
+from dynx.sim.step import with_disturbances
 from dynx.spatial.scalar import Floats
 
 TIME_ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
@@ -115,13 +116,13 @@ class Disturbances:
 
     @cached_property
     def sticks(self) -> bool:
-        """True if joint friction is solved for at the end of each step: there is some, and no slip speed."""
-        return self.friction.present and not self.friction.slip
+        """True if joint friction is solved for at the end of each step (`JointFriction.sticks`)."""
+        return self.friction.sticks
 
     @cached_property
     def has_torque(self) -> bool:
         """True if pushes or friction with a slip speed add a torque, a function of time and state."""
-        return (self.friction.present and not self.sticks) or bool(self.pushes)
+        return self.friction.smooth or bool(self.pushes)
 
     def friction_solver(self, h: float, *, damped: bool = True, armature: bool = True) -> FrictionSolver:
         """Return the solver of joint friction for steps of `h` [s], with damping and armature or without."""
@@ -167,13 +168,20 @@ class Disturbances:
     def torque(self, engine: Backend, t: float, q: Floats, v: Floats) -> Floats:
         """Return the torque (nv,) of pushes in a step that began at `t`, minus that of friction with a slip
         speed."""
-        tau = np.zeros(len(v)) if self.sticks else -self.friction(v)
-        for push in self.pushes:
-            share = push.share(t, self._step)
-            if share:
-                J = engine.jacobian(q, push.frame, reference=push.reference)
-                tau = tau + J.T @ (share * np.asarray(push.wrench))
-        return tau
+        return self.added_to(np.zeros(len(v)), engine, t, q, v)
+
+    def added_to(self, tau: Floats, engine: Backend, t: float, q: Floats, v: Floats) -> Floats:
+        """Return the torque `tau` (nv,) plus `torque`."""
+        shares = ((push, push.share(t, self._step)) for push in self.pushes)
+        return with_disturbances(
+            tau,
+            self.friction(v) if self.friction.smooth else None,
+            (
+                (engine.jacobian(q, push.frame, reference=push.reference), share * np.asarray(push.wrench))
+                for push, share in shares
+                if share
+            ),
+        )
 
 
 class DisturbedAcceleration:
@@ -210,7 +218,7 @@ class DisturbedAcceleration:
         """Return `tau` plus the torque of pushes, minus that of friction with a slip speed (nv,)."""
         if not self._disturbances.has_torque:
             return tau
-        return tau + self._disturbances.torque(self._engine, t, q, v)
+        return self._disturbances.added_to(tau, self._engine, t, q, v)
 
 
 def _armature_matrix(model: Model, armature: Coefficients) -> Floats:

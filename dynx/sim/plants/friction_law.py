@@ -29,7 +29,7 @@ import numpy as np
 from dynx.model import Model
 from dynx.rbd.crba import mass_matrix
 from dynx.rbd.elimination import filled_entries
-from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.scalar import Array, Floats, sign
 
 TOLERANCE = 1e-10
 """Fraction of F by which the torque on a joint that sticks may exceed F, so that rounding does not decide."""
@@ -37,6 +37,13 @@ TOLERANCE = 1e-10
 CAUTION = 0.2
 """Fraction of the estimated torque to stop a joint that is believed. An overestimate makes joints change
 direction that should stop, and costs more solutions than an underestimate."""
+
+CORRECTIONS = 1
+"""Number of corrections of the modes in one call of a kernel; few steps need more."""
+
+MAX_CORRECTED_OPERATIONS = 1500
+"""Number of products in one solution above which a kernel has one solution only, because a second one takes
+longer to compile than it saves."""
 
 
 class FrictionStep(NamedTuple):
@@ -118,6 +125,28 @@ class FrictionLaw:
         arrays = [np.array(each, dtype=object) for each in (a, moves, torque[::-1], corrected[::-1])]
         return FrictionStep(arrays[0], arrays[1], arrays[2], arrays[3], changes)
 
+    def step(
+        self,
+        A: Array,
+        r: Array,
+        v: Array,
+        friction: Sequence[Any] | Array,
+        h: Any,
+        shift: Array,
+        one_by_one: Any,
+        inertia: Sequence[Any] | Array | None = None,
+    ) -> tuple[FrictionStep, FrictionStep, Array]:
+        """Solve the law with `CORRECTIONS` corrections of the modes, or none for a large robot.
+
+        The first modes are the signs of the velocities plus `shift` (n,). Returns the first and the last
+        solution, and the shift with which the step is repeated where the last one has `changes`.
+        """
+        start = sign(v[list(self.joints)])
+        found = first = self.solve(A, r, v, friction, h, start + shift, one_by_one, inertia)
+        for _ in range(CORRECTIONS if self.operations <= MAX_CORRECTED_OPERATIONS else 0):
+            found = self.solve(A, r, v, friction, h, found.modes, one_by_one, inertia)
+        return first, found, found.modes - start
+
     def accelerations(
         self, A: Array, rest: list[Any], moves: list[Any], given: list[Any]
     ) -> tuple[list[Any], list[Any]]:
@@ -149,6 +178,13 @@ class FrictionLaw:
             a[k] = rest[k] * inverse[k] + given[k]
             rest[k] = rest[k] - D[k] * a[k]
         return a[::-1], rest[::-1]
+
+
+def damped_equation(
+    M: Array, r: Array, v: Array, h: Any, damping: Array, armature: Array
+) -> tuple[Array, Array]:
+    """Return A (nv, nv) and r (nv,) of the law, from the mass matrix and the torque without damping."""
+    return M + np.diag(armature + h * damping), r - damping * v
 
 
 @lru_cache(maxsize=64)

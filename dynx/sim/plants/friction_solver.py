@@ -7,24 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from dynx.sim.plants.friction_law import TOLERANCE, FrictionLaw
+from dynx.sim.plants.friction_law import TOLERANCE, FrictionLaw, damped_equation
 from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.emit import Settings
 from dynx.simd.kernel import Kernel
 from dynx.simd.simplify import STRICT
 from dynx.simd.target import host
 from dynx.simd.trace import trace
-from dynx.spatial.scalar import Array, Floats, sign
+from dynx.spatial.scalar import Array, Floats
 
 MAX_COMPILED_OPERATIONS = 8000
 """Number of products in one solution above which NumPy takes less time than compilation is worth."""
-
-CORRECTIONS = 1
-"""Number of corrections of the modes in one call of a kernel; few steps need more."""
-
-MAX_CORRECTED_OPERATIONS = 1500
-"""Number of products in one solution above which a kernel has one solution only, because a second one takes
-longer to compile than it saves."""
 
 BLOCK_CORRECTIONS = 8
 """Number of solutions after which modes are corrected one at a time."""
@@ -130,8 +123,7 @@ class FrictionSolver:
     ) -> tuple[Floats, Floats]:
         """Return the acceleration (nv,) for given modes (n,), and what is left of the torque (nv,)."""
         joints, h = self._joints, self._h
-        A = M + np.diag(self._armature + h * self._damping)
-        rest = tau - bias - self._damping * v
+        A, rest = damped_equation(M, tau - bias, v, h, self._damping, self._armature)
         rest[joints] -= modes * self._friction
         stuck = np.zeros(len(v), dtype=bool)
         stuck[joints] = modes == 0.0
@@ -181,19 +173,15 @@ def _kernel(joints: tuple[int, ...], below: tuple[tuple[int, ...], ...]) -> Kern
     def step(**given: Array) -> dict[str, Array]:
         v, h, friction, single = given["v"], given["h"][0], given["friction"], given["one_by_one"][0]
         damping, armature = given["damping"], given["armature"]
-        A = given["M"] + np.diag(armature + h * damping)
-        r = given["tau"] - given["bias"] - damping * v
-        start = sign(v[rows])
-        found = first = law.solve(A, r, v, friction, h, start + given["shift"], single, given["inertia"])
-        for _ in range(CORRECTIONS if law.operations <= MAX_CORRECTED_OPERATIONS else 0):
-            found = law.solve(A, r, v, friction, h, found.modes, single, given["inertia"])
+        A, r = damped_equation(given["M"], given["tau"] - given["bias"], v, h, damping, armature)
+        first, found, next_shift = law.step(A, r, v, friction, h, given["shift"], single, given["inertia"])
         net = given["tau"] - damping * (v + h * found.a) - armature * found.a
         net[rows] = net[rows] - found.torque
         return {
             "motion": np.array([found.a, found.moves]),
             "torque": found.torque,
             "net_torque": net,
-            "next_shift": found.modes - start,
+            "next_shift": next_shift,
             "first_a": first.a,
             "unsettled": np.array([found.changes], dtype=object),
         }

@@ -14,6 +14,7 @@ from dynx.model import Model
 from dynx.model.loading import load
 from dynx.sim import simulate, simulate_batch
 from dynx.sim.batch import batch, kernel
+from dynx.sim.plants import friction_law
 from tests.backends.robots import mixed_robot
 from tests.oracles.closed_form import MODELS
 from tests.sim.batch.batches import assert_same, batch_and_one
@@ -131,7 +132,7 @@ def test_mimic_joints_and_bases(base: str) -> None:
 
 def test_bits_do_not_depend_on_the_neighbours(arm: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     """Steps are repeated for some rollouts, here for many because no mode is corrected in the kernel."""
-    monkeypatch.setattr(kernel, "CORRECTIONS", 0)
+    monkeypatch.setattr(friction_law, "CORRECTIONS", 0)
     monkeypatch.setattr(kernel, "_made", {})
     rng = np.random.default_rng(1)
     law = PD(arm, kp=5.0, kd=0.02)
