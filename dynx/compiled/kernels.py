@@ -14,12 +14,12 @@ so no result depends on earlier calls.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import fields, replace
 from functools import cache, partial
 from hashlib import sha256
 from math import prod
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -32,7 +32,6 @@ import dynx.model.configuration
 import dynx.model.mechanism
 import dynx.rbd
 import dynx.spatial
-from dynx._version import __version__
 from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.compiled import frames as compiled_frames
 from dynx.compiled.defect import argument_defect, result_defect
@@ -49,7 +48,7 @@ from dynx.rbd import coriolis
 from dynx.rbd.base_parameters import regroup_inertias
 from dynx.rbd.kinematics import Poses, ancestry, frame_placement
 from dynx.rbd.linear import solve_positive_definite
-from dynx.simd.cache import load_kernel, source_hash
+from dynx.simd.cache import load_kernel, source_version
 from dynx.simd.emit import Settings
 from dynx.simd.kernel import Kernel
 from dynx.simd.program import Program
@@ -232,8 +231,9 @@ def _program(mechanism: Mechanism, name: str, result: Computation, **more: tuple
 @cache
 def _algorithms() -> str:
     """Return the hash of the source of everything that is traced."""
-    folders = [Path(str(package.__file__)).parent for package in (dynx.rbd, dynx.spatial)]
-    modules = (
+    return source_version(
+        dynx.rbd,
+        dynx.spatial,
         dynx.model.configuration,
         dynx.model.mechanism,
         dynx.backends.quantities,
@@ -241,9 +241,8 @@ def _algorithms() -> str:
         dynx.compiled.model_coordinates,
         dynx.compiled.simplification,
         compiled_frames,
+        sys.modules[__name__],
     )
-    files = [Path(str(module.__file__)) for module in modules]
-    return f"{__version__} {np.__version__} {source_hash(*folders, *files, Path(__file__))}"
 
 
 def _fingerprint(mechanism: Mechanism) -> str:

@@ -6,7 +6,6 @@ import threading
 from collections.abc import Callable, Sequence
 from functools import cache
 from math import prod
-from pathlib import Path
 
 import numpy as np
 
@@ -15,11 +14,10 @@ import dynx.compiled
 import dynx.model
 import dynx.rbd
 import dynx.spatial
-from dynx._version import __version__
 from dynx.backends.evaluation import batch_rows, common_batch
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.model import Mechanism, Model
-from dynx.simd.cache import load_kernel, source_hash
+from dynx.simd.cache import load_kernel, source_version
 from dynx.simd.emit import Settings
 from dynx.simd.kernel import Kernel
 from dynx.simd.program import Program
@@ -83,6 +81,4 @@ class RobotKernels:
 @cache
 def _algorithms() -> str:
     """Return the hash of the source of the packages that build such programs."""
-    packages = (dynx.rbd, dynx.spatial, dynx.model, dynx.backends, dynx.compiled)
-    folders = [Path(str(package.__file__)).parent for package in packages]
-    return f"{__version__} {np.__version__} {source_hash(*folders)}"
+    return source_version(dynx.rbd, dynx.spatial, dynx.model, dynx.backends, dynx.compiled)

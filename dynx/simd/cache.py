@@ -21,10 +21,13 @@ from functools import cache
 from hashlib import sha256
 from itertools import accumulate, pairwise
 from pathlib import Path
+from types import ModuleType
 from typing import TypeVar
 
+import numpy as np
 import platformdirs
 
+from dynx._version import __version__
 from dynx.errors import ArgumentError, CompileError
 from dynx.files.reading import open_regular
 from dynx.files.writing import write_bytes
@@ -122,15 +125,24 @@ def _emitter_version() -> str:
     return source_hash(Path(__file__).parent)
 
 
+def source_version(*modules: ModuleType) -> str:
+    """Return the versions of dynx and NumPy, and the hash of the source text of modules.
+
+    A package counts with all its modules and the packages inside it. The text is a part of the recipe of what
+    these modules trace, so that no kernel of another source is used.
+    """
+    files = (Path(str(module.__file__)) for module in modules)
+    sources = (file.parent if file.name == "__init__.py" else file for file in files)
+    return f"{__version__} {np.__version__} {source_hash(*sources)}"
+
+
 def source_hash(*sources: Path) -> str:
-    """Return a hash of Python files and of the Python files directly inside folders."""
+    """Return a hash of Python files and of the Python files in folders and in the folders below them."""
     digest = sha256()
     for source in sources:
-        names = sorted(os.listdir(source)) if source.is_dir() else [""]
-        for name in names:
-            if name and not name.endswith(".py"):
-                continue
-            text = (source / name).read_bytes()
+        files = sorted(source.rglob("*.py")) if source.is_dir() else [source]
+        for file in files:
+            name, text = file.relative_to(source).as_posix(), file.read_bytes()
             digest.update(f"{name} {len(text)}\n".encode())
             digest.update(text)
     return digest.hexdigest()

@@ -206,6 +206,14 @@ SIMULATION_FAULTS = (
         test="test_joints_beyond_limits_are_struck_only_outwards",
     ),
     Fault(
+        "cached_kernels_of_packages_inside_outlive_their_source",
+        "dynx.simd.cache",
+        right='source.rglob("*.py")',
+        wrong='source.glob("*.py")',
+        test_file="tests/simd/test_cache.py",
+        test="test_the_source_of_a_package_includes_the_packages_inside_it",
+    ),
+    Fault(
         "batch_reuses_a_part_of_other_arguments",
         "dynx.sim.batch.store",
         right="arrays = (part.start, part.fixed, tuple(part.setpoints),",

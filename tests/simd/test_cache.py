@@ -8,14 +8,16 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import platformdirs
 import pytest
 
+import dynx
 from dynx.simd import cache
-from dynx.simd.cache import load_kernel, program_recipe
+from dynx.simd.cache import load_kernel, program_recipe, source_hash, source_version
 from dynx.simd.emit import Settings
 from dynx.simd.kernel import Kernel
 from dynx.simd.program import Program
@@ -87,6 +89,32 @@ def test_everything_that_determines_the_code_is_part_of_the_key(
         monkeypatch.setattr(cache, name, lambda: "another version")
         load_kernel(b"twice", made)
     assert made.times == len(loads) + 2 == len(files(folder))
+
+
+@pytest.mark.parametrize("place", ["here.py", "inside/there.py", "inside/deeper/there.py"])
+def test_the_source_of_a_package_includes_the_packages_inside_it(tmp_path: Path, place: str) -> None:
+    """A kernel of the old source must not be used when a file changes, wherever it lies."""
+    file = tmp_path / place
+    file.parent.mkdir(parents=True, exist_ok=True)
+    hashes = [source_hash(tmp_path)]
+    for text in ("x = 1\n", "x = 2\n"):
+        file.write_text(text, encoding="utf-8")
+        hashes.append(source_hash(tmp_path))
+    file.rename(file.with_name("other.py"))
+    hashes.append(source_hash(tmp_path))
+    assert len(set(hashes)) == 4
+    (tmp_path / "notes.txt").write_text("no source", encoding="utf-8")
+    assert source_hash(tmp_path) == hashes[-1]
+
+
+def test_the_version_of_a_source_names_modules_and_packages() -> None:
+    package, module = import_module("dynx.simd"), import_module("dynx.simd.iteration.kernel")
+    assert package.__file__
+    assert module.__file__
+    folder, file = Path(package.__file__).parent, Path(module.__file__)
+    assert source_version(package).endswith(f" {source_hash(folder)}")
+    assert source_version(package, module).endswith(f" {source_hash(folder, file)}")
+    assert source_version(package).startswith(f"{dynx.__version__} {np.__version__} ")
 
 
 def test_recipes_of_programs() -> None:

@@ -9,11 +9,11 @@ import numpy as np
 from dynx.compiled.looped.routines import (
     INERTIA,
     JOINT_KINDS,
-    MATRIX,
     MOTION,
     POSE,
     ROOT_MOTION,
     SCALAR,
+    UPPER,
     VECTOR,
     WRENCH,
     Inputs,
@@ -21,14 +21,18 @@ from dynx.compiled.looped.routines import (
     check_arguments,
     checking,
     compute_root_motion,
+    joint_state,
     kind,
     load_axes,
+    outward_inputs,
     pack_inertia,
+    pack_pose,
     read_arguments,
     reading,
     unpack_inertia,
     unpack_motion,
     unpack_pose,
+    unpack_symmetric,
 )
 from dynx.model.mechanism import Mechanism
 from dynx.rbd.aba import ArticulatedInertia, accelerate_joint, eliminate_joint
@@ -38,14 +42,12 @@ from dynx.rbd.placement import Placement, SpatialVector
 from dynx.rbd.rnea import Motion, add_spatial, body_wrench, child_motion
 from dynx.simd.call_table import CallTable
 from dynx.simd.routines import Routine, RoutineSet
-from dynx.spatial.inertia import symmetric_from_upper
 from dynx.spatial.scalar import Array
 
 A, DEFECT = 3, 4
 """Numbers of the results, after those of q, v and tau."""
 
 _ARTICULATED, _SPATIAL = (21,), (6,)
-_UPPER = np.triu_indices(3)
 
 
 def routines() -> RoutineSet:
@@ -79,14 +81,7 @@ def routines() -> RoutineSet:
     for name, revolute, axis in JOINT_KINDS:
         found[f"outward {name}"] = Routine.of(
             _outward(revolute=revolute),
-            {
-                "R": ("constants", MATRIX),
-                "p": ("constants", VECTOR),
-                "q": ("vectors", SCALAR),
-                "v": ("vectors", SCALAR),
-                "parent": ("vectors", VECTOR),
-                **axis,
-            },
+            outward_inputs(VECTOR, "v", axis, inertia=False),
             {"pose": "vectors", "omega": "vectors", "velocity_product": "vectors"},
         )
         found[f"inward {name}"] = Routine.of(
@@ -131,7 +126,7 @@ def call_table(mechanism: Mechanism, routines: RoutineSet) -> CallTable:
     for index, body in enumerate(bodies):
         places = calls.reserve(12), calls.reserve(3), calls.reserve(6)
         numbers = calls.constants(body.R), calls.constants(body.p)
-        state = q + mechanism.nq - len(bodies) + index, v + base + index
+        state = joint_state(mechanism, index, q, v)
         calls.call(f"outward {kind(body)}", *numbers, *state, omegas[body.parent + 1], *axes[index], *places)
         poses.append(places[0])
         omegas.append(places[1])
@@ -170,7 +165,7 @@ def _outward(*, revolute: bool) -> Callable[..., dict[str, Array]]:
         placement = Placement.of(body, q)
         motion = child_motion(body, placement, Motion(parent, still, still), v, np.asarray(0.0))
         return {
-            "pose": np.concatenate([placement.R.ravel(), placement.p]),
+            "pose": pack_pose(placement),
             "omega": motion.omega,
             "velocity_product": np.concatenate([motion.proper_acceleration, motion.alpha]),
         }
@@ -235,13 +230,9 @@ def _split(packed: Array) -> SpatialVector:
 
 
 def _pack(inertia: ArticulatedInertia) -> Array:
-    return np.concatenate([inertia.M[_UPPER], inertia.C.ravel(), inertia.J[_UPPER]])
+    return np.concatenate([inertia.M[UPPER], inertia.C.ravel(), inertia.J[UPPER]])
 
 
 def _unpack(packed: Array) -> ArticulatedInertia:
-    def symmetric(upper: Array) -> Array:
-        full = np.zeros((3, 3), dtype=packed.dtype)
-        full[_UPPER] = upper
-        return symmetric_from_upper(full)
-
-    return ArticulatedInertia(symmetric(packed[:6]), packed[6:15].reshape(3, 3), symmetric(packed[15:]))
+    M, J = unpack_symmetric(packed[:6]), unpack_symmetric(packed[15:])
+    return ArticulatedInertia(M, packed[6:15].reshape(3, 3), J)

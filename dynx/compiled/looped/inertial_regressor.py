@@ -15,6 +15,7 @@ from dynx.compiled.looped.routines import (
     body_like,
     check_arguments,
     checking,
+    joint_state,
     kind,
     load_axes,
     read_arguments,
@@ -93,7 +94,7 @@ def call_table(mechanism: Mechanism, routines: RoutineSet, frames: Sequence[int]
         calls.call("world", calls.constants(np.zeros(3)), states[0])
     for index, body in enumerate(bodies):
         states.append(calls.reserve(24))
-        values = q + mechanism.nq - len(bodies) + index, v + base + index, a + base + index
+        values = joint_state(mechanism, index, q, v, a)
         pose = calls.constants(body.R), calls.constants(body.p)
         calls.call(
             f"outward {kind(body)}", *pose, *values, states[body.parent + 1], *axes[index], states[index + 1]

@@ -9,21 +9,21 @@ import numpy as np
 from dynx.compiled.looped.routines import (
     INERTIA,
     JOINT_KINDS,
-    MATRIX,
     MOTION,
     POSE,
     ROOT_MOTION,
-    SCALAR,
-    VECTOR,
     WRENCH,
     body_like,
     check_arguments,
     checking,
     compute_root_motion,
+    joint_state,
     kind,
     load_axes,
+    outward_inputs,
     pack_inertia,
     pack_motion,
+    pack_pose,
     read_arguments,
     reading,
     unpack_inertia,
@@ -56,16 +56,7 @@ def routines(n_inputs: int) -> RoutineSet:
     for name, revolute, axis in JOINT_KINDS:
         found[f"outward {name}"] = Routine.of(
             _outward(revolute=revolute),
-            {
-                "R": ("constants", MATRIX),
-                "p": ("constants", VECTOR),
-                "inertia": ("constants", INERTIA),
-                "q": ("vectors", SCALAR),
-                "v": ("vectors", SCALAR),
-                "a": ("vectors", SCALAR),
-                "parent": ("vectors", MOTION),
-                **axis,
-            },
+            outward_inputs(MOTION, "va", axis, inertia=True),
             {"pose": "vectors", "motion": "vectors", "wrench": "vectors"},
         )
         found[f"inward {name}"] = Routine.of(
@@ -95,7 +86,7 @@ def call_table(mechanism: Mechanism, routines: RoutineSet) -> CallTable:
     axes = load_axes(calls, bodies)
     for index, body in enumerate(bodies):
         numbers = [calls.constants(x) for x in (body.R, body.p, pack_inertia(body.inertia))]
-        state = q + mechanism.nq - len(bodies) + index, v[base + index], a[base + index]
+        state = *joint_state(mechanism, index, q), v[base + index], a[base + index]
         places = calls.reserve(12), calls.reserve(9), calls.reserve(6)
         calls.call(f"outward {kind(body)}", *numbers, *state, motions[body.parent + 1], *axes[index], *places)
         poses.append(places[0])
@@ -124,8 +115,7 @@ def _outward(*, revolute: bool) -> Callable[..., dict[str, Array]]:
         body = body_like(revolute, R, p, axis)
         placement = Placement.of(body, q)
         motion = pack_motion(child_motion(body, placement, unpack_motion(parent), v, a))
-        pose = np.concatenate([placement.R.ravel(), placement.p])
-        return {"pose": pose, "motion": motion, "wrench": _wrench(inertia, motion)}
+        return {"pose": pack_pose(placement), "motion": motion, "wrench": _wrench(inertia, motion)}
 
     return outward
 

@@ -7,15 +7,16 @@ from collections.abc import Callable
 import numpy as np
 
 from dynx.compiled.looped.routines import (
+    FLOATING_ROOT,
     INERTIA,
     JOINT_KINDS,
-    MATRIX,
-    SCALAR,
     VECTOR,
     Inputs,
     body_like,
+    joint_state,
     kind,
     load_axes,
+    outward_inputs,
     pack_inertia,
     read_arguments,
     reading,
@@ -64,12 +65,7 @@ def routines() -> RoutineSet:
         ),
         "floating root": Routine.of(
             _floating_root,
-            {
-                "gravity": ("constants", VECTOR),
-                "q": ("vectors", (7,)),
-                "v": ("vectors", (6,)),
-                "a": ("vectors", (6,)),
-            },
+            FLOATING_ROOT,
             {"motion": "vectors", "base": "vectors"},
         ),
         "root": Routine.of(
@@ -105,14 +101,7 @@ def routines() -> RoutineSet:
     for name, revolute, axis in JOINT_KINDS:
         found[f"outward {name}"] = Routine.of(
             _outward(revolute=revolute),
-            {
-                "R": ("constants", MATRIX),
-                "p": ("constants", VECTOR),
-                "inertia": ("constants", INERTIA),
-                **dict.fromkeys(("q", "v", "a"), ("vectors", SCALAR)),
-                "parent": ("vectors", _MOTION),
-                **axis,
-            },
+            outward_inputs(_MOTION, "va", axis, inertia=True),
             {"motion": "vectors", "joint": "vectors", "subtree": "vectors"},
         )
     return RoutineSet(found, 6, cleared=MATRICES)
@@ -134,7 +123,7 @@ def call_table(mechanism: Mechanism, routines: RoutineSet) -> CallTable:
     joints, axes = [], load_axes(calls, bodies)
     for index, body in enumerate(bodies):
         numbers = [calls.constants(x) for x in (body.R, body.p, pack_inertia(body.inertia))]
-        state = q + mechanism.nq - len(bodies) + index, v + first + index, a + first + index
+        state = joint_state(mechanism, index, q, v, a)
         places = calls.reserve(24), calls.reserve(18), calls.reserve(28)
         calls.call(f"outward {kind(body)}", *numbers, *state, motions[body.parent + 1], *axes[index], *places)
         motions.append(places[0])

@@ -8,17 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache, partial
-from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
 import dynx.compiled.defect
+import dynx.compiled.looped
 import dynx.model.configuration
 import dynx.model.mechanism
 import dynx.rbd
 import dynx.spatial
-from dynx._version import __version__
 from dynx.backends.quantities import QUANTITIES
 from dynx.compiled.looped import (
     coriolis_matrix,
@@ -30,7 +27,7 @@ from dynx.compiled.looped import (
 )
 from dynx.compiled.model_coordinates import argument_shapes
 from dynx.model import Mechanism
-from dynx.simd.cache import load_routines, source_hash
+from dynx.simd.cache import load_routines, source_version
 from dynx.simd.call_table import CallTable, RoutineCode, TableKernel
 from dynx.simd.program import Port
 from dynx.simd.routines import RoutineSet
@@ -94,7 +91,5 @@ def _code(name: str) -> tuple[RoutineSet, RoutineCode]:
 @cache
 def _algorithms() -> str:
     """Return the hash of the source of everything that is traced."""
-    folders = [Path(str(package.__file__)).parent for package in (dynx.rbd, dynx.spatial)]
     modules = (dynx.model.configuration, dynx.model.mechanism, dynx.compiled.defect)
-    files = [Path(str(module.__file__)) for module in modules]
-    return f"{__version__} {np.__version__} {source_hash(*folders, *files, Path(__file__).parent)}"
+    return source_version(dynx.rbd, dynx.spatial, dynx.compiled.looped, *modules)

@@ -33,26 +33,55 @@ JOINT_KINDS: tuple[tuple[str, bool, Inputs], ...] = (
 """Types of joints by which routines are named: the name, whether it is revolute, and the input for its axis,
 which is z for revolute joints."""
 
-_UPPER = np.triu_indices(3)
+UPPER = np.triu_indices(3)
+"""Rows and columns of the upper triangle of a matrix (3, 3)."""
+
+_MASSLESS = RigidInertia(np.asarray(0.0), np.zeros(3), np.zeros((3, 3)))
+
+
+def outward_inputs(parent: tuple[int, ...], rates: str, axis: Inputs, *, inertia: bool) -> Inputs:
+    """Return the inputs of a routine that continues motion from the body's parent, of that shape.
+
+    They are the body's numbers, with its `inertia` or without, and the state of its joint: its position and
+    the `rates` v, a.
+    """
+    return {
+        "R": ("constants", MATRIX),
+        "p": ("constants", VECTOR),
+        **({"inertia": ("constants", INERTIA)} if inertia else {}),
+        **dict.fromkeys(("q", *rates), ("vectors", SCALAR)),
+        "parent": ("vectors", parent),
+        **axis,
+    }
+
+
+def joint_state(mechanism: Mechanism, index: int, q: int, *rates: int) -> tuple[int, ...]:
+    """Return the places of a joint's position and rates, from those of q and of vectors of nv."""
+    n = len(mechanism.bodies)
+    return (q + mechanism.nq - n + index, *(place + mechanism.nv - n + index for place in rates))
+
+
+def unpack_symmetric(upper: Array) -> Array:
+    """Return the symmetric matrix (3, 3) with this upper triangle (6,)."""
+    full = np.zeros((3, 3), dtype=upper.dtype)
+    full[UPPER] = upper
+    return symmetric_from_upper(full)
 
 
 def pack_inertia(inertia: RigidInertia) -> Array:
     """Return the ten parameters (10,) of an inertia."""
-    tensor = [inertia.rotational_inertia[i, j] for i, j in zip(*_UPPER, strict=True)]
+    tensor = [inertia.rotational_inertia[i, j] for i, j in zip(*UPPER, strict=True)]
     return np.array([np.asarray(inertia.mass)[()], *inertia.first_moment, *tensor])
 
 
 def unpack_inertia(packed: Array) -> RigidInertia:
     """Return the inertia with ten parameters (10,)."""
-    tensor = np.zeros((3, 3), dtype=packed.dtype)
-    tensor[_UPPER] = packed[4:]
-    return RigidInertia(np.asarray(packed[0]), packed[1:4], symmetric_from_upper(tensor))
+    return RigidInertia(np.asarray(packed[0]), packed[1:4], unpack_symmetric(packed[4:]))
 
 
 def body_like(revolute: bool, R: Array, p: Array, axis: Array) -> Body:
     """Return a body with these numbers, for the algorithms that take one."""
-    massless = RigidInertia(np.asarray(0.0), np.zeros(3), np.zeros((3, 3)))
-    return Body("", ROOT, revolute, R, p, Z_AXIS if revolute else axis, massless)
+    return Body("", ROOT, revolute, R, p, Z_AXIS if revolute else axis, _MASSLESS)
 
 
 def at(R: Array, p: Array) -> Placement:
@@ -87,8 +116,7 @@ def read_arguments(table: CallTable, mechanism: Mechanism, n: int) -> list[tuple
 
 def _place_body(*, revolute: bool) -> Routine:
     def pose(R: Array, p: Array, axis: Array, q: Array) -> dict[str, Array]:
-        placement = Placement.of(body_like(revolute, R, p, axis), q)
-        return {"pose": np.concatenate([placement.R.ravel(), placement.p])}
+        return {"pose": pack_pose(Placement.of(body_like(revolute, R, p, axis), q))}
 
     inputs: Inputs = {
         "R": ("constants", MATRIX),
@@ -101,6 +129,11 @@ def _place_body(*, revolute: bool) -> Routine:
 
 POSE = (12,)
 """Shape of a rotation and a position."""
+
+
+def pack_pose(placement: Placement) -> Array:
+    """Return a rotation and a position (12,)."""
+    return np.concatenate([placement.R.ravel(), placement.p])
 
 
 def unpack_pose(pose: Array) -> Placement:
@@ -128,11 +161,10 @@ def place_bodies(table: CallTable, mechanism: Mechanism, q: int, *, size: int = 
     `size` vectors are reserved at each place, of which a pose takes 12.
     """
     places = []
-    first = mechanism.nq - len(mechanism.bodies)
     for index, body in enumerate(mechanism.bodies):
         pose = table.reserve(size)
         R, p, axis = (table.constants(x) for x in (body.R, body.p, body.axis))
-        table.call(f"place {kind(body)}", R, p, axis, q + first + index, pose)
+        table.call(f"place {kind(body)}", R, p, axis, *joint_state(mechanism, index, q), pose)
         places.append(pose)
     return places
 
@@ -215,8 +247,7 @@ def unpack_motion(packed: Array) -> Motion:
 
 def _root_motion(*, floating: bool) -> Callable[..., dict[str, Array]]:
     def motion(gravity: Array, **state: Array) -> dict[str, Array]:
-        massless = RigidInertia(np.asarray(0.0), np.zeros(3), np.zeros((3, 3)))
-        root = Mechanism("", floating, gravity, massless, (), (), None)
+        root = Mechanism("", floating, gravity, _MASSLESS, (), (), None)
         none = np.zeros(0)
         found = root_motion(root, state.get("q", none), state.get("v", none), state.get("a", none))
         return {"motion": pack_motion(found)}
@@ -224,20 +255,19 @@ def _root_motion(*, floating: bool) -> Callable[..., dict[str, Array]]:
     return motion
 
 
+FLOATING_ROOT: Inputs = {
+    "gravity": ("constants", VECTOR),
+    "q": ("vectors", (7,)),
+    "v": ("vectors", (6,)),
+    "a": ("vectors", (6,)),
+}
+"""Inputs of a routine that computes the motion of a floating root."""
+
 ROOT_MOTION = {
     "fixed root": Routine.of(
         _root_motion(floating=False), {"gravity": ("constants", VECTOR)}, {"motion": "vectors"}
     ),
-    "floating root": Routine.of(
-        _root_motion(floating=True),
-        {
-            "gravity": ("constants", VECTOR),
-            "q": ("vectors", (7,)),
-            "v": ("vectors", (6,)),
-            "a": ("vectors", (6,)),
-        },
-        {"motion": "vectors"},
-    ),
+    "floating root": Routine.of(_root_motion(floating=True), FLOATING_ROOT, {"motion": "vectors"}),
     "zeros": Routine.of(lambda: {"x": np.zeros(6)}, {}, {"x": "vectors"}),
 }
 """Routines that compute the motion of the root, from which gravity is subtracted, and six zeros."""
