@@ -8,7 +8,7 @@ import pytest
 import dynx
 from dynx.backends import backend
 from dynx.spatial.scalar import Floats
-from dynx.world import Material, PositionMotor, Scene, SceneRobot, World, box, ground
+from dynx.world import Material, PositionMotor, Scene, SceneRobot, World, box, ground, read_scene
 from tests.world.engines import WORLDS
 
 DT = 2e-3
@@ -53,3 +53,14 @@ def test_panda_picks_up_a_cube_lifts_it_by_ten_centimetres_and_holds_it(engine: 
             assert pose[2, 2] > 0.999
             fingers = {name for each in world.contacts("cube") for name in (each.a, each.b)} - {"cube"}
             assert fingers == {"arm/panda_leftfinger", "arm/panda_rightfinger"}
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+def test_the_gripper_of_the_scene_lifting_picks_up_its_cube(engine: str) -> None:
+    with World(read_scene("lifting"), engine, DT) as world:
+        world.run(2.5)
+        pose = world.state.bodies["cube"].T_world_body
+        assert 0.09 < pose[2, 3] < 0.13
+        assert pose[2, 2] > 0.999
+        fingers = {name for each in world.contacts("cube") for name in (each.a, each.b)} - {"cube"}
+        assert fingers == {"arm/panda_leftfinger", "arm/panda_rightfinger"}

@@ -110,7 +110,7 @@ def test_a_file_gives_an_equal_scene(suffix: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", scene_names())
 def test_the_scenes_of_dynx_are_read_and_written(name: str, tmp_path: Path) -> None:
-    if name in ("pushing", "standing"):
+    if name in ("lifting", "pushing", "standing"):
         require_robots()
     if name in ("duck", "rolling"):
         pytest.importorskip("pybullet_data")

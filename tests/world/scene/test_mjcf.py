@@ -62,7 +62,7 @@ def chain(*links: str, joint: str = "", kind: str = "revolute", base: Any = "fix
 
 @pytest.mark.parametrize("name", scene_names())
 def test_the_scenes_of_dynx_load_in_mujoco(name: str) -> None:
-    if name in ("pushing", "standing"):
+    if name in ("lifting", "pushing", "standing"):
         require_robots()
     if name in ("duck", "rolling"):
         pytest.importorskip("pybullet_data")
