@@ -184,9 +184,19 @@ def test_clearance_is_a_lower_bound() -> None:
             assert clearance(memory.heights, q.tolist(), 0.4) <= near + 1e-9
 
 
-def test_gravity_has_the_bounds_of_gymnasium() -> None:
-    with pytest.raises(ArgumentError, match="between -12 and 0"):
-        LunarLander(gravity=1.0)
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"gravity": 1.0}, "between -12 and 0"),
+        ({"gravity": "-10"}, "between -12 and 0"),
+        ({"continuous": 1}, "continuous is '1'; wanted a bool"),
+        ({"wind_power": -1.0}, "wind_power is '-1.0'; wanted a number of at least 0"),
+        ({"turbulence_power": math.nan}, "turbulence_power is 'nan'"),
+    ],
+)
+def test_wrong_options_are_refused(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(ArgumentError, match=message):
+        LunarLander(**options)
 
 
 def test_pictures_show_lander_and_ground() -> None:

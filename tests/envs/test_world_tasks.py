@@ -124,10 +124,15 @@ def test_wrong_options_are_refused() -> None:
     with TaskEnvironment(Push(), ENGINES[0]) as env:
         with pytest.raises(ArgumentError, match="goal is"):
             env.reset(options={"goal": (3.0, 0.0)})
+        with pytest.raises(ArgumentError, match="where the fingers are"):
+            env.reset(options={"cube": (0.35, 0.0)})
         with pytest.raises(UnknownNameError, match="'goal'"):
             env.reset(options={"gaol": (0.5, 0.0)})
-    with TaskEnvironment(Walk(), ENGINES[0]) as env, pytest.raises(ArgumentError, match="three numbers"):
-        env.reset(options={"velocity": (1.0, np.nan, 0.0)})
+    with TaskEnvironment(Walk(), ENGINES[0]) as env:
+        with pytest.raises(ArgumentError, match="three numbers"):
+            env.reset(options={"velocity": (1.0, np.nan, 0.0)})
+        with pytest.raises(ArgumentError, match="disturbance is 'big'; wanted a number from 0 to 5"):
+            env.reset(options={"disturbance": "big"})
 
 
 def test_a_task_is_a_world_task() -> None:

@@ -82,8 +82,7 @@ class Push(WorldTask):
     def __post_init__(self) -> None:
         if self.reward_kind not in REWARDS:
             raise ArgumentError(
-                f"reward_kind is {shown(self.reward_kind)}; wanted {' or '.join(REWARDS)}"
-                f"{nearest(str(self.reward_kind), REWARDS)}"
+                f"reward_kind is {shown(self.reward_kind)}{nearest(str(self.reward_kind), REWARDS)}"
             )
 
     @cached_property
@@ -112,7 +111,8 @@ class Push(WorldTask):
         Of the arm, the hand alone collides: the rest does not reach the table within the workspace.
         """
         material = Material(friction=FRICTION)
-        cube = box(CUBE, (SIZE,) * 3, mass=MASS, pose=Pose((0.5, 0.0, SIZE / 2)), material=material)
+        paint = Material(friction=FRICTION, rgba=(0.1, 0.3, 0.8, 1.0))
+        cube = box(CUBE, (SIZE,) * 3, mass=MASS, pose=Pose((0.5, 0.0, SIZE / 2)), material=paint)
         arm = SceneRobot(ARM, self.model, q=START, material=material)
         passive = [f"{ARM}/{link.name}" for link in self.model.links if link.name not in HAND]
         groups = {"passive": passive, "others": [CUBE, TABLE]}
@@ -126,7 +126,10 @@ class Push(WorldTask):
         aim = rng.uniform(*GOAL_AREA)
         while np.hypot(*(aim - place)) < LEAST_DISTANCE:
             aim = rng.uniform(*GOAL_AREA)
-        place = place if cube is None else checked_place("cube", cube)
+        if cube is not None:
+            place = checked_place("cube", cube)
+            if np.hypot(*(place - TIP_START[:2])) < SIZE:
+                raise ArgumentError(f"cube is {shown(cube)}, where the fingers are: {TIP_START[:2]}")
         aim = aim if goal is None else checked_place("goal", goal)
         memory.goal = np.array([*aim, SIZE / 2])
         memory.tip = np.array(TIP_START)
@@ -176,7 +179,7 @@ class Push(WorldTask):
     @cached_property
     def camera(self) -> Camera:
         """A camera in front of the table."""
-        return Camera.look_at((1.4, -0.9, 0.8), (0.4, 0.0, 0.15))
+        return Camera.look_at((1.1, -0.7, 0.6), (0.4, 0.0, 0.15))
 
 
 def checked_place(name: str, place: ArrayLike) -> Floats:

@@ -20,6 +20,7 @@ from dynx.envs.world.scene_task import Episode
 from dynx.envs.world.task import WorldTask
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
+from dynx.model.configuration import MAX_MAGNITUDE, is_real
 from dynx.model.loading import load
 from dynx.model.rotations import quat_from_rpy
 from dynx.spatial.scalar import Floats
@@ -38,6 +39,8 @@ KP, KD, MAX_TORQUE = 60.0, 2.0, 33.5
 LEAST_HEIGHT, LEAST_UPRIGHT = 0.16, 0.6
 """Height of the trunk [m], and cosine of its angle from the vertical, below which an episode ends."""
 FRICTION = 0.8
+MAX_DISTURBANCE = 5.0
+"""Largest disturbance of the start, in units of the usual one."""
 LARGEST = 100.0
 """Bound of the numbers of an observation."""
 SPEED_WIDTH = 0.25
@@ -89,6 +92,10 @@ class Stand(WorldTask):
 
     def start(self, episode: Episode, disturbance: float = 1.0) -> None:
         """Tilt, turn and push the trunk, and bend the legs, at random in proportion to `disturbance`."""
+        if not is_real(disturbance) or not 0.0 <= disturbance <= MAX_DISTURBANCE:
+            raise ArgumentError(
+                f"disturbance is {shown(disturbance)}; wanted a number from 0 to {MAX_DISTURBANCE:g}"
+            )
         rng, memory = episode.rng, episode.memory
         rpy = disturbance * rng.uniform(-0.1, 0.1, 3)
         height = START_HEIGHT + disturbance * rng.uniform(0.03, 0.06)
@@ -161,7 +168,7 @@ class Walk(Stand):
     def __post_init__(self) -> None:
         for name in ("max_speed", "max_yaw_rate"):
             number = getattr(self, name)
-            if isinstance(number, bool) or not isinstance(number, int | float) or not 0.0 <= number < np.inf:
+            if not is_real(number) or not 0.0 <= number < MAX_MAGNITUDE:
                 raise ArgumentError(f"{name} is {shown(number)}; wanted a number of at least 0")
 
     @property

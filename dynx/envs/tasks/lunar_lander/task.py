@@ -47,6 +47,7 @@ from dynx.envs.tasks.lunar_lander.thrust import (
 from dynx.envs.world.scene_task import Episode
 from dynx.envs.world.task import WorldTask
 from dynx.errors import ArgumentError, shown
+from dynx.model.configuration import MAX_MAGNITUDE, is_real
 from dynx.world import Camera, Scene
 
 FPS = 50
@@ -96,10 +97,17 @@ class LunarLander(WorldTask):
     reward_threshold = 200.0
 
     def __post_init__(self) -> None:
-        if not -12.0 < self.gravity < 0.0:
+        for name in ("continuous", "enable_wind"):
+            if not isinstance(getattr(self, name), bool):
+                raise ArgumentError(f"{name} is {shown(getattr(self, name))}; wanted a bool")
+        if not is_real(self.gravity) or not -12.0 < self.gravity < 0.0:
             raise ArgumentError(
                 f"gravity is {shown(self.gravity)}; wanted a number between -12 and 0 [m/s^2]"
             )
+        for name, unit in (("wind_power", "N"), ("turbulence_power", "N m")):
+            power = getattr(self, name)
+            if not is_real(power) or not 0.0 <= power < MAX_MAGNITUDE:
+                raise ArgumentError(f"{name} is {shown(power)}; wanted a number of at least 0 [{unit}]")
 
     @cached_property
     def observation_space(self) -> spaces.Box:
