@@ -107,15 +107,21 @@ def measure(name: str, count: int, toolbox: bool) -> None:
         )
         far = targets[:1000].copy()
         far[:, :3, 3] *= 1.0 + 10.0 / np.linalg.norm(far[:, :3, 3], axis=-1, keepdims=True)
-        begin = time.perf_counter()
-        none = verified(model, other, arm.frame, far, engine.inverse_kinematics(far, arm.frame))
-        seconds = time.perf_counter() - begin
+        nothing = engine.inverse_kinematics(far, arm.frame)
+        none, proved = (
+            verified(model, other, arm.frame, far, nothing),
+            (nothing.status == "UNREACHABLE").mean(),
+        )
+        of_far = shortest(partial(engine.inverse_kinematics, far, arm.frame), clock=time.process_time) / len(
+            far
+        )
+        one_far = np.median([shortest(partial(engine.inverse_kinematics, T, arm.frame)) for T in far[:200]])
         edges = edge_targets(engine, arm.frame, count // 10, rng)
         at_edges = verified(model, other, arm.frame, edges, engine.inverse_kinematics(edges, arm.frame))
         limits, zeros = at_edges[: count // 10].mean(), at_edges[count // 10 :].mean()
         print(
-            f"{'':10} out of reach: {none.sum()} of {len(far)} solved, {1e6 * seconds / len(far):.0f} us "
-            f"each; at limits {limits:.2%}, joints at zero {zeros:.2%}"
+            f"{'':10} out of reach: {none.sum()} of {len(far)} solved, {proved:.1%} proved, batch "
+            f"{of_far:.1f} us, single {one_far:.0f} us; at limits {limits:.2%}, joints at zero {zeros:.2%}"
         )
         if toolbox:
             solve = toolbox_solver(model, arm.frame)

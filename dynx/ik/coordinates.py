@@ -70,6 +70,9 @@ class FrameCoordinates:
         """Lower bounds of the search."""
         self.upper: list[float] = [math.inf] * offset + upper
         """Upper bounds of the search."""
+        limited = np.isfinite(self._low) & np.isfinite(self._high)
+        self._span = self._high - self._low if limited.all() else None
+        self._is_all = self.indices == list(range(model.nq))
         self._default_range = np.array([_DEFAULT_RANGE.get(joint.type, math.pi) for joint in kinds])
 
     def limits(self, k: int) -> tuple[float, float]:
@@ -88,11 +91,13 @@ class FrameCoordinates:
 
     def values(self, q: Floats) -> list[float]:
         """Return the coordinates at configuration q (nq,)."""
-        joints: list[float] = q[self._in_q].tolist()
+        joints: list[float] = q.tolist() if self._is_all else q[self._in_q].tolist()
         return [0.0] * 6 + joints if self._base else joints
 
     def with_values(self, q: Floats, to: list[float]) -> Floats:
         """Return the configuration q (nq,) with these coordinates set to `to`."""
+        if self._is_all:
+            return np.array(to)
         if self._base:
             v = np.zeros(self._model.nv)
             v[:6] = to[:6]
@@ -122,10 +127,13 @@ class FrameCoordinates:
 
         A joint without limits is drawn from within pi [rad] or 1 m of its value in q0.
         """
+        drawn: Floats = q0.copy()
+        if self._span is not None:
+            drawn[self._in_q] = self._low + self._span * rng.random(len(self._low))
+            return drawn
         current, default = q0[self._in_q], self._default_range
         low = np.where(np.isfinite(self._low), self._low, np.minimum(current, self._high) - default)
         high = np.where(np.isfinite(self._high), self._high, np.maximum(current, self._low) + default)
-        drawn: Floats = q0.copy()
         drawn[self._in_q] = low + (high - low) * rng.random(len(low))
         return drawn
 

@@ -9,6 +9,7 @@ with all coordinates free, so a coordinate leaves its bound as soon as that redu
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import gt
 
 import numpy as np
 
@@ -36,6 +37,8 @@ class BoundedStep:
         residual = np.array(error)
         displacement = self._displacement(J, residual, damping).tolist()
         y = [a + b for a, b in zip(x, displacement, strict=True)]
+        if not any(map(gt, self._lower, y)) and not any(map(gt, y, self._upper)):
+            return y
         fixed: dict[int, float] = {}
         while True:
             violated = {
@@ -57,7 +60,8 @@ class BoundedStep:
         # Solve the smaller of two equivalent systems: J'(J J' + d)^-1 e = (J'J + d)^-1 J'e.
         m, n = J.shape
         if m <= n:
-            return np.asarray(self._solve(J.dot(J.T), error, damping).dot(J))
+            displacement: Floats = self._solve(J.dot(J.T), error, damping).dot(J)
+            return displacement
         return self._solve(J.T.dot(J), error.dot(J), damping)
 
     def _solve(self, A: Floats, b: Floats, damping: float) -> Floats:
@@ -67,4 +71,5 @@ class BoundedStep:
         if not_definite:
             diagonal += _RELATIVE_RIDGE * float(diagonal.max())
             _, solution, not_definite = self._dposv(A, b)
-        return np.zeros_like(b) if not_definite else np.asarray(solution)
+        found: Floats = np.zeros_like(b) if not_definite else solution
+        return found

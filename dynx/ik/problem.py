@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,11 +79,18 @@ class Problem:
     def starts(self) -> Floats:
         """Return the starts (count, nq) of all samples."""
         q0 = self.q0
+        if not self.batch:
+            return q0[None]
         return np.broadcast_to(q0, (*self.batch, q0.shape[-1])).reshape(self.count, q0.shape[-1])
 
     def tasks(self, kinematics: Kinematics) -> Iterator[tuple[int, Task]]:
         """Yield the index of each sample, and what it has to reach."""
-        rows = [requirement.targets.rows(self.batch) for requirement in self.requirements]
+        rows: list[Iterable[tuple[Floats | None, Floats | None]]]
+        if self.batch:
+            rows = [requirement.targets.rows(self.batch) for requirement in self.requirements]
+        else:
+            targets = [requirement.targets for requirement in self.requirements]
+            rows = [((each.positions, each.rotations),) for each in targets]
         for k, sample in enumerate(zip(*rows, strict=True)):
             tasks: list[Task] = []
             for requirement, (position, rotation) in zip(self.requirements, sample, strict=True):

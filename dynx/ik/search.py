@@ -110,20 +110,25 @@ class Search:
 
     def descend(self, q: Floats, task: Task) -> tuple[Floats, int]:
         """Descend from one start; return (the best configuration found, the number of steps)."""
+        error_at, jacobian_at = task.error, task.jacobian
+        coordinates, max_iterations = self._coordinates, self._limits.max_iterations
         best, least = q, float("inf")
         recent: deque[float] = deque(maxlen=WINDOW)
-        for steps in range(self._limits.max_iterations + 1):
-            error = task.error(q)
+        for steps in range(max_iterations + 1):
+            error = error_at(q)
             if error.reached:
                 return q, steps
-            squared_error = _half_square(error.vector)
+            vector = error.vector
+            squared_error = 0.5 * sum([x * x for x in vector])
             if squared_error < least:
                 best, least = q, squared_error
             stagnant = len(recent) == WINDOW and squared_error > REQUIRED_REDUCTION * recent[0]
-            if stagnant or steps == self._limits.max_iterations:
+            if stagnant or steps == max_iterations:
                 break
             recent.append(squared_error)
-            q = self._step_from(q, task, error, DAMPING * squared_error + MIN_DAMPING)
+            damping = DAMPING * squared_error + MIN_DAMPING
+            y = self._step(jacobian_at(q, error), vector, coordinates.values(q), damping)
+            q = coordinates.with_values(q, y)
         return best, steps
 
     def _refine(self, q: Floats, task: Task) -> tuple[Floats, int]:

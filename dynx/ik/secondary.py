@@ -57,7 +57,7 @@ class Secondary:
             return lambda q: -_log_manipulability(task, q)
         low, high = coordinates.joint_limits
         bounded = np.isfinite(low) & np.isfinite(high)
-        middle, half = 0.5 * (low + high)[bounded], 0.5 * (high - low)[bounded]
+        middle, half = 0.5 * (low[bounded] + high[bounded]), 0.5 * (high[bounded] - low[bounded])
 
         def distance_from_middle(q: Floats) -> float:
             share = (coordinates.joint_values(q)[bounded] - middle) / np.maximum(half, 1e-12)

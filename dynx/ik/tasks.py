@@ -42,6 +42,9 @@ class TaskError(NamedTuple):
     """How the Jacobian rows of the error follow from those of the frame."""
 
 
+_MAKE = tuple.__new__
+
+
 class Tolerances(Protocol):
     """Bounds on the norms of errors."""
 
@@ -67,7 +70,9 @@ class Task(Protocol):
 class FrameTask:
     """Pose, position or rotation of one frame."""
 
-    __slots__ = ("_columns", "_frame", "_kinematics", "_point", "_residual", "_tolerances")
+    __slots__ = (
+        "_forward_kinematics", "_frame", "_jacobian", "_part", "_point", "_residual", "_tolerances"
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -79,22 +84,26 @@ class FrameTask:
         position: Floats | None,
         rotation: Floats | None,
     ) -> None:
-        self._kinematics, self._frame, self._point = kinematics, frame, point
-        self._columns = coordinates.columns
+        self._forward_kinematics, self._jacobian = kinematics.forward_kinematics, kinematics.jacobian
+        self._frame, self._point = frame, point
         self._tolerances = (tolerances.position_tolerance, tolerances.rotation_tolerance)
         self._residual = Residual(position, rotation, point)
+        self._part = (self._residual.rows, coordinates.columns)
 
     def error(self, q: Floats) -> TaskError:
         """Return the error at q (nq,)."""
         residual = self._residual
-        vector, distance, angle = residual(self._kinematics.forward_kinematics(q, self._frame))
+        vector, distance, angle = residual(self._forward_kinematics(q, self._frame))
         position_tolerance, rotation_tolerance = self._tolerances
         reached = distance <= position_tolerance and angle <= rotation_tolerance
-        return TaskError(vector, distance, angle, reached, residual.rows)
+        # Faster than the call of the class, which is written in Python.
+        return _MAKE(TaskError, (vector, distance, angle, reached, None))
 
     def jacobian(self, q: Floats, error: TaskError) -> Floats:
-        """Return the Jacobian rows at q that `error` names."""
-        return frame_jacobian(self._kinematics, q, self._frame, self._point)[error.rows, self._columns]
+        """Return the Jacobian rows at q."""
+        if self._point is None:
+            return self._jacobian(q, self._frame)[self._part]
+        return self._jacobian(q, self._frame, point=self._point)[self._part]
 
 
 class AxisTask:

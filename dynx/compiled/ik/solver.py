@@ -37,7 +37,7 @@ MAX_RESTARTS = 10_000
 """Most restarts for which a table of starts is made."""
 
 
-FIRST_RESTARTS = 8
+FIRST_RESTARTS = 24
 """Restarts before a target that is not reached is compared with the bounds on the reach."""
 
 
