@@ -7,6 +7,7 @@ from tests.faults.contacts import CONTACTS_FAULTS
 from tests.faults.description import DESCRIPTION_FAULTS
 from tests.faults.distance import DISTANCE_FAULTS
 from tests.faults.engines import ENGINES_FAULTS
+from tests.faults.environments import ENVIRONMENTS_FAULTS
 from tests.faults.fault import Fault
 from tests.faults.rigid_body import RIGID_BODY_FAULTS
 from tests.faults.simulation import SIMULATION_FAULTS
@@ -19,6 +20,7 @@ FAULTS_BY_AREA: dict[str, tuple[Fault, ...]] = {
     "checks": CHECKS_FAULTS,
     "contacts": CONTACTS_FAULTS,
     "distance": DISTANCE_FAULTS,
+    "environments": ENVIRONMENTS_FAULTS,
     "simulation": SIMULATION_FAULTS,
     "worlds": WORLDS_FAULTS,
 }
