@@ -1,6 +1,8 @@
-"""Methods of every backend that follow paths of poses."""
+"""Methods of every backend that follow paths of poses, and velocities of frames."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,10 +11,11 @@ from dynx.backends.quantity_calls import QuantityCalls
 from dynx.ik import Kinematics
 from dynx.ik.tracking import TrackResult, track
 from dynx.ik.tracking.tracker import Motion
+from dynx.ik.velocity import VelocityResult, VelocityTask, velocity_ik
 
 
 class PathCalls(QuantityCalls):
-    """Base of backends: inverse kinematics along a path."""
+    """Base of backends: inverse kinematics along a path, and of velocities."""
 
     def track(
         self: Kinematics,
@@ -53,4 +56,37 @@ class PathCalls(QuantityCalls):
             jumps=jumps,
             max_starts=max_starts,
             rng=rng,
+        )
+
+    def velocity_ik(
+        self: Kinematics,
+        q: ArrayLike,
+        tasks: VelocityTask | Sequence[VelocityTask],
+        *,
+        dt: float,
+        damping: float = 1e-6,
+        posture: ArrayLike | None = None,
+        posture_weight: float = 1e-2,
+        posture_gain: float = 1.0,
+        velocity_limit: ArrayLike | None = None,
+        acceleration_limit: ArrayLike | None = None,
+        v0: ArrayLike | None = None,
+    ) -> VelocityResult:
+        """Return the velocity v (nv,) that meets `tasks` best at q (nq,) and keeps the limits for `dt` [s].
+
+        `dynx.ik.velocity.velocity_ik` describes the options; needs the extra ``qp``. Elsewhere: Pink and mink
+        `solve_ik`, Drake `DoDifferentialInverseKinematics`.
+        """
+        return velocity_ik(
+            self,
+            q,
+            tasks,
+            dt=dt,
+            damping=damping,
+            posture=posture,
+            posture_weight=posture_weight,
+            posture_gain=posture_gain,
+            velocity_limit=velocity_limit,
+            acceleration_limit=acceleration_limit,
+            v0=v0,
         )

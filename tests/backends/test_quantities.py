@@ -13,7 +13,7 @@ from dynx.compiled.backend import CompiledBackend
 from dynx.engines.pinocchio.backend import PinocchioBackend
 from tests.backends.robots import mixed_robot, motion
 
-OTHER_METHODS = {"close", "engine_version", "inverse_kinematics", "require_engine", "track"}
+OTHER_METHODS = {"close", "engine_version", "inverse_kinematics", "require_engine", "track", "velocity_ik"}
 each_quantity = pytest.mark.parametrize("quantity", QUANTITIES.values(), ids=QUANTITIES)
 
 

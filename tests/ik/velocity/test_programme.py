@@ -1,0 +1,183 @@
+"""Velocity inverse kinematics against closed forms, SciPy's solvers, and the conditions of an optimum."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import LinearConstraint, lsq_linear, minimize
+
+from dynx.backends import backend
+from dynx.errors import ArgumentError, NotInstalledError, ShapeError, UnknownNameError
+from dynx.ik.velocity import VelocityTask
+from dynx.ik.velocity.limits import velocity_bounds
+from dynx.ik.velocity.programme import AT_BOUND
+from dynx.model.loading import load
+from dynx.testing.strategies import configurations, models
+from tests.oracles.closed_form import MODELS
+
+pytest.importorskip("daqp")
+
+ARM = load(MODELS / "seven_axis_arm.urdf")
+FRAME = ARM.frame_names[-1]
+ENGINE = backend("reference", ARM)
+Q = 0.5 * (ARM.lower + ARM.upper) + 0.3
+DT = 0.01
+ROUNDING = 1e-7
+"""Accuracy of v [rad/s]: rounding of H, whose condition is at most 1 / damping."""
+
+velocities = st.lists(st.floats(-3.0, 3.0), min_size=6, max_size=6).map(np.array)
+
+
+@given(velocities, st.sampled_from([1e-4, 1e-2, 1.0]))
+def test_without_limits_it_is_damped_least_squares(velocity: Any, damping: float) -> None:
+    """Wampler 1986; Siciliano et al., eq. 3.59."""
+    found = ENGINE.velocity_ik(
+        Q, VelocityTask(FRAME, velocity), dt=1e-4, damping=damping, velocity_limit=np.inf
+    )
+    J = ENGINE.jacobian(Q, FRAME)
+    expected = J.T @ np.linalg.solve(J @ J.T + damping * np.eye(6), velocity)
+    np.testing.assert_allclose(found.v, expected, atol=ROUNDING / damping**0.5)
+    assert found
+    assert not found.limited.any()
+
+
+@given(velocities, st.floats(0.01, 1.0))
+def test_within_bounds_it_is_the_bounded_least_squares_of_scipy(velocity: Any, limit: float) -> None:
+    damping = 1e-3
+    weights = np.array([1.0, 2.0, 1.0, 0.5, 1.0, 0.0])
+    task = VelocityTask(FRAME, velocity, weights=weights)
+    found = ENGINE.velocity_ik(Q, task, dt=DT, damping=damping, velocity_limit=limit)
+    J = ENGINE.jacobian(Q, FRAME)
+    A = np.concatenate([weights[:, None] * J, np.sqrt(damping) * np.eye(7)])
+    expected = lsq_linear(A, np.concatenate([weights * velocity, np.zeros(7)]), (-limit, limit), tol=1e-14)
+    np.testing.assert_allclose(found.v, expected.x, atol=1e-6)
+    assert (np.abs(found.v) <= limit).all()
+
+
+@settings(max_examples=15)
+@given(velocities)
+def test_hard_tasks_come_before_soft_ones(velocity: Any) -> None:
+    """SciPy's SLSQP, a solver of another kind, finds the same optimum."""
+    hard = VelocityTask(FRAME, 0.1 * velocity, weights=[1, 1, 1, 0, 0, 0], hard=True)
+    soft = VelocityTask(ARM.frame_names[4], velocity[::-1].copy())
+    found = ENGINE.velocity_ik(Q, [hard, soft], dt=DT, damping=1e-2, velocity_limit=2.0)
+    J, J_soft = ENGINE.jacobian(Q, FRAME)[:3], ENGINE.jacobian(Q, ARM.frame_names[4])
+
+    def cost(v: Any) -> float:
+        return float(0.5 * np.sum((J_soft @ v - velocity[::-1]) ** 2) + 0.5 * 1e-2 * v @ v)
+
+    def gradient(v: Any) -> Any:
+        return J_soft.T @ (J_soft @ v - velocity[::-1]) + 1e-2 * v
+
+    equal = LinearConstraint(J, 0.1 * velocity[:3], 0.1 * velocity[:3])
+    start = np.linalg.pinv(J) @ (0.1 * velocity[:3])
+    expected = minimize(
+        cost, start, jac=gradient, method="SLSQP", bounds=[(-2.0, 2.0)] * 7, constraints=equal,
+        options={"ftol": 1e-14, "maxiter": 500},
+    )  # fmt: skip
+    assert found.success == bool(expected.success)
+    if found:
+        np.testing.assert_allclose(J @ found.v, 0.1 * velocity[:3], atol=1e-8)
+        assert cost(found.v) <= expected.fun + 1e-7
+
+
+@settings(max_examples=25)
+@given(st.data())
+def test_every_robot_keeps_its_limits_and_is_at_an_optimum(data: st.DataObject) -> None:
+    """Karush, Kuhn and Tucker: the gradient vanishes but at a bound, where it presses against it."""
+    model = data.draw(models(max_links=5))
+    q = model.clip(data.draw(configurations(model, within_limits=True)))
+    frame = data.draw(st.sampled_from(model.frame_names))
+    velocity = data.draw(velocities)
+    damping = 1e-2
+    with backend("reference", model) as engine:
+        found = engine.velocity_ik(q, VelocityTask(frame, velocity), dt=DT, damping=damping)
+        J = engine.jacobian(q, frame)
+    v = found.v
+    assert (np.abs(v) <= model.velocity_limit).all()
+    after = model.integrate(q, DT * v)
+    offset = 7 if model.floating else 0
+    slack = 1e-12 * (1.0 + np.abs(q[offset:]))
+    assert (after[offset:] >= model.lower[offset:] - slack).all()
+    assert (after[offset:] <= model.upper[offset:] + slack).all()
+    gradient = J.T @ (J @ v - velocity) + damping * v
+    accuracy = 1e-8 * (1.0 + np.abs(J).max(initial=0.0)) ** 2
+    assert (np.abs(gradient[~found.limited]) <= accuracy).all()
+    unlimited = np.full(model.nv, np.inf)
+    lower, upper = velocity_bounds(model, q, DT, model.velocity_limit, unlimited, None)
+    assert (gradient[v > lower + AT_BOUND] <= accuracy).all()
+    assert (gradient[v < upper - AT_BOUND] >= -accuracy).all()
+
+
+def test_a_joint_brakes_before_its_limit_within_its_acceleration() -> None:
+    q, v, acceleration = Q.copy(), np.zeros(7), 2.0
+    task = VelocityTask(FRAME, [0.0, 0.0, 0.0, 0.0, 0.0, 50.0])
+    for _ in range(400):
+        found = ENGINE.velocity_ik(
+            q, task, dt=DT, acceleration_limit=acceleration, v0=v, velocity_limit=3.0, damping=1e-2
+        )
+        assert (np.abs(found.v - v) <= acceleration * DT * (1.0 + 1e-9) + 1e-12).all()
+        v = found.v
+        q = q + DT * v
+        assert (q >= ARM.lower - 1e-12).all()
+        assert (q <= ARM.upper + 1e-12).all()
+
+
+def test_a_pose_is_approached_at_the_rate_of_its_gain() -> None:
+    q = Q.copy()
+    T = ENGINE.forward_kinematics(Q + 0.05, FRAME)
+    start = np.linalg.norm(T[:3, 3] - ENGINE.forward_kinematics(q, FRAME)[:3, 3])
+    for _ in range(100):
+        q = q + DT * ENGINE.velocity_ik(q, VelocityTask(FRAME, target=T, gain=2.0), dt=DT, damping=1e-9).v
+    end = np.linalg.norm(T[:3, 3] - ENGINE.forward_kinematics(q, FRAME)[:3, 3])
+    assert end / start == pytest.approx(np.exp(-2.0), rel=0.1)
+
+
+def test_a_posture_moves_what_the_task_leaves_free() -> None:
+    task = VelocityTask(FRAME, np.zeros(6), hard=True)
+    found = ENGINE.velocity_ik(Q, task, dt=DT, posture=Q + 0.2, posture_weight=1.0)
+    J = ENGINE.jacobian(Q, FRAME)
+    N = np.eye(7) - np.linalg.pinv(J) @ J
+    np.testing.assert_allclose(found.v, N @ np.full(7, 0.2), atol=1e-5)
+
+
+def test_hard_tasks_that_contradict_each_other_are_met_as_well_as_possible() -> None:
+    up = [VelocityTask(FRAME, [0, 0, s, 0, 0, 0], weights=[0, 0, 1, 0, 0, 0], hard=True) for s in (0.1, -0.3)]
+    found = ENGINE.velocity_ik(Q, up, dt=DT)
+    assert not found
+    assert (ENGINE.jacobian(Q, FRAME) @ found.v)[2] == pytest.approx(-0.1, abs=1e-6)
+    assert [error.shape for error in found.errors] == [(1,), (1,)]
+
+
+@pytest.mark.parametrize(
+    ("task", "options", "error", "message"),
+    [
+        (VelocityTask("flang"), {}, UnknownNameError, "flang"),
+        (VelocityTask(FRAME, np.zeros(5)), {}, ShapeError, "velocity"),
+        (VelocityTask(FRAME, weights=-1.0), {}, ArgumentError, "weights"),
+        (VelocityTask(FRAME, target=np.eye(4), gain=-1.0), {}, ArgumentError, "gain"),
+        (VelocityTask(FRAME, target=np.zeros((2, 3))), {}, ShapeError, "target"),
+        ("flange", {}, ArgumentError, "wanted dynx.ik.velocity.VelocityTask"),
+        (VelocityTask(FRAME), {"damping": 0.0}, ArgumentError, "damping"),
+        (VelocityTask(FRAME), {"v0": np.zeros(7)}, ArgumentError, "acceleration_limit"),
+        (VelocityTask(FRAME), {"velocity_limit": [1.0]}, ShapeError, "velocity_limit"),
+        (VelocityTask(FRAME), {"posture": np.zeros(3)}, ShapeError, "posture"),
+        (VelocityTask(FRAME), {"dt": -1.0}, ArgumentError, "dt"),
+    ],
+)
+def test_invalid_arguments_raise(
+    task: Any, options: dict[str, Any], error: type[Exception], message: str
+) -> None:
+    with pytest.raises(error, match=message):
+        ENGINE.velocity_ik(Q, task, **{"dt": DT, **options})
+
+
+def test_without_the_solver_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "daqp", None)
+    with pytest.raises(NotInstalledError, match=r"pip install 'dynx\[qp\]'"):
+        ENGINE.velocity_ik(Q, VelocityTask(FRAME), dt=DT)
