@@ -15,7 +15,10 @@ from typing import Any
 from dynx.agreement.report import AgreementDocument
 from dynx.bench.document import BenchDocument
 from dynx.cli.contacts.document import ContactsDocument
+from dynx.cli.env.document import EnvDistanceDocument, TasksDocument
+from dynx.cli.play.document import PlayDocument
 from dynx.cli.sim.document_types import SimDocument, TutorialDocument
+from dynx.cli.train.document import TrainDocument
 from dynx.cli.world.document import WorldDocument
 from dynx.doctor.formats.baseline import BaselineDocument
 from dynx.doctor.report_document import DoctorDocument
@@ -34,9 +37,13 @@ def schemas() -> dict[str, dict[str, Any]]:
         "bench": json_schema(BenchDocument, "dynx bench --json"),
         "contacts": json_schema(ContactsDocument, "dynx contacts --json"),
         "doctor": json_schema(DoctorDocument, "dynx doctor --json"),
+        "env-distance": json_schema(EnvDistanceDocument, "dynx env distance --json"),
+        "play": json_schema(PlayDocument, "dynx play --json"),
         "scenario": json_schema(ScenarioDocument, "dynx.Scenario.to_json"),
         "scene": json_schema(SceneDocument, "dynx.world.write_scene", omits_defaults=True),
         "sim": json_schema(SimDocument, "dynx sim --json"),
+        "tasks": json_schema(TasksDocument, "dynx env list --json"),
+        "train": json_schema(TrainDocument, "dynx train --json"),
         "world": json_schema(WorldDocument, "dynx world --json"),
         "tutorial": json_schema(TutorialDocument, "dynx sim --tutorial --json"),
     }

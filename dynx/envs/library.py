@@ -6,7 +6,10 @@ from dynx.errors import NotInstalledError
 
 try:
     from gymnasium import Env, Space, spaces
+    from gymnasium import make as make_env
+    from gymnasium import make_vec as make_vec_env
     from gymnasium.envs.registration import register, registry
+    from gymnasium.error import Error as GymnasiumError
     from gymnasium.vector import AutoresetMode, VectorEnv
     from gymnasium.vector.utils import batch_space
 except ImportError as error:
@@ -15,9 +18,12 @@ except ImportError as error:
 __all__ = [
     "AutoresetMode",
     "Env",
+    "GymnasiumError",
     "Space",
     "VectorEnv",
     "batch_space",
+    "make_env",
+    "make_vec_env",
     "register",
     "registry",
     "spaces",

@@ -13,9 +13,11 @@ from dynx.errors import ArgumentError, nearest, shown
 def check_document(part: object, kind: Any, place: str = "") -> None:
     """Raise ArgumentError unless a part of a document of text and numbers has the type `kind`.
 
-    Types are dataclasses (tables with their keys), str, bool, float, Literal, list, dict by text, and unions
-    of them. An integer is a float too.
+    Types are dataclasses (tables with their keys), str, bool, float, Literal, list, dict by text, unions of
+    them, and Any, which takes every value. An integer is a float too.
     """
+    if kind is Any:
+        return
     if get_origin(kind) in (Union, UnionType):
         _check_union(part, get_args(kind), place)
     elif is_dataclass(kind):

@@ -25,6 +25,11 @@ COMMANDS = {
         "dynx.cli.world.command:world", "Run a scene with contacts on several engines, and compare them."
     ),
     "view": LazyCommand("dynx.cli.view.command:view", "Show a robot, a rollout or a scene in the browser."),
+    "env": LazyCommand(
+        "dynx.cli.env.command:env", "List tasks of reinforcement learning; compare the engines on one."
+    ),
+    "train": LazyCommand("dynx.cli.train.command:train", "Train a policy on a task, with checkpoints."),
+    "play": LazyCommand("dynx.cli.play.command:play", "Judge, show or film a trained policy."),
     "contacts": LazyCommand(
         "dynx.cli.contacts.command:contacts",
         "Measure errors of contacts against closed forms; find causes.",

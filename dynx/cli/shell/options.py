@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable
 from typing import Any, TypeVar
@@ -37,6 +38,20 @@ def plain_numbers(text: str) -> list[float]:
     if not numbers:
         raise click.BadParameter("wanted a number, or several separated by commas")
     return numbers
+
+
+def whole_numbers(text: str) -> tuple[int, ...]:
+    """Read whole numbers separated by commas, none negative and none twice."""
+    numbers: dict[int, None] = {}
+    for word in text.replace(",", " ").split():
+        if not word.isdecimal():
+            raise click.BadParameter(f"{shown(word)} is not a whole number")
+        if int(word) in numbers:
+            raise click.BadParameter(f"{word} is given twice")
+        numbers[int(word)] = None
+    if not numbers:
+        raise click.BadParameter("wanted whole numbers separated by commas, such as 0,1,2")
+    return tuple(numbers)
 
 
 def name_list(text: str) -> tuple[str, ...]:
@@ -89,6 +104,14 @@ def name_value(word: str) -> tuple[str, str]:
             f"{shown(word)} is not of the form name=value, such as solver_iterations=100"
         )
     return name.strip(), value.strip()
+
+
+def json_value(word: str) -> Any:
+    """Read a value in the notation of JSON; another word is a text."""
+    try:
+        return json.loads(word)
+    except (ValueError, RecursionError):
+        return word
 
 
 def _pair(word: str) -> tuple[str, float]:
@@ -210,6 +233,16 @@ def settings_option(subject: str) -> Callable[[F], F]:
         help=f"{subject}, as name=value for all engines that have it or engine.name=value; may be given "
         "several times.",
     )
+
+
+task_options = click.option(
+    "--option",
+    "options",
+    type=name_value,
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Option of the task, as gymnasium.make takes it; may be given several times.",
+)
 
 
 def robot_options(command: F) -> F:

@@ -1,0 +1,1 @@
+"""``dynx env``: the tasks, and how far apart the engines are on one."""

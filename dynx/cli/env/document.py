@@ -1,0 +1,150 @@
+"""The JSON document of ``dynx env distance``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import Any, Literal, TypedDict
+
+import numpy as np
+
+from dynx.envs.distance import EngineDistance, Parting
+
+SCHEMA: Literal["dynx.env-distance/1"] = "dynx.env-distance/1"
+
+
+class TaskEntry(TypedDict):
+    """A task of dynx: its Gymnasium id, what is learned, and the engines on which it runs, the default first.
+
+    `max_episode_steps` is null without a time limit, `reward_threshold` where no return counts as solved.
+    """
+
+    id: str
+    summary: str
+    max_episode_steps: int | None
+    reward_threshold: float | None
+    engines: list[str]
+
+
+class TasksDocument(TypedDict):
+    """The tasks of dynx."""
+
+    schema: Literal["dynx.tasks/1"]
+    tasks: list[TaskEntry]
+
+
+class EpisodeEntry(TypedDict):
+    """One episode on two engines: the step at which they part (null: never), and the entry that differs most.
+
+    `largest` is the largest difference of an entry over the steps that both have. `returns` and `lengths` are
+    those of the two engines.
+    """
+
+    seed: int
+    step: int | None
+    entry: int | None
+    largest: float
+    returns: list[float]
+    lengths: list[int]
+
+
+class PairEntry(TypedDict):
+    """Two engines: how many episodes part, the first and the median step of those, and each episode."""
+
+    engines: list[str]
+    parted: int
+    first_step: int | None
+    median_step: float | None
+    largest: float
+    mean_returns: list[float]
+    episodes: list[EpisodeEntry]
+
+
+class ReturnEntry(TypedDict):
+    """Returns of a policy on one engine; the mean lies between `low` and `high` with 95 % confidence."""
+
+    engine: str
+    mean: float
+    deviation: float
+    low: float
+    high: float
+
+
+class PolicyEntry(TypedDict):
+    """A policy, the engine on which it was trained, and what it is worth on each engine."""
+
+    file: str
+    trained_on: str | None
+    episodes: int
+    engines: list[ReturnEntry]
+
+
+class EnvDistanceDocument(TypedDict):
+    """How far apart engines are on one task, with the same seeds and the same actions."""
+
+    schema: Literal["dynx.env-distance/1"]
+    task: str
+    options: dict[str, Any]
+    engines: list[str]
+    tolerance: float
+    pairs: list[PairEntry]
+    policies: list[PolicyEntry]
+
+
+def document(
+    task: str, options: dict[str, Any], found: EngineDistance, policies: list[PolicyEntry]
+) -> EnvDistanceDocument:
+    """Return the document of a measurement."""
+    return {
+        "schema": SCHEMA,
+        "task": task,
+        "options": options,
+        "engines": list(found.engines),
+        "tolerance": found.tolerance,
+        "pairs": [_pair(found.of(a, b)) for a, b in combinations(found.engines, 2)],
+        "policies": policies,
+    }
+
+
+def _pair(episodes: Sequence[Parting]) -> PairEntry:
+    steps = [each.step for each in episodes if each.step is not None]
+    returns = np.array([each.returns for each in episodes])
+    return {
+        "engines": list(episodes[0].engines),
+        "parted": len(steps),
+        "first_step": min(steps, default=None),
+        "median_step": float(np.median(steps)) if steps else None,
+        "largest": max(each.largest for each in episodes),
+        "mean_returns": returns.mean(axis=0).tolist(),
+        "episodes": [
+            {
+                "seed": each.seed,
+                "step": each.step,
+                "entry": each.entry,
+                "largest": each.largest,
+                "returns": list(each.returns),
+                "lengths": list(each.lengths),
+            }
+            for each in episodes
+        ],
+    }
+
+
+def policy_entry(path: str, engines: Sequence[str], options: dict[str, Any], episodes: int) -> PolicyEntry:
+    """Judge a policy on each engine."""
+    # Imports PyTorch.
+    from dynx.training import TaskSpec, load_policy
+    from dynx.training.judging import judge
+
+    rows: list[ReturnEntry] = []
+    trained_on = None
+    for engine in engines:
+        policy = load_policy(path)
+        trained_on = policy.spec.task.engine
+        task = TaskSpec(policy.spec.task.id, engine, {**policy.spec.task.options, **options})
+        found = judge(policy, task, episodes)
+        low, high = found.interval
+        rows.append(
+            {"engine": engine, "mean": found.mean, "deviation": found.deviation, "low": low, "high": high}
+        )
+    return {"file": path, "trained_on": trained_on, "episodes": episodes, "engines": rows}

@@ -1,0 +1,1 @@
+"""``dynx play``: a trained policy, shown or judged."""

@@ -1,0 +1,141 @@
+"""Run of ``dynx play``: episodes of a policy, judged, shown or filmed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import closing, suppress
+from dataclasses import replace
+from itertools import count
+from typing import Any
+
+import numpy as np
+
+from dynx.cli.play.document import document
+from dynx.cli.play.tables import show
+from dynx.cli.shell.exits import BAD_INPUT, DONE, complain, one_line
+from dynx.cli.shell.interruption import interruptible
+from dynx.cli.shell.options import json_value
+from dynx.cli.shell.output_file import check_json, check_writable
+from dynx.cli.shell.progress import progress_bar
+from dynx.cli.shell.terminal import console, present
+from dynx.envs.ids import is_of_dynx
+from dynx.errors import ArgumentError
+from dynx.training import Evaluation, Policy, TaskSpec, judge, load_policy, make
+from dynx.training.policy import read_policy_document
+from dynx.viewer.gif import write_gif
+
+DEFAULT_EPISODES = 10
+
+PICTURES_PER_SECOND = 25.0
+"""Largest rate of the pictures of a film."""
+
+
+def play(
+    policy: str,
+    engines: tuple[str, ...] | None,
+    options: Sequence[tuple[str, str]],
+    episodes: int | None,
+    seed: int,
+    stochastic: bool,
+    view: bool,
+    export_path: str | None,
+    json_path: str | None,
+    quiet: bool,
+) -> int:
+    """Judge, show or film a policy; return the exit code."""
+    check_json(json_path)
+    if view and export_path is not None:
+        raise ArgumentError("--view and --export are given together; wanted one of them")
+    shown_only = "--view" if view else "--export"
+    if (view or export_path is not None) and (json_path is not None or len(engines or ()) > 1):
+        raise ArgumentError(f"{shown_only} shows episodes of one engine; --json and more engines judge them")
+    task = _task_of(policy, options)
+    if engines is not None and not is_of_dynx(task.id):
+        raise ArgumentError(f"--engine chooses the engine of a task of dynx; {task.id} has its own")
+    first = task.on(engines[0] if engines else None)
+    if view or export_path is not None:
+        trained = load_policy(policy, first)
+        if export_path is not None:
+            return _film(trained, first, episodes or 1, seed, not stochastic, export_path, quiet)
+        return _show(trained, first, episodes, seed, not stochastic)
+    tasks = [task.on(engine) for engine in engines or (None,)]
+    found: list[tuple[TaskSpec, Evaluation]] = []
+    with interruptible() as interruption:
+        per_engine = episodes or DEFAULT_EPISODES
+        with progress_bar(per_engine * len(tasks), words="episodes", enabled=not quiet) as advance:
+            for each in tasks:
+                trained = load_policy(policy, each)
+
+                def progress(done: int) -> None:
+                    advance(len(found) * per_engine + done, "episodes")
+
+                judged = judge(
+                    trained, each, per_engine, seed, deterministic=not stochastic, progress=progress
+                )
+                found.append((each, judged))
+        interruption.finishing = True
+        made = document(policy, trained, found)
+        error = present(made, _nothing if quiet else show, json_path)
+    if error is not None:
+        complain(str(error))
+        return BAD_INPUT
+    return DONE
+
+
+def _task_of(policy: str, options: Sequence[tuple[str, str]]) -> TaskSpec:
+    task = read_policy_document(policy).spec.task
+    given = {name: json_value(word) for name, word in options}
+    return replace(task, options={**task.options, **given})
+
+
+def _show(policy: Policy, task: TaskSpec, episodes: int | None, seed: int, deterministic: bool) -> int:
+    out = console()
+    with suppress(KeyboardInterrupt), interruptible(), closing(make(task, "human")) as env:
+        out.print(f"{one_line(repr(policy)[1:-1])}; Ctrl-C ends it")
+        for k in count() if episodes is None else range(episodes):
+            total, length = _episode(policy, env, seed + k, deterministic)
+            out.print(f"seed {seed + k}: return {total:.5g} in {length} steps")
+    return DONE
+
+
+def _episode(
+    policy: Policy, env: Any, seed: int, deterministic: bool, each: Any = lambda: None
+) -> tuple[float, int]:
+    """Run one episode; `each` is called at its start and after each step. Return its return and length."""
+    observation, _ = env.reset(seed=seed)
+    each()
+    total, length, ended = 0.0, 0, False
+    while not ended:
+        action = policy(np.asarray(observation)[None], deterministic)[0]
+        observation, reward, terminated, truncated, _ = env.step(action)
+        each()
+        total, length, ended = total + float(reward), length + 1, terminated or truncated
+    return total, length
+
+
+def _film(
+    policy: Policy, task: TaskSpec, episodes: int, seed: int, deterministic: bool, path: str, quiet: bool
+) -> int:
+    check_writable(path)
+    if not path.lower().endswith(".gif"):
+        raise ArgumentError(f"{one_line(path)}: a film is written as .gif")
+    pictures: list[Any] = []
+    with interruptible(), closing(make(task, "rgb_array")) as env:
+        rate = float(env.metadata.get("render_fps") or PICTURES_PER_SECOND)
+        skip = max(1, int(np.ceil(rate / PICTURES_PER_SECOND)))
+        steps = count()
+
+        def draw() -> None:
+            if next(steps) % skip == 0:
+                pictures.append(env.render())
+
+        for k in range(episodes):
+            _episode(policy, env, seed + k, deterministic, draw)
+    write_gif(path, pictures, skip / rate)
+    if not quiet:
+        console().print(f"wrote {one_line(path)}")
+    return DONE
+
+
+def _nothing(*_: object) -> None:
+    """Show nothing."""

@@ -1,0 +1,1 @@
+"""``dynx train``: reinforcement learning on a task, with checkpoints."""

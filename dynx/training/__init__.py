@@ -1,0 +1,34 @@
+"""Training of policies by reinforcement learning, with stable-baselines3 (extra ``train``).
+
+`train` runs an algorithm on a task of Gymnasium, such as those of `dynx.envs`, with checkpoints that survive
+the end of the process; `load_policy` reads a policy, and `evaluate` judges it.
+
+    from dynx.training import TaskSpec, TrainingSpec, train
+    trained = train(TrainingSpec(TaskSpec("dynx/CartPole-v0", "compiled"), "ppo", 100_000, 8, 0), "run")
+"""
+
+from __future__ import annotations
+
+from dynx.training.environments import make
+from dynx.training.evaluation import Evaluation, evaluate
+from dynx.training.hyperparameters import recipe_of
+from dynx.training.judging import judge
+from dynx.training.policy import Policy, load_policy
+from dynx.training.run import Progress, Schedule, Trained, train
+from dynx.training.specification import TaskSpec, TrainingSpec
+
+__all__ = [
+    "Evaluation",
+    "Policy",
+    "Progress",
+    "Schedule",
+    "TaskSpec",
+    "Trained",
+    "TrainingSpec",
+    "evaluate",
+    "judge",
+    "load_policy",
+    "make",
+    "recipe_of",
+    "train",
+]

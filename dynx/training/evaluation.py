@@ -1,0 +1,90 @@
+"""Judging a policy: returns of whole episodes, and how well their mean is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dynx.envs.library import Env
+from dynx.envs.statistics import confidence_interval
+from dynx.errors import ArgumentError
+from dynx.model.configuration import whole_number
+
+Act = Callable[[NDArray[Any]], NDArray[Any]]
+"""A policy: observations (n, ...) in, actions (n, ...) out."""
+
+AT_ONCE = 8
+"""Number of environments that are judged together; a policy takes little longer for all of them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """Returns and lengths (episodes,) of whole episodes; episode k began with seed ``seed + k``."""
+
+    returns: NDArray[np.float64]
+    lengths: NDArray[np.int64]
+    seed: int
+
+    @property
+    def mean(self) -> float:
+        """Mean of the returns."""
+        return float(self.returns.mean())
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of the returns over the episodes."""
+        return float(self.returns.std())
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Interval that has the true mean with 95 % confidence (Student's t)."""
+        return confidence_interval(self.returns)
+
+    def __repr__(self) -> str:
+        low, high = self.interval
+        return (
+            f"<Evaluation: return {self.mean:.4g} +/- {self.deviation:.3g} over {len(self.returns)} "
+            f"episodes, mean within {low:.4g} to {high:.4g}>"
+        )
+
+
+def evaluate(
+    act: Act,
+    envs: Sequence[Env[Any, Any]],
+    episodes: int = 100,
+    seed: int = 0,
+    progress: Callable[[int], object] = lambda _: None,
+) -> Evaluation:
+    """Run whole episodes in several environments of one task, the next in the first that is free.
+
+    Episode k begins with ``reset(seed=seed + k)``, the same on every engine. Every episode counts, long or
+    short. `progress` is called with the number of episodes that have ended.
+    """
+    whole_number("episodes", episodes, 1)
+    if not envs:
+        raise ArgumentError("no environment to judge the policy in")
+    returns, lengths = np.zeros(episodes), np.zeros(episodes, dtype=np.int64)
+    running: dict[int, tuple[int, Any]] = {}
+    begun = ended = 0
+    while ended < episodes:
+        for k in range(len(envs)):
+            if k not in running and begun < episodes:
+                running[k] = begun, envs[k].reset(seed=seed + begun)[0]
+                begun += 1
+        places = sorted(running)
+        actions = act(np.stack([running[k][1] for k in places]))
+        for k, action in zip(places, actions, strict=True):
+            number = running[k][0]
+            observation, reward, terminated, truncated, _ = envs[k].step(action)
+            returns[number] += float(reward)
+            lengths[number] += 1
+            running[k] = number, observation
+            if terminated or truncated:
+                del running[k]
+                ended += 1
+                progress(ended)
+    return Evaluation(returns, lengths, seed)

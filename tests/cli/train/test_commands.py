@@ -1,0 +1,132 @@
+"""`dynx train`, `dynx play` and `dynx env`: tables, documents, files, exit codes and errors."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+from dynx.cli.shell.main import cli
+
+pytest.importorskip("stable_baselines3", reason="needs the extra train")
+
+FEW = ("--set", "n_steps=16", "--set", "batch_size=32", "--envs", "2", "--episodes", "2")
+
+
+def run(*arguments: str) -> Result:
+    return CliRunner().invoke(cli, list(arguments))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a small run on the cart-pole of dynx."""
+    place = tmp_path_factory.mktemp("train") / "run"
+    result = run("train", "CartPole", "--engine", "reference", "--steps", "64", "--out", str(place), *FEW)
+    assert result.exit_code == 0, result.output
+    assert "dynx/CartPole-v0 on reference, ppo" in result.output
+    assert f"dynx play {place}/final.zip --view" in result.output
+    return place
+
+
+def test_several_seeds_have_a_folder_each_a_mean_and_a_plot(tmp_path: Path) -> None:
+    out, document, plot = tmp_path / "runs", tmp_path / "all.json", tmp_path / "curve.svg"
+    command = ("train", "CartPole-v1", "--steps", "64", "--seed", "3,5", "--out", str(out), *FEW)
+    result = run(*command, "--json", str(document), "--plot", str(plot))
+    assert result.exit_code == 0, result.output
+    found: dict[str, Any] = json.loads(document.read_text())
+    assert [each["seed"] for each in found["runs"]] == [3, 5]
+    assert found["mean"] == pytest.approx(sum(each["mean"] for each in found["runs"]) / 2)
+    assert found["low"] < found["mean"] < found["high"]
+    assert found["hyperparameters"]["gae_lambda"] == 0.8  # published
+    assert found["hyperparameters"]["n_steps"] == 16  # given
+    assert "seed 5" in plot.read_text()
+    assert {each.name for each in out.iterdir()} == {"seed-3", "seed-5"}
+    again = run(*command, "--resume", "--quiet")
+    assert (again.exit_code, again.output) == (0, "")
+    assert run(*command).exit_code == 2
+
+
+def test_a_policy_is_judged_on_several_engines(folder: Path, tmp_path: Path) -> None:
+    policy = str(folder / "final.zip")
+    result = run("play", policy, "--engine", "reference,compiled", "--episodes", "3", "--seed", "7", "--json")
+    assert result.exit_code == 0, result.output
+    found: dict[str, Any] = json.loads(result.stdout)
+    assert [each["engine"] for each in found["engines"]] == ["reference", "compiled"]
+    # The engines agree to rounding, so that the same policy balances equally long.
+    assert found["engines"][0]["returns"] == found["engines"][1]["returns"]
+    assert (found["seed"], found["trained_on"], found["steps"]) == (7, "reference", 64)
+    assert "on reference" in run("play", policy, "--episodes", "1").output
+
+
+def test_a_film_is_written(folder: Path, tmp_path: Path) -> None:
+    film = tmp_path / "film.gif"
+    result = run("play", str(folder / "final.zip"), "--export", str(film))
+    assert result.exit_code == 0, result.output
+    assert film.read_bytes()[:6] == b"GIF89a"
+
+
+def test_distance_of_engines_and_transfer_of_a_policy(folder: Path) -> None:
+    policy = str(folder / "final.zip")
+    arguments = ("--engine", "reference,compiled", "--seed", "0,1", "--policy", policy, "--episodes", "2")
+    result = run("env", "distance", "CartPole", *arguments, "--json")
+    assert result.exit_code == 0, result.output
+    found: dict[str, Any] = json.loads(result.stdout)
+    (pair,) = found["pairs"]
+    assert (pair["parted"], pair["first_step"]) == (0, None)
+    assert pair["largest"] < 1e-9
+    assert [each["engine"] for each in found["policies"][0]["engines"]] == ["reference", "compiled"]
+    shown = run("env", "distance", "CartPole", *arguments)
+    assert "0 of 2" in shown.output
+    assert "trained on" in shown.output
+
+
+def test_the_list_names_tasks_and_engines() -> None:
+    result = run("env", "list")
+    assert result.exit_code == 0, result.output
+    assert "dynx/CartPole-v0" in result.output
+    document = json.loads(run("env", "list", "--json").stdout)
+    assert "reference" in document["tasks"][0]["engines"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["train", "CartPol"], "no task 'CartPol'; did you mean 'CartPole'"),
+        (["train", "CartPole", "--engine", "pinochio"], "does not run on engine 'pinochio'"),
+        (["train", "CartPole-v1", "--engine", "mujoco"], "unexpected keyword argument 'engine'"),
+        (["train", "CartPole", "--algo", "pqo"], "no algorithm 'pqo'; did you mean 'ppo'"),
+        (["train", "CartPole", "--set", "gama=1"], "no hyperparameter 'gama'; did you mean 'gamma'"),
+        (["train", "CartPole", "--set", "gamma"], "is not of the form name=value"),
+        (["train", "CartPole", "--option", "pole_mas=1"], "no option 'pole_mas'; did you mean 'pole_mass'"),
+        (["train", "CartPole", "--seed", "0,0"], "0 is given twice"),
+        (["train", "CartPole", "--seed", "-1"], "'-1' is not a whole number"),
+        (["train", "CartPole", "--steps", "0"], "0 is not in the range"),
+        (["train", "CartPole", "--resume"], "no training run that could be resumed"),
+        (["train", "CartPole", "--plot", "curve.txt"], "a plot is saved as .png, .pdf or .svg"),
+        (["play", "none.zip"], "there is no such file"),
+        (["play", "none.zip", "--view", "--export", "x.gif"], "--view and --export are given together"),
+        (["env", "distance", "CartPole-v1"], "wanted a task of dynx"),
+        (["env", "distance", "CartPole", "--engine", "reference"], "wanted two engines or more"),
+        (["env", "distance", "CartPole", "--tolerance", "nan"], "nan"),
+        (["env", "distance", "CartPole", "--policy", "none.zip"], "there is no such file"),
+    ],
+    ids=lambda value: " ".join(value)[:40] if isinstance(value, list) else "",
+)
+def test_wrong_input_is_one_line_and_exit_code_2(
+    arguments: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = run(*arguments)
+    assert result.exit_code == 2, result.output
+    assert message in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1, result.stderr
+    assert not (tmp_path / "runs").exists(), "a run that cannot begin leaves a folder"
+
+
+def test_other_films_are_refused(folder: Path, tmp_path: Path) -> None:
+    result = run("play", str(folder / "final.zip"), "--export", str(tmp_path / "film.mp4"))
+    assert result.exit_code == 2
+    assert "a film is written as .gif" in result.stderr

@@ -1,0 +1,204 @@
+"""Training runs: what a folder holds, resuming, and what a sudden end leaves."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import warnings
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dynx.errors import ArgumentError, UnknownNameError
+from dynx.training import Schedule, TaskSpec, TrainingSpec, load_policy, train
+from dynx.training.policy import read_policy_document
+from dynx.training.records import read_lines
+from tests.training.runs import SMALL, small_run
+
+OFTEN = Schedule(checkpoint_every=64, evaluate_every=128, episodes=2)
+
+
+def weights(path: Path) -> dict[str, Any]:
+    found: dict[str, Any] = load_policy(path).algorithm.policy.state_dict()
+    return found
+
+
+def test_a_run_leaves_policies_checkpoints_and_curves(tmp_path: Path) -> None:
+    done = train(small_run(), tmp_path / "run", schedule=OFTEN, final_episodes=3)
+    assert done.policy.steps_done == 256
+    assert done.resumed_at == 0
+    assert len(done.evaluation.returns) == 3
+    assert np.all(done.evaluation.returns == done.evaluation.lengths)  # one point for each step
+    names = {each.name for each in (tmp_path / "run").iterdir()}
+    assert names == {"run.json", "checkpoints", "evaluations.jsonl", "curve.jsonl", "best.zip", "final.zip"}
+    assert [each["steps"] for each in read_lines(tmp_path / "run" / "evaluations.jsonl")] == [128]
+    kept = sorted(each.name for each in (tmp_path / "run" / "checkpoints").iterdir())
+    assert kept == ["000000000192.zip", "000000000256.zip"]
+
+
+def test_the_same_seed_gives_the_same_weights_and_another_seed_others(tmp_path: Path) -> None:
+    for name, seed in (("a", 0), ("b", 0), ("c", 1)):
+        train(small_run(64, seed=seed), tmp_path / name, schedule=OFTEN, final_episodes=1)
+    a, b, c = (weights(tmp_path / name / "final.zip") for name in "abc")
+    assert all(bool((a[key] == b[key]).all()) for key in a)
+    assert not all(bool((a[key] == c[key]).all()) for key in a)
+
+
+def test_a_finished_run_is_only_judged_when_it_is_resumed(tmp_path: Path) -> None:
+    train(small_run(), tmp_path, schedule=OFTEN, final_episodes=2)
+    before = weights(tmp_path / "final.zip")
+    again = train(small_run(), tmp_path, resume=True, schedule=OFTEN, final_episodes=2)
+    assert again.resumed_at == again.policy.steps_done == 256
+    after = weights(tmp_path / "final.zip")
+    assert all(bool((before[key] == after[key]).all()) for key in before)
+
+
+def test_a_resumed_run_starts_from_the_weights_and_schedules_of_its_checkpoint(tmp_path: Path) -> None:
+    spec = small_run(hyperparameters={**SMALL, "learning_rate": "lin_0.001"}, normalize=True)
+    rates: list[float] = []
+
+    class Stopped(Exception):
+        pass
+
+    def stop(progress: Any) -> None:
+        if progress.steps >= 128:
+            raise Stopped
+
+    with pytest.raises(Stopped):
+        train(spec, tmp_path, schedule=OFTEN, progress=stop)
+    saved = read_policy_document(tmp_path / "checkpoints" / "000000000128.zip")
+    assert saved.steps_done == 128
+    assert saved.samples == pytest.approx(128, abs=3.0)  # observations that the scaling has seen
+    done = train(spec, tmp_path, resume=True, schedule=OFTEN, final_episodes=1)
+    assert done.resumed_at == 128
+    assert done.policy.scaling is not None
+    assert done.policy.scaling.samples == pytest.approx(256, abs=6.0)
+    rates.extend(group["lr"] for group in done.policy.algorithm.policy.optimizer.param_groups)
+    # The last update had 32 of 256 steps left... of which none remain when it is computed.
+    assert rates[0] <= 0.001 * 32 / 256
+
+
+def test_replay_buffers_survive(tmp_path: Path) -> None:
+    spec = TrainingSpec(
+        TaskSpec("CartPole-v1"),
+        "dqn",
+        200,
+        1,
+        0,
+        hyperparameters={"learning_starts": 20, "buffer_size": 500, "train_freq": 4},
+    )
+
+    def stop(progress: Any) -> None:
+        if progress.steps >= 100:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train(spec, tmp_path, schedule=OFTEN, progress=stop)
+    done = train(spec, tmp_path, resume=True, schedule=OFTEN, final_episodes=1)
+    assert 0 < done.resumed_at <= 100
+    buffer = done.policy.algorithm.replay_buffer
+    assert buffer.pos == done.policy.steps_done
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"steps": 512},
+        {"envs": 3},
+        {"seed": 1},
+        {"normalize": True},
+        {"processes": True},
+        {"algorithm": "a2c"},
+        {"hyperparameters": {**SMALL, "gamma": 0.9}},
+        {"task": TaskSpec("CartPole-v1", None, {"sutton_barto_reward": True})},
+    ],
+    ids=lambda change: next(iter(change)),
+)
+def test_resuming_refuses_each_changed_field(change: dict[str, Any], tmp_path: Path) -> None:
+    train(small_run(32), tmp_path, schedule=OFTEN, final_episodes=1)
+    with pytest.raises(ArgumentError, match=f"has another run: {next(iter(change))}"):
+        train(replace(small_run(32), **change), tmp_path, resume=True)
+
+
+def test_folders_with_another_or_no_run_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ArgumentError, match="no training run that could be resumed"):
+        train(small_run(), tmp_path / "none", resume=True)
+    train(small_run(32), tmp_path / "run", schedule=OFTEN, final_episodes=1)
+    with pytest.raises(ArgumentError, match="has a training run already"):
+        train(small_run(32), tmp_path / "run")
+    (tmp_path / "run" / "run.json").write_text("{}")
+    with pytest.raises(ArgumentError, match=r"run.json' cannot be read"):
+        train(small_run(32), tmp_path / "run", resume=True)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"algorithm": "pqo"}, "no algorithm 'pqo'; did you mean 'ppo'"),
+        ({"hyperparameters": {"gama": 0.9}}, "ppo has no hyperparameter 'gama'; did you mean 'gamma'"),
+        ({"hyperparameters": {"learning_rate": "fast"}}, "learning_rate is a number, or lin_NUMBER"),
+        ({"hyperparameters": {"policy_kwargs": {"activation_fn": "rleu"}}}, "did you mean 'relu'"),
+        ({"algorithm": "sac", "hyperparameters": {}}, "sac refuses"),
+        ({"task": TaskSpec("CartPole-v1", None, {"no_such": 1})}, "cannot be made"),
+    ],
+)
+def test_wrong_specifications_are_refused(changes: dict[str, Any], message: str, tmp_path: Path) -> None:
+    with pytest.raises((ArgumentError, UnknownNameError), match=message):
+        train(small_run(**changes), tmp_path)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")
+def test_a_killed_run_loses_at_most_one_distance_between_checkpoints(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    command = [sys.executable, "-m", "dynx", "train", "CartPole-v1", "--steps", "1000000", "--envs", "2"]
+    command += ["--out", str(folder), "--checkpoint-every", "64", "--evaluate-every", "900000"]
+    for name, value in SMALL.items():
+        command += ["--set", f"{name}={value}"]
+    process = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    try:
+        checkpoints = folder / "checkpoints"
+        for _ in range(1200):
+            if checkpoints.is_dir() and len(list(checkpoints.glob("0*.zip"))) > 1:
+                break
+            assert process.poll() is None
+            time.sleep(0.1)
+        os.kill(process.pid, signal.SIGKILL)
+    finally:
+        process.kill()
+        process.wait()
+    newest = max(int(each.stem) for each in checkpoints.glob("0*.zip"))
+    assert newest % 64 == 0
+    document = json.loads((folder / "run.json").read_text())
+    assert document["spec"]["steps"] == 1_000_000
+
+    class Resumed(Exception):
+        pass
+
+    def first(progress: Any) -> None:
+        # The first report after resuming comes one distance of reports behind the checkpoint.
+        assert progress.steps >= newest
+        raise Resumed
+
+    spec = small_run(
+        1_000_000, hyperparameters={**document["spec"]["hyperparameters"]}, normalize=False, envs=2
+    )
+    with warnings.catch_warnings(), pytest.raises(Resumed):
+        train(spec, folder, resume=True, progress=first)
+
+
+def test_a_checkpoint_that_was_cut_off_is_passed_over(tmp_path: Path) -> None:
+    train(small_run(), tmp_path, schedule=OFTEN, final_episodes=1)
+    newest = tmp_path / "checkpoints" / "000000000256.zip"
+    newest.write_bytes(newest.read_bytes()[:1000])
+    assert train(small_run(), tmp_path, resume=True, schedule=OFTEN, final_episodes=1).resumed_at == 192
+    for each in (tmp_path / "checkpoints").glob("*.zip"):
+        each.write_bytes(b"PK")
+    with pytest.raises(ArgumentError, match="no checkpoint can be used"):
+        train(small_run(), tmp_path, resume=True)
