@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,12 @@ from dynx.spatial.scalar import Floats
 
 _FLOAT64 = np.dtype(np.float64)
 
+_ALL = 2**N_BRANCHES - 1
+
+_Workspace = tuple[Callable[[], None], memoryview, Floats, Floats, BoundVariants]
+"""Function that evaluates the pose, its masks, the pose (4, 4), and the block (8, 8) of results; last what
+holds their memory."""
+
 _ROWS = [np.flatnonzero([bits >> k & 1 for k in range(N_BRANCHES)]) for bits in range(2**N_BRANCHES)]
 """Numbers of the branches whose bits are set, for every byte."""
 
@@ -31,7 +38,7 @@ class SinglePose:
         assert form.kernel is not None
         self._kernel, self._names = form.kernel, form.branches
         # Workspaces that no call uses at the moment.
-        self._free: list[tuple[BoundVariants, Floats, Floats]] = [self._workspace()]
+        self._free: list[_Workspace] = [self._workspace()]
 
     def __call__(self, target: Any, q0: Any = None) -> IKSolutions | None:
         """Return the solutions for a pose (4, 4) without q0, or None for q0, and if the pose is not valid or
@@ -47,22 +54,21 @@ class SinglePose:
             workspace = self._free.pop()
         except IndexError:
             workspace = self._workspace()
-        bound, pose, block = workspace
+        run, masks, pose, block, _ = workspace
         pose[...] = target
-        bound.run()
-        found, review, invalid = bound.masks
-        bits = found[0]
-        if review[0] or invalid[0]:
-            self._free.append(workspace)
-            return None
-        rows = block.take(_ROWS[bits], 0)
+        run()
+        bits = masks[0]
+        # The bits of solutions are the first byte; others are set where there is something to review.
+        rows = None if bits > _ALL else block.copy() if bits == _ALL else block.take(_ROWS[bits], 0)
         self._free.append(workspace)
+        if rows is None:
+            return None
         return IKSolutions(rows[:, :N_JOINTS], rows[:, N_JOINTS:], self._names, bits)
 
-    def _workspace(self) -> tuple[BoundVariants, Floats, Floats]:
+    def _workspace(self) -> _Workspace:
         block = np.empty((N_BRANCHES, N_JOINTS + 2))
         bound = self._kernel.bind(block)
-        return bound, bound.inputs[0].reshape(4, 4), block
+        return bound.run, bound.masks, bound.inputs[0].reshape(4, 4), block, bound
 
 
 def single_pose_call(model: Model, frame: str, limits: SearchLimits) -> SinglePose | None:

@@ -24,25 +24,21 @@ Bytes = NDArray[np.uint8]
 
 
 class BoundVariants:
-    """Memory of one sample: `inputs` to write, a row (size,) each; `outputs` (variants, size) and `masks`
-    (1,) to read after ``run()``. Not safe for several threads at a time."""
+    """Memory of one sample: `inputs` to write, a row (size,) each; `outputs` (variants, size) to read after
+    ``run()``, and `masks`, of which byte k of its only number is mask k. Not safe for several threads."""
 
-    __slots__ = ("inputs", "masks", "outputs", "run")
+    __slots__ = ("_kept", "inputs", "masks", "outputs", "run")
 
     def __init__(self, kernel: VariantKernel, code: Code, outputs: Sequence[Floats]) -> None:
         image = kernel.image
         inputs = [np.zeros((1, port.size)) for port in image.inputs]
-        masks = [np.zeros(1, dtype=np.uint8) for _ in range(kernel.n_masks)]
+        number = np.zeros(1, dtype="<u8")
+        masks = [number.view(np.uint8)[k : k + 1] for k in range(kernel.n_masks)]
         words = np.array(kernel.words(inputs, outputs, masks), dtype=np.int64)
-        kept = (words, code, inputs, outputs, masks)
+        self._kept = (words, code, inputs)
         self.inputs = tuple(each[0] for each in inputs)
-        self.outputs, self.masks = tuple(outputs), tuple(each.data for each in masks)
-        run = partial(code.locked_entry, words.ctypes.data)
-
-        def call(_alive: object = kept) -> None:
-            run()
-
-        self.run: Callable[[], None] = call
+        self.outputs, self.masks = tuple(outputs), number.data
+        self.run: Callable[[], None] = partial(code.locked_entry, words.ctypes.data)
 
 
 class VariantKernel:

@@ -1,0 +1,1 @@
+"""All solutions of inverse kinematics in closed form, beside EAIK and ssik."""
