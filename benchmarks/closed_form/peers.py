@@ -49,8 +49,8 @@ def dynx_solver(model: Model, frame: str) -> Solver:
 
 def eaik_solver(model: Model, frame: str) -> Solver:
     """Return EAIK's C++ solver, called by its binding."""
-    from eaik.pybindings import EAIK
-
+    # The package has no annotations.
+    EAIK: Any = importlib.import_module("eaik.pybindings.EAIK")
     chain = chain_to(model, frame, {})
     points = np.vstack([np.zeros(3), chain.points, chain.T_zero[:3, 3]]) * chain.length
     offsets = np.diff(points, axis=0)

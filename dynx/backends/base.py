@@ -6,7 +6,7 @@ Arguments are checked, and one sample goes straight to the engine's hook, in `Qu
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +15,7 @@ from dynx.backends.evaluation import common_batch
 from dynx.backends.hooks import apply_matrix, solve_mass_matrix
 from dynx.backends.quantity_calls import ALL_FRAMES, ONE_FRAME, Forces
 from dynx.backends.tracking import PathCalls
-from dynx.ik import FrameTarget, IKOptions, IKResult, inverse_kinematics, spells_options
+from dynx.ik import FrameTarget, IKOptions, IKResult, IKSolutions, inverse_kinematics, spells_options
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, shift_jacobian
 from dynx.spatial.scalar import Floats
 
@@ -153,6 +153,28 @@ class Backend(PathCalls):
         J = self.jacobian(q, frame, reference=reference, point=point)
         dJ = self.jacobian_derivative(q, v, frame, reference=reference, point=point)
         return apply_matrix(J, a) + apply_matrix(dJ, v)
+
+    @overload
+    def inverse_kinematics(
+        self,
+        target: ArrayLike,
+        frame: str,
+        q0: ArrayLike | None = None,
+        *,
+        all_solutions: Literal[True],
+        given: Mapping[str, float] | None = None,
+        position_tolerance: ArrayLike = ...,
+        rotation_tolerance: ArrayLike = ...,
+    ) -> IKSolutions: ...
+
+    @overload
+    def inverse_kinematics(
+        self,
+        target: ArrayLike | Mapping[str, ArrayLike] | Sequence[FrameTarget],
+        frame: str | None = None,
+        q0: ArrayLike | None = None,
+        **options: Unpack[IKOptions],
+    ) -> IKResult: ...
 
     @spells_options
     def inverse_kinematics(

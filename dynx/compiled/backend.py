@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,7 +35,7 @@ from dynx.compiled.kernels import (
 from dynx.compiled.looped.kernels import LOOPED, looped_kernel
 from dynx.compiled.paths import PathKernels
 from dynx.compiled.simplification import has_physical_inertias, simplify_mechanism
-from dynx.ik import FrameTarget, IKOptions, IKResult, Problem, spells_options
+from dynx.ik import FrameTarget, IKOptions, IKResult, IKSolutions, Problem, spells_options
 from dynx.model import Model
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
 from dynx.simd.image import COMPILE_LOCK
@@ -202,6 +202,28 @@ class CompiledBackend(PathKernels):
         if joint_dynamics:
             M += self._joint_terms.armature
         return M
+
+    @overload
+    def inverse_kinematics(
+        self,
+        target: ArrayLike,
+        frame: str,
+        q0: ArrayLike | None = None,
+        *,
+        all_solutions: Literal[True],
+        given: Mapping[str, float] | None = None,
+        position_tolerance: ArrayLike = ...,
+        rotation_tolerance: ArrayLike = ...,
+    ) -> IKSolutions: ...
+
+    @overload
+    def inverse_kinematics(
+        self,
+        target: ArrayLike | Mapping[str, ArrayLike] | Sequence[FrameTarget],
+        frame: str | None = None,
+        q0: ArrayLike | None = None,
+        **options: Unpack[IKOptions],
+    ) -> IKResult: ...
 
     @spells_options
     def inverse_kinematics(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from dynx.errors import ArgumentError, nearest, shown
 from dynx.ik.checking import checked_problem
 from dynx.ik.closed_form.checking import all_solutions as solve_closed_form
+from dynx.ik.closed_form.solutions import IKSolutions
 from dynx.ik.options import IKOptions, Options, spells_options
 from dynx.ik.preference import preferred_solutions
 from dynx.ik.problem import Problem
@@ -35,6 +36,30 @@ EngineSolver = Callable[[Floats, str, Floats], Floats]
 
 METHODS = ("dynx", "engine")
 """Values of the option `method`."""
+
+
+@overload
+def inverse_kinematics(
+    kinematics: Kinematics,
+    target: ArrayLike,
+    frame: str,
+    q0: ArrayLike | None = None,
+    *,
+    all_solutions: Literal[True],
+    given: Mapping[str, float] | None = None,
+    position_tolerance: ArrayLike = ...,
+    rotation_tolerance: ArrayLike = ...,
+) -> IKSolutions: ...
+
+
+@overload
+def inverse_kinematics(
+    kinematics: Kinematics,
+    target: ArrayLike | Mapping[str, ArrayLike] | Sequence[FrameTarget],
+    frame: str | None = None,
+    q0: ArrayLike | None = None,
+    **options: Unpack[IKOptions],
+) -> IKResult: ...
 
 
 @spells_options

@@ -55,10 +55,11 @@ def polished(frames: AxisFrames, R: Array, p: Array, angles: list[Angle], steps:
     for _ in range(steps):
         _, error, J = _error_and_jacobian(frames, R, p, angles)
         columns = np.stack(J, axis=-1)
-        A = np.swapaxes(columns, -1, -2) @ columns + DAMPING * np.eye(len(angles), dtype=int)
-        b = (np.swapaxes(columns, -1, -2) @ error[..., None])[..., 0]
-        L, D = ldl_factors(np.asarray(A))
-        step = solve_ldl(L, D, np.asarray(b))
+        A = np.asarray(np.swapaxes(columns, -1, -2) @ columns + DAMPING * np.eye(len(angles), dtype=int))
+        b = np.asarray((np.swapaxes(columns, -1, -2) @ error[..., None])[..., 0])
+        step = (
+            solve_ldl(*ldl_factors(A), b) if A.dtype == object else np.linalg.solve(A, b[..., None])[..., 0]
+        )
         angles = [_turned(q, step[..., k]) for k, q in enumerate(angles)]
     return angles
 

@@ -39,7 +39,8 @@ _SAME = 1e-6
 """Difference [rad] up to which two candidates are one solution. At a singularity rounding moves a solution by
 the square root of its error."""
 
-_FURTHER_STEPS = 20
+_FURTHER_STEPS = 3, 17
+"""Newton steps for rough candidates, and for those that are rough after them."""
 
 _CHUNK = 4096
 """Number of poses that NumPy evaluates at once, so that its intermediate arrays stay in the cache."""
@@ -106,9 +107,15 @@ class Review:
     def _polish(self, pose: Floats, angles: Floats, measures: Floats, error: Floats, rough: Mask) -> None:
         """Polish the candidates `rough` further, where that reduces their error."""
         rows = np.nonzero(rough)
-        result = self.candidates.measured(pose[rows[0]], angles[rows], _FURTHER_STEPS)
+        first, more = _FURTHER_STEPS
+        result = self.candidates.measured(pose[rows[0]], angles[rows], first)
         after = result["measures"]
         reached = np.maximum(after[..., POSITION], after[..., ROTATION])
+        remaining = np.flatnonzero(reached > ROUNDING)
+        if remaining.size:
+            again = self.candidates.measured(pose[rows[0][remaining]], result["q"][remaining], more)
+            result["q"][remaining], after[remaining] = again["q"], again["measures"]
+            reached = np.maximum(after[..., POSITION], after[..., ROTATION])
         better = reached < error[rows]
         rows = tuple(each[better] for each in rows)
         after = after[better]

@@ -47,10 +47,9 @@ def test_compiled_solutions_equal_those_of_numpy(model: Model, frame: str) -> No
         assert (alone.q == compiled.q[k][compiled.success[k]]).all()
 
 
-def all_of(engine: Backend, T: Floats, frame: str, **options: float) -> IKSolutions:
-    found = engine.inverse_kinematics(T, frame, all_solutions=True, **options)  # type: ignore[arg-type]
-    assert isinstance(found, IKSolutions)
-    return found
+def all_of(engine: Backend, T: Floats, frame: str, position_tolerance: float = 1e-6) -> IKSolutions:
+    """Return all solutions, which have their own type: mypy checks it here."""
+    return engine.inverse_kinematics(T, frame, all_solutions=True, position_tolerance=position_tolerance)
 
 
 def test_the_compiled_backend_has_the_same_solutions_alone_and_in_a_batch() -> None:
