@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from pathlib import Path
-
-import numpy as np
 
 import dynx.compiled.ik
+import dynx.compiled.simplification
 import dynx.ik.coordinates
 import dynx.ik.search
 import dynx.ik.tracking.descent
 import dynx.model.mechanism
 import dynx.rbd
 import dynx.spatial
-from dynx._version import __version__
 from dynx.compiled.ik.refinement import refinement_iteration
 from dynx.compiled.ik.solver import MAX_RESTARTS, FrameSolver
 from dynx.compiled.ik.starts import StartTable
@@ -25,7 +22,7 @@ from dynx.compiled.simplification import simplify_mechanism
 from dynx.ik import Kinematics, Problem
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.model import Mechanism, Model
-from dynx.simd.cache import source_hash
+from dynx.simd.cache import source_version
 from dynx.simd.image import COMPILE_LOCK
 from dynx.simd.iteration import Iteration, IterationKernel, load_iteration
 
@@ -98,6 +95,4 @@ def _algorithms() -> str:
     """Return the hash of the source of everything that is traced."""
     packages = (dynx.rbd, dynx.spatial, dynx.compiled.ik)
     modules = (dynx.ik.coordinates, dynx.ik.search, dynx.ik.tracking.descent, dynx.model.mechanism)
-    sources = [Path(str(package.__file__)).parent for package in packages]
-    sources += [Path(str(module.__file__)) for module in modules]
-    return f"{__version__} {np.__version__} {source_hash(*sources)}"
+    return source_version(*packages, *modules, dynx.compiled.simplification)

@@ -6,24 +6,25 @@ away from singularities. `dynx.ik.closed_form.solver` reviews the poses of all o
 
 from __future__ import annotations
 
+import sys
 import threading
 from dataclasses import dataclass, replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+import dynx.ik.targets
+import dynx.model.configuration
 import dynx.rbd
 import dynx.spatial
-from dynx._version import __version__
 from dynx.ik.closed_form.branches import N_BRANCHES, SIGNS
 from dynx.ik.closed_form.candidates import ARBITRARY, POSITION, ROTATION, SEPARATION, VIOLATION, Candidates
 from dynx.ik.closed_form.chain import N_JOINTS
 from dynx.ik.closed_form.review import AT_LIMIT, ROUNDING
 from dynx.ik.targets import ROUNDING_TOLERANCE
 from dynx.model.configuration import MAX_MAGNITUDE
-from dynx.simd.cache import source_hash
+from dynx.simd.cache import source_version
 from dynx.simd.trace import trace
 from dynx.simd.variants import BoundVariants, VariantKernel, Variants, load_variants
 from dynx.spatial.scalar import Array, Floats, where_less
@@ -192,6 +193,5 @@ def _scalar(x: Array) -> Array:
 @cache
 def _algorithms() -> str:
     """Return the hash of the source of the packages that the kernel is traced from."""
-    packages = (dynx.rbd, dynx.spatial)
-    folders = [Path(__file__).parent, *(Path(str(package.__file__)).parent for package in packages)]
-    return f"{__version__} {np.__version__} {source_hash(*folders)}"
+    own = sys.modules[__name__.rpartition(".")[0]]
+    return source_version(own, dynx.ik.targets, dynx.model.configuration, dynx.rbd, dynx.spatial)

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cache
-from pathlib import Path
 
 import numpy as np
 
 from dynx.simd.arrays import check_arrays
-from dynx.simd.cache import load_code, source_hash
+from dynx.simd.cache import load_code
 from dynx.simd.emit import Settings
 from dynx.simd.image import Code, Image, compile_text
 from dynx.simd.iteration.emission import Iteration, emit_iteration
@@ -127,10 +125,4 @@ def load_iteration(
     def compiled() -> Image:
         return compile_iteration(iteration(), target, settings)
 
-    return load_code(recipe + _emitter_version(), compiled, target, settings, IterationKernel)
-
-
-@cache
-def _emitter_version() -> bytes:
-    """Return the hash of the source text of this package."""
-    return source_hash(Path(__file__).parent).encode()
+    return load_code(recipe, compiled, target, settings, IterationKernel)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import cache, partial
-from pathlib import Path
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dynx.errors import ArgumentError
-from dynx.simd.cache import load_code, source_hash
+from dynx.simd.cache import load_code
 from dynx.simd.emit import Settings
 from dynx.simd.image import Code, Image, compile_text
 from dynx.simd.kernel import part_count
@@ -117,15 +116,9 @@ def load_variants(recipe: bytes, count: int, masks: int, variants: Callable[[], 
     target = host()
     settings = Settings(count)
     return load_code(
-        recipe + _emitter_version(),
+        recipe,
         lambda: compile_variants(variants(), target, settings),
         target,
         settings,
         partial(VariantKernel, count=count, n_masks=masks),
     )
-
-
-@cache
-def _emitter_version() -> bytes:
-    """Return the hash of the source text of this package."""
-    return source_hash(Path(__file__).parent).encode()
