@@ -53,6 +53,8 @@ def cases() -> Iterator[Case]:
         if find_spec("envpool"):
             yield Case(name, "EnvPool", SIZES[0], _envpool(f"{name}-v1", SIZES[0]))
         yield Case(name, "Gymnasium, SyncVectorEnv", 64, _gymnasium(f"{name}-v1", 64, "sync"))
+    for n in SIZES:
+        yield Case("Reach on UR5", "dynx, copy=False", n, _dynx("dynx/Reach-v0", n, copy=False))
 
 
 def _dynx(env_id: str, n: int, **options: Any) -> Callable[[], Any]:

@@ -26,6 +26,7 @@ TASKS = {
     "Push-v0": "dynx.envs.tasks.push:Push",
     "Stand-v0": "dynx.envs.tasks.quadruped:Stand",
     "Walk-v0": "dynx.envs.tasks.quadruped:Walk",
+    "Reach-v0": "dynx.envs.tasks.reach:Reach",
 }
 """Tasks of dynx by the name of their environment, as ``"package.module:Class"``."""
 

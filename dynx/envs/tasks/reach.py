@@ -1,0 +1,182 @@
+"""Reach: bring a frame of an arm to a random pose, by torque or velocity.
+
+The arm is any robot that `dynx.load` takes. Goals are poses of the frame at configurations drawn within the
+limits of the joints, so each can be reached; the limits do not stop the joints.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from dynx.control.dynamics import Dynamics
+from dynx.envs.library import spaces
+from dynx.envs.robot.state import State
+from dynx.envs.robot.task import RobotTask
+from dynx.envs.task_options import refuse_unknown_choice
+from dynx.errors import UnsupportedFeatureError
+from dynx.model import Model
+from dynx.model.configuration import sampling_range
+from dynx.model.loading import load
+from dynx.rbd.kinematics import ancestry
+from dynx.sim.batch.traced_controller import ArrayDynamics
+from dynx.spatial.scalar import Array, Floats
+from dynx.world import Camera
+
+ACTIONS = ("torque", "velocity")
+
+MAX_ACCELERATION = 20.0
+"""Acceleration that the largest torque gives a joint alone, without gravity [rad/s^2 or m/s^2]."""
+
+DAMPING_RATE = 2.0
+"""Viscous damping of a joint over its inertia [1/s]."""
+
+MAX_SPEED = 1.0
+"""Largest velocity that an action asks for [rad/s or m/s]."""
+
+SERVO_RATE = 20.0
+"""Rate at which a velocity approaches the one that an action asks for [1/s]."""
+
+START_SPREAD = 0.1
+"""Largest distance of a joint from the middle of its range at the start [rad or m]."""
+
+ROTATION_WEIGHT = 0.2
+"""Reward for an error of one radian over that for an error of one metre [m/rad]."""
+
+ACTION_WEIGHT = 1e-3
+"""Reward for the square of an action."""
+
+LARGEST = float(np.finfo(np.float32).max)
+
+
+@dataclass(frozen=True)
+class Reach(RobotTask):
+    """Bring a frame of an arm to a random pose and hold it there.
+
+    Action (nv,) from -1 to 1. With ``actions="torque"``: the torque beyond that of gravity, 1 being the one
+    that accelerates the joint alone by 20 rad/s^2 at the neutral configuration; joints are damped by 2 /s.
+    With ``actions="velocity"``: the velocity, 1 being 1 rad/s or m/s, which the torque of the inverse
+    dynamics approaches at a rate of 20 /s.
+
+    Observation (2 nv + 9,): q, v, position of the frame [m], the vector from it to the goal [m], and the
+    rotation error in world axes: the axis times the sine of the angle. Reward: -(distance + 0.2 rotation
+    error + 0.001 action^2). An episode never terminates. `info` has the ``distance`` [m].
+    """
+
+    robot: str = "ur5"
+    """What `dynx.load` takes: the name of a robot, or a path."""
+    frame: str | None = None
+    """Frame that reaches; by default the first that most joints move."""
+    actions: str = "torque"
+
+    control_dt = 0.02
+    substeps = 5
+    max_episode_steps = 200
+
+    def __post_init__(self) -> None:
+        refuse_unknown_choice("actions", self.actions, ACTIONS)
+        self.model.frame_index(self.tool)
+
+    @cached_property
+    def model(self) -> Model:
+        """The arm. Raises UnsupportedFeatureError for a robot without joints."""
+        model = load(self.robot)
+        if not model.nv:
+            raise UnsupportedFeatureError(f"{model.name} has no joints, so no frame of it can reach a pose")
+        return model
+
+    @cached_property
+    def tool(self) -> str:
+        """Name of the frame that reaches."""
+        if self.frame is not None:
+            return self.frame
+        mechanism = self.model.mechanism
+        joints = [len(ancestry(mechanism, frame.body)) for frame in mechanism.frames]
+        return self.model.frame_names[joints.index(max(joints))]
+
+    @property
+    def random_size(self) -> int:  # type: ignore[override]
+        """Two numbers for each coordinate: the start and the goal."""
+        return 2 * self.model.nq
+
+    @cached_property
+    def observation_space(self) -> spaces.Box:
+        """Positions and velocities, bounded by the largest float32."""
+        return spaces.Box(-LARGEST, LARGEST, (2 * self.model.nv + 9,), np.float32)
+
+    @cached_property
+    def action_space(self) -> spaces.Box:
+        """Torques or velocities, relative."""
+        return spaces.Box(-1.0, 1.0, (self.model.nv,), np.float32)
+
+    @cached_property
+    def _range(self) -> tuple[Floats, Floats]:
+        """Range of each coordinate in which goals are drawn."""
+        model = self.model
+        ranges = [
+            sampling_range(float(low), float(high), 1.0 if joint.type == "prismatic" else math.pi)
+            for joint, low, high in zip(model.coordinate_joints, model.lower, model.upper, strict=True)
+        ]
+        low, high = np.array(ranges).T
+        return low, high
+
+    @cached_property
+    def _arrays(self) -> ArrayDynamics:
+        return ArrayDynamics(self.model)
+
+    @cached_property
+    def _inertia(self) -> Floats:
+        """Inertia of each joint at the neutral configuration."""
+        M = np.asarray(self._arrays.mass_matrix(self.model.neutral()), dtype=np.float64)
+        return np.array(np.diag(M))
+
+    def start(self, random: Array) -> State:
+        """Return a state at rest near the middle of the joints' ranges, and a goal as memory (12,)."""
+        (low, high), n = self._range, self.model.nq
+        spread = np.minimum(START_SPREAD, 0.5 * (high - low))
+        q = 0.5 * (low + high) + spread * (2.0 * random[:n] - 1.0)
+        T_world_goal = self._arrays.forward_kinematics(low + (high - low) * random[n:], self.tool)
+        return State(q, 0.0 * q, np.concatenate([T_world_goal[:3, 3], T_world_goal[:3, :3].reshape(9)]))
+
+    def torque(self, robot: Dynamics, state: State, action: Array) -> Array:
+        """Return the torque of an action."""
+        q, v, _ = state
+        if self.actions == "torque":
+            push = self._inertia * (MAX_ACCELERATION * action - DAMPING_RATE * v)
+            tau: Array = robot.gravity_torque(q) + push
+        else:
+            tau = robot.inverse_dynamics(q, v, SERVO_RATE * (MAX_SPEED * action - v))
+        return tau
+
+    def errors(self, robot: Dynamics, state: State) -> tuple[Array, Array, Array]:
+        """Return the position of the frame, the vector to the goal, and the rotation error (3,) each."""
+        T = robot.forward_kinematics(state.q, self.tool)
+        R, R_goal = T[:3, :3], state.memory[3:].reshape(3, 3)
+        # Half the sum of the cross products of the axes is the rotation's axis times the sine of its angle.
+        rotation = 0.5 * sum(np.cross(R[:, k], R_goal[:, k]) for k in range(3))
+        return T[:3, 3], state.memory[:3] - T[:3, 3], np.asarray(rotation)
+
+    def observation(self, robot: Dynamics, state: State) -> Array:
+        """Return q, v, position and errors of the frame."""
+        return np.concatenate([state.q, state.v, *self.errors(robot, state)])
+
+    def reward(self, robot: Dynamics, before: State, action: Array, after: State) -> Any:
+        """Return the negative sum of errors and effort."""
+        _, distance, rotation = self.errors(robot, after)
+        lengths = [np.sqrt(np.sum(each * each)) for each in (distance, rotation)]
+        return -(lengths[0] + ROTATION_WEIGHT * lengths[1] + ACTION_WEIGHT * np.sum(action * action))
+
+    def info(self, robot: Dynamics, state: State) -> dict[str, Any]:
+        """Return the distance to the goal [m]."""
+        return {"distance": float(np.linalg.norm(self.errors(robot, state)[1]))}
+
+    @cached_property
+    def camera(self) -> Camera:
+        """A camera that sees the reach of the arm."""
+        T = np.asarray(self._arrays.forward_kinematics(0.5 * sum(self._range), self.tool), dtype=np.float64)
+        far = 1.0 + float(np.linalg.norm(T[:3, 3]))
+        return Camera.look_at((far, -1.6 * far, far), 0.5 * T[:3, 3])

@@ -1,0 +1,74 @@
+"""Reach: arms, actions, goals that can be reached, and equal steps on every engine and in one kernel."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import dynx
+from dynx.backends import installed_backends
+from dynx.envs.environment import TaskEnvironment
+from dynx.envs.robot.state import State
+from dynx.envs.tasks.reach import SERVO_RATE, Reach
+from dynx.envs.vector.environment import RobotVectorEnvironment
+from dynx.errors import ArgumentError, UnknownNameError
+
+N = 4
+
+
+@pytest.mark.parametrize("actions", ["torque", "velocity"])
+def test_engines_and_the_kernel_take_equal_steps(actions: str) -> None:
+    task = Reach(robot="planar_3r", actions=actions)
+    envs = RobotVectorEnvironment(task, N)
+    envs.reset(seed=3)
+    starts = envs.states
+    given = np.random.default_rng(0).uniform(-1.0, 1.0, (N, 3))
+    observations, rewards, *_ = envs.step(given)
+    for engine in installed_backends():
+        env: Any = TaskEnvironment(task, engine)
+        env.reset(seed=0)
+        for k in range(N):
+            env.episodes.state = State(*np.split(starts[k], [3, 6]))
+            observation, reward, _, _, info = env.step(given[k])
+            assert observation == pytest.approx(observations[k], abs=1e-6)
+            assert reward == pytest.approx(rewards[k], abs=1e-9)
+            assert info["distance"] == pytest.approx(np.linalg.norm(observation[9:12]), rel=1e-5)
+        env.close()
+
+
+def test_the_goal_is_a_pose_of_the_frame_and_has_no_error() -> None:
+    task = Reach(robot="six_axis_arm")
+    env: Any = TaskEnvironment(task, "reference")
+    env.reset(seed=1)
+    model, random = task.model, np.random.default_rng(5).random(task.random_size)
+    state = task.start(random)
+    q_goal = task._range[0] + (task._range[1] - task._range[0]) * random[model.nq :]
+    T = dynx.backend("reference", model).forward_kinematics(q_goal, task.tool)
+    assert state.memory[:3] == pytest.approx(T[:3, 3])
+    env.episodes.state = State(q_goal, np.zeros(model.nv), state.memory)
+    _, distance, rotation = task.errors(env.episodes._robot, env.episodes.state)
+    assert max(np.linalg.norm(distance), np.linalg.norm(rotation)) < 1e-12
+
+
+def test_velocities_follow_the_action_and_gravity_is_carried() -> None:
+    env: Any = TaskEnvironment(Reach(robot="six_axis_arm", actions="velocity"), "compiled")
+    env.reset(seed=0)
+    wanted = np.array([0.2, -0.1, 0.3, 0.0, 0.1, -0.3])
+    for _ in range(50):
+        env.step(wanted)
+    remaining = (1.0 - SERVO_RATE * 0.004) ** 250
+    assert env.episodes.state.v == pytest.approx(wanted * (1.0 - remaining), abs=1e-3)
+    still: Any = TaskEnvironment(Reach(robot="six_axis_arm"), "compiled")
+    still.reset(seed=0)
+    for _ in range(50):
+        still.step(np.zeros(6))
+    assert np.abs(still.episodes.state.v).max() < 1e-9
+
+
+def test_unknown_names_are_refused() -> None:
+    with pytest.raises(ArgumentError, match="did you mean 'torque'"):
+        Reach(actions="torqe")
+    with pytest.raises(UnknownNameError, match="frame"):
+        Reach(robot="planar_2r", frame="tipp")
