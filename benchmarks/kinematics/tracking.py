@@ -1,9 +1,10 @@
 """Paths followed by `track` on the backend `compiled`: share of samples that are OK, and time of a sample.
 
-``python -m benchmarks.tracking`` follows, for each arm, paths of poses that a smooth motion of the joints
-within their limits passes through (so that a continuous solution exists), and straight lines between random
-reachable poses (of which some leave the workspace). Every sample that is OK is checked by Pinocchio, and it
-may not differ from the one before by more than the motion allows. Times are processor time of one thread.
+``python -m benchmarks.kinematics.tracking`` follows, for each arm, paths of poses that a smooth motion of the
+joints within their limits passes through (so that a continuous solution exists), and straight lines between
+random reachable poses (of which some leave the workspace). Every sample that is OK is checked by Pinocchio,
+and it may not differ from the one before by more than the motion allows. Times are processor time of one
+thread.
 """
 
 from __future__ import annotations

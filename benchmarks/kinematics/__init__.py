@@ -1,0 +1,1 @@
+"""Benchmarks of kinematics beyond one pose at a time."""
