@@ -28,8 +28,9 @@ from dynx.spatial.se3 import homogeneous
 if TYPE_CHECKING:
     from dynx.ik.closed_form.branch_kernel import BranchKernel
 
-_NEARNESS = 1e-6, 100.0
-"""Error above which a candidate is not near a solution: at least, and in units of the chain's tolerance."""
+_NEARNESS = 1e-6, 100.0, 3.0
+"""Error above which a candidate is not near a solution: at least, in units of the chain's tolerance, and in
+units of the square root of its deviation, by which solutions near a singularity move."""
 
 _EXACT = 2e-15
 """Deviation of a chain from the geometry that is rounding: its solutions need no polish."""
@@ -61,8 +62,10 @@ class ClosedForm:
         self._length = chain.length
         self.accuracy = ACCURACY * max(1.0, chain.length)
         """Largest error [m, rad] of a solution."""
-        nearness = max(_NEARNESS[0], _NEARNESS[1] * recognised.tolerance)
-        separation = max(_SEPARATION[0], _SEPARATION[1] * recognised.deviation**0.5)
+        least, of_tolerance, of_root = _NEARNESS
+        root = recognised.deviation**0.5
+        nearness = max(least, of_tolerance * recognised.tolerance, of_root * root)
+        separation = max(_SEPARATION[0], _SEPARATION[1] * root)
         exact = recognised.deviation <= _EXACT
         self._candidates = Candidates(
             recognised.geometry,
