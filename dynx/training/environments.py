@@ -36,7 +36,7 @@ def make_vector(spec: TrainingSpec) -> VecEnv:
     """
     if spec.processes:
         vector = VecMonitor(SubprocVecEnv([partial(_monitored, spec.task) for _ in range(spec.envs)]))
-    elif is_of_dynx(spec.task.id) and registry[spec.task.id].vector_entry_point is not None:
+    elif _steps_in_a_kernel(spec.task):
         vector = VecMonitor(BatchedEnvironments(_make_batched(spec)))
     else:
         vector = DummyVecEnv([partial(_monitored, spec.task) for _ in range(spec.envs)])
@@ -46,13 +46,19 @@ def make_vector(spec: TrainingSpec) -> VecEnv:
     return VecNormalize(vector, gamma=gamma, clip_obs=CLIPPED_AT, clip_reward=CLIPPED_AT)
 
 
+def _steps_in_a_kernel(task: TaskSpec) -> bool:
+    known = registry.get(task.id)
+    in_kernel = known is not None and known.vector_entry_point is not None
+    return in_kernel and is_of_dynx(task.id) and task.engine == "compiled"
+
+
 def _make_batched(spec: TrainingSpec) -> Any:
     try:
         return make_vec_env(
             spec.task.id,
             num_envs=spec.envs,
             vectorization_mode="vector_entry_point",
-            vector_kwargs={"autoreset_mode": AutoresetMode.SAME_STEP},
+            autoreset_mode=AutoresetMode.SAME_STEP,
             **spec.task.arguments(),
         )
     except DynxError:

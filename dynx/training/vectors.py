@@ -20,11 +20,11 @@ class BatchedEnvironments(VecEnv):  # type: ignore[misc]  # stable-baselines3 is
     """
 
     def __init__(self, vector: VectorEnv[Any, Any, Any]) -> None:
-        super().__init__(vector.num_envs, vector.single_observation_space, vector.single_action_space)
         self._vector = vector
+        self.render_mode = vector.render_mode  # asked for by the constructor
+        super().__init__(vector.num_envs, vector.single_observation_space, vector.single_action_space)
         self._actions: NDArray[Any] | None = None
         self._first_seed: int | None = None
-        self.render_mode = vector.render_mode
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Seed the next reset: environment k begins with ``seed + k``."""
