@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -47,12 +47,19 @@ class DrawnParts:
         self._root = root
         self.parts = parts
         """The node of each part."""
+        self._placed: list[Callable[[Mapping[str, Floats]], None]] = []
+
+    def on_placed(self, placed: Callable[[Mapping[str, Floats]], None]) -> None:
+        """Call `placed(poses)` whenever parts were placed."""
+        self._placed.append(placed)
 
     def place(self, poses: Mapping[str, Floats]) -> None:
         """Place parts at the poses (4, 4) in the world given."""
         for name, T in poses.items():
             node = self.parts[name]
             node.wxyz, node.position = wxyz(T[:3, :3]), T[:3, 3]
+        for placed in self._placed:
+            placed(poses)
 
     @property
     def visible(self) -> bool:
@@ -73,8 +80,8 @@ class DrawnRobot(DrawnParts):
     def __init__(self, scene: Any, path: str, model: Model, look: Look = AS_DESCRIBED) -> None:
         """`scene` is that of a viser server, and `path` the node of the robot, such as ``/robot``."""
         self.model = model
-        self.faults: tuple[str, ...] = ()
-        """Shapes that cannot be drawn, one sentence each."""
+        self._faults: dict[str, list[str]] = {}
+        self._reduced = (0, 0)
         self._scene, self._path, self._look = scene, path, look
         root = scene.add_frame(path, show_axes=False)
         self.links = {
@@ -96,8 +103,15 @@ class DrawnRobot(DrawnParts):
     @property
     def notes(self) -> tuple[str, ...]:
         """Shapes that cannot be drawn, and what is drawn instead, one sentence each."""
-        if any(self.visuals.values()) or self.faults:
-            return self.faults
+        faults = _grouped(self._faults)
+        drawn, whole = self._reduced
+        if drawn < whole:
+            faults.append(
+                f"{self.model.name} is drawn with {drawn} of the {whole} triangles of its meshes, for a "
+                "machine without a graphics processor; whole_meshes=True (--whole-meshes) draws all"
+            )
+        if any(self.visuals.values()) or faults:
+            return tuple(faults)
         return (f"{self.model.name} has no shapes; it is drawn as lines between its frames",)
 
     def show(self, *, visuals: bool, collisions: bool) -> None:
@@ -150,7 +164,7 @@ class DrawnRobot(DrawnParts):
             for each in self.model.geometry.visuals(link):
                 _readable(each.shape)
         except DynxError as error:
-            self.faults = (*self.faults, f"{link}: {error}")
+            self._faults.setdefault(link, []).append(str(error))
         try:
             return [(_readable(shape), rgba, T) for shape, rgba, T in link_shapes(self.model.geometry, link)]
         except DynxError:
@@ -161,6 +175,10 @@ class DrawnRobot(DrawnParts):
         if self._look.triangles is None:
             return {}
         parts = budgets(count, self._look.triangles)
+        self._reduced = (
+            sum(parts[mesh] * n for mesh, n in count.items()),
+            sum(len(mesh.triangles[1]) * n for mesh, n in count.items()),
+        )
         return {mesh: part for mesh, part in parts.items() if part < len(mesh.triangles[1])}
 
     def _add_collisions(self) -> list[Any]:
@@ -187,8 +205,24 @@ class DrawnRobot(DrawnParts):
                 for each in self.model.geometry.collisions(link)
             ]
         except DynxError as error:
-            self.faults = (*self.faults, f"{link}: {error}")
+            self._faults.setdefault(link, []).append(str(error))
             return []
+
+
+def _grouped(faults: Mapping[str, list[str]]) -> list[str]:
+    """Return the faults of links, one sentence each; those that end alike are one."""
+    links: dict[str, list[str]] = {}
+    for link, messages in faults.items():
+        for message in messages:
+            links.setdefault(message.rpartition(": ")[2], []).append(link)
+    grouped = []
+    for reason, names in links.items():
+        if len(names) == 1:
+            grouped += [f"{names[0]}: {m}" for m in faults[names[0]] if m.rpartition(": ")[2] == reason]
+        else:
+            some = ", ".join(names[:3]) + (", ..." if len(names) > 3 else "")
+            grouped.append(f"shapes of {len(names)} links ({some}) are not drawn: {reason}")
+    return grouped
 
 
 def _readable(shape: Shape) -> Shape:

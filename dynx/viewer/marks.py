@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from dynx.model.geometry import Box, Sphere
 from dynx.spatial.scalar import Floats
 from dynx.viewer.colours import BLUE, PURPLE, RGB, SKY_BLUE, VERMILION
 from dynx.viewer.drawn_robot import DrawnRobot, size_of, wxyz
+from dynx.viewer.page import Page
 from dynx.viewer.triangles import triangles_of
 
 INERTIA_OPACITY = 0.45
@@ -136,3 +137,27 @@ class Marks:
             inertial = self._model.inertial(link.name)
             if inertial.mass > 0.0:
                 yield link.name, inertial
+
+
+class NamedParts:
+    """The name of at most one part, beside its origin; it moves with the part."""
+
+    def __init__(self, page: Page, parts: Mapping[str, Any], visuals: Mapping[str, Sequence[Any]]) -> None:
+        """`parts` are the nodes of parts, and `visuals` those of their shapes, which are clicked."""
+        self._page, self._parts = page, parts
+        self._label: Any = None
+        self.shown: str | None = None
+        """The part whose name is shown."""
+        for name, nodes in visuals.items():
+            for node in nodes:
+                node.on_click(lambda _, name=name: self.show(None if name == self.shown else name))
+
+    def show(self, part: str | None) -> None:
+        """Show the name of a part; with None no name is shown."""
+        with self._page.lock:
+            if self._label is not None:
+                self._label.remove()
+                self._label = None
+            self.shown = part
+            if part is not None:
+                self._label = self._page.scene.add_label(f"{self._parts[part].name}/name", part)

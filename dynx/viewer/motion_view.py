@@ -14,6 +14,8 @@ from dynx.viewer.contact_arrows import ContactArrows
 from dynx.viewer.curves import Curves
 from dynx.viewer.drawn_robot import AS_DESCRIBED, GHOST_OPACITY, Look
 from dynx.viewer.drawn_scene import DrawnScene
+from dynx.viewer.following_camera import FollowingCamera
+from dynx.viewer.marks import NamedParts
 from dynx.viewer.motion import PARTED, Motion, separation
 from dynx.viewer.page import Page
 from dynx.viewer.timeline import Timeline
@@ -74,6 +76,10 @@ class MotionView:
         step = float(np.median(np.diff(motion.t))) if len(motion.t) > 1 else 1e-3
         self.timeline = Timeline(page, float(motion.t[-1]) - self._start, step, self._show, play=play)
         self._add_curves(curves, compare=compare)
+        self.camera = FollowingCamera(page, self.drawn)
+        """The camera of the page."""
+        self.names = NamedParts(page, self.drawn.parts, self.drawn.visuals)
+        """The name of the part that was clicked."""
         page.look_at(0.5 * (low + high), 1.3 * self._size)
 
     @property

@@ -7,17 +7,19 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from dynx.errors import DynxError
+from dynx.errors import ArgumentError, DynxError
 from dynx.model import Model
 from dynx.model.configuration import checked_q
 from dynx.model.topology import longest_chain_end
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.viewer.drawn_robot import AS_DESCRIBED, DrawnRobot, Look, size_of
+from dynx.viewer.following_camera import FollowingCamera
 from dynx.viewer.frame_handle import FrameHandle
 from dynx.viewer.joint_sliders import JointSliders
-from dynx.viewer.marks import Marks
+from dynx.viewer.marks import Marks, NamedParts
 from dynx.viewer.page import Page
 from dynx.viewer.robot_quantities import GravityTorques, Manipulability
 
@@ -67,6 +69,10 @@ class RobotView:
         self._add_frame_controls()
         self._sliders = JointSliders(page.gui, model, start, self._slid)
         self._add_configuration()
+        self.camera = FollowingCamera(page, self.robot)
+        """The camera of the page."""
+        self.names = NamedParts(page, self.robot.links, self.robot.visuals)
+        """The name of the part that was clicked."""
         self._handle.put(start)
         self._show(start)
         origins = np.array([node.position for node in self.robot.links.values()])
@@ -108,9 +114,11 @@ class RobotView:
         """The configuration that is shown (nq,)."""
         return self._sliders.q
 
-    def put(self, q: Floats) -> None:
+    def put(self, q: ArrayLike) -> None:
         """Show a configuration (nq,)."""
         checked = checked_q(self.model, q, "q")
+        if checked.ndim != 1:
+            raise ArgumentError(f"q has shape {checked.shape}; wanted ({self.model.nq},)")
         with self._page.lock, self._page.together():
             self._sliders.put(checked)
             self._handle.put(checked)

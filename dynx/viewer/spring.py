@@ -1,9 +1,10 @@
-"""A spring from a handle in the page to a part of a world."""
+"""A spring to a part of a world: from a handle in the page, or from the pointer that drags the part."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Callable, Coroutine, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,45 +16,86 @@ _FREQUENCY = 2.0 * math.pi * 1.0
 """Angular frequency [rad/s] at which a free body of the part's mass would swing on the spring."""
 
 
+class Pull(NamedTuple):
+    """A part that the pointer drags: where it was taken, and where the pointer is (3,) [m], in the world."""
+
+    part: str
+    taken: Floats
+    pointer: Floats
+
+
 class Spring:
-    """A critically damped spring between the handle and the origin of a part, while the handle is shown."""
+    """A critically damped spring between a point of a part and the pointer, or a handle that is shown."""
 
     def __init__(self, scene: Any, size: float) -> None:
         self._node = scene.add_transform_controls(
             "/spring", scale=size, disable_rotations=True, depth_test=False, visible=False
         )
         self.part: str | None = None
+        """The part on the handle."""
+        self._pull: Pull | None = None
+        self._point = np.zeros(3)
         self._mass = 1.0
         self._before: Floats | None = None
+        self._held: str | None = None
+
+    @property
+    def pulls(self) -> bool:
+        """True while the spring acts."""
+        return self.part is not None or self._pull is not None
 
     def hold(self, world: World, part: str | None) -> None:
         """Attach the handle to a part at its place, or remove it for None."""
-        self.part, self._before = part, None
+        self.part = part
         self._node.visible = part is not None
         if part is not None:
-            self._mass = _mass(world, part)
-            self._node.position = _origin(world, part)
+            self._node.position = _pose(world, part)[:3, 3]
+
+    def hold_by_pointer(self, visuals: Mapping[str, Sequence[Any]]) -> None:
+        """Let the pointer drag parts by the nodes of their shapes."""
+
+        def puller(part: str) -> Callable[[Any], Coroutine[Any, Any, None]]:
+            # viser calls functions that are not async in any order.
+            async def dragged(event: Any) -> None:
+                taken, pointer = np.array(event.start_position), np.array(event.end_position)
+                self.pull(None if event.phase == "end" else Pull(part, taken, pointer))
+
+            return dragged
+
+        for name, nodes in visuals.items():
+            for node in nodes:
+                node.on_drag(puller(name))
+
+    def pull(self, pull: Pull | None) -> None:
+        """Pull a part to the pointer from the next step on; None releases it."""
+        self._pull = pull
 
     def wrenches(self, world: World) -> list[Wrench]:
         """Return the force of the spring for the next step of `world.dt`."""
-        if self.part is None:
+        pull = self._pull
+        part = self.part if pull is None else pull.part
+        if part is None:
+            self._held = None
             return []
-        origin = _origin(world, self.part)
-        before = origin if self._before is None else self._before
-        velocity = (origin - before) / world.dt
-        self._before = origin
-        stretch = np.asarray(self._node.position, dtype=np.float64) - origin
-        stiffness = self._mass * _FREQUENCY**2
-        return [Wrench(self.part, stiffness * stretch - 2.0 * self._mass * _FREQUENCY * velocity)]
+        T = _pose(world, part)
+        holder = f"{part} {pull is None}"
+        if self._held != holder:
+            self._held, self._before, self._mass = holder, None, _mass(world, part)
+            self._point = np.zeros(3) if pull is None else T[:3, :3].T @ (pull.taken - T[:3, 3])
+        place = T[:3, :3] @ self._point + T[:3, 3]
+        velocity = (place - (place if self._before is None else self._before)) / world.dt
+        self._before = place
+        goal = np.asarray(self._node.position if pull is None else pull.pointer, dtype=np.float64)
+        force = self._mass * _FREQUENCY * (_FREQUENCY * (goal - place) - 2.0 * velocity)
+        return [Wrench(part, force, point=self._point)]
 
 
-def _origin(world: World, part: str) -> Floats:
+def _pose(world: World, part: str) -> Floats:
     robot, slash, link = part.partition("/")
     state = world.state
     if not slash:
-        return state.bodies[part].position
-    poses = dict(link_poses(world.scene.robot(robot).model, state.robots[robot].q))
-    return np.asarray(poses[link][:3, 3])
+        return np.asarray(state.bodies[part].T_world_body)
+    return dict(link_poses(world.scene.robot(robot).model, state.robots[robot].q))[link]
 
 
 def _mass(world: World, part: str) -> float:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, shown
 from dynx.files.reading import checked_path
@@ -82,6 +83,34 @@ class Viewer(Controls):
         """What cannot be drawn, and what is notable at the start of a world, one sentence each."""
         notes: tuple[str, ...] = self.view.notes
         return notes
+
+    def update(self, q: ArrayLike | None = None) -> None:
+        """Show the present state, from a loop of the program: the configuration q (nq,) of a robot, or the
+        state of a world that the program steps (``steps=False``).
+
+        The page shows as many of these as it can; the last is always among them. Raises ArgumentError for a
+        robot without q, a world with one, and a recorded motion, which has a timeline.
+        """
+        view = self.view
+        if view.duration is None:
+            if q is not None:
+                raise ArgumentError(f"update of the world {shown(view.title)} takes no q: it has a state")
+            view.draw()
+        elif not hasattr(view, "put"):
+            raise ArgumentError(f"{shown(view.title)} is a recorded motion, which the timeline moves")
+        elif q is None:
+            raise ArgumentError(f"update of the robot {shown(view.title)} needs its configuration q")
+        else:
+            view.put(q)
+
+    def follow(self, part: str | None, *, first_person: bool = False) -> None:
+        """Let the camera of every page move with a part: a link of a robot, or in a motion or a world a body
+        or ``robot/link``; with None it stays where it is.
+
+        The page turns around the part as before. With `first_person` it looks from the origin of the part
+        along its x axis, with its z axis up. Raises ArgumentError for an unknown part.
+        """
+        self.view.camera.follow(part, first_person=first_person)
 
     def on_part_clicked(self, clicked: Any) -> None:
         """Call `clicked(part, origin, direction)` when a part is clicked: its name, and the ray (3,), (3,)

@@ -15,6 +15,8 @@ from dynx.spatial.scalar import Floats
 from dynx.viewer.contact_arrows import ContactArrows
 from dynx.viewer.drawn_robot import AS_DESCRIBED, Look
 from dynx.viewer.drawn_scene import DrawnScene
+from dynx.viewer.following_camera import FollowingCamera
+from dynx.viewer.marks import NamedParts
 from dynx.viewer.motion import Motion, motion_of_state
 from dynx.viewer.page import Page
 from dynx.viewer.spring import Spring
@@ -76,6 +78,12 @@ class WorldView:
         if not any(_is_ground(body) for body in scene.bodies):
             page.scene.add_grid("/ground", 20.0, 20.0, cell_size=0.1, section_size=1.0)
         self._add_controls(moving, steps=steps)
+        self.camera = FollowingCamera(page, self.drawn)
+        """The camera of the page."""
+        self.names = NamedParts(page, self.drawn.parts, self.drawn.visuals)
+        """The name of the part that was clicked."""
+        if steps:
+            self._spring.hold_by_pointer({name: self.drawn.visuals[name] for name in moving})
         self.draw()
         page.look_at(0.5 * (low + high), 1.5 * self._size)
         page.at_end(self._running.set)
@@ -144,7 +152,7 @@ class WorldView:
             if self._page.closed:
                 return
             try:
-                if self._loads is None and self._spring.part is None and self._push is None:
+                if self._loads is None and not self._spring.pulls and self._push is None:
                     self.world.step(n)
                     n = 0
                 for _ in range(n):

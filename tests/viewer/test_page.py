@@ -15,9 +15,9 @@ from dynx.model import Model, Pose
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
 from dynx.viewer import Viewer, view
-from dynx.world import Scene
+from dynx.world import Scene, World
 from dynx.world.camera import Camera, draw_picture
-from dynx.world.scene import SceneRobot
+from dynx.world.scene import SceneRobot, read_scene
 from dynx.world.state import RobotState, WorldState
 from tests.conftest import needs_examples
 from tests.viewer.conftest import PATIENCE, Opened, connected, until
@@ -26,6 +26,9 @@ OpenPage = Callable[[str], Opened]
 
 PICTURE = 2000.0
 """Time in which software draws a picture beside other tests [ms]."""
+
+MESSAGE = 160.0
+"""Height of the part of a page on which viser tells that software draws [pixels]."""
 
 SAME = 0.93
 """Share of the pixels of a silhouette that two renderers have in common; edges differ by a pixel."""
@@ -135,6 +138,56 @@ def test_dragging_the_handle_solves_inverse_kinematics(open_page: OpenPage) -> N
         assert shift[2] > 0.02 * scale
         assert np.abs(shift[:2]).max() < 1e-3 * scale
         assert np.abs(moved[:3, :3] - T[:3, :3]).max() < 1e-5
+        assert not page.errors
+
+
+def test_the_camera_moves_with_a_part(open_page: OpenPage) -> None:
+    model = dynx.load("six_axis_arm", base="floating")
+    with view(model) as viewer:
+        page = open_page(viewer.url)
+        (client,) = connected(viewer)
+        part = model.links[0].name
+        before, distance = client.camera.position, np.array([0.4, -0.3, 0.2])
+        viewer.follow(part)
+        q = model.neutral()
+        q[:3] += distance
+        viewer.update(q)
+        assert np.allclose(client.camera.position - before, distance, atol=1e-9)
+        viewer.follow(part, first_person=True)
+        assert np.allclose(client.camera.position, distance, atol=1e-9)
+        assert np.allclose(client.camera.look_at - distance, [1.0, 0.0, 0.0], atol=1e-6)
+        assert not page.errors
+
+
+def test_a_click_names_a_body_of_a_world_and_the_pointer_drags_it(open_page: OpenPage) -> None:
+    with World(read_scene("stack")) as world, world.view() as viewer:
+        page = open_page(viewer.url)
+        (client,) = connected(viewer)
+        pixels = {name: _pixel(client, body.position) for name, body in world.state.bodies.items()}
+        # Below the message on software, which lies over the upper left of the page.
+        name, held = min(
+            ((name, pixel) for name, pixel in pixels.items() if pixel[1] > MESSAGE),
+            key=lambda each: each[1][1],
+        )
+        mouse = page.page.mouse
+        mouse.move(*held)
+        page.page.wait_for_timeout(PICTURE)
+        mouse.click(*held)
+        until(lambda: viewer.view.names.shown == name, "the name of the part that was clicked")
+        steps = [lambda x=x: mouse.move(held[0] + x, held[1]) for x in (30.0, 60.0)]
+        for action in (mouse.down, *steps):
+            action()
+            page.page.wait_for_timeout(PICTURE)
+
+        def pulled() -> Floats:
+            found = viewer.view._spring.wrenches(world)
+            return np.asarray(found[0].force) if found else np.zeros(3)
+
+        until(lambda: np.linalg.norm(pulled()) > 1e-3, "the spring")
+        # From the camera's place, right in the picture is along (1, 1, 0).
+        assert pulled() @ [1.0, 1.0, 0.0] > 0.9 * np.sqrt(2.0) * np.linalg.norm(pulled())
+        mouse.up()
+        until(lambda: not viewer.view._spring.pulls, "the end of the pull")
         assert not page.errors
 
 

@@ -14,6 +14,7 @@ import dynx
 from dynx.errors import ArgumentError
 from dynx.model import Model
 from dynx.viewer import Viewer, view
+from dynx.viewer.spring import Pull
 from dynx.world import World
 from dynx.world.scene import read_scene
 from tests.conftest import EXAMPLES_INSTALLED, needs_examples
@@ -142,6 +143,84 @@ def test_a_spring_pulls_a_body_to_its_handle() -> None:
         viewer.view._spring._node.position = before + np.array([0.0, 0.0, 1.0])
         viewer.view.step(300)
         assert world.state.bodies[body.name].position[2] > before[2] + 0.1
+
+
+def test_the_pointer_drags_a_part_by_the_point_taken() -> None:
+    scene = read_scene("slope")
+    body = next(each for each in scene.bodies if not each.fixed)
+    with World(scene) as world, world.view() as viewer:
+        before = world.state.bodies[body.name].T_world_body
+        taken = before[:3, 3] + before[:3, :3] @ np.array([0.05, 0.0, 0.05])
+        viewer.view._spring.pull(Pull(body.name, taken, taken + np.array([0.0, 0.0, 1.0])))
+        viewer.view.step(1)
+        (wrench,) = viewer.view._spring.wrenches(world)
+        assert np.allclose(wrench.point, [0.05, 0.0, 0.05], atol=1e-12)
+        viewer.view.step(300)
+        lifted = world.state.bodies[body.name].position[2]
+        assert lifted > before[2, 3] + 0.1
+        viewer.view._spring.pull(None)
+        viewer.view.step(600)
+        assert not viewer.view._spring.pulls
+        assert world.state.bodies[body.name].position[2] < lifted
+
+
+def test_a_program_shows_its_own_states(arm: Model) -> None:
+    with view(arm) as viewer:
+        q = arm.random(3)
+        viewer.update(q)
+        assert np.array_equal(viewer.view.q, q)
+        with pytest.raises(ArgumentError, match="needs its configuration q"):
+            viewer.update()
+        with pytest.raises(ArgumentError, match="shape"):
+            viewer.update(np.zeros((2, arm.nq)))
+    with World(read_scene("slope")) as world, world.view(steps=False) as viewer:
+        name = next(body.name for body in world.scene.bodies if not body.fixed)
+        for _ in range(100):
+            world.step()
+        viewer.update()
+        shown = viewer.view.drawn.parts[name].position
+        assert np.allclose(shown, world.state.bodies[name].position, atol=1e-6)
+        with pytest.raises(ArgumentError, match="takes no q"):
+            viewer.update(q)
+    with dynx.simulate(arm, duration=0.1).view() as viewer, pytest.raises(ArgumentError, match="recorded"):
+        viewer.update()
+
+
+def test_notes_that_are_alike_are_one(tmp_path: Path) -> None:
+    links = [
+        f'<link name="l{k}"><visual><geometry><mesh filename="package://none/{k}.stl"/></geometry></visual>'
+        "</link>"
+        for k in range(4)
+    ]
+    joints = [
+        f'<joint name="j{k}" type="fixed"><parent link="l{k - 1}"/><child link="l{k}"/></joint>'
+        for k in range(1, 4)
+    ]
+    path = tmp_path / "robot.urdf"
+    path.write_text(f'<robot name="r">{"".join(links + joints)}</robot>')
+    with view(dynx.load(path)) as viewer:
+        assert viewer.notes == (
+            "shapes of 4 links (l0, l1, l2, ...) are not drawn: package 'none' was not found",
+        )
+
+
+@needs_examples
+def test_reduced_meshes_are_told() -> None:
+    model = dynx.load("ur5")
+    with model.view(whole_meshes=False) as viewer:
+        assert any("of its meshes" in note and "whole_meshes=True" in note for note in viewer.notes)
+    with model.view(whole_meshes=True) as viewer:
+        assert viewer.notes == ()
+
+
+def test_a_part_that_is_followed_must_exist(arm: Model) -> None:
+    with view(arm) as viewer:
+        name = arm.links[-1].name
+        viewer.follow(name)
+        viewer.follow(name, first_person=True)
+        viewer.follow(None)
+        with pytest.raises(ArgumentError, match="no part 'nothing'"):
+            viewer.follow("nothing")
 
 
 @needs_examples

@@ -38,7 +38,8 @@ from dynx.cli.shell.options import FiniteRange, GroupedCommand, group, name_list
     click.option(
         "--shapes",
         metavar="ROBOT",
-        help="Robot whose shapes a rollout is drawn with; a file of a rollout has none.",
+        help="Robot whose shapes a rollout is drawn with; a file of a rollout has none (default: the robot "
+        "of `dynx robots` with that name and those joints).",
     ),
     click.option("--collisions", is_flag=True, help="Begin with the collision shapes of a robot."),
     click.option(
@@ -77,10 +78,10 @@ from dynx.cli.shell.options import FiniteRange, GroupedCommand, group, name_list
 def view() -> None:
     """Show a robot, a rollout or a scene in the browser.
 
-    TARGET is a robot (a URDF or xacro file, or a name), a rollout (.npz of `dynx sim --save`), or a scene
-    (TOML or JSON, or the name of a scene of dynx). A robot has sliders and a handle that moves a frame by
-    inverse kinematics; a rollout has a timeline; a scene is stepped live, or recorded first
-    for --compare and --export.
+    TARGET is a robot (a URDF or xacro file, or a name), a rollout (.npz or .mcap of `dynx sim --save`), or a
+    scene (TOML or JSON, or the name of a scene of dynx). A robot has sliders and a handle that moves a frame
+    by inverse kinematics; a rollout has a timeline; a scene is stepped live, or recorded first for --compare
+    and --export.
 
     The page is served until Ctrl-C. Exit code 0; 2 for input that cannot be shown, or a port that is taken.
 

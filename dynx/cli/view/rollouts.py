@@ -1,31 +1,71 @@
-"""Rollouts of ``dynx view``: read from files, with the shapes of a robot."""
+"""Rollouts of ``dynx view``: read from files, which have no shapes, and drawn with those of a robot."""
 
 from __future__ import annotations
 
 import os
 from dataclasses import replace
 
-from dynx.errors import ArgumentError, RobotNotFoundError, shown
+import numpy as np
+
+from dynx.errors import ArgumentError, DynxError, RobotNotFoundError, shown
+from dynx.model import Model
+from dynx.model.elements import Joint
 from dynx.model.geometry import Geometry
+from dynx.model.library import robots
 from dynx.model.loading import load
 from dynx.sim import Rollout
 
+_SAME = 1e-9
+"""Largest difference of joint origins [m, and entries of a rotation] of a robot that is the same."""
+
 
 def read_rollout(path: str, shapes: str | None) -> Rollout:
-    """Return the rollout of a file, drawn with the shapes of the robot named `shapes`, if one is named."""
+    """Return the rollout of a file, drawn with the shapes of the robot named `shapes`.
+
+    Without one it has the shapes of the robot of the library that has its name and its joints, if there is
+    one: the file came from anyone, so it does not choose which files are read.
+    """
     if not os.path.isfile(path):
         what = "it is a folder" if os.path.isdir(path) else "there is none"
         raise RobotNotFoundError(f"no file {shown(path, 300)}: {what}")
     rollout = Rollout.load(path)
+    model = rollout.model
     if shapes is None:
-        return rollout
-    links = [link.name for link in rollout.model.links]
+        robot = _of_library(model)
+        return rollout if robot is None else replace(rollout, model=_with_shapes(model, robot))
     robot = load(shapes)
-    missing = [name for name in links if name not in robot.geometry.links]
+    missing = [link.name for link in model.links if link.name not in robot.geometry.links]
     if missing:
         raise ArgumentError(
-            f"{shown(shapes, 300)} has no link {shown(missing[0])}, which {rollout.model.name} has; --shapes "
+            f"{shown(shapes, 300)} has no link {shown(missing[0])}, which {model.name} has; --shapes "
             "names the robot of the rollout"
         )
-    geometry = Geometry({name: robot.geometry.links[name] for name in links})
-    return replace(rollout, model=replace(rollout.model, geometry=geometry))
+    return replace(rollout, model=_with_shapes(model, robot))
+
+
+def _with_shapes(model: Model, robot: Model) -> Model:
+    geometry = Geometry({link.name: robot.geometry.links[link.name] for link in model.links})
+    return replace(model, geometry=geometry)
+
+
+def _of_library(model: Model) -> Model | None:
+    """Return the robot of the library with the name, links and joints of a model; None without one."""
+    entry = next((each for each in robots() if model.name in (each.name, *each.aliases)), None)
+    if entry is None:
+        return None
+    try:
+        robot = load(entry.name)
+    except DynxError:
+        return None
+    there = {joint.name: joint for joint in robot.joints}
+    if any(link.name not in robot.geometry.links for link in model.links):
+        return None
+    return robot if all(_same(joint, there.get(joint.name)) for joint in model.joints) else None
+
+
+def _same(joint: Joint, other: Joint | None) -> bool:
+    return (
+        other is not None
+        and (joint.parent, joint.child) == (other.parent, other.child)
+        and bool(np.abs(joint.origin.matrix - other.origin.matrix).max() < _SAME)
+    )

@@ -12,8 +12,8 @@ from dynx.model.loading import load
 from dynx.model.model import Base
 
 _SCENES = (".toml", ".json")
-_ROLLOUT = ".npz"
-_OTHER_RECORDS = (".mcap", ".csv")
+_ROLLOUTS = (".npz", ".mcap")
+_TABLE = ".csv"
 
 _OPTIONS = {
     "robot": ("--engine", "--base", "--collisions"),
@@ -38,7 +38,9 @@ def kind_of_targets(targets: tuple[str, ...], compare: bool) -> str:
         return "comparison of rollouts"
     if compare and kinds != ["scene"]:
         found = " and ".join(f"{shown(t, 300)}, a {kind}" for t, kind in zip(targets, kinds, strict=True))
-        raise ArgumentError(f"--compare takes two rollouts (.npz), or one scene in two engines; got {found}")
+        raise ArgumentError(
+            f"--compare takes two rollouts (.npz or .mcap), or one scene in two engines; got {found}"
+        )
     if len(targets) != 1:
         raise ArgumentError(f"{len(targets)} targets; wanted one, or two rollouts with --compare")
     return kinds[0]
@@ -46,12 +48,12 @@ def kind_of_targets(targets: tuple[str, ...], compare: bool) -> str:
 
 def _kind_of(target: str) -> str:
     suffix = os.path.splitext(target)[1].lower()
-    if suffix in _OTHER_RECORDS:
+    if suffix == _TABLE:
         raise ArgumentError(
-            f"{shown(target, 300)}: a rollout is shown from .npz, as dynx sim --save FILE.npz writes it: "
-            "that has the robot and every digit"
+            f"{shown(target, 300)}: a rollout is shown from .npz or .mcap, as dynx sim --save FILE.npz "
+            "writes it: that has the robot and every digit"
         )
-    if suffix == _ROLLOUT:
+    if suffix in _ROLLOUTS:
         return "rollout"
     return "scene" if suffix in _SCENES or target in scene_names() else "robot"
 

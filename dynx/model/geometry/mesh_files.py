@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
@@ -20,6 +21,8 @@ _PACKAGE_PARTS = ("meshes", "mesh", "urdf")
 _PARTS = frozenset({"description", "model", "models", "robot", "robots", "urdf", "urdfs", "xacro"})
 """Names of folders that by convention lie beside the folder of the meshes."""
 
+_THREE_SLASHES = re.compile("^package:///+")
+
 
 class MeshNotFoundError(Exception):
     """The folder of a mesh is known, and the mesh is not in it."""
@@ -36,7 +39,9 @@ def find_mesh(filename: str, source: str, package_dirs: Iterable[StrPath] = ()) 
     A description may come from anyone, so nothing is searched or listed outside the folder of its files (see
     `enclosing_folder`) and the packages: a path that leads elsewhere, also by a symbolic link, gives None.
     Folders in `package_dirs`, which the user names, are searched first: for packages, and for full paths.
+    ``package:///NAME/FILE``, with a slash too many, is read as ``package://NAME/FILE``.
     """
+    filename = _THREE_SLASHES.sub("package://", filename)
     for folder in package_dirs:
         found = _in_user_folder(filename, Path(folder))
         if found is not None:
@@ -62,6 +67,7 @@ def reason_unknown(filename: str, source: str) -> str:
     """Return the reason why `find_mesh` does not know the folder of a mesh."""
     if not os.path.isfile(source):
         return "the description was not read from a file"
+    filename = _THREE_SLASHES.sub("package://", filename)
     if filename.startswith("package://"):
         name = filename.removeprefix("package://").partition("/")[0]
         try:

@@ -1,4 +1,4 @@
-"""Files of rollouts: the format follows from the suffix; `load` reads NumPy's ``.npz``."""
+"""Files of rollouts: the format follows from the suffix; `load` reads ``.npz`` and ``.mcap``."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from dynx.files.writing import atomic_file
 from dynx.model.documents import robot_document, robot_from_document
 from dynx.sim.record.csv_file import write_csv
 from dynx.sim.record.mcap_file import write_mcap
+from dynx.sim.record.mcap_reading import load_mcap
 from dynx.sim.record.rollout_data import RolloutData
 from dynx.sim.scenario.scenario import Scenario
 from dynx.trajectory.base import Setpoint
@@ -51,10 +52,14 @@ def save(rollout: RolloutData, path: str | os.PathLike[str]) -> None:
 
 
 def load(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Read the fields of a rollout from a ``.npz`` of `save`. Raises ArgumentError for any other file.
+    """Read the fields of a rollout from a ``.npz`` or a ``.mcap`` of `save`.
 
-    The model is read from the URDF text in the file; no array is unpickled.
+    The model is read from the URDF text in the file; no array is unpickled. A ``.mcap`` has neither the
+    scenario nor what surrounds the robot, and whole nanoseconds (`load_mcap`). Raises ArgumentError for any
+    other file, NotInstalledError for ``.mcap`` without mcap.
     """
+    if Path(checked_path(path)).suffix.lower() == ".mcap":
+        return load_mcap(path)
     file = read_arrays(path, "a rollout", SCHEMA)
     with _reading("the robot", file):
         robot: dict[str, Any] = json.loads(file.text("robot"))

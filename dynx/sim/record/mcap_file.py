@@ -1,4 +1,5 @@
-"""Rollouts as MCAP recordings of ROS 2 messages, for PlotJuggler, Foxglove and ``ros2 bag``.
+"""Rollouts as MCAP recordings of ROS 2 messages, for PlotJuggler, Foxglove and ``ros2 bag``; the only import
+of mcap.
 
 `dynx.sim.record.ros_topics` lists the topics. Time stamps are the times of the record, starting at 0 s, in
 whole nanoseconds as in ROS. The metadata record ``dynx.rollout`` has the settings of the simulation and the
@@ -13,7 +14,8 @@ from typing import BinaryIO
 import numpy as np
 
 from dynx._version import __version__
-from dynx.errors import NotInstalledError
+from dynx.errors import ArgumentError, NotInstalledError
+from dynx.files.reading import open_regular, printable
 from dynx.model.documents import pose_numbers
 from dynx.sim.record.rollout_data import RolloutData
 from dynx.sim.record.ros_definitions import schema_name, schema_text
@@ -57,6 +59,31 @@ def write_mcap(rollout: RolloutData, file: BinaryIO) -> None:
         for k, channel, data in sorted(messages, key=lambda message: message[0]):
             writer.add_message(channel, times[k], data, times[k], sequence=k)
     writer.finish()
+
+
+def read_messages(path: str) -> tuple[list[tuple[str, int, bytes]], dict[str, dict[str, str]]]:
+    """Return topic, time stamp [ns] and data of the messages of a recording, in their order, and its metadata
+    by name.
+
+    Raises ArgumentError for a file that cannot be read as MCAP, NotInstalledError without mcap.
+    """
+    try:
+        from mcap.reader import make_reader
+    except ImportError as error:
+        raise NotInstalledError("a .mcap file needs mcap: pip install 'dynx[mcap]'") from error
+    try:
+        with open_regular(path) as file:
+            reader = make_reader(file, validate_crcs=True)
+            about = {each.name: dict(each.metadata) for each in reader.iter_metadata()}
+            messages = [
+                (channel.topic, message.log_time, message.data)
+                for _, channel, message in reader.iter_messages(log_time_order=False)
+            ]
+    # A damaged file raises what its records lead to: struct.error, KeyError, errors of zstandard.
+    except Exception as error:
+        reason = str(error) or type(error).__name__
+        raise ArgumentError(f"{printable(path)} is no whole MCAP file: {reason}") from error
+    return messages, about
 
 
 def _metadata(rollout: RolloutData) -> dict[str, str]:

@@ -26,5 +26,9 @@ class Rollout(RolloutData):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Rollout:
-        """Read a ``.npz`` file of `save`, to the last bit. Raises ArgumentError for any other file."""
+        """Read a file of `save`: ``.npz`` to the last bit, or ``.mcap``, which has times in whole
+        nanoseconds and neither scenario nor surroundings.
+
+        Raises ArgumentError for any other file, NotInstalledError for ``.mcap`` without mcap.
+        """
         return cls(**load(path))

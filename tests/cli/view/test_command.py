@@ -13,6 +13,7 @@ from click.testing import CliRunner
 
 import dynx
 from dynx.cli.shell.main import cli
+from dynx.cli.view.rollouts import read_rollout
 from tests.conftest import needs_examples
 
 BAD_INPUT = 2
@@ -65,7 +66,8 @@ def test_a_scene_is_recorded_in_one_engine(tmp_path: Path) -> None:
 @needs_examples
 def test_a_rollout_is_drawn_with_the_shapes_of_a_robot(tmp_path: Path) -> None:
     path, page = tmp_path / "run.npz", tmp_path / "page.html"
-    dynx.simulate(dynx.load("ur5"), duration=0.05).save(path)
+    own = dynx.load("ur5").to_urdf().replace('<robot name="ur5">', '<robot name="own_arm">')
+    dynx.simulate(dynx.load(own), duration=0.05).save(path)
     code, output = run(str(path), "--export", str(page))
     assert code == 0, output
     assert "has no shapes" in output
@@ -76,7 +78,7 @@ def test_a_rollout_is_drawn_with_the_shapes_of_a_robot(tmp_path: Path) -> None:
     assert page.stat().st_size > bare + 50_000
     code, output = run(str(path), "--shapes", "pendulum", "--export", str(page))
     assert code == BAD_INPUT
-    assert "which ur5 has" in output
+    assert "which own_arm has" in output
 
 
 @pytest.mark.parametrize(
@@ -84,7 +86,7 @@ def test_a_rollout_is_drawn_with_the_shapes_of_a_robot(tmp_path: Path) -> None:
     [
         (("no_such_robot",), "no_such_robot"),
         (("nowhere.npz",), "no file"),
-        (("run.mcap",), "shown from .npz"),
+        (("run.csv",), "shown from .npz"),
         (("pendulum", "pendulum"), "2 targets"),
         (("--compare", "pendulum"), "'pendulum', a robot"),
         (("--compare", "a.npz"), "takes two rollouts"),
@@ -141,3 +143,24 @@ def test_the_page_ends_with_ctrl_c() -> None:
     assert "http://127.0.0.1:" in address
     assert process.returncode == 0, output
     assert "Traceback" not in output
+
+
+def test_a_recording_in_mcap_is_shown(tmp_path: Path) -> None:
+    pytest.importorskip("mcap")
+    recording, picture = tmp_path / "run.mcap", tmp_path / "run.png"
+    dynx.simulate(dynx.load("six_axis_arm"), duration=0.05).save(recording)
+    code, output = run(str(recording), "--export", str(picture))
+    assert code == 0, output
+    assert picture.is_file()
+
+
+@needs_examples
+def test_a_rollout_is_drawn_with_the_shapes_of_the_library(tmp_path: Path) -> None:
+    path = tmp_path / "run.npz"
+    dynx.simulate(dynx.load("panda"), duration=0.01).save(path)
+    assert read_rollout(str(path), None).model.geometry.visuals("panda_link1")
+    text = dynx.load("panda").to_urdf()
+    assert 'xyz="0.0 0.0 0.333"' in text
+    longer = dynx.load(text.replace('xyz="0.0 0.0 0.333"', 'xyz="0.0 0.0 0.4"', 1))
+    dynx.simulate(longer, duration=0.01).save(path)
+    assert not read_rollout(str(path), None).model.geometry.visuals("panda_link1")

@@ -6,6 +6,7 @@ import json
 import struct
 import sys
 from collections import defaultdict
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,13 @@ import pytest
 
 from dynx.control import ComputedTorque
 from dynx.control.base import Controller, Measurement
-from dynx.errors import NotInstalledError
+from dynx.errors import ArgumentError, NotInstalledError
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.sim import Noise, Payload, Rollout, simulate
 from dynx.sim.record.ros_definitions import DEFINITIONS, SEPARATOR, schema_text
 from dynx.spatial.scalar import Floats
+from dynx.trajectory import cycloidal
 from dynx.trajectory.base import Setpoint
 from tests.sim.bars import tutorial_motion, tutorial_robot
 
@@ -282,3 +284,51 @@ def test_without_mcap_the_extra_is_named(
     with pytest.raises(NotInstalledError, match=r"dynx\[mcap\]"):
         arm.save(tmp_path / "run.mcap")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+@pytest.mark.parametrize("followed", [True, False])
+def test_a_recording_is_read_back(tmp_path: Path, base: str, followed: bool) -> None:
+    pytest.importorskip("mcap")
+    model = load(FOLLOWING, base=base)  # type: ignore[arg-type]
+    reference: Any = None
+    if followed:
+        goal = model.integrate(model.neutral(), np.full(model.nv, 0.1))
+        reference = goal if base == "floating" else cycloidal(model.neutral(), goal, duration=0.05)
+    law = Thrust(model) if followed else None
+    rollout = simulate(model, law, reference, duration=0.05)
+    path = tmp_path / "run.mcap"
+    rollout.save(path)
+    same = Rollout.load(path)
+    assert same.model.joint_names == model.joint_names
+    assert same.model.floating == model.floating
+    for name in ("q", "v", "a", "tau", "saturated", "rotors"):
+        assert np.array_equal(getattr(same, name), getattr(rollout, name)), name
+    assert np.abs(same.t - rollout.t).max() <= 0.5e-9
+    assert (same.reference is None) == (rollout.reference is None)
+    if rollout.reference is not None:
+        assert same.reference is not None
+        for found, wanted in zip(same.reference, rollout.reference, strict=True):
+            assert np.array_equal(found, wanted)
+
+
+def test_other_recordings_are_refused(tmp_path: Path) -> None:
+    pytest.importorskip("mcap")
+    rollout = simulate(load(FOLLOWING), duration=0.01)
+    path = tmp_path / "run.mcap"
+    rollout.save(path)
+    whole = path.read_bytes()
+    for data in (b"", b"no recording", whole[:200], whole[: len(whole) // 2], whole[:-30]):
+        path.write_bytes(data)
+        with pytest.raises(ArgumentError, match=r"run\.mcap"):
+            Rollout.load(path)
+    generator = np.random.default_rng(0)
+    for _ in range(60):
+        damaged = bytearray(whole)
+        damaged[generator.integers(len(whole))] ^= 1 << int(generator.integers(8))
+        path.write_bytes(damaged)
+        # What no checksum covers may be read; whatever fails is one error.
+        with suppress(ArgumentError):
+            Rollout.load(path)
+    with pytest.raises(ArgumentError):
+        Rollout.load(tmp_path / "nothing.mcap")
