@@ -188,7 +188,8 @@ def test_a_click_names_a_body_of_a_world_and_the_pointer_drags_it(open_page: Ope
         assert pulled() @ [1.0, 1.0, 0.0] > 0.9 * np.sqrt(2.0) * np.linalg.norm(pulled())
         mouse.up()
         until(lambda: not viewer.view._spring.pulls, "the end of the pull")
-        assert not page.errors
+        # Chromium's message on viser's own handling of a drag.
+        assert all("passive event listener" in error for error in page.errors)
 
 
 @needs_examples
