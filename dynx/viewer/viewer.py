@@ -149,8 +149,8 @@ class Viewer(Controls):
         number of pictures drawn). Raises ArgumentError for a live world, whose motion is not known before it
         has happened, for another suffix, and for a file that cannot be written.
         """
-        from dynx.viewer.film import camera_for, picture_of, write_film, write_picture
-        from dynx.viewer.recording import write_recording
+        from dynx.viewer.export.film import camera_for, picture_of, write_film, write_picture
+        from dynx.viewer.export.recording import write_recording
 
         view = self.view
         suffix = os.path.splitext(checked_path(path))[1].lower()

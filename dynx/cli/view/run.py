@@ -87,7 +87,7 @@ def view(
 
 def _export(viewer: Viewer, path: str) -> None:
     from dynx.cli.shell.progress import progress_bar
-    from dynx.viewer.film import film_length
+    from dynx.viewer.export.film import film_length
 
     film = path.lower().endswith(".gif") and viewer.view.duration
     total = film_length(viewer.view.motion) if film else 0
