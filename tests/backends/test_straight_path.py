@@ -118,10 +118,11 @@ def test_what_is_no_valid_sample_is_refused_on_the_straight_path(size: int, base
 def test_an_acceleration_of_the_straight_path_is_finite(
     size: int, validate: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    found: Floats = np.ones(size)
+    found = np.ones(size)
 
     def solved(self: PinocchioBackend, q: Floats, v: Floats, tau: Floats) -> Floats:
-        return found.copy()
+        copied: Floats = found.copy()
+        return copied
 
     monkeypatch.setattr(PinocchioBackend, "_forward_dynamics", solved)
     model = chain(size)
