@@ -221,7 +221,7 @@ def test_damaged_files_are_refused_or_whole(written: bytes, rollout: Rollout, tm
     assert lost > 100
 
 
-@pytest.mark.parametrize("name", ["run.csv", "run.mcap", "array.npy", "archive.zip", "empty.npz"])
+@pytest.mark.parametrize("name", ["run.csv", "array.npy", "archive.zip", "empty.npz"])
 def test_foreign_files(rollout: Rollout, tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     if name.startswith("run"):
