@@ -19,7 +19,14 @@ from dynx.cli.shell.options import (
 
 @click.group()
 def env() -> None:
-    """List the tasks of reinforcement learning, and measure how far apart the engines are on one."""
+    """List the tasks of reinforcement learning, and measure how far apart the engines are on one.
+
+    \b
+    Examples:
+      dynx env list
+      dynx env distance CartPole
+      dynx env distance LunarLander --engine pybullet,mujoco --tolerance 1e-3
+    """
 
 
 @env.command("list")

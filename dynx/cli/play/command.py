@@ -55,7 +55,7 @@ def play() -> None:
 
     \b
     Examples:
-      dynx play runs/CartPole-ppo/final.zip
+      dynx play runs/CartPole-compiled-ppo/final.zip
       dynx play lander/final.zip --engine mujoco,pybullet --episodes 100
       dynx play lander/final.zip --view
       dynx play lander/final.zip --export lander.gif

@@ -9,7 +9,7 @@ from dynx.training import Trained
 from dynx.training.records import read_lines
 from dynx.training.run import CURVE, EVALUATIONS
 
-_STYLES = ("-", "--", ":", "-.")
+_STYLES, _MARKS = ("-", "--", ":", "-."), "os^v"
 
 
 def plot(runs: Sequence[Trained], path: str) -> None:
@@ -28,12 +28,17 @@ def plot(runs: Sequence[Trained], path: str) -> None:
         )
         judged = read_lines(run.folder / EVALUATIONS)
         axes.plot(
-            [each["steps"] for each in judged], [each["mean"] for each in judged], "o", color=colour, ms=4
+            [each["steps"] for each in judged],
+            [each["mean"] for each in judged],
+            _MARKS[k % len(_MARKS)],
+            color=colour,
+            ms=5,
+            mfc="none",
         )
     spec = runs[0].policy.spec
     axes.set_xlabel("steps")
-    axes.set_ylabel("return")
-    axes.set_title(f"{spec.task.name}, {spec.algorithm}: mean of 100 episodes (lines), evaluations (points)")
+    axes.set_ylabel("return: last 100 episodes (line), evaluation (mark)")
+    axes.set_title(f"{spec.task.name}, {spec.algorithm}")
     axes.grid(True, alpha=0.3)
     axes.legend()
     save_figure(figure, path)
