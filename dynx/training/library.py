@@ -61,6 +61,9 @@ ACTIVATIONS = {
 _GIVEN = ("self", "policy", "env", "seed", "verbose", "tensorboard_log", "device", "_init_setup_model")
 """Parameters of an algorithm that training sets itself."""
 
+_FRACTIONS = ("gamma", "gae_lambda", "tau")
+"""Hyperparameters between 0 and 1; the algorithms accept others, with which nothing is learned."""
+
 _REPLAYED = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 
 
@@ -77,6 +80,10 @@ def new_algorithm(name: str, env: VecEnv, hyperparameters: dict[str, Any], seed:
     for each in hyperparameters:
         if each not in known:
             raise UnknownNameError(f"{name} has no hyperparameter {shown(each)}{nearest(each, known)}")
+    for each in _FRACTIONS:
+        value = hyperparameters.get(each, 1.0)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= 1.0:
+            raise ArgumentError(f"{each} is {value!r}; wanted a number between 0 and 1")
     values = {each: schedule_of(each, value) for each, value in hyperparameters.items()}
     if "policy_kwargs" in values:
         values["policy_kwargs"] = _policy_options(values["policy_kwargs"])

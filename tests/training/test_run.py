@@ -146,6 +146,8 @@ def test_folders_with_another_or_no_run_are_refused(tmp_path: Path) -> None:
         ({"hyperparameters": {"learning_rate": "fast"}}, "learning_rate is a number, or lin_NUMBER"),
         ({"hyperparameters": {"policy_kwargs": {"activation_fn": "rleu"}}}, "did you mean 'relu'"),
         ({"algorithm": "sac", "hyperparameters": {}}, "sac refuses"),
+        ({"hyperparameters": {"gamma": 1.9}}, "gamma is 1.9; wanted a number between 0 and 1"),
+        ({"hyperparameters": {"gae_lambda": "all"}}, "gae_lambda is 'all'; wanted a number"),
         ({"task": TaskSpec("CartPole-v1", None, {"no_such": 1})}, "cannot be made"),
     ],
 )
