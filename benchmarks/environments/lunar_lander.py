@@ -25,9 +25,9 @@ from dynx.world.registry import installed_worlds
 BOX2D = "Box2D"
 heuristic: Callable[[Any, Any], int] = lunar_lander.heuristic
 DISCRETE = SimpleNamespace(unwrapped=SimpleNamespace(continuous=False))
-"""What the heuristic reads of an environment."""
+"""Stands for an environment: all that the heuristic reads of one."""
 NEAR = 20.0
-"""Difference of two returns that count as the same landing."""
+"""Largest difference of two returns that count as the same landing."""
 
 
 @dataclass

@@ -11,7 +11,8 @@ CONFIDENCE = 0.95
 
 
 def confidence_interval(values: NDArray[np.float64]) -> tuple[float, float]:
-    """Return the interval of Student's t that has the mean with `CONFIDENCE`; infinite for one value."""
+    """Return the interval of Student's t that holds the true mean with the probability `CONFIDENCE`;
+    unbounded for one value."""
     from scipy.stats import t  # takes half a second to import
 
     mean, count = float(values.mean()), len(values)

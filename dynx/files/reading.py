@@ -64,7 +64,7 @@ def read_file(path: str) -> bytes:
 def checked_path(path: object) -> str:
     """Return a path as a str. Raises ArgumentError for anything but a str, bytes or an `os.PathLike`."""
     try:
-        return os.fsdecode(path)  # type: ignore[arg-type]
+        return os.fsdecode(path)  # type: ignore[arg-type]  # anything is tried
     except TypeError:
         raise ArgumentError(f"a path is {shown(path)}; wanted a str or an os.PathLike") from None
 

@@ -38,7 +38,7 @@ class AxisRequirement:
     rotation_tolerances: tuple[float, float, float] | None
     """Bounds on the components [rad]; None for a bound on their norm."""
     of_target: bool
-    """Whether the axes are those of the target, not of the world."""
+    """True if x, y and z are the axes of the target; False if they are those of the world."""
 
     @property
     def free_rotation(self) -> int | None:

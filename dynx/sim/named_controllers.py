@@ -172,12 +172,15 @@ CONTROLLERS = NamedControllers()
 def _of_class(kind: type[Controller[Any]]) -> NamedController:
     """Make the entry of a registered class, whose constructor gets the arguments that it declares."""
     parameters = signature(kind).parameters
+    constructor: Callable[..., Controller[Any]] = kind
 
     def make(request: ControllerRequest) -> Controller[Any]:
         options = {"frame": request.frame, "limit": request.limit, "backend": request.backend}
         options |= {"control_dt": request.control_dt, **request.gains.given()}
         try:
-            return kind(request.model, **{name: x for name, x in options.items() if name in parameters})  # type: ignore[call-arg]
+            return constructor(
+                request.model, **{name: x for name, x in options.items() if name in parameters}
+            )
         except TypeError as error:
             raise GainError(f"{kind.__name__} cannot be made: {error}") from None
 

@@ -41,7 +41,7 @@ class Evaluation:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Interval that has the true mean with 95 % confidence (Student's t)."""
+        """Interval that holds the true mean with 95 % confidence (Student's t)."""
         return confidence_interval(self.returns)
 
     def __repr__(self) -> str:

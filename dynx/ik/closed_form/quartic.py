@@ -12,6 +12,8 @@ rounding errors of the closed formula, which are large near double roots.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from dynx.ik.closed_form.subproblems import Angle, positive_root
@@ -49,17 +51,16 @@ def linear(a: tuple[Array, Array, Array]) -> Conic:
 
 def combined(*terms: tuple[Array | float, Conic]) -> Conic:
     """Return the sum of conics, each times a factor."""
-    k0, k1, k2, k3, k4, k5 = (sum(factor * conic[i] for factor, conic in terms) for i in range(6))
-    return k0, k1, k2, k3, k4, k5  # type: ignore[return-value]
+    return _conic(lambda i: np.asarray(sum(factor * conic[i] for factor, conic in terms)))
 
 
-def conic_root(k: Conic, first: Array, second: Array) -> Angle:
+def conic_root(conic: Conic, first: Array, second: Array) -> Angle:
     """Return the root of f that two signs (...,), each 1 or -1, choose among four.
 
     Where that root is not real, an angle near its real part is returned, at which f does not vanish.
     """
-    size = 1e-300 + sum(abs(each) for each in k)
-    k = tuple(each / size for each in k)  # type: ignore[assignment]
+    size = 1e-300 + sum(abs(each) for each in conic)
+    k = _conic(lambda i: conic[i] / size)
     c0, s0 = _far_direction(k)
     k0, k1, k2, k3, k4, k5 = _rotated(k, c0, s0)
     # Coefficients of the quartic in the tangent of half the angle.
@@ -76,6 +77,12 @@ def conic_root(k: Conic, first: Array, second: Array) -> Angle:
     slope = abs(_slope(k, c, s))
     none = where_less(slope, _DOUBLE, 0.0, -1.0)
     return Angle(c, s, separation=where_less(0.5, real, slope, none))
+
+
+def _conic(coefficient: Callable[[int], Array]) -> Conic:
+    """Return the conic whose coefficients a function gives by their index."""
+    k0, k1, k2, k3, k4, k5 = (coefficient(i) for i in range(6))
+    return k0, k1, k2, k3, k4, k5
 
 
 def _value(k: Conic, c: Array | float, s: Array | float) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ from dynx.ik.reach.intervals import (
     rotated_product,
     segment_lengths,
 )
-from dynx.ik.reach.stations import Stations, points_of_least_length
+from dynx.ik.reach.stations import Slide, Stations, points_of_least_length
 from dynx.spatial.scalar import Floats
 
 _PARALLEL = 1e-9
@@ -170,10 +171,10 @@ def height_bounds(stations: Stations, in_frame: Floats) -> list[HeightBound]:
     return [HeightBound(axis, name, allowed)]
 
 
-def _slid(direction: Floats, point: Floats, slides: object) -> Interval:
+def _slid(direction: Floats, point: Floats, slides: Sequence[Sequence[Slide]]) -> Interval:
     """Return the coordinates along a direction of a point that prismatic joints move."""
     allowed = Interval(float(point @ direction), float(point @ direction))
-    for each in slides:  # type: ignore[attr-defined]
+    for each in slides:
         for axis, travel in each:
             share = float(axis @ direction)
             if share != 0.0:

@@ -16,7 +16,7 @@ def positive_number(name: str, value: object) -> float:
 
 def finite_numbers(name: str, values: object, count: int) -> tuple[float, ...]:
     """Return `count` finite numbers below `MAX_MAGNITUDE`; raise ArgumentError for anything else."""
-    array = checked_array(name, values, count)  # type: ignore[arg-type]
+    array = checked_array(name, values, count)  # type: ignore[arg-type]  # anything is checked
     if array.ndim != 1:
         raise ShapeError(f"{name} has shape {array.shape}; wanted ({count},)")
     return tuple(array.tolist())

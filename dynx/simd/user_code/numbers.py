@@ -151,7 +151,7 @@ def logical(name: Literal["and", "or", "xor"], a: Any, b: Any) -> Any:
     if name == "xor":
         equal = _applied("equal", *sides)
         return ~Condition(equal.graph, equal.index)
-    found = _applied({"and": "mul", "or": "max"}[name], *sides)  # type: ignore[arg-type]
+    found = _applied("mul" if name == "and" else "max", *sides)
     return Condition(found.graph, found.index)
 
 
