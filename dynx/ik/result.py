@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,8 @@ from numpy.typing import NDArray
 
 from dynx.files.notebook import html_table
 from dynx.spatial.scalar import Floats
+
+Measures = tuple[float, float, float, int]
 
 REACHED, UNREACHABLE, NOT_FOUND = "REACHED", "UNREACHABLE", "NOT_FOUND"
 """Values of `IKResult.status`."""
@@ -93,3 +97,44 @@ class IKResult:
     def __bool__(self) -> bool:
         """Return whether every target was reached."""
         return bool(self.success.all())
+
+
+class ReachedTarget(IKResult):
+    """Result of one target that is reached. What is not asked for is not computed: the arrays of the other
+    fields take longer than the kernel's steps."""
+
+    by_frame: Mapping[str, tuple[Floats, Floats]] = MappingProxyType({})
+    _measures: Measures
+
+    @classmethod
+    def of(cls, q: Floats, measures: Measures) -> ReachedTarget:
+        """Make the result of q (nq,), with the position error [m], the rotation error [rad], and the numbers
+        of iterations and restarts."""
+        found = object.__new__(cls)
+        found.__dict__["q"], found.__dict__["_measures"] = q, measures
+        return found
+
+    @cached_property
+    def success(self) -> NDArray[np.bool_]:
+        """True, without axes."""
+        return np.array(True)
+
+    @cached_property
+    def position_error(self) -> Floats:
+        """Distance from the target [m]."""
+        return np.array(self._measures[0])
+
+    @cached_property
+    def rotation_error(self) -> Floats:
+        """Angle to the target [rad]."""
+        return np.array(self._measures[1])
+
+    @cached_property
+    def iterations(self) -> NDArray[np.int64]:
+        """Number of solver steps, summed over all starts."""
+        return np.array(self._measures[2], dtype=np.int64)
+
+    @cached_property
+    def restarts(self) -> NDArray[np.int64]:
+        """Number of starts after the first."""
+        return np.array(self._measures[3])

@@ -24,6 +24,8 @@ ROUNDING_TOLERANCE = 1e-12
 LIKENESS_TOLERANCE = 1e-2
 """Largest entry of R'R - 1 in three positions that are refused because they may be a rotation."""
 
+_LAST_ROW = [0.0, 0.0, 0.0, 1.0]
+
 FREE = ("rotation", "position")
 """Parts of a target that may be free."""
 
@@ -116,22 +118,17 @@ def _refuse_likeness(positions: Floats) -> None:
 
 def is_rigid(T: list[list[float]]) -> bool:
     """Return whether one pose is a rigid transform to rounding; on floats, ten times as fast as arrays."""
-    a, b, c, bottom = T
-    if bottom != [0.0, 0.0, 0.0, 1.0] or not math.hypot(a[3], b[3], c[3]) < MAX_MAGNITUDE:
-        return False
-    deviation = max(
-        abs(_dot(a, a) - 1.0),
-        abs(_dot(b, b) - 1.0),
-        abs(_dot(a, b)),
-        abs(a[1] * b[2] - a[2] * b[1] - c[0]),
-        abs(a[2] * b[0] - a[0] * b[2] - c[1]),
-        abs(a[0] * b[1] - a[1] * b[0] - c[2]),
+    (a, b, c, x), (d, e, f, y), (g, h, i, z), bottom = T
+    return (
+        bottom == _LAST_ROW
+        and abs(a * a + b * b + c * c - 1.0) <= ROUNDING_TOLERANCE
+        and abs(d * d + e * e + f * f - 1.0) <= ROUNDING_TOLERANCE
+        and abs(a * d + b * e + c * f) <= ROUNDING_TOLERANCE
+        and abs(b * f - c * e - g) <= ROUNDING_TOLERANCE
+        and abs(c * d - a * f - h) <= ROUNDING_TOLERANCE
+        and abs(a * e - b * d - i) <= ROUNDING_TOLERANCE
+        and math.hypot(x, y, z) < MAX_MAGNITUDE
     )
-    return deviation <= ROUNDING_TOLERANCE
-
-
-def _dot(a: list[float], b: list[float]) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def _checked_rotations(T: Floats) -> Floats:

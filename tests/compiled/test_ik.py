@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
@@ -50,6 +53,17 @@ def test_a_pose_of_a_batch_has_the_result_that_it_has_alone() -> None:
                 assert_equal(alone, together, k)
         part = engine.inverse_kinematics(targets[5:9], FRAME, max_restarts=20)
         assert_equal(part, together, slice(5, 9))
+
+
+def test_the_result_of_one_target_is_copied_pickled_and_changed_like_others() -> None:
+    with backend("compiled", ARM, threads=1) as engine:
+        target = reachable(engine, 1)[0]
+        first, again = (engine.inverse_kinematics(target, FRAME) for _ in range(2))
+    for same in (again, pickle.loads(pickle.dumps(again)), copy.deepcopy(again), replace(again, proof=None)):
+        assert_equal(same, first)
+        assert (same.status, same.message, repr(same)) == (first.status, first.message, repr(first))
+        assert (same.proof, dict(same.by_frame)) == (None, {})
+    assert not replace(again, success=np.array(False))
 
 
 def test_results_do_not_depend_on_threads() -> None:

@@ -11,13 +11,15 @@ from dynx.compiled.ik.race import Race
 from dynx.compiled.ik.starts import STARTS_OF_CELL, Starts
 from dynx.compiled.ik.step import Memory, TargetKind
 from dynx.ik import IKResult, Problem, is_rigid
+from dynx.ik.result import ReachedTarget
 from dynx.model import Model
 from dynx.simd.iteration import IterationKernel
 
 _POSE = Struct("12d")
 _FLOAT64 = np.dtype(np.float64)
 
-Workspace = tuple[Race, memoryview, memoryview, memoryview]
+Workspace = tuple[Race, memoryview, memoryview, memoryview, memoryview]
+"""A race, and its memory: target, starts, what angles are to be near, and results."""
 
 
 class PoseCall:
@@ -28,7 +30,7 @@ class PoseCall:
     ) -> None:
         """`problem` has the options, any pose as target, and the configuration without q0."""
         self._kernel, self._memory, self._starts, self._problem = kernel, memory, starts, problem
-        self._indices, self._n = problem.coordinates.indices, memory.n
+        self._indices, self._n, self._width = problem.coordinates.indices, memory.n, memory.n_results
         self._q0 = problem.q0.reshape(-1)
         self._places_all = self._indices == list(range(len(self._q0)))
         lower, upper = model.lower.copy(), model.upper.copy()
@@ -51,31 +53,24 @@ class PoseCall:
             workspace = free.pop()
         except IndexError:
             workspace = self._workspace()
-        race, target_view, x_view, near_view = workspace
+        race, target_view, x_view, near_view, results = workspace
         self._starts.copy_near(x_view, STARTS_OF_CELL * self._cells.number_of_one(rows))
         _POSE.pack_into(target_view, 0, *rows[0], *rows[1], *rows[2])
         if q0 is not None:
             near_view[:] = x_view[: self._n] = (q0 if self._places_all else q0[self._indices]).data
-        completed, n = race.run(), self._n
-        row = race.result[completed - 1]
-        q = row[:n].copy()
-        distance, angle, reached, iterations = row[n : n + 4].tolist()
-        if completed > 1:
-            iterations = race.result[:completed, n + 3].sum()
+        completed, n, width = race.run(), self._n, self._width
+        end = width * completed
+        first = end - width + n
+        distance, angle, reached = results[first], results[first + 1], results[first + 2]
+        iterations = results[first + 3] if completed == 1 else sum(results[n + 3 : end : width])
+        q = race.result[completed - 1, :n].copy()
         free.append(workspace)
         if not reached:
             return None
         if not self._places_all:
             of_frame, q = q, (self._q0 if q0 is None else q0).copy()
             q[self._indices] = of_frame
-        return IKResult(
-            q,
-            np.array(True),
-            np.array(distance),
-            np.array(angle),
-            np.array(int(iterations)),
-            np.array(completed - 1),
-        )
+        return ReachedTarget.of(q, (distance, angle, int(iterations), completed - 1))
 
     def _is_within(self, q0: Any) -> bool:
         """Check whether q0 is a contiguous configuration (nq,) within the limits."""
@@ -87,4 +82,5 @@ class PoseCall:
     def _workspace(self) -> Workspace:
         race = Race(self._kernel, TargetKind.of(self._problem), self._memory, self._starts)
         race.prepare(self._problem, self._indices)
-        return race, race.target.data, race.x.reshape(-1).data, race.near.data
+        x, results = (array.reshape(-1).data for array in (race.x, race.result))
+        return race, race.target.data, x, race.near.data, results

@@ -68,15 +68,19 @@ class Cells:
 
     def number_of_one(self, rows: list[list[float]]) -> int:
         """Return the cell of one pose, as the first three rows of its matrix; faster than for arrays."""
-        cell = 0
-        x, y, z, *_ = rows
-        for row, corner, per_metre in zip((x, y, z), *self._axes, strict=True):
-            at = (row[3] - corner) * per_metre
-            cell = cell * BOXES + (0 if at < 0.0 else LAST_BOX if at >= LAST_BOX else int(at))
+        x, y, z = rows[0], rows[1], rows[2]
+        (x_corner, y_corner, z_corner), (x_scale, y_scale, z_scale) = self._axes
+        # Written out, which takes half the time of a loop.
+        at = (x[3] - x_corner) * x_scale
+        cell = 0 if at < 0.0 else LAST_BOX if at >= LAST_BOX else int(at)
+        at = (y[3] - y_corner) * y_scale
+        cell = cell * BOXES + (0 if at < 0.0 else LAST_BOX if at >= LAST_BOX else int(at))
+        at = (z[3] - z_corner) * z_scale
+        cell = cell * BOXES + (0 if at < 0.0 else LAST_BOX if at >= LAST_BOX else int(at))
         a, b, c = abs(x[2]), abs(y[2]), abs(z[2])
         # Of equal magnitudes the lower axis counts, as in `numpy.argmax`.
         up = (0 if a >= c else 2) if a >= b else (1 if b >= c else 2)
-        first, second = rows[(up + 1) % 3][0], rows[(up + 2) % 3][0]
+        first, second = (y[0], z[0]) if up == 0 else (z[0], x[0]) if up == 1 else (x[0], y[0])
         closer = abs(first) - abs(second)
         along_first = closer > 0.0 or (closer == 0.0 and up != 1)
         turn = (first < 0.0) if along_first else 2 + (second < 0.0)
