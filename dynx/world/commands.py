@@ -13,17 +13,18 @@ from dynx.errors import ArgumentError, ShapeError, UnknownNameError, nearest, sh
 from dynx.model import Model
 from dynx.model.configuration import checked_array
 from dynx.spatial.scalar import Floats
-from dynx.world.engine import WorldEngine
+from dynx.world.engine import Torque, WorldEngine
 from dynx.world.layout import Layout, RobotLayout
-from dynx.world.loads import RobotLoads, Torque, Wrench, checked_torques, found_robot
+from dynx.world.loads import RobotLoads, Wrench, checked_torques, found_robot
 from dynx.world.motors import Motor
 from dynx.world.notes.divergence import LastLoads, RobotLoad
 from dynx.world.snapshot import Memory
 
 MotorsOf = Mapping[str, "Motor | MotorCommand | Sequence[Motor]"]
 
-Act = Callable[[WorldEngine], bool]
-"""Apply the loads of the next step to the engine; False if one of them is not finite."""
+Act = Callable[[WorldEngine], list[Torque] | None]
+"""Apply the wrenches and motors of the next step to the engine, and return the torques that act in it; None
+if one of them is not finite."""
 
 _NOTHING: list[Torque] = []
 
@@ -40,7 +41,6 @@ class Commands:
         self._loads = [RobotLoads(robot, h) for robot in layout.robots]
         shapes: list[tuple[int]] = [(robot.model.nv,) for robot in layout.robots]
         self._torques = {name: (k, shapes[k]) for name, k in robots.items()}
-        self._zeros: list[Torque] = [(k, np.zeros(nv), [0.0] * nv) for k, (nv,) in enumerate(shapes)]
         self._floating = [robot.model.floating for robot in layout.robots]
         self._no_wrench = np.zeros((len(layout.bodies), 6))
         self._held: Sequence[Torque] = _NOTHING
@@ -49,8 +49,7 @@ class Commands:
 
     def forget(self) -> None:
         """Forget all earlier steps: the engine is new, or its state was set."""
-        # Everything is sent once more before the next step.
-        self._loaded = set(range(len(self._loads)))
+        # Wrenches are sent once more before the next step.
         self._pushed = self._more_than_torques = True
         self._commanded: set[int] = set()
         self._forget_steps(frozenset())
@@ -79,27 +78,20 @@ class Commands:
             loads.memory = None if m is None else (np.array(m[0]), np.array(m[1]))
         self._more_than_torques = True
 
-    def hold(self, engine: WorldEngine, torques: Mapping[str, ArrayLike] | None, count: int) -> bool:
-        """Make the engine apply these torques alone in the next `count` steps.
+    def hold(
+        self, engine: WorldEngine, torques: Mapping[str, ArrayLike] | None, count: int
+    ) -> Sequence[Torque] | None:
+        """Return what the engine applies in the next `count` steps where these torques alone act in them.
 
-        Returns False, and does nothing, where they must be sent again before each of them.
+        Returns None, and does nothing, where the engine must get them again before each of the steps.
         """
         held = _NOTHING if torques is None else checked_torques(torques, self._torques)
         if count > 1 and any(self._floating[k] and any(entries[:6]) for k, _, entries in held):
-            return False
+            return None
         self._held = held
         if self._more_than_torques:
             self._end_other_loads(engine)
-        loaded = self._loaded
-        same = len(loaded) == len(held)
-        for k, tau, entries in held:
-            same = same and k in loaded
-            engine.set_torques(k, tau, entries)
-        if not same:
-            self._loaded = {k for k, _, _ in held}
-            for k in loaded - self._loaded:
-                engine.set_torques(*self._zeros[k])
-        return True
+        return held
 
     def _end_other_loads(self, engine: WorldEngine) -> None:
         """End the wrenches on bodies and the engine's own motors, and forget what motors keep."""
@@ -125,29 +117,28 @@ class Commands:
         commands = self._set_motors(motors or {})
         frames, pushes = self._sort_wrenches(wrenches)
         motored = frozenset(k for k, loads in enumerate(self._loads) if loads.has_motors)
-        repeated = motored | frames.keys() | {k for k in held if self._floating[k]}
+        repeated = motored | frames.keys()
+        constant = [torque for torque in self._held if torque[0] not in repeated]
         self._forget_steps(motored)
         begun = False
 
-        def act(engine: WorldEngine) -> bool:
+        def act(engine: WorldEngine) -> list[Torque] | None:
             nonlocal begun
             if not begun:
                 begun = True
                 self._command(engine, commands)
-                for k in (self._loaded | held.keys()) - repeated:
-                    engine.set_torques(*held.get(k, self._zeros[k]))
-                self._loaded = set(repeated | held.keys())
+            acting = constant.copy()
             for k in repeated:
                 q, v = engine.robot_state(k)
                 tau = self._loads[k].torque(q, v, held[k][1] if k in held else None, frames.get(k, ()))
                 entries = tau.tolist()
                 # A finite sum has finite entries; of few numbers, Python's is the fastest.
                 if not isfinite(sum(entries)) and not np.isfinite(tau).all():
-                    return False
-                engine.set_torques(k, tau, entries)
+                    return None
+                acting.append((k, tau, entries))
             if pushes or self._pushed:
                 self._push(engine, pushes)
-            return True
+            return acting
 
         return act
 

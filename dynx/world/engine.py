@@ -37,6 +37,10 @@ class TouchingPoint(NamedTuple):
     """Force (3,) on a [N]; None in a query of distances."""
 
 
+Torque = tuple[int, Floats, list[float]]
+"""The number of a robot, a generalised force (nv,) on it, and a new list of its entries."""
+
+
 class RayHit(NamedTuple):
     """First hit of a ray: the collider (None for no hit), the distance [m], the outward normal (3,)."""
 
@@ -82,15 +86,6 @@ class WorldEngine(ABC):
     # -- motion -------------------------------------------------------------------------------
 
     @abstractmethod
-    def set_torques(self, robot: int, tau: Floats, entries: list[float]) -> None:
-        """Apply the generalised force `tau` (nv,) in all later steps, until the next call.
-
-        The array may change after the call; `entries`, its numbers as a list, do not. The first six of a
-        floating base are force and moment at the base frame, in its axes. The caller repeats the call before
-        every step in which they are not zero, so that they may be converted to axes of the world once.
-        """
-
-    @abstractmethod
     def set_wrenches(self, wrenches: Floats) -> None:
         """Apply a force and a moment about the centre of mass (n_bodies, 6), in world axes, to every body of
         the scene in all later steps, until the next call."""
@@ -104,8 +99,13 @@ class WorldEngine(ABC):
             )
 
     @abstractmethod
-    def step(self, n: int) -> None:
-        """Take `n` steps of `dt`."""
+    def step(self, n: int, torques: Sequence[Torque] = ()) -> None:
+        """Take `n` steps of `dt`, in which `torques` act on the robots named there, and none on the others.
+
+        The arrays may change after the call. The first six entries of a floating base are force and moment at
+        the base frame, in its axes. The caller takes one step at a time where they are not zero, so that they
+        may be converted to axes of the world once.
+        """
 
     # -- state --------------------------------------------------------------------------------
 

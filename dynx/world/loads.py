@@ -9,6 +9,7 @@ from math import hypot
 from typing import TypeVar
 
 import numpy as np
+from numpy import ndarray
 from numpy.typing import ArrayLike
 
 from dynx.backends import Backend, backend
@@ -18,6 +19,7 @@ from dynx.model.configuration import checked_array, checked_entries, real_array
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross
+from dynx.world.engine import Torque
 from dynx.world.layout import BodyLayout, RobotLayout
 from dynx.world.motors import JointLaw, Motor, combine
 from dynx.world.state import BodyState
@@ -165,10 +167,6 @@ def _acceleration(M: Floats, tau: Floats) -> Floats:
     return np.asarray(np.linalg.lstsq(M, tau)[0] if failed else a)
 
 
-Torque = tuple[int, Floats, list[float]]
-"""The number of a robot, a generalised force (nv,) on it, and a new list of its entries."""
-
-
 def checked_torques(
     torques: Mapping[str, ArrayLike], robots: Mapping[str, tuple[int, tuple[int]]]
 ) -> list[Torque]:
@@ -184,7 +182,7 @@ def checked_torques(
             number, shape = robots[name]
         except KeyError:
             number, shape = found_robot(name, robots)
-        if type(tau) is not np.ndarray or tau.dtype is not _FLOAT64 or tau.shape != shape:
+        if type(tau) is not ndarray or tau.dtype is not _FLOAT64 or tau.shape != shape:
             tau = real_array(f"torque of {name}", tau)
             if tau.shape != shape:
                 raise ShapeError(f"torque of {name} has shape {tau.shape}; wanted {shape}")

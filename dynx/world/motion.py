@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NoReturn
 
 from dynx.errors import ClosedError, DivergedError, EngineError
 from dynx.model.configuration import DIVERGENCE_SPEED
 from dynx.world.commands import Act, Commands
-from dynx.world.engine import WorldEngine
+from dynx.world.engine import Torque, WorldEngine
 from dynx.world.layout import Layout
 from dynx.world.notes.divergence import likely_causes
 from dynx.world.state import WorldState, has_diverged
@@ -76,9 +76,9 @@ class Motion:
         assert self._state is not None
         return self._state
 
-    def advance(self, engine: WorldEngine, n: int, act: Act | None) -> None:
-        """Take `n` steps of `dt` in `engine`, the present one; `act` applies the loads before each step of
-        the engine.
+    def advance(self, engine: WorldEngine, n: int, torques: Sequence[Torque], act: Act | None = None) -> None:
+        """Take `n` steps of `dt` in `engine`, the present one, in which `torques` act; or the loads that
+        `act` applies before each step of the engine.
 
         Raises DivergedError and the errors of the engine.
         """
@@ -87,7 +87,7 @@ class Motion:
                 part = n if n < self._most else self._most
                 count = part * self._substeps
                 if act is None:
-                    engine.step(count)
+                    engine.step(count, torques)
                 else:
                     self._step_one_by_one(engine, count, act)
                 self._steps += part
@@ -102,9 +102,10 @@ class Motion:
 
     def _step_one_by_one(self, engine: WorldEngine, count: int, act: Act) -> None:
         for taken in range(count):
-            if not act(engine):
+            torques = act(engine)
+            if torques is None:
                 self._diverge(f"a load is not finite after {taken} of {count} steps of the engine")
-            engine.step(1)
+            engine.step(1, torques)
 
     def change(self, change: Callable[[WorldEngine], object], clock: tuple[float, int] | None = None) -> None:
         """Set the state of the engine by a function, and `clock` where it is given."""

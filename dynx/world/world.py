@@ -142,8 +142,12 @@ class World:
             n = whole_number("n", n, 1)
         if self._scene_motors:
             motors = with_scene_motors(self._scene_motors, torques, motors)
-        held = not motors and not wrenches and self._commands.hold(engine, torques, n * self.substeps)
-        self._motion.advance(engine, n, None if held else self._commands.plan(torques, motors, wrenches))
+        if not motors and not wrenches:
+            held = self._commands.hold(engine, torques, n * self.substeps)
+            if held is not None:
+                self._motion.advance(engine, n, held)
+                return
+        self._motion.advance(engine, n, (), self._commands.plan(torques, motors, wrenches))
 
     def run(
         self,

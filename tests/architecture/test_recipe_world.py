@@ -48,7 +48,7 @@ class ExactFlight(WorldEngine):
         self._wrenches = np.zeros((len(layout.bodies), 6))
         self._mass = np.array([[body.mass] * 3 + [body.inertia[0, 0]] * 3 for body in layout.bodies])
 
-    def step(self, n):
+    def step(self, n, torques=()):
         for _ in range(n):
             a = self._wrenches / self._mass + np.concatenate([self.layout.gravity, np.zeros(3)])
             h, c = self.dt, self._drag
@@ -65,10 +65,10 @@ class ExactFlight(WorldEngine):
                 T[:3, :3] = rotation_from_quat(quat_exp(omega)) @ T[:3, :3]
             self._twist[:, 3:] += h * a[:, 3:]
 
-    def set_torques(self, robot, tau, entries):
+    def robot_state(self, robot):
         raise AssertionError("a scene without robots")
 
-    robot_state = set_robot_state = set_torques
+    set_robot_state = robot_state
 
     def set_wrenches(self, wrenches):
         self._wrenches = wrenches.copy()

@@ -17,7 +17,7 @@ import numpy as np
 from dynx.model.geometry import Box, Cylinder, Plane, Sphere
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_exp, rotation_from_quat
-from dynx.world.engine import RayHit, TouchingPoint, WorldEngine
+from dynx.world.engine import RayHit, Torque, TouchingPoint, WorldEngine
 from dynx.world.layout import Collider, Layout
 from dynx.world.settings import Setting
 from dynx.world.state import BodyState, RobotState
@@ -118,7 +118,7 @@ class ExactWorld(WorldEngine):
 
     # -- motion -------------------------------------------------------------------------------
 
-    def step(self, n: int) -> None:
+    def step(self, n: int, torques: Sequence[Torque] = ()) -> None:
         for _ in range(n):
             left = self.dt
             while left > TINY:
@@ -278,9 +278,6 @@ class ExactWorld(WorldEngine):
 
     def set_wrenches(self, wrenches: Floats) -> None:
         assert not wrenches.any()
-
-    def set_torques(self, robot: int, tau: Floats, entries: list[float]) -> None:
-        raise NotImplementedError
 
     def robot_state(self, robot: int) -> RobotState:
         raise NotImplementedError

@@ -113,8 +113,7 @@ def test_mimic_joints_stay_coupled() -> None:
     engine = DrakeWorld(layout_of(Scene("s", robots=(SceneRobot("r", model),))), 1e-3, DEFAULTS)
     tau = np.zeros(model.nv)
     tau[-1] = 1.0
-    engine.set_torques(0, tau, tau.tolist())
-    engine.step(200)
+    engine.step(200, [(0, tau, tau.tolist())])
     q, _ = engine._state()
     assert q[-1] > 1e-3
     assert_allclose(q[-1], q[-2], atol=1e-6)

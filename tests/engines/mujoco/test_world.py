@@ -91,8 +91,7 @@ def test_mimic_joints_stay_coupled_under_contact() -> None:
     engine = MujocoWorld(layout, 1e-3, DEFAULTS)
     tau = np.zeros(model.nv)
     tau[-1] = -5.0  # closes the gripper, against the lower limit of both fingers
-    engine.set_torques(0, tau, tau.tolist())
-    engine.step(500)
+    engine.step(500, [(0, tau, tau.tolist())])
     positions = np.array(engine._data.qpos[-2:])
     assert_allclose(positions[0], positions[1], atol=1e-4)
     assert engine.robot_state(0).q[-1] < 1e-3

@@ -23,7 +23,7 @@ from dynx.model.geometry import HeightField, Plane
 from dynx.rbd.kinematics import body_poses
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
-from dynx.world.engine import RayHit, TouchingPoint, WorldEngine
+from dynx.world.engine import RayHit, Torque, TouchingPoint, WorldEngine
 from dynx.world.engine_failures import translate_failures
 from dynx.world.geometry.ray_casting import cast_on_shape
 from dynx.world.layout import WORLD, Collider, Layout
@@ -55,7 +55,6 @@ class DrakeWorld(WorldEngine):
         self._context = self._plant.GetMyMutableContextFromRoot(self._root)
         self._updates = self._diagram.AllocateDiscreteVariables()
         self._port = self._plant.get_applied_generalized_force_input_port()
-        self._torques: Floats = np.zeros(self._plant.num_velocities())
         self._wrenches: Floats = np.zeros(self._plant.num_velocities())
         self._applied: Floats = np.zeros(self._plant.num_velocities())
         self._port.FixValue(self._context, self._applied)
@@ -74,19 +73,16 @@ class DrakeWorld(WorldEngine):
     # -- motion -------------------------------------------------------------------------------
 
     @_engine_errors
-    def set_torques(self, robot: int, tau: Floats, entries: list[float]) -> None:
-        q = self._plant.GetPositions(self._context)
-        self._built.robots[robot].write_forces(tau, q, self._torques)
-
-    @_engine_errors
     def set_wrenches(self, wrenches: Floats) -> None:
         for number, body in self._built.bodies.items():
             force, moment = wrenches[number, :3], wrenches[number, 3:]
             self._wrenches[body.forces] = np.concatenate([moment, force])
 
     @_engine_errors
-    def step(self, n: int) -> None:
-        forces = self._torques + self._wrenches
+    def step(self, n: int, torques: Sequence[Torque] = ()) -> None:
+        forces = self._wrenches.copy()
+        for k, tau, _ in torques:
+            self._built.robots[k].write_forces(tau, self._plant.GetPositions(self._context), forces)
         if not np.array_equal(forces, self._applied):
             self._port.FixValue(self._context, forces)
             self._applied = forces

@@ -22,7 +22,7 @@ from dynx.engines.mujoco.world.touching import closest_of, read_contacts
 from dynx.errors import EngineError, nonblank_lines, shown
 from dynx.model.geometry import HeightField
 from dynx.spatial.scalar import Floats
-from dynx.world.engine import RayHit, TouchingPoint, WorldEngine
+from dynx.world.engine import RayHit, Torque, TouchingPoint, WorldEngine
 from dynx.world.engine_failures import translate_failures
 from dynx.world.geometry.ray_casting import cast_on_shape
 from dynx.world.layout import Layout
@@ -69,6 +69,8 @@ class MujocoWorld(WorldEngine):
             self._coupled[number].tau if number in self._coupled else robot.applied
             for number, robot in enumerate(self._robots)
         ]
+        self._loaded = False
+        """True if forces of an earlier step may still be in MuJoCo's data."""
         self._bodies = {
             number: BodyCoordinates(built.model, data, built.bodies[number], body)
             for number, body in enumerate(layout.bodies)
@@ -99,15 +101,14 @@ class MujocoWorld(WorldEngine):
 
     # -- motion -------------------------------------------------------------------------------
 
-    def set_torques(self, robot: int, tau: Floats, entries: list[float]) -> None:
-        self._applied[robot][:] = self._robots[robot].forces(tau, entries)
-
     def set_wrenches(self, wrenches: Floats) -> None:
         self._data.xfrc_applied[self._body_numbers] = wrenches
 
     @_engine_errors
-    def step(self, n: int) -> None:
+    def step(self, n: int, torques: Sequence[Torque] = ()) -> None:
         model, data, warnings = self._model, self._data, self._warnings
+        if torques or self._loaded:
+            self._apply(torques)
         if not self._coupled:
             mujoco.mj_step(model, data, n)
         else:
@@ -123,6 +124,15 @@ class MujocoWorld(WorldEngine):
                 f"mujoco has no memory for the contacts of the scene {shown(self.layout.name)}: "
                 f"{data.ncon} contacts, {data.nefc} constraints"
             )
+
+    def _apply(self, torques: Sequence[Torque]) -> None:
+        applied = self._applied
+        if len(torques) < len(applied):
+            for forces in applied:
+                forces[:] = 0.0
+        for k, tau, entries in torques:
+            applied[k][:] = self._robots[k].forces(tau, entries)
+        self._loaded = bool(torques)
 
     # -- state --------------------------------------------------------------------------------
 
@@ -151,6 +161,7 @@ class MujocoWorld(WorldEngine):
     @_engine_errors
     def load(self, data: bytes) -> None:
         mujoco.mj_setState(self._model, self._data, np.frombuffer(data), STATE)
+        self._loaded = True
         self._moved()
 
     # -- queries ------------------------------------------------------------------------------

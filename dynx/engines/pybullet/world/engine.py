@@ -31,7 +31,7 @@ from dynx.engines.pybullet.world.shapes import ShapeFiles, is_ground, load_groun
 from dynx.errors import EngineError
 from dynx.model.mechanism import ROOT
 from dynx.spatial.scalar import Floats
-from dynx.world.engine import RayHit, TouchingPoint, WorldEngine
+from dynx.world.engine import RayHit, Torque, TouchingPoint, WorldEngine
 from dynx.world.layout import Collider, Layout
 from dynx.world.materials import EffectiveCoefficient
 from dynx.world.settings import Setting
@@ -66,6 +66,7 @@ class BulletWorld(WorldEngine):
             raise
         self._pushed: list[BulletBody] = []
         self._corrected = [robot for robot in self._robots if robot.corrected]
+        self._apply = [robot.apply for robot in self._robots]
         self._list_calls()
         self._touch()
 
@@ -109,13 +110,6 @@ class BulletWorld(WorldEngine):
 
     # -- motion -------------------------------------------------------------------------------
 
-    def set_torques(self, robot: int, tau: Floats, entries: list[float]) -> None:
-        found = self._robots[robot]
-        found.torques = entries
-        if any(entries) != found.loaded:
-            found.loaded = not found.loaded
-            self._list_calls()
-
     def set_wrenches(self, wrenches: Floats) -> None:
         self._pushed = []
         for body, wrench in zip(self._bodies, wrenches, strict=True):
@@ -125,20 +119,22 @@ class BulletWorld(WorldEngine):
         self._list_calls()
 
     def _list_calls(self) -> None:
-        """List what is called before and after every step of the engine."""
-        self._before: list[Callable[[], None]] = [robot.apply for robot in self._robots if robot.loaded]
-        self._before += [body.push for body in self._pushed]
+        """List what is called before every step of the engine."""
+        self._before: list[Callable[[], None]] = [body.push for body in self._pushed]
         self._before += [robot.before_step for robot in self._corrected]
 
     def command_motors(self, robot: int, command: MotorCommand | None) -> None:
         self._robots[robot].command(command)
 
-    def step(self, n: int) -> None:
+    def step(self, n: int, torques: Sequence[Torque] = ()) -> None:
         self._contacts.fresh = False
         step, number = self._step_simulation, self._number
         try:
             while n:
                 n -= 1
+                # Bullet forgets torques after each step.
+                for k, _, entries in torques:
+                    self._apply[k](entries)
                 for call in self._before:
                     call()
                 step(physicsClientId=number)

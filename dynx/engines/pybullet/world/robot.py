@@ -73,10 +73,6 @@ class BulletRobot:
         self._friction = layout.friction
         self.near = [0.0, 0.0, 0.0, 1.0]
         """Quaternion (4,) of the last state read, whose sign the next one has."""
-        self.loaded = False
-        """True if `apply` is called before every step, because a torque is not zero."""
-        self.torques: list[float] = []
-        """Generalised force (nv,) of the next steps."""
         # Looked up once, because every step applies torques.
         self._control = client.engine.setJointMotorControlArray
         self._torque_control = client.engine.TORQUE_CONTROL
@@ -136,15 +132,15 @@ class BulletRobot:
 
     # -- forces -------------------------------------------------------------------------------
 
-    def apply(self) -> None:
-        """Apply `torques` during the next step. The engine's own errors are not translated."""
-        forces = self.torques
+    def apply(self, forces: list[float]) -> None:
+        """Apply a generalised force (nv,) during the next step. The engine's own errors are not
+        translated."""
         if self._base:
             if any(forces[:6]):
                 self._push_base(forces)
-                if not any(forces[6:]):
-                    return
             forces = forces[6:]
+        if not any(forces):
+            return
         if self._coupling is not None:
             forces = (self._shares @ forces).tolist()
         self._control(
