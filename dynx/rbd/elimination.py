@@ -48,6 +48,6 @@ def solve_with_factors(L: list[dict[int, Array]], D: list[Array], b: Array) -> A
 
 def solve_mass_matrix(mechanism: Mechanism, M: Array, B: Array) -> Array:
     """Return X (nv, m) with M X = B: floats by LAPACK, any other scalar by factors."""
-    if M.dtype != object:
+    if M.dtype != object and B.dtype != object:
         return np.asarray(np.linalg.solve(M, B))
     return np.asarray(solve_with_factors(*factorize_mass_matrix(mechanism, M), B.T).T)

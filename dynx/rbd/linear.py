@@ -22,7 +22,7 @@ def solve_positive_definite(A: Array, b: Array) -> Array:
 
 def solve_columns(A: Array, B: Array) -> Array:
     """Return X (n, m) with A X = B: floats by LAPACK, any other scalar by `solve_positive_definite`."""
-    if A.dtype != object:
+    if A.dtype != object and B.dtype != object:
         return np.asarray(np.linalg.solve(A, B))
     return np.asarray(solve_positive_definite(A, B.T).T)
 

@@ -66,4 +66,7 @@ def pose_error(T_world_target: Array, T_world_frame: Array) -> tuple[Array, Arra
     """
     position = T_world_target[..., :3, 3] - T_world_frame[..., :3, 3]
     R = T_world_target[..., :3, :3] @ np.swapaxes(T_world_frame[..., :3, :3], -1, -2)
+    if R.dtype == object and all(isinstance(entry, float) for entry in R.flat):
+        # In a trace, a frame that never rotates has constant entries.
+        R = R.astype(np.float64)
     return position, rotation_log(R) if R.dtype == object else quat_log(quat_from_rotation(R))

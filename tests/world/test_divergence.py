@@ -5,7 +5,7 @@ from __future__ import annotations
 import _thread
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ import dynx
 from dynx import Pose
 from dynx.errors import DivergedError, EngineError, SingularMassMatrixError
 from dynx.world import PDMotor, PositionMotor, Scene, SceneRobot, Weld, World, Wrench, box, ground
+from dynx.world.engine import Torque
 from tests.world.engines import FAST_WORLDS, WORLDS
 
 
@@ -64,12 +65,12 @@ def test_a_cause_that_is_not_known_is_not_made_up() -> None:
     assert "overlap" not in message
 
 
-def interrupting(world: World, after: int) -> Callable[[int], None]:
+def interrupting(world: World, after: int) -> Callable[[int, Sequence[Torque]], None]:
     """Return the engine's step, interrupted after some steps of a call."""
     step = world._motion.engine.step
 
-    def interrupted(n: int) -> None:
-        step(min(n, after))
+    def interrupted(n: int, torques: Sequence[Torque]) -> None:
+        step(min(n, after), torques)
         raise KeyboardInterrupt
 
     return interrupted

@@ -7,7 +7,7 @@ settings that cause violations.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import rotation_from_rpy
 from dynx.testing.strategies import scenes
 from dynx.world import Material, Scene, SceneRobot, World, box, capsule, ground
-from dynx.world.engine import TouchingPoint
+from dynx.world.engine import Torque, TouchingPoint
 from tests.world.engines import WORLDS
 from tests.world.random_scenes.attribution import cause_of
 from tests.world.random_scenes.drawing import resting_scene_of, scene_of
@@ -198,8 +198,8 @@ def test_an_engine_that_adds_energy_violates_a_law(monkeypatch: pytest.MonkeyPat
     assert examine(thrown(), "mujoco")["energy"] <= 1.0
     right = MujocoWorld.step
 
-    def step(self: MujocoWorld, n: int) -> None:
-        right(self, n)
+    def step(self: MujocoWorld, n: int, torques: Sequence[Torque] = ()) -> None:
+        right(self, n, torques)
         _faster(self)
 
     monkeypatch.setattr(MujocoWorld, "step", step)

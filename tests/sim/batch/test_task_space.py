@@ -86,3 +86,19 @@ def test_turned_by_half_a_turn() -> None:
         away = q.copy()
         away[joint] += angle
         batch_and_one(model, law, q, q0=away, duration=0.005, check_reference=False)
+
+
+@pytest.mark.parametrize("law", ["operational", "impedance"])
+def test_a_frame_that_never_rotates(law: str) -> None:
+    """Its rotation is constant in the trace."""
+    model = dynx.load("cart_pole")
+    q = model.neutral()
+    batch_and_one(model, LAWS[law](model, "cart"), q, q0=q + 0.1, duration=0.005, check_reference=False)
+
+
+@pytest.mark.parametrize("law", ["operational", "impedance"])
+def test_a_fixed_body_has_no_coordinates_to_move(law: str) -> None:
+    model = dynx.load("free_body")
+    many = simulate_batch(model, LAWS[law](model, "mark"), np.zeros(0), rollouts=2, duration=0.005)
+    assert many.done.all()
+    assert many.q.shape == (2, 0)
