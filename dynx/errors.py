@@ -94,7 +94,26 @@ class UnknownNameError(ArgumentError, LookupError):
 
 
 class NoClosedFormError(ArgumentError):
-    """The inverse kinematics of the joints between world and frame has no closed form that dynx knows."""
+    """The inverse kinematics of the joints between world and frame has no closed form that dynx knows.
+
+    `reason` says why, and `remedies` name sets of joints: if the positions of one set are given, there is a
+    closed form.
+    """
+
+    def __init__(self, reason: str, remedies: Iterable[tuple[str, ...]] = ()) -> None:
+        self.reason, self.remedies = reason, tuple(remedies)
+        super().__init__(reason + self._advice())
+
+    def _advice(self) -> str:
+        if not self.remedies:
+            return "; without all_solutions a search finds one solution"
+        first, *others = self.remedies
+        given = ", ".join(f"{joint!r}: ..." for joint in first)
+        instead = f" (or {', '.join(' and '.join(joints) for joints in others)})" if others else ""
+        return f"; there is one with given={{{given}}}{instead}"
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return type(self), (self.reason, self.remedies)
 
 
 class GainError(ArgumentError):

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from dynx.backends.quantity_calls import QuantityCalls
 from dynx.ik import Kinematics
+from dynx.ik.option_names import checks_option_names
 from dynx.ik.tracking import TrackResult, track
 from dynx.ik.tracking.tracker import Motion
 from dynx.ik.velocity import VelocityResult, VelocityTask, velocity_ik
@@ -17,6 +18,7 @@ from dynx.ik.velocity import VelocityResult, VelocityTask, velocity_ik
 class PathCalls(QuantityCalls):
     """Base of backends: inverse kinematics along a path, and of velocities."""
 
+    @checks_option_names
     def track(
         self: Kinematics,
         targets: ArrayLike | Motion,
@@ -58,6 +60,7 @@ class PathCalls(QuantityCalls):
             rng=rng,
         )
 
+    @checks_option_names
     def velocity_ik(
         self: Kinematics,
         q: ArrayLike,

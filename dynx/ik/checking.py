@@ -130,6 +130,25 @@ def _start(model: Model, q0: ArrayLike | None) -> Floats:
     return q
 
 
+def start_note(model: Model, q0: ArrayLike) -> str:
+    """Return a sentence if a q0 (..., nq) that was checked is outside the limits, otherwise an empty text."""
+    q = np.asarray(q0, dtype=np.float64)
+    outside = (q < model.lower) | (q > model.upper)
+    if not outside.any():
+        return ""
+    offset, names = model.nq - len(model.joint_names), model.joint_names
+    if q.ndim > 1:
+        columns = np.flatnonzero(outside.any(axis=tuple(range(q.ndim - 1))))
+        joints = ", ".join(names[k - offset] for k in columns.tolist())
+        count, size = int(outside.any(axis=-1).sum()), q[..., 0].size
+        return f"{count} of {size} q0 were outside the limits and moved into them ({joints})"
+    moved = [
+        f"{names[k - offset]} from {q[k]:.6g} to {min(max(q[k], model.lower[k]), model.upper[k]):.6g}"
+        for k in np.flatnonzero(outside).tolist()
+    ]
+    return f"q0 was outside the limits and moved into them: {', '.join(moved)}"
+
+
 @lru_cache(maxsize=64)
 def stored_coordinates(
     model: Model, frames: tuple[str, ...], margin: tuple[float, ...] | None = None

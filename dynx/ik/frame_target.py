@@ -9,9 +9,11 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, UnknownNameError, shown
+from dynx.ik.option_names import checks_field_names
 from dynx.ik.options import Options
 
 
+@checks_field_names
 @dataclass(frozen=True, eq=False)
 class FrameTarget:
     """Target of one frame among several that are to be reached at once.

@@ -63,8 +63,9 @@ class Options:
     """Configurations (..., nq): of several solutions the one whose joints have the least distance (root of
     the sum of squares [rad, m]) is returned, and redundant joints come as near as the target permits."""
     maximize: str | None = None
-    """``"manipulability"`` (square root of det J J') or ``"limit_distance"`` (joints at the middle of their
-    ranges): what the choice among solutions and the redundant joints make great."""
+    """What the choice among solutions and the redundant joints make great: ``"manipulability"`` (square root
+    of det J J') or ``"limit_distance"`` (minus the sum, over joints with two limits, of the squared distance
+    from the middle of the range in units of half the range)."""
     max_iterations: int = 50
     """Most steps of each start."""
     max_restarts: int = 200

@@ -47,6 +47,9 @@ class IKResult:
     """Position error (...,) [m] and rotation error (...,) [rad] of each frame, if there are several; those of
     the result are the largest."""
 
+    note: str = field(default="", kw_only=True)
+    """Sentence on what of the arguments was changed, such as a q0 outside the limits; empty if nothing."""
+
     @property
     def status(self) -> Any:
         """``"REACHED"``, ``"UNREACHABLE"`` (there is a `proof`) or ``"NOT_FOUND"``; an array (...,) of them
@@ -58,6 +61,9 @@ class IKResult:
     @property
     def message(self) -> str:
         """One sentence that summarises the result, for a log or a terminal."""
+        return f"{self._summary()}; {self.note}" if self.note else self._summary()
+
+    def _summary(self) -> str:
         worst = (
             f"at most {float(np.max(self.position_error, initial=0.0)):.3g} m "
             f"and {float(np.max(self.rotation_error, initial=0.0)):.3g} rad off"

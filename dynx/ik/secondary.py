@@ -23,6 +23,9 @@ MAXIMA = ("manipulability", "limit_distance")
 MAX_STEPS = 60
 """Most steps in the null space."""
 
+MAX_IMPROVED = 3
+"""Most solutions that are improved: the best one may lead to a poor local optimum."""
+
 _LEAST_STEP = 1e-7
 """Length of a step [rad or m] below which the objective counts as stationary."""
 
@@ -90,17 +93,28 @@ def best_solution(
         found = search.evaluate(coordinates.nearest(q, shift_to), task)
         if found.success:
             solutions.append((objective(found.q), found))
-    best = min(solutions, key=lambda each: each[0])[1]
-    found, steps = _improved(search, coordinates, task, best, objective)
-    found.iterations, found.restarts = iterations + steps, len(starts) - 1
-    return found
+    solutions.sort(key=lambda each: each[0])
+    improved: list[tuple[float, Candidate]] = []
+    for value, begin in solutions[:MAX_IMPROVED]:
+        found, steps, reached = _improved(search, coordinates, task, begin, value, objective)
+        iterations += steps
+        improved.append((reached, found))
+    best = min(improved, key=lambda each: each[0])[1]
+    best.iterations, best.restarts = iterations, len(starts) - 1
+    return best
 
 
 def _improved(
-    search: Search, coordinates: FrameCoordinates, task: Task, begin: Candidate, objective: Objective
-) -> tuple[Candidate, int]:
-    """Return the solution after steps in the null space that lower the objective, and their number."""
-    best, value, length, steps = begin, objective(begin.q), _FIRST_STEP, 0
+    search: Search,
+    coordinates: FrameCoordinates,
+    task: Task,
+    begin: Candidate,
+    value: float,
+    objective: Objective,
+) -> tuple[Candidate, int, float]:
+    """Return the solution after steps in the null space that lower the objective from `value`, the number of
+    steps, and the objective."""
+    best, length, steps = begin, _FIRST_STEP, 0
     direction: Floats | None = None
     while steps < MAX_STEPS and length > _LEAST_STEP:
         steps += 1
@@ -118,7 +132,7 @@ def _improved(
             length = min(1.6 * length, _GREATEST_STEP)
         else:
             length *= 0.4
-    return best, steps
+    return best, steps, value
 
 
 def _descent_direction(

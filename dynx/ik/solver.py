@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, nearest, shown
-from dynx.ik.checking import checked_problem
+from dynx.ik.checking import checked_problem, start_note
 from dynx.ik.closed_form.checking import all_solutions as solve_closed_form
 from dynx.ik.closed_form.solutions import IKSolutions
 from dynx.ik.options import IKOptions, Options, spells_options
@@ -81,10 +81,11 @@ def inverse_kinematics(
     axes a target need not be reached in every direction: ``free="rotation_z"`` leaves the rotation about the
     target's z axis free (a welding torch), ``free=("position_x", "rotation")`` the position on a line.
 
-    The search starts at `q0` (..., nq), moved into the limits, or at a random configuration if q0 is None.
-    Targets and q0 broadcast. A start is abandoned after `max_iterations` steps, or sooner if it stagnates;
-    the search then restarts at a random configuration, up to `max_restarts` times. With a seed `rng` (the
-    default) equal calls return equal results, and each sample of a batch has the result that it has alone.
+    The search starts at `q0` (..., nq), moved into the limits (`IKResult.note` says so), or at a random
+    configuration if q0 is None. Targets and q0 broadcast. A start is abandoned after `max_iterations` steps,
+    or sooner if it stagnates; the search then restarts at a random configuration, up to `max_restarts` times.
+    With a seed `rng` (the default) equal calls return equal results, and each sample of a batch has the
+    result that it has alone.
 
     Only the joints between root and frames move, and a floating base; the others stay at q0 (or at the
     neutral configuration). Angles whose range is a full turn are returned nearest to q0.
@@ -96,8 +97,9 @@ def inverse_kinematics(
     With ``all_solutions=True`` the result is an `IKSolutions` with every configuration within limits that
     reaches a pose, and the names of its branches, from the closed form (`dynx.ik.closed_form`). It exists for
     six revolute joints with a spherical wrist or three parallel axes; `given` holds positions [rad or m] of
-    further joints between root and frame, such as one of seven. Angles are those nearest to q0, or to 0. The
-    options of the search have no effect then.
+    further joints between root and frame, such as one of seven. Angles are those nearest to q0, or to 0;
+    `IKSolutions.with_full_turns` lists the others within the limits. The options of the search have no effect
+    then.
 
     Raises UnknownNameError for the frame or the name of an option; ArgumentError (ShapeError, DTypeError,
     NotFiniteError) for an invalid argument, and for method ``"engine"`` if the backend has no solver of its
@@ -111,7 +113,14 @@ def inverse_kinematics(
             "given has no effect without all_solutions=True; lock joints when loading instead"
         )
     problem = checked_problem(kinematics.model, target, frame, q0, chosen)
-    if chosen.method == "dynx":
+    found = _solved(kinematics, problem, chosen.method)
+    note = "" if q0 is None else start_note(kinematics.model, q0)
+    return replace(found, note=note) if note else found
+
+
+def _solved(kinematics: Kinematics, problem: Problem, method: str) -> IKResult:
+    """Return the result of a checked problem. Raises ArgumentError for an unknown method."""
+    if method == "dynx":
         solve_all: ProblemSolver | None = getattr(kinematics, "solve_inverse_kinematics", None)
         found = None if solve_all is None else solve_all(problem)
         if found is None:
@@ -121,9 +130,9 @@ def inverse_kinematics(
         found = preferred_solutions(kinematics, problem, problem.secondary, found, solve_all)
         errors = _errors_by_frame(list(found.q.reshape(problem.count, -1)), problem, kinematics)
         return replace(found, by_frame=errors)
-    if chosen.method == "engine":
+    if method == "engine":
         return _solved_by_engine(kinematics, problem)
-    raise ArgumentError(f"method is {shown(chosen.method)}{nearest(str(chosen.method), METHODS)}")
+    raise ArgumentError(f"method is {shown(method)}{nearest(str(method), METHODS)}")
 
 
 def _searched(kinematics: Kinematics, problem: Problem) -> IKResult:

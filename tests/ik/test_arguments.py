@@ -117,6 +117,18 @@ def test_unknown_frames_raise(engine: Backend, frame: Any) -> None:
         engine.inverse_kinematics(np.eye(4), frame)
 
 
+def test_a_start_outside_the_limits_is_moved_and_noted(engine: Backend) -> None:
+    q0, target = engine.model.neutral(), engine.forward_kinematics(engine.model.neutral(), "flange")
+    assert engine.inverse_kinematics(target, "flange", q0).note == ""
+    q0[1] = 99.0
+    found = engine.inverse_kinematics(target, "flange", q0)
+    assert found
+    assert f"joint2 from 99 to {engine.model.upper[1]:.6g}" in found.note
+    assert found.note in found.message
+    batch = engine.inverse_kinematics(target, "flange", np.array([q0, 0.0 * q0]))
+    assert batch.note == "1 of 2 q0 were outside the limits and moved into them (joint2)"
+
+
 def test_a_closed_backend_refuses(engine: Backend) -> None:
     engine.close()
     with pytest.raises(ClosedError):

@@ -210,6 +210,12 @@ def test_invalid_targets_of_frames(target: Any, frame: Any, options: dict[str, A
         engine.inverse_kinematics(target, frame, **options)
 
 
+def test_a_misspelt_field_of_a_target_has_the_nearest_name() -> None:
+    misspelt: dict[str, Any] = {"wieghts": [1.0] * 6}
+    with pytest.raises(UnknownNameError, match="FrameTarget has no option 'wieghts'; did you mean 'weights'"):
+        FrameTarget(FRAME, np.eye(4), **misspelt)
+
+
 def test_signatures_list_every_option() -> None:
     names = [field.name for field in fields(Options)]
     assert list(IKOptions.__annotations__) == names

@@ -10,7 +10,7 @@ from dynx.cli.shell.exits import DONE, NEGATIVE_RESULT, one_line
 from dynx.cli.shell.inputs import Numbers, default_frame_note
 from dynx.cli.shell.tables import Table
 from dynx.cli.shell.terminal import console, number, write_json
-from dynx.errors import ArgumentError
+from dynx.errors import ArgumentError, NoClosedFormError
 from dynx.ik import IKSolutions
 from dynx.spatial.scalar import Floats
 
@@ -30,7 +30,10 @@ def all_solutions(
     names = engine.model.joint_names
     if given is not None and not isinstance(given, dict):
         raise ArgumentError("--given takes names and positions, such as joint7=0.5")
-    found = engine.inverse_kinematics(target, frame, q, all_solutions=True, given=given)
+    try:
+        found = engine.inverse_kinematics(target, frame, q, all_solutions=True, given=given)
+    except NoClosedFormError as error:
+        raise ArgumentError(_advised(error)) from None
     assert isinstance(found, IKSolutions)
     result: dict[str, Any] = {
         **document_head(engine),
@@ -65,3 +68,13 @@ def all_solutions(
     for k, solution in enumerate(result["solutions"], 1):
         out.print(f"{k} {solution['branch']}: --q {','.join(format(x, '.17g') for x in solution['q'])}")
     return code
+
+
+def _advised(error: NoClosedFormError) -> str:
+    """Return the message of an error with the options of this command."""
+    if not error.remedies:
+        return f"{error.reason}; without --all-solutions a search finds one solution"
+    first, *others = error.remedies
+    given = ",".join(f"{joint}=POSITION" for joint in first)
+    instead = f" (or {', '.join(' and '.join(joints) for joints in others)})" if others else ""
+    return f"{error.reason}; there is one with --given {given}{instead}"

@@ -14,8 +14,9 @@ For the inverse chain (the first three axes meet, or axes 3, 4 and 5 are paralle
 2, ..., 6 and exchange the words shoulder and wrist. If axes 1 and 2 are parallel, elbow and forearm take the
 place of shoulder and elbow: elbow right, if the wrist centre lies to the right of the line from axis 1 to
 axis 2 (on the side of that direction x h_2), and forearm up, if the height of the wrist centre along h_2
-rises with q_3. If a quartic is solved, its roots have numbers, in no order. Other branches change only
-at a singularity.
+rises with q_3. If axes 1, 2 and 3 are parallel, the wrists have numbers, in no order, and elbow right says
+that axis 2 passes to the right of the line from axis 1 to axis 3, seen against h_1. If a quartic is solved,
+its roots have numbers, in no order. Other branches change only at a singularity.
 """
 
 from __future__ import annotations
@@ -24,7 +25,9 @@ from itertools import product
 
 import numpy as np
 
-from dynx.ik.closed_form.recognition import Geometry, Recognised
+from dynx.ik.closed_form.outer_parallel_axes import OuterParallelAxes
+from dynx.ik.closed_form.parallel_axes import ParallelAxes
+from dynx.ik.closed_form.recognition import Recognised
 from dynx.ik.closed_form.spherical_wrist import SphericalWrist
 from dynx.spatial.scalar import Floats
 
@@ -39,13 +42,19 @@ def branch_names(recognised: Recognised) -> tuple[str, ...]:
     first, last = ("wrist", "shoulder") if recognised.inverted else ("shoulder", "wrist")
     found = []
     for number, signs in enumerate(SIGNS.tolist()):
+        if isinstance(recognised.geometry, OuterParallelAxes):
+            arm, elbow, wrist = signs
+            right = (elbow > 0.0) == (float(recognised.geometry.axes[0] @ recognised.geometry.axes[1]) > 0.0)
+            place = 1 + 2 * (arm < 0.0) + (wrist < 0.0)
+            found.append(f"{last} {place}, elbow {'right' if right else 'left'}")
+            continue
         arm, unflipped = _sides(recognised.geometry, signs)
         flip = f"{last} {'unflipped' if unflipped else 'flipped'}"
         found.append(f"{arm.format(first=first, number=number // 2 + 1)}, {flip}")
     return tuple(found)
 
 
-def _sides(geometry: Geometry, signs: list[float]) -> tuple[str, bool]:
+def _sides(geometry: SphericalWrist | ParallelAxes, signs: list[float]) -> tuple[str, bool]:
     """Return the name of the arm's branch, and whether the wrist is unflipped."""
     h, (arm, elbow, wrist) = geometry.axes, signs
     if isinstance(geometry, SphericalWrist):

@@ -68,8 +68,8 @@ def chain_to(model: Model, frame: str, given: Mapping[str, float]) -> Chain:
         value = _fixed_position(model, body.joint, given)
         if value is None and not body.revolute:
             raise NoClosedFormError(
-                f"joint {shown(body.joint)} is prismatic; the closed form covers revolute joints, and any "
-                f"joint whose position is given: given={{{body.joint!r}: ...}}"
+                f"joint {shown(body.joint)} is prismatic; the closed form covers revolute joints",
+                [(body.joint,)],
             )
         origins.append(p + rotate(R, body.p))
         if value is None:
@@ -100,15 +100,12 @@ def _fixed_position(model: Model, name: str, given: Mapping[str, float]) -> floa
         drives = [j.name for j in model.joints if j.mimic is not None and j.mimic.joint == name]
         if name not in given and drives:
             raise NoClosedFormError(
-                f"joint {shown(drives[0])} follows {shown(name)}, which moves the frame; give that: "
-                f"given={{{name!r}: ...}}"
+                f"joint {shown(drives[0])} follows {shown(name)}, which moves the frame", [(name,)]
             )
         return given.get(name)
     driver = joint.mimic.joint
     if driver not in given:
-        raise NoClosedFormError(
-            f"joint {shown(name)} follows {shown(driver)}; give that: given={{{driver!r}: ...}}"
-        )
+        raise NoClosedFormError(f"joint {shown(name)} follows {shown(driver)}", [(driver,)])
     return joint.mimic.multiplier * given[driver] + joint.mimic.offset
 
 

@@ -7,10 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.errors import ArgumentError, shown
 from dynx.ik.closed_form.chain import checked_given
 from dynx.ik.closed_form.solutions import IKSolutions
 from dynx.ik.closed_form.solver import stored_closed_form
 from dynx.ik.tasks import Kinematics
+from dynx.model import Model
 from dynx.spatial.se3 import pose_error
 
 
@@ -30,7 +32,7 @@ def all_solutions(
     solutions, unless joints are given: each position of theirs would be compiled anew.
     """
     compiled = bool(getattr(kinematics, "compiles", False)) and not given
-    positions = () if given is None else tuple(checked_given(kinematics.model, given).items())
+    positions = () if given is None else _within_limits(kinematics.model, given)
     form = stored_closed_form(kinematics.model, frame, positions, compiled)
     found = form.solve(target, q0, threads=getattr(kinematics, "threads", 1))
     if compiled and min(position_tolerance, rotation_tolerance) >= form.accuracy:
@@ -42,3 +44,18 @@ def all_solutions(
         errors[rows] = np.stack([np.linalg.norm(part, axis=-1) for part in parts], axis=-1)
     within = (errors <= (position_tolerance, rotation_tolerance)).all(axis=-1)
     return found.measured(errors, rows & within)
+
+
+def _within_limits(model: Model, given: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
+    """Return the positions by joint; raise ArgumentError for one outside the limits: no solution has it."""
+    checked = tuple(checked_given(model, given).items())
+    for name, value in checked:
+        at = model.coordinate_index(name)
+        low, high = float(model.lower[at]), float(model.upper[at])
+        if not low <= value <= high:
+            unit = "m" if model.joint(name).type == "prismatic" else "rad"
+            raise ArgumentError(
+                f"the given position of joint {shown(name)} is {value:.6g} {unit}, outside its limits: "
+                f"{low:.6g} to {high:.6g} {unit}"
+            )
+    return checked

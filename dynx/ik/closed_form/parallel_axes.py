@@ -18,9 +18,9 @@ from typing import Literal
 
 import numpy as np
 
+from dynx.ik.closed_form.planar_arm import PlanarArm
 from dynx.ik.closed_form.quartic import combined, conic_root, linear, squared
 from dynx.ik.closed_form.subproblems import (
-    ALIGNMENT,
     Angle,
     angle_from_to,
     component_terms,
@@ -31,7 +31,7 @@ from dynx.ik.closed_form.subproblems import (
     turn_back,
     value_at,
 )
-from dynx.spatial.scalar import Array, Floats, append_axis, where_less
+from dynx.spatial.scalar import Array, Floats, append_axis
 from dynx.spatial.so3 import rotate, rotate_back
 
 WristCase = Literal["intersecting_5_6", "parallel_5_6", "general"]
@@ -57,7 +57,7 @@ class ParallelAxes:
 
     def angles(self, R: Array, p: Array, signs: Array) -> list[Angle]:
         """Return the six angles of the branch `signs` (..., 3) for E_1 ... E_6 = (R, p)."""
-        h, x = self.axes, self.points
+        h = self.axes
         q1, q5 = self._outer(R, p, signs[..., 0], signs[..., 2])
         # Axis 6 as seen from it: R_6 turns R_G^-1 R_1 h into R_5^-1 h.
         common = h[1]
@@ -67,20 +67,18 @@ class ParallelAxes:
 
         # The plane motion, by its effect on a normal and on axis 4.
         turned = turn_back(h[0], q1, rotate(R, turn_back(h[5], q6, turn_back(h[4], q5, self.normal))))
-        tip = self._axis_4(R, p, q1, q5, q6) - x[1]
-        reach = tip - common * append_axis(dot(common, tip))
-        upper, fore = self._links()
-        constant, c3, s3 = (2.0 * float(each) for each in component_terms(upper, h[2], fore))
-        fixed = constant + float(upper @ upper + fore @ fore)
-        q3 = solve_linear(c3, s3, dot(reach, reach) - fixed, signs[..., 1], 0.0)
-        q2 = angle_from_to(common, upper + turn(h[2], q3, fore), reach, self.preferred[1])
-        rest = turn_back(h[2], q3, turn_back(common, q2, turned))
-        return [q1, q2, q3, angle_from_to(h[3], self.normal, rest, 0.0), q5, q6]
+        tip = self._axis_4(R, p, q1, q5, q6)
+        q2, q3, q4 = self.plane.angles(turned, tip, signs[..., 1], self.preferred[1])
+        return [q1, q2, q3, q4, q5, q6]
+
+    @property
+    def plane(self) -> PlanarArm:
+        """Axes 2, 3 and 4."""
+        return PlanarArm(self.axes[1:4], self.points[1:4], self.normal)
 
     def reaches(self, least: float) -> bool:
         """Return whether every joint changes the terms that determine it by more than `least`."""
-        upper, fore = self._links()
-        return bool(min(np.linalg.norm(upper), np.linalg.norm(fore)) > least)
+        return self.plane.reaches(least)
 
     def _outer(self, R: Array, p: Array, shoulder: Array, wrist: Array) -> tuple[Angle, Angle]:
         """Return q_1 and q_5."""
@@ -130,12 +128,6 @@ class ParallelAxes:
         at_6 = x[5] + turn_back(h[5], q6, at_5 - x[5])
         return np.asarray(x[0] + turn_back(h[0], q1, rotate(R, at_6) + p - x[0]))
 
-    def _links(self) -> tuple[Floats, Floats]:
-        """Return the vectors from axis 2 to 3 and from 3 to 4, normal to the axes."""
-        upper, fore = (self.points[k + 1] - self.points[k] for k in (1, 2))
-        h = self.axes[1]
-        return upper - h * (h @ upper), fore - h * (h @ fore)
-
     def _chosen(self, R: Array, p: Array, q1: Angle, q5: Angle, q6: Angle) -> Angle:
         """Return q_6, and where it is arbitrary an angle for which axis 4 is within reach of axis 2.
 
@@ -150,19 +142,7 @@ class ParallelAxes:
         _, c6, s6 = component_terms(back, -h[5], at_5)
         across = at_5 - h[5] * append_axis(dot(h[5], at_5))
         middle = dot(centre, centre) + dot(across, across)
-        upper, fore = (float(np.linalg.norm(each)) for each in self._links())
-        preferred = middle + 2.0 * (c6 * np.cos(self.preferred[5]) + s6 * np.sin(self.preferred[5]))
-        least, most = (upper - fore) ** 2, (upper + fore) ** 2
-        wanted = where_less(preferred, least, least, where_less(most, preferred, most, preferred))
-        found = solve_linear(2.0 * c6, 2.0 * s6, wanted - middle, 1.0 + 0.0 * middle, self.preferred[5])
-        inside = where_less(abs(wanted - preferred), ALIGNMENT, 1.0, 0.0)
-        c = where_less(0.5, inside, np.cos(self.preferred[5]), found.cos)
-        s = where_less(0.5, inside, np.sin(self.preferred[5]), found.sin)
-        return Angle(
-            where_less(0.5, q6.arbitrary, c, q6.cos),
-            where_less(0.5, q6.arbitrary, s, q6.sin),
-            q6.arbitrary,
-        )
+        return self.plane.reachable(q6, (middle, 2.0 * c6, 2.0 * s6), self.preferred[5])
 
 
 def _turned_terms(direction: Floats, axis: Floats, a: Array) -> Terms:

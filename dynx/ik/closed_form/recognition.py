@@ -1,6 +1,6 @@
 """Recognition of chains that have a closed form, from the lines of their axes.
 
-Two families are looked for, along the chain and along its inverse (from the frame to the world): a spherical
+Families are looked for along the chain and along its inverse (from the frame to the world): a spherical
 wrist, and three parallel axes. Axes count as parallel, or as meeting, within a tolerance; the recognised
 geometry is that of the idealised chain, in which they do exactly.
 """
@@ -14,8 +14,10 @@ import numpy as np
 from dynx.errors import NoClosedFormError
 from dynx.ik.closed_form.chain import Chain
 from dynx.ik.closed_form.lines import Lines, along, angle_between, common_point, normal_feet
+from dynx.ik.closed_form.outer_parallel_axes import OuterParallelAxes, OuterWristCase
 from dynx.ik.closed_form.parallel_axes import ParallelAxes, WristCase
 from dynx.ik.closed_form.spherical_wrist import ArmCase, SphericalWrist, unit_normal
+from dynx.ik.closed_form.subproblems import component_terms
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross
 
@@ -26,7 +28,7 @@ at the first tolerance at which it has a family: rounding, files with about six 
 NEGLIGIBLE = 1e-6
 """Relative length, or angle [rad], below which an offset within a recognised family is idealised."""
 
-Geometry = SphericalWrist | ParallelAxes
+Geometry = SphericalWrist | ParallelAxes | OuterParallelAxes
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +65,11 @@ def recognise(chain: Chain, preferred: Floats) -> Recognised:
                 numbers = "3, 4 and 5" if inverted else "2, 3 and 4"
                 text = f"axes {numbers} are parallel"
                 return Recognised(parallel, inverted, tolerance, _deviation(here, parallel), text)
+            outer = _outer_parallel_axes(here, angles, tolerance)
+            if outer is not None:
+                numbers = "4, 5 and 6" if inverted else "1, 2 and 3"
+                text = f"axes {numbers} are parallel"
+                return Recognised(outer, inverted, tolerance, _deviation(here, outer), text)
     raise NoClosedFormError(_why_none(chain))
 
 
@@ -141,6 +148,39 @@ def _parallel_axes(lines: Lines, preferred: Floats, tolerance: float) -> Paralle
     return found if found.reaches(near) else None
 
 
+def _outer_parallel_axes(lines: Lines, preferred: Floats, tolerance: float) -> OuterParallelAxes | None:
+    h, points = lines.axes.copy(), lines.points.copy()
+    near = max(tolerance, NEGLIGIBLE)
+    if max(angle_between(h[0], h[1]), angle_between(h[0], h[2])) > tolerance:
+        return None
+    if angle_between(h[0], h[3]) < near:
+        return None
+    h[1], h[2] = along(h[0], h[1]), along(h[0], h[2])
+    case: OuterWristCase = "general"
+    points[4], points[5] = normal_feet(h[4], points[4], h[5], points[5])
+    if angle_between(h[3], h[4]) < near:
+        case, h[4] = "parallel_4_5", along(h[3], h[4])
+        link = points[4] - points[3]
+        if angle_between(h[4], h[5]) < near or np.linalg.norm(cross(h[3], link)) < near:
+            return None
+    else:
+        # Terms in the cosine and sine of q_4 of both equations; a point elsewhere on axis 5 mixes them.
+        by_axis, by_point = (
+            np.array(component_terms(h[0], h[3], across)[1:]) for across in (h[4], points[4] - points[3])
+        )
+        shift = float(by_axis @ by_point / (by_axis @ by_axis))
+        if np.linalg.norm(by_point - shift * by_axis) < near:
+            case = "intersecting_4_5"
+            points[4] = points[4] - shift * h[4]
+            points[3] = points[3] + h[3] * float(h[3] @ (points[4] - points[3]))
+            if np.linalg.norm(points[4] - points[3]) < near:
+                points[3] = points[4] = 0.5 * (points[3] + points[4])
+            if np.linalg.norm(cross(h[5], points[5] - points[4])) < near:
+                return None
+    found = OuterParallelAxes(case, h, points, preferred, unit_normal(h[0]))
+    return found if found.reaches(near) else None
+
+
 def _why_none(chain: Chain) -> str:
     """Return how far a chain is from each family."""
     lines = Lines(chain.axes, chain.points)
@@ -150,7 +190,7 @@ def _why_none(chain: Chain) -> str:
         parts.append(
             f"the axes of the {end} three joints miss a common point by {distance * chain.length:.2g} m"
         )
-    for numbers, first in (("2, 3 and 4", 1), ("3, 4 and 5", 2)):
+    for numbers, first in (("1, 2 and 3", 0), ("2, 3 and 4", 1), ("3, 4 and 5", 2), ("4, 5 and 6", 3)):
         h = lines.axes[first : first + 3]
         angle = max(angle_between(h[0], h[1]), angle_between(h[1], h[2]))
         parts.append(f"axes {numbers} are off parallel by {np.rad2deg(angle):.2g} deg")

@@ -37,6 +37,7 @@ class SinglePose:
     def __init__(self, form: ClosedForm) -> None:
         assert form.kernel is not None
         self._kernel, self._names = form.kernel, form.branches
+        self._turns = form.full_turns
         # Workspaces that no call uses at the moment.
         self._free: list[_Workspace] = [self._workspace()]
 
@@ -63,7 +64,7 @@ class SinglePose:
         self._free.append(workspace)
         if rows is None:
             return None
-        return IKSolutions(rows[:, :N_JOINTS], rows[:, N_JOINTS:], self._names, bits)
+        return IKSolutions(rows[:, :N_JOINTS], rows[:, N_JOINTS:], self._names, bits, full_turns=self._turns)
 
     def _workspace(self) -> _Workspace:
         block = np.empty((N_BRANCHES, N_JOINTS + 2))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from dynx.errors import ArgumentError
 from dynx.files.notebook import html_table
+from dynx.ik.closed_form.full_turns import FullTurns
 from dynx.ik.result import NOT_FOUND, REACHED, IKResult
 from dynx.spatial.scalar import Floats
 
@@ -32,6 +33,7 @@ class IKSolutions(IKResult):
     """Empty: the solutions are those of one frame."""
     _errors: Floats
     _named: tuple[tuple[str, ...], int | None]
+    _full_turns: FullTurns | None
 
     def __init__(
         self,
@@ -42,6 +44,7 @@ class IKSolutions(IKResult):
         *,
         success: Mask | None = None,
         arbitrary: Mask | None = None,
+        full_turns: FullTurns | None = None,
     ) -> None:
         """`errors` (..., 2) are those of position [m] and rotation [rad]. `branches` name the rows of q; if
         `bits` are given, those whose bits are set do.
@@ -50,6 +53,7 @@ class IKSolutions(IKResult):
         """
         found = self.__dict__
         found["q"], found["_errors"], found["_named"] = q, errors, (branches, bits)
+        found["_full_turns"] = full_turns
         if success is not None:
             found["success"] = success
         if arbitrary is not None:
@@ -92,6 +96,25 @@ class IKSolutions(IKResult):
         many configurations reach the pose, of which q is one."""
         return np.zeros(self.q.shape, dtype=np.bool_)
 
+    @cached_property
+    def multiplicity(self) -> NDArray[np.int64]:
+        """Number (...,) of configurations within the limits that differ from each solution by full turns,
+        itself included: more than 1 where limits span more than a turn; 0 for rows that are no solutions.
+        Joints without limits count with one value."""
+        if self._full_turns is None:
+            return self.success.astype(np.int64)
+        return np.where(self.success, self._full_turns.counts(self.q), 0)
+
+    def with_full_turns(self) -> Floats:
+        """Return all configurations (m, nq) that reach one pose: every solution, with every full turn that
+        its limits allow (`multiplicity`), those of the first solution first.
+
+        Raises ArgumentError for a batch, and for more than a million configurations.
+        """
+        if self.success.ndim > 1:
+            raise ArgumentError("these are solutions of several poses; full turns are listed for one")
+        return self.q.copy() if self._full_turns is None else self._full_turns.configurations(self.q)
+
     def __len__(self) -> int:
         """Return the number of rows of q: the solutions of one pose, or the poses of a batch."""
         return len(self.q)
@@ -110,9 +133,22 @@ class IKSolutions(IKResult):
     def measured(self, errors: Floats, success: Mask) -> IKSolutions:
         """Return these solutions with other `errors` (..., 2), of which those in `success` (...,) remain."""
         if success.ndim > 1:
-            return IKSolutions(self.q, errors, self.branches, success=success, arbitrary=self.arbitrary)
+            return IKSolutions(
+                self.q,
+                errors,
+                self.branches,
+                success=success,
+                arbitrary=self.arbitrary,
+                full_turns=self._full_turns,
+            )
         names = tuple(name for name, remains in zip(self.branches, success.tolist(), strict=True) if remains)
-        return IKSolutions(self.q[success], errors[success], names, arbitrary=self.arbitrary[success])
+        return IKSolutions(
+            self.q[success],
+            errors[success],
+            names,
+            arbitrary=self.arbitrary[success],
+            full_turns=self._full_turns,
+        )
 
     @property
     def status(self) -> Any:
@@ -131,7 +167,8 @@ class IKSolutions(IKResult):
         text = "no solution" if not count else "1 solution" if count == 1 else f"{count} solutions"
         if self.arbitrary.any():
             return f"{text}, which stand for infinitely many (singular pose)"
-        return text
+        multiplicity = int(self.multiplicity.sum())
+        return text if multiplicity == count else f"{text}, {multiplicity} with full turns within the limits"
 
     def __repr__(self) -> str:
         if self.success.ndim > 1:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
+from itertools import combinations
 from math import prod
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ from dynx.errors import NoClosedFormError, ShapeError, shown
 from dynx.ik.closed_form.branches import N_BRANCHES, branch_names
 from dynx.ik.closed_form.candidates import ARBITRARY, POSITION, ROTATION, Candidates
 from dynx.ik.closed_form.chain import N_JOINTS, Chain, chain_to
+from dynx.ik.closed_form.full_turns import FullTurns
 from dynx.ik.closed_form.polish import AxisFrames
 from dynx.ik.closed_form.recognition import TOLERANCES, Recognised, recognise
 from dynx.ik.closed_form.review import ACCURACY, Mask, Review, near_to
@@ -40,6 +42,10 @@ _SEPARATION = 1e-5, 10.0
 of the chain's deviation, by which solutions near a singularity move."""
 
 
+MAX_SURPLUS = 3
+"""Most joints beyond those of a closed form for which sets to be given are looked for."""
+
+
 class ClosedForm:
     """The closed form of the inverse kinematics of one frame; safe to use from several threads."""
 
@@ -57,6 +63,8 @@ class ClosedForm:
         self.branches = branch_names(recognised)
         """Names of the eight branches, in the order of the rows of a batch."""
         self._columns = list(chain.columns)
+        self.full_turns = FullTurns.of(model, self._columns)
+        """Angles that may take several values within their limits."""
         self.covers_model = self._columns == list(range(model.nq))
         """True if the model has no other joints."""
         self._length = chain.length
@@ -105,7 +113,7 @@ class ClosedForm:
         """Return all solutions for poses T_world_target (..., 4, 4).
 
         Each solution has one value of each angle: the one within the limits that is nearest to 0, or to q0
-        (..., nq) if that is given. Its other values that differ by full turns are not listed. Coordinates of
+        (..., nq) if that is given; `IKSolutions.with_full_turns` lists the others. Coordinates of
         other joints stay at q0, or at the neutral configuration. With `ignore_limits` solutions outside the
         limits are included. If the form is compiled, a batch is split over at most `threads` threads, with
         the same results for any number.
@@ -179,7 +187,9 @@ class ClosedForm:
         if not batch:
             bits = int(np.packbits(found[0], bitorder="little")[0])
             marked = None if arbitrary is None else arbitrary[found]
-            return IKSolutions(q[found], errors[found], self.branches, bits, arbitrary=marked)
+            return IKSolutions(
+                q[found], errors[found], self.branches, bits, arbitrary=marked, full_turns=self.full_turns
+            )
         shape = (*batch, N_BRANCHES)
         return IKSolutions(
             q.reshape(*shape, nq),
@@ -187,6 +197,7 @@ class ClosedForm:
             self.branches,
             success=found.reshape(shape),
             arbitrary=None if arbitrary is None else arbitrary.reshape(*shape, nq),
+            full_turns=self.full_turns,
         )
 
     def _relative(self, T: Floats) -> Floats:
@@ -246,11 +257,24 @@ def closed_form(
     model.frame_index(frame)
     refuse_other_than_model(model)
     positions = {} if given is None else given
-    chain = chain_to(model, frame, positions)
-    if len(chain.joints) != N_JOINTS:
-        raise NoClosedFormError(_wrong_count(model, frame, chain))
+    try:
+        chain, recognised = _recognised(model, frame, positions)
+    except NoClosedFormError as error:
+        sets = _sets_to_give(error, model, frame, positions)
+        raise NoClosedFormError(error.reason, _remedies(model, frame, positions, sets)) from None
+    return ClosedForm(model, chain, recognised, compiled=compiled)
+
+
+def _recognised(model: Model, frame: str, given: Mapping[str, float]) -> tuple[Chain, Recognised]:
+    """Return the chain to a frame and its geometry. Raises NoClosedFormError."""
+    chain = chain_to(model, frame, given)
+    count = len(chain.joints)
+    if count != N_JOINTS:
+        raise NoClosedFormError(
+            f"{count} joints move {shown(frame)} of {model.name}; the closed form is for {N_JOINTS}"
+        )
     low, high = (each[list(chain.columns)] for each in (model.lower, model.upper))
-    return ClosedForm(model, chain, recognise(chain, np.clip(0.0, low, high)), compiled=compiled)
+    return chain, recognise(chain, np.clip(0.0, low, high))
 
 
 @lru_cache(maxsize=64)
@@ -263,24 +287,36 @@ def stored_closed_form(
 
 def redundant_joints(model: Model, frame: str, given: Mapping[str, float] | None = None) -> tuple[str, ...]:
     """Return the joints between world and frame of which one, if it is given, leaves a closed form."""
+    joints = chain_to(model, frame, {} if given is None else given).joints
+    found = _remedies(model, frame, {} if given is None else given, [(joint,) for joint in joints])
+    return tuple(joint for (joint,) in found)
+
+
+def _remedies(
+    model: Model, frame: str, given: Mapping[str, float], sets: Iterable[tuple[str, ...]]
+) -> list[tuple[str, ...]]:
+    """Return those sets of joints that leave a closed form if they are given."""
     found = []
-    positions = {} if given is None else dict(given)
-    for joint in chain_to(model, frame, positions).joints:
+    for joints in sets:
         try:
-            # At a position without special geometry.
-            closed_form(model, frame, {**positions, joint: 0.7})
+            # At positions without special geometry.
+            positions = {joint: 0.7 - 0.4 * k for k, joint in enumerate(joints)}
+            _recognised(model, frame, {**given, **positions})
         except NoClosedFormError:
             continue
-        found.append(joint)
-    return tuple(found)
+        found.append(joints)
+    return found
 
 
-def _wrong_count(model: Model, frame: str, chain: Chain) -> str:
-    count = len(chain.joints)
-    text = f"{count} joints move {shown(frame)} of {model.name}; the closed form is for {N_JOINTS}"
-    if count == N_JOINTS + 1:
-        names = redundant_joints(model, frame, chain.given)
-        if names:
-            return f"{text} and a given one: given={{{names[0]!r}: ...}} (or {', '.join(names[1:])})"
-        return f"{text}, and none of them leaves one if it is given"
-    return text
+def _sets_to_give(
+    error: NoClosedFormError, model: Model, frame: str, given: Mapping[str, float]
+) -> list[tuple[str, ...]]:
+    """Return sets of joints that may leave a closed form if they are given."""
+    if error.remedies:
+        return list(error.remedies)
+    try:
+        joints = chain_to(model, frame, given).joints
+    except NoClosedFormError:
+        return []
+    surplus = len(joints) - N_JOINTS
+    return list(combinations(joints, surplus)) if 1 <= surplus <= MAX_SURPLUS else []

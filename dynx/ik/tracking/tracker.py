@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.ik.checking import checked_margin
 from dynx.ik.coordinates import FrameCoordinates
+from dynx.ik.option_names import checks_option_names
 from dynx.ik.search import SearchLimits
 from dynx.ik.targets import Targets, checked_targets
 from dynx.ik.tasks import Kinematics
@@ -44,6 +45,7 @@ class Motion(Protocol):
         """Return q, v and a at times t [s]."""
 
 
+@checks_option_names
 def track(
     kinematics: Kinematics,
     targets: ArrayLike | Motion,

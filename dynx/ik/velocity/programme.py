@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dynx.errors import ArgumentError, ShapeError, shown
+from dynx.ik.option_names import checks_option_names
 from dynx.ik.tasks import Kinematics
 from dynx.ik.velocity.library import solve_programme
 from dynx.ik.velocity.limits import velocity_bounds
@@ -43,6 +44,7 @@ class VelocityResult:
         return self.success
 
 
+@checks_option_names
 def velocity_ik(
     kinematics: Kinematics,
     q: ArrayLike,

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError, shown
+from dynx.ik.option_names import checks_field_names
 from dynx.ik.residual import Residual
 from dynx.ik.targets import checked_targets
 from dynx.ik.tasks import Kinematics, frame_jacobian
@@ -15,6 +16,7 @@ from dynx.model.configuration import checked_array, checked_vector, is_real, rea
 from dynx.spatial.scalar import Floats
 
 
+@checks_field_names
 @dataclass(frozen=True, eq=False)
 class VelocityTask:
     """The velocity of one frame, its weights, and whether it must be met."""

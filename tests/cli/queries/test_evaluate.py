@@ -130,7 +130,7 @@ def test_every_solution_is_shown() -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["panda", "--to-pose", "0.4,0,0.4,0,0,0", "--frame", "panda_link8"], "panda_joint"),
+        (["panda", "--to-pose", "0.4,0,0.4,0,0,0", "--frame", "panda_link8"], "with --given panda_j"),
         (["panda", "--to-pose", "0.4,0,0.4,0,0,0", "--frame", "panda_link8", "--given", "panda_join7=0"],
          "panda_joint7"),
         (["ur5", "--to-pose", "0.4,0,0.4"], "whole pose"),

@@ -15,6 +15,11 @@ FAMILIES = (
     "parallel: axes 5 and 6 intersecting",
     "parallel: axes 5 and 6 parallel",
     "parallel: general",
+    "outer: axes 4 and 5 intersecting",
+    "outer: axes 4 and 5 parallel",
+    "outer: axes 5 and 6 parallel",
+    "outer: axes 5 and 6 intersecting",
+    "outer: general",
 )
 
 LENGTH = 0.5
@@ -53,6 +58,10 @@ def _lines(family: str, rng: np.random.Generator) -> tuple[Floats, Floats]:
         points[3:] = points[3]
         pairs = {"axes 2 and 3 parallel": (1, 2), "axes 1 and 2 parallel": (0, 1)}
         meeting = {"axes 1 and 2 intersecting": (0, 1)}
+    elif kind == "outer":
+        axes[1], axes[2] = axes[0] * rng.choice([-1, 1]), axes[0] * rng.choice([-1, 1])
+        pairs = {"axes 4 and 5 parallel": (3, 4), "axes 5 and 6 parallel": (4, 5)}
+        meeting = {"axes 4 and 5 intersecting": (3, 4), "axes 5 and 6 intersecting": (4, 5)}
     else:
         axes[2], axes[3] = axes[1] * rng.choice([-1, 1]), axes[1] * rng.choice([-1, 1])
         pairs, meeting = {"axes 5 and 6 parallel": (4, 5)}, {"axes 5 and 6 intersecting": (4, 5)}

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from dynx.backends import Backend, backend
+from dynx.errors import ArgumentError
 from dynx.ik import IKResult, IKSolutions, closed_form
 from dynx.model import Model
 from dynx.model.loading import load
@@ -171,6 +172,38 @@ def test_a_position_at_its_limit_is_kept_within_it() -> None:
                 assert (found.q >= model.lower).all()
                 assert (found.q <= model.upper).all()
                 assert np.abs(found.q - at_limit).max(axis=-1).min() < 1e-6
+
+
+@pytest.mark.parametrize("name", ["reference", "compiled"])
+def test_full_turns_within_the_limits_are_counted_and_listed(name: str) -> None:
+    q = np.array([0.3, -0.5, 0.9, 0.4, 0.8, 0.2])
+    with backend(name, UR5) as engine:
+        T = engine.forward_kinematics(q, "tool0")
+        for _ in range(2):
+            found = solutions(engine.inverse_kinematics(T, "tool0", all_solutions=True))
+            assert (found.multiplicity == 2**5).all()  # the elbow has one turn
+            assert "8 solutions, 256 with full turns" in found.message
+        every = found.with_full_turns()
+        reached = engine.forward_kinematics(every, "tool0")
+        batch = solutions(engine.inverse_kinematics(T[None], "tool0", all_solutions=True))
+    assert every.shape == (256, 6)
+    assert (pose_difference(reached, T) < 1e-10).all()
+    assert ((every >= UR5.lower) & (every <= UR5.upper)).all()
+    assert len(np.unique(every.round(6), axis=0)) == 256
+    assert batch.multiplicity.sum() == 256
+    with pytest.raises(ArgumentError, match="several poses"):
+        batch.with_full_turns()
+
+
+def test_an_angle_at_zero_is_also_at_both_limits_of_two_turns() -> None:
+    with backend("reference", UR5) as engine:
+        T = engine.forward_kinematics([0.0, -0.5, 0.9, 0.4, 0.8, 0.2], "tool0")
+        found = solutions(engine.inverse_kinematics(T, "tool0", all_solutions=True))
+    at_zero = np.abs(found.q[:, 0]) < 1e-9
+    assert at_zero.any()
+    assert (found.multiplicity == np.where(at_zero, 3, 2) * 2**4).all()
+    pan = found.with_full_turns()[:, 0]
+    assert (np.abs(pan).max(), np.abs(pan).min()) == pytest.approx((2.0 * np.pi, 0.0), abs=1e-9)
 
 
 def test_the_result_prints_its_branches() -> None:

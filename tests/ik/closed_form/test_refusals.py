@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import re
 from typing import Any
 
@@ -41,7 +42,13 @@ def coupled_arm() -> Model:
 @pytest.mark.parametrize(
     ("model", "frame", "given", "error", "says"),
     [
-        (PANDA, "panda_hand", {}, NoClosedFormError, "7 joints .*given={'panda_joint.': ...} .*panda_joint7"),
+        (
+            PANDA,
+            "panda_hand",
+            {},
+            NoClosedFormError,
+            "7 joints .*given={'panda_joint.': ...} .*panda_joint7",
+        ),
         (
             PANDA,
             "panda_hand",
@@ -49,8 +56,14 @@ def coupled_arm() -> Model:
             NoClosedFormError,
             "miss a common point by .* m.*parallel",
         ),
-        (SCARA, SCARA.links[-1].name, {}, NoClosedFormError, "prismatic"),
-        (general_arm(), "tool", {}, NoClosedFormError, "off parallel by .* deg"),
+        (
+            SCARA,
+            SCARA.links[-1].name,
+            {},
+            NoClosedFormError,
+            "prismatic.*; without all_solutions a search",
+        ),
+        (general_arm(), "tool", {}, NoClosedFormError, "off parallel by .* deg.*; without all_solutions"),
         (load("ur5", base="floating"), "tool0", {}, NoClosedFormError, "floating base"),
         (coupled_arm(), "b", {}, NoClosedFormError, "'second' follows 'first'"),
         (UR5, "forearm_link", {}, NoClosedFormError, "3 joints move 'forearm_link'"),
@@ -89,6 +102,12 @@ def test_joints_that_leave_a_closed_form_are_named() -> None:
         (np.eye(4), {"position_tolerance": -1.0}, ArgumentError, "position_tolerance"),
         (np.eye(4), {"q0": np.zeros((2, 6))}, ShapeError, "q0 has leading axes"),
         (np.eye(4), {"given": {"nobody": 1.0}}, UnknownNameError, "nobody"),
+        (
+            np.eye(4),
+            {"given": {"elbow_joint": 9.0}},
+            ArgumentError,
+            "'elbow_joint' is 9 rad, outside its limits",
+        ),
         (2.0 * np.eye(4), {}, ArgumentError, "rigid"),
     ],
 )
@@ -100,3 +119,13 @@ def test_invalid_arguments(target: Any, options: dict[str, Any], error: type[Dyn
 def test_given_without_all_solutions_is_refused() -> None:
     with backend("reference", PANDA) as engine, pytest.raises(ArgumentError, match="all_solutions=True"):
         engine.inverse_kinematics(np.eye(4), "panda_hand", given={"panda_joint7": 0.1})
+
+
+def test_what_an_error_advises_can_be_followed() -> None:
+    with pytest.raises(NoClosedFormError) as caught:
+        closed_form(PANDA, "panda_hand")
+    assert len(caught.value.remedies) == 4
+    for joints in caught.value.remedies:
+        assert closed_form(PANDA, "panda_hand", dict.fromkeys(joints, 0.1)).given.keys() == set(joints)
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert (str(again), again.remedies) == (str(caught.value), caught.value.remedies)

@@ -54,6 +54,7 @@ def engine(request: pytest.FixtureRequest) -> Iterator[Backend]:
         (PATH, {"free": "turn"}, ArgumentError, "free is 'turn'"),
         (PATH, {"free": "position", "point": np.ones(3)}, ArgumentError, "no effect"),
         (PATH, {"rng": "seed"}, ArgumentError, "rng is 'seed'"),
+        (PATH, {"max_stp": 0.1}, UnknownNameError, "track has no option 'max_stp'; did you mean 'max_step'"),
     ],
 )
 def test_arguments(

@@ -168,6 +168,12 @@ def test_hard_tasks_that_contradict_each_other_are_met_as_well_as_possible() -> 
         (VelocityTask(FRAME), {"velocity_limit": [1.0]}, ShapeError, "velocity_limit"),
         (VelocityTask(FRAME), {"posture": np.zeros(3)}, ShapeError, "posture"),
         (VelocityTask(FRAME), {"dt": -1.0}, ArgumentError, "dt"),
+        (
+            VelocityTask(FRAME),
+            {"dampin": 1.0},
+            UnknownNameError,
+            "velocity_ik has .*; did you mean 'damping'",
+        ),
     ],
 )
 def test_invalid_arguments_raise(
@@ -175,6 +181,12 @@ def test_invalid_arguments_raise(
 ) -> None:
     with pytest.raises(error, match=message):
         ENGINE.velocity_ik(Q, task, **{"dt": DT, **options})
+
+
+def test_a_misspelt_field_of_a_task_has_the_nearest_name() -> None:
+    misspelt: dict[str, Any] = {"weight": 2.0}
+    with pytest.raises(UnknownNameError, match="VelocityTask has no option 'weight'; did you mean 'weights'"):
+        VelocityTask(FRAME, **misspelt)
 
 
 def test_without_the_solver_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,38 @@
+"""Names of keyword arguments: a misspelt one raises an error with the nearest name."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, TypeVar, cast
+
+from dynx.errors import UnknownNameError, nearest, shown
+
+F = TypeVar("F", bound=Callable[..., Any])
+C = TypeVar("C", bound=type)
+
+
+def checks_option_names(function: F) -> F:
+    """Decorate a function so that a keyword that it does not have raises UnknownNameError, not TypeError."""
+    return _checked(function, function.__name__)
+
+
+def checks_field_names(cls: C) -> C:
+    """Decorate a dataclass so that a field that it does not have raises UnknownNameError, not TypeError."""
+    cls.__init__ = _checked(cls.__init__, cls.__name__)  # type: ignore[misc]  # of the class, not an instance
+    return cls
+
+
+def _checked(function: F, name: str) -> F:
+    parameters = [each for each in inspect.signature(function).parameters if each != "self"]
+    known = frozenset(parameters)
+
+    @wraps(function)
+    def checked(*arguments: Any, **options: Any) -> Any:
+        if not options.keys() <= known:
+            wrong = next(each for each in options if each not in known)
+            raise UnknownNameError(f"{name} has no option {shown(wrong)}{nearest(wrong, parameters)}")
+        return function(*arguments, **options)
+
+    return cast(F, checked)
