@@ -8,7 +8,7 @@ from io import StringIO
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.console import Console
 
@@ -28,6 +28,7 @@ from dynx.spatial.scalar import Floats
 from tests.doctor.planting.catalogue import PLANTERS
 from tests.doctor.planting.plan import Trial, pair_trials, plant_defects
 from tests.doctor.planting.robots import QUICK
+from tests.examples import PROFILE
 from tests.rules.documents import case_of, joint, link
 
 needs_all_engines = pytest.mark.skipif(
@@ -73,7 +74,11 @@ def values(text: str) -> Iterator[Floats]:
     yield from (found.poses, found.mass_matrix, found.torque, found.bias, *found.jacobians.values())
 
 
+few = settings(max_examples=min(PROFILE, max(25, PROFILE // 2)))
+
+
 @needs_all_engines
+@few
 @given(st.data(), st.sampled_from(LEVELS))
 def test_every_changed_element_is_named_and_no_level_is_exceeded(data: st.DataObject, level: Level) -> None:
     trial = data.draw(st.sampled_from(trials()))
@@ -92,6 +97,7 @@ def test_every_changed_element_is_named_and_no_level_is_exceeded(data: st.DataOb
 
 
 @needs_all_engines
+@few
 @given(st.data())
 def test_what_a_lower_level_leaves_undone_is_what_the_highest_does(data: st.DataObject) -> None:
     trial = data.draw(st.sampled_from(trials()))

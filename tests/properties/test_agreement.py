@@ -24,13 +24,11 @@ from dynx.model import Model
 from dynx.model.loading import load
 from dynx.testing.strategies import models, samples, wrenches
 from tests.error_bounds import samples_at
+from tests.examples import PROFILE
 
 REAL = ("ur5", "panda", "solo12", "hyq", "xarm7", "z1", "six_axis_arm", "seven_axis_arm", "scara")
 REAL_COMPILED = [(robot, ("fixed", "floating")[k % 2]) for k, robot in enumerate(REAL)]
 """Real robots for the compiled backend, which takes seconds per robot: each on one base."""
-
-COMPILED_EXAMPLES = 40
-"""Number of random robots in a test of the compiled backend."""
 
 STATES = 2
 """Number of states in one example, evaluated as a batch."""
@@ -93,7 +91,7 @@ def test_random_robots(base: Base, data: st.DataObject) -> None:
 
 @each_base
 @given(data=st.data())
-@settings(max_examples=min(COMPILED_EXAMPLES, settings().max_examples))
+@settings(max_examples=min(PROFILE, max(15, PROFILE // 4)))
 def test_compiled_random_robots(base: Base, data: st.DataObject) -> None:
     physical, solvable = data.draw(st.sampled_from([(True, False), (True, True), (False, False)]))
     model, states = data.draw(robots_in_states(base, physical, solvable))

@@ -30,7 +30,7 @@ from tests.examples import PROFILE
 from tests.sim.bars import EXACT_ON_DYNX, apart
 from tests.sim.batch.batches import assert_same, batch_and_one
 
-few = settings(max_examples=min(PROFILE, 25))
+few = settings(max_examples=min(PROFILE, max(12, PROFILE // 4)))
 """Every example compiles a kernel of its own."""
 
 
