@@ -123,7 +123,7 @@ class Selection:
             bodies.append((self.model.frame_index(self.payload), inertia_from_parameters(_next(values, 10))))
         if self.point_payload is not None:
             mass, *center = _next(values, len(POINT))
-            bodies.append((self.model.frame_index(self.point_payload), _point_mass(mass, np.array(center))))
+            bodies.append((self.model.frame_index(self.point_payload), point_mass(mass, np.array(center))))
         if not self.joint_dynamics:
             return ParameterValues(tuple(bodies), None)
         moving = sum(joint.moves for joint in self.model.joints)
@@ -134,6 +134,7 @@ def _next(values: Iterator[object], count: int) -> Array:
     return np.array([next(values) for _ in range(count)], dtype=object)
 
 
-def _point_mass(mass: object, center: Array) -> RigidInertia:
+def point_mass(mass: object, center: Array) -> RigidInertia:
+    """Return the inertia of a mass [kg] at a place (3,) [m] about the origin, for any scalar."""
     C = skew(center)
     return RigidInertia(np.asarray(mass), center * mass, -(C @ C) * mass)

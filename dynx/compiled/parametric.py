@@ -95,7 +95,7 @@ class ParametricDynamics:
         Raises SingularMassMatrixError where the mass matrix is singular.
         """
         arrays = [self._arguments.q(q), self._arguments.v(v), self._arguments.v(tau, "tau")]
-        a = self._evaluate("forward_dynamics", _forward_dynamics, arrays, parameters)
+        a = self._evaluate("forward_dynamics", solve_forward_dynamics, arrays, parameters)
         return self._arguments.finite_acceleration(a)
 
     def mass_matrix(self, q: ArrayLike, parameters: ArrayLike | None = None) -> Floats:
@@ -199,7 +199,11 @@ def _mass_matrix(mechanism: Mechanism, joints: Array | None, q: Array) -> Array:
     return reduce_rows(mechanism, reduce_columns(mechanism, M))
 
 
-def _forward_dynamics(mechanism: Mechanism, joints: Array | None, q: Array, v: Array, tau: Array) -> Array:
+def solve_forward_dynamics(
+    mechanism: Mechanism, joints: Array | None, q: Array, v: Array, tau: Array
+) -> Array:
+    """Return the acceleration (nv,) of a mechanism of symbols, by factors of its mass matrix; `joints` (n, 3)
+    are damping, friction and armature."""
     bias = _inverse_dynamics(mechanism, joints, q, v, np.zeros(len(v)))
     L, D = factorize_mass_matrix(mechanism, _mass_matrix(mechanism, joints, q))
     return solve_with_factors(L, D, tau - bias)

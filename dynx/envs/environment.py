@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from dynx.envs.actions import checked_action
 from dynx.envs.library import Env
+from dynx.envs.randomization.randomization import Randomization
+from dynx.envs.randomization.variation import Variation
 from dynx.envs.task import Episodes, Task, checked_engine
 from dynx.errors import ArgumentError, ClosedError, EpisodeError, nearest, shown
 from dynx.model.configuration import whole_number
@@ -38,13 +40,15 @@ class TaskEnvironment(Env[Any, Any]):
         engine: str | None = None,
         render_mode: str | None = None,
         *,
+        randomize: Randomization | Mapping[str, Any] | None = None,
         width: int = 480,
         height: int = 360,
     ) -> None:
         """`engine` is by default the first of ``task.engines()``; pictures have `width` x `height` pixels.
 
-        Raises ArgumentError for an engine or a render mode that does not exist, NotInstalledError for an
-        engine that is not installed.
+        Each episode draws the parameters that `randomize` names; ``info["parameters"]`` of `reset` has their
+        values. Raises ArgumentError for an engine or a render mode that does not exist, NotInstalledError for
+        an engine that is not installed, and the errors of `Randomization` and of its parameters.
         """
         if not isinstance(task, Task):
             raise ArgumentError(f"task is of type {type(task).__name__}; wanted a dynx.envs.Task")
@@ -63,7 +67,17 @@ class TaskEnvironment(Env[Any, Any]):
         self._size = (whole_number("width", width, 1, MAX_SIDE), whole_number("height", height, 1, MAX_SIDE))
         self._phase = "before reset"
         self._shown_at = -np.inf
+        drawn = None if randomize is None else Randomization.read(randomize)
         self._episodes: Episodes | None = task.open(self.engine)
+        self._variation: Variation | None = None
+        if drawn is not None:
+            try:
+                motion = self._episodes.vary(drawn)
+                self._variation = Variation(drawn, motion, task.observation_space, task.action_space)
+            except BaseException:
+                self.close()
+                raise
+        self._seeded = False
 
     @property
     def episodes(self) -> Episodes:
@@ -84,10 +98,19 @@ class TaskEnvironment(Env[Any, Any]):
         super().reset(seed=seed)
         if not isinstance(options, Mapping | None):
             raise ArgumentError(f"options is {shown(options)}; wanted a dict of options by name")
-        found: tuple[Any, dict[str, Any]] = episodes.start(self.np_random, options or {})
+        if self._variation is not None:
+            if seed is not None or not self._seeded:
+                self._variation.seed(self.np_random_seed, self.np_random)
+                self._seeded = True
+            self._variation.start()
+            episodes.set_parameters(self._variation.values[0, : self._variation.motion_size].copy())
+        observation, info = episodes.start(self.np_random, options or {})
         self._phase = "running"
         self._show()
-        return found
+        if self._variation is not None:
+            values = {name: float(numbers[0]) for name, numbers in self._variation.by_name().items()}
+            observation, info = self._observed(observation), {**info, "parameters": values}
+        return observation, info
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Act for one control step; return observation, reward, terminated, truncated (False) and info.
@@ -102,11 +125,34 @@ class TaskEnvironment(Env[Any, Any]):
                 if self._phase == "before reset"
                 else "step was called after the episode ended (terminated): call reset"
             )
-        outcome = episodes.step(checked_action(self.action_space, action))
+        given = checked_action(self.action_space, action)
+        if self._variation is not None:
+            given = self._acting(given)
+        outcome = episodes.step(given)
         if outcome.terminated:
             self._phase = "ended"
         self._show()
-        return outcome.observation, outcome.reward, outcome.terminated, False, outcome.info
+        observation = outcome.observation
+        if self._variation is not None:
+            self._variation.count_step()
+            observation = self._observed(observation)
+        return observation, outcome.reward, outcome.terminated, False, outcome.info
+
+    def _acting(self, action: Any) -> Any:
+        """Return an action with noise."""
+        variation = self._variation
+        if variation is None or variation.action_noise is None:
+            return action
+        noisy = variation.action_noise.added(action.reshape(1, -1), variation.noise_on_actions())
+        return noisy.reshape(action.shape)
+
+    def _observed(self, observation: Any) -> Any:
+        """Return an observation with noise."""
+        variation = self._variation
+        if variation is None or variation.observation_noise is None:
+            return observation
+        noisy = variation.noisy_observations(observation.reshape(1, -1).astype(np.float64))
+        return noisy.reshape(observation.shape).astype(observation.dtype)
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return the picture of the present state (height, width, 3) in mode ``"rgb_array"``, otherwise None.

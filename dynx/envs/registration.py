@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
 
 from dynx.envs.environment import TaskEnvironment
 from dynx.envs.library import AutoresetMode, register, registry
+from dynx.envs.randomization.randomization import Randomization
 from dynx.envs.robot.array_task import ArrayTask
 from dynx.envs.task import Task
 from dynx.envs.vector.environment import RobotVectorEnvironment
@@ -50,13 +52,14 @@ def make_environment(
     engine: str | None = None,
     render_mode: str | None = None,
     *,
+    randomize: Randomization | Mapping[str, Any] | None = None,
     width: int = 480,
     height: int = 360,
     **options: Any,
 ) -> TaskEnvironment:
     """Return the environment of a task with these `options` on an engine; `gymnasium.make` calls this."""
     made = task_class(task).with_options(options)
-    return TaskEnvironment(made, engine, render_mode, width=width, height=height)
+    return TaskEnvironment(made, engine, render_mode, randomize=randomize, width=width, height=height)
 
 
 def make_vector_environment(
@@ -68,6 +71,7 @@ def make_vector_environment(
     max_episode_steps: int | None = None,
     autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
     copy: bool = True,
+    randomize: Randomization | Mapping[str, Any] | None = None,
     width: int = 480,
     height: int = 360,
     **options: Any,
@@ -90,6 +94,7 @@ def make_vector_environment(
         max_episode_steps=max_episode_steps,
         autoreset_mode=autoreset_mode,
         copy=copy,
+        randomize=randomize,
         render_mode=render_mode,
         width=width,
         height=height,

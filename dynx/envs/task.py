@@ -15,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.envs.library import Space
-from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
+from dynx.envs.randomization.draws import Parameter
+from dynx.envs.randomization.randomization import Randomization
+from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError, nearest, shown
 
 Kind = TypeVar("Kind", bound="Task")
 
@@ -77,6 +79,18 @@ class Task(ABC):
 
 class Episodes(ABC):
     """Episodes of a task on one engine, one after another. Arguments were checked by the environment."""
+
+    def vary(self, randomization: Randomization) -> tuple[Parameter, ...]:
+        """Return the parameters of the motion that later episodes draw: those of `randomization` that are
+        neither noise of observations nor of actions.
+
+        Raises UnsupportedFeatureError by default, UnknownNameError for a part that the task does not have.
+        """
+        raise UnsupportedFeatureError(f"{type(self).__name__} has no parameters that episodes can draw")
+
+    def set_parameters(self, values: NDArray[np.float64]) -> None:
+        """Set the values (k,) of the parameters that `vary` returned, before the next episode starts."""
+        raise UnsupportedFeatureError(f"{type(self).__name__} has no parameters that episodes can draw")
 
     @abstractmethod
     def start(self, rng: np.random.Generator, options: Mapping[str, Any]) -> tuple[Any, dict[str, Any]]:

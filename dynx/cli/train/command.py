@@ -23,6 +23,14 @@ from dynx.cli.shell.options import (
     click.option("--engine", metavar="NAME", help="Engine of a task of dynx (default: that of the task)."),
     task_options,
     click.option(
+        "--randomize",
+        type=name_value,
+        multiple=True,
+        metavar="NAME=VALUE",
+        help="Parameter of a task of dynx that each episode draws, such as mass_scale=[0.8,1.2] (uniform) or "
+        "delay=0.02 [s]; may be given several times (docs/environments.md).",
+    ),
+    click.option(
         "--algo",
         "algorithm",
         default="ppo",
@@ -123,5 +131,6 @@ def train() -> None:
       dynx train CartPole --engine compiled --seed 0,1,2 --plot curve.png
       dynx train LunarLander --engine mujoco --out lander
       dynx train LunarLander --engine mujoco --out lander --resume
+      dynx train CartPole --engine compiled --randomize mass_scale=[0.5,2] --randomize delay=[0,0.04]
       dynx train Pendulum --algo sac --steps 20000 --set learning_rate=0.001
     """

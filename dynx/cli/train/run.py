@@ -33,6 +33,7 @@ def train(
     task: str,
     engine: str | None,
     options: Sequence[tuple[str, str]],
+    randomize: Sequence[tuple[str, str]],
     algorithm: str,
     steps: int | None,
     seeds: tuple[int, ...],
@@ -56,7 +57,10 @@ def train(
     if plot_path is not None:
         check_writable(plot_path)
         picture_format(plot_path)
-    spec = TaskSpec(task_id(task), engine, {name: json_value(word) for name, word in options})
+    chosen = {name: json_value(word) for name, word in options}
+    if randomize:
+        chosen["randomize"] = {name: json_value(word) for name, word in randomize}
+    spec = TaskSpec(task_id(task), engine, chosen)
     recipe = recipe_of(algorithm, spec.id)
     given = {name: json_value(word) for name, word in values}
     schedule = Schedule(checkpoint_every, evaluate_every, threads=threads, tensorboard=tensorboard)

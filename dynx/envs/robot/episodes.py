@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,10 +11,14 @@ from numpy.typing import NDArray
 from dynx.backends import backend
 from dynx.control.dynamics import EngineDynamics
 from dynx.envs.library import spaces
+from dynx.envs.randomization.draws import Parameter
+from dynx.envs.randomization.randomization import Randomization
 from dynx.envs.robot.array_task import ArrayTask
 from dynx.envs.robot.pictures import draw_robot
 from dynx.envs.robot.state import State
-from dynx.envs.robot.step import control_step
+from dynx.envs.robot.step import ForwardDynamics, control_step
+from dynx.envs.robot.variation import RobotVariation
+from dynx.envs.robot.varied_robot import VariedRobot
 from dynx.envs.task import Episodes, Outcome
 from dynx.errors import DivergedError, ShapeError
 from dynx.model.configuration import DIVERGENCE_SPEED
@@ -28,11 +32,22 @@ class RobotEpisodes(Episodes):
         self._task = task
         self._backend = backend(engine, task.model, validate=False)
         self._robot = EngineDynamics(self._backend)
-        self._forward = self._robot.forward_dynamics
+        self._forward: ForwardDynamics = self._robot.forward_dynamics
+        self._variation: RobotVariation | None = None
         self._discrete = isinstance(task.action_space, spaces.Discrete)
         self._dtype, self._shape = task.observation_space.dtype, task.observation_space.shape
         self._viewer: Any = None
         self._steps = 0
+
+    def vary(self, randomization: Randomization) -> tuple[Parameter, ...]:
+        """Return the parameters of this robot that episodes draw."""
+        self._variation = RobotVariation(VariedRobot(self._task, randomization), self._backend)
+        return self._variation.robot.parameters
+
+    def set_parameters(self, values: Floats) -> None:
+        """Give the robot of the next episode the values (k,) of the parameters that `vary` returned."""
+        assert self._variation is not None, "vary was not called"
+        self._forward = self._variation.forward_dynamics(values)
 
     @property
     def state(self) -> State:
@@ -52,7 +67,11 @@ class RobotEpisodes(Episodes):
     def step(self, action: Any) -> Outcome:
         task, robot, before = self._task, self._robot, self._state
         given = np.asarray(float(action) if self._discrete else action, dtype=np.float64)
-        moved = control_step(task, robot, self._forward, before, given)
+        if self._variation is None:
+            actions: Sequence[Array] = [given] * task.substeps
+        else:
+            actions = self._variation.acting_actions(given, first=self._steps == 0)
+        moved = control_step(task, robot, self._forward, before, actions)
         self._steps += 1
         self._refuse_divergence(moved.q, moved.v)
         after = self._state = task.settle(moved)
@@ -92,6 +111,8 @@ class RobotEpisodes(Episodes):
         self._viewer.view.put(self._state.q)
 
     def close(self) -> None:
+        if self._variation is not None:
+            self._variation.close()
         self._backend.close()
         if self._viewer is not None:
             self._viewer.close()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from dynx.control.dynamics import Dynamics
@@ -15,11 +16,22 @@ ForwardDynamics = Callable[..., Any]
 
 
 def control_step(
-    task: ArrayTask, robot: Dynamics, forward_dynamics: ForwardDynamics, before: State, action: Array
+    task: ArrayTask,
+    robot: Dynamics,
+    forward_dynamics: ForwardDynamics,
+    before: State,
+    actions: Sequence[Array],
 ) -> State:
-    """Return the state after an action has acted for ``task.control_dt``, before the task settles it."""
+    """Return the state after ``task.control_dt``, before the task settles it.
+
+    `actions` has the one that acts in each step of the integrator.
+    """
     q, v, memory = before
-    for _ in range(task.substeps):
+    for action in actions:
         tau = task.torque(robot, State(q, v, memory), action)
-        q, v = task.advance(lambda q, v, tau=tau: forward_dynamics(q, v, tau), q, v)  # type: ignore[misc]
+        q, v = task.advance(partial(_acceleration, forward_dynamics, tau), q, v)
     return State(q, v, memory)
+
+
+def _acceleration(forward_dynamics: ForwardDynamics, tau: Array, q: Array, v: Array) -> Any:
+    return forward_dynamics(q, v, tau)

@@ -9,8 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dynx.envs.library import AutoresetMode, VectorEnv, batch_space, spaces
+from dynx.envs.randomization.randomization import Randomization
+from dynx.envs.randomization.variation import Variation
 from dynx.envs.robot.array_task import ArrayTask
 from dynx.envs.robot.pictures import draw_robot
+from dynx.envs.robot.varied_robot import VariedRobot
 from dynx.envs.vector.checks import checked_actions, checked_mode, checked_reset_mask, raise_defect
 from dynx.envs.vector.kernels import INVALID, VectorKernels
 from dynx.errors import ArgumentError, ClosedError, EpisodeError, ShapeError, nearest, shown
@@ -46,6 +49,7 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         max_episode_steps: int | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         copy: bool = True,
+        randomize: Randomization | Mapping[str, Any] | None = None,
         render_mode: str | None = None,
         width: int = 480,
         height: int = 360,
@@ -73,7 +77,15 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         self.action_space = batch_space(task.action_space, n)
         self._discrete = isinstance(task.action_space, spaces.Discrete)
         self._kinds = "iu" if self._discrete else "fiu"
-        self._kernels = VectorKernels(task, mode, max_episode_steps)
+        self._variation: Variation | None = None
+        varied = None
+        if randomize is not None:
+            drawn = Randomization.read(randomize)
+            varied = VariedRobot(task, drawn)
+            spaces_of_one = task.observation_space, task.action_space
+            self._variation = Variation(drawn, varied.parameters, *spaces_of_one, count=n)
+        noisy = self._variation is not None and self._variation.action_noise is not None
+        self._kernels = VectorKernels(task, mode, max_episode_steps, varied, noisy_actions=noisy)
         self._layout = self._kernels.layout
         self._copy = copy
         self._rows = max(n, host().lanes)
@@ -86,7 +98,10 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         kernels, rows, n = self._kernels, self._rows, self.num_envs
         kernel = kernels.step()
         sizes = {port.name: port.size for port in kernel.inputs + kernel.outputs}
-        sets = [{name: np.zeros((rows, sizes[name])) for name in ("state", "steps")} for _ in range(2)]
+        twice: list[str] = [name for name in ("state", "steps", "earlier") if name in sizes]
+        sets: list[dict[str, Floats]] = [
+            {name: np.zeros((rows, sizes[name])) for name in twice} for _ in range(2)
+        ]
         arrays = {name: np.zeros((rows, size)) for name, size in sizes.items()}
         self._calls: list[Callable[[], None]] = [
             kernel.bind(
@@ -125,6 +140,13 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         now["state"][: self.num_envs] = array
         now["steps"][...] = 0.0
         self._ended = NONE_ENDED
+        if self._variation is not None:
+            self._variation.restart()
+
+    @property
+    def parameters(self) -> dict[str, Floats]:
+        """Drawn values of the present episodes (num_envs,), by the name of the parameter."""
+        return {} if self._variation is None else self._variation.by_name()
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -143,6 +165,8 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         self.task.require_start_options(given)
         n, now, found = self.num_envs, self._sets[self._turn], self._arrays["observation"]
         rows = np.flatnonzero(mask)
+        if self._variation is not None and (seed is not None or not self._running):
+            self._variation.seed(self.np_random_seed, self.np_random)
         self._renew(rows)
         begun, observation = np.empty_like(now["state"]), np.empty_like(found)
         self._kernels.start(given)([self._random], [begun, observation])
@@ -152,7 +176,9 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         if self._mode is not AutoresetMode.DISABLED:
             self._random[:n] = self.np_random.random((n, self.task.random_size))
         self._running = True
-        return self._found.astype(self.single_observation_space.dtype), {}
+        infos: dict[str, Any] = {}
+        self._add_parameters(infos, rows)
+        return self._observed().astype(self.single_observation_space.dtype), infos
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         """Act for one control step in each environment; return observations, rewards, terminations,
@@ -178,6 +204,8 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         ):
             actions = checked_actions(self._kinds, self._actions.shape, actions)
         self._actions[...] = actions
+        if self._variation is not None and self._variation.action_noise is not None:
+            self._arrays["noise"][: self.num_envs] = self._variation.noise_on_actions()
         turn = self._turn
         self._calls[turn]()
         flags = self._flags
@@ -185,33 +213,56 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         if largest >= INVALID:
             raise_defect(self.single_action_space, self._actions, flags >= INVALID)
         self._turn = 1 - turn
+        infos: dict[str, Any] = {}
+        if self._variation is not None:
+            self._variation.count_step()
         if mode is AutoresetMode.NEXT_STEP:
             # The episodes that ended one step ago have started with these random numbers.
             self._renew(ended)
+            self._add_parameters(infos, ended)
         self._ended = ended = flags.nonzero()[0] if largest else NONE_ENDED
+        if mode is AutoresetMode.SAME_STEP and len(ended):
+            infos = self._final_infos(ended)
+            self._renew(ended)
+            self._add_parameters(infos, ended)
+            self._ended = NONE_ENDED
         rewards, terminated, truncated = self._rewards, self._terminated, self._truncated
         if self._copy:
             rewards, terminated, truncated = rewards.copy(), terminated.copy(), truncated.copy()
-            observations = self._found.astype(self._observations.dtype)
+            observations = self._observed().astype(self._observations.dtype)
         else:
             observations = self._observations
-            observations[...] = self._found
-        infos: dict[str, Any] = {}
-        if mode is AutoresetMode.SAME_STEP and len(ended):
-            self._renew(ended)
-            infos = self._final_infos(ended)
-            self._ended = NONE_ENDED
+            observations[...] = self._observed()
         return observations, rewards, terminated, truncated, infos
+
+    def _observed(self) -> Floats:
+        """Return the observations that the kernel found, with noise where it is drawn."""
+        return self._found if self._variation is None else self._variation.noisy_observations(self._found)
+
+    def _add_parameters(self, infos: dict[str, Any], rows: NDArray[np.intp]) -> None:
+        """Add the drawn values of all environments to infos, with the mask of those that drew new ones."""
+        if self._variation is not None and len(rows):
+            fresh = np.zeros(self.num_envs, dtype=np.bool_)
+            fresh[rows] = True
+            infos["parameters"], infos["_parameters"] = self._variation.by_name(), fresh
 
     def _renew(self, rows: NDArray[np.intp]) -> None:
         """Draw the random numbers of the next episodes of some environments."""
         if len(rows):
             self._random[rows] = self.np_random.random((len(rows), self.task.random_size))
+            if self._variation is not None:
+                self._variation.start(rows)
+                if "parameters" in self._arrays:
+                    size = self._variation.motion_size
+                    self._arrays["parameters"][rows] = self._variation.values[rows, :size]
 
     def _final_infos(self, rows: NDArray[np.intp]) -> dict[str, Any]:
         """Return the last observations of the episodes that ended, as Gymnasium returns them."""
         found = np.full(self.num_envs, None, dtype=object)
-        last = self._arrays["final"][rows].astype(self.single_observation_space.dtype)
+        final = self._arrays["final"][rows]
+        if self._variation is not None:
+            final = self._variation.noisy_observations(final, rows)
+        last = final.astype(self.single_observation_space.dtype)
         for row, observation in zip(rows.tolist(), last, strict=True):
             found[row] = observation
         mask = self._flags != 0

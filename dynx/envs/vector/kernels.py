@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from dynx.envs.library import AutoresetMode, spaces
 from dynx.envs.robot.array_task import ArrayTask
 from dynx.envs.robot.state import State
 from dynx.envs.robot.step import control_step
+from dynx.envs.robot.varied_robot import VariedRobot
 from dynx.envs.vector.layout import Layout
 from dynx.errors import ArgumentError, ShapeError, TraceError, UnsupportedFeatureError
 from dynx.model.configuration import DIVERGENCE_SPEED
@@ -40,13 +42,23 @@ ENDED = -1.0
 class VectorKernels:
     """Kernels of one task, one autoreset mode and one time limit."""
 
-    def __init__(self, task: ArrayTask, mode: AutoresetMode, max_episode_steps: int | None) -> None:
+    def __init__(
+        self,
+        task: ArrayTask,
+        mode: AutoresetMode,
+        max_episode_steps: int | None,
+        varied: VariedRobot | None = None,
+        *,
+        noisy_actions: bool = False,
+    ) -> None:
+        """`varied` are the parameters of the motion that each environment has for itself."""
         space = task.action_space
         if not isinstance(space, spaces.Discrete | spaces.Box):
             raise UnsupportedFeatureError(
                 f"a vector environment takes actions of a Discrete or a Box space, not of {space}"
             )
         self._task, self._mode = task, mode
+        self._varied, self._noisy_actions = varied, noisy_actions
         self._limit = math.inf if max_episode_steps is None else float(max_episode_steps)
         self.layout = Layout.of(task)
         self._robot = ArrayDynamics(task.model)
@@ -63,8 +75,10 @@ class VectorKernels:
         """Return the kernel of a step.
 
         Inputs: ``state`` (layout), the number of ``steps``, ``action``, and ``random`` for the start of the
-        next episode. Outputs: ``state``, ``steps``, ``observation``, ``reward``, ``flags``, and in mode
-        SAME_STEP ``final``, the last observation of the episode.
+        next episode; where they are drawn, ``parameters`` of the motion, ``noise`` on the action, and
+        ``earlier`` actions that may still act. Outputs: ``state``, ``steps``, ``observation``, ``reward``,
+        ``flags``, ``earlier`` if it is an input, and in mode SAME_STEP ``final``, the last observation of the
+        episode.
         """
         sizes = {
             "state": (self.layout.size,),
@@ -72,6 +86,12 @@ class VectorKernels:
             "action": (self.actions,),
             "random": (self._task.random_size,),
         }
+        if self._varied is not None and self._varied.parameters:
+            sizes["parameters"] = (len(self._varied.parameters),)
+            if self._varied.delayed_actions:
+                sizes["earlier"] = (self._varied.delayed_actions * self.actions,)
+        if self._noisy_actions:
+            sizes["noise"] = (self.actions,)
         return self._compiled("step", sizes)
 
     def start(self, options: Mapping[str, Any]) -> Kernel:
@@ -84,7 +104,7 @@ class VectorKernels:
     ) -> Kernel:
         def traced(**inputs: Array) -> dict[str, Array]:
             given = {name: traced_array(array) for name, array in inputs.items()}
-            results = self._step(**given) if options is None else self._start(given["random"], options)
+            results = self._step(given) if options is None else self._start(given["random"], options)
             # Entries that do not depend on an input are numbers.
             return {name: symbol_array(entries) for name, entries in results.items()}
 
@@ -100,12 +120,25 @@ class VectorKernels:
         state = self._task.start(random, **options)
         return {"state": self.layout.row(state), "observation": self._observation(state)}
 
-    def _step(self, state: Array, steps: Array, action: Array, random: Array) -> dict[str, Any]:
+    def _step(self, inputs: Mapping[str, Array]) -> dict[str, Any]:
         task, robot, layout = self._task, self._robot, self.layout
-        before, (count,) = layout.state(state), steps
-        space = task.action_space
-        given: Any = action[0] if isinstance(space, spaces.Discrete) else action.reshape(space.shape)
-        moved = control_step(task, robot, robot.forward_dynamics, before, given)
+        action, random, (count,) = inputs["action"], inputs["random"], inputs["steps"]
+        before, space = layout.state(inputs["state"]), task.action_space
+        noisy = action
+        if self._noisy_actions and isinstance(space, spaces.Box):
+            low, high = (each.ravel().astype(np.float64) for each in (space.low, space.high))
+            noisy = np.clip(action + inputs["noise"], low, high)
+        results: dict[str, Any] = {}
+        actions, forward_dynamics = [noisy] * task.substeps, robot.forward_dynamics
+        if self._varied is not None and "parameters" in inputs:
+            values = inputs["parameters"]
+            forward_dynamics = partial(self._forward_dynamics, self._varied, values)
+            if "earlier" in inputs:
+                actions, results["earlier"] = self._delayed(
+                    self._varied, values, count, noisy, inputs["earlier"]
+                )
+        moved = control_step(task, robot, forward_dynamics, before, [self._shaped(each) for each in actions])
+        given = self._shaped(noisy)
         after = task.settle(moved)
         reward = _number(task.reward(robot, before, given, after))
         taken = count + 1.0
@@ -114,7 +147,6 @@ class VectorKernels:
         flags = select(np.sum(moved.v * moved.v) < DIVERGENCE_SPEED**2, flags, _bits(DIVERGED))
         flags = select(_is_valid(space, action), flags, _bits(INVALID))
         ends = np.maximum(terminated, truncated)
-        results: dict[str, Any] = {}
         if self._mode is AutoresetMode.NEXT_STEP:
             ended = count < 0.0
             reward, flags = select(ended, 0.0, reward), select(ended, 0.0, flags)
@@ -132,6 +164,29 @@ class VectorKernels:
             "flags": [flags],
             **results,
         }
+
+    def _shaped(self, action: Array) -> Any:
+        """Return an action (n,) as the task takes it."""
+        space = self._task.action_space
+        return action[0] if isinstance(space, spaces.Discrete) else action.reshape(space.shape)
+
+    def _forward_dynamics(self, varied: VariedRobot, values: Array, q: Array, v: Array, tau: Array) -> Array:
+        total = tau + varied.joint_torque(values, v)
+        if not varied.changes_masses:
+            return np.asarray(self._robot.forward_dynamics(q, v, total))
+        return traced_array(varied.forward_dynamics(*(symbol_array(each) for each in (values, q, v, total))))
+
+    def _delayed(
+        self, varied: VariedRobot, values: Array, count: Any, action: Array, earlier: Array
+    ) -> tuple[list[Array], Array]:
+        """Return the action that acts in each step of the integrator, and the actions before the next."""
+        # Before the first action of an episode there was none; it acts from the beginning.
+        rows = [
+            np.where(count == 0.0, action, row)
+            for row in earlier.reshape(varied.delayed_actions, self.actions)
+        ]
+        acting = varied.acting_actions(values, action, rows)
+        return acting, np.concatenate([action, *rows[:-1]])
 
     def _observation(self, state: State) -> Array:
         found = np.asarray(self._task.observation(self._robot, state))

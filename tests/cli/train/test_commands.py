@@ -49,6 +49,27 @@ def test_several_seeds_have_a_folder_each_a_mean_and_a_plot(tmp_path: Path) -> N
     assert run(*command).exit_code == 2
 
 
+def test_drawn_parameters_are_part_of_the_run(tmp_path: Path) -> None:
+    command = (
+        "train",
+        "CartPole",
+        "--engine",
+        "compiled",
+        "--steps",
+        "64",
+        "--out",
+        str(tmp_path / "run"),
+        *FEW,
+    )
+    result = run(*command, "--randomize", 'mass_scale={"pole": [0.5, 2]}', "--randomize", "delay=0.02")
+    assert result.exit_code == 0, result.output
+    spec = json.loads((tmp_path / "run" / "run.json").read_text())["spec"]
+    assert spec["task"]["options"]["randomize"] == {"mass_scale": {"pole": [0.5, 2]}, "delay": 0.02}
+    result = run("train", "CartPole", "--out", str(tmp_path / "other"), "--randomize", "mas_scale=2")
+    assert result.exit_code == 2
+    assert "did you mean 'mass_scale'" in result.output
+
+
 def test_a_policy_is_judged_on_several_engines(folder: Path, tmp_path: Path) -> None:
     policy = str(folder / "final.zip")
     result = run("play", policy, "--engine", "reference,compiled", "--episodes", "3", "--seed", "7", "--json")

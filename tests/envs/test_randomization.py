@@ -1,0 +1,376 @@
+"""Parameters per environment: draws that depend on nothing else, and steps of a robot that has them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import dynx.envs
+from dynx.backends import backend, installed_backends
+from dynx.envs import Randomization
+from dynx.envs.environment import TaskEnvironment
+from dynx.envs.randomization.counter_random import (
+    Purpose,
+    consecutive_seeds,
+    normal_numbers,
+    philox,
+    uniform_pairs,
+)
+from dynx.envs.randomization.distribution import read_distribution
+from dynx.envs.randomization.draws import Draws, parameters_of
+from dynx.envs.randomization.point_mass import with_point_mass
+from dynx.envs.randomization.variation import EPISODES_AHEAD
+from dynx.envs.robot.state import State
+from dynx.envs.robot.varied_robot import VariedRobot
+from dynx.envs.tasks.cart_pole import CartPole
+from dynx.envs.tasks.pendulum import Pendulum
+from dynx.envs.tasks.push import Push
+from dynx.envs.tasks.quadruped import Stand
+from dynx.envs.tasks.reach import Reach
+from dynx.envs.vector.environment import RobotVectorEnvironment
+from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError
+from dynx.sim.plants.model_error import Payload, plant_model
+
+CART_POLE: dict[str, Any] = {
+    "mass_scale": {"pole": (0.5, 2.0), "cart": {"log_uniform": (0.5, 2.0)}},
+    "joint_damping": {"slide": (0.0, 0.5)},
+    "joint_friction": (0.0, 0.2),
+    "delay": (0.0, 0.05),
+    "observation_noise": {0: 0.01, 2: (0.0, 0.002)},
+}
+REACH: dict[str, Any] = {
+    "mass_scale": (0.7, 1.4),
+    "payload": {"frame": "tip", "mass": (0.1, 0.5), "center": (0.0, (-0.05, 0.05), 0.1)},
+    "joint_damping": {"normal": (0.3, 0.05)},
+    "joint_friction": {"elbow": (0.1, 0.2)},
+    "delay": (0.005, 0.05),
+    "action_noise": 0.2,
+}
+
+
+def words(*numbers: int) -> Any:
+    return tuple(np.array([number], dtype=np.uint64) for number in numbers)
+
+
+@pytest.mark.parametrize(
+    ("counter", "key", "random"),
+    [
+        ((0, 0, 0, 0), (0, 0), (0x6627E8D5, 0xE169C58D, 0xBC57AC4C, 0x9B00DBD8)),
+        ((2**32 - 1,) * 4, (2**32 - 1,) * 2, (0x408F276D, 0x41C83B0E, 0xA20BC7C6, 0x6D5451FD)),
+        (
+            (0x243F6A88, 0x85A308D3, 0x13198A2E, 0x03707344),
+            (0xA4093822, 0x299F31D0),
+            (0xD16CFE09, 0x94FDCCEB, 0x5001E420, 0x24126EA1),
+        ),
+    ],
+)
+def test_random_words_are_the_published_ones(counter: Any, key: Any, random: Any) -> None:
+    # Known answers of Random123, the library of the authors of Philox.
+    assert tuple(int(each[0]) for each in philox(words(*counter), words(*key))) == random
+
+
+def test_random_numbers_have_their_distributions() -> None:
+    seeds, zero = consecutive_seeds(7, 20_000), np.zeros(20_000, dtype=np.uint64)
+    uniform = uniform_pairs(seeds, zero, np.arange(3, dtype=np.uint64))
+    assert uniform.min() >= 0.0
+    assert uniform.max() < 1.0
+    flat = uniform.reshape(len(seeds), -1)
+    # Six standard errors: 1 / sqrt(12 n) of the mean, and 1 / sqrt(n) of a correlation.
+    assert np.abs(flat.mean(axis=0) - 0.5).max() < 6.0 / np.sqrt(12.0 * len(seeds))
+    assert np.abs(np.corrcoef(flat.T) - np.eye(6)).max() < 6.0 / np.sqrt(len(seeds))
+    normal = normal_numbers(Purpose.ACTION, seeds, zero, zero, 5)
+    assert normal.shape == (20_000, 5)
+    assert np.abs(normal.mean(axis=0)).max() < 6.0 / np.sqrt(len(seeds))
+    assert np.abs(normal.std(axis=0) - 1.0).max() < 6.0 / np.sqrt(2.0 * len(seeds))
+    other = normal_numbers(Purpose.OBSERVATION, seeds, zero, zero, 5)
+    assert np.abs(np.corrcoef(normal[:, 0], other[:, 0])[0, 1]) < 6.0 / np.sqrt(len(seeds))
+
+
+@given(
+    seed=st.integers(0, 2**70),
+    count=st.integers(1, 9),
+    first=st.integers(0, 8),
+    episode=st.integers(0, 2**40),
+    low=st.floats(0.1, 1.0),
+    high=st.floats(1.0, 3.0),
+)
+@settings(max_examples=40, deadline=None)
+def test_a_draw_depends_on_its_environment_alone(
+    seed: int, count: int, first: int, episode: int, low: float, high: float
+) -> None:
+    given_ranges = Randomization(mass_scale={"a": (low, high)}, delay={"log_uniform": (low, high)})
+    alone = Randomization(delay={"log_uniform": (low, high)})
+    draws, fewer = (Draws(parameters_of(each, ("mass_scale", "delay"))) for each in (given_ranges, alone))
+    seeds = consecutive_seeds(seed, first + count)
+    episodes = np.full(first + count, episode, dtype=np.uint64)
+    values = draws.values(seeds, episodes)
+    part = draws.values(seeds[first:], episodes[first:])
+    assert np.array_equal(values[first:], part)
+    assert np.array_equal(values[:, 1:], fewer.values(seeds, episodes))
+    assert (values >= low * (1.0 - 1e-15)).all()
+    assert (values <= high * (1.0 + 1e-15)).all()
+
+
+def test_vectors_of_any_size_and_single_environments_draw_the_same() -> None:
+    def drawn(seed: int, n: int) -> Any:
+        envs = RobotVectorEnvironment(CartPole(), n, randomize=CART_POLE)
+        _, infos = envs.reset(seed=seed)
+        assert infos["_parameters"].all()
+        return infos["parameters"]
+
+    whole = drawn(11, 7)
+    for part, first in ((drawn(11, 3), 0), (drawn(14, 4), 3)):
+        for name, values in part.items():
+            assert np.array_equal(values, whole[name][first : first + len(values)])
+    singles: Any = gymnasium.make_vec(
+        "dynx/CartPole-v0", num_envs=7, vectorization_mode="sync", engine="reference", randomize=CART_POLE
+    )
+    _, infos = singles.reset(seed=11)
+    for name, values in whole.items():
+        assert np.array_equal(infos["parameters"][name], values)
+        assert name == "observation_noise.0" or len(np.unique(values)) > 1
+    singles.close()
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode), ids=str)
+def test_each_episode_draws_anew_as_in_a_single_environment(mode: AutoresetMode) -> None:
+    n = 4
+    envs = RobotVectorEnvironment(
+        CartPole(), n, autoreset_mode=mode, randomize=CART_POLE, max_episode_steps=12
+    )
+    _, infos = envs.reset(seed=5)
+    episodes = [[{name: values[k] for name, values in infos["parameters"].items()}] for k in range(n)]
+    for step in range(260):
+        *_, terminated, truncated, infos = envs.step(np.full(n, step // 3 % 2))
+        if mode is AutoresetMode.DISABLED and (terminated | truncated).any():
+            _, infos = envs.reset(options={"reset_mask": terminated | truncated})
+        if infos:
+            for k in np.flatnonzero(infos["_parameters"]):
+                episodes[k].append({name: values[k] for name, values in infos["parameters"].items()})
+    with TaskEnvironment(CartPole(), "reference", randomize=CART_POLE) as env:
+        for number, rows in enumerate(episodes):
+            assert len(rows) > EPISODES_AHEAD
+            for episode, row in enumerate(rows):
+                _, info = env.reset(seed=None if episode else 5 + number)
+                assert info["parameters"] == row
+
+
+@pytest.mark.parametrize(
+    ("task", "drawn"), [(CartPole(), CART_POLE), (Reach(robot="planar_3r"), REACH)], ids=["CartPole", "Reach"]
+)
+def test_the_kernel_takes_the_steps_of_every_engine(task: Any, drawn: Any) -> None:
+    n, steps, model = 3, 7, task.model
+    envs = RobotVectorEnvironment(task, n, randomize=drawn)
+    envs.reset(seed=2)
+    starts = envs.states
+    rng = np.random.default_rng(0)
+    discrete = isinstance(task, CartPole)
+    actions: Any = rng.integers(0, 2, (steps, n)) if discrete else rng.uniform(-1.0, 1.0, (steps, n, 3))
+    found = [envs.step(each) for each in actions]
+    for engine in installed_backends():
+        with TaskEnvironment(task, engine, randomize=drawn) as env:
+            for k in range(n):
+                env.reset(seed=2 + k)
+                episodes: Any = env.episodes
+                episodes.state = State(*np.split(starts[k], [model.nq, model.nq + model.nv]))
+                for action, (observations, rewards, terminated, _, _) in zip(actions, found, strict=True):
+                    observation, reward, ended, _, _ = env.step(action[k])
+                    assert observation == pytest.approx(observations[k], abs=1e-6)
+                    assert reward == pytest.approx(rewards[k], abs=1e-9)
+                    assert ended == terminated[k]
+                assert np.concatenate(episodes.state) == pytest.approx(envs.states[k], abs=1e-9)
+    assert np.abs(envs.states - starts).max() > 1e-3
+
+
+@given(pole=st.floats(0.2, 5.0), cart=st.floats(0.2, 5.0))
+@settings(max_examples=8, deadline=None)
+def test_scaled_masses_are_those_of_a_task_with_these_masses(pole: float, cart: float) -> None:
+    scaled = RobotVectorEnvironment(CartPole(), 1, randomize={"mass_scale": {"pole": pole, "cart": cart}})
+    scaled.reset(seed=0)
+    robot: Any = TaskEnvironment(CartPole(pole_mass=0.1 * pole, cart_mass=cart), "reference")
+    robot.reset(seed=0)
+    robot.episodes.state = State(*np.split(scaled.states[0], [2]))
+    for k in range(6):
+        scaled.step(np.array([k % 2]))
+        robot.step(k % 2)
+    assert scaled.states[0] == pytest.approx(np.concatenate(robot.episodes.state), abs=1e-12)
+
+
+@pytest.mark.parametrize("engine", ["compiled", "reference"])
+def test_joint_friction_opposes_the_motion(engine: str) -> None:
+    task, inertia = Pendulum(), 1.0 / 3.0
+    velocities = []
+    for drawn in ({"delay": 0.0}, {"joint_damping": 0.2}, {"joint_friction": 0.3}, {"joint_friction": 1e3}):
+        with TaskEnvironment(task, engine, randomize=drawn) as env:
+            env.reset(seed=0)
+            episodes: Any = env.episodes
+            episodes.state = State(np.array([0.0]), np.array([2.0]))
+            env.step(np.zeros(1, dtype=np.float32))
+            velocities.append(float(episodes.state.v[0]))
+    free, damped, rubbed, stopped = velocities
+    assert free - damped == pytest.approx(0.05 * 0.2 * 2.0 / inertia, rel=1e-9)
+    assert free - rubbed == pytest.approx(0.05 * 0.3 / inertia, rel=1e-9)
+    # Friction beyond any bound halves the velocity in each step, and never turns it round.
+    assert stopped == pytest.approx(1.0, rel=1e-9)
+
+
+def test_a_delay_shifts_actions() -> None:
+    task = Reach(robot="planar_3r")
+    robot = VariedRobot(task, Randomization(delay=(0.0, 0.028)))
+    assert task.step_dt == 0.004
+    assert robot.delayed_actions == 2
+    now, before, first = (np.full(3, x) for x in (2.0, 1.0, 0.0))
+    for steps, expected in (
+        (0, [2.0] * 5),
+        (1, [1.0, 2.0, 2.0, 2.0, 2.0]),
+        (5, [1.0] * 5),
+        (7, [0.0, 0.0, 1.0, 1.0, 1.0]),
+    ):
+        acting = robot.acting_actions(np.array([steps * 0.004]), now, [before, first])
+        assert [each[0] for each in acting] == expected
+
+
+def test_a_delayed_episode_is_one_with_earlier_actions() -> None:
+    def states(delay: float, actions: list[int]) -> Any:
+        envs = RobotVectorEnvironment(CartPole(), 1, randomize={"delay": delay})
+        envs.reset(seed=1)
+        found = []
+        for action in actions:
+            envs.step(np.array([action]))
+            found.append(envs.states)
+        return found
+
+    actions = [0, 1, 1, 0, 1, 0, 0]
+    assert np.array_equal(states(0.04, actions), states(0.0, [0, 0, *actions[:-2]]))
+    assert not np.array_equal(states(0.04, actions), states(0.0, actions))
+
+
+def test_noise_has_its_deviation_and_leaves_the_state() -> None:
+    n = 4000
+    envs = RobotVectorEnvironment(
+        Pendulum(), n, randomize={"observation_noise": {2: 0.1}, "action_noise": 0.3}
+    )
+    observations, _ = envs.reset(seed=0)
+    state = envs.states
+    noise = observations[:, 2] - state[:, 1]
+    assert np.abs(observations[:, 0] - np.cos(state[:, 0])).max() < 1e-6
+    assert noise.std() == pytest.approx(0.1, rel=6.0 / np.sqrt(2.0 * n))
+    envs.set_states(np.zeros((n, 2)))
+    observations, *_ = envs.step(np.zeros((n, 1), dtype=np.float32))
+    # From rest at the top, the velocity after a step is the torque over the inertia.
+    acted = envs.states[:, 1] / 0.05 / 3.0 / 2.0
+    assert acted.std() == pytest.approx(0.3, rel=0.05)
+    assert np.abs(acted).max() <= 1.0 + 1e-12
+    assert np.abs(np.corrcoef(noise, observations[:, 2] - envs.states[:, 1])[0, 1]) < 6.0 / np.sqrt(n)
+    with pytest.raises(ArgumentError, match="environment 0: action"):
+        envs.step(np.full((n, 1), 1.5))
+
+
+def test_a_payload_of_a_world_is_a_body_on_the_link() -> None:
+    model, rng = dynx.load("ur5"), np.random.default_rng(0)
+    placed = with_point_mass(model, "tool0", 2.0, (0.1, -0.2, 0.3))
+    added = plant_model(model, Payload("tool0", 2.0, (0.1, -0.2, 0.3)), 1.0)
+    q, v, a = (rng.normal(size=6) for _ in range(3))
+    one, other = (backend("reference", each).inverse_dynamics(q, v, a) for each in (placed, added))
+    assert one == pytest.approx(other, rel=1e-12)
+
+
+def test_worlds_have_the_drawn_parameters() -> None:
+    drawn = {
+        "mass_scale": {"cube": (0.5, 2.0), "panda_link7": 1.5},
+        "payload": {"frame": "panda_hand_tcp", "mass": 0.4},
+        "friction_scale": (0.5, 1.5),
+        "joint_damping": {"panda_joint1": 2.0},
+    }
+    task = Push()
+    with TaskEnvironment(task, "pybullet", randomize=drawn) as env:
+        _, info = env.reset(seed=4)
+        episodes: Any = env.episodes
+        scene, nominal, values = episodes.world.scene, task.scene(), info["parameters"]
+        arm, own = scene.robot("arm"), nominal.robot("arm")
+        assert scene.body("cube").mass == values["mass_scale.cube"] * nominal.body("cube").mass
+        assert (
+            scene.material("table").friction == values["friction_scale"] * nominal.material("table").friction
+        )
+        gained = 0.5 * own.model.inertial("panda_link7").mass + values["payload.mass"]
+        assert arm.model.total_mass == pytest.approx(own.model.total_mass + gained, rel=1e-12)
+        assert arm.model.joint("panda_joint1").dynamics.damping == 2.0
+        first, _ = env.reset(seed=4)
+        assert np.array_equal(env.reset(seed=4)[0], first)
+        env.reset()
+        assert episodes.world.scene.body("cube").mass != scene.body("cube").mass
+
+
+def test_a_delay_of_a_world_shifts_actions() -> None:
+    def returned(delay: float, actions: list[Any]) -> list[float]:
+        env = TaskEnvironment(Stand(), "pybullet", randomize={"delay": delay})
+        env.reset(seed=0)
+        rewards = [env.step(action)[1] for action in actions]
+        env.close()
+        return rewards
+
+    actions = list(np.random.default_rng(0).uniform(-1.0, 1.0, (6, 12)).astype(np.float32))
+    assert returned(0.04, actions) != returned(0.0, actions)
+    assert returned(0.04, actions)[0] == returned(0.0, actions)[0]
+    with TaskEnvironment(Stand(), "pybullet", randomize={"delay": 0.04}) as env:
+        env.reset(seed=0)
+        episodes: Any = env.episodes
+        for action in actions:
+            env.step(action)
+        assert np.array_equal(episodes.episode.memory.action, actions[-3].astype(np.float64))
+
+
+@pytest.mark.parametrize(
+    ("drawn", "error", "message"),
+    [
+        ({"mass": (0.5, 2.0)}, UnknownNameError, "did you mean 'mass_scale'"),
+        ({"mass_scale": {"pol": 1.0}}, UnknownNameError, "did you mean 'pole'"),
+        ({"joint_damping": {"slid": 1.0}}, UnknownNameError, "did you mean 'slide'"),
+        ({"mass_scale": (2.0, 0.5)}, ArgumentError, "a lower bound above the upper one"),
+        ({"mass_scale": (0.0, 1.0)}, ArgumentError, "reaches 0; wanted numbers above 0"),
+        ({"delay": {"normal": (0.01, 0.01)}}, ArgumentError, "reaches -0.02"),
+        ({"delay": {"uniforme": (0.0, 0.1), "b": 1}}, ArgumentError, "wanted one of uniform"),
+        ({"delay": "long"}, ArgumentError, "wanted a number, .low, high."),
+        (
+            {"observation_noise": {4: 0.1}},
+            ArgumentError,
+            "entry 4; wanted the number of an entry from 0 to 3",
+        ),
+        ({"action_noise": 0.1}, UnsupportedFeatureError, "action_noise needs a Box"),
+        ({"friction_scale": 0.5}, UnsupportedFeatureError, "joint_friction"),
+        ({"payload": {"frame": "pole"}}, ArgumentError, "payload has no mass"),
+        ({"payload": {"frame": "pile", "mass": 1.0}}, UnknownNameError, "did you mean 'pole'"),
+        ({"payload": {"fram": "pole", "mass": 1.0}}, UnknownNameError, "did you mean 'frame'"),
+        ({}, ArgumentError, "names no parameter"),
+        ([("delay", 1.0)], ArgumentError, "wanted a dict"),
+    ],
+)
+def test_wrong_randomizations_are_refused(drawn: Any, error: type[Exception], message: str) -> None:
+    for make in (TaskEnvironment, RobotVectorEnvironment):
+        with pytest.raises(error, match=message):
+            make(CartPole(), randomize=drawn)
+
+
+def test_parts_of_worlds_are_refused_by_name() -> None:
+    for drawn, nearest in (
+        ({"mass_scale": {"cub": 1.0}}, "cube"),
+        ({"mass_scale": {"arm/panda_link77": 1.0}}, "arm/panda_link7"),
+        ({"joint_friction": {"panda_joint11": 1.0}}, "panda_joint1"),
+    ):
+        with pytest.raises(UnknownNameError, match=f"did you mean '{nearest}'"):
+            TaskEnvironment(Push(), "pybullet", randomize=drawn)
+
+
+def test_a_normal_distribution_is_clamped() -> None:
+    found = read_distribution("delay", {"normal": (1.0, 0.1)})
+    numbers = found.numbers(np.random.default_rng(0).random((20_000, 2)))
+    assert found.bounds == pytest.approx((0.7, 1.3))
+    assert numbers.min() >= 0.7 - 1e-12
+    assert numbers.max() <= 1.3 + 1e-12
+    assert numbers.std() == pytest.approx(0.1, rel=0.03)
