@@ -10,13 +10,10 @@ import numpy as np
 from dynx.errors import SingularMassMatrixError, shown
 from dynx.model import Model
 from dynx.model.mechanism import ROOT, Mechanism
-from dynx.rbd.crba import mass_matrix
 from dynx.spatial.scalar import Floats
 from dynx.world.layout import Layout, RobotLayout
+from dynx.world.notes.conditioning import singular_direction
 from dynx.world.state import WorldState
-
-MIN_SINGULAR_CONDITION = 1e10
-"""Condition number of a mass matrix, with its diagonal scaled to 1, from which it is conspicuous."""
 
 
 def unbounded_motions(layout: Layout, state: WorldState) -> Iterator[str]:
@@ -25,8 +22,9 @@ def unbounded_motions(layout: Layout, state: WorldState) -> Iterator[str]:
         model = robot.model
         if not model.mechanism.bodies:
             continue
-        condition, direction = scaled_condition(model, state.robots[robot.name].q)
-        if condition > MIN_SINGULAR_CONDITION:
+        found = singular_direction(model, state.robots[robot.name].q)
+        if found is not None:
+            _, direction = found
             joints = [shown(f"{robot.name}/{name}") for name in main_joints(model, direction)]
             yield (
                 f"the mass matrix of {shown(robot.name)} is singular to rounding, because its links have "
@@ -46,7 +44,10 @@ def refuse_singular_start(robot: RobotLayout, remedy: str) -> None:
     start."""
     if not robot.model.mechanism.bodies:
         return
-    condition, direction = scaled_condition(robot.model, robot.q)
+    found = singular_direction(robot.model, robot.q)
+    if found is None:
+        return
+    condition, direction = found
     if condition * len(direction) * 4.0 * np.finfo(float).eps > 1.0:
         joints = " and ".join(map(shown, main_joints(robot.model, direction))) or "its base"
         raise SingularMassMatrixError(
@@ -56,20 +57,9 @@ def refuse_singular_start(robot: RobotLayout, remedy: str) -> None:
         )
 
 
-def scaled_condition(model: Model, q: Floats) -> tuple[float, Floats]:
-    """Return the condition number of the mass matrix of all joints, mimic joints included, with its diagonal
-    scaled to 1, and the direction of its smallest eigenvalue."""
-    mechanism = model.mechanism
-    M = np.asarray(mass_matrix(mechanism, mechanism.tree_q(q)), dtype=float)
-    d = 1.0 / np.sqrt(np.maximum(M.diagonal(), np.finfo(float).tiny))
-    sizes, directions = np.linalg.eigh(d[:, None] * M * d)
-    smallest = max(float(sizes[0]), 0.0)
-    return (float(sizes[-1]) / smallest if smallest else np.inf), directions[:, 0]
-
-
 def main_joints(model: Model, direction: Floats) -> list[str]:
-    """Return the names of the at most two joints that move the most along a direction of `scaled_condition`;
-    none where the base does."""
+    """Return the names of the at most two joints that move the most along a `singular_direction`; none where
+    the base does."""
     moving = [joint.name for joint in model.joints if joint.moves]
     share = np.abs(direction[len(direction) - len(moving) :])
     return [moving[k] for k in np.argsort(-share)[:2] if share[k] > 0.1]

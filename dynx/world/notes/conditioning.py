@@ -1,0 +1,93 @@
+"""Condition of the mass matrix of a robot at one configuration.
+
+A world computes it when it opens. So the matrix is the sum of Jp' F + Jr' N over the bodies, with force F and
+moment N at unit accelerations of each coordinate, for all bodies and coordinates at once: `dynx.rbd.crba`,
+which takes any scalar, takes four times as long for floats. Eigenvalues are computed only where a bound on
+the condition is large, because on a busy machine the threads of LAPACK wait for one another for tens of
+milliseconds.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynx.model import Model
+from dynx.model.mechanism import Mechanism
+from dynx.rbd.kinematics import ancestry, body_poses
+from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import cross
+
+MIN_SINGULAR_CONDITION = 1e10
+"""Condition number of a mass matrix, with its diagonal scaled to 1, from which it is conspicuous."""
+
+
+def singular_direction(model: Model, q: Floats) -> tuple[float, Floats] | None:
+    """Return the condition number of the mass matrix of all joints, mimic joints included, with its diagonal
+    scaled to 1, and the direction of its smallest eigenvalue; None below `MIN_SINGULAR_CONDITION`."""
+    mechanism = model.mechanism
+    if not mechanism.nv:
+        return None
+    M = mass_matrix_of_floats(mechanism, mechanism.tree_q(q))
+    d = 1.0 / np.sqrt(np.maximum(M.diagonal(), np.finfo(float).tiny))
+    scaled = d[:, None] * M * d
+    if condition_bound(scaled) < MIN_SINGULAR_CONDITION:
+        return None
+    sizes, directions = np.linalg.eigh(scaled)
+    smallest = max(float(sizes[0]), 0.0)
+    condition = float(sizes[-1]) / smallest if smallest else np.inf
+    return None if condition <= MIN_SINGULAR_CONDITION else (condition, directions[:, 0])
+
+
+def condition_bound(A: Floats) -> float:
+    """Return an upper bound on the condition number of a symmetric matrix (n, n) with a diagonal of ones,
+    infinite where it is not positive definite.
+
+    The largest eigenvalue is at most n, and the smallest at least 1 / |L^-1|^2 in Frobenius' norm, where
+    A = L L'. The bound is at most n^2 times too large.
+    """
+    try:
+        L = np.linalg.cholesky(A)
+    except np.linalg.LinAlgError:
+        return np.inf
+    inverse = np.eye(len(L))
+    for k, row in enumerate(L):
+        inverse[k] -= np.einsum("j,jk->k", row[:k], inverse[:k])
+        inverse[k] /= row[k]
+    return float(len(L) * np.einsum("ij,ij->", inverse, inverse))
+
+
+def mass_matrix_of_floats(mechanism: Mechanism, q: Floats) -> Floats:
+    """Return the joint-space inertia M (nv, nv) in tree coordinates at one configuration q (nq,)."""
+    base = 6 if mechanism.floating else 0
+    if mechanism.floating:
+        # M does not depend on the position, from which the levers of the bodies would lose digits.
+        q = np.concatenate([np.zeros(3), q[3:]])
+    poses, bodies = body_poses(mechanism, q), mechanism.bodies
+    R, p = np.stack([*map(_floats, poses.R)]), np.stack([*map(_floats, poses.p)])
+    inertias = [mechanism.root, *(body.inertia for body in bodies)]
+    mass = np.array([float(each.mass) for each in inertias])
+    moment = np.einsum("bij,bj->bi", R, np.stack([_floats(each.first_moment) for each in inertias]))
+    tensor = R @ np.stack([_floats(each.rotational_inertia) for each in inertias]) @ R.transpose(0, 2, 1)
+
+    # Velocities of the origin of each body and angular velocities, for a unit velocity of each coordinate.
+    linear, angular = np.zeros((2, mechanism.nv, len(inertias), 3))
+    if base:
+        linear[:3] = angular[3:6] = R[0].T[:, None]
+        linear[3:6] = cross(angular[3:6], p - p[0])
+    axes = np.einsum("bij,bj->bi", R[1:], np.stack([np.zeros(3), *(_floats(b.axis) for b in bodies)])[1:])
+    moves = np.zeros((len(bodies), len(inertias)), dtype=bool)
+    for number in range(len(bodies)):
+        moves[ancestry(mechanism, number), number + 1] = True
+    revolute = np.array([body.revolute for body in bodies], dtype=bool)[:, None]
+    turning = np.where((moves & revolute)[..., None], axes[:, None], 0.0)
+    angular[base:] = turning
+    levers = p - p[1:, None]
+    linear[base:] = np.where((moves & ~revolute)[..., None], axes[:, None], cross(turning, levers))
+
+    force = mass[:, None] * linear + cross(angular, moment)
+    torque = np.einsum("bij,kbj->kbi", tensor, angular) + cross(moment, linear)
+    return np.asarray(np.einsum("kbi,lbi->kl", linear, force) + np.einsum("kbi,lbi->kl", angular, torque))
+
+
+def _floats(x: object) -> Floats:
+    return np.asarray(x, dtype=np.float64)

@@ -1,0 +1,64 @@
+"""The condition of mass matrices that a world computes when it opens."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import dynx
+from dynx.model import Model
+from dynx.rbd.crba import mass_matrix
+from dynx.spatial.scalar import Floats
+from dynx.testing.strategies import configurations, models
+from dynx.world.notes.conditioning import condition_bound, mass_matrix_of_floats, singular_direction
+
+
+def of_algorithm(model: Model, q: Floats) -> Floats:
+    mechanism = model.mechanism
+    return np.asarray(mass_matrix(mechanism, mechanism.tree_q(q)), dtype=float)
+
+
+@settings(max_examples=60)
+@given(st.data())
+def test_the_mass_matrix_is_that_of_the_composite_rigid_body_algorithm(data: st.DataObject) -> None:
+    model = data.draw(models())
+    q = data.draw(configurations(model))
+    mechanism = model.mechanism
+    M, found = of_algorithm(model, q), mass_matrix_of_floats(mechanism, mechanism.tree_q(q))
+    assert (np.abs(M - found) <= 1e-12 * float(np.abs(M).max(initial=0.0))).all()
+
+
+@settings(max_examples=60)
+@given(st.integers(1, 12), st.integers(0, 2**32 - 1), st.floats(-6.0, 0.0))
+def test_the_condition_is_bounded_from_above(n: int, seed: int, spread: float) -> None:
+    rng = np.random.default_rng(seed)
+    B = rng.normal(size=(n, n)) * 10.0 ** rng.uniform(spread, 0.0, n)
+    A = B @ B.T
+    d = 1.0 / np.sqrt(A.diagonal())
+    A = d[:, None] * A * d
+    sizes = np.linalg.eigvalsh(A)
+    if sizes[0] > 1e-10:
+        condition = float(sizes[-1] / sizes[0])
+        assert condition * (1.0 - 1e-5) <= condition_bound(A) <= 1.00001 * n**2 * condition
+
+
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+def test_a_robot_with_a_massless_joint_is_found(base: dynx.model.model.Base) -> None:
+    model = dynx.load("romeo", base=base)
+    found = singular_direction(model, model.neutral())
+    assert found is not None
+    condition, direction = found
+    M = of_algorithm(model, model.neutral())
+    assert condition > 1e13
+    # Along this direction the coordinates, scaled to equal inertias, move almost no mass.
+    d = 1.0 / np.sqrt(np.maximum(M.diagonal(), np.finfo(float).tiny))
+    assert abs(direction @ (d[:, None] * M * d) @ direction) < 1e-12
+
+
+def test_a_usual_robot_is_not() -> None:
+    for name in ("panda", "solo12", "talos"):
+        model = dynx.load(name, base="floating")
+        assert singular_direction(model, model.neutral()) is None
+    assert singular_direction(dynx.load("free_body"), np.zeros(0)) is None
