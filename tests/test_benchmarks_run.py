@@ -49,6 +49,12 @@ def test_paths_are_followed_in_kernels() -> None:
     assert finished.stdout.splitlines()[-1].startswith("| z1 | 100 / 0 / 0 / 0 | 2 |")
 
 
+def test_obstacles_are_avoided() -> None:
+    finished = run("benchmarks.kinematics.avoidance", "z1", "--poses", "20")
+    assert finished.returncode == 0, finished.stdout + finished.stderr
+    assert finished.stdout.splitlines()[-1].startswith("| z1 | 20 |")
+
+
 def test_integrators_are_of_their_order() -> None:
     finished = run("benchmarks.integrators", "--quick")
     assert finished.returncode == 0, finished.stdout + finished.stderr

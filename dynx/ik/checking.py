@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError, nearest, shown
+from dynx.ik.avoidance import Avoidance, AvoidanceSource
 from dynx.ik.axes import checked_axes
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.frame_target import frame_targets
@@ -52,7 +53,21 @@ def checked_problem(
         raise ShapeError(
             f"leading axes do not broadcast: target has {of_targets}, q0 has {start.shape[:-1]}"
         ) from None
-    return Problem(requirements, coordinates, margin, start, q0 is not None, batch, limits, rng, secondary)
+    avoidance = checked_avoidance(model, options.avoid)
+    if avoidance is not None and options.method != "dynx":
+        raise ArgumentError("avoid needs method 'dynx'")
+    return Problem(
+        requirements, coordinates, margin, start, q0 is not None, batch, limits, rng, secondary, avoidance
+    )
+
+
+def checked_avoidance(model: Model, avoid: AvoidanceSource | None) -> Avoidance | None:
+    """Return what the robot is to avoid, or None. Raises ArgumentError."""
+    if avoid is None:
+        return None
+    if not isinstance(avoid, AvoidanceSource):
+        raise ArgumentError(f"avoid is {shown(avoid)}; wanted a dynx.world.Scene, or Scene.avoidance(...)")
+    return avoid.avoidance_for(model)
 
 
 def _secondary(model: Model, options: Options) -> Secondary | None:

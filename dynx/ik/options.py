@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
+from dynx.ik.avoidance import AvoidanceSource
 from dynx.ik.axes import checked_tolerance
 from dynx.ik.search import SearchLimits
 from dynx.model.configuration import whole_number
@@ -30,6 +31,7 @@ class IKOptions(TypedDict, total=False):
     limit_margin: ArrayLike
     nearest: ArrayLike | None
     maximize: str | None
+    avoid: AvoidanceSource | None
     max_iterations: int
     max_restarts: int
     rng: np.random.Generator | int | None
@@ -66,6 +68,9 @@ class Options:
     """What the choice among solutions and the redundant joints make great: ``"manipulability"`` (square root
     of det J J') or ``"limit_distance"`` (minus the sum, over joints with two limits, of the squared distance
     from the middle of the range in units of half the range)."""
+    avoid: AvoidanceSource | None = None
+    """What the robot is to keep away from: a `dynx.world.Scene`, with a margin of 0.01 m, or what its method
+    `avoidance` returns for other margins [m]. Links of the robot keep away from one another as well."""
     max_iterations: int = 50
     """Most steps of each start."""
     max_restarts: int = 200

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dynx.ik.avoidance import Avoidance
 from dynx.ik.axes import AxisRequirement
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.search import SearchLimits
@@ -50,6 +51,8 @@ class Problem:
     rng: np.random.Generator | int | None
     secondary: Secondary | None = None
     """What solutions are chosen by, if there is a choice."""
+    avoidance: Avoidance | None = None
+    """What solutions keep away from, or None."""
 
     @property
     def count(self) -> int:

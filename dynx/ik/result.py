@@ -17,6 +17,7 @@ from dynx.spatial.scalar import Floats
 Measures = tuple[float, float, float, int]
 
 REACHED, UNREACHABLE, NOT_FOUND = "REACHED", "UNREACHABLE", "NOT_FOUND"
+IN_COLLISION = "IN_COLLISION"
 """Values of `IKResult.status`."""
 
 
@@ -24,14 +25,14 @@ REACHED, UNREACHABLE, NOT_FOUND = "REACHED", "UNREACHABLE", "NOT_FOUND"
 class IKResult:
     """Configurations with their errors by forward kinematics; leading axes are batch.
 
-    `success` is decided by forward kinematics at the returned `q` and nothing else. Where it is False, `q` is
-    the best configuration found; it always lies within the limits.
+    `success` is decided by forward kinematics at the returned `q`, with `avoid` also by certified distances.
+    Where it is False, `q` is the best configuration found; it always lies within the limits.
     """
 
     q: Floats
     """Configurations (..., nq), within the position limits."""
     success: NDArray[np.bool_]
-    """True where both errors are within the tolerances (...,)."""
+    """True where both errors are within the tolerances (...,), and with `avoid` all margins are kept."""
     position_error: Floats
     """Distance from the target (...,) [m]; 0 if the position is free."""
     rotation_error: Floats
@@ -43,6 +44,9 @@ class IKResult:
     proof: NDArray[np.object_] | None = field(default=None, kw_only=True)
     """Sentence (...,) that proves a target out of reach; empty where there is none. None stands for no
     proof."""
+    collision: NDArray[np.object_] | None = field(default=None, kw_only=True)
+    """With `avoid` a sentence (...,) that says which bodies are too close in the solutions found; empty where
+    that is not the failure."""
     by_frame: Mapping[str, tuple[Floats, Floats]] = field(default_factory=dict, kw_only=True)
     """Position error (...,) [m] and rotation error (...,) [rad] of each frame, if there are several; those of
     the result are the largest."""
@@ -52,10 +56,12 @@ class IKResult:
 
     @property
     def status(self) -> Any:
-        """``"REACHED"``, ``"UNREACHABLE"`` (there is a `proof`) or ``"NOT_FOUND"``; an array (...,) of them
-        for a batch."""
+        """``"REACHED"``, ``"UNREACHABLE"`` (there is a `proof`), ``"IN_COLLISION"`` (bodies are too close in
+        every solution found) or ``"NOT_FOUND"``; an array (...,) of them for a batch."""
         proved = False if self.proof is None else self.proof != ""
-        found = np.where(self.success, REACHED, np.where(proved, UNREACHABLE, NOT_FOUND))
+        collides = False if self.collision is None else self.collision != ""
+        unreached = np.where(proved, UNREACHABLE, np.where(collides, IN_COLLISION, NOT_FOUND))
+        found = np.where(self.success, REACHED, unreached)
         return found if found.ndim else str(found)
 
     @property
@@ -71,11 +77,15 @@ class IKResult:
         if self.success.ndim:
             beyond = 0 if self.proof is None else int((self.proof != "").sum())
             proved = f", {beyond} proved out of reach" if beyond else ""
+            close = 0 if self.collision is None else int((self.collision != "").sum())
+            proved += f", {close} only in collision" if close else ""
             return f"{int(self.success.sum())} of {self.success.size} reached{proved}, {worst}"
         if self.success:
             restarts = "1 restart" if self.restarts == 1 else f"{int(self.restarts)} restarts"
             steps = "1 step" if self.iterations == 1 else f"{int(self.iterations)} steps"
             return f"reached, {worst}, after {steps} and {restarts}"
+        if self.status == IN_COLLISION:
+            return f"in collision: {self.collision}"
         why = "not found" if self.status == NOT_FOUND else "out of reach"
         starts = "the start" if not self.restarts else f"the best of {int(self.restarts) + 1} starts"
         off = f"{starts} is {float(self.position_error):.3g} m and {float(self.rotation_error):.3g} rad off"

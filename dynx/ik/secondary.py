@@ -41,6 +41,9 @@ _RANK = 1e-6
 Objective = Callable[[Floats], float]
 """Function of q (nq,) that is to become small."""
 
+Admissible = Callable[[Floats], bool]
+"""Function of q (nq,) that tells whether it may be a solution."""
+
 
 @dataclass(frozen=True, eq=False)
 class Secondary:
@@ -81,8 +84,10 @@ def best_solution(
     task: Task,
     starts: list[Floats],
     secondary: Secondary,
+    is_admissible: Admissible | None = None,
 ) -> Candidate:
     """Return the best solution from starts (nq,), of which at least one reaches the target, improved."""
+    admits = is_admissible or (lambda q: True)
     objective = secondary.objective(coordinates, task)
     shift_to = starts[0] if secondary.nearest is None else secondary.nearest
     solutions: list[tuple[float, Candidate]] = []
@@ -91,12 +96,12 @@ def best_solution(
         q, steps = search.descend(start, task)
         iterations += steps
         found = search.evaluate(coordinates.nearest(q, shift_to), task)
-        if found.success:
+        if found.success and admits(found.q):
             solutions.append((objective(found.q), found))
     solutions.sort(key=lambda each: each[0])
     improved: list[tuple[float, Candidate]] = []
     for value, begin in solutions[:MAX_IMPROVED]:
-        found, steps, reached = _improved(search, coordinates, task, begin, value, objective)
+        found, steps, reached = _improved(search, coordinates, task, begin, value, objective, admits)
         iterations += steps
         improved.append((reached, found))
     best = min(improved, key=lambda each: each[0])[1]
@@ -111,6 +116,7 @@ def _improved(
     begin: Candidate,
     value: float,
     objective: Objective,
+    admits: Admissible,
 ) -> tuple[Candidate, int, float]:
     """Return the solution after steps in the null space that lower the objective from `value`, the number of
     steps, and the objective."""
@@ -127,7 +133,7 @@ def _improved(
         q, _ = search.descend(coordinates.with_values(best.q, moved), task)
         trial = search.evaluate(coordinates.nearest(q, best.q), task)
         lower = objective(trial.q) if trial.success else np.inf
-        if lower < value:
+        if lower < value and admits(trial.q):
             best, value, direction = trial, lower, None
             length = min(1.6 * length, _GREATEST_STEP)
         else:

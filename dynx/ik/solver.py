@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
@@ -11,9 +12,11 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, nearest, shown
 from dynx.ik.checking import checked_problem, start_note
+from dynx.ik.clear_solutions import clear_solutions
 from dynx.ik.closed_form.checking import all_solutions as solve_closed_form
 from dynx.ik.closed_form.solutions import IKSolutions
 from dynx.ik.options import IKOptions, Options, spells_options
+from dynx.ik.other_solutions import ProblemSolver
 from dynx.ik.preference import preferred_solutions
 from dynx.ik.problem import Problem
 from dynx.ik.reach import proofs
@@ -26,10 +29,6 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
     from dynx.ik.frame_target import FrameTarget
-
-ProblemSolver = Callable[[Problem], "IKResult | None"]
-"""Method ``solve_inverse_kinematics`` of kinematics that solve many targets at once; it returns None for a
-problem that it does not apply to."""
 
 EngineSolver = Callable[[Floats, str, Floats], Floats]
 """Function from a pose T_world_target (4, 4), a frame and q0 (nq,) to the engine's solution q (nq,)."""
@@ -94,6 +93,12 @@ def inverse_kinematics(
     has the best q found, and the status UNREACHABLE if a bound on distances, heights or angles proves that no
     configuration reaches it (`dynx.ik.reach`), otherwise NOT_FOUND.
 
+    With `avoid`, a scene or what `Scene.avoidance` returns, a solution keeps the robot's links at least a
+    margin from the obstacles and from one another, by certified distances (`dynx.distance`). Solutions that
+    do not are replaced: by others of the closed form or from further starts, or by moving redundant joints.
+    If each solution found is too close to something, the status is IN_COLLISION and the message names the
+    pair.
+
     With ``all_solutions=True`` the result is an `IKSolutions` with every configuration within limits that
     reaches a pose, and the names of its branches, from the closed form (`dynx.ik.closed_form`). It exists for
     six revolute joints with a spherical wrist or three parallel axes; `given` holds positions [rad or m] of
@@ -125,9 +130,14 @@ def _solved(kinematics: Kinematics, problem: Problem, method: str) -> IKResult:
         found = None if solve_all is None else solve_all(problem)
         if found is None:
             found = _searched(kinematics, problem)
-        if problem.secondary is None:
+        if problem.secondary is None and problem.avoidance is None:
             return found
-        found = preferred_solutions(kinematics, problem, problem.secondary, found, solve_all)
+        avoidance, is_clear = problem.avoidance, None
+        if avoidance is not None:
+            found = clear_solutions(kinematics, problem, avoidance, found, solve_all)
+            is_clear = partial(avoidance.is_clear, kinematics)
+        if problem.secondary is not None:
+            found = preferred_solutions(kinematics, problem, problem.secondary, found, solve_all, is_clear)
         errors = _errors_by_frame(list(found.q.reshape(problem.count, -1)), problem, kinematics)
         return replace(found, by_frame=errors)
     if method == "engine":
@@ -204,7 +214,7 @@ def _all_solutions(
     plain = Options(
         position_tolerance=options.position_tolerance, rotation_tolerance=options.rotation_tolerance
     )
-    names = ("free", "point", "weights", "axes", "limit_margin", "nearest", "maximize", "method")
+    names = ("free", "point", "weights", "axes", "limit_margin", "nearest", "maximize", "avoid", "method")
     if frame is None or any(getattr(options, name) is not getattr(plain, name) for name in names):
         raise ArgumentError(
             f"all_solutions takes poses (..., 4, 4) of a frame, without {', '.join(names[:-1])} or "

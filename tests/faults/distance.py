@@ -31,10 +31,26 @@ DISTANCE_FAULTS = (
     ),
     Fault(
         "distance_broad_phase_without_radii",
-        "dynx.world.geometry.distances",
+        "dynx.distance.solids",
         right="self._reach = self.core.extent + self.core.radius",
         wrong="self._reach = self.core.extent",
         test_file="tests/world/test_distances.py",
         test="test_broad_phase_loses_no_pair",
+    ),
+    Fault(
+        "avoidance_overlap_instead_of_the_margin",
+        "dynx.ik.avoidance.avoidance",
+        right="return self.separation.lower >= self.pair.margin",
+        wrong="return self.separation.lower >= 0.0",
+        test_file="tests/ik/avoidance/test_clear_solutions.py",
+        test="test_solutions_keep_their_margins_by_another_engine[ur5]",
+    ),
+    Fault(
+        "avoidance_of_the_first_body_only",
+        "dynx.ik.avoidance.avoidance",
+        right="((pair.a, found.point_a, 1.0), (pair.b, found.point_b, -1.0))",
+        wrong="((pair.a, found.point_a, 1.0),)",
+        test_file="tests/ik/avoidance/test_clear_solutions.py",
+        test="test_derivatives_of_distances",
     ),
 )

@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
+from dynx.ik.avoidance import Avoidance
+from dynx.model import Model
 from dynx.model.configuration import checked_gravity
 from dynx.model.elements import Vector
 from dynx.model.model import STANDARD_GRAVITY
+from dynx.world.scene.avoidance import MARGIN, robot_avoidance, robot_like
 from dynx.world.scene.bodies import SceneBody
 from dynx.world.scene.constraints import Constraint, PointToPoint, Weld
 from dynx.world.scene.filters import CollisionFilter
@@ -127,6 +130,44 @@ class Scene:
     def collision_filter(self) -> CollisionFilter:
         """Which parts may collide, by names that are not checked again."""
         return CollisionFilter(self.robots, self.bodies, [tuple(map(self._members, p)) for p in self.ignored])
+
+    def avoidance(
+        self, robot: str | None = None, *, margin: float = MARGIN, self_margin: float | None = None
+    ) -> Avoidance:
+        """Return what a robot keeps away from, for the option `avoid` of inverse kinematics.
+
+        Its links keep `margin` [m] from bodies and other robots, which stay where they start, and
+        `self_margin` (by default `margin`) from one another, by certified distances. Bodies with mass that
+        are welded to the robot move with it. Pairs in `ignored` are left out. `robot` is needed if there are
+        several.
+
+        Raises UnknownNameError for the robot, ArgumentError for a margin, and the errors of collision shapes.
+        """
+        if robot is None:
+            if len(self.robots) != 1:
+                raise ArgumentError(f"{self.name} has {len(self.robots)} robots; wanted the name of one")
+            robot = self.robots[0].name
+        return self._avoidance(self.robot(robot), margin, self_margin)
+
+    def avoidance_for(self, model: Model) -> Avoidance:
+        """Return what the robot that is `model` keeps away from, with the default margin.
+
+        Raises ArgumentError unless exactly one robot of the scene is like `model`, or the scene has none.
+        """
+        kept = self._kept_avoidance
+        if kept and kept[0].model is model:
+            return kept[0]
+        kept[:] = [self._avoidance(robot_like(self.robots, model), MARGIN, None)]
+        return kept[0]
+
+    @cached_property
+    def _kept_avoidance(self) -> list[Avoidance]:
+        return []
+
+    def _avoidance(self, robot: SceneRobot, margin: float, self_margin: float | None) -> Avoidance:
+        ignored = [tuple(map(self._members, pair)) for pair in self.ignored]
+        own = margin if self_margin is None else self_margin
+        return robot_avoidance(robot, self.robots, self.bodies, self.constraints, ignored, margin, own)
 
     def _members(self, name: str) -> frozenset[str]:
         """Return the parts behind a name."""

@@ -1,0 +1,220 @@
+"""Configurations that reach a target and keep bodies apart: every solution is checked, then improved.
+
+For each sample the solutions are those of the search without obstacles, of the closed form where there is
+one, and of random starts. The first that keeps all margins is the result. Where joints are redundant, the
+solutions that lack least are improved: the distances that are too small count as further errors of the
+search, so that the arm moves within the null space of the target, away from what it meets.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from dynx.ik.avoidance.avoidance import Avoidance, NearPair
+from dynx.ik.avoidance.task import AvoidingTask
+from dynx.ik.avoidance.wording import collision_sentence
+from dynx.ik.other_solutions import ProblemSolver, Target, from_closed_form, from_kernel
+from dynx.ik.problem import Problem
+from dynx.ik.result import IKResult
+from dynx.ik.search import Candidate, Search
+from dynx.ik.tasks import Kinematics, Task
+from dynx.spatial.scalar import Floats
+
+ROUND = 24
+"""Random starts between two rounds of improvement."""
+
+IMPROVED = 4
+"""Most solutions that are improved in a round."""
+
+_SAME = 1e-6
+"""Largest difference of a joint [rad or m] between configurations that count as one."""
+
+
+@dataclass(eq=False)
+class _Tally:
+    """Solutions of one sample that reach the target but are too close to something."""
+
+    best: Candidate | None = None
+    """The one that lacks least, or what an attempt to improve one ended with."""
+    blockers: list[NearPair] = field(default_factory=list)
+    """The pairs that are too close in the best one."""
+    lack: float = math.inf
+    """Sum of what the distances of the best one lack [m]."""
+    pairs: Counter[tuple[int, int]] = field(default_factory=Counter)
+    """In how many solutions each pair is too close."""
+    count: int = 0
+    complete: bool = False
+    """Whether these are all solutions of the closed form."""
+
+    def add(self, candidate: Candidate, violated: list[NearPair]) -> float:
+        """Count a solution; return what its distances lack [m]."""
+        self.count += 1
+        self.pairs.update({(each.pair.a, each.pair.b) for each in violated})
+        return self.compare(candidate, violated)
+
+    def compare(self, candidate: Candidate, violated: list[NearPair]) -> float:
+        """Keep a configuration if it lacks less than the best; return what it lacks [m]."""
+        lack = sum(each.pair.margin - each.separation.lower for each in violated)
+        if lack < self.lack:
+            self.best, self.blockers, self.lack = candidate, violated, lack
+        return lack
+
+
+def clear_solutions(
+    kinematics: Kinematics,
+    problem: Problem,
+    avoidance: Avoidance,
+    first: IKResult,
+    solve_all: ProblemSolver | None,
+) -> IKResult:
+    """Return `first` with solutions that keep all margins, where one is found.
+
+    Samples that `first` does not reach stay. Where each solution found is too close to something, `success`
+    is False, q is the one that lacks least, and `collision` says which pairs prevent it.
+    """
+    nq = kinematics.model.nq
+    q = first.q.reshape(-1, nq).copy()
+    columns = (first.position_error, first.rotation_error, first.iterations, first.restarts)
+    distances, angles, iterations, restarts = (column.reshape(-1).copy() for column in columns)
+    success = first.success.reshape(-1).copy()
+    sentences = np.full(len(q), "", dtype=object)
+    search = Search(kinematics.model, problem.coordinates, problem.limits)
+    finder = _Finder(kinematics, problem, avoidance, search, solve_all)
+    samples = zip(problem.tasks(kinematics), problem.targets.rows(problem.batch), strict=True)
+    starts = problem.starts()
+    for (k, task), target in samples:
+        if not success[k]:
+            continue
+        found, tally = finder.find(task, target, starts[k], q[k])
+        if found is None:
+            assert tally.best is not None
+            found, success[k] = tally.best, False
+            sentences[k] = collision_sentence(
+                avoidance, tally.blockers, tally.pairs, tally.count, complete=tally.complete
+            )
+        q[k], distances[k], angles[k] = found.q, found.position_error, found.rotation_error
+        iterations[k] += found.iterations
+        restarts[k] += found.restarts
+    batch = problem.batch
+    return replace(
+        first,
+        q=q.reshape(first.q.shape),
+        success=success.reshape(batch),
+        position_error=distances.reshape(batch),
+        rotation_error=angles.reshape(batch),
+        iterations=iterations.reshape(batch),
+        restarts=restarts.reshape(batch),
+        collision=sentences.reshape(batch),
+    )
+
+
+class _Finder:
+    """Search for a configuration of one sample that keeps all margins."""
+
+    def __init__(
+        self,
+        kinematics: Kinematics,
+        problem: Problem,
+        avoidance: Avoidance,
+        search: Search,
+        solve_all: ProblemSolver | None,
+    ) -> None:
+        self._kinematics, self._problem, self._avoidance = kinematics, problem, avoidance
+        self._search, self._solve_all = search, solve_all
+
+    def find(
+        self, task: Task, target: Target, start: Floats, solution: Floats
+    ) -> tuple[Candidate | None, _Tally]:
+        """Return a configuration that reaches the target and keeps the margins, or None; and what failed."""
+        tally = _Tally()
+        avoiding = AvoidingTask(task, self._avoidance, self._kinematics, self._problem.coordinates)
+        restarts = -1
+        for solutions, drawn, complete in self._rounds(task, target, start, solution):
+            restarts += drawn
+            tally.complete = complete
+            lacking: list[tuple[float, Candidate]] = []
+            for q in solutions:
+                candidate = self._search.evaluate(q, task)
+                if not candidate.success:
+                    continue
+                violated = self._avoidance.violated(self._kinematics, candidate.q)
+                if not violated:
+                    candidate.restarts = max(restarts, 0)
+                    return candidate, tally
+                lacking.append((tally.add(candidate, violated), candidate))
+            lacking.sort(key=lambda each: each[0])
+            for _, candidate in lacking[:IMPROVED]:
+                if self._is_redundant(task, candidate.q):
+                    improved = self._improved(task, avoiding, candidate, tally)
+                    if improved is not None:
+                        improved.restarts = max(restarts, 0)
+                        return improved, tally
+        if tally.best is not None:
+            tally.best.restarts = max(restarts, 0)
+        return None, tally
+
+    def _rounds(
+        self, task: Task, target: Target, start: Floats, solution: Floats
+    ) -> Iterator[tuple[list[Floats], int, bool]]:
+        """Yield solutions with the number of starts that they took, and whether there are no others."""
+        problem, coordinates = self._problem, self._problem.coordinates
+        known = from_closed_form(self._kinematics, problem, target, start) if coordinates.count else []
+        if known is not None:
+            distinct = [solution]
+            for q in map(coordinates.clipped, known):
+                # Full turns change no distance.
+                if all(_angles_differ(q, other) for other in distinct):
+                    distinct.append(q)
+            yield distinct, 1, True
+            return
+        yield [solution], 1, False
+        rng, left = np.random.default_rng(problem.rng), problem.limits.max_restarts
+        seen: list[Floats] = [solution]
+        while left > 0:
+            count = min(ROUND, left)
+            left -= count
+            found = None
+            if self._solve_all is not None:
+                found = from_kernel(problem, target, start, rng, count, self._solve_all)
+            if found is None:
+                found = []
+                for _ in range(count):
+                    q, _ = self._search.descend(coordinates.random(start, rng), task)
+                    found.append(coordinates.nearest(q, start))
+            new = []
+            for q in map(coordinates.clipped, found):
+                if all(np.abs(q - other).max() > _SAME for other in seen):
+                    new.append(q)
+                    seen.append(q)
+            yield new, count, False
+
+    def _improved(
+        self, task: Task, avoiding: AvoidingTask, candidate: Candidate, tally: _Tally
+    ) -> Candidate | None:
+        """Return a configuration near a solution that reaches the target and keeps the margins, or None."""
+        q, steps = self._search.descend(candidate.q, avoiding)
+        found = self._search.evaluate(self._problem.coordinates.nearest(q, candidate.q), task)
+        found.iterations = steps
+        if not found.success:
+            return None
+        violated = self._avoidance.violated(self._kinematics, found.q)
+        if not violated:
+            return found
+        tally.compare(found, violated)
+        return None
+
+    def _is_redundant(self, task: Task, q: Floats) -> bool:
+        """Return whether the joints can move without moving what the target fixes."""
+        J = task.jacobian(q, task.error(q))
+        rank = int(np.linalg.matrix_rank(J, tol=1e-6))
+        return len(J.T) > rank
+
+
+def _angles_differ(q: Floats, other: Floats) -> bool:
+    """Return whether two configurations of revolute joints are different ones."""
+    return any(abs(math.remainder(x, 2.0 * math.pi)) > _SAME for x in (q - other).tolist())

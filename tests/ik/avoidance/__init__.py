@@ -1,0 +1,1 @@
+"""Tests of `dynx.ik.avoidance` and of what uses it."""
