@@ -39,7 +39,8 @@ HUMANOIDS = ("talos", "g1", "icub")
 
 COUNTERS = """
 (() => {
-  const counts = window.counts = {triangles: 0, pictures: 0, updates: 0, most: 0, drawn: null};
+  const counts = window.counts = {triangles: 0, pictures: 0, updates: 0, drawn: null};
+  const turns = {};
   let now = 0;
   const count = (mode, n, copies) => { if (mode === 4) now += n / 3 * copies; };
   const GL = WebGL2RenderingContext.prototype;
@@ -67,14 +68,19 @@ COUNTERS = """
     constructor(...given) {
       super(...given);
       this.addEventListener("message", (event) => {
-        if (event.data && event.data.type === "message_batch"
-            && event.data.messages.some((each) => each.type === "SetPositionMessage")) counts.updates += 1;
+        if (!event.data || event.data.type !== "message_batch") return;
+        for (const each of event.data.messages) {
+          if (each.type !== "SetOrientationMessage") continue;
+          turns[each.name] = (turns[each.name] || 0) + 1;
+          counts.updates = Math.max(counts.updates, turns[each.name]);
+        }
       });
     }
   };
 })();
 """
-"""Counters in the page: triangles of the latest picture, pictures drawn, and batches that move something."""
+"""Counters in the page: triangles of the latest picture, pictures drawn, and rotations that arrive for the
+link that is turned most often (a pose of the robot may come in several batches)."""
 
 
 class Start(NamedTuple):

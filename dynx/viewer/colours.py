@@ -11,16 +11,19 @@ ORANGE: RGB = (230, 159, 0)
 SKY_BLUE: RGB = (86, 180, 233)
 """The second motion of two, and references."""
 GREEN: RGB = (0, 158, 115)
-"""Traces of frames, and friction forces."""
+"""Curves only: to deuteranopes it is nearly grey."""
 BLUE: RGB = (0, 114, 178)
-"""Inertia, and ellipsoids of manipulability."""
+"""Inertia, ellipsoids of manipulability, and traces of parts."""
 VERMILION: RGB = (213, 94, 0)
 """Contact forces and torques; inertia that no body can have."""
-PURPLE: RGB = (204, 121, 167)
+YELLOW: RGB = (240, 228, 66)
 """Centres of mass."""
 
-SERIES: tuple[RGB, ...] = (BLUE, VERMILION, GREEN, ORANGE, SKY_BLUE, PURPLE, (120, 120, 120))
-"""Curves of a plot, in their order."""
+SERIES: tuple[RGB, ...] = (BLUE, ORANGE, GREEN, SKY_BLUE)
+"""Curves of a plot, in their order; further ones have `DASHES`."""
+DASHES: tuple[tuple[float, ...] | None, ...] = (None, (8.0, 4.0), (2.0, 3.0))
+"""Lengths of strokes and gaps [pixels] of the curves that use the colours for the first, second and third
+time."""
 
 
 def css(colour: RGB) -> str:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from dynx.spatial.scalar import Floats
-from dynx.viewer.colours import SERIES, css
+from dynx.viewer.colours import DASHES, SERIES, css
 from dynx.viewer.library import uplot
 
 MAX_POINTS = 400
@@ -38,10 +38,7 @@ class Curves:
             self._data(len(self._t)),
             series=(
                 uplot.Series(label="t"),
-                *(
-                    uplot.Series(label=name, stroke=css(SERIES[k % len(SERIES)]), width=2)
-                    for k, name in enumerate(names)
-                ),
+                *(_series(k, name) for k, name in enumerate(names)),
             ),
             title=title,
             scales={
@@ -64,3 +61,11 @@ class Curves:
         shown = self._values.copy()
         shown[count:] = np.nan
         return (self._t, *(np.ascontiguousarray(column) for column in shown.T))
+
+
+def _series(k: int, name: str) -> Any:
+    """Return the look of the curve with the number k."""
+    stroke, dashes = css(SERIES[k % len(SERIES)]), DASHES[k // len(SERIES) % len(DASHES)]
+    if dashes is None:
+        return uplot.Series(label=name, stroke=stroke, width=2)
+    return uplot.Series(label=name, stroke=stroke, width=2, dash=dashes)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,14 +15,12 @@ from dynx.model.geometry.links import Colour
 from dynx.model.geometry.visible_shapes import link_shapes
 from dynx.rbd.link_poses import link_poses
 from dynx.spatial.scalar import Floats
-from dynx.spatial.so3 import quat_from_rotation
 from dynx.viewer.colours import GREY, ORANGE, RGB
-from dynx.viewer.triangles import TRIANGLE_BUDGET, Triangles, budgets, hull_of, triangles_of
+from dynx.viewer.drawn_parts import DrawnParts, wxyz
+from dynx.viewer.triangles import TRIANGLE_BUDGET, Triangles, budgets, hull_of, triangles_of, turned_outwards
 
 COLLISION_OPACITY = 0.4
 GHOST_OPACITY = 0.3
-
-Quaternion = tuple[float, float, float, float]
 
 
 class Look(NamedTuple):
@@ -40,37 +38,6 @@ AS_DESCRIBED = Look()
 """Shapes in their own colours, heavy meshes reduced."""
 
 
-class DrawnParts:
-    """Nodes of the page by the names of parts, below one root."""
-
-    def __init__(self, root: Any, parts: dict[str, Any]) -> None:
-        self._root = root
-        self.parts = parts
-        """The node of each part."""
-        self._placed: list[Callable[[Mapping[str, Floats]], None]] = []
-
-    def on_placed(self, placed: Callable[[Mapping[str, Floats]], None]) -> None:
-        """Call `placed(poses)` whenever parts were placed."""
-        self._placed.append(placed)
-
-    def place(self, poses: Mapping[str, Floats]) -> None:
-        """Place parts at the poses (4, 4) in the world given."""
-        for name, T in poses.items():
-            node = self.parts[name]
-            node.wxyz, node.position = wxyz(T[:3, :3]), T[:3, 3]
-        for placed in self._placed:
-            placed(poses)
-
-    @property
-    def visible(self) -> bool:
-        """True while the parts are shown."""
-        return bool(self._root.visible)
-
-    @visible.setter
-    def visible(self, shown: bool) -> None:
-        self._root.visible = shown
-
-
 class DrawnRobot(DrawnParts):
     """A robot on the page, at a configuration; each link is a node that carries its shapes.
 
@@ -84,12 +51,14 @@ class DrawnRobot(DrawnParts):
         self._reduced = (0, 0)
         self._scene, self._path, self._look = scene, path, look
         root = scene.add_frame(path, show_axes=False)
-        self.links = {
-            link.name: scene.add_frame(f"{path}/link{k}", show_axes=False)
-            for k, link in enumerate(model.links)
-        }
-        """The node of each link."""
-        super().__init__(root, self.links)
+        self.above = {joint.child: joint.parent for joint in model.joints}
+        """The parent of each link that has one."""
+        self.links = dict[str, Any]()
+        """The node of each link, below that of its parent."""
+        for link in _parents_first(model):
+            over = self.links[self.above[link]].name if link in self.above else path
+            self.links[link] = scene.add_frame(f"{over}/link{len(self.links)}", show_axes=False)
+        super().__init__(root, self.links, self.above)
         self.visuals: dict[str, list[Any]] = {}
         """The nodes of the visual shapes of each link."""
         self._collisions: list[Any] | None = None
@@ -209,6 +178,18 @@ class DrawnRobot(DrawnParts):
             return []
 
 
+def _parents_first(model: Model) -> list[str]:
+    """Return the names of the links, each after its parent."""
+    children: dict[str, list[str]] = {}
+    for joint in model.joints:
+        children.setdefault(joint.parent, []).append(joint.child)
+    under = {joint.child for joint in model.joints}
+    ordered = [link.name for link in model.links if link.name not in under]
+    for name in ordered:
+        ordered += children.get(name, ())
+    return ordered
+
+
 def _grouped(faults: Mapping[str, list[str]]) -> list[str]:
     """Return the faults of links, one sentence each; those that end alike are one."""
     links: dict[str, list[str]] = {}
@@ -236,6 +217,10 @@ def add_triangles(
     scene: Any, path: str, triangles: Triangles, T: Floats, colour: RGB, opacity: float | None, *, flat: bool
 ) -> Any:
     """Add a node with triangles at the pose T (4, 4) in its parent, and return it."""
+    # The triangles of many files are turned inside out, so they are drawn from both sides, which takes a
+    # third more time in software.
+    outwards = turned_outwards(triangles) if len(triangles.faces) <= TRIANGLE_BUDGET else None
+    triangles = outwards or triangles
     return scene.add_mesh_simple(
         path,
         triangles.vertices,
@@ -243,19 +228,12 @@ def add_triangles(
         color=colour,
         opacity=opacity,
         flat_shading=flat,
-        # The triangles of many files are turned inside out.
-        side="double",
+        side="front" if outwards else "double",
         cast_shadow=False,
         receive_shadow=False,
         wxyz=wxyz(T[:3, :3]),
         position=T[:3, 3],
     )
-
-
-def wxyz(R: Floats) -> Quaternion:
-    """Return the unit quaternion (w, x, y, z) of a rotation (3, 3), as viser writes it."""
-    x, y, z, w = quat_from_rotation(R).tolist()
-    return (w, x, y, z)
 
 
 def rgb_of(rgba: Colour) -> RGB:

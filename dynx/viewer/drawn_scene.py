@@ -8,7 +8,8 @@ from typing import Any
 from dynx.errors import DynxError
 from dynx.model import Model
 from dynx.model.geometry import Mesh
-from dynx.viewer.drawn_robot import AS_DESCRIBED, DrawnParts, DrawnRobot, Look, add_triangles, rgb_of, wxyz
+from dynx.viewer.drawn_parts import DrawnParts
+from dynx.viewer.drawn_robot import AS_DESCRIBED, DrawnRobot, Look, add_triangles, rgb_of
 from dynx.viewer.triangles import triangles_of
 from dynx.world.scene import SceneBody
 
@@ -37,6 +38,11 @@ class DrawnScene(DrawnParts):
             for link, node in drawn.links.items()
         }
         faults = [f"{name}: {fault}" for name, drawn in self.robots.items() for fault in drawn.notes]
+        start = {
+            f"{robot}/{link}": drawn.pose(link)
+            for robot, drawn in self.robots.items()
+            for link in drawn.links
+        }
         self._bodies: dict[str, list[Any]] = {}
         for k, body in enumerate(bodies):
             node = parts[body.name] = scene.add_frame(f"{path}/body{k}", show_axes=False)
@@ -45,8 +51,14 @@ class DrawnScene(DrawnParts):
                 self._bodies[body.name] = list(_add_body(scene, node, body, look))
             except DynxError as error:
                 faults.append(f"{body.name}: {error}")
-            node.wxyz, node.position = wxyz(body.pose.matrix[:3, :3]), body.pose.matrix[:3, 3]
-        super().__init__(root, parts)
+            start[body.name] = body.pose.matrix
+        above = {
+            f"{robot}/{link}": f"{robot}/{parent}"
+            for robot, drawn in self.robots.items()
+            for link, parent in drawn.above.items()
+        }
+        super().__init__(root, parts, above)
+        self.place(start)
         self.faults = tuple(faults)
         """Shapes that cannot be drawn, one sentence each."""
 

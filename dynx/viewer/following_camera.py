@@ -8,8 +8,7 @@ import numpy as np
 
 from dynx.errors import ArgumentError, nearest, shown
 from dynx.spatial.scalar import Floats
-from dynx.spatial.so3 import rotation_from_quat
-from dynx.viewer.drawn_robot import DrawnParts
+from dynx.viewer.drawn_parts import DrawnParts
 from dynx.viewer.page import Page
 
 _FREE, _FOLLOWS, _FIRST_PERSON = "free", "moves with", "looks from"
@@ -19,7 +18,7 @@ class FollowingCamera:
     """The controls of the camera; it moves all open pages alike."""
 
     def __init__(self, page: Page, drawn: DrawnParts) -> None:
-        self._page, self._parts = page, drawn.parts
+        self._page, self._drawn = page, drawn
         self._before: Floats | None = None
         gui = page.gui
         with gui.add_folder("camera", expand_by_default=False):
@@ -32,8 +31,8 @@ class FollowingCamera:
     def follow(self, part: str | None, *, first_person: bool = False) -> None:
         """Follow a part; None leaves the camera where it is. Raises ArgumentError for an unknown part."""
         if part is not None:
-            if part not in self._parts:
-                raise ArgumentError(f"no part {shown(part)}{nearest(str(part), self._parts)}")
+            if part not in self._drawn.parts:
+                raise ArgumentError(f"no part {shown(part)}{nearest(str(part), self._drawn.parts)}")
             self._part.value = part
         self._mode.value = _FREE if part is None else _FIRST_PERSON if first_person else _FOLLOWS
         self._start()
@@ -41,11 +40,7 @@ class FollowingCamera:
     def _start(self) -> None:
         with self._page.lock:
             self._before = None
-            node = self._parts[self._part.value]
-            w, x, y, z = (float(each) for each in node.wxyz)
-            T = np.eye(4)
-            T[:3, :3] = rotation_from_quat(np.array([x, y, z, w]))
-            T[:3, 3] = node.position
+            T = self._drawn.pose(self._part.value)
             self._move({self._part.value: T})
 
     def _move(self, poses: Mapping[str, Floats]) -> None:

@@ -13,7 +13,7 @@ from dynx.rbd.link_poses import frame_poses
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_quat
-from dynx.viewer.drawn_robot import wxyz
+from dynx.viewer.drawn_parts import wxyz
 
 if TYPE_CHECKING:
     from dynx.backends import Backend

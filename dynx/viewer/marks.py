@@ -11,8 +11,9 @@ from dynx.model import Model
 from dynx.model.elements import Inertial
 from dynx.model.geometry import Box, Sphere
 from dynx.spatial.scalar import Floats
-from dynx.viewer.colours import BLUE, PURPLE, RGB, SKY_BLUE, VERMILION
-from dynx.viewer.drawn_robot import DrawnRobot, size_of, wxyz
+from dynx.viewer.colours import BLUE, RGB, SKY_BLUE, VERMILION, YELLOW
+from dynx.viewer.drawn_parts import wxyz
+from dynx.viewer.drawn_robot import DrawnRobot, size_of
 from dynx.viewer.page import Page
 from dynx.viewer.triangles import triangles_of
 
@@ -108,7 +109,7 @@ class Marks:
             yield self._scene.add_icosphere(
                 f"{self._robot.links[name].name}/center",
                 radius=0.015 * self._size,
-                color=PURPLE,
+                color=YELLOW,
                 position=inertial.origin.matrix[:3, 3],
             )
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dynx.spatial.scalar import Floats
-from dynx.viewer.colours import GREEN, SKY_BLUE, css
+from dynx.viewer.colours import BLUE, SKY_BLUE, css
 from dynx.viewer.contact_arrows import ContactArrows
 from dynx.viewer.curves import Curves
 from dynx.viewer.drawn_robot import AS_DESCRIBED, GHOST_OPACITY, Look
@@ -58,7 +58,7 @@ class MotionView:
         self._start = float(motion.t[0])
         low, high = _extent(motion)
         self._size = max(float(np.linalg.norm(high - low)), 0.3)
-        page.scene.add_grid("/ground", 20.0, 20.0, cell_size=0.1, section_size=1.0)
+        page.add_ground(20.0, 1.0)
         with page.together():
             self.drawn = DrawnScene(page.scene, "/motion", motion.robots, motion.bodies, look)
             self._ghost_drawn = None if ghost is None else self._draw_ghost(ghost, look)
@@ -117,7 +117,7 @@ class MotionView:
         now = time + self._start
         k = self.motion.frame_at(now)
         self.drawn.place(self.motion.at(k))
-        if self.ghost is not None and self._ghost_drawn is not None:
+        if self.ghost is not None and self._ghost_drawn is not None and self._ghost_drawn.visible:
             moved = self.ghost.at(self.ghost.frame_at(now))
             self._ghost_drawn.place({n: T for n, T in moved.items() if n in self._ghost_drawn.parts})
         if self.motion.contacts:
@@ -150,7 +150,7 @@ class MotionView:
                     self._ghost_drawn.visible = ghost.value
                 if forces is not None:
                     self._arrows.shown = forces.value
-                    self._show(self.timeline.time)
+                self._show(self.timeline.time)
 
         def draw_trace(_: Any) -> None:
             with self._page.lock, self._page.together():
@@ -171,7 +171,7 @@ class MotionView:
         return self._page.scene.add_line_segments(
             "/trace",
             np.stack([points[:-1], points[1:]], axis=1).astype(np.float32),
-            GREEN,
+            BLUE,
             thickness=0.006 * self._size,
         )
 

@@ -24,15 +24,35 @@ DEFAULT_PORT = 8080
 VIEW_DIRECTION = np.array([1.0, -1.0, 0.7]) / math.sqrt(2.49)
 """Unit vector (3,) from what is seen to the camera."""
 
-_AMBIENT = 1.5
-"""Intensity of the light from all sides, where there is no light from surroundings."""
+_SKY = 1.8
+"""Intensity of the light from above and, in another colour, from below, in a plain picture."""
+_GROUND_COLOUR = (150, 150, 150)
+"""Colour of the light from below."""
+_SUN = 2.2
+"""Intensity of the lamp of a plain picture."""
+_SUN_PLACE = (1.0, -2.0, 3.0)
+"""Place of the lamp relative to what it shines on."""
 
-NARROW = 600
-"""Width of a page below which viser lays the panel over the lower part of the picture [pixels]."""
-_COVERED = 0.6
+_MAX_LINES = 60
+"""Largest number of lines of the ground in each direction, in a plain picture."""
+_LINE_COLOUR = {False: (170, 170, 170), True: (70, 70, 70)}
+"""Colour of the lines of the ground on a light and on a dark page."""
+
+_STYLE = """<style>
+#webgl-software-rendering { display: %s; }
+@media (max-width: %dpx) {
+  .mantine-Notifications-root { --notifications-container-width: calc(100vw - 2em) !important; }
+  .mantine-Paper-root[style*="position: fixed"] { width: 100%% !important; max-height: %d%% !important; }
+  .mantine-Paper-root[style*="position: fixed"] div[style*="width: 20em"] { width: 100%% !important; }
+}
+</style>"""
+"""Style of viser's page: its panel as wide as a narrow page and lower than viser's, and without the message
+that software draws where dynx says so itself (a note) and has prepared for it."""
+
+NARROW = 576
+"""Width of a page up to which viser lays the panel over the lower part of the picture [pixels]."""
+_COVERED = 0.45
 """Share of the height of a narrow page that the panel covers."""
-_FARTHER = 1.25
-"""Factor of the camera's distance on a narrow page."""
 
 
 class Page:
@@ -48,10 +68,11 @@ class Page:
         *,
         title: str = "dynx",
         dark: bool = False,
-        plain_light: bool = False,
+        plain: bool = False,
     ) -> None:
-        """`plain_light` is what software draws fastest: two lamps and no shadows, instead of the surroundings
-        of viser, whose reflections take most of the time of a picture.
+        """`plain` is what software draws fastest: one lamp and a sky, without shadows, instead of viser's
+        surroundings and four lamps, whose reflections take most of the time of a picture, and a ground of
+        lines instead of a shader.
 
         Raises ArgumentError for a port that is taken and a host that is not of this machine."""
         if not isinstance(host, str) or not host:
@@ -69,10 +90,15 @@ class Page:
         # Beside the picture, not over it.
         self._server.gui.main_panel.dock_right()
         self._server.scene.set_up_direction("+z")
-        if plain_light:
-            self._server.scene.configure_environment_map(None)
-            self._server.scene.configure_default_lights(cast_shadow=False)
-            self._server.scene.add_light_ambient("/ambient_light", intensity=_AMBIENT)
+        style = _STYLE % ("none" if plain else "block", NARROW, round(100.0 * _COVERED))
+        self._server.gui.add_html(style, order=math.inf)
+        self._plain, self._line_colour = plain, _LINE_COLOUR[dark]
+        if plain:
+            scene = self._server.scene
+            scene.configure_environment_map(None)
+            scene.configure_default_lights(False)
+            scene.add_light_hemisphere("/sky", ground_color=_GROUND_COLOUR, intensity=_SKY)
+            scene.add_light_directional("/sun", intensity=_SUN, position=_SUN_PLACE)
         self._server.on_client_connect(_make_room_on_narrow)
         self.lock = threading.RLock()
         """Held by whoever changes what the page shows."""
@@ -104,6 +130,23 @@ class Page:
         """Send the changes made in a ``with`` block in one piece."""
         context: AbstractContextManager[Any] = self._server.atomic()
         return context
+
+    def add_ground(self, side: float, cell: float, height: float = 0.0) -> None:
+        """Add a square grid with the side and the distance between lines [m], at a height [m]."""
+        if not self._plain:
+            self.scene.add_grid(
+                "/ground", side, side, cell_size=0.1, section_size=cell, position=(0.0, 0.0, height)
+            )
+            return
+        half = 0.5 * side
+        along = np.linspace(-half, half, min(round(side / cell), _MAX_LINES) + 1)
+        ends = np.full_like(along, half)
+        level = np.full_like(along, height)
+        rows = np.stack([np.stack([-ends, along, level], -1), np.stack([ends, along, level], -1)], axis=1)
+        lines = np.concatenate([rows, rows[:, :, [1, 0, 2]]]).astype(np.float32)
+        self.scene.add_line_segments(
+            "/ground", lines, self._line_colour, thickness=1.0, thickness_units="screen"
+        )
 
     def look_at(self, target: ArrayLike, distance: float) -> None:
         """Begin with a camera that sees `target` (3,) from a distance [m]."""
@@ -155,10 +198,10 @@ class Page:
 def _make_room_on_narrow(client: Any) -> None:
     """Move what a narrow page shows above its panel, which viser lays over the picture there."""
     camera = client.camera
-    if camera.image_width >= NARROW:
+    if camera.image_width > NARROW:
         return
     target, eye = np.array(camera.look_at), np.array(camera.position)
-    away = _FARTHER * (eye - target)
+    away = eye - target
     up = np.array(camera.up_direction, dtype=np.float64)
     up -= (up @ away) / (away @ away) * away
     height = 2.0 * float(np.linalg.norm(away)) * math.tan(0.5 * camera.fov)

@@ -12,7 +12,8 @@ from dynx.model.geometry import Sphere
 from dynx.rbd.link_poses import frame_poses, link_poses
 from dynx.spatial.scalar import Floats
 from dynx.viewer.colours import BLUE, VERMILION
-from dynx.viewer.drawn_robot import size_of, wxyz
+from dynx.viewer.drawn_parts import wxyz
+from dynx.viewer.drawn_robot import size_of
 from dynx.viewer.triangles import triangles_of
 
 if TYPE_CHECKING:

@@ -75,10 +75,10 @@ class RobotView:
         """The name of the part that was clicked."""
         self._handle.put(start)
         self._show(start)
-        origins = np.array([node.position for node in self.robot.links.values()])
+        origins = np.array([self.robot.pose(link)[:3, 3] for link in self.robot.links])
         # A humanoid whose base is its pelvis stands above the ground, too.
         lowest = min(float(origins[:, 2].min()), 0.0)
-        page.scene.add_grid("/ground", 4.0, 4.0, cell_size=0.1, section_size=0.5, position=(0.0, 0.0, lowest))
+        page.add_ground(4.0, 0.5, lowest)
         page.look_at(0.5 * (origins.min(axis=0) + origins.max(axis=0)), 1.5 * size)
 
     @property

@@ -16,9 +16,8 @@ from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane
 from dynx.spatial.scalar import Floats
 from dynx.viewer.library import simplify
 
-TRIANGLE_BUDGET = 30_000
-"""Largest number of triangles of all visual meshes together where they are reduced: a browser without a
-graphics processor draws about 350,000 a second."""
+TRIANGLE_BUDGET = 15_000
+"""Largest number of triangles of all visual meshes together where they are reduced."""
 
 FEWEST_TRIANGLES = 100
 """Number of triangles below which a mesh is not reduced."""
@@ -78,6 +77,40 @@ def has_graphics_processor() -> bool:
     if not sys.platform.startswith("linux"):
         return True
     return bool(glob("/dev/dri/renderD*") or glob("/dev/nvidia[0-9]*"))
+
+
+def turned_outwards(triangles: Triangles) -> Triangles | None:
+    """Return triangles that form closed surfaces turned outwards, so that nobody sees one from behind; None
+    where a surface is open.
+
+    Each edge of a closed surface is passed as often in one direction as in the other, and a surface that is
+    turned inwards encloses a negative volume (divergence theorem). That of a cavity, which nobody sees, is
+    turned, too.
+    """
+    _, number = np.unique(triangles.vertices, axis=0, return_inverse=True)
+    faces = number.reshape(-1)[triangles.faces].astype(np.int64)
+    if not len(faces):
+        return None
+    count = int(faces.max()) + 1
+    first, second = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
+    if not np.array_equal(np.sort(first * count + second), np.sort(second * count + first)):
+        return None
+    surface = np.arange(count)
+    while True:
+        # Each vertex takes the smallest number among its neighbours', and then that one's.
+        smaller = surface.copy()
+        np.minimum.at(smaller, first, surface[second])
+        smaller = smaller[smaller]
+        if np.array_equal(smaller, surface):
+            break
+        surface = smaller
+    a, b, c = np.moveaxis(triangles.vertices[triangles.faces].astype(np.float64), 1, 0)
+    surface_of_face = surface[faces[:, 0]]
+    volumes = np.bincount(surface_of_face, np.einsum("ij,ij->i", a, np.cross(b, c)), minlength=count)
+    inwards = volumes[surface_of_face] < 0.0
+    return Triangles(
+        triangles.vertices, np.where(inwards[:, None], triangles.faces[:, ::-1], triangles.faces)
+    )
 
 
 @lru_cache(maxsize=256)

@@ -59,7 +59,7 @@ class Viewer(Controls):
         opened: Any = open_subject(shown)
         check_options(opened, options)
         self._dark = dark
-        self.page = Page(host, port, title=f"dynx: {title_of(opened)}", dark=dark, plain_light=not whole)
+        self.page = Page(host, port, title=f"dynx: {title_of(opened)}", dark=dark, plain=not whole)
         if open_browser:
             # The browser loads the page while the shapes are read.
             webbrowser.open(self.url)

@@ -76,7 +76,7 @@ class WorldView:
         self._push: Floats | None = None
         self._running = threading.Event()
         if not any(_is_ground(body) for body in scene.bodies):
-            page.scene.add_grid("/ground", 20.0, 20.0, cell_size=0.1, section_size=1.0)
+            page.add_ground(20.0, 1.0)
         self._add_controls(moving, steps=steps)
         self.camera = FollowingCamera(page, self.drawn)
         """The camera of the page."""

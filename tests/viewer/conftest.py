@@ -56,12 +56,12 @@ def browser() -> Iterator[Any]:
 
 
 @pytest.fixture
-def open_page(browser: Any) -> Iterator[Callable[[str], Opened]]:
-    """Open addresses in pages of 900 x 450 pixels, which are closed after the test."""
+def open_page(browser: Any) -> Iterator[Callable[..., Opened]]:
+    """Open addresses in pages of a width and a height [pixels], which are closed after the test."""
     pages = []
 
-    def opened(url: str) -> Opened:
-        page = browser.new_page(viewport={"width": 900, "height": 450})
+    def opened(url: str, size: tuple[int, int] = (900, 450)) -> Opened:
+        page = browser.new_page(viewport={"width": size[0], "height": size[1]})
         page.set_default_timeout(1e3 * PATIENCE)
         pages.append(page)
         found = Opened(page)

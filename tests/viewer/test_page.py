@@ -22,7 +22,7 @@ from dynx.world.state import RobotState, WorldState
 from tests.conftest import needs_examples
 from tests.viewer.conftest import PATIENCE, Opened, connected, until
 
-OpenPage = Callable[[str], Opened]
+OpenPage = Callable[..., Opened]
 
 PICTURE = 2000.0
 """Time in which software draws a picture beside other tests [ms]."""
@@ -108,6 +108,22 @@ def test_sliders_buttons_and_keys_reach_the_program(open_page: OpenPage) -> None
         until(lambda: len(viewer.page.server.get_clients()) == 1, "one page after the other closed")
         assert not page.errors
         assert not again.errors
+
+
+def test_the_panel_of_a_narrow_page_lies_below_the_robot(open_page: OpenPage) -> None:
+    with view(dynx.load("six_axis_arm"), whole_meshes=False) as viewer:
+        page = open_page(viewer.url, (400, 800))
+        (client,) = connected(viewer)
+        assert not page.page.locator("#webgl-software-rendering").is_visible()
+        panel = page.page.locator(".mantine-Paper-root", has_text="show").first
+        until(lambda: panel.bounding_box()["width"] == 400, "the panel to be as wide as the page")
+        top = panel.bounding_box()["y"]
+        robot = viewer.view.robot
+        until(
+            lambda: all(0.0 < _pixel(client, robot.pose(link)[:3, 3])[1] < top for link in robot.links),
+            "room",
+        )
+        assert not page.errors
 
 
 def test_dragging_the_handle_solves_inverse_kinematics(open_page: OpenPage) -> None:

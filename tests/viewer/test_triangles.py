@@ -9,7 +9,15 @@ import pytest
 
 import dynx
 from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Shape, Sphere, solid_properties
-from dynx.viewer.triangles import FEWEST_TRIANGLES, TRIANGLE_BUDGET, Triangles, budgets, hull_of, triangles_of
+from dynx.viewer.triangles import (
+    FEWEST_TRIANGLES,
+    TRIANGLE_BUDGET,
+    Triangles,
+    budgets,
+    hull_of,
+    triangles_of,
+    turned_outwards,
+)
 from tests.conftest import needs_examples
 
 SOLIDS: list[Shape] = [Box((0.1, 0.2, 0.3)), Sphere(0.4), Cylinder(0.2, 0.5), Capsule(0.1, 0.3)]
@@ -37,6 +45,23 @@ def test_solids_are_closed_and_turned_outwards(shape: Shape) -> None:
     # Of a circle's area 32 sides leave out this share, of a ball's volume less than three times that.
     missing = 3.0 * (1.0 - math.sin(2.0 * math.pi / 32) / (2.0 * math.pi / 32))
     assert exact * (1.0 - missing) <= volume(triangles) <= exact * (1.0 + 1e-6)
+
+
+@pytest.mark.parametrize("shape", SOLIDS, ids=lambda shape: type(shape).__name__)
+def test_a_closed_surface_that_is_turned_inwards_is_turned(shape: Shape) -> None:
+    outwards = triangles_of(shape)
+    inwards = Triangles(outwards.vertices + np.float32(1.0), outwards.faces[:, ::-1])
+    count = len(outwards.vertices)
+    both = Triangles(
+        np.concatenate([outwards.vertices, inwards.vertices]),
+        np.concatenate([outwards.faces, inwards.faces + np.uint32(count)]),
+    )
+    found = turned_outwards(both)
+    assert found is not None
+    assert np.array_equal(found.faces[: len(outwards.faces)], outwards.faces)
+    assert volume(found) == pytest.approx(2.0 * volume(outwards), rel=1e-4)
+    # Without one triangle it can be seen from behind.
+    assert turned_outwards(Triangles(both.vertices, both.faces[1:])) is None
 
 
 def test_a_height_field_has_two_triangles_a_cell() -> None:

@@ -13,7 +13,11 @@ import pytest
 import dynx
 from dynx.errors import ArgumentError
 from dynx.model import Model
+from dynx.spatial.scalar import Floats
+from dynx.spatial.se3 import homogeneous
+from dynx.spatial.so3 import rotation_from_quat
 from dynx.viewer import Viewer, view
+from dynx.viewer.drawn_parts import DrawnParts
 from dynx.viewer.spring import Pull
 from dynx.world import World
 from dynx.world.scene import read_scene
@@ -22,6 +26,18 @@ from tests.viewer.conftest import until
 
 LARGEST_PAGE = 15_000_000
 """Largest size of an exported page of a rollout of 10 s [bytes]."""
+
+
+def poses_of_nodes(drawn: DrawnParts) -> dict[str, Floats]:
+    """Return the pose (4, 4) in the world of each part, as a page computes it from its nodes."""
+    poses: dict[str, Floats] = {}
+    for path, (name, node) in sorted((node.name, (name, node)) for name, node in drawn.parts.items()):
+        w, *xyz = node.wxyz
+        T = homogeneous(rotation_from_quat(np.array([*xyz, w])), node.position)
+        over = path.rpartition("/")[0]
+        above = next((poses[each] for each, n in drawn.parts.items() if n.name == over), np.eye(4))
+        poses[name] = above @ T
+    return poses
 
 
 @pytest.fixture(scope="module")
@@ -37,9 +53,10 @@ def test_a_robot_is_shown_at_the_configuration_given(arm: Model) -> None:
         viewer.view.put(other)
         assert np.array_equal(viewer.view.q, other)
         with dynx.backend("reference", arm) as engine:
-            for link, node in viewer.view.robot.links.items():
-                T = engine.forward_kinematics(other, link)
-                assert np.abs(node.position - T[:3, 3]).max() < 1e-6
+            for link, T in poses_of_nodes(viewer.view.robot).items():
+                expected = engine.forward_kinematics(other, link)
+                assert np.abs(T - expected).max() < 1e-6
+                assert np.abs(viewer.view.robot.pose(link) - expected).max() < 1e-9
     assert viewer.page.closed
 
 
@@ -121,9 +138,21 @@ def test_a_rollout_plays_to_its_end(arm: Model) -> None:
     with rollout.view(play=True) as viewer:
         until(lambda: not viewer.view.timeline.playing, "the end of the motion")
         assert viewer.view.timeline.time == pytest.approx(0.2)
-        shown = [node.position for node in viewer.view.drawn.parts.values()]
-        last = viewer.view.motion.at(-1)
-        assert np.allclose(shown, [last[name][:3, 3] for name in viewer.view.drawn.parts], atol=1e-6)
+        shown, last = poses_of_nodes(viewer.view.drawn), viewer.view.motion.at(-1)
+        assert shown.keys() == last.keys()
+        for name, T in shown.items():
+            assert np.allclose(T, last[name], atol=1e-5)
+
+
+def test_a_page_gets_one_message_for_each_joint_that_moves(arm: Model) -> None:
+    rollout = dynx.simulate(arm, duration=0.2)
+    with rollout.view() as viewer:
+        buffer = viewer.page.server._websock_server.get_message_buffer()
+        viewer.view.go_to(0.1)
+        before = buffer.message_counter
+        viewer.view.go_to(0.2)
+        # The slider of the time and three plots are the others.
+        assert 0 < buffer.message_counter - before <= arm.nv + 4
 
 
 def test_a_world_is_stepped_in_its_own_time() -> None:
