@@ -17,7 +17,7 @@ from dynx.spatial.so3 import rotation_from_rpy
 from dynx.world import Scene, SceneBody, SceneRobot, World, box, ground, sphere
 from dynx.world.geometry.boxes import shape_box
 from tests.world.engines import WORLDS
-from tests.world.scenes import quadruped
+from tests.world.standing import quadruped
 
 angles = st.floats(-3.0, 3.0)
 
