@@ -107,10 +107,17 @@ class NoClosedFormError(ArgumentError):
     def _advice(self) -> str:
         if not self.remedies:
             return "; without all_solutions a search finds one solution"
-        first, *others = self.remedies
-        given = ", ".join(f"{joint!r}: ..." for joint in first)
-        instead = f" (or {', '.join(' and '.join(joints) for joints in others)})" if others else ""
-        return f"; there is one with given={{{given}}}{instead}"
+        given = ", ".join(f"{joint!r}: ..." for joint in self.remedies[0])
+        return f"; there is one with given={{{given}}}{self.alternatives}"
+
+    @property
+    def alternatives(self) -> str:
+        """Clause that names the remedies after the first, of many three; empty without others."""
+        _, *sets = self.remedies
+        listed = sets if len(sets) <= 4 else sets[:3]
+        names = ", ".join(" and ".join(joints) for joints in listed)
+        more = f", or {len(sets) - len(listed)} more" if len(listed) < len(sets) else ""
+        return f" (or {names}{more})" if sets else ""
 
     def __reduce__(self) -> tuple[object, ...]:
         return type(self), (self.reason, self.remedies)

@@ -100,11 +100,11 @@ def inverse_kinematics(
     pair.
 
     With ``all_solutions=True`` the result is an `IKSolutions` with every configuration within limits that
-    reaches a pose, and the names of its branches, from the closed form (`dynx.ik.closed_form`). It exists for
-    six revolute joints with a spherical wrist or three parallel axes; `given` holds positions [rad or m] of
-    further joints between root and frame, such as one of seven. Angles are those nearest to q0, or to 0;
-    `IKSolutions.with_full_turns` lists the others within the limits. The options of the search have no effect
-    then.
+    reaches a pose, and the names of its branches, from the closed form (`dynx.ik.closed_form`). It exists
+    for six revolute joints with a spherical wrist or three parallel axes, and for many arms with prismatic
+    joints; `given` holds positions [rad or m] of further joints between root and frame, such as one of seven.
+    Angles are those nearest to q0, or to 0; `IKSolutions.with_full_turns` lists the others within the limits.
+    The options of the search have no effect then.
 
     Raises UnknownNameError for the frame or the name of an option; ArgumentError (ShapeError, DTypeError,
     NotFiniteError) for an invalid argument, and for method ``"engine"`` if the backend has no solver of its

@@ -74,7 +74,5 @@ def _advised(error: NoClosedFormError) -> str:
     """Return the message of an error with the options of this command."""
     if not error.remedies:
         return f"{error.reason}; without --all-solutions a search finds one solution"
-    first, *others = error.remedies
-    given = ",".join(f"{joint}=POSITION" for joint in first)
-    instead = f" (or {', '.join(' and '.join(joints) for joints in others)})" if others else ""
-    return f"{error.reason}; there is one with --given {given}{instead}"
+    given = ",".join(f"{joint}=POSITION" for joint in error.remedies[0])
+    return f"{error.reason}; there is one with --given {given}{error.alternatives}"

@@ -1,8 +1,10 @@
 """Closed forms of inverse kinematics: all solutions of six-axis arms, with the names of their branches.
 
-From the robot to its solutions: `chain` (axes of the joints), `lines` and `recognition` (which family),
-`spherical_wrist` and `parallel_axes` (the families, from `subproblems` and `quartic`), `polish` (Newton's
-method on the chain itself), `candidates` (one branch), `evaluation` (all, by NumPy or a kernel), `solver`.
+From the robot to its solutions: `chain` (axes of the joints), `lines`, `recognition` and
+`sliding_recognition` (which family), the families, from `subproblems` and `quartic` (`spherical_wrist`,
+`parallel_axes` and `outer_parallel_axes` of six revolute joints; `three_slides`, `sliding_arm` and
+`parallel_arm` with prismatic ones), `polish` (Newton's method on the chain itself), `candidates` (one
+branch), `review` and `branch_kernel` (all, by NumPy or a kernel), `solver`.
 """
 
 from dynx.ik.closed_form.solutions import IKSolutions

@@ -20,7 +20,6 @@ import dynx.rbd
 import dynx.spatial
 from dynx.ik.closed_form.branches import N_BRANCHES, SIGNS
 from dynx.ik.closed_form.candidates import ARBITRARY, POSITION, ROTATION, SEPARATION, VIOLATION, Candidates
-from dynx.ik.closed_form.chain import N_JOINTS
 from dynx.ik.closed_form.review import AT_LIMIT, ROUNDING
 from dynx.ik.targets import ROUNDING_TOLERANCE
 from dynx.model.configuration import MAX_MAGNITUDE
@@ -51,10 +50,10 @@ class Judgement:
     separation: float
     """Separation of two branches below which they may be one solution."""
     start: Floats
-    """Angles (6,) of rows that hold no solution."""
+    """Coordinates (n,) of rows that hold no solution."""
 
     def __call__(self, target: Array, limited: Array, signs: Array) -> dict[str, Array]:
-        """Return the angles `q` (6,), the `errors` (2,) [m, rad], and as 1 or 0 whether the candidate is
+        """Return the coordinates `q` (n,), the `errors` (2,) [m, rad], and as 1 or 0 whether the candidate is
         `found` to be a solution, whether the pose needs a `review`, and whether the target is `invalid`: not
         a pose (4, 4) to rounding.
 
@@ -105,7 +104,7 @@ class BranchResults:
     """Candidates of n poses. Bit k of a byte belongs to branch k."""
 
     q: Floats
-    """Angles (n, 8, 6)."""
+    """Coordinates (n, 8, joints)."""
     errors: Floats
     """Errors (n, 8, 2) of the position [m] and the rotation [rad]."""
     found: Bytes
@@ -120,27 +119,28 @@ class BranchKernel:
     """The kernel, compiled or loaded from the cache when it is first needed. Safe to use from threads."""
 
     def __init__(self, judgement: Judgement) -> None:
-        self._judgement = judgement
+        self._judgement, self._count = judgement, len(judgement.start)
         self._kernel: VariantKernel | None = None
         self._making = threading.Lock()
 
     def __call__(self, targets: Floats, limited: bool, threads: int) -> BranchResults:
         """Evaluate poses (n, 4, 4) with contiguous entries."""
-        n = len(targets)
+        n, count = len(targets), self._count
         found = BranchResults(
-            np.empty((n, N_BRANCHES, N_JOINTS)),
+            np.empty((n, N_BRANCHES, count)),
             np.empty((n, N_BRANCHES, len(ERRORS))),
             *(np.empty(n, dtype=np.uint8) for _ in _MASKS),
         )
-        rows = found.q.reshape(-1, N_JOINTS), found.errors.reshape(-1, len(ERRORS))
+        rows = found.q.reshape(-1, count), found.errors.reshape(-1, len(ERRORS))
         options = np.broadcast_to(float(limited), (n, 1))
         masks = (found.found, found.review, found.invalid)
         self.kernel([targets.reshape(n, 16), options], rows, masks, threads=threads)
         return found
 
     def bind(self, block: Floats) -> BoundVariants:
-        """Return memory for one pose, whose results are written to `block` (8, 8): angles, then errors."""
-        bound = self.kernel.bind([block[:, :N_JOINTS], block[:, N_JOINTS:]])
+        """Return memory for one pose, whose results, coordinates and errors, are written to `block`
+        (8, n + 2)."""
+        bound = self.kernel.bind([block[:, : self._count], block[:, self._count :]])
         bound.inputs[1][0] = 1.0
         return bound
 

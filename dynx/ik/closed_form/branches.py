@@ -16,7 +16,9 @@ place of shoulder and elbow: elbow right, if the wrist centre lies to the right 
 axis 2 (on the side of that direction x h_2), and forearm up, if the height of the wrist centre along h_2
 rises with q_3. If axes 1, 2 and 3 are parallel, the wrists have numbers, in no order, and elbow right says
 that axis 2 passes to the right of the line from axis 1 to axis 3, seen against h_1. If a quartic is solved,
-its roots have numbers, in no order. Other branches change only at a singularity.
+its roots have numbers, in no order, as have arms with prismatic joints before a spherical wrist; of
+three parallel axes alone elbow right says the same as for axes 1, 2 and 3. Other branches change only at a
+singularity.
 """
 
 from __future__ import annotations
@@ -26,9 +28,12 @@ from itertools import product
 import numpy as np
 
 from dynx.ik.closed_form.outer_parallel_axes import OuterParallelAxes
+from dynx.ik.closed_form.parallel_arm import ParallelArm
 from dynx.ik.closed_form.parallel_axes import ParallelAxes
 from dynx.ik.closed_form.recognition import Recognised
+from dynx.ik.closed_form.sliding_arm import SlidingArm
 from dynx.ik.closed_form.spherical_wrist import SphericalWrist
+from dynx.ik.closed_form.three_slides import ThreeSlides
 from dynx.spatial.scalar import Floats
 
 SIGNS: Floats = np.array(list(product((1.0, -1.0), repeat=3)))
@@ -48,10 +53,25 @@ def branch_names(recognised: Recognised) -> tuple[str, ...]:
             place = 1 + 2 * (arm < 0.0) + (wrist < 0.0)
             found.append(f"{last} {place}, elbow {'right' if right else 'left'}")
             continue
+        if isinstance(recognised.geometry, ThreeSlides | ParallelArm | SlidingArm):
+            found.append(_with_slides(recognised.geometry, signs, last))
+            continue
         arm, unflipped = _sides(recognised.geometry, signs)
         flip = f"{last} {'unflipped' if unflipped else 'flipped'}"
         found.append(f"{arm.format(first=first, number=number // 2 + 1)}, {flip}")
     return tuple(found)
+
+
+def _with_slides(geometry: ThreeSlides | ParallelArm | SlidingArm, signs: list[float], last: str) -> str:
+    """Return the name of a branch of an arm with prismatic joints. Signs that select nothing are 1."""
+    arm, elbow, wrist = signs
+    place = 1 + 2 * (arm < 0.0) + (elbow < 0.0)
+    if isinstance(geometry, ParallelArm):
+        plane = geometry.plane.axes
+        right = (elbow > 0.0) == (float(plane[0] @ plane[1]) > 0.0)
+        return f"elbow {'right' if right else 'left'}"
+    flip = f"{last} {'unflipped' if wrist > 0.0 else 'flipped'}"
+    return flip if isinstance(geometry, ThreeSlides) else f"arm {place}, {flip}"
 
 
 def _sides(geometry: SphericalWrist | ParallelAxes, signs: list[float]) -> tuple[str, bool]:

@@ -8,11 +8,10 @@ import numpy as np
 
 from dynx.ik.closed_form.polish import AxisFrames, errors_of, polished
 from dynx.ik.closed_form.recognition import Geometry
-from dynx.ik.closed_form.subproblems import Angle
+from dynx.ik.closed_form.subproblems import Angle, Coordinate, Slide
+from dynx.ik.coordinates import FULL_TURN
 from dynx.spatial.scalar import Array, Floats, arctan2, cos, sin, where_less
 from dynx.spatial.so3 import rotate, rotate_back
-
-FULL_TURN = 2.0 * np.pi
 
 POSITION, ROTATION, VIOLATION, SEPARATION, ARBITRARY = range(5)
 """Columns of the measures of a candidate."""
@@ -22,7 +21,7 @@ N_MEASURES = 5
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Function from a pose and a branch to six angles, for one chain."""
+    """Function from a pose and a branch to the coordinates of one chain."""
 
     geometry: Geometry
     inverted: bool
@@ -32,24 +31,31 @@ class Candidates:
     """Pose of the frame at the zero configuration; lengths are relative."""
     lower: Floats
     upper: Floats
-    """Limits (6,) [rad]."""
+    """Limits (n,) [rad or m]."""
+    revolute: tuple[bool, ...]
+    """Whether each joint turns; the others slide."""
+    length: float
+    """Length [m] of the chain."""
     steps: int
     """Number of Newton steps."""
 
     def __call__(self, pose: Array, signs: Array) -> dict[str, Array]:
-        """Return the angles `q` (..., 6) [rad] and `measures` (..., 5) for poses (..., 3, 4), with relative
-        lengths, and signs (..., 3).
+        """Return the coordinates `q` (..., n) [rad or m] and `measures` (..., 5) for poses (..., 3, 4), with
+        relative lengths, and signs (..., 3).
 
         The measures are the errors of position (relative) and rotation (`polish.errors_of`), the violation of
-        the limits [rad], the least separation of the branches (`subproblems.Angle`), and the sum of 2^k for
-        the entries k of `geometry.arbitrary` whose angles are arbitrary.
+        the limits [rad or m], the least separation of the branches (`subproblems.Angle`), and the sum of 2^k
+        for the entries k of `geometry.arbitrary` whose angles are arbitrary.
         """
         R, p = pose[..., :3], pose[..., 3]
         return self._measured(R, p, self._closed_form(R, p, signs), self.steps)
 
     def measured(self, pose: Array, q: Array, steps: int) -> dict[str, Array]:
-        """Return the same for angles q (..., 6), after some Newton steps; the separation is 1."""
-        angles = [Angle(cos(q[..., k]), sin(q[..., k])) for k in range(q.shape[-1])]
+        """Return the same for coordinates q (..., n), after some Newton steps; the separation is 1."""
+        angles = [
+            Angle(cos(q[..., k]), sin(q[..., k])) if turns else Slide(q[..., k] / self.length)
+            for k, turns in enumerate(self.revolute)
+        ]
         return self._measured(pose[..., :3], pose[..., 3], angles, steps)
 
     @property
@@ -62,11 +68,13 @@ class Candidates:
         numbers = [each.tolist() if isinstance(each, np.ndarray) else str(each) for each in arrays]
         return type(self.geometry).__name__, *numbers
 
-    def _measured(self, R: Array, p: Array, angles: list[Angle], steps: int) -> dict[str, Array]:
+    def _measured(self, R: Array, p: Array, angles: list[Coordinate], steps: int) -> dict[str, Array]:
         angles = polished(self.frames, R, p, angles, steps)
         position, rotation = errors_of(self.frames, R, p, angles)
         within = [
-            _within(arctan2(q.sin, q.cos), float(low), float(high))
+            _slide_within(q.value * self.length, float(low), float(high))
+            if isinstance(q, Slide)
+            else _within(arctan2(q.sin, q.cos), float(low), float(high))
             for q, low, high in zip(angles, self.lower, self.upper, strict=True)
         ]
         violation = within[0][1]
@@ -75,7 +83,11 @@ class Candidates:
         separation = np.asarray(angles[0].separation)
         for q in angles[1:]:
             separation = where_less(q.separation, separation, q.separation, separation)
-        joints = [5 - k for k in self.geometry.arbitrary] if self.inverted else self.geometry.arbitrary
+        joints = (
+            [len(angles) - 1 - k for k in self.geometry.arbitrary]
+            if self.inverted
+            else self.geometry.arbitrary
+        )
         arbitrary = sum(2.0**place * np.asarray(angles[k].arbitrary) for place, k in enumerate(joints))
         measures = np.broadcast_arrays(position, rotation, violation, separation, np.asarray(arbitrary))
         return {
@@ -83,12 +95,12 @@ class Candidates:
             "measures": np.stack(measures, axis=-1),
         }
 
-    def _closed_form(self, R: Array, p: Array, signs: Array) -> list[Angle]:
+    def _closed_form(self, R: Array, p: Array, signs: Array) -> list[Coordinate]:
         R_G = R @ self.R_zero.T
         p_G = p - rotate(R_G, self.p_zero)
         if not self.inverted:
-            return self.geometry.angles(R_G, p_G, signs)
-        return self.geometry.angles(np.swapaxes(R_G, -1, -2), -rotate_back(R_G, p_G), signs)[::-1]
+            return [*self.geometry.angles(R_G, p_G, signs)]
+        return [*self.geometry.angles(np.swapaxes(R_G, -1, -2), -rotate_back(R_G, p_G), signs)][::-1]
 
 
 def _within(value: Array, low: float, high: float) -> tuple[Array, Array]:
@@ -104,6 +116,11 @@ def _within(value: Array, low: float, high: float) -> tuple[Array, Array]:
         excess = _excess(each, low, high)
         found, least = where_less(excess, least, each, found), where_less(excess, least, excess, least)
     return found, least
+
+
+def _slide_within(value: Array, low: float, high: float) -> tuple[Array, Array]:
+    """Return a position and by how much it violates its limits."""
+    return value, _excess(value, low, high)
 
 
 def _excess(value: Array, low: float, high: float) -> Array:

@@ -2,7 +2,7 @@
 
 With the pose T_zero of the frame there, the pose at any configuration is the product of exponentials
 E_1(q_1) ... E_n(q_n) T_zero (Murray, Li and Sastry, eq. 3.3), in which E_i rotates about the axis of joint i
-at the zero configuration.
+at the zero configuration, or for a prismatic joint translates along it.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotate
 
-N_JOINTS = 6
-"""Number of joints of a closed form."""
+MAX_JOINTS = 6
+"""Most joints of a closed form."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,16 +44,18 @@ class Chain:
     T_zero: Floats
     """Pose of the frame (4, 4)."""
     length: float
-    """Length [m] of the chain, from joint to joint and to the frame."""
+    """Length [m] of the chain, from joint to joint and to the frame, with the travels of prismatic joints."""
     given: Mapping[str, float]
     """Positions [rad or m] of the joints that do not move."""
+    revolute: tuple[bool, ...]
+    """Whether each joint turns about its axis; the others slide along it."""
 
 
 def chain_to(model: Model, frame: str, given: Mapping[str, float]) -> Chain:
     """Return the chain to a frame, in which the joints `given` are fixed at those positions [rad or m].
 
-    Raises NoClosedFormError for a floating base, and for a joint of the chain that is prismatic or coupled
-    to another; UnknownNameError or ArgumentError for `given`.
+    Raises NoClosedFormError for a floating base, and for a joint of the chain that is coupled to another;
+    UnknownNameError or ArgumentError for `given`.
     """
     given = checked_given(model, given)
     if model.floating:
@@ -62,25 +64,25 @@ def chain_to(model: Model, frame: str, given: Mapping[str, float]) -> Chain:
     placed = mechanism.frames[model.frame_index(frame)]
     R, p = np.eye(3), np.zeros(3)
     joints, axes, points = [], [], []
-    origins = []
+    origins: list[Floats] = []
+    revolute: list[bool] = []
+    travel = 0.0
     for index in reversed(ancestry(mechanism, placed.body)):
         body = mechanism.bodies[index]
         value = _fixed_position(model, body.joint, given)
-        if value is None and not body.revolute:
-            raise NoClosedFormError(
-                f"joint {shown(body.joint)} is prismatic; the closed form covers revolute joints",
-                [(body.joint,)],
-            )
         origins.append(p + rotate(R, body.p))
         if value is None:
             joints.append(body.joint)
             axes.append(rotate(R @ body.R, body.axis))
             points.append(origins[-1])
+            revolute.append(body.revolute)
+            if not body.revolute:
+                travel += _travel(model, body.joint)
         R_joint, p_joint = joint_motion(body, np.asarray(0.0 if value is None else value))
         R, p = R @ R_joint, p + rotate(R, p_joint)
     T_zero = homogeneous(R @ placed.R, p + rotate(R, placed.p))
     origins.append(T_zero[:3, 3])
-    length = float(sum(np.linalg.norm(b - a) for a, b in pairwise(origins))) or 1.0
+    length = float(sum(np.linalg.norm(b - a) for a, b in pairwise(origins))) + travel or 1.0
     T_zero[:3, 3] /= length
     return Chain(
         tuple(joints),
@@ -90,7 +92,15 @@ def chain_to(model: Model, frame: str, given: Mapping[str, float]) -> Chain:
         T_zero,
         length,
         given,
+        tuple(revolute),
     )
+
+
+def _travel(model: Model, joint: str) -> float:
+    """Return the largest distance [m] of a prismatic joint from zero, or 0 if it has no limits."""
+    at = model.coordinate_index(joint)
+    farthest = max(abs(float(model.lower[at])), abs(float(model.upper[at])))
+    return farthest if farthest < MAX_MAGNITUDE else 0.0
 
 
 def _fixed_position(model: Model, name: str, given: Mapping[str, float]) -> float | None:

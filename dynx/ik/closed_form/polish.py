@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dynx.ik.closed_form.chain import Chain
-from dynx.ik.closed_form.subproblems import Angle, dot
+from dynx.ik.closed_form.subproblems import Coordinate, Slide, dot
 from dynx.rbd.linear import ldl_factors, solve_ldl
 from dynx.spatial.scalar import Array, Floats, append_axis, clamp, sqrt
 from dynx.spatial.so3 import cross, rotate
@@ -50,7 +50,9 @@ class AxisFrames:
         return cls(tuple(Rs), tuple(ps))
 
 
-def polished(frames: AxisFrames, R: Array, p: Array, angles: list[Angle], steps: int) -> list[Angle]:
+def polished(
+    frames: AxisFrames, R: Array, p: Array, angles: list[Coordinate], steps: int
+) -> list[Coordinate]:
     """Return the angles after some steps towards the pose (R, p)."""
     for _ in range(steps):
         _, error, J = _error_and_jacobian(frames, R, p, angles)
@@ -60,11 +62,11 @@ def polished(frames: AxisFrames, R: Array, p: Array, angles: list[Angle], steps:
         step = (
             solve_ldl(*ldl_factors(A), b) if A.dtype == object else np.linalg.solve(A, b[..., None])[..., 0]
         )
-        angles = [_turned(q, step[..., k]) for k, q in enumerate(angles)]
+        angles = [_moved(q, step[..., k]) for k, q in enumerate(angles)]
     return angles
 
 
-def errors_of(frames: AxisFrames, R: Array, p: Array, angles: list[Angle]) -> tuple[Array, Array]:
+def errors_of(frames: AxisFrames, R: Array, p: Array, angles: list[Coordinate]) -> tuple[Array, Array]:
     """Return the distance from the position p (...,), relative to the length of the chain, and twice the sine
     of half the angle from the rotation R (...,), which is the angle [rad] to third order."""
     chord, error, _ = _error_and_jacobian(frames, R, p, angles)
@@ -73,7 +75,7 @@ def errors_of(frames: AxisFrames, R: Array, p: Array, angles: list[Angle]) -> tu
 
 
 def _error_and_jacobian(
-    frames: AxisFrames, R: Array, p: Array, angles: list[Angle]
+    frames: AxisFrames, R: Array, p: Array, angles: list[Coordinate]
 ) -> tuple[Array, Array, list[Array]]:
     """Return the square of the rotation error's chord, the twist to the pose, and the columns of J."""
     axes, origins = [], []
@@ -82,6 +84,10 @@ def _error_and_jacobian(
         x, y, z = R_here[..., :, 0], R_here[..., :, 1], R_here[..., :, 2]
         axes.append(z)
         origins.append(p_here)
+        if isinstance(q, Slide):
+            p_here = p_here + z * append_axis(q.value) + rotate(R_here, p_next)
+            R_here = R_here @ R_next
+            continue
         c, s = append_axis(q.cos), append_axis(q.sin)
         turned = np.stack(np.broadcast_arrays(c * x + s * y, c * y - s * x, z + 0.0 * c), axis=-1)
         p_here = p_here + rotate(turned, p_next)
@@ -90,15 +96,18 @@ def _error_and_jacobian(
     chord = 0.5 * np.sum(np.sum(difference * difference, axis=-1), axis=-1)
     rotation = 0.5 * sum(cross(R_here[..., :, k], R[..., :, k]) for k in range(3))
     error = np.concatenate(np.broadcast_arrays(p - p_here, rotation), axis=-1)
-    J = [
-        np.concatenate(np.broadcast_arrays(cross(axis, p_here - origin), axis + 0.0 * p_here), axis=-1)
-        for axis, origin in zip(axes, origins, strict=True)
-    ]
+    J = []
+    for q, axis, origin in zip(angles, axes, origins, strict=True):
+        none = 0.0 * p_here
+        linear, angular = (axis, none) if isinstance(q, Slide) else (cross(axis, p_here - origin), axis)
+        J.append(np.concatenate(np.broadcast_arrays(linear + none, angular + none), axis=-1))
     return np.asarray(chord), error, J
 
 
-def _turned(q: Angle, step: Array) -> Angle:
-    """Return the angle increased by a small step, by Cayley's formula for its half."""
+def _moved(q: Coordinate, step: Array) -> Coordinate:
+    """Return the coordinate increased by a small step, an angle by Cayley's formula for its half."""
+    if isinstance(q, Slide):
+        return replace(q, value=q.value + step)
     half = clamp(0.5 * step, MAX_HALF_STEP)
     w = 1.0 + half * half
     c, s = (1.0 - half * half) / w, 2.0 * half / w

@@ -44,6 +44,18 @@ def squared(a: tuple[Array, Array, Array]) -> Conic:
     return a[0] * a[0], 2.0 * a[0] * a[1], 2.0 * a[0] * a[2], a[1] * a[1], 2.0 * a[1] * a[2], a[2] * a[2]
 
 
+def multiplied(a: tuple[Array, Array, Array], b: tuple[Array, Array, Array]) -> Conic:
+    """Return the coefficients of (a0 + a1 c + a2 s) (b0 + b1 c + b2 s)."""
+    return (
+        a[0] * b[0],
+        a[0] * b[1] + a[1] * b[0],
+        a[0] * b[2] + a[2] * b[0],
+        a[1] * b[1],
+        a[1] * b[2] + a[2] * b[1],
+        a[2] * b[2],
+    )
+
+
 def linear(a: tuple[Array, Array, Array]) -> Conic:
     """Return the coefficients of a0 + a1 c + a2 s."""
     return a[0], a[1], a[2], 0.0 * a[0], 0.0 * a[0], 0.0 * a[0]

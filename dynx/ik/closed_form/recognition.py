@@ -1,8 +1,8 @@
 """Recognition of chains that have a closed form, from the lines of their axes.
 
 Families are looked for along the chain and along its inverse (from the frame to the world): a spherical
-wrist, and three parallel axes. Axes count as parallel, or as meeting, within a tolerance; the recognised
-geometry is that of the idealised chain, in which they do exactly.
+wrist, three parallel axes, and those of `sliding_recognition`. Axes count as parallel, or as meeting, within
+a tolerance; the recognised geometry is that of the idealised chain, in which they do exactly.
 """
 
 from __future__ import annotations
@@ -12,12 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynx.errors import NoClosedFormError
-from dynx.ik.closed_form.chain import Chain
+from dynx.ik.closed_form.chain import MAX_JOINTS, Chain
 from dynx.ik.closed_form.lines import Lines, along, angle_between, common_point, normal_feet
 from dynx.ik.closed_form.outer_parallel_axes import OuterParallelAxes, OuterWristCase
+from dynx.ik.closed_form.parallel_arm import ParallelArm
 from dynx.ik.closed_form.parallel_axes import ParallelAxes, WristCase
+from dynx.ik.closed_form.sliding_arm import SlidingArm
+from dynx.ik.closed_form.sliding_recognition import Kinds, parallel_arm, sliding_arm, three_slides
 from dynx.ik.closed_form.spherical_wrist import ArmCase, SphericalWrist, unit_normal
 from dynx.ik.closed_form.subproblems import component_terms
+from dynx.ik.closed_form.three_slides import ThreeSlides
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross
 
@@ -28,7 +32,7 @@ at the first tolerance at which it has a family: rounding, files with about six 
 NEGLIGIBLE = 1e-6
 """Relative length, or angle [rad], below which an offset within a recognised family is idealised."""
 
-Geometry = SphericalWrist | ParallelAxes | OuterParallelAxes
+Geometry = SphericalWrist | ParallelAxes | OuterParallelAxes | ThreeSlides | ParallelArm | SlidingArm
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,31 +50,58 @@ class Recognised:
 
 
 def recognise(chain: Chain, preferred: Floats) -> Recognised:
-    """Return the geometry of a chain of six joints; `preferred` (6,) [rad] stand for arbitrary angles.
+    """Return the geometry of a chain of at most six joints; `preferred` (n,) stand for arbitrary angles.
 
     Raises NoClosedFormError, which says how far the chain is from each family.
     """
     lines = Lines(chain.axes, chain.points)
     for tolerance in TOLERANCES:
         for inverted in (False, True):
-            here = lines.reversed() if inverted else lines
-            angles = preferred[::-1] if inverted else preferred
-            wrist = _spherical_wrist(here, angles, tolerance)
-            if wrist is not None:
-                end = "first" if inverted else "last"
-                text = f"axes of the {end} three joints meet in a point"
-                return Recognised(wrist, inverted, tolerance, _deviation(here, wrist), text)
-            parallel = _parallel_axes(here, angles, tolerance)
-            if parallel is not None:
-                numbers = "3, 4 and 5" if inverted else "2, 3 and 4"
-                text = f"axes {numbers} are parallel"
-                return Recognised(parallel, inverted, tolerance, _deviation(here, parallel), text)
-            outer = _outer_parallel_axes(here, angles, tolerance)
-            if outer is not None:
-                numbers = "4, 5 and 6" if inverted else "1, 2 and 3"
-                text = f"axes {numbers} are parallel"
-                return Recognised(outer, inverted, tolerance, _deviation(here, outer), text)
+            here, angles, kinds = lines, preferred, chain.revolute
+            if inverted:
+                here, angles, kinds = lines.reversed(), preferred[::-1], kinds[::-1]
+            find = _revolute_family if kinds == (True,) * MAX_JOINTS else _sliding_family
+            found = find(here, kinds, angles, tolerance, inverted)
+            if found is not None:
+                geometry, text = found
+                return Recognised(geometry, inverted, tolerance, _deviation(here, geometry), text)
     raise NoClosedFormError(_why_none(chain))
+
+
+def _revolute_family(
+    lines: Lines, kinds: Kinds, preferred: Floats, tolerance: float, inverted: bool
+) -> tuple[Geometry, str] | None:
+    """Return the geometry of six revolute joints, and the property of their axes, or None."""
+    wrist = _spherical_wrist(lines, preferred, tolerance)
+    if wrist is not None:
+        return wrist, f"axes of the {'first' if inverted else 'last'} three joints meet in a point"
+    parallel = _parallel_axes(lines, preferred, tolerance)
+    if parallel is not None:
+        return parallel, f"axes {'3, 4 and 5' if inverted else '2, 3 and 4'} are parallel"
+    outer = _outer_parallel_axes(lines, preferred, tolerance)
+    if outer is not None:
+        return outer, f"axes {'4, 5 and 6' if inverted else '1, 2 and 3'} are parallel"
+    return None
+
+
+def _sliding_family(
+    lines: Lines, kinds: Kinds, preferred: Floats, tolerance: float, inverted: bool
+) -> tuple[Geometry, str] | None:
+    """Return the geometry of joints of which some are prismatic, and what it is, or None."""
+    near = max(tolerance, NEGLIGIBLE)
+    slides = three_slides(lines, kinds, preferred, near)
+    if slides is not None:
+        return slides, "three prismatic joints, and revolute ones that determine the rotation alone"
+    plane = parallel_arm(lines, kinds, preferred, near, tolerance)
+    if plane is not None:
+        return plane, "all axes are parallel" if all(
+            kinds
+        ) else "all axes are parallel, one of a prismatic joint"
+    arm = sliding_arm(lines, kinds, preferred, near, tolerance)
+    if arm is not None:
+        end = "first" if inverted else "last"
+        return arm, f"axes of the {end} three joints meet in a point, and others are prismatic"
+    return None
 
 
 def _deviation(lines: Lines, geometry: Geometry) -> float:
@@ -183,6 +214,13 @@ def _outer_parallel_axes(lines: Lines, preferred: Floats, tolerance: float) -> O
 
 def _why_none(chain: Chain) -> str:
     """Return how far a chain is from each family."""
+    if not all(chain.revolute) or len(chain.revolute) != MAX_JOINTS:
+        kinds = ", ".join("revolute" if turns else "prismatic" for turns in chain.revolute)
+        return (
+            f"no closed form: the joints are {kinds}; with prismatic joints it needs three of them and at "
+            "most three revolute joints, or one or two and a spherical wrist, or three parallel revolute "
+            "joints and one along them"
+        )
     lines = Lines(chain.axes, chain.points)
     parts = []
     for end, three in (("first", slice(0, 3)), ("last", slice(3, 6))):

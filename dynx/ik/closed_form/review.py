@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from dynx.ik.closed_form.branches import N_BRANCHES, SIGNS
 from dynx.ik.closed_form.candidates import (
-    FULL_TURN,
     N_MEASURES,
     POSITION,
     ROTATION,
@@ -21,7 +20,7 @@ from dynx.ik.closed_form.candidates import (
     VIOLATION,
     Candidates,
 )
-from dynx.ik.closed_form.chain import N_JOINTS
+from dynx.ik.coordinates import FULL_TURN
 from dynx.spatial.scalar import Floats
 
 ACCURACY = 1e-11
@@ -32,12 +31,12 @@ ROUNDING = 1e-14
 """Error up to which a candidate is a solution at once; above it, it is polished further."""
 
 AT_LIMIT = 1e-8
-"""Violation [rad] of a limit that counts as rounding: the solution is moved to the limit if it still reaches
-the pose."""
+"""Violation [rad or m] of a limit that counts as rounding: the solution is moved to the limit if it still
+reaches the pose."""
 
 _SAME = 1e-6
-"""Difference [rad] up to which two candidates are one solution. At a singularity rounding moves a solution by
-the square root of its error."""
+"""Difference [rad or m] up to which two candidates are one solution. At a singularity rounding moves a
+solution by the square root of its error."""
 
 _FURTHER_STEPS = 3, 17
 """Newton steps for rough candidates, and for those that are rough after them."""
@@ -53,7 +52,7 @@ class Reviewed:
     """Candidates of n poses, and which of them are solutions."""
 
     angles: Floats
-    """Angles (n, 8, 6) [rad]."""
+    """Coordinates (n, 8, joints) [rad or m]."""
     measures: Floats
     """Measures (n, 8, 5) of `Candidates`."""
     found: Mask
@@ -75,7 +74,8 @@ class Review:
     def __call__(self, pose: Floats, ignore_limits: bool) -> Reviewed:
         """Return all candidates of poses (n, 3, 4), whose lengths are relative, polished."""
         n = len(pose)
-        angles, measures = np.empty((n, N_BRANCHES, N_JOINTS)), np.empty((n, N_BRANCHES, N_MEASURES))
+        angles = np.empty((n, N_BRANCHES, len(self.candidates.lower)))
+        measures = np.empty((n, N_BRANCHES, N_MEASURES))
         found = np.empty((n, N_BRANCHES), dtype=np.bool_)
         for first in range(0, n, _CHUNK):
             rows = slice(first, first + _CHUNK)
@@ -101,7 +101,7 @@ class Review:
         doubtful = found if self.repeats else found & (measures[..., SEPARATION] < self.separation)
         poses = np.flatnonzero(doubtful.any(axis=1) & (found.sum(axis=1) > 1))
         if poses.size:
-            found[poses] = _distinct(angles[poses], found[poses])
+            found[poses] = _distinct(angles[poses], found[poses], self.candidates.revolute)
         return found
 
     def _polish(self, pose: Floats, angles: Floats, measures: Floats, error: Floats, rough: Mask) -> None:
@@ -131,25 +131,30 @@ class Review:
         measures[rows] = after
 
 
-def near_to(angles: Floats, start: Floats, limits: tuple[Floats, Floats] | None) -> Floats:
-    """Return angles shifted by full turns to be near `start`, and within limits if they are."""
+def near_to(
+    angles: Floats, start: Floats, limits: tuple[Floats, Floats] | None, revolute: tuple[bool, ...]
+) -> Floats:
+    """Return coordinates with angles shifted by full turns to be near `start`, and within limits if they
+    are."""
+    turns = np.array(revolute)
+    start = np.where(turns, start, angles)
     near = np.asarray(start + np.remainder(angles - start + np.pi, FULL_TURN) - np.pi)
     if limits is None:
         return near
     low, high = limits
-    near += FULL_TURN * (near < low - AT_LIMIT)
-    near -= FULL_TURN * (near > high + AT_LIMIT)
+    near += FULL_TURN * (turns & (near < low - AT_LIMIT))
+    near -= FULL_TURN * (turns & (near > high + AT_LIMIT))
     clipped = np.clip(near, low, high)
     return np.asarray(np.where(np.abs(near - clipped) <= AT_LIMIT, clipped, angles))
 
 
-def _distinct(angles: Floats, found: Mask) -> Mask:
+def _distinct(angles: Floats, found: Mask, revolute: tuple[bool, ...]) -> Mask:
     """Return `found` (n, 8) without solutions that repeat an earlier one."""
     found = found.copy()
     for later in range(1, N_BRANCHES):
         for earlier in range(later):
             difference = angles[:, later] - angles[:, earlier]
-            difference -= FULL_TURN * np.round(difference / FULL_TURN)
+            difference -= FULL_TURN * np.round(difference / FULL_TURN) * revolute
             same = np.abs(difference).max(axis=-1) < _SAME
             found[:, later] &= ~(same & found[:, earlier])
     return found

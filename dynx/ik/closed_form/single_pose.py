@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from dynx.ik.closed_form.branches import N_BRANCHES
-from dynx.ik.closed_form.chain import N_JOINTS
 from dynx.ik.closed_form.solutions import IKSolutions
 from dynx.ik.closed_form.solver import ClosedForm, stored_closed_form
 from dynx.ik.search import SearchLimits
@@ -21,8 +20,8 @@ _FLOAT64 = np.dtype(np.float64)
 _ALL = 2**N_BRANCHES - 1
 
 _Workspace = tuple[Callable[[], None], memoryview, Floats, Floats, BoundVariants]
-"""Function that evaluates the pose, its masks, the pose (4, 4), and the block (8, 8) of results; last what
-holds their memory."""
+"""Function that evaluates the pose, its masks, the pose (4, 4), and the block (8, n + 2) of results; last
+what holds their memory."""
 
 _ROWS = [np.flatnonzero([bits >> k & 1 for k in range(N_BRANCHES)]) for bits in range(2**N_BRANCHES)]
 """Numbers of the branches whose bits are set, for every byte."""
@@ -37,7 +36,7 @@ class SinglePose:
     def __init__(self, form: ClosedForm) -> None:
         assert form.kernel is not None
         self._kernel, self._names = form.kernel, form.branches
-        self._turns = form.full_turns
+        self._turns, self._count = form.full_turns, len(form.joints)
         # Workspaces that no call uses at the moment.
         self._free: list[_Workspace] = [self._workspace()]
 
@@ -64,10 +63,11 @@ class SinglePose:
         self._free.append(workspace)
         if rows is None:
             return None
-        return IKSolutions(rows[:, :N_JOINTS], rows[:, N_JOINTS:], self._names, bits, full_turns=self._turns)
+        count = self._count
+        return IKSolutions(rows[:, :count], rows[:, count:], self._names, bits, full_turns=self._turns)
 
     def _workspace(self) -> _Workspace:
-        block = np.empty((N_BRANCHES, N_JOINTS + 2))
+        block = np.empty((N_BRANCHES, self._count + 2))
         bound = self._kernel.bind(block)
         return bound.run, bound.masks, bound.inputs[0].reshape(4, 4), block, bound
 

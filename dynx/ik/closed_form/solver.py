@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from dynx.errors import NoClosedFormError, ShapeError, shown
 from dynx.ik.closed_form.branches import N_BRANCHES, branch_names
 from dynx.ik.closed_form.candidates import ARBITRARY, POSITION, ROTATION, Candidates
-from dynx.ik.closed_form.chain import N_JOINTS, Chain, chain_to
+from dynx.ik.closed_form.chain import MAX_JOINTS, Chain, chain_to
 from dynx.ik.closed_form.full_turns import FullTurns
 from dynx.ik.closed_form.polish import AxisFrames
 from dynx.ik.closed_form.recognition import TOLERANCES, Recognised, recognise
@@ -53,7 +53,7 @@ class ClosedForm:
         self.model = model
         """The robot."""
         self.joints = chain.joints
-        """Names of the six joints that are solved for."""
+        """Names of the joints that are solved for, from the world to the frame."""
         self.given = dict(chain.given)
         """Positions [rad or m] of joints that are given."""
         self.family = recognised.description
@@ -83,13 +83,15 @@ class ClosedForm:
             chain.T_zero[:3, 3],
             model.lower[self._columns],
             model.upper[self._columns],
+            chain.revolute,
+            chain.length,
             0 if exact else 1 + TOLERANCES.index(recognised.tolerance),
         )
         self._start = model.neutral()
         for name, value in chain.given.items():
             self._start[model.coordinate_index(name)] = value
         # Roots of a quartic that are not real may lead Newton's method to one that is.
-        repeats = recognised.geometry.case == "general"
+        repeats = recognised.geometry.case.endswith("general")
         self._review = Review(self._candidates, nearness, separation, repeats)
         self.kernel: BranchKernel | None = None
         """The kernel that evaluates the branches, if the form is compiled."""
@@ -100,7 +102,7 @@ class ClosedForm:
             fill = self._start[self._columns]
             self.kernel = BranchKernel(Judgement(self._candidates, self._length, nearness, separation, fill))
         joints = recognised.geometry.arbitrary
-        self._arbitrary = [5 - k for k in joints] if recognised.inverted else list(joints)
+        self._arbitrary = [len(self.joints) - 1 - k for k in joints] if recognised.inverted else list(joints)
 
     def solve(
         self,
@@ -163,7 +165,12 @@ class ClosedForm:
         if q0 is not None:
             start = np.broadcast_to(start, (*batch, self.model.nq)).reshape(-1, 1, self.model.nq)
             limits = (self._candidates.lower, self._candidates.upper)
-            angles = near_to(angles, start[..., self._columns], None if ignore_limits else limits)
+            angles = near_to(
+                angles,
+                start[..., self._columns],
+                None if ignore_limits else limits,
+                self._candidates.revolute,
+            )
         if q0 is not None or self.kernel is None:
             angles = np.where(found[..., None], angles, start[..., self._columns])
         return self._solutions(batch, angles, errors, found, arbitrary, start)
@@ -247,8 +254,9 @@ def closed_form(
     """Return the closed form of the inverse kinematics of a frame.
 
     It exists for six revolute joints between world and frame of which the last (or the first) three axes meet
-    in a point, or of which the axes 2, 3 and 4 (or 3, 4 and 5) are parallel. `given` holds the positions [rad
-    or m] of further joints between world and frame, such as one of seven.
+    in a point, or of which three that follow each other are parallel; for a spherical wrist on an arm with
+    prismatic joints, for three prismatic and up to three revolute joints, and for SCARA arms. `given` holds
+    the positions [rad or m] of further joints between world and frame, such as one of seven.
 
     With `compiled` it is compiled for this arm, which takes some seconds unless it is in the cache.
 
@@ -269,12 +277,16 @@ def _recognised(model: Model, frame: str, given: Mapping[str, float]) -> tuple[C
     """Return the chain to a frame and its geometry. Raises NoClosedFormError."""
     chain = chain_to(model, frame, given)
     count = len(chain.joints)
-    if count != N_JOINTS:
-        raise NoClosedFormError(
-            f"{count} joints move {shown(frame)} of {model.name}; the closed form is for {N_JOINTS}"
-        )
     low, high = (each[list(chain.columns)] for each in (model.lower, model.upper))
-    return chain, recognise(chain, np.clip(0.0, low, high))
+    try:
+        if count in range(1, MAX_JOINTS + 1):
+            return chain, recognise(chain, np.clip(0.0, low, high))
+    except NoClosedFormError:
+        if count == MAX_JOINTS or not all(chain.revolute):
+            raise
+    raise NoClosedFormError(
+        f"{count} joints move {shown(frame)} of {model.name}; the closed form is for {MAX_JOINTS}"
+    )
 
 
 @lru_cache(maxsize=64)
@@ -318,5 +330,5 @@ def _sets_to_give(
         joints = chain_to(model, frame, given).joints
     except NoClosedFormError:
         return []
-    surplus = len(joints) - N_JOINTS
+    surplus = len(joints) - MAX_JOINTS
     return list(combinations(joints, surplus)) if 1 <= surplus <= MAX_SURPLUS else []

@@ -19,6 +19,7 @@ where k and s depend on q_3 alone, linearly in its cosine and sine. What determi
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -81,14 +82,11 @@ class SphericalWrist:
         q2 = replace(angle_from_to(h[1], z, placed, self.preferred[1]), separation=root)
         q1 = angle_from_to(h[0], self.p2 - self.p1 + turn(h[1], q2, z), x, self.preferred[0])
 
-        # Rotation of the wrist, by its effect on axis 6 and on a normal of it.
-        normal = unit_normal(h[5])
-        tip, side = (self._back(q1, q2, q3, rotate(R, each)) for each in (h[5], normal))
-        k5, c5, s5 = component_terms(h[3], h[4], h[5])
-        q5 = solve_linear(c5, s5, dot(h[3], tip) - k5, flip, 0.0)
-        q4 = angle_from_to(h[3], turn(h[4], q5, h[5]), tip, self.preferred[3])
-        turned = turn_back(h[4], q5, turn_back(h[3], q4, side))
-        return [q1, q2, q3, q4, q5, angle_from_to(h[5], normal, turned, 0.0)]
+        def back(a: Array) -> Array:
+            """Return the inverse rotation of the arm, after R, of a vector."""
+            return turn_back(h[2], q3, turn_back(h[1], q2, turn_back(h[0], q1, rotate(R, a))))
+
+        return [q1, q2, q3, *wrist_angles(h[3:], unit_normal(h[5]), back, flip, self.preferred[3])]
 
     @property
     def points(self) -> Floats:
@@ -101,10 +99,6 @@ class SphericalWrist:
         if self.case == "general":
             return bool(max(np.hypot(*K[1:]), np.hypot(*S[1:])) > least)
         return bool(np.hypot(*(K if self.case == "parallel_1_2" else S)[1:]) > least)
-
-    def _back(self, q1: Angle, q2: Angle, q3: Angle, a: Array) -> Array:
-        h = self.axes
-        return turn_back(h[2], q3, turn_back(h[1], q2, turn_back(h[0], q1, a)))
 
     def _elbow(
         self, a: Array, b: Array, arm: Array, elbow: Array
@@ -158,6 +152,23 @@ class SphericalWrist:
 def _scaled(factor: Array, *terms: float) -> tuple[Array, Array]:
     x, y = (factor * each for each in terms)
     return x, y
+
+
+def wrist_angles(
+    axes: Floats, normal: Floats, rotated: Callable[[Array], Array], flip: Array, preferred: float
+) -> list[Angle]:
+    """Return the angles about three axes (3, 3) whose rotations make the rotation `rotated` together.
+
+    They follow from its effect on the last axis and on a `normal` of that; `flip` (1 or -1) selects one of
+    two solutions. The first angle is `preferred` [rad] where the other axes put the last along the first.
+    """
+    first, second, last = axes
+    tip, side = rotated(last), rotated(normal)
+    known, cosine, sine = component_terms(first, second, last)
+    q_second = solve_linear(cosine, sine, dot(first, tip) - known, flip, 0.0)
+    q_first = angle_from_to(first, turn(second, q_second, last), tip, preferred)
+    turned = turn_back(second, q_second, turn_back(first, q_first, side))
+    return [q_first, q_second, angle_from_to(last, normal, turned, 0.0)]
 
 
 def unit_normal(axis: Floats) -> Floats:

@@ -35,6 +35,21 @@ class Angle:
     both are one, and negative where neither is real."""
 
 
+@dataclass(frozen=True)
+class Slide:
+    """Position of a prismatic joint (...,), relative to the length of the chain."""
+
+    value: Array
+    arbitrary: Array | float = 0.0
+    """0: the position is never arbitrary."""
+    separation: Array | float = 1.0
+    """Measure, half the difference of positions, as that of `Angle`."""
+
+
+Coordinate = Angle | Slide
+"""Position of a joint."""
+
+
 def dot(a: Array, b: Array) -> Array:
     """Return a' b (...,), for arrays (..., 3)."""
     return np.asarray(np.sum(a * b, axis=-1))
@@ -93,6 +108,15 @@ def solve_linear(A: Array | float, B: Array | float, D: Array, sign: Array, pref
     root = sign * separation
     x, y = (A * d - B * root) / length, (B * d + A * root) / length
     return replace(normalised(x, y, 1.0, preferred), separation=separation)
+
+
+def quadratic_root(square: float, half_linear: Array | float, constant: Array, sign: Array) -> Slide:
+    """Return the root d, which `sign` (1 or -1) selects, of ``square d^2 + 2 half_linear d + constant = 0``.
+
+    Where no root is real, their real part is returned.
+    """
+    root = positive_root(half_linear * half_linear - square * constant)
+    return Slide((sign * root - half_linear) / square, separation=root)
 
 
 def component_terms(direction: Array, axis: Array, a: Array) -> tuple[Array, Array, Array]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dynx.model import Joint, Limits, Link, Model, Pose
+from dynx.model.elements import JointType
 from dynx.spatial.scalar import Floats
 
 FAMILIES = (
@@ -37,17 +38,24 @@ def random_arm(family: str, rng: np.random.Generator, deviation: float = 0.0, li
     points = points + deviation * rng.normal(size=(6, 3))
     axes = axes + deviation * rng.normal(size=(6, 3))
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    return arm_of(axes, points, "RRRRRR", rng, limit)
+
+
+def arm_of(axes: Floats, points: Floats, kinds: str, rng: np.random.Generator, limit: float) -> Model:
+    """Return an arm of joints R (revolute) and P (prismatic), with limits +-limit [rad or m], whose frames
+    have any orientation."""
     links, joints, T = [Link("base")], [], np.eye(4)
     for k, (axis, point) in enumerate(zip(axes, points, strict=True)):
         T_joint = _random_pose(rng)
         T_joint[:3, 3] = point + 0.2 * rng.normal() * axis
         child, (x, y, z) = f"link{k + 1}", (T_joint[:3, :3].T @ axis).tolist()
         origin, limits = Pose.from_matrix(np.linalg.solve(T, T_joint)), Limits(-limit, limit)
-        joints.append(Joint(f"joint{k + 1}", "revolute", links[-1].name, child, origin, (x, y, z), limits))
+        kind: JointType = "revolute" if kinds[k] == "R" else "prismatic"
+        joints.append(Joint(f"joint{k + 1}", kind, links[-1].name, child, origin, (x, y, z), limits))
         links.append(Link(child))
         T = T_joint
     arm = Model.build("arm", links, joints)
-    return arm.with_frame("tool", "link6", _random_pose(rng))
+    return arm.with_frame("tool", links[-1].name, _random_pose(rng))
 
 
 def _lines(family: str, rng: np.random.Generator) -> tuple[Floats, Floats]:

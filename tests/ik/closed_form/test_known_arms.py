@@ -29,6 +29,10 @@ ARMS: list[tuple[Model, str, dict[str, float]]] = [
     (PANDA, "panda_hand_tcp", {"panda_joint7": 0.3}),
     (PANDA, "panda_hand_tcp", {"panda_joint5": -0.6}),
     (load("talos_arm"), "arm_left_7_link", {}),
+    (load(MODELS / "scara.urdf"), "tip", {}),
+    (load(MODELS / "planar_3r.urdf"), "tip", {}),
+    (load("tiago"), "arm_7_link", {"torso_lift_joint": 0.2, "arm_1_joint": 0.4}),
+    (load("tiago"), "arm_7_link", {"arm_1_joint": 0.4, "arm_2_joint": -0.3}),
 ]
 
 
@@ -92,6 +96,22 @@ def test_branches_have_the_geometry_that_their_names_say(
                     f"shoulder {'right' if side > 0.0 else 'left'}, elbow {'up' if above else 'down'}, "
                     f"wrist {'unflipped' if flip else 'flipped'}"
                 )
+
+
+def test_the_elbow_of_a_scara_arm_is_on_the_side_that_the_branch_names() -> None:
+    scara = load(MODELS / "scara.urdf")
+    with backend("compiled", scara) as engine:
+        T = engine.forward_kinematics(np.array([0.4, -0.9, 0.05, 0.3]), "tip")
+        found = solutions(engine.inverse_kinematics(T, "tip", all_solutions=True))
+        assert sorted(found.branches) == ["elbow left", "elbow right"]
+        for q, branch in found:
+            _, points = axes_at(engine, q)
+            forearm, tip = points[1] - points[0], T[:3, 3] - points[0]
+            assert branch == ("elbow right" if cross(forearm, tip)[2] > 0.0 else "elbow left")
+        # The arm reaches no pose that is tilted.
+        tilt = np.array([[1.0, 0.0, 0.0], [0.0, 0.8, -0.6], [0.0, 0.6, 0.8]])
+        T[:3, :3] = T[:3, :3] @ tilt
+        assert not engine.inverse_kinematics(T, "tip", all_solutions=True)
 
 
 def test_a_batch_has_one_row_for_each_branch() -> None:
