@@ -42,8 +42,8 @@ class EpisodeRecord:
 
 
 @dataclass(frozen=True, eq=False)
-class Parting:
-    """Where the observations of two engines part, in the episode of one seed."""
+class EpisodeDifference:
+    """Difference of the observations of two engines, in the episode of one seed."""
 
     engines: tuple[str, str]
     seed: int
@@ -59,22 +59,22 @@ class Parting:
 
 @dataclass(frozen=True, eq=False)
 class EngineDistance:
-    """Episodes of the same seeds and actions on several engines, and where each two of them part."""
+    """Episodes of the same seeds and actions on several engines, and how each two of them differ."""
 
     engines: tuple[str, ...]
     tolerance: float
     records: tuple[EpisodeRecord, ...]
-    partings: tuple[Parting, ...]
+    differences: tuple[EpisodeDifference, ...]
 
-    def of(self, a: str, b: str) -> list[Parting]:
-        """Return the partings of two engines, one for each seed."""
-        return [each for each in self.partings if each.engines == (a, b)]
+    def of(self, a: str, b: str) -> list[EpisodeDifference]:
+        """Return the differences of two engines, one for each seed."""
+        return [each for each in self.differences if each.engines == (a, b)]
 
     def __repr__(self) -> str:
-        parted = sum(each.step is not None for each in self.partings)
+        different = sum(each.step is not None for each in self.differences)
         return (
-            f"<EngineDistance of {', '.join(self.engines)}: {parted} of {len(self.partings)} pairs of "
-            f"episodes part by more than {self.tolerance:g}>"
+            f"<EngineDistance of {', '.join(self.engines)}: {different} of {len(self.differences)} pairs "
+            f"of episodes differ by more than {self.tolerance:g}>"
         )
 
 
@@ -116,12 +116,12 @@ def engine_distance(
         finally:
             env.close()
     by_name = {(each.engine, each.seed): each for each in records}
-    partings = tuple(
-        _parting(by_name[a, seed], by_name[b, seed], tolerance)
+    differences = tuple(
+        _difference(by_name[a, seed], by_name[b, seed], tolerance)
         for a, b in combinations(engines, 2)
         for seed in seeds
     )
-    return EngineDistance(tuple(engines), tolerance, tuple(records), partings)
+    return EngineDistance(tuple(engines), tolerance, tuple(records), differences)
 
 
 def _run(
@@ -157,8 +157,8 @@ def _numbers(observation: Any) -> NDArray[np.float64]:
     return np.asarray(observation, dtype=np.float64).ravel()
 
 
-def _parting(a: EpisodeRecord, b: EpisodeRecord, tolerance: float) -> Parting:
-    """Compare two episodes over the steps that both have; one that ends earlier parts where it ends."""
+def _difference(a: EpisodeRecord, b: EpisodeRecord, tolerance: float) -> EpisodeDifference:
+    """Compare two episodes over the steps that both have; one that ends earlier differs where it ends."""
     common = min(a.steps, b.steps)
     difference = np.abs(a.observations[: common + 1] - b.observations[: common + 1])
     beyond = np.flatnonzero(difference.max(axis=1) > tolerance)
@@ -167,7 +167,7 @@ def _parting(a: EpisodeRecord, b: EpisodeRecord, tolerance: float) -> Parting:
     # Only an end by the task is a difference: the first engine's episode has as many steps as actions.
     if step is None and (a.steps != b.steps or a.terminated != b.terminated):
         step = common
-    return Parting(
+    return EpisodeDifference(
         (a.engine, b.engine),
         a.seed,
         step,

@@ -26,8 +26,8 @@ TASKS = {
     "LunarLander-v0": "dynx.envs.tasks.lunar_lander.task:LunarLander",
     "Pendulum-v0": "dynx.envs.tasks.pendulum:Pendulum",
     "Push-v0": "dynx.envs.tasks.push:Push",
-    "Stand-v0": "dynx.envs.tasks.quadruped:Stand",
-    "Walk-v0": "dynx.envs.tasks.quadruped:Walk",
+    "Stand-v0": "dynx.envs.tasks.stand:Stand",
+    "Walk-v0": "dynx.envs.tasks.walk:Walk",
     "Reach-v0": "dynx.envs.tasks.reach:Reach",
 }
 """Tasks of dynx by the name of their environment, as ``"package.module:Class"``."""

@@ -21,6 +21,9 @@ from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError
 
 Kind = TypeVar("Kind", bound="Task")
 
+ENVIRONMENT_OPTIONS = ("engine", "render_mode", "randomize", "width", "height")
+"""Options of every environment, beside those of its task."""
+
 
 class Outcome(NamedTuple):
     """The outcome of one step, as `gymnasium.Env.step` returns it but for ``truncated``, which is the time
@@ -73,7 +76,8 @@ class Task(ABC):
         known = [each.name for each in fields(kind) if each.init] if is_dataclass(kind) else []
         for name in options:
             if name not in known:
-                raise UnknownNameError(f"{cls.__name__} has no option {shown(name)}{nearest(name, known)}")
+                names = [*known, *ENVIRONMENT_OPTIONS]
+                raise UnknownNameError(f"{cls.__name__} has no option {shown(name)}{nearest(name, names)}")
         return cls(**options)
 
 

@@ -13,8 +13,9 @@ from dynx.training.environments import make
 from dynx.training.evaluation import Evaluation, evaluate
 from dynx.training.hyperparameters import recipe_of
 from dynx.training.judging import judge
+from dynx.training.learning import Progress, Schedule
 from dynx.training.policy import Policy, load_policy
-from dynx.training.run import Progress, Schedule, Trained, train
+from dynx.training.run import Trained, train
 from dynx.training.specification import TaskSpec, TrainingSpec
 
 __all__ = [

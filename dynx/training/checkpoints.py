@@ -78,7 +78,7 @@ class Checkpoints:
             except ArgumentError as error:
                 problems.append(str(error))
                 continue
-            difference = spec.first_difference(document.spec)
+            difference = spec.obstacle_to_continuing(document.spec)
             if difference is None:
                 return Checkpoint(path, document)
             problems.append(f"{shown(path, 300)} is of another run: {difference}")

@@ -13,8 +13,9 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.envs.library import spaces
 from dynx.errors import ArgumentError, NotInstalledError, UnknownNameError, nearest, shown
-from dynx.training.schedules import schedule_of
+from dynx.training.schedules import SCHEDULED, schedule_of
 
 try:
     import torch
@@ -61,6 +62,16 @@ ACTIVATIONS = {
 _GIVEN = ("self", "policy", "env", "seed", "verbose", "tensorboard_log", "device", "_init_setup_model")
 """Parameters of an algorithm that training sets itself."""
 
+_OF_NUMBERS, _OF_CHOICES = ("sac", "td3"), ("dqn",)
+_REFUSED_ACTIONS: dict[str, type[Any]] = {
+    **dict.fromkeys(_OF_NUMBERS, spaces.Discrete),
+    **dict.fromkeys(_OF_CHOICES, spaces.Box),
+}
+"""Actions that an algorithm cannot learn."""
+
+_OF_SEVERAL_KINDS = ("train_freq",)
+"""Hyperparameters whose default is a number, and which may also be something else."""
+
 _FRACTIONS = ("gamma", "gae_lambda", "tau")
 """Hyperparameters between 0 and 1; the algorithms accept others, with which nothing is learned."""
 
@@ -80,6 +91,17 @@ def new_algorithm(name: str, env: VecEnv, hyperparameters: dict[str, Any], seed:
     for each in hyperparameters:
         if each not in known:
             raise UnknownNameError(f"{name} has no hyperparameter {shown(each)}{nearest(each, known)}")
+    for each, value in hyperparameters.items():
+        _check_kind(each, value, inspect.signature(algorithm.__init__).parameters[each].default)
+    if isinstance(env.action_space, _REFUSED_ACTIONS.get(name, ())):
+        others = [
+            each for each in ALGORITHMS if not isinstance(env.action_space, _REFUSED_ACTIONS.get(each, ()))
+        ]
+        kind = "numbers" if name in _OF_NUMBERS else "choices"
+        raise ArgumentError(
+            f"{name} learns actions that are {kind}, and those of the task are {env.action_space}; wanted "
+            f"{', '.join(others)}"
+        )
     for each in _FRACTIONS:
         value = hyperparameters.get(each, 1.0)
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= 1.0:
@@ -91,6 +113,21 @@ def new_algorithm(name: str, env: VecEnv, hyperparameters: dict[str, Any], seed:
         return algorithm("MlpPolicy", env, seed=seed, device="cpu", **values)
     except (AssertionError, TypeError, ValueError, RuntimeError) as error:
         raise ArgumentError(f"{name} refuses: {error}") from error
+
+
+def _check_kind(name: str, value: object, default: object) -> None:
+    """Refuse a value of another kind than the default of a hyperparameter, where that tells the kind."""
+    wanted = None
+    if name in SCHEDULED:
+        return
+    if isinstance(default, bool):
+        wanted = None if isinstance(value, bool) else "true or false"
+    elif isinstance(default, int) and name not in _OF_SEVERAL_KINDS:
+        wanted = None if isinstance(value, int) and not isinstance(value, bool) else "a whole number"
+    elif isinstance(default, float):
+        wanted = None if isinstance(value, int | float) and not isinstance(value, bool) else "a number"
+    if wanted is not None:
+        raise ArgumentError(f"{name} is {value!r:.100}; wanted {wanted}")
 
 
 def _policy_options(options: object) -> dict[str, Any]:

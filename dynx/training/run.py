@@ -8,7 +8,6 @@ from collections.abc import Callable
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from dynx._version import __version__
 from dynx.errors import ArgumentError, shown
@@ -16,55 +15,13 @@ from dynx.files.documents import json_text
 from dynx.files.writing import write_text
 from dynx.training.checkpoints import Checkpoints
 from dynx.training.environments import make, make_vector
-from dynx.training.evaluation import AT_ONCE, Evaluation, evaluate
-from dynx.training.library import log_to, new_algorithm, set_threads
-from dynx.training.observer import Observer
-from dynx.training.policy import Policy, Scaling
-from dynx.training.records import Lines, read_lines
+from dynx.training.evaluation import AT_ONCE, Evaluation
+from dynx.training.learning import Learning, Progress, Schedule
+from dynx.training.library import new_algorithm, set_threads
+from dynx.training.policy import Policy
 from dynx.training.specification import TrainingSpec, read_spec, spec_document
 
-RUN, BEST, FINAL = "run.json", "best.zip", "final.zip"
-EVALUATIONS, CURVE = "evaluations.jsonl", "curve.jsonl"
-TENSORBOARD = "tensorboard"
-
-CHECKPOINTS_PER_RUN, EVALUATIONS_PER_RUN = 20, 10
-"""Numbers of checkpoints and of evaluations of a run, unless their distance is given."""
-
-EVALUATION_SEED = 1_000_000_000
-"""Seed of the first episode of every evaluation: far from those of training."""
-
-
-@dataclass(frozen=True)
-class Progress:
-    """Where a run is: steps done and wanted, and the mean return of the last hundred episodes, if any
-    ended."""
-
-    steps: int
-    total: int
-    mean_return: float | None
-    last_evaluation: Evaluation | None
-
-
-@dataclass(frozen=True)
-class Schedule:
-    """What a run does beside training, which does not change what is learned.
-
-    Steps between checkpoints and between evaluations (None: `CHECKPOINTS_PER_RUN` and `EVALUATIONS_PER_RUN`
-    in all), episodes of an evaluation, threads of PyTorch, and whether curves are written for TensorBoard.
-    """
-
-    checkpoint_every: int | None = None
-    evaluate_every: int | None = None
-    episodes: int = 10
-    threads: int = 1
-    tensorboard: bool = False
-
-    def distances(self, steps: int) -> tuple[int, int]:
-        """Return the steps between checkpoints and between evaluations of a run of `steps`."""
-        return (
-            self.checkpoint_every or max(1, steps // CHECKPOINTS_PER_RUN),
-            self.evaluate_every or max(1, steps // EVALUATIONS_PER_RUN),
-        )
+RUN = "run.json"
 
 
 @dataclass(frozen=True)
@@ -92,7 +49,8 @@ def train(
     The folder gets `RUN`, checkpoints, `EVALUATIONS` and `CURVE` (a JSON document in each line), `BEST` (the
     policy of the best evaluation) and `FINAL`. A run that was ended, even by a power failure, goes on with
     `resume` from its last checkpoint: weights, state of the optimizer, schedules, scaling and replay buffer
-    are those of the checkpoint; the environments begin new episodes. A finished run is only judged.
+    are those of the checkpoint; the environments begin new episodes. A finished run is only judged, unless
+    the number of steps is greater now: then it goes on, with schedules that end at the new one.
 
     Raises ArgumentError for a folder that has another run, or one that is not to be resumed, and the errors
     of the task and the algorithm.
@@ -100,9 +58,8 @@ def train(
     schedule = schedule or Schedule()
     place = Path(folder)
     _check_folder(place, spec, resume)
-    reset_threads = set_threads(schedule.threads)
     with ExitStack() as stack:
-        stack.callback(reset_threads)
+        stack.callback(set_threads(schedule.threads))
         vector = make_vector(spec)
         stack.callback(vector.close)
         judged = [
@@ -116,61 +73,12 @@ def train(
         algorithm = new_algorithm(spec.algorithm, vector, spec.hyperparameters, spec.seed + done)
         if found is not None:
             found.restore(algorithm, vector)
-        if not resume:
-            _begin(place, spec)
-        evaluations, curve = Lines(place / EVALUATIONS, done), Lines(place / CURVE, done)
-        if schedule.tensorboard:
-            log_to(algorithm, str(place / TENSORBOARD))
-        best = max((float(line["mean"]) for line in read_lines(place / EVALUATIONS)), default=-float("inf"))
-        last: Evaluation | None = None
-
-        def policy_now() -> Policy:
-            return Policy(algorithm, spec, int(algorithm.num_timesteps), Scaling.of(vector))
-
-        def judge() -> None:
-            nonlocal best, last
-            policy = policy_now()
-            last = evaluate(policy, judged, schedule.episodes, EVALUATION_SEED)
-            evaluations.add(evaluation_line(policy.steps_done, last))
-            if last.mean > best:
-                best = last.mean
-                policy.save(place / BEST)
-
-        def report(mean_return: float | None) -> None:
-            steps = int(algorithm.num_timesteps)
-            if mean_return is not None:
-                curve.add({"steps": steps, "mean_return": mean_return})
-            progress(Progress(min(steps, spec.steps), spec.steps, mean_return, last))
-
-        every, judge_every = schedule.distances(spec.steps)
-        observer = Observer(
-            {"checkpoint": every, "judge": judge_every, "report": max(1, spec.steps // 200)},
-            {"checkpoint": lambda: checkpoints.add(policy_now()), "judge": judge},
-            report,
-        )
+        _write_run(place, spec)
+        learning = Learning(spec, place, schedule, algorithm, vector, judged, checkpoints, progress)
         if done < spec.steps:
-            algorithm.learn(spec.steps - done, callback=observer, reset_num_timesteps=False)
-            checkpoints.add(policy_now())
-        policy = policy_now()
-        policy.save(place / FINAL)
-        final = evaluate(policy, judged, final_episodes, EVALUATION_SEED)
-        if not (place / BEST).exists():
-            policy.save(place / BEST)
+            learning.learn(spec.steps - done)
+        policy, final = learning.finish(final_episodes)
         return Trained(place, policy, final, done)
-
-
-def evaluation_line(steps: int, found: Evaluation) -> dict[str, Any]:
-    """Return an evaluation as a line of `EVALUATIONS`."""
-    low, high = found.interval
-    return {
-        "steps": steps,
-        "mean": found.mean,
-        "deviation": found.deviation,
-        "low": low,
-        "high": high,
-        "episodes": len(found.returns),
-        "mean_length": float(found.lengths.mean()),
-    }
 
 
 def read_run(folder: str | os.PathLike[str]) -> TrainingSpec:
@@ -196,13 +104,13 @@ def _check_folder(place: Path, spec: TrainingSpec, resume: bool) -> None:
         raise ArgumentError(
             f"{shown(place, 300)} has a training run already; resume it (--resume) or name another folder"
         )
-    difference = spec.first_difference(read_run(place))
+    difference = spec.obstacle_to_continuing(read_run(place))
     if difference is not None:
         raise ArgumentError(f"{shown(place, 300)} has another run: {difference}")
 
 
-def _begin(place: Path, spec: TrainingSpec) -> None:
-    """Make the folder of a run that can begin."""
+def _write_run(place: Path, spec: TrainingSpec) -> None:
+    """Make the folder of a run that can begin, or go on, perhaps with more steps."""
     try:
         place.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -9,7 +9,7 @@ from typing import Any
 from dynx.errors import ArgumentError, shown
 
 _LINEAR = "lin_"
-_SCHEDULED = ("learning_rate", "clip_range", "clip_range_vf")
+SCHEDULED = ("learning_rate", "clip_range", "clip_range_vf")
 """Hyperparameters that stable-baselines3 takes as a function of the progress."""
 
 
@@ -30,7 +30,7 @@ def schedule_of(name: str, value: Any) -> Any:
     """
     if isinstance(value, float) and not math.isfinite(value):
         raise ArgumentError(f"{name} is {value}, not a finite number")
-    if not isinstance(value, str) or name not in _SCHEDULED:
+    if not isinstance(value, str) or name not in SCHEDULED:
         return value
     try:
         if not value.startswith(_LINEAR):

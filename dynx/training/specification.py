@@ -34,7 +34,8 @@ class TaskSpec:
 
 @dataclass(frozen=True)
 class TrainingSpec:
-    """All that a training run depends on; a run is resumed only with an equal one.
+    """All that a training run depends on; a run is resumed only with an equal one, or with
+    more steps.
 
     `hyperparameters` are arguments of the algorithm of stable-baselines3; ``lin_0.001`` falls linearly to
     zero until the end. `envs` environments are stepped together, in as many processes with `processes`. With
@@ -61,6 +62,15 @@ class TrainingSpec:
             if mine != theirs:
                 return f"{each.name} is {shown(mine, 200)}, there {shown(theirs, 200)}"
         return None
+
+    def obstacle_to_continuing(self, other: TrainingSpec) -> str | None:
+        """Return a sentence about why this run cannot go on from what `other` learned; None if it can.
+
+        It can if nothing but the number of steps differs, and that is not smaller.
+        """
+        if self.steps < other.steps:
+            return f"steps is {self.steps}, there {other.steps}; a run goes on with as many steps or more"
+        return self.first_difference(replace(other, steps=self.steps))
 
 
 @dataclass(frozen=True)

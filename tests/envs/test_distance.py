@@ -37,10 +37,10 @@ class Drifting(gymnasium.Env[Any, Any]):
         return np.array([self._sum, jump]), self._sum, ends, False, {}
 
 
-def test_engines_that_agree_never_part() -> None:
+def test_engines_that_agree_do_not_differ() -> None:
     found = engine_distance(Drifting, ["one", "same"], seeds=[0, 1, 2], steps=12)
-    assert [each.step for each in found.partings] == [None] * 3
-    assert all(each.largest == 0.0 and each.returns[0] == each.returns[1] for each in found.partings)
+    assert [each.step for each in found.differences] == [None] * 3
+    assert all(each.largest == 0.0 and each.returns[0] == each.returns[1] for each in found.differences)
     # Seeds draw different episodes, of as many steps as were wanted.
     assert len({each.episode_return for each in found.records}) == 3
     assert {each.steps for each in found.records} == {12}
@@ -48,15 +48,15 @@ def test_engines_that_agree_never_part() -> None:
 
 def test_a_planted_difference_is_found_at_its_step_and_entry() -> None:
     found = engine_distance(Drifting, ["one", "other"], seeds=[3], steps=12, tolerance=0.1)
-    (parting,) = found.of("one", "other")
-    assert (parting.step, parting.entry, parting.largest) == (5, 1, 0.5)
-    assert engine_distance(Drifting, ["one", "other"], seeds=[3], tolerance=0.6).partings[0].step is None
+    (difference,) = found.of("one", "other")
+    assert (difference.step, difference.entry, difference.largest) == (5, 1, 0.5)
+    assert engine_distance(Drifting, ["one", "other"], seeds=[3], tolerance=0.6).differences[0].step is None
 
 
 def test_an_early_end_is_a_difference() -> None:
     found = engine_distance(Drifting, ["one", "short"], seeds=[0], steps=12)
-    assert found.partings[0].step == 8
-    assert found.partings[0].lengths == (12, 8)
+    assert found.differences[0].step == 8
+    assert found.differences[0].lengths == (12, 8)
 
 
 def test_a_policy_acts_on_the_first_engine_for_all() -> None:
@@ -68,8 +68,8 @@ def test_a_policy_acts_on_the_first_engine_for_all() -> None:
 
     found = engine_distance(Drifting, ["one", "other", "same"], seeds=[0], steps=4, policy=policy)
     assert len(seen) == 4
-    assert all(each.step is None for each in found.partings)
-    assert len(found.partings) == 3
+    assert all(each.step is None for each in found.differences)
+    assert len(found.differences) == 3
 
 
 def test_wrong_arguments_are_refused() -> None:

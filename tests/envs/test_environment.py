@@ -42,8 +42,8 @@ def test_ids_are_registered_with_time_limits() -> None:
     found = gymnasium.make("dynx/CartPole-v0", engine="reference", pole_mass=0.2)
     assert found.spec is not None
     assert found.spec.max_episode_steps == 500
-    task: Any = found.unwrapped.task  # type: ignore[attr-defined]
-    assert task.pole_mass == 0.2
+    inner: Any = found.unwrapped
+    assert inner.task.pole_mass == 0.2
     found.close()
 
 
@@ -90,10 +90,11 @@ def test_wrong_choices_are_refused_and_leave_the_state(
     env: TaskEnvironment, action: Any, error: type[Exception]
 ) -> None:
     env.reset(seed=0)
-    before = env.episodes.state  # type: ignore[attr-defined]
+    episodes: Any = env.episodes
+    before = episodes.state
     with pytest.raises(error, match="whole number"):
         env.step(action)
-    assert env.episodes.state is before  # type: ignore[attr-defined]
+    assert episodes.state is before
     assert env.step(np.int64(1))[1] == 1.0
 
 
@@ -134,10 +135,29 @@ def test_unknown_names_offer_the_nearest() -> None:
         TaskEnvironment(CartPole(), "pinochio")
     with pytest.raises(UnknownNameError, match="did you mean 'pole_mass'"):
         gymnasium.make("dynx/CartPole-v0", pole_mas=1.0)
+    with pytest.raises(UnknownNameError, match="did you mean 'engine'"):
+        gymnasium.make("dynx/CartPole-v0", enginee="mujoco")
     with pytest.raises(ArgumentError, match="did you mean 'human'"):
         TaskEnvironment(CartPole(), "reference", "hman")
     with TaskEnvironment(CartPole(), "reference") as made, pytest.raises(UnknownNameError, match="'low'"):
         made.reset(options={"lo": 0.0})
+
+
+@pytest.mark.parametrize(
+    ("task", "option", "message"),
+    [
+        ("CartPole", {"pole_mass": -1.0}, r"pole_mass is '-1.0'; wanted a number above 0 \[kg\]"),
+        ("CartPole", {"half_length": "long"}, "half_length is 'long'; wanted a number above 0"),
+        ("Pendulum", {"length": 0.0}, r"length is '0.0'; wanted a number above 0 \[m\]"),
+        ("Pendulum", {"g": float("nan")}, "g is 'nan'; wanted a number of at least 0"),
+        ("Acrobot", {"inertia": None}, "inertia is 'None'; wanted a number above 0"),
+    ],
+)
+def test_options_that_no_robot_has_are_refused_by_name(
+    task: str, option: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(ArgumentError, match=message):
+        gymnasium.make(f"dynx/{task}-v0", **option)
 
 
 def test_options_of_the_start(env: TaskEnvironment) -> None:

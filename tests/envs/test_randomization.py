@@ -31,8 +31,8 @@ from dynx.envs.robot.varied_robot import VariedRobot
 from dynx.envs.tasks.cart_pole import CartPole
 from dynx.envs.tasks.pendulum import Pendulum
 from dynx.envs.tasks.push import Push
-from dynx.envs.tasks.quadruped import Stand
 from dynx.envs.tasks.reach import Reach
+from dynx.envs.tasks.stand import Stand
 from dynx.envs.vector.environment import RobotVectorEnvironment
 from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError
 from dynx.sim.plants.model_error import Payload, plant_model

@@ -13,7 +13,9 @@ from gymnasium.utils.env_checker import check_env
 import dynx.envs  # noqa: F401  (registers the environments)
 from dynx.envs.environment import TaskEnvironment
 from dynx.envs.tasks.push import NEAR, TIP_START, Push
-from dynx.envs.tasks.quadruped import POSTURE, Stand, Walk
+from dynx.envs.tasks.quadruped import POSTURE
+from dynx.envs.tasks.stand import Stand
+from dynx.envs.tasks.walk import Walk
 from dynx.envs.world.task import WorldTask
 from dynx.errors import ArgumentError, UnknownNameError
 from dynx.world.registry import installed_worlds
@@ -43,7 +45,7 @@ def test_checkers_find_nothing(env: TaskEnvironment, recwarn: pytest.WarningsRec
 
 def test_episodes_after_a_seed_are_the_same_bits(env: TaskEnvironment) -> None:
     rng = np.random.default_rng(0)
-    actions = rng.uniform(-1.0, 1.0, (4, *env.action_space.shape)).astype(np.float32)  # type: ignore[misc]
+    actions = rng.uniform(-1.0, 1.0, (4, *(env.action_space.shape or ()))).astype(np.float32)
 
     def episode() -> list[Any]:
         seen: list[Any] = [env.reset(seed=3)[0].tobytes()]

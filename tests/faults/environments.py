@@ -39,7 +39,7 @@ ENVIRONMENTS_FAULTS = (
     ),
     Fault(
         "walk_rewarded_for_standing",
-        "dynx.envs.tasks.quadruped",
+        "dynx.envs.tasks.walk",
         right="error, turning = v[:2] - episode.memory.velocity[:2]",
         wrong="error, turning = v[:2]",
         test_file="tests/envs/test_world_tasks.py",

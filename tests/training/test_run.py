@@ -60,6 +60,24 @@ def test_a_finished_run_is_only_judged_when_it_is_resumed(tmp_path: Path) -> Non
     assert all(bool((before[key] == after[key]).all()) for key in before)
 
 
+def test_a_finished_run_goes_on_with_more_steps(tmp_path: Path) -> None:
+    linear = {**SMALL, "learning_rate": "lin_0.001"}
+    train(small_run(128, hyperparameters=linear), tmp_path, schedule=OFTEN, final_episodes=1)
+    before = weights(tmp_path / "final.zip")
+    done = train(
+        small_run(256, hyperparameters=linear), tmp_path, resume=True, schedule=OFTEN, final_episodes=1
+    )
+    assert (done.resumed_at, done.policy.steps_done) == (128, 256)
+    after = weights(tmp_path / "final.zip")
+    assert not all(bool((before[key] == after[key]).all()) for key in before)
+    assert json.loads((tmp_path / "run.json").read_text())["spec"]["steps"] == 256
+    # The rate falls to zero at the new end: after 192 of 256 steps a quarter of it is left.
+    between = load_policy(tmp_path / "checkpoints" / "000000000192.zip").algorithm
+    assert [group["lr"] for group in between.policy.optimizer.param_groups] == pytest.approx([0.00025])
+    with pytest.raises(ArgumentError, match="steps is 128, there 256; a run goes on"):
+        train(small_run(128, hyperparameters=linear), tmp_path, resume=True)
+
+
 def test_a_resumed_run_starts_from_the_weights_and_schedules_of_its_checkpoint(tmp_path: Path) -> None:
     spec = small_run(hyperparameters={**SMALL, "learning_rate": "lin_0.001"}, normalize=True)
 
@@ -110,7 +128,7 @@ def test_replay_buffers_survive(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "change",
     [
-        {"steps": 512},
+        {"steps": 31},
         {"envs": 3},
         {"seed": 1},
         {"normalize": True},
@@ -145,7 +163,14 @@ def test_folders_with_another_or_no_run_are_refused(tmp_path: Path) -> None:
         ({"hyperparameters": {"gama": 0.9}}, "ppo has no hyperparameter 'gama'; did you mean 'gamma'"),
         ({"hyperparameters": {"learning_rate": "fast"}}, "learning_rate is a number, or lin_NUMBER"),
         ({"hyperparameters": {"policy_kwargs": {"activation_fn": "rleu"}}}, "did you mean 'relu'"),
-        ({"algorithm": "sac", "hyperparameters": {}}, "sac refuses"),
+        (
+            {"algorithm": "sac", "hyperparameters": {}},
+            "sac learns .* are numbers.* wanted ppo, a2c, dqn",
+        ),
+        ({"hyperparameters": {"batch_size": "abc"}}, "batch_size is 'abc'; wanted a whole number"),
+        ({"hyperparameters": {"n_epochs": 2.5}}, "n_epochs is 2.5; wanted a whole number"),
+        ({"hyperparameters": {"ent_coef": "auto"}}, "ent_coef is 'auto'; wanted a number"),
+        ({"hyperparameters": {"normalize_advantage": 1}}, "normalize_advantage is 1; wanted true or false"),
         ({"hyperparameters": {"gamma": 1.9}}, "gamma is 1.9; wanted a number between 0 and 1"),
         ({"hyperparameters": {"gae_lambda": "all"}}, "gae_lambda is 'all'; wanted a number"),
         ({"task": TaskSpec("CartPole-v1", None, {"no_such": 1})}, "cannot be made"),

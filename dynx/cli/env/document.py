@@ -8,7 +8,7 @@ from typing import Any, Literal, TypedDict
 
 import numpy as np
 
-from dynx.envs.distance import EngineDistance, Parting
+from dynx.envs.distance import EngineDistance, EpisodeDifference
 
 SCHEMA: Literal["dynx.env-distance/1"] = "dynx.env-distance/1"
 
@@ -106,7 +106,7 @@ def document(
     }
 
 
-def _pair(episodes: Sequence[Parting]) -> PairEntry:
+def _pair(episodes: Sequence[EpisodeDifference]) -> PairEntry:
     steps = [each.step for each in episodes if each.step is not None]
     returns = np.array([each.returns for each in episodes])
     return {

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from dynx.files.figures import new_figure, save_figure
 from dynx.training import Trained
+from dynx.training.learning import CURVE, EVALUATIONS
 from dynx.training.records import read_lines
-from dynx.training.run import CURVE, EVALUATIONS
 
 _STYLES, _MARKS = ("-", "--", ":", "-."), "os^v"
 

@@ -18,6 +18,7 @@ from dynx.control.dynamics import Dynamics
 from dynx.envs.library import spaces
 from dynx.envs.robot.state import State
 from dynx.envs.robot.task import RobotTask
+from dynx.envs.task_options import refuse_unphysical
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.spatial.scalar import Array
@@ -74,6 +75,10 @@ class Acrobot(RobotTask):
     random_size = 4
     max_episode_steps = 500
     reward_threshold = -100.0
+
+    def __post_init__(self) -> None:
+        refuse_unphysical("mass", self.mass, "kg")
+        refuse_unphysical("inertia", self.inertia, "kg m^2")
 
     @cached_property
     def model(self) -> Model:

@@ -17,6 +17,7 @@ from dynx.control.dynamics import Dynamics
 from dynx.envs.library import spaces
 from dynx.envs.robot.state import State
 from dynx.envs.robot.task import RobotTask
+from dynx.envs.task_options import refuse_unphysical
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.spatial.scalar import Array
@@ -88,6 +89,10 @@ class CartPole(RobotTask):
     random_size = 4
     max_episode_steps = 500
     reward_threshold = 475.0
+
+    def __post_init__(self) -> None:
+        for name, unit in (("cart_mass", "kg"), ("pole_mass", "kg"), ("half_length", "m")):
+            refuse_unphysical(name, getattr(self, name), unit)
 
     @cached_property
     def model(self) -> Model:

@@ -18,7 +18,7 @@ from dynx.envs.library import spaces
 from dynx.envs.robot.integration import Accelerate
 from dynx.envs.robot.state import State
 from dynx.envs.robot.task import RobotTask
-from dynx.envs.task_options import refuse_unknown_choice
+from dynx.envs.task_options import refuse_unknown_choice, refuse_unphysical
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.spatial.scalar import Array
@@ -77,6 +77,9 @@ class Pendulum(RobotTask):
 
     def __post_init__(self) -> None:
         refuse_unknown_choice("actions", self.actions, ACTIONS)
+        refuse_unphysical("g", self.g, "m/s^2", zero=True)
+        refuse_unphysical("mass", self.mass, "kg")
+        refuse_unphysical("length", self.length, "m")
 
     @cached_property
     def model(self) -> Model:

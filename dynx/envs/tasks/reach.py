@@ -99,7 +99,7 @@ class Reach(RobotTask):
         return self.model.frame_names[joints.index(max(joints))]
 
     @property
-    def random_size(self) -> int:  # type: ignore[override]
+    def random_size(self) -> int:  # type: ignore[override]  # a property in place of the class's number
         """Two numbers for each coordinate: the start and the goal."""
         return 2 * self.model.nq
 

@@ -220,7 +220,8 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
             # The episodes that ended one step ago have started with these random numbers.
             self._renew(ended)
             self._add_parameters(infos, ended)
-        self._ended = ended = flags.nonzero()[0] if largest else NONE_ENDED
+        # NumPy finds True in a third of the time that it takes to find integers other than 0.
+        self._ended = ended = flags.astype(np.bool_).nonzero()[0] if largest else NONE_ENDED
         if mode is AutoresetMode.SAME_STEP and len(ended):
             infos = self._final_infos(ended)
             self._renew(ended)

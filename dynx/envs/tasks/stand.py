@@ -1,0 +1,34 @@
+"""Stand still with a quadruped from a disturbed start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dynx.envs.tasks.quadruped import DOG, SPEED_WIDTH, STAND_HEIGHT, Quadruped
+from dynx.envs.world.scene_task import Episode
+from dynx.spatial.so3 import rotation_from_quat
+
+
+@dataclass(frozen=True)
+class Stand(Quadruped):
+    """Stand still from a disturbed start.
+
+    Action and observation are those of `Quadruped`. Reward: up to 1 for a trunk that is upright, high and at
+    rest, less the power of the motors and changes of the action. ``reset(options={"disturbance": 0.0})``
+    starts at rest in the posture.
+    """
+
+    def start(self, episode: Episode, disturbance: float = 1.0) -> None:
+        """Start near the posture, at random in proportion to `disturbance`."""
+        self.start_near_posture(episode, disturbance)
+
+    def reward(self, episode: Episode, action: Any) -> float:
+        """Return the reward for standing, less the costs of the motion."""
+        q, v = episode.world.state.robots[DOG]
+        upright = float(rotation_from_quat(q[3:7])[2, 2])
+        high = float(np.exp(-((q[2] - STAND_HEIGHT) ** 2) / 0.01))
+        still = float(np.exp(-(v[:6] @ v[:6]) / SPEED_WIDTH))
+        return max(upright, 0.0) * high * (0.5 + 0.5 * still) - self.costs(episode)

@@ -1,0 +1,80 @@
+"""Walk with a quadruped at a velocity that each episode draws."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dynx.envs.tasks.quadruped import DOG, SPEED_WIDTH, Quadruped
+from dynx.envs.world.scene_task import Episode
+from dynx.errors import ArgumentError, shown
+from dynx.model.configuration import MAX_MAGNITUDE, is_real
+from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import rotation_from_quat
+
+
+@dataclass(frozen=True)
+class Walk(Quadruped):
+    """Walk with a velocity that each episode draws.
+
+    Action and observation are those of `Quadruped`; the observation ends with the wanted velocity (48,):
+    forward and to the left [m/s], and the yaw rate [rad/s], in the axes of the trunk. Reward:
+    exp(-error^2 / 0.25) of the velocity, half of that of the yaw rate, less vertical motion, roll and pitch
+    rates, a leaning trunk, motor power and changes of the action. ``reset(options={"velocity": (0.5, 0.0,
+    0.0)})`` sets the velocity.
+    """
+
+    max_speed: float = 0.6
+    """Largest wanted velocity forward [m/s]; to the side a half of it."""
+    max_yaw_rate: float = 0.6
+    """Largest wanted yaw rate [rad/s]."""
+
+    observation_size: ClassVar[int] = 48
+
+    def __post_init__(self) -> None:
+        for name in ("max_speed", "max_yaw_rate"):
+            number = getattr(self, name)
+            if not is_real(number) or not 0.0 <= number < MAX_MAGNITUDE:
+                raise ArgumentError(f"{name} is {shown(number)}; wanted a number of at least 0")
+
+    def start(
+        self, episode: Episode, disturbance: float = 0.2, velocity: tuple[float, float, float] | None = None
+    ) -> None:
+        """Start near the posture, and draw the wanted velocity unless it is given."""
+        self.start_near_posture(episode, disturbance)
+        largest = (self.max_speed, 0.5 * self.max_speed, self.max_yaw_rate)
+        drawn = episode.rng.uniform(-1.0, 1.0, 3) * largest
+        episode.memory.velocity = checked_velocity(drawn if velocity is None else velocity)
+
+    def observation(self, episode: Episode) -> NDArray[np.float32]:
+        """Return the observation of `Quadruped`, and the wanted velocity."""
+        return np.concatenate([super().observation(episode), episode.memory.velocity.astype(np.float32)])
+
+    def reward(self, episode: Episode, action: Any) -> float:
+        """Return the reward for the velocity, less the costs of the motion."""
+        q, v = episode.world.state.robots[DOG]
+        error, turning = v[:2] - episode.memory.velocity[:2], v[5] - episode.memory.velocity[2]
+        R = rotation_from_quat(q[3:7])
+        tracking = np.exp(-(error @ error) / SPEED_WIDTH) + 0.5 * np.exp(-(turning**2) / SPEED_WIDTH)
+        shaking = 2.0 * v[2] ** 2 + 0.05 * (v[3:5] @ v[3:5]) + 0.5 * (R[2, :2] @ R[2, :2])
+        return float(tracking - shaking) - self.costs(episode)
+
+    def info(self, episode: Episode) -> dict[str, Any]:
+        """Return the wanted ``velocity`` (3,)."""
+        return {"velocity": episode.memory.velocity.copy()}
+
+
+def checked_velocity(velocity: Any) -> Floats:
+    """Return a wanted velocity (3,). Raises ArgumentError for anything but three finite numbers."""
+    try:
+        array = np.array(velocity, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.zeros(0)
+    if array.shape != (3,) or not np.isfinite(array).all():
+        raise ArgumentError(
+            f"velocity is {shown(velocity)}; wanted forward, left [m/s] and yaw rate [rad/s], three numbers"
+        )
+    return array
