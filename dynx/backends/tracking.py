@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from dynx.backends.quantity_calls import QuantityCalls
 from dynx.ik import Kinematics
+from dynx.ik.avoidance import AvoidanceSource
 from dynx.ik.option_names import checks_option_names
 from dynx.ik.tracking import TrackResult, track
 from dynx.ik.tracking.tracker import Motion
@@ -74,6 +75,8 @@ class PathCalls(QuantityCalls):
         velocity_limit: ArrayLike | None = None,
         acceleration_limit: ArrayLike | None = None,
         v0: ArrayLike | None = None,
+        avoid: AvoidanceSource | None = None,
+        avoid_gain: float = 5.0,
     ) -> VelocityResult:
         """Return the velocity v (nv,) that meets `tasks` best at q (nq,) and keeps the limits for `dt` [s].
 
@@ -92,4 +95,6 @@ class PathCalls(QuantityCalls):
             velocity_limit=velocity_limit,
             acceleration_limit=acceleration_limit,
             v0=v0,
+            avoid=avoid,
+            avoid_gain=avoid_gain,
         )

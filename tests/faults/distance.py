@@ -53,4 +53,12 @@ DISTANCE_FAULTS = (
         test_file="tests/ik/avoidance/test_clear_solutions.py",
         test="test_derivatives_of_distances",
     ),
+    Fault(
+        "dampers_without_the_margin",
+        "dynx.ik.velocity.dampers",
+        right="each.separation.lower - each.pair.margin for each in near",
+        wrong="each.separation.lower for each in near",
+        test_file="tests/ik/velocity/test_dampers.py",
+        test="test_the_margin_is_kept_on_the_way_into_an_obstacle[ur5]",
+    ),
 )

@@ -101,7 +101,8 @@ def adapted_pairs(
 
     Links whose shapes are closer than the margin at the neutral configuration are so by the way that they
     are built or modelled (hulls of hollow parts, closed fingers). They keep that distance instead, or do not
-    overlap if they are closer in most configurations. Links that overlap in nearly all are not kept apart.
+    overlap if they are closer in most configurations. Links that overlap in nearly all are not kept apart. A
+    link that is closer to an obstacle in all configurations, as the first one above a table, stays so close.
     """
     kept: list[Pair] = []
     reasons: dict[tuple[str, str], str] = {}
@@ -109,40 +110,60 @@ def adapted_pairs(
     draws: list[dict[int, list[PlacedSolid]]] = []
     for pair in pairs:
         names = parts[pair.a].name, parts[pair.b].name
-        found = None
-        if parts[pair.a].frame is not None and parts[pair.b].frame is not None:
-            found = separation_of(placed[pair.a], placed[pair.b], pair.margin)
+        found = separation_of(placed[pair.a], placed[pair.b], pair.margin)
         if found is None or found.lower >= pair.margin:
             kept.append(pair)
             continue
         if not draws:
             draws = [_placed(model, parts, solids, model.random(k)) for k in range(SAMPLES)]
-        least = found.lower
-        bound = max(least, 0.0)
-        close = sum(separation_of(each[pair.a], each[pair.b], bound) is not None for each in draws)
-        if least > 0.0 and close > MOSTLY * SAMPLES:
-            kept.append(replace(pair, margin=0.0))
-            reasons[names] = (
-                f"{least:.3g} m apart at the neutral configuration and closer in {close} of {SAMPLES} "
-                "others: kept from overlapping"
-            )
-        elif least > 0.0:
-            kept.append(replace(pair, margin=least - ROUNDING))
-            reasons[names] = f"{least:.3g} m apart at the neutral configuration, which is their margin"
-        elif close < ALWAYS * SAMPLES:
-            kept.append(replace(pair, margin=least - ROUNDING))
-            reasons[names] = f"overlap by {-least:.3g} m at the neutral configuration, and may do so"
-        else:
-            reasons[names] = f"overlap in {close} of {SAMPLES} configurations: not kept apart"
+        drawn = [separation_of(each[pair.a], each[pair.b], pair.margin) for each in draws]
+        distances = [math.inf if each is None else each.lower for each in drawn]
+        is_link = parts[pair.a].frame is not None and parts[pair.b].frame is not None
+        rule = _between_links if is_link else _from_obstacle
+        margin, reason = rule(pair.margin, found.lower, distances)
+        if margin is not None:
+            kept.append(replace(pair, margin=margin))
+        if reason:
+            reasons[names] = reason
     return tuple(kept), reasons
+
+
+def _between_links(margin: float, neutral: float, distances: Sequence[float]) -> tuple[float | None, str]:
+    """Return the margin of two links that are too close at the neutral configuration, and why."""
+    bound = max(neutral, 0.0)
+    close = sum(distance <= bound for distance in distances)
+    if neutral > 0.0 and close > MOSTLY * SAMPLES:
+        return 0.0, (
+            f"{neutral:.3g} m apart at the neutral configuration and closer in {close} of {SAMPLES} others: "
+            "kept from overlapping"
+        )
+    if neutral > 0.0:
+        return neutral - ROUNDING, f"{neutral:.3g} m apart at the neutral configuration: their margin"
+    if close < ALWAYS * SAMPLES:
+        return neutral - ROUNDING, f"overlap by {-neutral:.3g} m at the neutral configuration, and may do so"
+    return None, f"overlap in {close} of {SAMPLES} configurations: not kept apart"
+
+
+def _from_obstacle(margin: float, neutral: float, distances: Sequence[float]) -> tuple[float | None, str]:
+    """Return the margin of a link and an obstacle, which differs only if no configuration keeps it."""
+    least, most = min([neutral, *distances]), max([neutral, *distances])
+    if most >= margin:
+        return margin, ""
+    if least > 0.0:
+        return least - ROUNDING, f"{least:.3g} to {most:.3g} m apart in all configurations: kept so"
+    if most > 0.0:
+        return 0.0, f"at most {most:.3g} m apart in any configuration: kept from overlapping"
+    return None, "overlap in all configurations: not kept apart"
 
 
 def _placed(
     model: Model, parts: Sequence[Part], solids: Sequence[list[Solid]], q: Floats
 ) -> dict[int, list[PlacedSolid]]:
-    """Return the solids of the parts that the robot moves, at a configuration (nq,)."""
+    """Return the solids of the parts at a configuration (nq,)."""
     poses = frame_poses(model, q)
-    return {k: place(solids[k], poses[part.frame]) for k, part in enumerate(parts) if part.frame is not None}
+    return {
+        k: place(solids[k], None if part.frame is None else poses[part.frame]) for k, part in enumerate(parts)
+    }
 
 
 def frame_poses(model: Model, q: Floats) -> Mapping[str, Floats]:

@@ -23,9 +23,9 @@ _SOLVED = 1
 
 
 def solve_programme(
-    H: Floats, g: Floats, lower: Floats, upper: Floats, A: Floats, b: Floats
+    H: Floats, g: Floats, lower: Floats, upper: Floats, A: Floats, b: Floats, G: Floats, least: Floats
 ) -> Floats | None:
-    """Return the x (n,) that minimises x'Hx / 2 + g'x over lower <= x <= upper and A x = b.
+    """Return the x (n,) that minimises x'Hx / 2 + g'x over lower <= x <= upper, A x = b and G x >= least.
 
     H (n, n) is positive definite. Returns None if no x satisfies the constraints. Raises NotInstalledError
     without DAQP.
@@ -35,13 +35,15 @@ def solve_programme(
     except ImportError:
         raise NotInstalledError("velocity_ik needs a package: pip install 'dynx[qp]'") from None
     # Rows of norm 1 give the tolerance one meaning for all constraints.
-    norms = np.linalg.norm(A, axis=1, keepdims=True)
+    rows, values = np.concatenate([A, G]), np.concatenate([b, least])
+    norms = np.linalg.norm(rows, axis=1, keepdims=True)
     norms[norms == 0.0] = 1.0
-    rows, values = A / norms, b / norms[:, 0]
-    high = np.concatenate([np.minimum(upper, _UNLIMITED), values])
+    rows, values = rows / norms, values / norms[:, 0]
+    equal, count = slice(len(upper), len(upper) + len(A)), len(A)
+    high = np.concatenate([np.minimum(upper, _UNLIMITED), values[:count], np.full(len(G), _UNLIMITED)])
     low = np.concatenate([np.maximum(lower, -_UNLIMITED), values])
     kinds = np.zeros(len(high), dtype=np.int32)
-    kinds[len(upper) :] = _EQUALITY
+    kinds[equal] = _EQUALITY
     found: tuple[Floats, float, int, Any] = daqp.solve(
         np.ascontiguousarray(H), np.ascontiguousarray(g), np.ascontiguousarray(rows), high, low, kinds,
         primal_tol=PRIMAL_TOLERANCE,

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dynx.errors import ArgumentError, ShapeError, shown
+from dynx.ik.avoidance import AvoidanceSource
 from dynx.ik.option_names import checks_option_names
 from dynx.ik.tasks import Kinematics
+from dynx.ik.velocity.dampers import dampers
 from dynx.ik.velocity.library import solve_programme
 from dynx.ik.velocity.limits import velocity_bounds
 from dynx.ik.velocity.tasks import VelocityTask
@@ -21,6 +23,9 @@ from dynx.spatial.scalar import Floats
 
 RELAXED_WEIGHT = 1e4
 """Weight of hard tasks that cannot all be met within the bounds."""
+
+DAMPER_WEIGHT = 1e5
+"""Weight of the rates of distances that cannot all be kept within the bounds."""
 
 AT_BOUND = 1e-9
 """Distance from a bound [rad/s or m/s] below which a velocity is at it."""
@@ -38,6 +43,11 @@ class VelocityResult:
     """For each task the weighted error J v - velocity (m,), of its components with a weight above 0."""
     limited: NDArray[np.bool_]
     """Coordinates (nv,) whose velocity is at a bound."""
+    held_back: tuple[tuple[str, str], ...] = ()
+    """With `avoid` the pairs of bodies that approach one another as fast as they may."""
+    too_fast: tuple[tuple[str, str], ...] = ()
+    """Pairs of bodies that approach faster than they may, because no velocity within the bounds prevents it;
+    empty otherwise."""
 
     def __bool__(self) -> bool:
         """Return whether all hard tasks are met."""
@@ -58,6 +68,8 @@ def velocity_ik(
     velocity_limit: ArrayLike | None = None,
     acceleration_limit: ArrayLike | None = None,
     v0: ArrayLike | None = None,
+    avoid: AvoidanceSource | None = None,
+    avoid_gain: float = 5.0,
 ) -> VelocityResult:
     """Find the velocity v (nv,) at q (nq,) that meets tasks best and keeps the limits for `dt` [s].
 
@@ -67,6 +79,11 @@ def velocity_ik(
     |v| within `velocity_limit` (one number or (nv,), by default the model's), and with `acceleration_limit`
     [rad/s^2 or m/s^2] the joints can stop before their limits; with `v0` (nv,), the velocity before, the
     change is at most ``acceleration_limit dt``. A base that floats has no bounds but those given.
+
+    With `avoid`, a scene or what `Scene.avoidance` returns, the distance d of each pair of bodies that is
+    near changes by at least ``-avoid_gain (d - margin)`` [m/s], before all tasks: d does not fall below the
+    margin but by what the linear rate neglects, of the order ``dt^2``, and where it is below, it grows back.
+    `avoid_gain` [1/s] is at most ``1 / dt``. Pairs count from where 1 m/s is allowed (``1 / avoid_gain`` m).
 
     If the hard tasks contradict each other or the bounds, they count as soft ones of a large weight, and
     `success` is False. The quadratic programme is solved by DAQP (extra ``qp``). Siciliano et al., section
@@ -115,14 +132,28 @@ def velocity_ik(
         error = (goal - position)[7 if model.floating else 0 :]
         soft.append((posture_weight * select, posture_weight * posture_gain * error))
     A, b = _stacked(hard, model.nv)
-    v = solve_programme(*_quadratic(soft, damping, model.nv), lower, upper, A, b)
+    near = dampers(kinematics, position, avoid, avoid_gain, seconds)
+    G, rates = near.J, near.bound
+    v = solve_programme(*_quadratic(soft, damping, model.nv), lower, upper, A, b, G, rates)
     success = v is not None
     if v is None:
         soft += [(RELAXED_WEIGHT * J, RELAXED_WEIGHT * velocity) for J, velocity in hard]
-        v = solve_programme(*_quadratic(soft, damping, model.nv), lower, upper, A[:0], b[:0])
-        assert v is not None
+        v = solve_programme(*_quadratic(soft, damping, model.nv), lower, upper, A[:0], b[:0], G, rates)
+    if v is None:
+        # Bodies that are too close cannot part as fast as they should: they count before the tasks, and those
+        # that are not are kept as far as the bounds permit.
+        close = rates > 0.0
+        soft.append((DAMPER_WEIGHT * G[close], DAMPER_WEIGHT * rates[close]))
+        H, g = _quadratic(soft, damping, model.nv)
+        v = solve_programme(H, g, lower, upper, A[:0], b[:0], G[~close], rates[~close])
+        if v is None:
+            soft.append((DAMPER_WEIGHT * G[~close], DAMPER_WEIGHT * np.zeros(int((~close).sum()))))
+            H, g = _quadratic(soft, damping, model.nv)
+            v = solve_programme(H, g, lower, upper, A[:0], b[:0], G[:0], rates[:0])
+    assert v is not None
     at_bound = (v <= lower + AT_BOUND) | (v >= upper - AT_BOUND)
-    return VelocityResult(v, success, tuple(J @ v - velocity for J, velocity in rows), at_bound)
+    errors = tuple(J @ v - velocity for J, velocity in rows)
+    return VelocityResult(v, success, errors, at_bound, near.active(v, AT_BOUND), near.missed(v, AT_BOUND))
 
 
 def _quadratic(soft: list[tuple[Floats, Floats]], damping: float, nv: int) -> tuple[Floats, Floats]:

@@ -177,6 +177,11 @@ def test_links_that_are_close_by_the_way_they_are_modelled() -> None:
     # Links that a joint connects, and a base that cannot leave the table.
     assert ("arm/panda_link1", "arm/panda_link2") not in margins
     assert ("arm/panda_link0", "table") not in margins
+    # The first link turns 0.2 m above the table, whatever the joints do.
+    high = scene("panda").avoidance(margin=0.3, self_margin=0.0)
+    assert "kept so" in high.exceptions["arm/panda_link1", "table"]
+    assert {high.names(pair): pair.margin for pair in high.pairs}["arm/panda_link1", "table"] > 0.15
+    assert high.is_clear(panda, neutral)
 
 
 @pytest.mark.parametrize(
