@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.backends.quantities import QUANTITIES, Quantity
+from dynx.backends.straight import BindingCall
 from dynx.errors import SingularMassMatrixError
 from dynx.model import Mechanism, Model
 from dynx.rbd import jacobians, kinematics
@@ -55,6 +56,10 @@ class EngineHooks(ABC):
         """
         function = untranslated(getattr(type(self), hook))
         return _with_details(function, arguments, *details) if details else function
+
+    def _binding_call(self, hook: str) -> BindingCall | None:
+        """Return the only call of the engine's binding that a hook for three arrays makes, or None."""
+        return None
 
     @classmethod
     def _is_native(cls, quantity: Quantity) -> bool:

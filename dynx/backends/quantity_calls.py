@@ -22,7 +22,7 @@ from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.backends.lifecycle import Lifecycle
 from dynx.backends.quantities import QUANTITIES
 from dynx.backends.solvability import Solvability
-from dynx.backends.straight import StraightCall, straight_call
+from dynx.backends.straight import BindingCall, StraightCall, straight_call
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
@@ -104,7 +104,8 @@ class QuantityCalls(Lifecycle, EngineHooks):
         elif plan.hook not in vars(self) and key not in self._straight:
             function = self._sample_hook(plan.hook, len(arguments), details)
             function = self._evaluation.of_sample(function, plan.reduction)
-            self._store_straight(key, function, len(arguments), solves=plan.solves)
+            binding = self._binding_call(plan.hook) if self._uncoupled else None
+            self._store_straight(key, function, len(arguments), solves=plan.solves, binding=binding)
         result = self._evaluation(hook, plan.result_shape, q, *rates, args=details, reduce=plan.reduction)
         return self._arguments.finite_acceleration(result) if plan.solves else result
 
@@ -120,10 +121,16 @@ class QuantityCalls(Lifecycle, EngineHooks):
         )
 
     def _store_straight(
-        self, key: Key, function: Callable[..., Any], arguments: int, *, solves: bool
+        self,
+        key: Key,
+        function: Callable[..., Any],
+        arguments: int,
+        *,
+        solves: bool,
+        binding: BindingCall | None = None,
     ) -> None:
         self._straight[key] = straight_call(
-            self.model, function, arguments, validate=self._validate, solves=solves
+            self.model, function, arguments, validate=self._validate, solves=solves, binding=binding
         )
         if self._arguments.closed:
             # Another thread closed this backend meanwhile.

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from dynx.backends import Backend, backend, installed_backends
 from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.backends.quantity_calls import QuantityCalls
-from dynx.engines.pinocchio.backend import PinocchioBackend
+from dynx.engines.pinocchio.backend import _FUNCTIONS, PinocchioBackend
+from dynx.engines.pinocchio.library import pin
 from dynx.errors import (
     ArgumentError,
     ClosedError,
@@ -113,18 +114,24 @@ def test_what_is_no_valid_sample_is_refused_on_the_straight_path(size: int, base
             call_of(engine, quantity, *sample)
 
 
+@pytest.mark.parametrize("replaced", ["hook", "binding"])
 @pytest.mark.parametrize("validate", [True, False])
 @pytest.mark.parametrize("size", SIZES)
 def test_an_acceleration_of_the_straight_path_is_finite(
-    size: int, validate: bool, monkeypatch: pytest.MonkeyPatch
+    size: int, validate: bool, replaced: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found = np.ones(size)
 
-    def solved(self: PinocchioBackend, q: Floats, v: Floats, tau: Floats) -> Floats:
+    def solved(*_: object) -> Floats:
         copied: Floats = found.copy()
         return copied
 
-    monkeypatch.setattr(PinocchioBackend, "_forward_dynamics", solved)
+    if replaced == "hook":
+        monkeypatch.setattr(PinocchioBackend, "_forward_dynamics", solved)
+    else:
+        # By the first the hook calls it, and by the second the straight path.
+        monkeypatch.setattr(pin, "aba", solved)
+        monkeypatch.setitem(_FUNCTIONS, "forward_dynamics", solved)
     model = chain(size)
     engine = PinocchioBackend(model, validate=validate)
     sample = motion(model)

@@ -22,6 +22,7 @@ import numpy as np
 
 from dynx.backends.base import Backend
 from dynx.backends.engine_errors import engine_errors
+from dynx.backends.straight import BindingCall
 from dynx.engines.pinocchio.engine_model import WORLD, LinkRegressor, engine_model, error_message
 from dynx.engines.pinocchio.library import pin
 from dynx.model import Model
@@ -179,6 +180,12 @@ class PinocchioBackend(Backend):
 
     # -- dynamics -----------------------------------------------------------------------------
 
+    def _binding_call(self, hook: str) -> BindingCall | None:
+        # The hook of a subclass may do more.
+        if getattr(type(self), hook) is not _HOOKS.get(hook):
+            return None
+        return BindingCall(_FUNCTIONS[hook.removeprefix("_")], self._engine, self._workspace)
+
     def _unchecked_callable(self, quantity: str) -> Callable[..., Floats] | None:
         """Return the binding's function itself, with the `Data` of the calling thread."""
         function = _FUNCTIONS.get(quantity)
@@ -256,6 +263,10 @@ class PinocchioBackend(Backend):
     def _potential_energy(self, q: Floats) -> Floats:
         moving = pin.computePotentialEnergy(self._engine, self._workspace.data, q)
         return np.asarray(moving + self._rest_energy)
+
+
+_HOOKS = {f"_{quantity}": getattr(PinocchioBackend, f"_{quantity}") for quantity in _FUNCTIONS}
+"""Hooks that only call a function of the binding."""
 
 
 _PREPARED: dict[str, Callable[..., Callable[..., Floats]]] = {
