@@ -10,10 +10,10 @@ from dynx.ik.axes import AxisRequirement
 from dynx.ik.residual import rotation_vector
 from dynx.spatial.scalar import Floats
 
-_INSIDE = 0.99
+INSIDE = 0.99
 """Fraction of a tolerance along an axis at which its error begins to count: the search ends within it."""
 
-_SMALL_SINE = 1e-12
+SMALL_SINE = 1e-12
 """Sine of the angle between two directions below which their cross product does not give an axis."""
 
 
@@ -38,7 +38,7 @@ class AxisResidual:
             self._bounds[:3] = axes.position_tolerances
         if axes.rotation_tolerances is not None:
             self._bounds[3:] = axes.rotation_tolerances
-        self._slack = np.where(np.isfinite(self._bounds), _INSIDE * self._bounds, 0.0)
+        self._slack = np.where(np.isfinite(self._bounds), INSIDE * self._bounds, 0.0)
         self._axes = rotation if axes.of_target and rotation is not None else np.eye(3)
         k = axes.free_rotation
         self._direction: Floats | None = None
@@ -78,7 +78,7 @@ def _turn_between(a: Floats, b: Floats) -> Floats:
     u, v, w = b
     normal = np.array([y * w - z * v, z * u - x * w, x * v - y * u])
     sine, cosine = float(np.linalg.norm(normal)), float(a @ b)
-    if sine > _SMALL_SINE:
+    if sine > SMALL_SINE:
         return normal * (math.atan2(sine, cosine) / sine)
     if cosine > 0.0:
         return normal

@@ -55,7 +55,7 @@ def from_kernel(
     solve_all: ProblemSolver,
 ) -> list[Floats] | None:
     """Return solutions of a target from random starts, or None if no kernel applies."""
-    if not problem.is_plain:
+    if len(problem.requirements) > 1:
         return None
     q0 = np.array([problem.coordinates.random(start, rng) for _ in range(count)]).reshape(count, len(start))
     requirement = replace(problem.requirements[0], targets=Targets(*target))

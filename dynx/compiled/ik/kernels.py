@@ -7,6 +7,7 @@ from functools import cache
 
 import dynx.compiled.ik
 import dynx.compiled.simplification
+import dynx.ik.axis_residual
 import dynx.ik.coordinates
 import dynx.ik.search
 import dynx.ik.tracking.descent
@@ -40,7 +41,7 @@ def applies(problem: Problem) -> bool:
     """Check whether a kernel solves a problem: for one frame that 1 to `MAX_JOINTS` joints move, on a fixed
     base."""
     coordinates = problem.coordinates
-    if coordinates.floating or problem.limits.max_restarts > MAX_RESTARTS or not problem.is_plain:
+    if coordinates.floating or problem.limits.max_restarts > MAX_RESTARTS or len(problem.requirements) > 1:
         return False
     return 0 < coordinates.count <= MAX_JOINTS
 
@@ -95,4 +96,4 @@ def _algorithms() -> str:
     """Return the hash of the source of everything that is traced."""
     packages = (dynx.rbd, dynx.spatial, dynx.compiled.ik)
     modules = (dynx.ik.coordinates, dynx.ik.search, dynx.ik.tracking.descent, dynx.model.mechanism)
-    return source_version(*packages, *modules, dynx.compiled.simplification)
+    return source_version(*packages, *modules, dynx.ik.axis_residual, dynx.compiled.simplification)

@@ -19,11 +19,12 @@ class Race:
         self.starts = starts
         self._n, self._kind = n, kind
         self.x = starts.random.copy()
-        self.target, self.near, self._point = np.zeros(kind.size), np.zeros(n), np.zeros(3)
+        self.target, self.near = np.zeros(kind.size), np.zeros(n)
+        self._optional = [np.zeros(size) for size in kind.optional_sizes.values()]
         # A task that is a start does not restart.
         self._settings = np.zeros(len(SETTINGS) + 3)
         self.result = np.zeros((count, memory.n_results))
-        shared = [memory.initial, self.target, self.near, np.zeros(1)] + [self._point] * kind.point
+        shared = [memory.initial, self.target, self.near, np.zeros(1), *self._optional]
         tasks = [self.x, *(np.broadcast_to(row, (count, len(row))) for row in shared)]
         self.run = kernel.bind_race(tasks, self.result, self._settings, starts.random)
         """Function that solves for the present target and returns the number of completed starts."""
@@ -32,8 +33,8 @@ class Race:
         """Set everything but the target; `indices` are those of the coordinates in q."""
         limits = problem.limits
         self.near[:] = problem.q0.reshape(-1)[indices]
-        if problem.point is not None:
-            self._point[:] = problem.point
+        for array, values in zip(self._optional, self._kind.optional_values(problem), strict=True):
+            array[:] = values
         self._settings[:3] = limits.position_tolerance, limits.rotation_tolerance, limits.max_iterations
 
     def solve(self, problem: Problem, indices: list[int]) -> Floats:

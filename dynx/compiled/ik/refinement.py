@@ -53,25 +53,30 @@ def refinement_iteration(
 ) -> Iteration:
     """Return the iteration that reduces the error of frame number `frame` from one configuration.
 
-    Tasks have the arrays ``x``, where it begins (n,); ``memory`` (`RefinementMemory`); ``target``, ``near``
-    and ``point`` as in `dynx.compiled.ik.step.solver_iteration`. The constants are those of `SETTINGS`.
+    Tasks have the arrays ``x``, where it begins (n,); ``memory`` (`RefinementMemory`); ``target``, ``near``,
+    ``point`` and ``axes`` as in `dynx.compiled.ik.step.solver_iteration`. The constants are those of
+    `SETTINGS`.
     """
     n = coordinates.count
     path = FramePath.of(mechanism, frame, coordinates)
 
     def step(
-        x: Array, memory: Array, target: Array, near: Array, settings: Array, point: Array | None = None
+        x: Array,
+        memory: Array,
+        target: Array,
+        near: Array,
+        settings: Array,
+        point: Array | None = None,
+        axes: Array | None = None,
     ) -> dict[str, Any]:
-        residual, J, squared = traced_residual(path, kind, x, target, point)
+        residual, J, squared = traced_residual(path, kind, x, target, point, axes)
         position_tolerance, rotation_tolerance, max_iterations, _ = settings
         iterations, least, factor, at_best = memory[n + 3 : n + 7]
         trial = 1.0 - at_best
         iterations = iterations + trial
         gain = least - squared
         accepted = maximum(at_best, less(0.0, gain))
-        reached = less_equal(residual.distance, position_tolerance) * less_equal(
-            residual.angle, rotation_tolerance
-        )
+        reached = residual.reached(position_tolerance, rotation_tolerance)
         found = [*x, residual.distance, residual.angle, reached]
         best = [select(accepted, a, b) for a, b in zip(found, memory[: n + 3], strict=True)]
         factor = select(at_best, factor, factor * select(accepted, 0.3, 4.0))
@@ -93,8 +98,6 @@ def refinement_iteration(
 
     memory = RefinementMemory(n)
     sizes = {"x": n, "memory": len(memory.initial), "target": kind.size, "near": n}
-    sizes |= {"settings": len(SETTINGS)}
-    if kind.point:
-        sizes["point"] = 3
+    sizes |= {"settings": len(SETTINGS)} | kind.optional_sizes
     shapes = {name: (size,) for name, size in sizes.items()}
     return Iteration(trace(step, shapes), ("settings",), memory.n_results)

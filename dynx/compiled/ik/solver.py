@@ -125,8 +125,7 @@ class FrameSolver:
         memory = np.broadcast_to(self._memory.initial, (n, len(self._memory.initial)))
         target = self._kind.rows(problem)
         arrays = [first, memory, target, near, cell[:, None].astype(np.float64)]
-        if problem.point is not None:
-            arrays.append(np.broadcast_to(problem.point, (n, 3)))
+        arrays += [np.broadcast_to(each, (n, len(each))) for each in self._kind.optional_values(problem)]
         return arrays
 
     def _batch(self, arrays: list[Floats], problem: Problem, starts: Starts, max_restarts: int) -> Floats:
@@ -139,9 +138,15 @@ class FrameSolver:
     def _refine(self, rows: Floats, at: NDArray[np.int64], problem: Problem, starts: Starts) -> None:
         """Refine the results (n, n_results) of the samples `at` to local minima of their errors."""
         memory = RefinementMemory(self._coordinates.count)
-        _, _, target, near, _, *point = (array[at] for array in self._arrays(problem, starts))
+        _, _, target, near, _, *optional = (array[at] for array in self._arrays(problem, starts))
         begin = np.ascontiguousarray(rows[at, : memory.n])
-        tasks = [begin, np.broadcast_to(memory.initial, (len(at), len(memory.initial))), target, near, *point]
+        tasks = [
+            begin,
+            np.broadcast_to(memory.initial, (len(at), len(memory.initial))),
+            target,
+            near,
+            *optional,
+        ]
         refined = np.empty((len(at), memory.n_results))
         self._refinement()(tasks, refined, _settings(problem, 0), begin, threads=self._threads)
         refined[:, memory.n + 3] += rows[at, memory.n + 3]

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from dynx.compiled.ik.axis_residual import N_AXIS_VALUES, AxisKind, axis_residual, axis_values
 from dynx.compiled.ik.residual import TracedResidual
 from dynx.ik import Problem
 from dynx.ik.coordinates import FULL_TURN, FrameCoordinates
@@ -41,17 +42,37 @@ SETTINGS = ("position_tolerance", "rotation_tolerance", "max_iterations", "max_r
 
 @dataclass(frozen=True)
 class TargetKind:
-    """Parts of a target that are prescribed, and whether a point of the frame is placed."""
+    """Parts of a target that are prescribed, whether a point of the frame is placed, and which requirements
+    there are per axis."""
 
     position: bool
     rotation: bool
     point: bool
+    axes: AxisKind | None = None
 
     @classmethod
     def of(cls, problem: Problem) -> TargetKind:
         """Return the kind of the targets of a problem."""
         targets = problem.targets
-        return cls(targets.positions is not None, targets.rotations is not None, problem.point is not None)
+        axes = problem.requirements[0].axes
+        return cls(
+            targets.positions is not None,
+            targets.rotations is not None,
+            problem.point is not None,
+            None if axes is None else AxisKind.of(axes),
+        )
+
+    @property
+    def optional_sizes(self) -> dict[str, int]:
+        """Sizes of the arrays that only some kinds have: ``point`` and ``axes`` (weights and bounds)."""
+        sizes = {"point": 3} if self.point else {}
+        return sizes if self.axes is None else {**sizes, "axes": N_AXIS_VALUES}
+
+    def optional_values(self, problem: Problem) -> list[Floats]:
+        """Return those arrays for a problem, in order."""
+        axes = problem.requirements[0].axes
+        point = [] if problem.point is None else [problem.point]
+        return point if axes is None else [*point, axis_values(axes)]
 
     @property
     def size(self) -> int:
@@ -106,8 +127,9 @@ def solver_iteration(
 
     Tasks have the arrays ``x``, the first start (n,); ``memory`` (`Memory`); ``target``, the first three rows
     of a pose (12,), a position (3,) or a rotation (9,); ``near`` (n,), to which periodic angles are shifted;
-    ``cell``, the first row of starts near the target; and ``point`` (3,) if there is one. The constants are
-    those of `SETTINGS`, then the numbers that the rows of starts follow from (`dynx.compiled.ik.starts`).
+    ``cell``, the first row of starts near the target; ``point`` (3,) if there is one; and ``axes`` (12,),
+    weights and bounds per axis, if there are such. The constants are those of `SETTINGS`, then the numbers
+    that the rows of starts follow from (`dynx.compiled.ik.starts`).
     """
     n = coordinates.count
     path = FramePath.of(mechanism, frame, coordinates)
@@ -121,8 +143,9 @@ def solver_iteration(
         settings: Array,
         starts: Array,
         point: Array | None = None,
+        axes: Array | None = None,
     ) -> dict[str, Any]:
-        residual, rows, squared = traced_residual(path, kind, x, target, point)
+        residual, rows, squared = traced_residual(path, kind, x, target, point, axes)
         new = bounded_step(rows, residual.vector, x, coordinates, DAMPING * squared + MIN_DAMPING)
         next_x = shifted_to(new, near, coordinates)
         return {
@@ -131,15 +154,13 @@ def solver_iteration(
         }
 
     sizes = {"x": n, "memory": len(Memory(n).initial), "target": kind.size, "near": n}
-    sizes |= {"cell": 1, "settings": len(SETTINGS), "starts": 3}
-    if kind.point:
-        sizes["point"] = 3
+    sizes |= {"cell": 1, "settings": len(SETTINGS), "starts": 3} | kind.optional_sizes
     shapes = {name: (size,) for name, size in sizes.items()}
     return Iteration(trace(step, shapes), ("settings", "starts"), Memory(n).n_results)
 
 
 def traced_residual(
-    path: FramePath, kind: TargetKind, x: Array, target: Array, point: Array | None
+    path: FramePath, kind: TargetKind, x: Array, target: Array, point: Array | None, axes: Array | None = None
 ) -> tuple[TracedResidual, Array, Any]:
     """Return the error of the frame at x (n,), its Jacobian rows (m, n), and half its squared norm."""
     R, p, J = path.pose(x)
@@ -148,6 +169,9 @@ def traced_residual(
         p = p + lever
         J = np.concatenate([J[:3] + np.cross(J[3:].T, lever).T, J[3:]])
     position, rotation = kind.parts(target)
+    if kind.axes is not None and axes is not None:
+        residual, rows = axis_residual(kind.axes, (R, p, J), position, rotation, axes)
+        return residual, rows, 0.5 * _dot(residual.vector, residual.vector)
     residual = TracedResidual.of(
         None if position is None else position - p, None if rotation is None else rotation @ R.T
     )
@@ -163,9 +187,7 @@ def _bookkeeping(
     position_tolerance, rotation_tolerance, max_iterations, max_restarts = settings
     iterations, restarts, least = memory[n + 3 : n + 6]
     recent, own_steps = list(memory[n + 6 : n + 6 + WINDOW]), memory[-1]
-    reached = less_equal(residual.distance, position_tolerance) * less_equal(
-        residual.angle, rotation_tolerance
-    )
+    reached = residual.reached(position_tolerance, rotation_tolerance)
     better = maximum(less(squared, least), reached)
     found = [*x, residual.distance, residual.angle]
     best = [select(better, a, b) for a, b in zip(found, memory[: n + 2], strict=True)]

@@ -14,6 +14,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+import dynx.ik.coordinates
 import dynx.ik.targets
 import dynx.model.configuration
 import dynx.rbd
@@ -194,4 +195,6 @@ def _scalar(x: Array) -> Array:
 def _algorithms() -> str:
     """Return the hash of the source of the packages that the kernel is traced from."""
     own = sys.modules[__name__.rpartition(".")[0]]
-    return source_version(own, dynx.ik.targets, dynx.model.configuration, dynx.rbd, dynx.spatial)
+    return source_version(
+        own, dynx.ik.coordinates, dynx.ik.targets, dynx.model.configuration, dynx.rbd, dynx.spatial
+    )
