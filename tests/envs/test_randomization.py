@@ -272,10 +272,20 @@ def test_noise_has_its_deviation_and_leaves_the_state() -> None:
         envs.step(np.full((n, 1), 1.5))
 
 
-def test_a_payload_of_a_world_is_a_body_on_the_link() -> None:
+def test_noise_differs_from_step_to_step() -> None:
+    envs = RobotVectorEnvironment(Pendulum(), 50, randomize={"observation_noise": {2: 0.1}})
+    noises = [envs.reset(seed=0)[0][:, 2] - envs.states[:, 1]]
+    rest = np.zeros((50, 1), dtype=np.float32)
+    noises += [envs.step(rest)[0][:, 2] - envs.states[:, 1] for _ in range(3)]
+    # Two of 200 independent numbers of float32 are the same with a probability of about 1e-3.
+    assert np.unique(np.concatenate(noises).round(6)).size > 190
+
+
+@pytest.mark.parametrize("frame", ["tool0", "forearm_link"])
+def test_a_payload_of_a_world_is_a_body_on_the_link(frame: str) -> None:
     model, rng = dynx.load("ur5"), np.random.default_rng(0)
-    placed = with_point_mass(model, "tool0", 2.0, (0.1, -0.2, 0.3))
-    added = plant_model(model, Payload("tool0", 2.0, (0.1, -0.2, 0.3)), 1.0)
+    placed = with_point_mass(model, frame, 2.0, (0.1, -0.2, 0.3))
+    added = plant_model(model, Payload(frame, 2.0, (0.1, -0.2, 0.3)), 1.0)
     q, v, a = (rng.normal(size=6) for _ in range(3))
     one, other = (backend("reference", each).inverse_dynamics(q, v, a) for each in (placed, added))
     assert one == pytest.approx(other, rel=1e-12)

@@ -130,6 +130,19 @@ def test_equal_seeds_give_equal_runs_and_copies_are_independent() -> None:
     assert all(np.array_equal(a, b) for a, b in zip(first[-1], reused[-1], strict=True))
 
 
+def test_results_of_a_step_are_copies() -> None:
+    envs, actions = make(AutoresetMode.SAME_STEP, Pendulum(), limit=2), np.zeros((N, 1), dtype=np.float32)
+    envs.reset(seed=0)
+    first = envs.step(actions)[:4]
+    kept = [each.copy() for each in first]
+    second = envs.step(actions)[:4]
+    for given, before, now in zip(first, kept, second, strict=True):
+        assert np.array_equal(given, before)
+        assert not np.shares_memory(given, now)
+    assert not np.array_equal(first[1], second[1])
+    assert second[3].all()
+
+
 def test_one_environment_steps_as_many_do() -> None:
     task = CartPole()
     one = RobotVectorEnvironment(task, 1)

@@ -11,6 +11,7 @@ from tests.faults.environments import ENVIRONMENTS_FAULTS
 from tests.faults.fault import Fault
 from tests.faults.rigid_body import RIGID_BODY_FAULTS
 from tests.faults.simulation import SIMULATION_FAULTS
+from tests.faults.training import TRAINING_FAULTS
 from tests.faults.worlds import WORLDS_FAULTS
 
 FAULTS_BY_AREA: dict[str, tuple[Fault, ...]] = {
@@ -22,6 +23,7 @@ FAULTS_BY_AREA: dict[str, tuple[Fault, ...]] = {
     "distance": DISTANCE_FAULTS,
     "environments": ENVIRONMENTS_FAULTS,
     "simulation": SIMULATION_FAULTS,
+    "training": TRAINING_FAULTS,
     "worlds": WORLDS_FAULTS,
 }
 FAULTS: tuple[Fault, ...] = tuple(fault for faults in FAULTS_BY_AREA.values() for fault in faults)
