@@ -62,6 +62,10 @@ class DrawnParts:
         for placed in self._placed:
             placed(poses)
 
+    def remove(self) -> None:
+        """Remove all parts from the page."""
+        self._root.remove()
+
     @property
     def visible(self) -> bool:
         """True while the parts are shown."""

@@ -28,6 +28,11 @@ class FollowingCamera:
         self._part.on_update(lambda _: self._start())
         drawn.on_placed(self._move)
 
+    def watch(self, drawn: DrawnParts) -> None:
+        """Follow the parts of another drawing with the same names from now on."""
+        self._drawn, self._before = drawn, None
+        drawn.on_placed(self._move)
+
     def follow(self, part: str | None, *, first_person: bool = False) -> None:
         """Follow a part; None leaves the camera where it is. Raises ArgumentError for an unknown part."""
         if part is not None:

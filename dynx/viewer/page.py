@@ -84,26 +84,32 @@ class Page:
         # viser prints its addresses and its end, also when it is told not to.
         with redirect_stdout(io.StringIO()):
             self._server = viser.ViserServer(self.host, self.port, label=title, verbose=False)
+        self._plain, self._dark = plain, dark
+        self._furnish()
+        self._server.on_client_connect(_make_room_on_narrow)
+        self.lock = threading.RLock()
+        """Held by whoever changes what the page shows."""
+        self._closed = threading.Event()
+        self.ended = threading.Event()
+        """Set when what is shown now is removed or the page is closed: threads that move it end then."""
+        self._at_end: list[Callable[[], None]] = []
+
+    def _furnish(self) -> None:
+        """Set what is the same whatever is shown: theme, style, place of the panel, and light."""
         self._server.gui.configure_theme(
-            dark_mode=dark, show_logo=False, show_share_button=False, control_width="medium"
+            dark_mode=self._dark, show_logo=False, show_share_button=False, control_width="medium"
         )
         # Beside the picture, not over it.
         self._server.gui.main_panel.dock_right()
         self._server.scene.set_up_direction("+z")
-        style = _STYLE % ("none" if plain else "block", NARROW, round(100.0 * _COVERED))
+        style = _STYLE % ("none" if self._plain else "block", NARROW, round(100.0 * _COVERED))
         self._server.gui.add_html(style, order=math.inf)
-        self._plain, self._line_colour = plain, _LINE_COLOUR[dark]
-        if plain:
+        if self._plain:
             scene = self._server.scene
             scene.configure_environment_map(None)
             scene.configure_default_lights(False)
             scene.add_light_hemisphere("/sky", ground_color=_GROUND_COLOUR, intensity=_SKY)
             scene.add_light_directional("/sun", intensity=_SUN, position=_SUN_PLACE)
-        self._server.on_client_connect(_make_room_on_narrow)
-        self.lock = threading.RLock()
-        """Held by whoever changes what the page shows."""
-        self._ended = threading.Event()
-        self._at_end: list[Callable[[], None]] = []
 
     @property
     def url(self) -> str:
@@ -145,7 +151,7 @@ class Page:
         rows = np.stack([np.stack([-ends, along, level], -1), np.stack([ends, along, level], -1)], axis=1)
         lines = np.concatenate([rows, rows[:, :, [1, 0, 2]]]).astype(np.float32)
         self.scene.add_line_segments(
-            "/ground", lines, self._line_colour, thickness=1.0, thickness_units="screen"
+            "/ground", lines, _LINE_COLOUR[self._dark], thickness=1.0, thickness_units="screen"
         )
 
     def look_at(self, target: ArrayLike, distance: float) -> None:
@@ -156,25 +162,47 @@ class Page:
         self._server.initial_camera.look_at = tuple(point.tolist())
 
     def at_end(self, action: Callable[[], None]) -> None:
-        """Call `action` when the page is closed."""
+        """Call `action` when what is shown at present is removed or the page is closed."""
         self._at_end.append(action)
+
+    def clear(self, title: str) -> None:
+        """Remove everything from the page, with all controls, and give it another title; pages that are open
+        keep their cameras.
+
+        Raises ArgumentError for a page that is closed.
+        """
+        with self.lock:
+            if self.closed:
+                raise ArgumentError(f"the page at {self.url} is closed")
+            self._end_shown()
+            self.ended = threading.Event()
+            with self.together():
+                self.scene.reset()
+                self.gui.reset()
+                self.gui.set_panel_label(title)
+                self._furnish()
+
+    def _end_shown(self) -> None:
+        self.ended.set()
+        actions, self._at_end = self._at_end, []
+        for action in actions:
+            action()
 
     @property
     def closed(self) -> bool:
         """True after `close`."""
-        return self._ended.is_set()
+        return self._closed.is_set()
 
     def wait(self, seconds: float | None = None) -> bool:
         """Wait until the page is closed, or for `seconds`; return True once it is."""
-        return self._ended.wait(seconds)
+        return self._closed.wait(seconds)
 
     def close(self) -> None:
         """End the server. Closing twice is harmless."""
-        if self._ended.is_set():
+        if self.closed:
             return
-        self._ended.set()
-        for action in self._at_end:
-            action()
+        self._closed.set()
+        self._end_shown()
         # Whoever draws has ended then, or sees that the page is closed.
         with self.lock, redirect_stdout(io.StringIO()):
             self._server.stop()

@@ -24,6 +24,7 @@ class Timeline:
     ) -> None:
         """`show(time)` shows the motion at a time from 0 to `end` [s]; `step` [s] is that of two buttons."""
         self._page, self._end, self._step, self._show = page, max(end, 1e-9), step, show
+        self._ended = page.ended
         self._time = 0.0
         self._running = threading.Event()
         gui = page.gui
@@ -74,7 +75,7 @@ class Timeline:
     def go_to(self, time: float) -> None:
         """Show the motion at a time [s], moved into its range."""
         with self._page.lock, self._page.together():
-            if self._page.closed:
+            if self._ended.is_set():
                 return
             self._time = min(max(time, 0.0), self._end)
             self._slider.value = self._time
@@ -93,9 +94,9 @@ class Timeline:
 
     def _play(self) -> None:
         period = 1.0 / UPDATES_PER_SECOND
-        while not self._page.closed:
+        while not self._ended.is_set():
             self._running.wait()
-            if self._page.closed:
+            if self._ended.is_set():
                 return
             began, start, speed = time.monotonic(), self._time, self._speed.value
             while self._running.is_set() and self._speed.value == speed:
@@ -109,7 +110,7 @@ class Timeline:
                     break
                 self.go_to(wanted)
                 # The next multiple of the period, whatever this update took.
-                if self._page.wait(period - (time.monotonic() - began) % period):
+                if self._ended.wait(period - (time.monotonic() - began) % period):
                     return
                 if self._time != wanted:  # Scrubbed meanwhile: go on from there.
                     break

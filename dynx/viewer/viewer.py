@@ -55,7 +55,7 @@ class Viewer(Controls):
         NotInstalledError without the extra ``viewer``.
         """
         whole = has_graphics_processor() if whole_meshes is None else whole_meshes
-        look = Look(triangles=None if whole else TRIANGLE_BUDGET)
+        self._look = Look(triangles=None if whole else TRIANGLE_BUDGET)
         opened: Any = open_subject(shown)
         check_options(opened, options)
         self._dark = dark
@@ -63,15 +63,31 @@ class Viewer(Controls):
         if open_browser:
             # The browser loads the page while the shapes are read.
             webbrowser.open(self.url)
+        super().__init__(self.page)
+        self.view: Any = self._view_of(opened, shown, options)
+        """A `RobotView`, `MotionView` or `WorldView`: what is shown, to be moved by the program."""
+
+    def show(self, shown: object, **options: Any) -> None:
+        """Show something else on the same page, with the `options` of its view; what was shown is removed,
+        with the controls of the program. Pages that are open keep their cameras.
+
+        Raises the errors of what is shown, after which the page is closed if it was cleared already, and
+        ArgumentError for a viewer that is closed.
+        """
+        opened: Any = open_subject(shown)
+        check_options(opened, options)
+        self.page.clear(f"dynx: {title_of(opened)}")
+        self.view = self._view_of(opened, shown, options)
+
+    def _view_of(self, opened: Any, shown: object, options: dict[str, Any]) -> Any:
+        if is_world(opened) and opened is not shown:
+            self.page.at_end(opened.close)
         try:
-            super().__init__(self.page)
-            self.view: Any = view_of(self.page, opened, look, options)
-            """A `RobotView`, `MotionView` or `WorldView`: what is shown, to be moved by the program."""
+            with self.page.lock:
+                return view_of(self.page, opened, self._look, options)
         except BaseException:
             self.page.close()
             raise
-        if is_world(opened) and opened is not shown:
-            self.page.at_end(opened.close)
 
     @property
     def url(self) -> str:

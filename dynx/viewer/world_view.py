@@ -56,10 +56,10 @@ class WorldView:
     ) -> None:
         """`loads(world)` returns the arguments of `World.step` that act in the next step."""
         self._page, self.world, self._loads = page, world, loads
+        self._ended = page.ended
         scene = world.scene
-        with page.together():
-            robots = {robot.name: robot.model for robot in scene.robots}
-            self.drawn = DrawnScene(page.scene, "/world", robots, scene.bodies, look)
+        self._look = look
+        self.drawn = self._draw_scene()
         self.notes = (*world.notes, *self.drawn.faults)
         """Notes on the start, and shapes that cannot be drawn, one sentence each."""
         poses = dict(part_poses(scene, world.state))
@@ -92,6 +92,31 @@ class WorldView:
             self._thread.start()
             if play:
                 self.play()
+
+    def _draw_scene(self) -> DrawnScene:
+        scene = self.world.scene
+        robots = {robot.name: robot.model for robot in scene.robots}
+        with self._page.together():
+            return DrawnScene(self._page.scene, "/world", robots, scene.bodies, self._look)
+
+    def replace(self, world: World) -> bool:
+        """Show another world with parts of the same names, on the same controls; return False where the names
+        differ and nothing was done.
+
+        Functions that the program calls on clicks are those of the parts before.
+        """
+        with self._page.lock, self._page.together():
+            parts = {f"{r.name}/{link.name}" for r in world.scene.robots for link in r.model.links}
+            if parts | {body.name for body in world.scene.bodies} != self.drawn.parts.keys():
+                return False
+            self.world = world
+            self.names.show(None)
+            self.drawn.remove()
+            self.drawn = self._draw_scene()
+            self.camera.watch(self.drawn)
+            self.names = NamedParts(self._page, self.drawn.parts, self.drawn.visuals)
+            self.draw()
+            return True
 
     @property
     def title(self) -> str:
@@ -149,7 +174,7 @@ class WorldView:
     def step(self, n: int = 1) -> None:
         """Take `n` steps under the loads, the spring and a push, and draw. Errors are shown in the page."""
         with self._page.lock:
-            if self._page.closed:
+            if self._ended.is_set():
                 return
             try:
                 if self._loads is None and not self._spring.pulls and self._push is None:
@@ -256,10 +281,10 @@ class WorldView:
 
     def _run(self) -> None:
         period = 1.0 / UPDATES_PER_SECOND
-        while not self._page.closed:
+        while not self._ended.is_set():
             self._running.wait()
             began, start = time.monotonic(), self.world.time
-            while self._running.is_set() and not self._page.closed:
+            while self._running.is_set() and not self._ended.is_set():
                 if self._closed():
                     self._end()
                     break
@@ -273,10 +298,10 @@ class WorldView:
                 before, clock = self.world.time, time.monotonic()
                 if n > 0:
                     self.step(n)
-                if self._page.wait(max(period - (time.monotonic() - clock), 0.001)):
+                if self._ended.wait(max(period - (time.monotonic() - clock), 0.001)):
                     return
                 spent = time.monotonic() - clock
-                if self._page.closed:
+                if self._ended.is_set():
                     return
                 self._rate.value = f"{(self.world.time - before) / spent:.2f}"
 

@@ -97,14 +97,12 @@ class WorldEpisodes(Episodes):
         return self._world.camera(replace(self._task.camera, size=(width, height))).rgb
 
     def view(self) -> None:
-        """Show the world in the browser, at one address for all worlds of these episodes."""
+        """Show the world in the browser, on one page for all worlds of these episodes."""
         if self._viewer is None:
             self._viewer = self._world.view(steps=False)
             print(f"{type(self._task).__name__} is shown at {self._viewer.url}", flush=True)
-        elif self._viewer.view.world is not self._world:
-            port = self._viewer.page.server.get_port()
-            self._viewer.close()
-            self._viewer = self._world.view(steps=False, port=port)
+        elif self._viewer.view.world is not self._world and not self._viewer.view.replace(self._world):
+            self._viewer.show(self._world, steps=False)
         self._viewer.view.draw()
 
     def close(self) -> None:
