@@ -7,9 +7,10 @@ inertias, ballast), `canonical_urdf` (the file that Bullet loads), `client` (loa
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import isfinite
 from threading import RLock
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -153,6 +154,15 @@ class PyBulletBackend(Backend):
                 return robots[0].inverse_dynamics(q, v, a)
             return self._extrapolate([robot.inverse_dynamics(q, v, a) for robot in robots])
 
+    def _sample_hook(self, hook: str, arguments: int, details: tuple[Any, ...]) -> Callable[..., Any]:
+        """Return the functions of bias and gravity torque with the zeros of inverse dynamics made once."""
+        if getattr(type(self), hook) is not _AT_ZEROS.get(hook):
+            return super()._sample_hook(hook, arguments, details)
+        torque, zeros = type(self)._inverse_dynamics, np.zeros(self._mechanism.nv)
+        if arguments == 1:
+            return lambda backend, q: torque(backend, q, zeros, zeros)
+        return lambda backend, q, v: torque(backend, q, v, zeros)
+
     def _mass_matrix(self, q: Floats) -> Floats:
         with self._lock:
             robots = self._robots or self._all_robots()
@@ -225,3 +235,7 @@ class PyBulletBackend(Backend):
     def _extrapolate(results: list[Floats]) -> Floats:
         once, twice = results
         return 2.0 * once - twice
+
+
+_AT_ZEROS = {hook: getattr(PyBulletBackend, hook) for hook in ("_bias_torque", "_gravity_torque")}
+"""Hooks that evaluate inverse dynamics where velocities or accelerations are zero."""

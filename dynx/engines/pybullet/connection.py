@@ -134,9 +134,11 @@ class BulletConnection(ABC):
         """
         # The root is at the identity, because Bullet misreads attitudes about several axes.
         q = [*ORIGIN, *_UPRIGHT, *joints] if self.floating else joints
-        if not isfinite(sum(joints) + sum(v) + sum(a) + sum(gravity)):
-            self.check(joints, v, a, gravity)
+        if not isfinite(sum(joints) + sum(v) + sum(a)):
+            self.check(joints, v, a)
         if gravity != self._gravity:
+            # NaN differs from itself.
+            self.check(gravity)
             self.set_gravity(gravity)
         function = self.engine.calculateInverseDynamics
         try:
