@@ -175,8 +175,15 @@ def start(browser: Any, robot: str, folder: str, triangles: int) -> Start:
             "(performance.timeOrigin + performance.getEntriesByType('navigation')[0].domInteractive) / 1e3"
         )
         counts = page.evaluate("({...counts})")
-        stages = (answered, loaded, counts["connected"], counts["shapes"], drawn)
-        return Start(*(stage - began for stage in stages), processor_time(process.pid))
+        connected, shapes = counts["connected"] - began, counts["shapes"] - began
+        return Start(
+            answered - began,
+            loaded - began,
+            connected,
+            shapes,
+            drawn - began,
+            processor_time(process.pid),
+        )
 
 
 def rates(browser: Any, robot: str, folder: str, *, seconds: float, whole: bool) -> Rates:
