@@ -37,6 +37,7 @@ class PathCalls(QuantityCalls):
         jumps: bool | None = None,
         max_starts: int = 32,
         rng: np.random.Generator | int = 0,
+        avoid: AvoidanceSource | None = None,
     ) -> TrackResult:
         """Return configurations (..., n, nq) that follow `targets`, poses (..., n, 4, 4), continuously.
 
@@ -59,6 +60,7 @@ class PathCalls(QuantityCalls):
             jumps=jumps,
             max_starts=max_starts,
             rng=rng,
+            avoid=avoid,
         )
 
     @checks_option_names

@@ -16,8 +16,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from dynx.ik.avoidance.avoidance import Avoidance, NearPair
-from dynx.ik.avoidance.task import AvoidingTask
-from dynx.ik.avoidance.wording import collision_sentence
+from dynx.ik.avoidance.descent import AvoidingDescent
+from dynx.ik.avoidance.wording import collision_sentence, fixed_sentence
 from dynx.ik.other_solutions import ProblemSolver, Target, from_closed_form, from_kernel
 from dynx.ik.problem import Problem
 from dynx.ik.result import IKResult
@@ -50,6 +50,8 @@ class _Tally:
     count: int = 0
     complete: bool = False
     """Whether these are all solutions of the closed form."""
+    fixed: bool = False
+    """Whether the joints that move the frame do not move the pairs that are too close."""
 
     def add(self, candidate: Candidate, violated: list[NearPair]) -> float:
         """Count a solution; return what its distances lack [m]."""
@@ -94,8 +96,12 @@ def clear_solutions(
         if found is None:
             assert tally.best is not None
             found, success[k] = tally.best, False
-            sentences[k] = collision_sentence(
-                avoidance, tally.blockers, tally.pairs, tally.count, complete=tally.complete
+            sentences[k] = (
+                fixed_sentence(avoidance, tally.blockers)
+                if tally.fixed
+                else collision_sentence(
+                    avoidance, tally.blockers, tally.pairs, tally.count, complete=tally.complete
+                )
             )
         q[k], distances[k], angles[k] = found.q, found.position_error, found.rotation_error
         iterations[k] += found.iterations
@@ -126,13 +132,14 @@ class _Finder:
     ) -> None:
         self._kinematics, self._problem, self._avoidance = kinematics, problem, avoidance
         self._search, self._solve_all = search, solve_all
+        self._fixed = avoidance.fixed_pairs(problem.coordinates)
 
     def find(
         self, task: Task, target: Target, start: Floats, solution: Floats
     ) -> tuple[Candidate | None, _Tally]:
         """Return a configuration that reaches the target and keeps the margins, or None; and what failed."""
         tally = _Tally()
-        avoiding = AvoidingTask(task, self._avoidance, self._kinematics, self._problem.coordinates)
+        descent = AvoidingDescent(task, self._avoidance, self._kinematics, self._problem.coordinates)
         restarts = -1
         for solutions, drawn, complete in self._rounds(task, target, start, solution):
             restarts += drawn
@@ -147,10 +154,15 @@ class _Finder:
                     candidate.restarts = max(restarts, 0)
                     return candidate, tally
                 lacking.append((tally.add(candidate, violated), candidate))
+                hopeless = [each for each in violated if each.pair in self._fixed]
+                if hopeless:
+                    candidate.restarts = max(restarts, 0)
+                    tally.best, tally.blockers, tally.fixed = candidate, hopeless, True
+                    return None, tally
             lacking.sort(key=lambda each: each[0])
             for _, candidate in lacking[:IMPROVED]:
                 if self._is_redundant(task, candidate.q):
-                    improved = self._improved(task, avoiding, candidate, tally)
+                    improved = self._improved(task, descent, candidate, tally)
                     if improved is not None:
                         improved.restarts = max(restarts, 0)
                         return improved, tally
@@ -194,10 +206,10 @@ class _Finder:
             yield new, count, False
 
     def _improved(
-        self, task: Task, avoiding: AvoidingTask, candidate: Candidate, tally: _Tally
+        self, task: Task, descent: AvoidingDescent, candidate: Candidate, tally: _Tally
     ) -> Candidate | None:
         """Return a configuration near a solution that reaches the target and keeps the margins, or None."""
-        q, steps = self._search.descend(candidate.q, avoiding)
+        q, steps, _ = descent.run(candidate.q)
         found = self._search.evaluate(self._problem.coordinates.nearest(q, candidate.q), task)
         found.iterations = steps
         if not found.success:

@@ -107,6 +107,17 @@ class FrameCoordinates:
         changed[self._in_q] = to
         return changed
 
+    def moving(self, frame: str | None) -> frozenset[int]:
+        """Return which of these coordinates, by their indices in q, move a frame; none moves the world.
+
+        The base of a floating robot counts as number -1.
+        """
+        if frame is None:
+            return frozenset()
+        base = 7 if self._model.floating else 0
+        moved = {base + k for k in _joints_on_path(self._model, frame)} & set(self.indices)
+        return frozenset(moved | {-1}) if self.floating else frozenset(moved)
+
     @property
     def joint_limits(self) -> tuple[Floats, Floats]:
         """Lower and upper limits of the joints, which may be infinite."""

@@ -208,6 +208,18 @@ def mass() -> None:
     metavar="JOINT=VALUE",
     help="Positions [rad or m] of joints that --all-solutions takes as given, such as one of seven.",
 )
+@click.option(
+    "--avoid",
+    metavar="SCENE",
+    help="Scene whose bodies and robots the robot keeps away from, as its links do from one another: a file, "
+    "or a name of the library. A scene without robots has this one.",
+)
+@click.option(
+    "--margin",
+    type=float,
+    metavar="METRES",
+    help="Distance [m] that --avoid keeps (default: 0.01)",
+)
 @runs("dynx.cli.queries.ik:ik")
 def ik() -> None:
     """Compute inverse kinematics: a configuration, within limits, that brings a frame to a target.

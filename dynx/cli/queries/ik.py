@@ -19,6 +19,8 @@ from dynx.cli.shell.inputs import (
 from dynx.cli.shell.tables import Table
 from dynx.cli.shell.terminal import console, counted, number, write_json
 from dynx.errors import ArgumentError
+from dynx.world.scene import read_scene
+from dynx.world.scene.avoidance import MARGIN
 
 
 def ik(
@@ -28,6 +30,8 @@ def ik(
     q: Numbers,
     every: bool,
     given: Numbers,
+    avoid: str | None,
+    margin: float | None,
     json_path: str | None,
     **robot: Any,
 ) -> int:
@@ -39,8 +43,13 @@ def ik(
         )
     if given is not None and not every:
         raise ArgumentError("--given has an effect only with --all-solutions; --lock fixes a joint otherwise")
+    if avoid is not None and every:
+        raise ArgumentError("--avoid chooses one solution; --all-solutions shows all, in collision or not")
+    if margin is not None and avoid is None:
+        raise ArgumentError("--margin is the distance that --avoid SCENE keeps; give the scene as well")
     if wanted.ndim == 1:
         free = "rotation"
+    scene = None if avoid is None else read_scene(avoid)
     with open_backend(**robot) as engine:
         model = engine.model
         name = chosen_frame(model, frame)
@@ -48,7 +57,10 @@ def ik(
         if every:
             by_default = frame is None
             return all_solutions(engine, wanted, name, start, given, json_path, frame_is_default=by_default)
-        found = engine.inverse_kinematics(wanted, name, start, free=free)
+        kept = None
+        if scene is not None:
+            kept = scene.avoidance_for(model, margin=MARGIN if margin is None else margin)
+        found = engine.inverse_kinematics(wanted, name, start, free=free, avoid=kept)
         result = {
             **document_head(engine),
             "frame": name,
@@ -61,6 +73,9 @@ def ik(
             "iterations": int(found.iterations),
             "restarts": int(found.restarts),
         }
+        if kept is not None:
+            result["status"], result["avoid"] = found.status, avoid
+            result["collision"] = "" if found.collision is None else str(found.collision)
         joints = dict(zip(model.joint_names, result["q"][model.nq - len(model.joint_names) :], strict=True))
     code = DONE if result["success"] else NEGATIVE_RESULT
     if write_json(result, json_path):
@@ -84,5 +99,8 @@ def _outcome(result: dict[str, Any]) -> str:
     error = " and ".join(f"{value:.3g} {unit}" for value, unit in errors if value is not None)
     iterations, restarts = counted(result["iterations"], "iteration"), counted(result["restarts"], "restart")
     if result["success"]:
-        return f"target reached: error {error}, after {iterations} and {restarts}"
+        clear = ", margins kept" if "avoid" in result else ""
+        return f"target reached{clear}: error {error}, after {iterations} and {restarts}"
+    if result.get("collision"):
+        return f"in collision: {result['collision']}"
     return f"target not reached: smallest error {error}, after {iterations} and {restarts}"

@@ -10,6 +10,7 @@ import numpy as np
 
 from dynx.errors import ArgumentError, shown
 from dynx.ik.avoidance.parts import Pair, Part, Separation, adapted_pairs, place, separation_of
+from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.tasks import Kinematics
 from dynx.model import Model
 from dynx.model.configuration import is_real
@@ -95,6 +96,11 @@ class Avoidance:
                 if separation is not None:
                     found.append(NearPair(pair, separation))
         return found
+
+    def fixed_pairs(self, coordinates: FrameCoordinates) -> frozenset[Pair]:
+        """Return the pairs whose distance these coordinates do not change."""
+        moving = [coordinates.moving(part.frame) for part in self.parts]
+        return frozenset(pair for pair in self.pairs if moving[pair.a] == moving[pair.b])
 
     def violated(self, kinematics: Kinematics, q: Floats) -> list[NearPair]:
         """Return the pairs that are not proved to keep their margin at q (nq,)."""

@@ -29,6 +29,12 @@ def collision_sentence(
     return sentence
 
 
+def fixed_sentence(avoidance: Avoidance, blockers: Sequence[NearPair]) -> str:
+    """Return that a pair is too close whatever the joints do that move the frame."""
+    worst = max(blockers, key=lambda each: each.pair.margin - each.separation.lower)
+    return f"{pair_sentence(avoidance, worst)}; the joints that move the frame do not change that"
+
+
 def pair_sentence(avoidance: Avoidance, near: NearPair) -> str:
     """Return how close two bodies are, and their margin."""
     a, b = avoidance.names(near.pair)

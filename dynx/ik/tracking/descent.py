@@ -9,7 +9,8 @@ that cannot be reached.
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from typing import Protocol
 
 import numpy as np
@@ -65,6 +66,23 @@ class Followed:
 
     def __len__(self) -> int:
         return len(self.q)
+
+    def part(self, of: slice) -> Followed:
+        """Return some of the samples."""
+        return Followed(*(getattr(self, each.name)[of] for each in fields(self)))
+
+    @classmethod
+    def joined(cls, pieces: Sequence[Followed]) -> Followed:
+        """Return the samples of several pieces, of which there is at least one."""
+        return cls(*(np.concatenate([getattr(piece, each.name) for piece in pieces]) for each in fields(cls)))
+
+
+def part_of(targets: Targets, of: slice) -> Targets:
+    """Return some of the targets (n,)."""
+    return Targets(
+        None if targets.positions is None else targets.positions[of],
+        None if targets.rotations is None else targets.rotations[of],
+    )
 
 
 class Follower(Protocol):

@@ -21,7 +21,7 @@ from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.residual import Residual
 from dynx.ik.targets import Targets
 from dynx.ik.tasks import Kinematics
-from dynx.ik.tracking.descent import Followed, Follower, StepBounds
+from dynx.ik.tracking.descent import Followed, Follower, StepBounds, part_of
 from dynx.ik.tracking.result import TrackStatus
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_exp, quat_from_rotation, quat_log, rotation_from_quat
@@ -243,14 +243,6 @@ class _Between:
             rotations = self._rotation @ rotation_from_quat(quat_exp(s * self._vector))
             rotations[-1] = self._target.rotations[0]
         return Targets(positions, rotations)
-
-
-def part_of(targets: Targets, of: slice) -> Targets:
-    """Return some of the targets (n,)."""
-    return Targets(
-        None if targets.positions is None else targets.positions[of],
-        None if targets.rotations is None else targets.rotations[of],
-    )
 
 
 def _repeated(target: Targets, count: int) -> Targets:

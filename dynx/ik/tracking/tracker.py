@@ -9,14 +9,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError, shown
-from dynx.ik.checking import checked_margin
+from dynx.ik.avoidance import AvoidanceSource
+from dynx.ik.checking import checked_avoidance, checked_margin
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.option_names import checks_option_names
 from dynx.ik.search import SearchLimits
 from dynx.ik.targets import Targets, checked_targets
 from dynx.ik.tasks import Kinematics
-from dynx.ik.tracking.descent import Follower, SampleFollower
-from dynx.ik.tracking.path import PathTracker, TrackedPath, TrackLimits, part_of
+from dynx.ik.tracking.avoiding import AvoidingFollower
+from dynx.ik.tracking.descent import Follower, SampleFollower, part_of
+from dynx.ik.tracking.path import PathTracker, TrackedPath, TrackLimits
 from dynx.ik.tracking.result import TrackResult
 from dynx.model import Model
 from dynx.model.configuration import (
@@ -63,6 +65,7 @@ def track(
     jumps: bool | None = None,
     max_starts: int = 32,
     rng: np.random.Generator | int = 0,
+    avoid: AvoidanceSource | None = None,
 ) -> TrackResult:
     """Follow a path of targets by a continuous sequence of configurations within limits.
 
@@ -87,6 +90,10 @@ def track(
     `max_starts` random starts and the status is JUMPED; without one, or with ``jumps=False`` (the
     default with `dt`), q is the configuration with the least error that is continuous, and LIMITED or HELD
     names the cause. Equal calls with a seed `rng` return equal results.
+
+    With `avoid`, a scene or what `Scene.avoidance` returns, samples that are OK or JUMPED keep bodies apart
+    (not the ways between them): redundant joints move around what is in the way, and where no continuous
+    configuration is clear the path jumps, or the sample is HELD at one that is clear.
 
     Raises UnknownNameError for the frame; ArgumentError (ShapeError, DTypeError, NotFiniteError) for an
     invalid argument.
@@ -119,6 +126,9 @@ def track(
     follower: Follower | None = None if make is None else make(frame, path, at, settings)
     if follower is None:
         follower = SampleFollower(kinematics, frame, at, settings)
+    avoidance = checked_avoidance(model, avoid)
+    if avoidance is not None:
+        follower = AvoidingFollower(follower, kinematics, frame, at, coordinates, settings, avoidance)
     draws = coordinates.starts(_generator(rng), max_starts)
     offset = coordinates.count - len(coordinates.indices)
     starts = np.clip(draws, limits.lower[offset:], limits.upper[offset:])

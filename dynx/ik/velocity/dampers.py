@@ -14,6 +14,7 @@ import numpy as np
 
 from dynx.errors import ArgumentError, shown
 from dynx.ik.avoidance import AvoidanceSource
+from dynx.ik.checking import checked_avoidance
 from dynx.ik.tasks import Kinematics
 from dynx.model.configuration import is_real
 from dynx.spatial.scalar import Floats
@@ -52,15 +53,13 @@ def dampers(
     Raises ArgumentError for `avoid` or `gain`.
     """
     model = kinematics.model
-    if avoid is None:
+    avoidance = checked_avoidance(model, avoid)
+    if avoidance is None:
         return Dampers(np.zeros((0, model.nv)), np.zeros(0), ())
-    if not isinstance(avoid, AvoidanceSource):
-        raise ArgumentError(f"avoid is {shown(avoid)}; wanted a dynx.world.Scene, or Scene.avoidance(...)")
     if not (is_real(gain) and 0.0 < gain * dt <= 1.0):
         raise ArgumentError(
             f"avoid_gain is {shown(gain)}; wanted a number above 0, at most 1 / dt = {1.0 / dt:.6g} [1/s]"
         )
-    avoidance = avoid.avoidance_for(model)
     near = avoidance.near(kinematics, q, FREE_SPEED / gain)
     room = np.array([each.separation.lower - each.pair.margin for each in near])
     names = tuple(avoidance.names(each.pair) for each in near)

@@ -149,20 +149,24 @@ class Scene:
             robot = self.robots[0].name
         return self._avoidance(self.robot(robot), margin, self_margin)
 
-    def avoidance_for(self, model: Model) -> Avoidance:
-        """Return what the robot that is `model` keeps away from, with the default margin.
+    def avoidance_for(
+        self, model: Model, *, margin: float = MARGIN, self_margin: float | None = None
+    ) -> Avoidance:
+        """Return what the robot that is `model` keeps away from, with margins as `avoidance` has them.
 
-        Raises ArgumentError unless exactly one robot of the scene is like `model`, or the scene has none.
+        A scene without robots has it as its only one. Raises ArgumentError unless exactly one robot of the
+        scene is like `model`, or the scene has none; and the errors of `avoidance`.
         """
-        kept = self._kept_avoidance
-        if kept and kept[0].model is model:
-            return kept[0]
-        kept[:] = [self._avoidance(robot_like(self.robots, model), MARGIN, None)]
-        return kept[0]
+        margins = margin, self_margin
+        kept = self._kept_avoidance.get(margins)
+        if kept is None or kept.model is not model:
+            kept = self._avoidance(robot_like(self.robots, model), *margins)
+            self._kept_avoidance[margins] = kept
+        return kept
 
     @cached_property
-    def _kept_avoidance(self) -> list[Avoidance]:
-        return []
+    def _kept_avoidance(self) -> dict[tuple[float, float | None], Avoidance]:
+        return {}
 
     def _avoidance(self, robot: SceneRobot, margin: float, self_margin: float | None) -> Avoidance:
         ignored = [tuple(map(self._members, pair)) for pair in self.ignored]

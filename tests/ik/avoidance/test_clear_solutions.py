@@ -112,6 +112,22 @@ def test_the_bodies_that_prevent_a_solution_are_named(name: str) -> None:
         assert ur5.inverse_kinematics(target, "ee_link", avoid=described).status == "UNREACHABLE"
 
 
+def test_a_pair_that_the_joints_do_not_move_ends_the_search() -> None:
+    """Joint 1, which alone moves link 1, turns the hand and the forearm that it meets alike."""
+    panda, frame = engine("panda"), "panda_link1"
+    avoidance = scene("panda").avoidance(margin=0.0)
+    for q in arm("panda").random(9, 200):
+        pairs = [avoidance.names(each.pair) for each in avoidance.violated(panda, q)]
+        if pairs and not any(name.endswith(("link0", "link1", "table")) for pair in pairs for name in pair):
+            break
+    target = panda.forward_kinematics(arm("panda").random(5), frame)
+    found = panda.inverse_kinematics(target, frame, q, avoid=avoidance)
+    assert found.status == "IN_COLLISION"
+    assert found.restarts == 0
+    assert any(f"{a} and {b} overlap" in found.message for a, b in pairs)
+    assert "the joints that move the frame do not change that" in found.message
+
+
 def test_a_batch_has_the_results_of_its_samples() -> None:
     ur5, described = engine("ur5"), scene("ur5", box("box", (0.3, 0.3, 0.4), pose=Pose((0.4, 0.2, 0.1))))
     targets = ur5.forward_kinematics(arm("ur5").random(3, 12), "ee_link")
