@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import io
 import math
 import socket
 import threading
 from collections.abc import Callable
-from contextlib import AbstractContextManager, redirect_stdout
+from contextlib import AbstractContextManager
 from html import escape
 from typing import Any
 
@@ -16,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, shown
 from dynx.model.configuration import whole_number
-from dynx.viewer.library import viser
+from dynx.viewer.library import silent, viser
 
 DEFAULT_HOST = "127.0.0.1"
 DEFAULT_PORT = 8080
@@ -81,8 +80,7 @@ class Page:
         if wanted > 65535:
             raise ArgumentError(f"port is {wanted}; wanted 0 to 65535")
         self.host, self.port = host, _free_port(host, wanted)
-        # viser prints its addresses and its end, also when it is told not to.
-        with redirect_stdout(io.StringIO()):
+        with silent():
             self._server = viser.ViserServer(self.host, self.port, label=title, verbose=False)
         self._plain, self._dark = plain, dark
         self._furnish()
@@ -204,7 +202,7 @@ class Page:
         self._closed.set()
         self._end_shown()
         # Whoever draws has ended then, or sees that the page is closed.
-        with self.lock, redirect_stdout(io.StringIO()):
+        with self.lock, silent():
             self._server.stop()
 
     def __enter__(self) -> Page:

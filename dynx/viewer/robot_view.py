@@ -15,6 +15,7 @@ from dynx.model.configuration import checked_q
 from dynx.model.topology import longest_chain_end
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
+from dynx.viewer.copy_button import CopyButton
 from dynx.viewer.drawn_robot import AS_DESCRIBED, DrawnRobot, Look, size_of
 from dynx.viewer.following_camera import FollowingCamera
 from dynx.viewer.frame_handle import FrameHandle
@@ -140,6 +141,7 @@ class RobotView:
         except DynxError as error:
             self._message.value = str(error)
         self._code.value = f"q = np.array({q.tolist()})"
+        self._copy.put(self._code.value)
 
     def _slid(self, q: Floats) -> None:
         with self._page.lock, self._page.together():
@@ -208,6 +210,7 @@ class RobotView:
             neutral = gui.add_button("neutral")
             drawn = gui.add_button("random")
             self._code = gui.add_text("as code", "", multiline=True)
+            self._copy = CopyButton(gui, "copy")
         rng = np.random.default_rng(0)
         neutral.on_click(lambda _: self.put(self.model.clip(self.model.neutral())))
         drawn.on_click(lambda _: self.put(self.model.random(rng)))

@@ -7,9 +7,14 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import numpy as np
 import pytest
 
+from dynx.spatial.scalar import Floats
+from dynx.spatial.se3 import homogeneous
+from dynx.spatial.so3 import rotation_from_quat
 from dynx.viewer import Viewer
+from dynx.viewer.drawn_parts import DrawnParts
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
@@ -86,3 +91,15 @@ def connected(viewer: Viewer, count: int = 1) -> list[Any]:
     until(lambda: len(viewer.page.server.get_clients()) >= count, f"{count} connected pages")
     clients = viewer.page.server.get_clients()
     return [clients[k] for k in sorted(clients)]
+
+
+def poses_of_nodes(drawn: DrawnParts) -> dict[str, Floats]:
+    """Return the pose (4, 4) in the world of each part, as a page computes it from its nodes."""
+    poses: dict[str, Floats] = {}
+    for path, (name, node) in sorted((node.name, (name, node)) for name, node in drawn.parts.items()):
+        w, *xyz = node.wxyz
+        T = homogeneous(rotation_from_quat(np.array([*xyz, w])), node.position)
+        over = path.rpartition("/")[0]
+        above = next((poses[each] for each, n in drawn.parts.items() if n.name == over), np.eye(4))
+        poses[name] = above @ T
+    return poses

@@ -93,6 +93,11 @@ def test_sliders_buttons_and_keys_reach_the_program(open_page: OpenPage) -> None
         moved = viewer.view.q
         again.page.get_by_role("button", name="random").click()
         until(lambda: not np.array_equal(viewer.view.q, moved), "the button")
+        again.page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+        again.page.get_by_role("button", name="copy").click()
+        again.page.get_by_role("button", name="copied").wait_for()
+        copied = again.page.evaluate("navigator.clipboard.readText()")
+        assert copied == f"q = np.array({viewer.view.q.tolist()})"
 
         pressed: list[str] = []
         viewer.on_key("k", lambda: pressed.append("k"))
@@ -204,7 +209,8 @@ def test_a_click_names_a_body_of_a_world_and_the_pointer_drags_it(open_page: Ope
         assert pulled() @ [1.0, 1.0, 0.0] > 0.9 * np.sqrt(2.0) * np.linalg.norm(pulled())
         mouse.up()
         until(lambda: not viewer.view._spring.pulls, "the end of the pull")
-        # Chromium's message on viser's own handling of a drag.
+        # A node of viser that can be dragged calls preventDefault on a press of the pointer, for which
+        # react-three-fiber listens passively, so that Chromium says that the call has no effect.
         assert all("passive event listener" in error for error in page.errors)
 
 

@@ -13,31 +13,15 @@ import pytest
 import dynx
 from dynx.errors import ArgumentError
 from dynx.model import Model
-from dynx.spatial.scalar import Floats
-from dynx.spatial.se3 import homogeneous
-from dynx.spatial.so3 import rotation_from_quat
 from dynx.viewer import Viewer, view
-from dynx.viewer.drawn_parts import DrawnParts
 from dynx.viewer.spring import Pull
 from dynx.world import World
 from dynx.world.scene import read_scene
 from tests.conftest import EXAMPLES_INSTALLED, needs_examples
-from tests.viewer.conftest import until
+from tests.viewer.conftest import poses_of_nodes, until
 
 LARGEST_PAGE = 15_000_000
 """Largest size of an exported page of a rollout of 10 s [bytes]."""
-
-
-def poses_of_nodes(drawn: DrawnParts) -> dict[str, Floats]:
-    """Return the pose (4, 4) in the world of each part, as a page computes it from its nodes."""
-    poses: dict[str, Floats] = {}
-    for path, (name, node) in sorted((node.name, (name, node)) for name, node in drawn.parts.items()):
-        w, *xyz = node.wxyz
-        T = homogeneous(rotation_from_quat(np.array([*xyz, w])), node.position)
-        over = path.rpartition("/")[0]
-        above = next((poses[each] for each, n in drawn.parts.items() if n.name == over), np.eye(4))
-        poses[name] = above @ T
-    return poses
 
 
 @pytest.fixture(scope="module")
@@ -153,49 +137,6 @@ def test_a_page_gets_one_message_for_each_joint_that_moves(arm: Model) -> None:
         viewer.view.go_to(0.2)
         # The slider of the time and three plots are the others.
         assert 0 < buffer.message_counter - before <= arm.nv + 4
-
-
-def test_one_page_shows_one_thing_after_another(arm: Model) -> None:
-    rollout = dynx.simulate(arm, duration=0.2)
-    with World(read_scene("stack")) as world, rollout.view(play=True) as viewer:
-        viewer.slider("gain", 0.0, 1.0)
-        url, timeline = viewer.url, viewer.view.timeline
-        viewer.show(world, steps=False)
-        timeline._thread.join(10.0)
-        assert not timeline._thread.is_alive()
-        world.step(10)
-        viewer.update()
-        shown, expected = poses_of_nodes(viewer.view.drawn), world.state.bodies
-        for name, body in expected.items():
-            assert np.allclose(shown[name][:3, 3], body.position, atol=1e-5)
-        viewer.show(arm, q=arm.random(0))
-        assert np.array_equal(viewer.view.q, arm.random(0))
-        assert viewer.url == url
-        with pytest.raises(ArgumentError, match="no option 'play'"):
-            viewer.show(arm, play=True)
-        assert not viewer.page.closed
-    with pytest.raises(ArgumentError, match="is closed"):
-        viewer.show(arm)
-
-
-def test_a_world_with_the_same_parts_replaces_another_below_the_same_controls() -> None:
-    scene = read_scene("stack")
-    with (
-        World(scene) as first,
-        World(scene) as second,
-        World(read_scene("slope")) as other,
-        first.view(steps=False) as viewer,
-    ):
-        button = viewer.view._button
-        second.step(10)
-        assert viewer.view.replace(second)
-        viewer.follow(next(iter(second.state.bodies)))
-        for name, body in second.state.bodies.items():
-            assert np.allclose(viewer.view.drawn.pose(name)[:3, 3], body.position)
-            assert np.allclose(poses_of_nodes(viewer.view.drawn)[name][:3, 3], body.position, atol=1e-5)
-        assert viewer.view._button is button
-        assert not viewer.view.replace(other)
-        assert viewer.view.world is second
 
 
 def test_a_world_is_stepped_in_its_own_time() -> None:

@@ -33,8 +33,8 @@ def open_scene(
         return World(scene, single_engine(engines) or installed_worlds()[0], step)
     chosen = engines or installed_worlds()[: 2 if compare else 1]
     if len(chosen) != (2 if compare else 1):
-        wanted = "two, with --compare" if compare else "one, or two with --compare"
-        raise ArgumentError(f"--engine names {len(chosen)} engines; wanted {wanted}")
+        wanted = "two different ones, with --compare" if compare else "one, or two with --compare"
+        raise ArgumentError(f"--engine names {', '.join(chosen)}; wanted {wanted}")
     time = DEFAULT_DURATION if duration is None else duration
     samples = min(MAX_FRAMES, max(2, round(FRAME_RATE * time)))
     total = round(1e3 * time) * len(chosen)

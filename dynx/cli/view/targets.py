@@ -72,5 +72,5 @@ def load_robot(target: str, base: Base) -> Model:
 def single_engine(engines: tuple[str, ...] | None) -> str | None:
     """Return the engine named, or None; ArgumentError for several."""
     if engines is not None and len(engines) != 1:
-        raise ArgumentError(f"--engine names {len(engines)} engines; wanted one")
+        raise ArgumentError(f"--engine names {', '.join(engines) or 'no engine'}; wanted one")
     return engines[0] if engines else None

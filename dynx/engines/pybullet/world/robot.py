@@ -15,8 +15,10 @@ from dynx.engines.pybullet.world.client import WorldClient
 from dynx.engines.pybullet.world.objects import UNLIMITED, BulletObject
 from dynx.engines.pybullet.world.shapes import ShapeFiles
 from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
+from dynx.model.mechanism import build_mechanism
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.branchless import quat_exp
+from dynx.spatial.extended import longdouble
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross, quat_product, rotation_from_quat
 from dynx.world.layout import Collider, RobotLayout
@@ -57,7 +59,7 @@ class BulletRobot:
             k: (max(float(layout.lower[k]), -UNLIMITED), min(float(layout.upper[k]), UNLIMITED))
             for k in limited
         }
-        mechanism = model.extended_mechanism
+        mechanism = build_mechanism(model, longdouble)
         self.object = BulletObject(client, mechanism, colliders, files, folder, limits)
         self._client = client
         self._coupling = model.mechanism.coupling
@@ -119,23 +121,14 @@ class BulletRobot:
 
     def state(self) -> RobotState:
         """Return the configuration and velocity of the model."""
-        positions, rates = self._joint_states()
+        positions, rates = self.object.joint_states()
+        if self._coupling is not None:
+            positions, rates = [positions[k] for k in self._owners], [rates[k] for k in self._owners]
         if not self._base:
             return RobotState(np.array(positions), np.array(rates))
         q, v = self.object.root.coordinates(self.object.base_state(), self.near)
         self.near = q[3:]
         return RobotState(np.array(q + positions), np.array(v + rates))
-
-    def joint_state(self) -> RobotState:
-        """Return the positions and velocities of the joints of the model."""
-        positions, rates = self._joint_states()
-        return RobotState(np.array(positions), np.array(rates))
-
-    def _joint_states(self) -> tuple[list[float], list[float]]:
-        positions, rates = self.object.joint_states()
-        if self._coupling is not None:
-            return [positions[k] for k in self._owners], [rates[k] for k in self._owners]
-        return positions, rates
 
     # -- forces -------------------------------------------------------------------------------
 
