@@ -1,4 +1,4 @@
-"""The only imports of viser (the page; it prints by rich), fast-simplification (meshes) and Pillow (films)."""
+"""Imports of viser (the page), rich (its prints), fast-simplification (meshes) and Pillow (films)."""
 
 from __future__ import annotations
 

@@ -25,6 +25,9 @@ FRAME_RATE = 60.0
 MAX_FRAMES = 6000
 """Largest number of frames."""
 
+_SAME_TIME = 1e-9
+"""Difference of times that are the same [s]."""
+
 PARTED = 1e-3
 """Distance [m] from which two motions count as parted."""
 
@@ -52,7 +55,7 @@ class Motion:
 
     def frame_at(self, time: float) -> int:
         """Return the number of the last frame whose time is not after `time`."""
-        return max(int(np.searchsorted(self.t, time + 1e-9, side="right")) - 1, 0)
+        return max(int(np.searchsorted(self.t, time + _SAME_TIME, side="right")) - 1, 0)
 
     def at(self, k: int) -> dict[str, Floats]:
         """Return the pose (4, 4) of each part that moves in frame k."""
@@ -124,19 +127,32 @@ def motion_of_run(scene: Scene, run: EngineRun) -> Motion:
 def separation(a: Motion, b: Motion) -> tuple[Floats, tuple[str, ...]]:
     """Return the largest distance (n,) [m] between a part in two motions at the times of `a`, and its name.
 
-    Raises ArgumentError for motions without a common part.
+    Positions of `b` are interpolated linearly between its frames; where `b` has not begun or has ended the
+    distance is NaN. Raises ArgumentError for motions without a common part or without a common time.
     """
     common = [name for name in a.poses if name in b.poses]
     if not common:
         raise ArgumentError(
             f"{a.name} and {b.name} have no part in common: {_some(a.poses)}; {_some(b.poses)}"
         )
-    frames = [b.frame_at(float(time)) for time in a.t]
-    apart = np.array(
-        [np.linalg.norm(a.poses[name][:, :3, 3] - b.poses[name][frames, :3, 3], axis=1) for name in common]
-    )
+    outside = (a.t < b.t[0] - _SAME_TIME) | (a.t > b.t[-1] + _SAME_TIME)
+    if outside.all():
+        raise ArgumentError(
+            f"{a.name} and {b.name} have no time in common: {a.t[0]:g} to {a.t[-1]:g} s; "
+            f"{b.t[0]:g} to {b.t[-1]:g} s"
+        )
+    after = np.clip(np.searchsorted(b.t, a.t), min(1, len(b.t) - 1), len(b.t) - 1)
+    before = np.maximum(after - 1, 0)
+    step = b.t[after] - b.t[before]
+    weight = np.clip(np.divide(a.t - b.t[before], step, out=np.ones(len(a.t)), where=step > 0.0), 0.0, 1.0)
+    apart = np.empty((len(common), len(a.t)))
+    for k, name in enumerate(common):
+        p = b.poses[name][:, :3, 3]
+        there = (1.0 - weight[:, None]) * p[before] + weight[:, None] * p[after]
+        apart[k] = np.linalg.norm(a.poses[name][:, :3, 3] - there, axis=1)
     largest = apart.argmax(axis=0)
-    return apart[largest, np.arange(len(frames))], tuple(common[k] for k in largest.tolist())
+    distance = np.where(outside, np.nan, apart[largest, np.arange(len(a.t))])
+    return distance, tuple(common[k] for k in largest.tolist())
 
 
 def _frames(t: Floats) -> NDArray[np.intp]:

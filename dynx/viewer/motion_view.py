@@ -74,8 +74,8 @@ class MotionView:
         self._curves: list[Curves] = []
         self._add_switches(compare=compare)
         step = float(np.median(np.diff(motion.t))) if len(motion.t) > 1 else 1e-3
-        self.timeline = Timeline(page, float(motion.t[-1]) - self._start, step, self._show, play=play)
-        self._add_curves(curves, compare=compare)
+        self.timeline = Timeline(page, self.duration, step, self._show, play=play)
+        self._add_curves(curves, step, compare=compare)
         self.camera = FollowingCamera(page, self.drawn)
         """The camera of the page."""
         self.names = NamedParts(page, self.drawn.parts, self.drawn.visuals)
@@ -99,9 +99,10 @@ class MotionView:
         return self._start + self.timeline.time
 
     @property
-    def duration(self) -> float | None:
-        """Length of the first motion [s]."""
-        return float(self.motion.t[-1]) - self._start
+    def duration(self) -> float:
+        """Length of the longer motion [s]; the other one stays where it ends."""
+        both = [self.motion] if self.ghost is None else [self.motion, self.ghost]
+        return max(float(each.t[-1]) for each in both) - self._start
 
     def go_to(self, time: float) -> None:
         """Show the motions at a time after their start [s]."""
@@ -179,7 +180,7 @@ class MotionView:
         self.timeline.pause()
         self.timeline.go_to(time)
 
-    def _add_curves(self, curves: Sequence[Series], *, compare: bool) -> None:
+    def _add_curves(self, curves: Sequence[Series], step: float, *, compare: bool) -> None:
         gui = self._page.gui
         if compare and self.ghost is not None:
             distance, farthest = separation(self.motion, self.ghost)
@@ -193,6 +194,12 @@ class MotionView:
                     at = float(self.motion.t[first]) - self._start
                     jump.on_click(lambda _: self._jump_to(at))
                 gui.add_text("they part", f"{text} {1e3 * PARTED:g} mm", disabled=True)
+                ends = {each.name: float(each.t[-1]) for each in (self.motion, self.ghost)}
+                shorter = min(ends, key=lambda name: ends[name])
+                if ends[shorter] < max(ends.values()) - step:
+                    gui.add_text(
+                        "compared", f"until {ends[shorter]:.4g} s, where {shorter} ends", disabled=True
+                    )
                 self._curves.append(
                     Curves(gui, "distance [m]", self.motion.t, distance[:, None], ["largest distance"])
                 )

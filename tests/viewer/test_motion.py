@@ -9,7 +9,18 @@ import pytest
 
 import dynx
 from dynx.errors import ArgumentError
-from dynx.viewer.motion import MAX_FRAMES, motion_of_reference, motion_of_rollout, motion_of_run, separation
+from dynx.spatial.scalar import Floats
+from dynx.viewer.export.film import film_length
+from dynx.viewer.motion import (
+    MAX_FRAMES,
+    Motion,
+    motion_of_reference,
+    motion_of_rollout,
+    motion_of_run,
+    separation,
+)
+from dynx.viewer.motion_view import MotionView
+from dynx.viewer.page import Page
 from dynx.world.comparison import compare_worlds
 from dynx.world.scene import read_scene
 
@@ -60,6 +71,39 @@ def test_the_reference_is_another_motion_of_the_same_parts(rollout: dynx.Rollout
 def test_a_motion_is_not_apart_from_itself(rollout: dynx.Rollout) -> None:
     motion = motion_of_rollout(rollout)
     assert not separation(motion, motion)[0].any()
+
+
+def accelerated(name: str, t: Floats) -> Motion:
+    """Return the motion of a body along x = t^2 [m]."""
+    T = np.tile(np.eye(4), (len(t), 1, 1))
+    T[:, 0, 3] = t**2
+    return Motion(name, t, {"body": T}, {})
+
+
+def test_frames_at_other_times_and_a_shorter_motion_do_not_part() -> None:
+    a, b = accelerated("a", np.linspace(0.0, 2.0, 121)), accelerated("b", np.linspace(0.0, 1.0, 37))
+    for first, second in ((a, b), (b, a)):
+        distance, _ = separation(first, second)
+        # Between frames h apart a line is at most h^2 / 8 of the acceleration from the motion.
+        step = float(np.diff(second.t).max())
+        assert np.nanmax(distance) <= 2.0 * step**2 / 8.0 + 1e-12
+        assert np.array_equal(np.isnan(distance), first.t > 1.0 + 1e-9)
+    with pytest.raises(ArgumentError, match="no time in common: 0 to 1 s; 5 to 6 s"):
+        separation(b, accelerated("later", np.linspace(5.0, 6.0, 10)))
+
+
+def test_the_longer_of_two_motions_is_shown_to_its_end(rollout: dynx.Rollout) -> None:
+    long = motion_of_rollout(rollout, "long")
+    short = replace(long, name="short", t=long.t[:10], poses={n: T[:10] for n, T in long.poses.items()})
+    with Page(port=0) as page:
+        view = MotionView(page, short, long, compare=True)
+        assert view.duration == pytest.approx(long.t[-1] - long.t[0])
+        view.go_to(view.duration)
+        for shown, motion in ((view.drawn, short), (view._ghost_drawn, long)):
+            assert shown is not None
+            for name, T in motion.at(-1).items():
+                assert np.allclose(shown.pose(name), T)
+    assert film_length((short, long)) == film_length((long,)) > film_length((short,))
 
 
 def test_what_is_not_finite_is_refused(rollout: dynx.Rollout) -> None:

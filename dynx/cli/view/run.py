@@ -90,6 +90,6 @@ def _export(viewer: Viewer, path: str) -> None:
     from dynx.viewer.export.film import film_length
 
     film = path.lower().endswith(".gif") and viewer.view.duration
-    total = film_length(viewer.view.motion) if film else 0
+    total = film_length(viewer.view.motions) if film else 0
     with progress_bar(total, words="pictures", enabled=total > 0) as advance:
         viewer.export(path, lambda done: advance(done, "pictures"))

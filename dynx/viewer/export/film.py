@@ -67,27 +67,25 @@ def write_picture(path: str | os.PathLike[str], rgb: NDArray[np.uint8]) -> None:
     write_bytes(path, png_bytes(rgb))
 
 
-def film_length(motion: Motion) -> int:
-    """Return the number of pictures of the film of a motion."""
-    duration = float(motion.t[-1] - motion.t[0])
-    return min(MAX_PICTURES, max(1, round(duration * PICTURES_PER_SECOND)))
+def film_length(motions: tuple[Motion, ...]) -> int:
+    """Return the number of pictures of the film of motions that begin together."""
+    return min(MAX_PICTURES, max(1, round(_duration(motions) * PICTURES_PER_SECOND)))
 
 
 def write_film(
     path: str | os.PathLike[str], motions: tuple[Motion, ...], progress: Progress = lambda _: None
 ) -> None:
-    """Write motions as a GIF file that plays in the time of the first, again and again.
+    """Write motions as a GIF file that plays in the time of the longest, again and again.
 
     Raises ArgumentError for a file that cannot be written.
     """
-    first = motions[0]
-    camera, count = camera_for(first), film_length(first)
+    first, duration = motions[0], _duration(motions)
+    camera, count = camera_for(first), film_length(motions)
     pictures = []
-    for k, time in enumerate(np.linspace(first.t[0], first.t[-1], count).tolist()):
+    for k, time in enumerate(np.linspace(first.t[0], first.t[0] + duration, count).tolist()):
         # One table of colours for all pictures would lose the shades of the later ones.
         pictures.append(Image.fromarray(picture_of(motions, time, camera)).quantize(128))
         progress(k + 1)
-    duration = float(first.t[-1] - first.t[0])
     stream = io.BytesIO()
     pictures[0].save(
         stream,
@@ -98,6 +96,10 @@ def write_film(
         loop=0,
     )
     write_bytes(path, stream.getvalue())
+
+
+def _duration(motions: tuple[Motion, ...]) -> float:
+    return float(max(each.t[-1] for each in motions) - motions[0].t[0])
 
 
 def _shapes(motion: Motion) -> Iterator[tuple[str, Shape, Colour, Floats]]:
