@@ -1,4 +1,4 @@
-"""Steps a second of vector CartPole with parameters of its own in each environment.
+"""Steps a second of vector environments with parameters of its own in each of them.
 
 python -m benchmarks.environments.randomization [--repetitions 5]
 """
@@ -15,12 +15,16 @@ from benchmarks.environments.speed import SIZES, VECTOR, Case, Timing
 
 MASSES = {"mass_scale": {"pole": (0.5, 2.0), "cart": (0.8, 1.2)}}
 FRICTION = {"joint_damping": (0.0, 0.1), "joint_friction": (0.0, 0.1), "delay": (0.0, 0.04)}
-DRAWN: Mapping[str, Mapping[str, Any] | None] = {
-    "none": None,
-    "two masses": MASSES,
-    "two masses, damping, friction, delay": {**MASSES, **FRICTION},
-    "observation noise": {"observation_noise": 0.01},
+PAYLOAD = {"payload": {"frame": "tool0", "mass": (0.0, 3.0), "center": (0.0, 0.0, 0.05)}}
+CASES: Mapping[tuple[str, str], Mapping[str, Any] | None] = {
+    ("CartPole", "none"): None,
+    ("CartPole", "two masses"): MASSES,
+    ("CartPole", "two masses, damping, friction, delay"): {**MASSES, **FRICTION},
+    ("CartPole", "observation noise"): {"observation_noise": 0.01},
+    ("Reach", "none"): None,
+    ("Reach", "payload, damping, friction, delay"): {**PAYLOAD, **FRICTION},
 }
+"""Drawn parameters by task and name."""
 
 
 def main(given: Sequence[str] | None = None) -> None:
@@ -29,24 +33,25 @@ def main(given: Sequence[str] | None = None) -> None:
     parser.add_argument("--repetitions", type=int, default=5)
     repetitions = parser.parse_args(given).repetitions
     timings = {
-        (name, n): Timing(Case("CartPole", name, n, _maker(n, drawn)))
-        for name, drawn in DRAWN.items()
+        (task, name, n): Timing(Case(task, name, n, _maker(task, n, drawn)))
+        for (task, name), drawn in CASES.items()
         for n in SIZES
     }
     for _ in range(repetitions):
         for timing in timings.values():
             timing.repeat()
-    print(f"| drawn | {' | '.join(f'{n:,} environments' for n in SIZES)} |")
-    print("|---|" + "---|" * len(SIZES))
-    for name in DRAWN:
-        print(f"| {name} | {' | '.join(f'{1e-6 / timings[name, n].best:.3g}' for n in SIZES)} |")
+    print(f"| task | drawn | {' | '.join(f'{n:,} environments' for n in SIZES)} |")
+    print("|---|---|" + "---|" * len(SIZES))
+    for task, name in CASES:
+        speeds = [f"{1e-6 / timings[task, name, n].best:.3g}" for n in SIZES]
+        print(f"| {task} | {name} | {' | '.join(speeds)} |")
     for timing in timings.values():
         timing.close()
 
 
-def _maker(n: int, drawn: Mapping[str, Any] | None) -> Any:
+def _maker(task: str, n: int, drawn: Mapping[str, Any] | None) -> Any:
     return lambda: gymnasium.make_vec(
-        "dynx/CartPole-v0", num_envs=n, vectorization_mode=VECTOR, randomize=drawn
+        f"dynx/{task}-v0", num_envs=n, vectorization_mode=VECTOR, randomize=drawn
     )
 
 

@@ -54,6 +54,13 @@ REACH: dict[str, Any] = {
 }
 
 
+PANDA: dict[str, Any] = {
+    "mass_scale": {"panda_link7": (0.5, 2.0), "panda_leftfinger": 2.0},
+    "payload": {"frame": "panda_hand_tcp", "mass": (0.0, 2.0)},
+    "joint_damping": (0.0, 1.0),
+}
+
+
 def words(*numbers: int) -> Any:
     return tuple(np.array([number], dtype=np.uint64) for number in numbers)
 
@@ -162,7 +169,13 @@ def test_each_episode_draws_anew_as_in_a_single_environment(mode: AutoresetMode)
 
 
 @pytest.mark.parametrize(
-    ("task", "drawn"), [(CartPole(), CART_POLE), (Reach(robot="planar_3r"), REACH)], ids=["CartPole", "Reach"]
+    ("task", "drawn"),
+    [
+        (CartPole(), CART_POLE),
+        (Reach(robot="planar_3r"), REACH),
+        (Reach(robot="panda", actions="velocity"), PANDA),
+    ],
+    ids=["CartPole", "Reach", "Panda"],
 )
 def test_the_kernel_takes_the_steps_of_every_engine(task: Any, drawn: Any) -> None:
     n, steps, model = 3, 7, task.model
@@ -171,7 +184,9 @@ def test_the_kernel_takes_the_steps_of_every_engine(task: Any, drawn: Any) -> No
     starts = envs.states
     rng = np.random.default_rng(0)
     discrete = isinstance(task, CartPole)
-    actions: Any = rng.integers(0, 2, (steps, n)) if discrete else rng.uniform(-1.0, 1.0, (steps, n, 3))
+    actions: Any = (
+        rng.integers(0, 2, (steps, n)) if discrete else rng.uniform(-1.0, 1.0, (steps, n, model.nv))
+    )
     found = [envs.step(each) for each in actions]
     for engine in installed_backends():
         with TaskEnvironment(task, engine, randomize=drawn) as env:
