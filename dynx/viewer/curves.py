@@ -19,6 +19,11 @@ MAX_POINTS = 400
 UPDATES_PER_SECOND = 5.0
 """Largest rate at which curves are redrawn while a motion plays."""
 
+_SMALL = 0.05
+"""Values below which a plot shows a power of ten: the numbers at its axis have three decimals."""
+_NOTHING = 1e-12
+"""Values below which they count as zero."""
+
 _LARGEST_LEGEND = 7
 """Number of curves up to which the legend is shown."""
 
@@ -29,8 +34,12 @@ class Curves:
     def __init__(self, gui: Any, title: str, t: Floats, values: Floats, names: Sequence[str]) -> None:
         """`values` (n, m) are those of m quantities `names` at the times t (n,) [s]."""
         picked = np.unique(np.linspace(0, len(t) - 1, min(len(t), MAX_POINTS)).round().astype(int))
-        self._t, self._values = np.ascontiguousarray(t[picked]), np.asarray(values[picked], dtype=np.float64)
+        self._t, self._values = np.ascontiguousarray(t[picked]), np.array(values[picked], dtype=np.float64)
         self._drawn_at = -math.inf
+        power = _power(self._values)
+        if power:
+            self._values *= 10.0**power
+            title = f"{title} x 1e-{power}"
         finite = self._values[np.isfinite(self._values)]
         low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
         margin = 0.05 * (high - low) or max(abs(high), 1.0) * 0.05
@@ -61,6 +70,15 @@ class Curves:
         shown = self._values.copy()
         shown[count:] = np.nan
         return (self._t, *(np.ascontiguousarray(column) for column in shown.T))
+
+
+def _power(values: Floats) -> int:
+    """Return the power of ten by which values are multiplied, so that three decimals show them."""
+    finite = values[np.isfinite(values)]
+    largest = float(np.abs(finite).max(initial=0.0))
+    if largest >= _SMALL or largest < _NOTHING:
+        return 0
+    return 3 * math.ceil(-math.log10(largest) / 3.0)
 
 
 def _series(k: int, name: str) -> Any:

@@ -216,4 +216,8 @@ def _extent(motion: Motion) -> tuple[Floats, Floats]:
 
 
 def _legend(solid: str, ghost: str) -> str:
-    return f"<p>solid: {escape(solid)}<br><b style='color: {css(SKY_BLUE)}'>&#9632;</b> {escape(ghost)}</p>"
+    return (
+        "<p style='margin: 0.2em 0.8em; font-size: 0.8em; overflow-wrap: anywhere'>"
+        f"solid: {escape(solid)}<br><b style='color: {css(SKY_BLUE)}'>&#9632;</b> see-through: "
+        f"{escape(ghost)}</p>"
+    )

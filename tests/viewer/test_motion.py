@@ -10,6 +10,7 @@ import pytest
 import dynx
 from dynx.errors import ArgumentError
 from dynx.spatial.scalar import Floats
+from dynx.viewer.curves import _power
 from dynx.viewer.export.film import film_length
 from dynx.viewer.motion import (
     MAX_FRAMES,
@@ -104,6 +105,13 @@ def test_the_longer_of_two_motions_is_shown_to_its_end(rollout: dynx.Rollout) ->
             for name, T in motion.at(-1).items():
                 assert np.allclose(shown.pose(name), T)
     assert film_length((short, long)) == film_length((long,)) > film_length((short,))
+
+
+@pytest.mark.parametrize(
+    ("largest", "power"), [(2.0, 0), (0.05, 0), (0.02, 3), (1e-3, 3), (4e-5, 6), (3e-14, 0)]
+)
+def test_small_values_of_a_plot_have_a_power_of_ten(largest: float, power: int) -> None:
+    assert _power(np.array([0.0, -largest, np.nan])) == power
 
 
 def test_what_is_not_finite_is_refused(rollout: dynx.Rollout) -> None:
