@@ -15,9 +15,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from dynx.ik.avoidance.avoidance import Avoidance, NearPair
+from dynx.ik.avoidance import Avoidance, NearPair, Pair
 from dynx.ik.avoidance.descent import AvoidingDescent
-from dynx.ik.avoidance.wording import collision_sentence, fixed_sentence
+from dynx.ik.avoidance.wording import FIXED, OF_TARGET, collision_sentence, inevitable_sentence
 from dynx.ik.other_solutions import ProblemSolver, Target, from_closed_form, from_kernel
 from dynx.ik.problem import Problem
 from dynx.ik.result import IKResult
@@ -28,8 +28,11 @@ from dynx.spatial.scalar import Floats
 ROUND = 24
 """Random starts between two rounds of improvement."""
 
-IMPROVED = 4
-"""Most solutions that are improved in a round."""
+IMPROVED, MOST_IMPROVED = 4, 16
+"""Most solutions that are improved in a round, and in all."""
+
+FRAME_REACH = 10.0
+"""Bound [m] on how far a body extends from the frame that it is fixed to, for what tolerances move it."""
 
 _SAME = 1e-6
 """Largest difference of a joint [rad or m] between configurations that count as one."""
@@ -50,8 +53,8 @@ class _Tally:
     count: int = 0
     complete: bool = False
     """Whether these are all solutions of the closed form."""
-    fixed: bool = False
-    """Whether the joints that move the frame do not move the pairs that are too close."""
+    reason: str = ""
+    """Why the pairs that are too close are so in every solution, if that is proved."""
 
     def add(self, candidate: Candidate, violated: list[NearPair]) -> float:
         """Count a solution; return what its distances lack [m]."""
@@ -97,8 +100,8 @@ def clear_solutions(
             assert tally.best is not None
             found, success[k] = tally.best, False
             sentences[k] = (
-                fixed_sentence(avoidance, tally.blockers)
-                if tally.fixed
+                inevitable_sentence(avoidance, tally.blockers, tally.reason)
+                if tally.reason
                 else collision_sentence(
                     avoidance, tally.blockers, tally.pairs, tally.count, complete=tally.complete
                 )
@@ -133,6 +136,12 @@ class _Finder:
         self._kinematics, self._problem, self._avoidance = kinematics, problem, avoidance
         self._search, self._solve_all = search, solve_all
         self._fixed = avoidance.fixed_pairs(problem.coordinates)
+        self._of_target: frozenset[Pair] = frozenset()
+        targets, limits = problem.targets, problem.limits
+        if problem.is_plain and targets.positions is not None and targets.rotations is not None:
+            self._of_target = avoidance.pairs_of_target(problem.coordinates, problem.frame)
+        # Two solutions differ by twice the tolerances.
+        self._slack = 2.0 * (limits.position_tolerance + FRAME_REACH * limits.rotation_tolerance)
 
     def find(
         self, task: Task, target: Target, start: Floats, solution: Floats
@@ -140,7 +149,7 @@ class _Finder:
         """Return a configuration that reaches the target and keeps the margins, or None; and what failed."""
         tally = _Tally()
         descent = AvoidingDescent(task, self._avoidance, self._kinematics, self._problem.coordinates)
-        restarts = -1
+        restarts, improvements = -1, 0
         for solutions, drawn, complete in self._rounds(task, target, start, solution):
             restarts += drawn
             tally.complete = complete
@@ -154,13 +163,15 @@ class _Finder:
                     candidate.restarts = max(restarts, 0)
                     return candidate, tally
                 lacking.append((tally.add(candidate, violated), candidate))
-                hopeless = [each for each in violated if each.pair in self._fixed]
+                hopeless = [each for each in violated if self._is_in_every_solution(each)]
                 if hopeless:
                     candidate.restarts = max(restarts, 0)
-                    tally.best, tally.blockers, tally.fixed = candidate, hopeless, True
+                    tally.best, tally.blockers = candidate, hopeless
+                    tally.reason = FIXED if hopeless[0].pair in self._fixed else OF_TARGET
                     return None, tally
             lacking.sort(key=lambda each: each[0])
-            for _, candidate in lacking[:IMPROVED]:
+            for _, candidate in lacking[: min(IMPROVED, MOST_IMPROVED - improvements)]:
+                improvements += 1
                 if self._is_redundant(task, candidate.q):
                     improved = self._improved(task, descent, candidate, tally)
                     if improved is not None:
@@ -219,6 +230,12 @@ class _Finder:
             return found
         tally.compare(found, violated)
         return None
+
+    def _is_in_every_solution(self, near: NearPair) -> bool:
+        """Return whether a pair is proved to be too close at every configuration that reaches the target."""
+        if near.pair in self._fixed:
+            return near.separation.upper < near.pair.margin
+        return near.pair in self._of_target and near.separation.upper + self._slack < near.pair.margin
 
     def _is_redundant(self, task: Task, q: Floats) -> bool:
         """Return whether the joints can move without moving what the target fixes."""

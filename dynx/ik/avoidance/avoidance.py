@@ -102,6 +102,13 @@ class Avoidance:
         moving = [coordinates.moving(part.frame) for part in self.parts]
         return frozenset(pair for pair in self.pairs if moving[pair.a] == moving[pair.b])
 
+    def pairs_of_target(self, coordinates: FrameCoordinates, frame: str) -> frozenset[Pair]:
+        """Return the pairs whose distance follows from the pose of a frame alone: of a body that is fixed to
+        the frame, and of one that these coordinates do not move."""
+        moving = [coordinates.moving(part.frame) for part in self.parts]
+        wanted = {coordinates.moving(frame), frozenset[int]()}
+        return frozenset(pair for pair in self.pairs if {moving[pair.a], moving[pair.b]} == wanted)
+
     def violated(self, kinematics: Kinematics, q: Floats) -> list[NearPair]:
         """Return the pairs that are not proved to keep their margin at q (nq,)."""
         return [each for each in self.near(kinematics, q) if not each.is_clear]

@@ -8,6 +8,7 @@ are rejected and the damping is raised (Marquardt 1963).
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,8 +34,8 @@ DAMPING, MIN_DAMPING = 0.1, 1e-9
 ACCEPTED_FACTOR, REJECTED_FACTOR, MAX_FACTOR = 0.3, 4.0, 1e6
 """Factors of the damping after an accepted and a rejected step, and the damping per unit that ends."""
 
-MIN_RELATIVE_GAIN = 1e-6
-"""A descent ends when a step reduces the sum of squares by a smaller fraction."""
+WINDOW, REQUIRED_REDUCTION = 4, 0.8
+"""A descent ends unless the sum of squares falls below this fraction of itself within so many steps."""
 
 ROUNDS = 6
 """Most changes of the active set in one step."""
@@ -76,6 +77,7 @@ class AvoidingDescent:
         """Descend from q (nq,); return the configuration, the number of steps, and whether it reaches the
         target and keeps all margins."""
         best, factor, steps = self._state(q), DAMPING, 0
+        recent = deque([best.squared])
         while not best.done and steps < MAX_STEPS and factor <= MAX_FACTOR:
             steps += 1
             trial = self._state(self._moved(best, factor * best.squared + MIN_DAMPING))
@@ -83,9 +85,9 @@ class AvoidingDescent:
             if not (trial.done or gain > 0.0):
                 factor *= REJECTED_FACTOR
                 continue
-            stagnates = gain <= MIN_RELATIVE_GAIN * best.squared
             best, factor = trial, factor * ACCEPTED_FACTOR
-            if stagnates:
+            recent.append(best.squared)
+            if len(recent) > WINDOW and best.squared > REQUIRED_REDUCTION * recent.popleft():
                 break
         return best.q, steps, best.done
 

@@ -62,6 +62,8 @@ class Separation:
 
     lower: float
     """Certified lower bound of the signed distance [m]."""
+    upper: float
+    """Certified upper bound of the signed distance [m]."""
     distance: float
     """Signed distance [m]: negative where the bodies overlap."""
     point_a: Floats
@@ -86,7 +88,7 @@ def separation_of(a: Sequence[PlacedSolid], b: Sequence[PlacedSolid], limit: flo
                 best, limit = found, min(limit, found.distance)
     if best is None:
         return None
-    return Separation(lower, best.distance, best.point_a, best.point_b, best.normal)
+    return Separation(lower, best.upper, best.distance, best.point_a, best.point_b, best.normal)
 
 
 def place(solids: Iterable[Solid], T: Floats | None) -> list[PlacedSolid]:

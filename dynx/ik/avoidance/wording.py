@@ -29,10 +29,15 @@ def collision_sentence(
     return sentence
 
 
-def fixed_sentence(avoidance: Avoidance, blockers: Sequence[NearPair]) -> str:
-    """Return that a pair is too close whatever the joints do that move the frame."""
+FIXED = "the joints that move the frame do not change that"
+OF_TARGET = "so it is in every configuration that reaches the target"
+"""Why a pair is too close in every solution."""
+
+
+def inevitable_sentence(avoidance: Avoidance, blockers: Sequence[NearPair], reason: str) -> str:
+    """Return that a pair is too close in every solution, and the reason."""
     worst = max(blockers, key=lambda each: each.pair.margin - each.separation.lower)
-    return f"{pair_sentence(avoidance, worst)}; the joints that move the frame do not change that"
+    return f"{pair_sentence(avoidance, worst)}; {reason}"
 
 
 def pair_sentence(avoidance: Avoidance, near: NearPair) -> str:

@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 
 import dynx
 from dynx.errors import ArgumentError
+from dynx.ik.avoidance import Avoidance
 from dynx.model import Pose
+from dynx.spatial.scalar import Floats
 from dynx.world import Scene, SceneBody, SceneRobot, Weld, World, box
 from tests.ik.avoidance.scenes import ARMS, ENGINE_ERROR, TABLE, arm, engine, least_room, scene
 
@@ -70,9 +72,9 @@ def test_solutions_keep_their_margins_by_another_engine(name: str) -> None:
     assert counts["REACHED"]
 
 
-def _overlaps(avoidance: dynx.ik.avoidance.Avoidance, q: object, name: str) -> bool:
+def _overlaps(avoidance: Avoidance, q: Floats, name: str) -> bool:
     """Return whether links overlap more than at the neutral configuration, which MuJoCo does not measure."""
-    violated = avoidance.violated(engine(name), np.asarray(q))
+    violated = avoidance.violated(engine(name), q)
     return any(each.pair.margin < 0.0 for each in violated)
 
 
@@ -97,19 +99,51 @@ def test_redundant_joints_move_away_from_an_obstacle() -> None:
 
 @pytest.mark.parametrize("name", ["pinocchio", "compiled"])
 def test_the_bodies_that_prevent_a_solution_are_named(name: str) -> None:
-    """A flange below the table cannot be reached from above, and the target is not called unreachable."""
-    described = scene("ur5")
+    """Behind a wall each solution is blocked; in the table the target itself. Neither is unreachable."""
+    described = scene("ur5", box("wall", (0.02, 3.0, 3.0), pose=Pose((0.35, 0.0, 1.3))))
     with dynx.backend(name, arm("ur5")) as ur5:
         target = np.diag([1.0, -1.0, -1.0, 1.0])
-        target[:3, 3] = 0.4, 0.1, -0.1
-        found = ur5.inverse_kinematics(target, "ee_link", avoid=described)
-        assert found.status == "IN_COLLISION"
-        assert not found
-        assert "of the closed form" in found.message
-        assert "arm/ee_link and table" in found.message or "arm/wrist_3_link and table" in found.message
-        assert found.position_error <= 1e-6
+        target[:3, 3] = 0.6, 0.1, 0.2
+        behind = ur5.inverse_kinematics(target, "ee_link", avoid=described)
+        assert behind.status == "IN_COLLISION"
+        assert not behind
+        every = ur5.inverse_kinematics(target, "ee_link", all_solutions=True)
+        assert "solutions of the closed form" in behind.message
+        assert "and wall" in behind.message
+        assert min(np.abs(np.sin((q - behind.q) / 2.0)).max() for q in every.q) < 1e-6
+        target[:3, 3] = 0.3, 0.1, -0.1
+        sunk = ur5.inverse_kinematics(target, "ee_link", avoid=described)
+        assert sunk.status == "IN_COLLISION"
+        assert sunk.restarts == 0
+        assert "and table" in sunk.message
+        assert "every configuration that reaches the target" in sunk.message
+        assert sunk.position_error <= 1e-6
         target[:3, 3] *= 10.0
         assert ur5.inverse_kinematics(target, "ee_link", avoid=described).status == "UNREACHABLE"
+
+
+def test_what_the_target_decides_holds_for_every_solution() -> None:
+    """Bodies that are fixed to the frame are as close to what does not move in all solutions of a target."""
+    described = scene("ur5", box("box", (0.3, 0.3, 0.3), pose=Pose((0.45, 0.1, 0.2))))
+    avoidance, ur5 = described.avoidance(margin=0.05), engine("ur5")
+    sentences = set()
+    for target in ur5.forward_kinematics(arm("ur5").random(21, 60), "ee_link"):
+        found = ur5.inverse_kinematics(target, "ee_link", avoid=avoidance)
+        every = ur5.inverse_kinematics(target, "ee_link", all_solutions=True)
+        decided = "every configuration that reaches the target" in found.message
+        sentences.add(decided)
+        clear = [avoidance.is_clear(ur5, q) for q in every.q[every.success]]
+        assert found.success == any(clear)
+        if decided:
+            for q in every.q[every.success]:
+                assert any(
+                    "arm/ee_link" in pair or "arm/wrist_3_link" in pair for pair in _violated(avoidance, q)
+                )
+    assert sentences == {True, False}
+
+
+def _violated(avoidance: Avoidance, q: Floats) -> list[tuple[str, str]]:
+    return [avoidance.names(each.pair) for each in avoidance.violated(engine("ur5"), q)]
 
 
 def test_a_pair_that_the_joints_do_not_move_ends_the_search() -> None:
