@@ -80,7 +80,7 @@ TRAINING_FAULTS = (
         "dynx.envs.randomization.draws",
         right="[crc32(name.encode()) for name in self.names]",
         wrong="range(len(self.names))",
-        test_file=DRAWN,
+        test_file="tests/envs/test_draws.py",
         test="test_a_draw_depends_on_its_environment_alone",
     ),
     Fault(
