@@ -36,6 +36,7 @@ from dynx.compiled.looped.kernels import LOOPED, looped_kernel
 from dynx.compiled.paths import PathKernels
 from dynx.compiled.simplification import has_physical_inertias, simplify_mechanism
 from dynx.ik import FrameTarget, IKOptions, IKResult, IKSolutions, Problem, spells_options
+from dynx.ik.secondary import Posture
 from dynx.model import Model
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
 from dynx.simd.image import COMPILE_LOCK
@@ -252,6 +253,17 @@ class CompiledBackend(PathKernels):
 
     def solve_inverse_kinematics(self, problem: Problem) -> IKResult | None:
         """Solve a checked problem by a kernel; return None if none applies (`dynx.compiled.ik.kernels`)."""
+        solver = self._frame_solver(problem)
+        return None if solver is None else solver.solve(problem, self)
+
+    def nearest_solutions(self, problem: Problem, posture: Posture) -> tuple[Floats, IKResult] | None:
+        """Return the objective (count,) and the solutions nearest to a posture, each from its own q0, or None
+        if no kernel applies."""
+        solver = self._frame_solver(problem)
+        return None if solver is None else solver.nearest(problem, posture)
+
+    def _frame_solver(self, problem: Problem) -> FrameSolver | None:
+        """Return the solver for problems of this kind, or None if no kernel applies."""
         self._arguments.refuse_closed()
         if not applies(problem):
             return None
@@ -262,7 +274,7 @@ class CompiledBackend(PathKernels):
                 solver = self._ik_solvers.get(key)
                 if solver is None:
                     solver = self._ik_solvers[key] = frame_solver(self, problem, self._threads)
-        return solver.solve(problem, self)
+        return solver
 
     # -- kernels ------------------------------------------------------------------------------
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -53,19 +53,19 @@ def from_kernel(
     rng: np.random.Generator,
     count: int,
     solve_all: ProblemSolver,
+    others: Sequence[Floats] = (),
 ) -> list[Floats] | None:
-    """Return solutions of a target from random starts, or None if no kernel applies."""
+    """Return solutions of a target from random starts and `others`, or None if no kernel applies."""
     if len(problem.requirements) > 1:
         return None
-    q0 = np.array([problem.coordinates.random(start, rng) for _ in range(count)]).reshape(count, len(start))
-    requirement = replace(problem.requirements[0], targets=Targets(*target))
-    several = replace(
-        problem,
-        requirements=(requirement,),
-        q0=q0,
-        begins_at_q0=True,
-        batch=(count,),
-        limits=replace(problem.limits, max_restarts=0),
-    )
+    draws = [problem.coordinates.random(start, rng) for _ in range(count)]
+    q0 = np.array([*draws, *others]).reshape(-1, len(start))
+    several = replace(one_target(problem, target, q0), limits=replace(problem.limits, max_restarts=0))
     found = solve_all(several)
     return None if found is None else list(found.q[found.success])
+
+
+def one_target(problem: Problem, target: Target, q0: Floats) -> Problem:
+    """Return the problem of one target of a problem for one frame, from several starts (k, nq)."""
+    requirement = replace(problem.requirements[0], targets=Targets(*target))
+    return replace(problem, requirements=(requirement,), q0=q0, begins_at_q0=True, batch=(len(q0),))

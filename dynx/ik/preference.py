@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from dynx.ik.other_solutions import ProblemSolver, from_closed_form, from_kernel
+from dynx.ik.other_solutions import ProblemSolver, Target, from_closed_form, from_kernel, one_target
 from dynx.ik.problem import Problem
 from dynx.ik.result import IKResult
-from dynx.ik.search import Search
-from dynx.ik.secondary import Admissible, Secondary, best_solution
+from dynx.ik.search import Candidate, Search
+from dynx.ik.secondary import Admissible, Posture, Secondary, best_solution
 from dynx.ik.tasks import Kinematics
+from dynx.spatial.scalar import Floats
 
 STARTS = 24
 """Most random starts from which solutions are sought."""
+
+NearestSolver = Callable[[Problem, Posture], "tuple[Floats, IKResult] | None"]
+"""Method ``nearest_solutions`` of kinematics that bring many solutions near to a posture; it returns None for
+a problem that it does not apply to."""
 
 _COLUMNS = ("q", "position_error", "rotation_error", "iterations", "restarts")
 
@@ -36,6 +42,10 @@ def preferred_solutions(
     """
     coordinates, nq = problem.coordinates, kinematics.model.nq
     search, starts = Search(kinematics.model, coordinates, problem.limits), problem.starts()
+    # A kernel knows nothing of what is admissible.
+    nearest_solutions: NearestSolver | None = (
+        getattr(kinematics, "nearest_solutions", None) if is_admissible is None else None
+    )
     goals = None
     if secondary.nearest is not None:
         goals = np.broadcast_to(secondary.nearest, (*problem.batch, nq)).reshape(-1, nq)
@@ -50,16 +60,51 @@ def preferred_solutions(
         goal, rng = None if goals is None else goals[k], np.random.default_rng(problem.rng)
         begins = [q[k]] if goal is None else [coordinates.with_joints_of(starts[k], goal), q[k]]
         known = from_closed_form(kinematics, problem, target, starts[k])
+        is_complete = known is not None
         if known is None and solve_all is not None:
-            known = from_kernel(problem, target, starts[k], rng, count, solve_all)
+            known = from_kernel(problem, target, starts[k], rng, count, solve_all, begins[:-1])
         if known is None:
             known = [coordinates.random(starts[k], rng) for _ in range(count)]
         begins += [coordinates.clipped(each) for each in known]
-        best = best_solution(
-            search, coordinates, task, begins, replace(secondary, nearest=goal), is_admissible
-        )
+        of_sample = replace(secondary, nearest=goal)
+        best = None
+        if nearest_solutions is not None and not is_complete:
+            best = _nearest(problem, target, begins, starts[k], of_sample, nearest_solutions)
+        if best is None:
+            best = best_solution(search, coordinates, task, begins, of_sample, is_admissible)
         q[k], distances[k], angles[k] = best.q, best.position_error, best.rotation_error
         iterations[k] += best.iterations
         restarts[k] += best.restarts
     errors = (column.reshape(problem.batch) for column in (distances, angles, iterations, restarts))
     return replace(first, **dict(zip(_COLUMNS, (q.reshape(first.q.shape), *errors), strict=True)))
+
+
+def _nearest(
+    problem: Problem,
+    target: Target,
+    begins: list[Floats],
+    start: Floats,
+    secondary: Secondary,
+    solve: NearestSolver,
+) -> Candidate | None:
+    """Return the best solution from some that a kernel improves, or None if no kernel applies, or if the
+    objective is no posture."""
+    coordinates = problem.coordinates
+    posture = None if coordinates.floating else secondary.posture(coordinates)
+    if posture is None:
+        return None
+    found = solve(one_target(problem, target, np.array(begins)), posture)
+    if found is None:
+        return None
+    objective, solutions = found
+    best = int(np.argmin(np.where(solutions.success, objective, np.inf)))
+    if not solutions.success[best]:
+        return None
+    # Joints that do not count stay near the start.
+    shift_to = start.copy()
+    counts = posture.weights > 0.0
+    shift_to[np.array(coordinates.indices)[counts]] = posture.goal[counts]
+    q = coordinates.nearest(solutions.q[best], shift_to)
+    errors = float(solutions.position_error[best]), float(solutions.rotation_error[best])
+    steps = int(solutions.iterations.sum())
+    return Candidate(q, *errors, float(objective[best]), True, steps, len(begins) - 1)

@@ -46,6 +46,21 @@ Admissible = Callable[[Floats], bool]
 
 
 @dataclass(frozen=True, eq=False)
+class Posture:
+    """An objective that is a sum of squares: weights (n,) times squared distances of joints from a goal (n,)
+    [rad or m]."""
+
+    goal: Floats
+    weights: Floats
+
+    @property
+    def inverse(self) -> Floats:
+        """Inverse weights (n,), of mean 1; those of joints that do not count are 1."""
+        found = np.where(self.weights > 0.0, 1.0 / np.where(self.weights > 0.0, self.weights, 1.0), 1.0)
+        return np.asarray(found / found.mean())
+
+
+@dataclass(frozen=True, eq=False)
 class Secondary:
     """What a solution is chosen by."""
 
@@ -54,22 +69,26 @@ class Secondary:
     maximize: str | None
     """One of `MAXIMA`, or None."""
 
-    def objective(self, coordinates: FrameCoordinates, task: Task) -> Objective:
-        """Return the objective of one sample."""
+    def posture(self, coordinates: FrameCoordinates) -> Posture | None:
+        """Return the posture of one sample, or None if the objective is no sum of squared distances."""
         if self.nearest is not None:
             goal = coordinates.joint_values(self.nearest)
-            return lambda q: float(np.sum((coordinates.joint_values(q) - goal) ** 2))
+            return Posture(goal, np.ones(len(goal)))
         if self.maximize == "manipulability":
-            return lambda q: -_log_manipulability(task, q)
+            return None
         low, high = coordinates.joint_limits
         bounded = np.isfinite(low) & np.isfinite(high)
-        middle, half = 0.5 * (low[bounded] + high[bounded]), 0.5 * (high[bounded] - low[bounded])
+        middle = np.where(bounded, 0.5 * (np.where(bounded, low, 0.0) + np.where(bounded, high, 0.0)), 0.0)
+        half = np.where(bounded, 0.5 * (np.where(bounded, high, 0.0) - np.where(bounded, low, 0.0)), np.inf)
+        return Posture(middle, np.where(bounded, 1.0 / np.maximum(half, 1e-12) ** 2, 0.0))
 
-        def distance_from_middle(q: Floats) -> float:
-            share = (coordinates.joint_values(q)[bounded] - middle) / np.maximum(half, 1e-12)
-            return float(np.sum(share * share))
-
-        return distance_from_middle
+    def objective(self, coordinates: FrameCoordinates, task: Task) -> Objective:
+        """Return the objective of one sample."""
+        posture = self.posture(coordinates)
+        if posture is None:
+            return lambda q: -_log_manipulability(task, q)
+        goal, weights = posture.goal, posture.weights
+        return lambda q: float(weights @ (coordinates.joint_values(q) - goal) ** 2)
 
 
 def _log_manipulability(task: Task, q: Floats) -> float:

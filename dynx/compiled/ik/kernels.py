@@ -14,6 +14,7 @@ import dynx.ik.tracking.descent
 import dynx.model.mechanism
 import dynx.rbd
 import dynx.spatial
+from dynx.compiled.ik.posture import posture_iteration
 from dynx.compiled.ik.refinement import refinement_iteration
 from dynx.compiled.ik.solver import MAX_RESTARTS, FrameSolver
 from dynx.compiled.ik.starts import StartTable
@@ -75,8 +76,13 @@ def frame_solver(kinematics: Kinematics, problem: Problem, threads: int) -> Fram
         with COMPILE_LOCK:
             return load(refinement_iteration)
 
+    @cache
+    def posture() -> IterationKernel:
+        with COMPILE_LOCK:
+            return load(posture_iteration)
+
     table = StartTable.of(coordinates, kinematics, frame) if kind == POSES else None
-    return FrameSolver(load(solver_iteration), refinement, coordinates, kind, table, threads)
+    return FrameSolver(load(solver_iteration), refinement, posture, coordinates, kind, table, threads)
 
 
 def path_kernel(model: Model, frame: str, kind: TargetKind) -> IterationKernel:

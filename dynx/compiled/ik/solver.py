@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.compiled.ik.pose_call import PoseCall
+from dynx.compiled.ik.posture import MAX_STEPS, SHARE_OF_TOLERANCE, PostureMemory
 from dynx.compiled.ik.race import Race
 from dynx.compiled.ik.refinement import RefinementMemory
 from dynx.compiled.ik.starts import Starts, StartTable
@@ -29,6 +30,7 @@ from dynx.ik import (
     proofs,
 )
 from dynx.ik.coordinates import FrameCoordinates
+from dynx.ik.secondary import Posture
 from dynx.model import Model
 from dynx.simd.iteration import IterationKernel
 from dynx.spatial.scalar import Floats
@@ -48,14 +50,16 @@ class FrameSolver:
         self,
         kernel: IterationKernel,
         refinement: Callable[[], IterationKernel],
+        posture: Callable[[], IterationKernel],
         coordinates: FrameCoordinates,
         kind: TargetKind,
         table: StartTable | None,
         threads: int,
     ) -> None:
-        """`refinement` returns the kernel for targets that are not reached, which is needed only then."""
+        """`refinement` and `posture` return kernels that are needed only for some problems: for targets that
+        are not reached, and for solutions that are to be near to a posture."""
         self._kernel, self._coordinates, self._kind, self._threads = kernel, coordinates, kind, threads
-        self._refinement = refinement
+        self._refinement, self._posture = refinement, posture
         self._memory, self._table = Memory(coordinates.count), table
         self._seeded: tuple[object, Starts | None] = (None, None)
         # Workspaces of single targets that no call uses at the moment.
@@ -89,6 +93,32 @@ class FrameSolver:
         if unreached.any():
             self._refine(rows, np.flatnonzero(unreached), problem, starts)
         return self._result(rows, problem, proof)
+
+    def nearest(self, problem: Problem, posture: Posture) -> tuple[Floats, IKResult]:
+        """Return the objective (count,) and the solutions nearest to a posture, each from its own q0."""
+        n, count = self._coordinates.count, problem.count
+        memory = PostureMemory(n)
+        near = np.broadcast_to(problem.q0, (*problem.batch, problem.q0.shape[-1])).reshape(count, -1)
+        begin = np.ascontiguousarray(near[:, self._coordinates.indices])
+        shared = (posture.goal, posture.weights, posture.inverse)
+        tasks = [begin, np.broadcast_to(memory.initial, (count, len(memory.initial)))]
+        tasks.append(self._kind.rows(problem))
+        tasks += [np.broadcast_to(each, (count, n)) for each in shared]
+        optional = self._kind.optional_values(problem)
+        limits = replace(
+            problem.limits,
+            position_tolerance=SHARE_OF_TOLERANCE * problem.limits.position_tolerance,
+            rotation_tolerance=SHARE_OF_TOLERANCE * problem.limits.rotation_tolerance,
+            max_iterations=MAX_STEPS,
+        )
+        settings = _settings(replace(problem, limits=limits), 0)
+        tasks += [np.broadcast_to(each, (count, len(each))) for each in optional]
+        rows = np.empty((count, memory.n_results))
+        self._posture()(tasks, rows, settings, begin, threads=self._threads)
+        objective = rows[:, n + 4].copy()
+        # In place of the objective: the number of restarts of a result.
+        rows[:, n + 4] = 0.0
+        return objective, self._result(rows, problem, None)
 
     def _result(self, rows: Floats, problem: Problem, proof: NDArray[np.object_] | None) -> IKResult:
         n, batch = self._coordinates.count, problem.batch
