@@ -66,7 +66,9 @@ def checked_avoidance(model: Model, avoid: AvoidanceSource | None) -> Avoidance 
     if avoid is None:
         return None
     if not isinstance(avoid, AvoidanceSource):
-        raise ArgumentError(f"avoid is {shown(avoid)}; wanted a dynx.world.Scene, or Scene.avoidance(...)")
+        raise ArgumentError(
+            f"avoid is {shown(avoid)}; wanted a dynx.world.Scene or World, or its avoidance(...)"
+        )
     return avoid.avoidance_for(model)
 
 

@@ -9,6 +9,8 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError
+from dynx.ik.avoidance import Avoidance
+from dynx.model import Model
 from dynx.model.configuration import positive_seconds, whole_number
 from dynx.model.package_paths import StrPath
 from dynx.registry import view
@@ -24,10 +26,12 @@ from dynx.world.motion import Motion
 from dynx.world.notes.overlaps import Overlap, overlaps_of
 from dynx.world.notes.start_notes import notes_on_engine, notes_on_start
 from dynx.world.preparation import prepare
+from dynx.world.present import scene_at
 from dynx.world.queries import MAX_RAY_LENGTH, Queries
 from dynx.world.registry import renderer_of, world_class
 from dynx.world.running import run_for
 from dynx.world.scene import Scene
+from dynx.world.scene.avoidance import MARGIN
 from dynx.world.scene.paths import ScenePaths
 from dynx.world.scene.reading import scene_from_document
 from dynx.world.scene.writing import scene_document
@@ -309,6 +313,16 @@ class World:
         for each pair of their links at most `within` [m] apart, by `dynx.distance` or, if `native`, by the
         engine."""
         return self._queries.closest_points(self._motion.engine, self.state, a, b, within, native)
+
+    def avoidance(
+        self, robot: str | None = None, *, margin: float = MARGIN, self_margin: float | None = None
+    ) -> Avoidance:
+        """Return what a robot keeps away from, where everything is now (`Scene.avoidance`)."""
+        return scene_at(self.scene, self.state).avoidance(robot, margin=margin, self_margin=self_margin)
+
+    def avoidance_for(self, model: Model) -> Avoidance:
+        """Return what the robot that is `model` keeps away from now, with the default margin."""
+        return scene_at(self.scene, self.state).avoidance_for(model)
 
     def aabb(self, name: str) -> tuple[Floats, Floats]:
         """Return the lower and upper corner (3,) of the box around a part, along the axes of the world."""

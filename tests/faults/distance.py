@@ -69,4 +69,12 @@ DISTANCE_FAULTS = (
         test_file="tests/ik/tracking/test_avoiding.py",
         test="test_redundant_joints_move_around_a_post",
     ),
+    Fault(
+        "avoidance_proof_from_one_solution",
+        "dynx.ik.clear_solutions",
+        right="return near.pair in self._of_target and near",
+        wrong="return near",
+        test_file="tests/ik/avoidance/test_clear_solutions.py",
+        test="test_what_the_target_decides_holds_for_every_solution",
+    ),
 )

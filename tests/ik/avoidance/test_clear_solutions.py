@@ -237,7 +237,7 @@ def test_links_that_are_close_by_the_way_they_are_modelled() -> None:
 @pytest.mark.parametrize(
     ("avoid", "message"),
     [
-        (lambda: "table", "wanted a dynx.world.Scene"),
+        (lambda: "table", "wanted a dynx.world.Scene or World"),
         (lambda: scene("panda"), "none with the joints and links of the backend's"),
         (lambda: _moved(), "at another base pose"),
         (lambda: scene("ur5").avoidance(margin=-0.1), r"margin is '?-0.1"),
@@ -267,6 +267,24 @@ def test_a_scene_of_obstacles_has_the_robot_of_the_backend() -> None:
     with_robot = engine("ur5").inverse_kinematics(target, "ee_link", avoid=scene("ur5"))
     np.testing.assert_array_equal(alone.q, with_robot.q)
     assert alone.status == with_robot.status
+
+
+def test_a_world_is_avoided_as_it_stands() -> None:
+    """A box that starts elsewhere and stands in the way now."""
+    model, ur5 = arm("ur5"), engine("ur5")
+    block = box("block", (0.2, 0.2, 0.2), mass=1.0, pose=Pose((3.0, 0.0, 1.0)))
+    described = Scene(robots=[SceneRobot("arm", model)], bodies=[TABLE, block])
+    q = np.array([0.0, -1.3, 1.6, -1.9, -np.pi / 2, 0.0])
+    target = ur5.forward_kinematics(q, "ee_link")
+    with World(described, "mujoco") as world:
+        assert ur5.inverse_kinematics(target, "ee_link", avoid=world)
+        world.set_state(bodies={"block": (target, np.zeros(6))})
+        found = ur5.inverse_kinematics(target, "ee_link", avoid=world)
+        assert found.status == "IN_COLLISION"
+        assert "and block" in found.message
+        assert ur5.inverse_kinematics(target, "ee_link", avoid=described)
+        world.set_state(robots={"arm": (q, np.zeros(6))})
+        assert {world.avoidance(margin=0.03).names(each.pair) for each in world.avoidance().near(ur5, q)}
 
 
 def test_avoidance_can_be_pickled() -> None:

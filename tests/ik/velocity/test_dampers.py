@@ -132,7 +132,10 @@ def test_pairs_that_cannot_part_are_named() -> None:
 
 @pytest.mark.parametrize(
     ("options", "message"),
-    [({"avoid": "wall"}, "wanted a dynx.world.Scene"), ({"avoid_gain": 200.0}, "at most 1 / dt = 100")],
+    [
+        ({"avoid": "wall"}, "wanted a dynx.world.Scene or World"),
+        ({"avoid_gain": 200.0}, "at most 1 / dt = 100"),
+    ],
     ids=["avoid", "gain"],
 )
 def test_invalid_arguments(options: dict[str, Any], message: str) -> None:
