@@ -69,9 +69,9 @@ class Options:
     of det J J') or ``"limit_distance"`` (minus the sum, over joints with two limits, of the squared distance
     from the middle of the range in units of half the range)."""
     avoid: AvoidanceSource | None = None
-    """What the robot is to keep away from: a `dynx.world.Scene`, or a `World` as it stands now, with a margin of
-    0.01 m; or what their method `avoidance` returns for other margins [m]. Links of the robot keep away from
-    one another as well."""
+    """What the robot is to keep away from: a `dynx.world.Scene`, or a `World` as it stands now, with a margin
+    of 0.01 m; or what their method `avoidance` returns for other margins [m]. Links of the robot keep away
+    from one another as well."""
     max_iterations: int = 50
     """Most steps of each start."""
     max_restarts: int = 200

@@ -11,7 +11,7 @@ from dynx.world.state import WorldState
 
 def scene_at(scene: Scene, state: WorldState) -> Scene:
     """Return the scene with its robots and bodies where they are at a state, at rest."""
-    robots = [replace(robot, q=state.robots[robot.name].q, v=None) for robot in scene.robots]
+    robots = [replace(robot, q=tuple(state.robots[robot.name].q.tolist()), v=None) for robot in scene.robots]
     bodies = [
         body
         if body.fixed
