@@ -85,6 +85,8 @@ def ik(
     if frame is None:
         out.print(default_frame_note(name))
     out.print(_outcome(result), style="green" if result["success"] else "red")
+    if found.note:
+        out.print(found.note)
     table = Table("joint", "q", right=("q",))
     for joint, value in joints.items():
         table.add_row(one_line(joint), number(value))

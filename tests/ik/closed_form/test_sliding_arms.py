@@ -11,7 +11,7 @@ from dynx.backends import backend
 from dynx.ik import closed_form
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
-from tests.ik.closed_form.arms import pose_difference
+from tests.ik.closed_form.arms import arm_of, pose_difference
 from tests.ik.closed_form.sliding_arms import FAMILIES, random_sliding_arm
 
 REACHED = 1e-10
@@ -85,6 +85,26 @@ def test_far_poses_have_no_solution(family: str) -> None:
     found = closed_form(model, "tool").solve(T)
     assert not found.success.any()
     assert np.isfinite(found.q).all()
+
+
+def test_the_stanford_arm_has_eight_solutions() -> None:
+    """Lengths of Paul, Robot Manipulators, 1981: axes 1 and 2 meet, a slide, then a spherical wrist."""
+    x, y, z = np.eye(3)
+    shoulder = np.array([0.0, 0.0, 0.412])
+    wrist = shoulder + 0.154 * y
+    rng = np.random.default_rng(1)
+    axes, points = np.array([z, y, z, z, x, z]), np.array([0.0 * z, shoulder, *[wrist] * 4])
+    model = arm_of(axes, points, "RRPRRR", rng, np.pi)
+    form = closed_form(model, "tool")
+    assert "last three joints meet" in form.family
+    q, T = reachable(model, rng, 50)
+    found = form.solve(T)
+    assert (
+        difference(model, found.q, q[:, None]).min(axis=1, initial=9.0, where=found.success) < FOUND
+    ).all()
+    # The slide may be extended in either direction.
+    assert found.counts.max() == 8
+    assert (found.counts % 4 == 0).all()
 
 
 @pytest.mark.parametrize("family", ["PPPRRR", "RRPR parallel", "RRP wrist, meeting", "PRR wrist"])
