@@ -124,7 +124,8 @@ class ClosedForm:
         configurations do, one stands for them (`IKSolutions.arbitrary`): its arbitrary angle is the one
         nearest to 0 within the limits, or for three parallel axes, if that puts the pose out of reach, the
         nearest within reach. Where the axes meet or are parallel only to `tolerance`, solutions may be missed
-        that close to a singularity or to the edge of the workspace.
+        that close to a singularity or to the edge of the workspace, and where a quartic is solved within some
+        1e-6 rad of a singularity.
 
         Raises ShapeError, DTypeError, NotFiniteError or ArgumentError for an invalid target or q0.
         """
