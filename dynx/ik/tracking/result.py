@@ -46,6 +46,8 @@ class TrackResult:
     """Number of solver steps (..., n)."""
     dt: float | None
     """Time between two samples [s], if velocity limits were kept."""
+    note: str = ""
+    """Sentence on a q0 that was outside the limits and moved into them; empty otherwise."""
 
     @property
     def ok(self) -> NDArray[np.bool_]:
@@ -73,7 +75,7 @@ class TrackResult:
         if self.status.ndim == 1 and not self:
             first = int(np.argmin(self.ok))
             text += f"; the first that is not OK is number {first}, {TrackStatus(self.status[first]).name}"
-        return text
+        return f"{text}; {self.note}" if self.note else text
 
     def __repr__(self) -> str:
         return f"<TrackResult {self.message}>"

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.ik.avoidance import AvoidanceSource
-from dynx.ik.checking import checked_avoidance, checked_margin
+from dynx.ik.checking import checked_avoidance, checked_margin, start_note
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.option_names import checks_option_names
 from dynx.ik.search import SearchLimits
@@ -74,10 +74,11 @@ def track(
     `inverse_kinematics`. Leading axes are paths of their own. `targets` may also be a motion of this robot,
     such as a `dynx.trajectory.Trajectory`, whose poses of `frame` are taken every `dt` [s].
 
-    `q0` (..., nq) is the configuration before the first sample, moved into the limits: a path may be tracked
-    in pieces, each from the last q of the piece before. Without q0 the start is chosen: of up to `max_starts`
-    configurations that reach the first target, the one farthest from position limits from which the whole
-    path is OK; if there is none, the one from which the path is OK longest.
+    `q0` (..., nq) is the configuration before the first sample, moved into the limits (`TrackResult.note`
+    says so): a path may be tracked in pieces, each from the last q of the piece before. Without q0 the start
+    is chosen: of up to `max_starts` configurations that reach the first target, the one farthest from
+    position limits from which the whole path is OK; if there is none, the one from which the path is OK
+    longest.
 
     With `dt` [s], the time between two samples, no coordinate moves faster than `velocity_limit` (one number
     or (nv,) [rad/s or m/s], by default the model's limits), and samples that would need more are LIMITED. The
@@ -170,6 +171,7 @@ def track(
         gathered("jump"),
         gathered("iterations").astype(np.int64),
         seconds,
+        "" if q0 is None else start_note(model, q0),
     )
 
 

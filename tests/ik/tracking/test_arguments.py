@@ -82,3 +82,12 @@ def test_results_print_their_statuses(engine: Backend) -> None:
     assert result.message.startswith("5 samples (3 OK, 2 ")
     assert "the first that is not OK is number 3" in repr(result)
     assert "tracking" in result._repr_html_()
+
+
+def test_a_start_outside_the_limits_is_noted(engine: Backend) -> None:
+    q0 = engine.model.neutral()
+    q0[2] = 99.0
+    found = engine.track(PATH, "flange", q0, jumps=False)
+    assert f"joint3 from 99 to {engine.model.upper[2]:.6g}" in found.note
+    assert found.note in repr(found)
+    assert engine.track(PATH, "flange", jumps=False).note == ""
