@@ -72,6 +72,9 @@ def preferred_solutions(
             best = _nearest(problem, target, begins, starts[k], of_sample, nearest_solutions)
         if best is None:
             best = best_solution(search, coordinates, task, begins, of_sample, is_admissible)
+        if best is None:
+            # Rounding decides at the edge of a tolerance or of a margin: what was found stays.
+            continue
         q[k], distances[k], angles[k] = best.q, best.position_error, best.rotation_error
         iterations[k] += best.iterations
         restarts[k] += best.restarts

@@ -104,8 +104,9 @@ def best_solution(
     starts: list[Floats],
     secondary: Secondary,
     is_admissible: Admissible | None = None,
-) -> Candidate:
-    """Return the best solution from starts (nq,), of which at least one reaches the target, improved."""
+) -> Candidate | None:
+    """Return the best solution from starts (nq,), improved, or None if none of them reaches the target and is
+    admissible."""
     admits = is_admissible or (lambda q: True)
     objective = secondary.objective(coordinates, task)
     shift_to = starts[0] if secondary.nearest is None else secondary.nearest
@@ -123,6 +124,8 @@ def best_solution(
         found, steps, reached = _improved(search, coordinates, task, begin, value, objective, admits)
         iterations += steps
         improved.append((reached, found))
+    if not improved:
+        return None
     best = min(improved, key=lambda each: each[0])[1]
     best.iterations, best.restarts = iterations, len(starts) - 1
     return best
