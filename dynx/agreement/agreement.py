@@ -33,6 +33,7 @@ from dynx.errors import ArgumentError, DynxError
 from dynx.model import Model
 from dynx.model.configuration import whole_number
 from dynx.model.loading import load
+from dynx.option_names import checks_option_names
 
 DEFAULT_SAMPLES = 16
 DEFAULT_REFEREE_SAMPLES = 2
@@ -47,6 +48,7 @@ IDENTITY_SAMPLES = 4
 Progress = Callable[[str], None]
 
 
+@checks_option_names
 def agree(
     model: Model | str | Path,
     backends: Sequence[str | Backend] | None = None,

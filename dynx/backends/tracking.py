@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 from dynx.backends.quantity_calls import QuantityCalls
 from dynx.ik import Kinematics
 from dynx.ik.avoidance import AvoidanceSource
-from dynx.ik.option_names import checks_option_names
 from dynx.ik.tracking import TrackResult, track
 from dynx.ik.tracking.tracker import Motion
 from dynx.ik.velocity import VelocityResult, VelocityTask, velocity_ik
+from dynx.option_names import checks_option_names
 
 
 class PathCalls(QuantityCalls):

@@ -50,6 +50,7 @@ from dynx.model.configuration import checked_base
 from dynx.model.loading import read_description
 from dynx.model.model import Base
 from dynx.model.xml.source import XmlSource
+from dynx.option_names import checks_option_names
 from dynx.rules import LEVELS, Case, Detection, Level, Rule, all_rules
 from dynx.rules.choices import checked_choices
 
@@ -62,6 +63,7 @@ Progress = Callable[[str], None]
 Robot = str | os.PathLike[str] | bytes | Model
 
 
+@checks_option_names
 def diagnose(
     robot: Robot,
     *,

@@ -9,8 +9,8 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, UnknownNameError, shown
-from dynx.ik.option_names import checks_field_names
 from dynx.ik.options import Options
+from dynx.option_names import checks_field_names
 
 
 @checks_field_names

@@ -18,10 +18,12 @@ from dynx.model.package_paths import StrPath, data_folders, environment_folders,
 from dynx.model.urdf.geometry import urdf_geometry
 from dynx.model.urdf.reader import read_urdf
 from dynx.model.xacro_reading import expand_xacro
+from dynx.option_names import checks_option_names
 
 _SUFFIXES = (".urdf", ".xacro", ".xml")
 
 
+@checks_option_names
 def load(
     x: StrPath | bytes | bytearray | Model,
     *,

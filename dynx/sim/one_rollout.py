@@ -12,6 +12,7 @@ from dynx.control.friction import Coefficients
 from dynx.errors import ArgumentError
 from dynx.model import Model
 from dynx.model.package_paths import StrPath
+from dynx.option_names import checks_option_names
 from dynx.registry import DEFAULT_ENGINE
 from dynx.sim.loop.noise import Noise
 from dynx.sim.plants.disturbances import Push
@@ -33,6 +34,7 @@ class RolloutInterrupted(KeyboardInterrupt):
         self.rollout = rollout
 
 
+@checks_option_names
 def simulate(
     model: Model | Scenario | StrPath,
     controller: Controller[Any] | None = None,

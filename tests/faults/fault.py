@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import importlib.util
 from dataclasses import dataclass
 
-ENGINES = {"pybullet": "pybullet", "pinocchio": "pinocchio", "mujoco": "mujoco", "drake": "pydrake"}
-"""Name of an engine in modules and tests -> the top-level module that it is imported as."""
+OPTIONAL = {
+    "pybullet": "pybullet",
+    "pinocchio": "pinocchio",
+    "mujoco": "mujoco",
+    "drake": "pydrake",
+    "tests/training/": "stable_baselines3",
+}
+"""Part of the name of a module or test -> the top-level module that it then needs, and that may be absent."""
 
 
 @dataclass(frozen=True)
@@ -28,12 +35,17 @@ class Fault:
         return f"{self.test_file}::{self.test}"
 
     @property
-    def engine(self) -> str | None:
-        """Module to import for the engine that the fault or its test needs, or None."""
-        for engine, top_level in ENGINES.items():
-            if engine in self.module or engine in self.caught_by:
+    def needs(self) -> str | None:
+        """Top-level module that the fault or its test needs and that may be absent, or None."""
+        for part, top_level in OPTIONAL.items():
+            if part in self.module or part in self.caught_by:
                 return top_level
         return None
+
+    @property
+    def can_be_tried(self) -> bool:
+        """Whether what it needs is installed."""
+        return self.needs is None or importlib.util.find_spec(self.needs) is not None
 
     def faulty_source(self, source: str) -> str:
         """Return the source with the mistake in it; raise ValueError unless it fits exactly once."""

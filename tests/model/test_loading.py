@@ -206,3 +206,9 @@ def test_the_robots_of_pybullet_data_are_found_without_a_folder() -> None:
     found = load(f"package://pybullet_data/{path}", base="floating")
     assert found == load(Path(data.getDataPath()) / path, base="floating")
     assert found.geometry.collisions(found.root)
+
+
+def test_a_misspelt_option_gets_the_nearest_name() -> None:
+    wrong: dict[str, Any] = {"bse": "floating"}
+    with pytest.raises(UnknownNameError, match=r"load has no option 'bse'; did you mean 'base'\?"):
+        load("pendulum", **wrong)

@@ -131,6 +131,6 @@ def train() -> None:
       dynx train CartPole --engine compiled --seed 0,1,2 --plot curve.png
       dynx train LunarLander --engine mujoco --out lander
       dynx train LunarLander --engine mujoco --out lander --resume
-      dynx train CartPole --engine compiled --randomize mass_scale=[0.5,2] --randomize delay=[0,0.04]
+      dynx train CartPole --engine compiled --randomize mass_scale=[0.5,2]
       dynx train Pendulum --algo sac --steps 20000 --set learning_rate=0.001
     """

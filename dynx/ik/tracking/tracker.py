@@ -12,7 +12,6 @@ from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.ik.avoidance import AvoidanceSource
 from dynx.ik.checking import checked_avoidance, checked_margin, start_note
 from dynx.ik.coordinates import FrameCoordinates
-from dynx.ik.option_names import checks_option_names
 from dynx.ik.search import SearchLimits
 from dynx.ik.targets import Targets, checked_targets
 from dynx.ik.tasks import Kinematics
@@ -29,6 +28,7 @@ from dynx.model.configuration import (
     real_array,
     whole_number,
 )
+from dynx.option_names import checks_option_names
 from dynx.spatial.scalar import Floats
 
 MAX_STEPS = 60

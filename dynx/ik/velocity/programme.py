@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.ik.avoidance import AvoidanceSource
-from dynx.ik.option_names import checks_option_names
 from dynx.ik.tasks import Kinematics
 from dynx.ik.velocity.dampers import dampers
 from dynx.ik.velocity.library import solve_programme
@@ -19,6 +18,7 @@ from dynx.ik.velocity.limits import velocity_bounds
 from dynx.ik.velocity.tasks import VelocityTask
 from dynx.model import Model
 from dynx.model.configuration import checked_array, checked_q, is_real, positive_seconds, real_array
+from dynx.option_names import checks_option_names
 from dynx.spatial.scalar import Floats
 
 RELAXED_WEIGHT = 1e4

@@ -19,6 +19,7 @@ from dynx.errors import ArgumentError, shown
 from dynx.model import Model
 from dynx.model.configuration import checked_q, whole_number
 from dynx.model.package_paths import StrPath
+from dynx.option_names import checks_option_names
 from dynx.sim.batch.disturbances import PLACEHOLDER, BatchDisturbances
 from dynx.sim.batch.kernel import FusedStep
 from dynx.sim.batch.part import Part, PartNoise, PartOutcome, StepKernels, pushing
@@ -68,6 +69,7 @@ class BatchInterrupted(KeyboardInterrupt):
         self.rollouts = rollouts
 
 
+@checks_option_names
 def simulate_batch(
     model: Model | Scenario | StrPath,
     controller: Controller[Any] | None = None,
