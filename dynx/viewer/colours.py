@@ -21,9 +21,13 @@ YELLOW: RGB = (240, 228, 66)
 
 SERIES: tuple[RGB, ...] = (BLUE, ORANGE, GREEN, SKY_BLUE)
 """Curves of a plot, in their order; further ones have `DASHES`."""
-DASHES: tuple[tuple[float, ...] | None, ...] = (None, (8.0, 4.0), (2.0, 3.0))
-"""Lengths of strokes and gaps [pixels] of the curves that use the colours for the first, second and third
-time."""
+DASHES: tuple[tuple[str, tuple[float, ...] | None], ...] = (
+    ("solid", None),
+    ("dashed", (8.0, 4.0)),
+    ("dotted", (2.0, 3.0)),
+)
+"""Names, and lengths of strokes and gaps [pixels], of the curves that use the colours for the first, second
+and third time."""
 
 
 def css(colour: RGB) -> str:

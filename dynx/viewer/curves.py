@@ -83,7 +83,8 @@ def _power(values: Floats) -> int:
 
 def _series(k: int, name: str) -> Any:
     """Return the look of the curve with the number k."""
-    stroke, dashes = css(SERIES[k % len(SERIES)]), DASHES[k // len(SERIES) % len(DASHES)]
+    stroke, (look, dashes) = css(SERIES[k % len(SERIES)]), DASHES[k // len(SERIES) % len(DASHES)]
     if dashes is None:
         return uplot.Series(label=name, stroke=stroke, width=2)
-    return uplot.Series(label=name, stroke=stroke, width=2, dash=dashes)
+    # The legend shows only the colour.
+    return uplot.Series(label=f"{name} ({look})", stroke=stroke, width=2, dash=dashes)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from xml.sax.saxutils import quoteattr
 
 from dynx.doctor.counterexample.tree_reductions import Reductions
+from dynx.model.xml.quoting import quoteattr
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.rules.text.number_text import is_number
 

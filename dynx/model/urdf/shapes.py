@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from xml.sax.saxutils import quoteattr
 
 from dynx.errors import DescriptionError, shown
 from dynx.model.elements import Pose
@@ -20,6 +19,7 @@ from dynx.model.geometry import (
     Sphere,
     Visual,
 )
+from dynx.model.xml.quoting import quoteattr
 
 INDENT = "    "
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
-from xml.sax.saxutils import quoteattr
 
 from dynx.errors import DescriptionError
 from dynx.model.elements import Inertial, Joint, JointDynamics, Pose, Vector
 from dynx.model.urdf.joints import FRAME_TAG, LOCKED_TAG
 from dynx.model.urdf.shapes import write_shapes
 from dynx.model.urdf.values import name_fault
+from dynx.model.xml.quoting import quoteattr
 
 if TYPE_CHECKING:
     from dynx.model.model import Model

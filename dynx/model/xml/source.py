@@ -12,9 +12,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from xml.parsers import expat
-from xml.sax.saxutils import quoteattr
 
 from dynx.model.elements import Note
+from dynx.model.xml.quoting import quoteattr
 from dynx.model.xml.reading import repair_of
 from dynx.model.xml.text import TextForm, decode_with_encoding, strip_ends
 

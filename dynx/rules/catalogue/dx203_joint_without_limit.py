@@ -15,9 +15,9 @@ limits. ``--choose DX203=zero`` writes ``lower="0" upper="0"`` instead, the numb
 """
 
 from collections.abc import Iterable
-from xml.sax.saxutils import quoteattr
 
 from dynx.errors import escaped
+from dynx.model.xml.quoting import quoteattr
 from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules import Case, Correction, EditingRule, correction, found_at, measured_on
 from dynx.rules.joints.elements import UNLIMITED, joints_of_type

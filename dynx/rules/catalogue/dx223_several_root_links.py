@@ -16,9 +16,9 @@ that leaves a choice.
 """
 
 from collections.abc import Iterable
-from xml.sax.saxutils import quoteattr
 
 from dynx.errors import shown
+from dynx.model.xml.quoting import quoteattr
 from dynx.model.xml.source import Edit
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.case import end_of

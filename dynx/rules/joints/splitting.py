@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from dynx.model.xml.quoting import quoteattr
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.rules.case import end_of
 from dynx.rules.inertia.massless_links import least_inertial
