@@ -1,21 +1,14 @@
-"""Cache of compiled kernels on disk, shared between processes.
-
-The folder is given by the environment variable ``DYNX_CACHE_DIR``, by default the user's cache folder of
-dynx. ``DYNX_CACHE=0`` switches the cache off; a folder that cannot be written is silently not used. Cached
-code is executed, so a folder that another user owns or may write to is not used either.
+"""Compiled kernels in the cache on disk (`dynx.files.cache`).
 
 The key of an image is the hash of its *recipe* and of everything that turns the recipe into machine code. A
 recipe is any text that determines the program. `program_recipe` derives one from a program; a caller who
-knows a shorter one saves the time of tracing. Each file has a checksum and is written under a temporary
-name first, so that a truncated, altered or unfinished file is never used but compiled again and replaced.
+knows a shorter one saves the time of tracing.
 """
 
 from __future__ import annotations
 
 import contextlib
 import json
-import os
-import stat
 from collections.abc import Callable
 from functools import cache
 from hashlib import sha256
@@ -25,12 +18,10 @@ from types import ModuleType
 from typing import TypeVar
 
 import numpy as np
-import platformdirs
 
 from dynx._version import __version__
-from dynx.errors import ArgumentError, CompileError
-from dynx.files.reading import open_regular
-from dynx.files.writing import write_bytes
+from dynx.errors import CompileError
+from dynx.files.cache import keep, read_cached
 from dynx.simd.call_table import RoutineCode
 from dynx.simd.emit import Settings
 from dynx.simd.image import Code, Image, compile_image, compile_routines
@@ -39,17 +30,7 @@ from dynx.simd.program import Port, Program
 from dynx.simd.routines import RoutineSet
 from dynx.simd.target import Target, compiler_version, host
 
-MAX_CACHE_BYTES = 512 * 2**20
-"""Largest size of the cache [bytes]; beyond it the least recently used files are removed."""
-
-OFF_WORDS = frozenset({"0", "no", "off", "false"})
-"""Values of ``DYNX_CACHE`` that switch the cache off."""
-
 T = TypeVar("T")
-
-_SUFFIX = ".kernel"
-_MAGIC = b"dynx kernel 2\n"
-_DIGEST = 32
 
 
 def load_kernel(
@@ -91,16 +72,13 @@ def load_code(
     link: Callable[[Image], T],
 ) -> T:
     """Link the image of `recipe` from the cache, or that of `compiled()`, which is then stored there."""
-    folder = _cache_folder()
-    if folder is None:
-        return link(compiled())
-    path = folder / (_key(recipe, target, settings) + _SUFFIX)
-    found = _read(path, target)
+    name = f"{_key(recipe, target, settings)}.kernel"
+    found = read_cached(name)
     if found is not None:
         with contextlib.suppress(CompileError):
-            return link(found)
+            return link(_image_of(found, target))
     image = compiled()
-    _write(path, image)
+    keep(name, _content_of(image))
     return link(image)
 
 
@@ -148,77 +126,24 @@ def source_hash(*sources: Path) -> str:
     return digest.hexdigest()
 
 
-# -- files -------------------------------------------------------------------------------------------
-
-
-def _cache_folder() -> Path | None:
-    """Return the cache folder, created if necessary, or None if the cache is off or unusable."""
-    if os.environ.get("DYNX_CACHE", "").strip().lower() in OFF_WORDS:
-        return None
-    given = os.environ.get("DYNX_CACHE_DIR")
-    folder = (Path(given) if given else platformdirs.user_cache_path("dynx")) / "kernels"
-    try:
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        state = folder.stat()
-    except OSError:
-        return None
-    if hasattr(os, "geteuid") and (
-        state.st_uid != os.geteuid() or state.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
-    ):
-        return None
-    return folder if os.access(folder, os.W_OK | os.X_OK) else None
-
-
-def _read(path: Path, target: Target) -> Image | None:
-    """Read the image in a file; None if the file is absent or its checksum is wrong."""
-    try:
-        with open_regular(path) as file:
-            content = file.read()
-        os.utime(path)
-    except OSError:
-        return None
-    start = len(_MAGIC) + _DIGEST
-    digest, body = content[len(_MAGIC) : start], content[start:]
-    if content[: len(_MAGIC)] != _MAGIC or sha256(body).digest() != digest:
-        return None
-    size = int.from_bytes(body[:4], "little")
-    head = json.loads(body[4 : 4 + size])
+def _image_of(content: bytes, target: Target) -> Image:
+    """Return the image in a content of the cache."""
+    size = int.from_bytes(content[:4], "little")
+    head = json.loads(content[4 : 4 + size])
     inputs, outputs = (
         tuple(Port(name, tuple(shape)) for name, shape in head[side]) for side in ("inputs", "outputs")
     )
     ends = [4 + size + end for end in accumulate(head["sizes"], initial=0)]
-    objects = tuple(body[start:end] for start, end in pairwise(ends))
+    objects = tuple(content[start:end] for start, end in pairwise(ends))
     return Image(inputs, outputs, head["lanes"], target, objects)
 
 
-def _write(path: Path, image: Image) -> None:
-    """Write an image atomically; failure to write is ignored."""
+def _content_of(image: Image) -> bytes:
+    """Return an image as a content of the cache."""
     ports = {
         side: [(port.name, port.shape) for port in found]
         for side, found in (("inputs", image.inputs), ("outputs", image.outputs))
     }
     sizes = [len(code) for code in image.objects]
     head = json.dumps({**ports, "lanes": image.lanes, "sizes": sizes}).encode()
-    body = b"".join([len(head).to_bytes(4, "little"), head, *image.objects])
-    # Only the user may read or write it, whatever the umask: it holds code that is run.
-    with contextlib.suppress(ArgumentError, OSError):
-        write_bytes(path, _MAGIC + sha256(body).digest() + body, mode=0o600, sync=False)
-        _evict(path.parent)
-
-
-def _evict(folder: Path) -> None:
-    """Remove the least recently used files until the folder holds at most `MAX_CACHE_BYTES`."""
-    found = []
-    with os.scandir(folder) as entries:
-        for entry in entries:
-            # Another process may remove a file between listing it and reading its state.
-            with contextlib.suppress(FileNotFoundError):
-                state = entry.stat()
-                found.append((state.st_mtime, state.st_size, entry.path))
-    total = sum(size for _, size, _ in found)
-    for _, size, name in sorted(found):
-        if total <= MAX_CACHE_BYTES:
-            return
-        with contextlib.suppress(OSError):
-            os.unlink(name)
-        total -= size
+    return b"".join([len(head).to_bytes(4, "little"), head, *image.objects])

@@ -6,6 +6,7 @@ import copy
 import pickle
 from dataclasses import replace
 from itertools import permutations
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,9 +14,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dynx.backends import Backend, backend
-from dynx.compiled.ik.starts import BOXES, ROTATIONS, Cells
+from dynx.compiled.ik.starts import BOXES, ROTATIONS, STARTS_OF_CELL, Cells, StartTable
 from dynx.errors import ArgumentError, ClosedError
-from dynx.ik import IKResult
+from dynx.files.cache import keep
+from dynx.ik import IKResult, Kinematics
+from dynx.ik.coordinates import FrameCoordinates
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.spatial.scalar import Floats
@@ -53,6 +56,35 @@ def test_a_pose_of_a_batch_has_the_result_that_it_has_alone() -> None:
                 assert_equal(alone, together, k)
         part = engine.inverse_kinematics(targets[5:9], FRAME, max_restarts=20)
         assert_equal(part, together, slice(5, 9))
+
+
+def test_the_table_of_starts_is_kept_in_the_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is made once for all processes, and again where its file is damaged; results are the same bits."""
+    monkeypatch.delenv("DYNX_CACHE", raising=False)
+    monkeypatch.setenv("DYNX_CACHE_DIR", str(tmp_path))
+    made, make = [], StartTable.of
+
+    def counted(coordinates: FrameCoordinates, kinematics: Kinematics, frame: str) -> StartTable:
+        made.append(frame)
+        return make(coordinates, kinematics, frame)
+
+    monkeypatch.setattr(StartTable, "of", counted)
+    results = []
+    for turn in range(4):
+        with backend("compiled", ARM, threads=1) as engine:
+            targets = reachable(engine, 50)
+            results.append(engine.inverse_kinematics(targets, FRAME))
+            assert_equal(engine.inverse_kinematics(targets[7], FRAME), results[0], 7)
+        assert made == [FRAME] * (1 if turn < 2 else turn)
+        (file,) = tmp_path.rglob("*.starts")
+        content = file.read_bytes()
+        if turn == 1:
+            file.write_bytes(content[:-9])
+        elif turn == 2:
+            # A whole file, but of an arm with fewer joints.
+            keep(file.name, bytes(8 * (6 + BOXES**3 * ROTATIONS * STARTS_OF_CELL)))
+    for found in results[1:]:
+        assert_equal(found, results[0])
 
 
 def test_the_result_of_one_target_is_copied_pickled_and_changed_like_others() -> None:

@@ -16,6 +16,7 @@ import platformdirs
 import pytest
 
 import dynx
+from dynx.files.cache import keep
 from dynx.simd import cache
 from dynx.simd.cache import load_kernel, program_recipe, source_hash, source_version
 from dynx.simd.emit import Settings
@@ -150,7 +151,7 @@ def test_code_that_cannot_be_linked_is_replaced(folder: Path) -> None:
     """The checksum is right, but the content is not an object file."""
     image = load_kernel(b"twice", CountedProgram(TWICE)).image
     (path,) = files(folder)
-    cache._write(path, replace(image, objects=(b"nothing of the kind",)))
+    keep(path.name, cache._content_of(replace(image, objects=(b"nothing of the kind",))))
     made = CountedProgram(TWICE)
     assert values(load_kernel(b"twice", made)) == [3.0, 21.0]
     assert made.times == 1
@@ -211,7 +212,7 @@ def test_the_least_recently_used_file_is_evicted(folder: Path, monkeypatch: pyte
     made = CountedProgram(TWICE)
     load_kernel(recipes[0], made)
     assert made.times == 0
-    monkeypatch.setattr(cache, "MAX_CACHE_BYTES", 3 * paths[0].stat().st_size)
+    monkeypatch.setattr("dynx.files.cache.MAX_CACHE_BYTES", 3 * paths[0].stat().st_size)
     load_kernel(b"one more", CountedProgram(TWICE))
     assert len(files(folder)) == 3
     assert {path.exists() for path in (paths[0], paths[4])} == {True}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from hashlib import sha256
 
 import dynx.compiled.ik
 import dynx.compiled.simplification
@@ -21,12 +22,14 @@ from dynx.compiled.ik.starts import StartTable
 from dynx.compiled.ik.step import POSES, TargetKind, solver_iteration
 from dynx.compiled.ik.tracking import tracking_iteration
 from dynx.compiled.simplification import simplify_mechanism
+from dynx.files.cache import keep, read_cached
 from dynx.ik import Kinematics, Problem
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.model import Mechanism, Model
 from dynx.simd.cache import source_version
 from dynx.simd.image import COMPILE_LOCK
 from dynx.simd.iteration import Iteration, IterationKernel, load_iteration
+from dynx.simd.target import host
 
 MAX_JOINTS = 24
 """Most joints between root and frame for which a kernel is compiled, in some seconds."""
@@ -81,7 +84,17 @@ def frame_solver(kinematics: Kinematics, problem: Problem, threads: int) -> Fram
         with COMPILE_LOCK:
             return load(posture_iteration)
 
-    table = StartTable.of(coordinates, kinematics, frame) if kind == POSES else None
+    def start_table() -> StartTable:
+        recipe = repr((_algorithms(), "starts", content, host())).encode()
+        name = f"{sha256(recipe).hexdigest()}.starts"
+        found = read_cached(name)
+        table = None if found is None else StartTable.from_content(found, coordinates.count)
+        if table is None:
+            table = StartTable.of(coordinates, kinematics, frame)
+            keep(name, table.content)
+        return table
+
+    table = start_table() if kind == POSES else None
     return FrameSolver(load(solver_iteration), refinement, posture, coordinates, kind, table, threads)
 
 

@@ -1,8 +1,9 @@
 """Starts of the solver: configurations whose poses are near the target, then random ones.
 
-A table is made once for a frame from the poses of random configurations. Poses are divided into cells: boxes
-of the frame's position, times the 24 rotations of a cube, of which one is nearest to the frame's axes. Each
-cell has a few starts; a target begins at those of its own cell. Finding a cell takes a few comparisons.
+A table is made once for a frame from the poses of random configurations, and kept in the cache on disk.
+Poses are divided into cells: boxes of the frame's position, times the 24 rotations of a cube, of which one is
+nearest to the frame's axes. Each cell has a few starts; a target begins at those of its own cell. Finding a
+cell takes a few comparisons.
 """
 
 from __future__ import annotations
@@ -113,6 +114,19 @@ class StartTable:
         rows = coordinates.starts(rng, BOXES**3 * ROTATIONS * STARTS_OF_CELL)
         rows[cell[order][kept] * STARTS_OF_CELL + place[kept]] = samples[order][kept]
         return cls(cells, rows)
+
+    @classmethod
+    def from_content(cls, content: bytes, joints: int) -> StartTable | None:
+        """Return the table that `content` made, for a number of joints; None if it is of another size."""
+        if len(content) != 8 * (6 + BOXES**3 * ROTATIONS * STARTS_OF_CELL * joints):
+            return None
+        numbers = np.frombuffer(content)
+        return cls(Cells(numbers[:3], numbers[3:6]), numbers[6:].reshape(-1, joints))
+
+    @property
+    def content(self) -> bytes:
+        """All numbers, as the cache on disk keeps them."""
+        return np.concatenate([self.cells.corner, self.cells.per_metre, self.rows.ravel()]).tobytes()
 
 
 @dataclass(frozen=True, eq=False)
