@@ -61,6 +61,18 @@ def read_file(path: str) -> bytes:
     return data
 
 
+def irregularity(path: str | os.PathLike[str]) -> str:
+    """Return what a path leads to, such as "is a FIFO; wanted a regular file"; empty for a regular file, and
+    where nothing is there."""
+    try:
+        _require_regular(os.stat(path))
+    except NotRegularError as error:
+        return str(error.strerror)
+    except (OSError, ValueError):
+        pass
+    return ""
+
+
 def checked_path(path: object) -> str:
     """Return a path as a str. Raises ArgumentError for anything but a str, bytes or an `os.PathLike`."""
     try:

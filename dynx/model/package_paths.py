@@ -8,6 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from dynx.errors import DescriptionError, shown
+from dynx.files.reading import irregularity
 
 StrPath = str | os.PathLike[str]
 
@@ -60,5 +61,8 @@ def resolve_package(uri: str, roots: Iterable[StrPath]) -> Path:
     if not found.is_relative_to(package):
         raise DescriptionError(f"{shown(uri)} leaves the package {shown(name)}, which is not allowed")
     if not found.is_file():
+        other = irregularity(found)
+        if other:
+            raise DescriptionError(f"{shown(uri)} {other}")
         raise DescriptionError(f"{shown(uri)} does not exist: no file {shown(inside)} in {package}")
     return found

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from dynx._version import __version__
 from dynx.errors import ArgumentError, shown
 from dynx.files.documents import convert_document, json_text, to_json_values
+from dynx.files.reading import irregularity
 from dynx.files.writing import atomic_file
 from dynx.training.environments import CLIPPED_AT, make
 from dynx.training.library import (
@@ -121,7 +122,7 @@ def read_policy_document(path: str | os.PathLike[str]) -> PolicyDocument:
     """
     where = shown(os.fspath(path), 300)
     if not Path(path).is_file():
-        raise ArgumentError(f"{where}: there is no such file")
+        raise ArgumentError(f"{where}: {irregularity(path) or 'there is no such file'}")
     try:
         with zipfile.ZipFile(path) as archive:
             if DOCUMENT not in archive.namelist():

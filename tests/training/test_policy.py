@@ -93,6 +93,8 @@ def test_files_that_are_no_policy_are_refused(trained: Path, tmp_path: Path) -> 
             load_policy(path)
     with pytest.raises(ArgumentError, match="there is no such file"):
         load_policy(tmp_path / "none.zip")
+    with pytest.raises(ArgumentError, match="is a directory; wanted a file"):
+        load_policy(tmp_path)
     without = {name: each for name, each in parts.items() if name != "dynx.json"}
     with pytest.raises(ArgumentError, match="was not written by dynx train"):
         load_policy(written(tmp_path / "plain.zip", without))

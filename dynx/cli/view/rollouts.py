@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from dynx.errors import ArgumentError, DynxError, RobotNotFoundError, shown
+from dynx.files.reading import irregularity
 from dynx.model import Model
 from dynx.model.elements import Joint
 from dynx.model.geometry import Geometry
@@ -26,8 +27,8 @@ def read_rollout(path: str, shapes: str | None) -> Rollout:
     one: the file came from anyone, so it does not choose which files are read.
     """
     if not os.path.isfile(path):
-        what = "it is a folder" if os.path.isdir(path) else "there is none"
-        raise RobotNotFoundError(f"no file {shown(path, 300)}: {what}")
+        other = irregularity(path)
+        raise RobotNotFoundError(f"no file {shown(path, 300)}: {other or 'there is none'}")
     rollout = Rollout.load(path)
     model = rollout.model
     if shapes is None:

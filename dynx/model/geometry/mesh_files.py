@@ -10,6 +10,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 from dynx.errors import DescriptionError, nearest, shown
+from dynx.files.reading import irregularity
 from dynx.model.package_paths import StrPath, environment_folders, find_package, resolve_package
 
 _PACKAGE_FILES = ("package.xml", "manifest.xml")
@@ -103,6 +104,9 @@ def _existing(path: Path, root: Path, described: str) -> Path | None:
         return None
     if real.is_file():
         return real
+    other = irregularity(real)
+    if other:
+        raise MeshNotFoundError(f"{described} {other}")
     # A path such as "." leads to the root itself, and what lies beside that is not listed.
     hint = _similar(real) if real != root else ""
     raise MeshNotFoundError(f"no file {described}{hint}")

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from dynx.errors import DescriptionError, nearest, shown
+from dynx.files.reading import irregularity
 from dynx.model.geometry.mesh_files import enclosing_folder
 from dynx.model.library import example_roots, own_roots
 from dynx.model.package_paths import StrPath, data_folders, resolve_package
@@ -38,6 +39,9 @@ class ScenePaths:
             raise DescriptionError(
                 f"{what} is {shown(name, 200)}, outside the folder of the scene (see package_dirs)"
             )
+        other = irregularity(found)
+        if other:
+            raise DescriptionError(f"{what} is {shown(name, 200)}, which {other}")
         if not found.is_file():
             hint = nearest(found.name, sorted(os.listdir(found.parent))) if found.parent.is_dir() else ""
             raise DescriptionError(f"{what} is {shown(name, 200)}, which is no file{hint}")

@@ -120,6 +120,11 @@ def test_damaged_rollouts_are_told(saved: str, tmp_path: Path) -> None:
     code, output = run(str(damaged))
     assert code == BAD_INPUT
     assert "damaged.npz" in output
+    folder = tmp_path / "folder.npz"
+    folder.mkdir()
+    code, output = run(str(folder))
+    assert code == BAD_INPUT
+    assert "is a directory; wanted a file" in output
 
 
 def test_a_port_that_is_taken_is_told() -> None:

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from dynx.errors import DescriptionError
 from dynx.model.geometry import mesh_files
 from dynx.model.geometry.mesh_files import MeshNotFoundError, find_mesh
+from dynx.model.package_paths import resolve_package
 from dynx.rules.geometry.meshes import mesh_box
 
 
@@ -171,3 +173,11 @@ def test_names_of_no_file_are_missed(robot: Path, name: str) -> None:
 def test_a_fifo_is_not_opened(robot: Path) -> None:
     os.mkfifo(robot.parent / "pipe.stl")
     assert mesh_box(robot.parent / "pipe.stl") is None
+    with pytest.raises(MeshNotFoundError, match=r"^'pipe\.stl' is a FIFO; wanted a regular file$"):
+        find_mesh("pipe.stl", str(robot))
+    os.mkfifo(robot.parents[1] / "meshes/pipe.stl")
+    uri = "package://arm_description/meshes/pipe.stl"
+    with pytest.raises(MeshNotFoundError, match=r"^'meshes/pipe\.stl' in package '.*' is a FIFO"):
+        find_mesh(uri, str(robot))
+    with pytest.raises(DescriptionError, match=r"pipe\.stl' is a FIFO"):
+        resolve_package(uri, [robot.parents[2]])
