@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import runpy
 from pathlib import Path
 
@@ -58,3 +59,13 @@ def test_tables_of_contacts_have_every_verdict() -> None:
     )
     assert "| three | `sliding` | a \\| b |" in parts["lacking"]
     assert "falls (order 1.0), 4.0e-02 .. 1.0e-02" in parts["figures"]
+
+
+@pytest.mark.parametrize("name", ["README.md", "docs/doctor.md"])
+def test_the_danger_of_xacro_files_is_stated(name: str) -> None:
+    """They are programs: xacro evaluates Python expressions in them."""
+    words = " ".join((DOCS.parent / name).read_text(encoding="utf-8").split())
+    assert re.search(
+        "evaluates expressions of (a|the) file as Python code[,:] (so )?expand only files that you trust",
+        words,
+    )
