@@ -56,6 +56,22 @@ def test_the_document_has_the_shape_of_the_schema() -> None:
     assert "2 robots" in result.stderr
 
 
+def test_the_document_is_a_summary_unless_every_row_is_asked_for() -> None:
+    options = ["pendulum", "--samples", "3", "--jobs", "1", "--seed", "1"]
+    options += ["--backends", "reference,compiled", "--json", "-"]
+    short = CliRunner().invoke(cli, ["agree", *options]).stdout
+    whole = CliRunner().invoke(cli, ["agree", *options, "--json-samples"]).stdout
+    assert len(short) < 0.2 * len(whole)
+    (summary,), (everything,) = (json.loads(text)["results"] for text in (short, whole))
+    assert set(summary) == set(everything)
+    rows = everything["quantities"]
+    assert all("worst_sample" in row for row in rows)
+    for row in summary["quantities"]:
+        same = [each for each in rows if (each["quantity"], each["pair"]) == (row["quantity"], row["pair"])]
+        assert row["max_rel_error"] == max(each["max_rel_error"] for each in same)
+    assert {row["quantity"] for row in summary["quantities"]} == {row["quantity"] for row in rows}
+
+
 def test_a_directory_means_every_urdf_below_it_sorted(tmp_path: Path) -> None:
     (tmp_path / "b").mkdir()
     (tmp_path / "c.urdf").mkdir()
