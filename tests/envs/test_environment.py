@@ -11,10 +11,8 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium import spaces
-from gymnasium.utils.env_checker import check_env
 
 import dynx.envs  # noqa: F401  (registers the environments)
-from dynx.backends import installed_backends
 from dynx.envs.actions import checked_action
 from dynx.envs.environment import TaskEnvironment
 from dynx.envs.robot.state import State
@@ -45,14 +43,6 @@ def test_ids_are_registered_with_time_limits() -> None:
     inner: Any = found.unwrapped
     assert inner.task.pole_mass == 0.2
     found.close()
-
-
-@pytest.mark.parametrize("engine", installed_backends())
-def test_checkers_find_nothing(engine: str, recwarn: pytest.WarningsRecorder) -> None:
-    made = gymnasium.make("dynx/CartPole-v0", engine=engine).unwrapped
-    check_env(made, skip_render_check=True)
-    made.close()
-    assert not recwarn.list
 
 
 def test_pictures_are_drawn_without_a_display() -> None:

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-import gymnasium
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env
 
 import dynx.envs  # noqa: F401  (registers the environments)
 from dynx.envs.environment import TaskEnvironment
@@ -33,14 +31,6 @@ def engine(request: pytest.FixtureRequest) -> str:
 def env(request: pytest.FixtureRequest, engine: str) -> Iterator[TaskEnvironment]:
     with TaskEnvironment(request.param, engine) as made:
         yield made
-
-
-def test_checkers_find_nothing(env: TaskEnvironment, recwarn: pytest.WarningsRecorder) -> None:
-    name = f"dynx/{type(env.task).__name__}-v0"
-    made = gymnasium.make(name, engine=env.engine)
-    check_env(made.unwrapped, skip_render_check=True)
-    made.close()
-    assert not recwarn.list
 
 
 def test_episodes_after_a_seed_are_the_same_bits(env: TaskEnvironment) -> None:
