@@ -18,6 +18,7 @@ from dynx.model.mechanism import Mechanism, build_mechanism
 from dynx.model.number_bounds import refuse_unbounded_numbers
 from dynx.model.urdf.writer import write_urdf
 from dynx.registry import view
+from dynx.spatial.extended import longdouble
 from dynx.spatial.scalar import Floats
 
 Base = Literal["fixed", "floating"]
@@ -208,6 +209,11 @@ class Model:
         return build_mechanism(self)
 
     to_urdf = write_urdf
+
+    @cached_property
+    def extended_mechanism(self) -> Mechanism:
+        """`mechanism` with its inertias merged in extended precision (`dynx.spatial.extended`)."""
+        return build_mechanism(self, longdouble)
 
     def with_base(self, base: Base) -> Model:
         """Return the same robot with that kind of base; `base_pose` is kept for a fixed base only, because a

@@ -183,3 +183,19 @@ def test_half_a_turn_has_a_logarithm() -> None:
     """The scalar part is exactly zero, by which a formula for small angles would divide."""
     for axis in np.eye(3):
         assert_same_to_rounding(quat_log(np.append(axis, 0.0)), math.pi * axis, 2)
+
+
+def test_one_rotation_has_the_quaternion_of_a_batch() -> None:
+    """Right angles, tiny angles and matrices that are no rotations included, to the last bit."""
+    rng = np.random.default_rng(0)
+    R = np.concatenate(
+        [
+            Rotation.random(500, random_state=1).as_matrix(),
+            Rotation.from_rotvec(1e-9 * rng.normal(size=(50, 3))).as_matrix(),
+            Rotation.from_euler("xyz", 0.5 * np.pi * rng.integers(-2, 3, (100, 3))).as_matrix(),
+            rng.normal(size=(100, 3, 3)),
+        ]
+    )
+    single = np.array([quat_from_rotation(each) for each in R])
+    assert single.tobytes() == quat_from_rotation(R).tobytes()
+    assert np.isnan(quat_from_rotation(np.full((3, 3), np.nan))).all()

@@ -22,9 +22,7 @@ from dynx.engines.pybullet.robot import BulletRobot
 from dynx.errors import ArgumentError, ClosedError, EngineError
 from dynx.model import Model
 from dynx.model.configuration import checked_array
-from dynx.model.mechanism import build_mechanism
 from dynx.rbd.jacobians import Reference
-from dynx.spatial.extended import longdouble
 from dynx.spatial.scalar import Floats
 
 MIN_RESIDUAL_TO_REFINE = 1e-13
@@ -61,7 +59,7 @@ class PyBulletBackend(Backend):
         super().__init__(model, validate=validate)
         engine = bullet()
         self._lock = RLock()
-        mechanism = build_mechanism(model, longdouble)
+        mechanism = model.extended_mechanism
         self._ballast = ballast_for(mechanism)
         self._has_ballast = any(load != Ballast() for load in self._ballast)
         copies = (1, 2) if self._has_ballast else (0,)

@@ -24,11 +24,9 @@ from dynx.engines.pybullet.root_frame import BaseState, RootFrame
 from dynx.engines.pybullet.stepping import SteppingClient
 from dynx.errors import EngineLimitError, UnsupportedFeatureError
 from dynx.model import Model
-from dynx.model.mechanism import build_mechanism
 from dynx.sim.plants.disturbances import Disturbances, DisturbedAcceleration
 from dynx.sim.plants.friction_solver import FrictionSolver
 from dynx.sim.plants.plant import Plant, StepResult
-from dynx.spatial.extended import longdouble
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross, rotate_back, rotation_from_quat
 
@@ -48,7 +46,7 @@ class BulletPlant(Plant):
     def __init__(self, model: Model, disturbances: Disturbances, dt: float, *, substeps: int = 1) -> None:
         """Raises EngineLimitError for a robot with an inertia that Bullet's stepper does not accept."""
         super().__init__(model, disturbances, dt, substeps=substeps)
-        mechanism = build_mechanism(model, longdouble)
+        mechanism = model.extended_mechanism
         ballast = ballast_for(mechanism)
         if any(load.mass or load.rotational for load in ballast):
             raise EngineLimitError(

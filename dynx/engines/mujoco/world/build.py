@@ -27,8 +27,7 @@ from dynx.engines.mujoco.world.materials import ContactMaterials
 from dynx.engines.mujoco.world.options import constraint_reference, limit_reference, set_options
 from dynx.engines.mujoco.world.shapes import ShapeBuilder
 from dynx.errors import EngineLimitError
-from dynx.model.mechanism import ROOT, build_mechanism
-from dynx.spatial.extended import longdouble
+from dynx.model.mechanism import ROOT
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.world.layout import WORLD, Layout, Owner, RobotLayout
@@ -127,7 +126,7 @@ def build_scene(layout: Layout, dt: float, settings: Mapping[str, Any]) -> Built
 def _add_robot(spec: Any, number: int, robot: RobotLayout, carriers: Carriers) -> None:
     """Add the bodies of a robot, named by its number and theirs; that of a fixed base is at the world's
     origin."""
-    mechanism = build_mechanism(robot.model, longdouble)
+    mechanism = robot.model.extended_mechanism
     root = spec.worldbody.add_body(name=f"r{number}.{ROOT}")
     set_substitute_inertia(root)
     if mechanism.floating:
@@ -231,7 +230,7 @@ def _write_inertias(model: Any, layout: Layout) -> None:
     model.body_ipos[:] = 0.0
     model.body_iquat[:] = [1.0, 0.0, 0.0, 0.0]
     for number, robot in enumerate(layout.robots):
-        mechanism = build_mechanism(robot.model, longdouble)
+        mechanism = robot.model.extended_mechanism
         inertias = [mechanism.root, *(body.inertia for body in mechanism.bodies)]
         centered = mechanism.floating and mechanism.root.mass != 0.0
         for index, inertia in enumerate(inertias, ROOT):

@@ -15,10 +15,8 @@ from dynx.engines.pybullet.world.client import WorldClient
 from dynx.engines.pybullet.world.objects import UNLIMITED, BulletObject
 from dynx.engines.pybullet.world.shapes import ShapeFiles
 from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
-from dynx.model.mechanism import build_mechanism
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.branchless import quat_exp
-from dynx.spatial.extended import longdouble
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross, quat_product, rotation_from_quat
 from dynx.world.layout import Collider, RobotLayout
@@ -59,7 +57,7 @@ class BulletRobot:
             k: (max(float(layout.lower[k]), -UNLIMITED), min(float(layout.upper[k]), UNLIMITED))
             for k in limited
         }
-        mechanism = build_mechanism(model, longdouble)
+        mechanism = model.extended_mechanism
         self.object = BulletObject(client, mechanism, colliders, files, folder, limits)
         self._client = client
         self._coupling = model.mechanism.coupling

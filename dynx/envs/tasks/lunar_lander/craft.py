@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -122,9 +122,10 @@ def _leg(name: str, side: float) -> str:
     return link + _joint(f"{name}_hip", "revolute", BODY, f"{name}_leg", "0 -1 0", lower, upper)
 
 
-@cache
-def lander_model() -> Model:
-    """Return the lander: joints x, z, angle, right_hip, left_hip."""
+@lru_cache(maxsize=8)
+def lander_model(gravity: float = -10.0) -> Model:
+    """Return the lander: joints x, z, angle, right_hip, left_hip; always the same object for one gravity
+    [m/s^2], so that what a world computes of it is computed once."""
     (top, top_z), (side, side_z), (_, bottom_z) = HULL[5], HULL[4], HULL[3]
     # Two boxes with the corners of the body's six-cornered outline.
     boxes = _box(0.0, bottom_z / 2, 2 * side, side_z - bottom_z) + _box(0.0, top_z / 2, 2 * top, top_z)
@@ -137,7 +138,8 @@ def lander_model() -> Model:
         + _joint("angle", "continuous", "z_slide", BODY, "0 -1 0", -far, far)
         + f'<link name="{BODY}">{body}{boxes}</link>'
         + "".join(_leg(name, side) for name, side in zip(LEGS, (1.0, -1.0), strict=True))
-        + "</robot>"
+        + "</robot>",
+        gravity=(0.0, 0.0, gravity),
     )
 
 
@@ -190,7 +192,7 @@ def lander_scene(
     """
     robot = SceneRobot(
         LANDER,
-        lander_model(),
+        lander_model(gravity),
         q=(0.0, START_HEIGHT, 0.0, LEG_START, -LEG_START),
         v=(*velocity, 0.0, 0.0),
         material=Material(friction=HULL_FRICTION),
