@@ -118,6 +118,7 @@ class Commands:
         frames, pushes = self._sort_wrenches(wrenches)
         motored = frozenset(k for k, loads in enumerate(self._loads) if loads.has_motors)
         repeated = motored | frames.keys()
+        of_joints = {k for k in motored - frames.keys() if self._loads[k].depends_on_joints}
         constant = [torque for torque in self._held if torque[0] not in repeated]
         self._forget_steps(motored)
         begun = False
@@ -129,8 +130,11 @@ class Commands:
                 self._command(engine, commands)
             acting = constant.copy()
             for k in repeated:
-                q, v = engine.robot_state(k)
-                tau = self._loads[k].torque(q, v, held[k][1] if k in held else None, frames.get(k, ()))
+                loads, given = self._loads[k], held[k][1] if k in held else None
+                if k in of_joints:
+                    tau = loads.torque_of_joints(*engine.joint_state(k), given)
+                else:
+                    tau = loads.torque(*engine.robot_state(k), given, frames.get(k, ()))
                 entries = tau.tolist()
                 # A finite sum has finite entries; of few numbers, Python's is the fastest.
                 if not isfinite(sum(entries)) and not np.isfinite(tau).all():

@@ -113,6 +113,13 @@ class WorldEngine(ABC):
     def robot_state(self, robot: int) -> RobotState:
         """Return new arrays q (nq,), v (nv,); NaN or infinity where the engine has diverged."""
 
+    def joint_state(self, robot: int) -> RobotState:
+        """Return new arrays of the positions and velocities (n,) of the joints of `robot_state`, which motors
+        read before every step: that of a base may take longer than the joints'."""
+        q, v = self.robot_state(robot)
+        floating = self.layout.robots[robot].model.floating
+        return RobotState(q[7:], v[6:]) if floating else RobotState(q, v)
+
     @abstractmethod
     def body_state(self, body: int) -> BodyState:
         """Return new arrays, as `robot_state` does."""

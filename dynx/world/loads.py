@@ -97,6 +97,11 @@ class RobotLoads:
         return bool(self._motors)
 
     @property
+    def depends_on_joints(self) -> bool:
+        """True if the motors depend on positions and velocities of joints alone, not on the whole motion."""
+        return bool(self._motors) and not self._law.implicit
+
+    @property
     def law(self) -> tuple[JointLaw | None, Floats | None]:
         """Law of the motors, and 1 for the joints where it holds at the end of a step, else 0."""
         return (self._law, self._implicit_joints) if self._motors else (None, None)
@@ -125,18 +130,31 @@ class RobotLoads:
             return total
         return self._with_motors(q, v, total)
 
+    def torque_of_joints(self, positions: Floats, rates: Floats, tau: Floats | None) -> Floats:
+        """Return `torque` without wrenches where the motors depend on the joints alone, whose positions and
+        velocities (n,) are given."""
+        total: Floats = (self._nothing if tau is None else tau).copy()
+        total[self._base :] += self._saturated(self._motor_torque(positions, rates))
+        return total
+
+    def _motor_torque(self, positions: Floats, rates: Floats) -> Floats:
+        law = self._law
+        return law.torque + law.kp * (law.target - positions) + law.kd * (law.velocity - rates)
+
+    def _saturated(self, motor: Floats) -> Floats:
+        if not self._saturates:
+            return motor
+        return np.minimum(np.maximum(motor, -self._law.max_force), self._law.max_force)
+
     def _with_motors(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        law, base = self._law, self._base
+        base = self._base
         rates = v[base:]
-        positions = q[7:] if base else q
-        motor = law.torque + law.kp * (law.target - positions) + law.kd * (law.velocity - rates)
-        if law.implicit:
+        motor = self._motor_torque(q[7:] if base else q, rates)
+        if self._law.implicit:
             motor = self._implicit(q, v, tau, motor - self._ahead * rates)
-        if self._saturates:
-            motor = np.minimum(np.maximum(motor, -law.max_force), law.max_force)
         total: Floats = tau.copy()
-        total[base:] += motor
-        if law.implicit:
+        total[base:] += self._saturated(motor)
+        if self._law.implicit:
             self.memory = (v, total)
         return total
 

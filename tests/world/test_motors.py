@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import dynx
+from dynx import Pose
 from dynx.model import Inertial, Joint, Link, Model
 from dynx.world import (
     PDMotor,
@@ -126,3 +127,22 @@ def prepare_robot(model: Model) -> RobotLayout:
     return prepare(
         scene, collisions=False, joint_limits=False, joint_damping=False, joint_friction=False
     ).robots[0]
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+def test_motors_read_the_joints_of_the_state(engine: str) -> None:
+    """Mimic joints and a floating base included, and after steps."""
+    robots = (
+        SceneRobot("arm", dynx.load("panda"), q=tuple(dynx.load("panda").clip(np.zeros(8)))),
+        SceneRobot("dog", dynx.load("solo12", base="floating")).at(Pose((3.0, 0.0, 1.0))),
+        SceneRobot("hand", dynx.load("panda", base="floating")).at(Pose((-3.0, 0.0, 1.0))),
+    )
+    with World(Scene("s", robots=robots), engine) as world:
+        world.step(5, motors={robot.name: PDMotor(0.1, 1.0, 0.1) for robot in robots})
+        for k, robot in enumerate(robots):
+            state = world.state.robots[robot.name]
+            base = robot.model.floating
+            joints = world._motion.engine.joint_state(k)
+            np.testing.assert_allclose(joints.q, state.q[7 * base :], rtol=0.0, atol=1e-15)
+            np.testing.assert_allclose(joints.v, state.v[6 * base :], rtol=0.0, atol=1e-15)
+            assert np.abs(joints.v).max() > 0.0

@@ -43,6 +43,7 @@ class RobotCoordinates:
         self._coupling = mechanism.coupling
         self._q: Floats = data.qpos[first[0] : first[0] + mechanism.nq]
         self._v: Floats = data.qvel[first[1] : first[1] + mechanism.nv]
+        self._joint_q, self._joint_v = (self._q[7:], self._v[6:]) if model.floating else (self._q, self._v)
         self.applied: Floats = data.qfrc_applied[first[1] : first[1] + mechanism.nv]
         """Generalised forces of MuJoCo that act in the next steps, of the tree."""
         if self._coupling is not None:
@@ -67,6 +68,13 @@ class RobotCoordinates:
             q[:7] = x - ahead[0], y - ahead[1], z - ahead[2], qx, qy, qz, qw
             v[:3] = minus_cross(rotate_back(R, base_v[:3]), base_v[3:], c)
         return RobotState(q, v)
+
+    def read_joints(self) -> RobotState:
+        """Return new arrays of the positions and velocities of the joints of the model."""
+        if self._coupling is not None:
+            q, v = self.read()
+            return RobotState(q[7:], v[6:]) if self._floating else RobotState(q, v)
+        return RobotState(self._joint_q.copy(), self._joint_v.copy())
 
     def write(self, q: Floats, v: Floats) -> None:
         """Set the state from q, v in the coordinates of the model."""

@@ -139,6 +139,9 @@ class MujocoWorld(WorldEngine):
     def robot_state(self, robot: int) -> RobotState:
         return self._robots[robot].read()
 
+    def joint_state(self, robot: int) -> RobotState:
+        return self._robots[robot].read_joints()
+
     def body_state(self, body: int) -> BodyState:
         if body in self._bodies:
             return self._bodies[body].read()

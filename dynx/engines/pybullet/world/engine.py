@@ -148,6 +148,9 @@ class BulletWorld(WorldEngine):
     def robot_state(self, robot: int) -> RobotState:
         return self._robots[robot].state()
 
+    def joint_state(self, robot: int) -> RobotState:
+        return self._robots[robot].joint_state()
+
     def body_state(self, body: int) -> BodyState:
         return self._bodies[body].state()
 

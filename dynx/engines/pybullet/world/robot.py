@@ -119,14 +119,23 @@ class BulletRobot:
 
     def state(self) -> RobotState:
         """Return the configuration and velocity of the model."""
-        positions, rates = self.object.joint_states()
-        if self._coupling is not None:
-            positions, rates = [positions[k] for k in self._owners], [rates[k] for k in self._owners]
+        positions, rates = self._joint_states()
         if not self._base:
             return RobotState(np.array(positions), np.array(rates))
         q, v = self.object.root.coordinates(self.object.base_state(), self.near)
         self.near = q[3:]
         return RobotState(np.array(q + positions), np.array(v + rates))
+
+    def joint_state(self) -> RobotState:
+        """Return the positions and velocities of the joints of the model."""
+        positions, rates = self._joint_states()
+        return RobotState(np.array(positions), np.array(rates))
+
+    def _joint_states(self) -> tuple[list[float], list[float]]:
+        positions, rates = self.object.joint_states()
+        if self._coupling is not None:
+            return [positions[k] for k in self._owners], [rates[k] for k in self._owners]
+        return positions, rates
 
     # -- forces -------------------------------------------------------------------------------
 
