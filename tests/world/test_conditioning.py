@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -62,3 +64,24 @@ def test_a_usual_robot_is_not() -> None:
         model = dynx.load(name, base="floating")
         assert singular_direction(model, model.neutral()) is None
     assert singular_direction(dynx.load("free_body"), np.zeros(0)) is None
+
+
+def test_results_that_are_kept_are_of_the_configuration_and_the_robot() -> None:
+    model = dynx.load("planar_2r")
+    massless = replace(
+        model, links=tuple(replace(each, inertial=None) if k else each for k, each in enumerate(model.links))
+    )
+    q = np.array([0.3, 0.6])
+    for _ in range(2):
+        assert singular_direction(model, q) is None
+        assert singular_direction(massless, q) is not None
+    romeo = dynx.load("romeo")
+    first, again = (singular_direction(romeo, romeo.neutral()) for _ in range(2))
+    assert first is not None
+    assert again is not None
+    assert np.array_equal(first[1], again[1])
+    with pytest.raises(ValueError, match="read-only"):
+        first[1][0] = 1.0
+    elsewhere = singular_direction(romeo, romeo.neutral() + 0.3)
+    assert elsewhere is not None
+    assert not np.array_equal(first[1], elsewhere[1])

@@ -9,6 +9,9 @@ milliseconds.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import lru_cache
+
 import numpy as np
 
 from dynx.model import Model
@@ -21,13 +24,36 @@ MIN_SINGULAR_CONDITION = 1e10
 """Condition number of a mass matrix, with its diagonal scaled to 1, from which it is conspicuous."""
 
 
+MAX_KNOWN = 16
+"""Number of configurations whose result is kept: a world asks twice as it opens, and environments open worlds
+with the same robot at the same configuration again and again."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Key:
+    """Mechanism as a key, equal only to the same object: comparing its arrays would take longer."""
+
+    mechanism: Mechanism
+
+    def __hash__(self) -> int:
+        return id(self.mechanism)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Key) and other.mechanism is self.mechanism
+
+
 def singular_direction(model: Model, q: Floats) -> tuple[float, Floats] | None:
     """Return the condition number of the mass matrix of all joints, mimic joints included, with its diagonal
     scaled to 1, and the direction of its smallest eigenvalue; None below `MIN_SINGULAR_CONDITION`."""
     mechanism = model.mechanism
     if not mechanism.nv:
         return None
-    M = mass_matrix_of_floats(mechanism, mechanism.tree_q(q))
+    return _singular_direction(_Key(mechanism), _floats(mechanism.tree_q(q)).tobytes())
+
+
+@lru_cache(MAX_KNOWN)
+def _singular_direction(key: _Key, q: bytes) -> tuple[float, Floats] | None:
+    M = mass_matrix_of_floats(key.mechanism, np.frombuffer(q))
     d = 1.0 / np.sqrt(np.maximum(M.diagonal(), np.finfo(float).tiny))
     scaled = d[:, None] * M * d
     if condition_bound(scaled) < MIN_SINGULAR_CONDITION:
@@ -35,7 +61,11 @@ def singular_direction(model: Model, q: Floats) -> tuple[float, Floats] | None:
     sizes, directions = np.linalg.eigh(scaled)
     smallest = max(float(sizes[0]), 0.0)
     condition = float(sizes[-1]) / smallest if smallest else np.inf
-    return None if condition <= MIN_SINGULAR_CONDITION else (condition, directions[:, 0])
+    if condition <= MIN_SINGULAR_CONDITION:
+        return None
+    direction = directions[:, 0].copy()
+    direction.flags.writeable = False
+    return condition, direction
 
 
 def condition_bound(A: Floats) -> float:

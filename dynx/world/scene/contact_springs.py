@@ -9,6 +9,7 @@ time is at a random part of the last step's way below it, so the restitution is 
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -20,7 +21,11 @@ PHASES = 64
 
 BISECTIONS = 40
 
+MAX_KNOWN = 256
+"""Number of results that are kept: worlds are opened again and again with the same materials and step."""
 
+
+@lru_cache(MAX_KNOWN)
 def restitution_of(ratio: float, step: float) -> float:
     """Return the restitution of a contact with a damping ratio; `step` is the product of step and natural
     frequency.
@@ -45,6 +50,7 @@ def restitution_of(ratio: float, step: float) -> float:
     return float(v.mean())
 
 
+@lru_cache(MAX_KNOWN)
 def damping_ratio(restitution: float, step: float) -> float:
     """Return the damping ratio of a contact with this restitution, or with the nearest that it can have.
 

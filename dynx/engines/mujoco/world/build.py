@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dynx.backends.solvability import Solvability
-from dynx.engines.mujoco.library import mujoco, silent_data
+from dynx.engines.mujoco.library import mujoco, silence_warnings, silent_data
 from dynx.engines.mujoco.tree import MAX_NV, quat_wxyz, set_substitute_inertia
 from dynx.engines.mujoco.world.coordinates import root_center
 from dynx.engines.mujoco.world.filters import collision_masks, pairs_to_exclude
@@ -41,11 +41,13 @@ WELD_TORQUE_WEIGHT = 10
 class BuiltScene:
     """A compiled scene and where to find its parts in it.
 
-    `robots` are the first index of q and v of each robot; `bodies` MuJoCo's number of each body of the scene;
-    `geom_collider` the collider of each geom, and `collider_geoms` the geoms of each collider.
+    `data` is that of the model, at its reference configuration. `robots` are the first index of q and v of
+    each robot; `bodies` MuJoCo's number of each body of the scene; `geom_collider` the collider of each geom,
+    and `collider_geoms` the geoms of each collider.
     """
 
     model: Any
+    data: Any
     robots: tuple[tuple[int, int], ...]
     bodies: tuple[int, ...]
     geom_collider: tuple[int, ...]
@@ -107,7 +109,11 @@ def build_scene(layout: Layout, dt: float, settings: Mapping[str, Any]) -> Built
     model = spec.compile()
     _write_inertias(model, layout)
     _write_joints(model, layout, settings, dt)
-    mujoco.mj_setConst(model, silent_data(model))
+    data = silent_data(model)
+    mujoco.mj_setConst(model, data)
+    # Memory for a second set of data takes longer to get than this takes.
+    mujoco.mj_resetData(model, data)
+    silence_warnings(data)
     geoms = tuple(
         tuple(model.geom(f"{number}.{k}").id for k in range(len(collider.shapes)))
         for number, collider in enumerate(layout.colliders)
@@ -115,6 +121,7 @@ def build_scene(layout: Layout, dt: float, settings: Mapping[str, Any]) -> Built
     owner = {geom: number for number, found in enumerate(geoms) for geom in found}
     return BuiltScene(
         model,
+        data,
         tuple(_first_indices(model, number, robot) for number, robot in enumerate(layout.robots)),
         tuple(model.body(f"b{number}").id for number in range(len(layout.bodies))),
         tuple(owner[geom] for geom in range(model.ngeom)),

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from dynx.engines.mujoco.library import mujoco, silence_warnings
+from dynx.engines.mujoco.library import mujoco
 from dynx.engines.mujoco.world.build import build_scene
 from dynx.engines.mujoco.world.coordinates import BodyCoordinates, RobotCoordinates
 from dynx.engines.mujoco.world.mimics import CoupledRobot
@@ -53,8 +53,7 @@ class MujocoWorld(WorldEngine):
         self.closed = False
         built = build_scene(layout, dt, settings)
         self._built, self._model = built, built.model
-        self._data = data = mujoco.MjData(built.model)
-        silence_warnings(data)
+        self._data = data = built.data
         self._warnings = data.warning.number
         self._robots = [
             RobotCoordinates(data, robot.model, first)
