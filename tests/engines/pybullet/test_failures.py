@@ -36,6 +36,8 @@ def test_the_engine_s_exceptions_become_engine_errors() -> None:
         with pytest.raises(EngineError, match="mixed") as caught:
             call()
         assert caught.value.__cause__ is not None
+    # Otherwise it would disconnect a later client with the same number, whenever it is garbage-collected.
+    engine.close()
 
 
 def test_after_a_failed_step_the_engine_is_opened_anew() -> None:
@@ -47,6 +49,7 @@ def test_after_a_failed_step_the_engine_is_opened_anew() -> None:
     with pytest.raises(EngineError):
         engine.forward_dynamics(q, v, x)
     np.testing.assert_array_equal(engine.forward_dynamics(q, v, x), wanted)
+    engine.close()
 
 
 @pytest.mark.parametrize(
