@@ -19,6 +19,9 @@ MAX_POINTS = 400
 UPDATES_PER_SECOND = 5.0
 """Largest rate at which curves are redrawn while a motion plays."""
 
+VALUES_PER_SECOND = 20_000.0
+"""Largest number of values of one plot that are sent a second while a motion plays."""
+
 _SMALL = 0.05
 """Values below which a plot shows a power of ten: the numbers at its axis have three decimals."""
 _NOTHING = 1e-12
@@ -36,6 +39,7 @@ class Curves:
         picked = np.unique(np.linspace(0, len(t) - 1, min(len(t), MAX_POINTS)).round().astype(int))
         self._t, self._values = np.ascontiguousarray(t[picked]), np.array(values[picked], dtype=np.float64)
         self._drawn_at = -math.inf
+        self._period = max(1.0 / UPDATES_PER_SECOND, self._values.size / VALUES_PER_SECOND)
         power = _power(self._values)
         if power:
             self._values *= 10.0**power
@@ -61,7 +65,7 @@ class Curves:
     def put(self, now: float, *, at_once: bool = False) -> None:
         """Draw the curves up to the time `now` [s]; not more often than the page can follow, or `at_once`."""
         clock = time.monotonic()
-        if not at_once and clock - self._drawn_at < 1.0 / UPDATES_PER_SECOND:
+        if not at_once and clock - self._drawn_at < self._period:
             return
         self._drawn_at = clock
         self._plot.data = self._data(int(np.searchsorted(self._t, now + 1e-9, side="right")))

@@ -1,10 +1,14 @@
-"""Imports of viser (the page), rich (its prints), fast-simplification (meshes) and Pillow (films)."""
+"""Imports of viser (the page), rich (its prints), fast-simplification (meshes) and Pillow (films), and the
+start of viser's server."""
 
 from __future__ import annotations
 
 import io
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout
+from pathlib import Path
+from typing import Any
 
 import rich
 
@@ -18,7 +22,12 @@ try:
 except ImportError as error:
     raise NotInstalledError(f"the viewer needs viser: pip install 'dynx[viewer]' ({error})") from error
 
-__all__ = ["HOTKEYS", "Image", "silent", "simplify", "uplot", "viser"]
+__all__ = ["CLIENT", "HOTKEYS", "Image", "serve", "silent", "simplify", "uplot"]
+
+CLIENT = Path(viser.__file__).parent / "client" / "build" / "index.html"
+"""The page of viser."""
+
+_starting = threading.Lock()
 
 HOTKEYS = (
     *(chr(code) for code in range(ord("A"), ord("Z") + 1)),
@@ -43,3 +52,16 @@ def silent() -> Iterator[None]:
             yield
     finally:
         console.quiet = before
+
+
+def serve(host: str, port: int, title: str, folder: Path) -> Any:
+    """Start a server of viser, with the page in a folder instead of its own."""
+    infra: Any = viser.infra
+    with _starting, silent():
+        # viser takes no folder, so the class that serves it is replaced while the server starts.
+        original = infra.WebsockServer
+        infra.WebsockServer = lambda **given: original(**{**given, "http_server_root": folder})
+        try:
+            return viser.ViserServer(host, port, label=title, verbose=False)
+        finally:
+            infra.WebsockServer = original

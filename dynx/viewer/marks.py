@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -11,6 +12,7 @@ from dynx.model import Model
 from dynx.model.elements import Inertial
 from dynx.model.geometry import Box, Sphere
 from dynx.spatial.scalar import Floats
+from dynx.viewer.browser.client import names_element
 from dynx.viewer.colours import BLUE, RGB, SKY_BLUE, VERMILION, YELLOW
 from dynx.viewer.drawn_parts import wxyz
 from dynx.viewer.drawn_robot import DrawnRobot, size_of
@@ -141,14 +143,17 @@ class Marks:
 
 
 class NamedParts:
-    """The name of at most one part, beside its origin; it moves with the part."""
+    """The names of parts: that under the pointer, and that of at most one part that was clicked, which stays
+    beside its origin and moves with it."""
 
     def __init__(self, page: Page, parts: Mapping[str, Any], visuals: Mapping[str, Sequence[Any]]) -> None:
         """`parts` are the nodes of parts, and `visuals` those of their shapes, which are clicked."""
         self._page, self._parts = page, parts
         self._label: Any = None
         self.shown: str | None = None
-        """The part whose name is shown."""
+        """The part whose name stays."""
+        names = {node.name: name for name, nodes in visuals.items() for node in nodes}
+        self._names = page.gui.add_html(names_element(names), order=math.inf)
         for name, nodes in visuals.items():
             for node in nodes:
                 node.on_click(lambda _, name=name: self.show(None if name == self.shown else name))
@@ -162,3 +167,8 @@ class NamedParts:
             self.shown = part
             if part is not None:
                 self._label = self._page.scene.add_label(f"{self._parts[part].name}/name", part)
+
+    def remove(self) -> None:
+        """Remove the names from the page."""
+        self.show(None)
+        self._names.remove()

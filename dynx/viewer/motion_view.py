@@ -79,7 +79,7 @@ class MotionView:
         self.camera = FollowingCamera(page, self.drawn)
         """The camera of the page."""
         self.names = NamedParts(page, self.drawn.parts, self.drawn.visuals)
-        """The name of the part that was clicked."""
+        """The names of the part under the pointer and of that which was clicked."""
         page.look_at(0.5 * (low + high), 1.3 * self._size)
 
     @property

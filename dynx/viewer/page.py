@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, shown
 from dynx.model.configuration import whole_number
-from dynx.viewer.library import silent, viser
+from dynx.viewer.browser.client import Client
+from dynx.viewer.library import serve, silent
 
 DEFAULT_HOST = "127.0.0.1"
 DEFAULT_PORT = 8080
@@ -70,8 +71,8 @@ class Page:
         plain: bool = False,
     ) -> None:
         """`plain` is what software draws fastest: one lamp and a sky, without shadows, instead of viser's
-        surroundings and four lamps, whose reflections take most of the time of a picture, and a ground of
-        lines instead of a shader.
+        surroundings and four lamps, whose reflections take most of the time of a picture, a ground of lines
+        instead of a shader, and no antialiasing.
 
         Raises ArgumentError for a port that is taken and a host that is not of this machine."""
         if not isinstance(host, str) or not host:
@@ -80,8 +81,8 @@ class Page:
         if wanted > 65535:
             raise ArgumentError(f"port is {wanted}; wanted 0 to 65535")
         self.host, self.port = host, _free_port(host, wanted)
-        with silent():
-            self._server = viser.ViserServer(self.host, self.port, label=title, verbose=False)
+        self._client = Client(antialiasing=not plain)
+        self._server = serve(self.host, self.port, title, self._client.folder)
         self._plain, self._dark = plain, dark
         self._furnish()
         self._server.on_client_connect(_make_room_on_narrow)
@@ -204,6 +205,7 @@ class Page:
         # Whoever draws has ended then, or sees that the page is closed.
         with self.lock, silent():
             self._server.stop()
+        self._client.remove()
 
     def __enter__(self) -> Page:
         return self

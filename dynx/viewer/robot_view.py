@@ -15,7 +15,7 @@ from dynx.model.configuration import checked_q
 from dynx.model.topology import longest_chain_end
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
-from dynx.viewer.copy_button import CopyButton
+from dynx.viewer.browser.copy_button import CopyButton
 from dynx.viewer.drawn_robot import AS_DESCRIBED, DrawnRobot, Look, size_of
 from dynx.viewer.following_camera import FollowingCamera
 from dynx.viewer.frame_handle import FrameHandle
@@ -73,7 +73,7 @@ class RobotView:
         self.camera = FollowingCamera(page, self.robot)
         """The camera of the page."""
         self.names = NamedParts(page, self.robot.links, self.robot.visuals)
-        """The name of the part that was clicked."""
+        """The names of the part under the pointer and of that which was clicked."""
         self._handle.put(start)
         self._show(start)
         origins = np.array([self.robot.pose(link)[:3, 3] for link in self.robot.links])

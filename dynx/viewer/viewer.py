@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 import webbrowser
 from collections.abc import Callable
 from typing import Any
@@ -61,8 +62,8 @@ class Viewer(Controls):
         self._dark = dark
         self.page = Page(host, port, title=f"dynx: {title_of(opened)}", dark=dark, plain=not whole)
         if open_browser:
-            # The browser loads the page while the shapes are read.
-            webbrowser.open(self.url)
+            # The browser starts and loads the page while the shapes are read.
+            threading.Thread(target=webbrowser.open, args=(self.url,), daemon=True).start()
         super().__init__(self.page)
         self.view: Any = self._view_of(opened, shown, options)
         """A `RobotView`, `MotionView` or `WorldView`: what is shown, to be moved by the program."""

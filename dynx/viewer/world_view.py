@@ -81,7 +81,7 @@ class WorldView:
         self.camera = FollowingCamera(page, self.drawn)
         """The camera of the page."""
         self.names = NamedParts(page, self.drawn.parts, self.drawn.visuals)
-        """The name of the part that was clicked."""
+        """The names of the part under the pointer and of that which was clicked."""
         if steps:
             self._spring.hold_by_pointer({name: self.drawn.visuals[name] for name in moving})
         self.draw()
@@ -110,7 +110,7 @@ class WorldView:
             if parts | {body.name for body in world.scene.bodies} != self.drawn.parts.keys():
                 return False
             self.world = world
-            self.names.show(None)
+            self.names.remove()
             self.drawn.remove()
             self.drawn = self._draw_scene()
             self.camera.watch(self.drawn)

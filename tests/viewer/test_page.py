@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from dynx.model import Model, Pose
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
 from dynx.viewer import Viewer, view
+from dynx.viewer.browser.client import HOVERED
 from dynx.world import Scene, World
 from dynx.world.camera import Camera, draw_picture
 from dynx.world.scene import SceneRobot, read_scene
@@ -59,6 +61,12 @@ def drawn_silhouette(model: Model, q: Floats, camera: Camera) -> Any:
     return draw_picture(scene, state, camera).segmentation >= 0
 
 
+def antialiased(page: Opened) -> bool:
+    """Return whether the page draws each pixel several times, to smooth edges."""
+    context = "document.querySelector('canvas[data-engine]').getContext('webgl2')"
+    return bool(page.page.evaluate(f"{context}.getContextAttributes().antialias"))
+
+
 @needs_examples
 def test_the_page_shows_what_the_camera_of_the_world_sees(open_page: OpenPage) -> None:
     model = dynx.load("ur5")
@@ -77,6 +85,7 @@ def test_the_page_shows_what_the_camera_of_the_world_sees(open_page: OpenPage) -
                 return float((found & expected).sum() / (found | expected).sum())
 
             until(lambda: common() > SAME, "the picture of the configuration")
+        assert antialiased(page)
         assert not page.errors
 
 
@@ -212,6 +221,39 @@ def test_a_click_names_a_body_of_a_world_and_the_pointer_drags_it(open_page: Ope
         # A node of viser that can be dragged calls preventDefault on a press of the pointer, for which
         # react-three-fiber listens passively, so that Chromium says that the call has no effect.
         assert all("passive event listener" in error for error in page.errors)
+
+
+def test_the_name_of_the_part_under_the_pointer_is_shown(open_page: OpenPage, tmp_path: Path) -> None:
+    name = "<b>upper & 'arm'</b>"
+    path = tmp_path / "robot.urdf"
+    box = '<visual><geometry><box size="0.3 0.3 0.3"/></geometry></visual>'
+    path.write_text(
+        f'<robot name="r"><link name="base">{box}</link><link name="{escape(name)}">{box}</link>'
+        f'<joint name="j" type="prismatic"><parent link="base"/><child link="{escape(name)}"/>'
+        '<origin xyz="0 0 0.6"/><axis xyz="0 0 1"/>'
+        '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+    )
+    with view(dynx.load(path), whole_meshes=False) as viewer:
+        page = open_page(viewer.url)
+        (client,) = connected(viewer)
+        label = page.page.locator(f"#{HOVERED}")
+        for part in ("base", name):
+            pixel = _pixel(client, viewer.view.robot.pose(part)[:3, 3])
+            page.page.mouse.move(*pixel)
+            page.page.wait_for_function(
+                "([id, part]) => document.getElementById(id)?.textContent === part", arg=[HOVERED, part]
+            )
+            assert label.is_visible()
+            left = label.bounding_box()["x"]
+            page.page.mouse.move(*(pixel + 4.0))
+            page.page.wait_for_function(
+                "([id, left]) => document.getElementById(id).getBoundingClientRect().x > left",
+                arg=[HOVERED, left],
+            )
+        assert not antialiased(page)
+        page.page.mouse.move(20.0, 430.0)
+        label.wait_for(state="hidden")
+        assert not page.errors
 
 
 @needs_examples

@@ -6,6 +6,8 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import dynx
 from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Shape, Sphere, solid_properties
@@ -13,6 +15,7 @@ from dynx.viewer.triangles import (
     FEWEST_TRIANGLES,
     TRIANGLE_BUDGET,
     Triangles,
+    _distinct_rows,
     budgets,
     hull_of,
     triangles_of,
@@ -106,3 +109,15 @@ def test_a_mesh_collides_as_its_hull() -> None:
 
 def test_budgets_leave_light_robots_whole() -> None:
     assert budgets({}) == {}
+
+
+numbers = st.integers(0, 3)
+
+
+@given(st.lists(st.tuples(numbers, numbers, numbers), min_size=1), st.sampled_from([1, 2**61]))
+def test_distinct_rows_are_found(given_rows: list[tuple[int, int, int]], scale: int) -> None:
+    # The large scale exceeds what one number holds.
+    rows = np.array(given_rows) * [1, 1, scale]
+    first, number = _distinct_rows(rows)
+    assert np.array_equal(rows[first][number], rows)
+    assert len(first) == len(set(map(tuple, rows.tolist())))

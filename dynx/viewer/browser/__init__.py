@@ -1,0 +1,1 @@
+"""Scripts of dynx that run in the browser."""
