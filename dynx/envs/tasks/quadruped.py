@@ -23,7 +23,8 @@ from dynx.model import Model
 from dynx.model.configuration import is_real
 from dynx.model.loading import load
 from dynx.model.rotations import quat_from_rpy
-from dynx.spatial.so3 import rotation_from_quat
+from dynx.spatial.plain import Vector3, rotation_rows
+from dynx.spatial.scalar import Floats
 from dynx.world import Camera, Material, PositionMotor, Scene, SceneRobot, ground
 
 DOG, GROUND = "dog", "ground"
@@ -115,7 +116,7 @@ class Quadruped(WorldTask):
     def observation(self, episode: Episode) -> NDArray[np.float32]:
         """Return velocities and gravity in the axes of the trunk, joints, and the last action."""
         q, v = episode.world.state.robots[DOG]
-        down = -rotation_from_quat(q[3:7])[2]
+        down = [-x for x in vertical_axis(q)]
         parts = [v[:6], down, q[7:] - POSTURE, v[6:], episode.memory.action]
         return np.concatenate(parts).clip(-LARGEST, LARGEST).astype(np.float32)
 
@@ -131,9 +132,14 @@ class Quadruped(WorldTask):
     def terminated(self, episode: Episode) -> bool:
         """Check whether the trunk is too low, or leans too far."""
         q = episode.world.state.robots[DOG].q
-        return bool(q[2] < LEAST_HEIGHT or rotation_from_quat(q[3:7])[2, 2] < LEAST_UPRIGHT)
+        return bool(q[2] < LEAST_HEIGHT or vertical_axis(q)[2] < LEAST_UPRIGHT)
 
     @cached_property
     def camera(self) -> Camera:
         """A camera beside the robot."""
         return Camera.look_at((1.2, -1.6, 0.8), (0.0, 0.0, 0.25))
+
+
+def vertical_axis(q: Floats) -> Vector3:
+    """Return the upward vertical (3,) in the axes of the trunk."""
+    return rotation_rows(*q[3:7].tolist())[2]

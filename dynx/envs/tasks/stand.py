@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from dynx.envs.tasks.quadruped import DOG, SPEED_WIDTH, STAND_HEIGHT, Quadruped
+from dynx.envs.tasks.quadruped import DOG, SPEED_WIDTH, STAND_HEIGHT, Quadruped, vertical_axis
 from dynx.envs.world.scene_task import Episode
-from dynx.spatial.so3 import rotation_from_quat
 
 
 @dataclass(frozen=True)
@@ -28,7 +27,7 @@ class Stand(Quadruped):
     def reward(self, episode: Episode, action: Any) -> float:
         """Return the reward for standing, less the costs of the motion."""
         q, v = episode.world.state.robots[DOG]
-        upright = float(rotation_from_quat(q[3:7])[2, 2])
+        upright = vertical_axis(q)[2]
         high = float(np.exp(-((q[2] - STAND_HEIGHT) ** 2) / 0.01))
         still = float(np.exp(-(v[:6] @ v[:6]) / SPEED_WIDTH))
         return max(upright, 0.0) * high * (0.5 + 0.5 * still) - self.costs(episode)

@@ -8,12 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.envs.tasks.quadruped import DOG, SPEED_WIDTH, Quadruped
+from dynx.envs.tasks.quadruped import DOG, SPEED_WIDTH, Quadruped, vertical_axis
 from dynx.envs.world.scene_task import Episode
 from dynx.errors import ArgumentError, shown
 from dynx.model.configuration import MAX_MAGNITUDE, is_real
 from dynx.spatial.scalar import Floats
-from dynx.spatial.so3 import rotation_from_quat
 
 
 @dataclass(frozen=True)
@@ -57,9 +56,9 @@ class Walk(Quadruped):
         """Return the reward for the velocity, less the costs of the motion."""
         q, v = episode.world.state.robots[DOG]
         error, turning = v[:2] - episode.memory.velocity[:2], v[5] - episode.memory.velocity[2]
-        R = rotation_from_quat(q[3:7])
+        leaning_x, leaning_y, _ = vertical_axis(q)
         tracking = np.exp(-(error @ error) / SPEED_WIDTH) + 0.5 * np.exp(-(turning**2) / SPEED_WIDTH)
-        shaking = 2.0 * v[2] ** 2 + 0.05 * (v[3:5] @ v[3:5]) + 0.5 * (R[2, :2] @ R[2, :2])
+        shaking = 2.0 * v[2] ** 2 + 0.05 * (v[3:5] @ v[3:5]) + 0.5 * (leaning_x**2 + leaning_y**2)
         return float(tracking - shaking) - self.costs(episode)
 
     def info(self, episode: Episode) -> dict[str, Any]:
