@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -104,6 +104,31 @@ def test_walking_is_rewarded_by_the_velocity() -> None:
     expected = np.exp(-(v @ v) / 0.25) - np.exp(-((v[0] - 0.6) ** 2 + v[1] ** 2) / 0.25)
     assert rewards[0] == pytest.approx(1.5, abs=0.05)
     assert rewards[0] - rewards[1] == pytest.approx(expected, abs=1e-5)
+
+
+def trot(step: int) -> Any:
+    """Return the action of a trot: diagonal pairs of legs in turn."""
+    phase = 2.0 * np.pi * 4.0 * 0.02 * step + np.array([0.0, np.pi, np.pi, 0.0])
+    lift = 0.3 * np.maximum(np.sin(phase), 0.0)
+    thigh = 0.4 * np.cos(phase + 0.6) + lift + 0.3
+    return np.stack([np.zeros(4), thigh, -3.0 * lift], axis=1).ravel().astype(np.float32)
+
+
+def test_a_trot_walks_and_earns_more_than_the_posture(engine: str) -> None:
+    def episode(env: TaskEnvironment, action_of: Callable[[int], Any]) -> tuple[float, float]:
+        env.reset(seed=0, options={"velocity": (0.5, 0.0, 0.0), "disturbance": 0.0})
+        total, speeds = 0.0, []
+        for step in range(100):
+            observation, reward, terminated, *_ = env.step(action_of(step))
+            assert not terminated
+            total += reward
+            speeds.append(float(observation[0]))
+        return total, float(np.mean(speeds[50:]))
+
+    with TaskEnvironment(Walk(), engine) as env:
+        (walking, speed), (standing, _) = episode(env, trot), episode(env, lambda _: np.zeros(len(POSTURE)))
+    assert speed == pytest.approx(0.47, abs=0.08)
+    assert walking > standing + 15.0
 
 
 def test_wrong_options_are_refused() -> None:

@@ -17,7 +17,7 @@ def show(out: Console, report: Entry) -> None:
     """Print where every two engines part, and what each policy is worth on each engine."""
     seeds = len(report["pairs"][0]["episodes"])
     out.print(
-        f"{one_line(report['task'])}: {seeds} episodes with the same actions, on "
+        f"{one_line(report['task'])}: {seeds} episode{'s' * (seeds != 1)} with the same actions, on "
         f"{', '.join(report['engines'])}",
         style="bold",
     )
