@@ -1,7 +1,9 @@
 """The page in headless Chromium: time until a robot is drawn, pose updates and pictures a second.
 
 ``python -m benchmarks.viewer`` starts ``dynx view ur5`` and times it until the page has drawn the robot, in a
-browser that is open already. Then it plays the rollout of a humanoid and counts, in the page, the
+browser that is open already and has drawn before, and in one that is started to show the page. The time of an
+empty page of viser, from when the browser is told to open it, is the lower bound of what follows when the
+command has opened its page. Then it plays the rollout of a humanoid and counts, in the page, the
 updates of poses that arrive and the pictures that are drawn by software. ``--whole-meshes`` draws every
 triangle; ``--robots talos,g1`` names other humanoids. Times on the clock mean little beside other programs,
 so the processor time of the server stands beside them, and the best of ``--repeats`` counts.
@@ -18,12 +20,14 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import dynx
+from dynx.viewer.library import CLIENT, serve, silent
+from dynx.viewer.page import DEFAULT_HOST, _free_port
 from dynx.viewer.triangles import TRIANGLE_BUDGET
 from tests.viewer.conftest import BROWSERS, SOFTWARE
 
@@ -109,6 +113,8 @@ class Rates(NamedTuple):
     triangles: float
     processor: float
     """Processor time of the server per second."""
+    browser: float
+    """Processor time of the browser per picture [s]."""
 
 
 @contextmanager
@@ -141,6 +147,24 @@ def processor_time(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
+def processor_time_of_browsers() -> float:
+    """Return the processor time of all browsers that this program runs [s]."""
+    started: dict[int, list[int]] = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        # A process may end meanwhile.
+        with suppress(OSError):
+            fields = stat.read_text().rpartition(")")[2].split()
+            started.setdefault(int(fields[1]), []).append(int(stat.parent.name))
+    spent, waiting = 0.0, [os.getpid()]
+    while waiting:
+        for pid in started.get(waiting.pop(), ()):
+            waiting.append(pid)
+            with suppress(OSError):
+                if "chrom" in Path(f"/proc/{pid}/comm").read_text():
+                    spent += processor_time(pid)
+    return spent
+
+
 @contextmanager
 def page_of(browser: Any, triangles: float) -> Iterator[Any]:
     """Open an empty page with the counters, which notes when it has drawn so many triangles."""
@@ -165,22 +189,45 @@ def triangles_of_robot(name: str) -> int:
         return sum(len(node.faces) for nodes in viewer.view.robot.visuals.values() for node in nodes)
 
 
-def start(browser: Any, robot: str, folder: str, triangles: int) -> Start:
-    """Start ``dynx view ROBOT`` and wait until it is drawn."""
-    with page_of(browser, triangles) as page, served(folder, robot) as (process, address, began):
-        answered = time.time()
+def empty_page(browser: Any, launch: Callable[[], Any] | None) -> float:
+    """Return the time in which a page of viser that shows nothing has drawn [s], with the start of a browser
+    where `launch` is given."""
+    port = _free_port(DEFAULT_HOST, 0)
+    server = serve(DEFAULT_HOST, port, "empty", CLIENT.parent)
+    try:
+        with ExitStack() as ended:
+            began = time.time()
+            if launch is not None:
+                browser = ended.enter_context(closing(launch()))
+            page = ended.enter_context(page_of(browser, 1))
+            page.goto(f"http://{DEFAULT_HOST}:{port}")
+            return until_drawn(page) - began
+    finally:
+        with silent():
+            server.stop()
+
+
+def start(robot: str, folder: str, triangles: int, browser: Any, launch: Callable[[], Any] | None) -> Start:
+    """Start ``dynx view ROBOT`` and wait until it is drawn, in a new tab of the browser; in one that is
+    started once the command opens its page, where `launch` is given."""
+    with ExitStack() as ended:
+        if launch is None:
+            page = ended.enter_context(page_of(browser, triangles))
+        process, address, began = ended.enter_context(served(folder, robot))
+        answered = os.stat(Path(folder, "opened")).st_mtime
+        if launch is not None:
+            page = ended.enter_context(page_of(ended.enter_context(closing(launch())), triangles))
         page.goto(address)
         drawn = until_drawn(page)
         loaded = page.evaluate(
             "(performance.timeOrigin + performance.getEntriesByType('navigation')[0].domInteractive) / 1e3"
         )
         counts = page.evaluate("({...counts})")
-        connected, shapes = counts["connected"] - began, counts["shapes"] - began
         return Start(
             answered - began,
             loaded - began,
-            connected,
-            shapes,
+            counts["connected"] - began,
+            counts["shapes"] - began,
             drawn - began,
             processor_time(process.pid),
         )
@@ -205,14 +252,17 @@ def rates(browser: Any, robot: str, folder: str, *, seconds: float, whole: bool)
         until_drawn(page)
         time.sleep(2.0)
         before, spent, began = page.evaluate("({...counts})"), processor_time(process.pid), time.time()
+        spent_on_pictures = processor_time_of_browsers()
         time.sleep(seconds)
         after, spent_after, ended = page.evaluate("({...counts})"), processor_time(process.pid), time.time()
+        spent_on_pictures = processor_time_of_browsers() - spent_on_pictures
         elapsed = ended - began
         return Rates(
             (after["updates"] - before["updates"]) / elapsed,
             (after["pictures"] - before["pictures"]) / elapsed,
             after["triangles"],
             (spent_after - spent) / elapsed,
+            spent_on_pictures / max(after["pictures"] - before["pictures"], 1),
         )
 
 
@@ -232,15 +282,22 @@ def main() -> None:
     with sync_playwright() as playwright, tempfile.TemporaryDirectory() as folder:
         browser = playwright.chromium.launch(executable_path=found, args=list(SOFTWARE))
         triangles = triangles_of_robot("ur5")
-        starts = [start(browser, "ur5", folder, triangles) for _ in range(given.repeats)]
-        best = min(starts, key=lambda each: each.drawn)
-        print(
-            f"dynx view ur5: opens the page after {best.served:.2f} s; the browser has read it after "
-            f"{best.loaded:.2f} s, is connected after {best.connected:.2f} s, has all shapes after "
-            f"{best.shapes:.2f} s, and has drawn the robot after {best.drawn:.2f} s (processor time of the "
-            f"command {best.processor:.2f} s), best of {given.repeats}, load {os.getloadavg()[0]:.1f}",
-            flush=True,
-        )
+
+        def launch() -> Any:
+            return playwright.chromium.launch(executable_path=found, args=list(SOFTWARE))
+
+        for which, launched in (("a browser that is open", None), ("a browser that it starts", launch)):
+            empty = min(empty_page(browser, launched) for _ in range(given.repeats))
+            starts = [start("ur5", folder, triangles, browser, launched) for _ in range(given.repeats)]
+            best = min(starts, key=lambda each: each.drawn)
+            print(
+                f"in {which}: an empty page of viser has drawn after {empty:.2f} s; dynx view ur5 opens the "
+                f"page after {best.served:.2f} s; the browser has read it after {best.loaded:.2f} s, is "
+                f"connected after {best.connected:.2f} s, has all shapes after {best.shapes:.2f} s, and has "
+                f"drawn the robot after {best.drawn:.2f} s (processor time of the command "
+                f"{best.processor:.2f} s), best of {given.repeats}, load {os.getloadavg()[0]:.1f}",
+                flush=True,
+            )
         for robot in given.robots.split(","):
             runs = [
                 rates(browser, robot, folder, seconds=given.seconds, whole=given.whole_meshes)
@@ -250,7 +307,9 @@ def main() -> None:
             print(
                 f"{robot}: {max(run.updates for run in runs):.1f} pose updates a second, "
                 f"{fastest.pictures:.1f} pictures a second of {fastest.triangles:.0f} triangles "
-                f"(server: {fastest.processor:.2f} s of processor time a second), best of {given.repeats}",
+                f"(processor time: the server's {fastest.processor:.2f} s a second, the browser's "
+                f"{1e3 * fastest.browser:.0f} ms a picture), best of {given.repeats}, "
+                f"load {os.getloadavg()[0]:.1f}",
                 flush=True,
             )
         browser.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -11,6 +12,9 @@ from dynx.viewer.page import Page
 
 UPDATES_PER_SECOND = 40.0
 """Rate at which the page is moved while a motion plays; 30 arrive where the machine is busy."""
+
+SLIDER_UPDATES_PER_SECOND = 10.0
+"""Largest rate at which the slider moves while a motion plays: the page lays out its panel anew each time."""
 
 SPEEDS = ("1/10", "1/4", "1/2", "1", "2", "4")
 """Choices of the speed, relative to the clock."""
@@ -70,15 +74,20 @@ class Timeline:
     def pause(self) -> None:
         """Stop playing."""
         self._running.clear()
+        self._slider.value = self._time
         self._button.label = "play"
 
     def go_to(self, time: float) -> None:
         """Show the motion at a time [s], moved into its range."""
+        self._place(time, slider=True)
+
+    def _place(self, time: float, *, slider: bool) -> None:
         with self._page.lock, self._page.together():
             if self._ended.is_set():
                 return
             self._time = min(max(time, 0.0), self._end)
-            self._slider.value = self._time
+            if slider:
+                self._slider.value = self._time
             self._show(self._time)
 
     def _move(self, by: float) -> None:
@@ -99,6 +108,7 @@ class Timeline:
             if self._ended.is_set():
                 return
             began, start, speed = time.monotonic(), self._time, self._speed.value
+            moved = -math.inf
             while self._running.is_set() and self._speed.value == speed:
                 wanted = start + (time.monotonic() - began) * _number(speed)
                 if wanted >= self._end:
@@ -108,7 +118,10 @@ class Timeline:
                     else:
                         self.pause()
                     break
-                self.go_to(wanted)
+                now = time.monotonic()
+                slider = now - moved >= 1.0 / SLIDER_UPDATES_PER_SECOND
+                moved = now if slider else moved
+                self._place(wanted, slider=slider)
                 # The next multiple of the period, whatever this update took.
                 if self._ended.wait(period - (time.monotonic() - began) % period):
                     return
