@@ -2,8 +2,8 @@
 
     python -m benchmarks.environments.lunar_lander --episodes 100 --engine pybullet --engine mujoco
 
-Each flies the same seeds. Processor time is that of whole episodes, resets and controller included; the
-environments take turns, an episode each. Needs ``gymnasium[box2d]``.
+Each flies the same seeds. The processor time of a reset and of a step is the median over episodes, without
+the controller; the environments take turns, an episode each. Needs ``gymnasium[box2d]``.
 """
 
 from __future__ import annotations
@@ -32,25 +32,32 @@ NEAR = 20.0
 
 @dataclass
 class Record:
-    """Returns of the episodes of one environment, their steps, and the processor time they took [s]."""
+    """Returns of the episodes of one environment, their lengths, and the processor time of the reset and of a
+    step of each [s]."""
 
     returns: list[float] = field(default_factory=list)
-    steps: int = 0
-    seconds: float = 0.0
+    lengths: list[int] = field(default_factory=list)
+    resets: list[float] = field(default_factory=list)
+    steps: list[float] = field(default_factory=list)
 
 
 def fly(env: gymnasium.Env[Any, Any], seed: int, record: Record) -> None:
     """Fly one episode, and add it to the record."""
     began = time.process_time()
     observation, _ = env.reset(seed=seed)
-    total, ended = 0.0, False
+    record.resets.append(time.process_time() - began)
+    total, steps, seconds, ended = 0.0, 0, 0.0, False
     while not ended:
-        observation, reward, terminated, truncated, _ = env.step(heuristic(DISCRETE, observation))
+        action = heuristic(DISCRETE, observation)
+        began = time.process_time()
+        observation, reward, terminated, truncated, _ = env.step(action)
+        seconds += time.process_time() - began
         total += float(reward)
         ended = terminated or truncated
-        record.steps += 1
-    record.seconds += time.process_time() - began
+        steps += 1
     record.returns.append(total)
+    record.lengths.append(steps)
+    record.steps.append(seconds / steps)
 
 
 def main() -> None:
@@ -67,15 +74,19 @@ def main() -> None:
         for name, env in envs.items():
             fly(env, seed, records[name])
     own = np.array(records[BOX2D].returns)
-    print("| engine | mean return | median | above 200 | below 0 | within 20 of Box2D's | us a step |")
-    print("|---|---|---|---|---|---|---|")
+    print(
+        "| engine | mean return | median | above 200 | below 0 | within 20 of Box2D's "
+        "| reset [ms] | step [us] | steps |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|")
     for name, record in records.items():
         returns = np.array(record.returns)
         error = returns.std(ddof=1) / np.sqrt(len(returns))
         print(
             f"| {name} | {returns.mean():.1f} ± {error:.1f} | {np.median(returns):.1f} "
             f"| {np.mean(returns > 200.0):.0%} | {np.mean(returns < 0.0):.0%} "
-            f"| {np.mean(np.abs(returns - own) < NEAR):.0%} | {record.seconds / record.steps * 1e6:.0f} |"
+            f"| {np.mean(np.abs(returns - own) < NEAR):.0%} | {np.median(record.resets) * 1e3:.2f} "
+            f"| {np.median(record.steps) * 1e6:.0f} | {np.mean(record.lengths):.0f} |"
         )
 
 

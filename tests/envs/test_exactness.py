@@ -19,6 +19,7 @@ from benchmarks.environments.exactness import (
     visited,
 )
 from dynx.backends import installed_backends
+from dynx.envs.tasks.cart_pole import CartPole
 
 MAX_DIFFERENCE = 1e-13
 """Largest difference of a state after one step: the bar of the environments (docs/environments.md)."""
@@ -39,6 +40,13 @@ def test_steps_and_episodes_are_those_of_gymnasium(engine: str, pair_and_steps: 
     few = Visited(*(column[:200] for column in steps))
     assert max(largest_difference(few, stepper(pair.task, engine))) < MAX_DIFFERENCE
     assert parted_episodes(pair.task, steps, engine, 2) == 0
+
+
+def test_episodes_in_batches_end_where_those_of_gymnasium_do() -> None:
+    pair = PAIRS[0]
+    steps = visited(pair, 1, 10)
+    assert parted_episodes(pair.task, steps, "reference", 10, batch=True) == 0
+    assert parted_episodes(CartPole(pole_mass=0.3), steps, "reference", 10, batch=True) > 0
 
 
 @pytest.mark.parametrize("name", ["CartPole", "Pendulum"])

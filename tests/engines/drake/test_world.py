@@ -179,3 +179,21 @@ def test_the_parts_of_a_contact_force_add_up_to_it(force: tuple[float, float, fl
     along, rest = parts_of_force(np.array(force), normal)
     assert along == max(0.0, force[2])
     assert_allclose(along * normal + rest, force)
+
+
+@pytest.mark.parametrize("model", ["hydroelastic", "point"])
+def test_touching_pairs_are_those_of_the_contacts_in_every_step(model: str) -> None:
+    shapes = [
+        sphere("ball", 0.1, mass=0.5, pose=Pose((0.02, 0, 0.45))),
+        box("crate", (0.2, 0.2, 0.2), mass=1.0, pose=Pose((0, 0, 0.15))),
+        box("tilted", (0.2, 0.1, 0.1), mass=1.0, pose=Pose((0.5, 0, 0.2), (0.3, 0.4, 0.0))),
+    ]
+    seen = set()
+    with World(Scene("s", bodies=(ground(), *shapes)), "drake", 0.01, contact_model=model) as world:
+        for _ in range(40):
+            world.step()
+            touching = world.touching_pairs()
+            assert touching == {(contact.a, contact.b) for contact in world.contacts()}
+            assert world.touching_pairs() == touching
+            seen.add(touching)
+    assert len(seen) > 2

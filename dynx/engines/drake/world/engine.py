@@ -7,7 +7,7 @@ they are asked for.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
@@ -59,6 +59,8 @@ class DrakeWorld(WorldEngine):
         self._applied: Floats = np.zeros(self._plant.num_velocities())
         self._port.FixValue(self._context, self._applied)
         self._quaternions = built.quaternions
+        hydroelastic = settings["contact_model"] == "hydroelastic"
+        self._surfaces = self._plant.get_contact_surface_representation() if hydroelastic else None
         self._past: tuple[Floats, Floats] | None = None
         q, v = self._state()
         for robot, coordinates in zip(layout.robots, built.robots, strict=True):
@@ -164,17 +166,39 @@ class DrakeWorld(WorldEngine):
         if self._past is None:
             pairs = self._query().ComputePointPairPenetration()
             return [touching_point(pair, np.zeros(3), self._built.collider_of) for pair in pairs]
+        state, forces = self._past
+        query = self._query_at(state)
+        self._port.FixValue(self._plant.GetMyMutableContextFromRoot(self._past_root), forces)
+        results = self._plant.get_contact_results_output_port().Eval(
+            self._plant.GetMyContextFromRoot(self._past_root)
+        )
+        return read_contacts(results, query, self._built.collider_of)
+
+    @_engine_errors
+    def touching_pairs(self) -> Iterable[tuple[int, int]]:
+        if self._past is None:
+            return super().touching_pairs()
+        # Contacts are found without their forces, which the solver would compute a second time.
+        query = self._query_at(self._past[0])
+        surfaces: Sequence[Any] = ()
+        if self._surfaces is None:
+            points = query.ComputePointPairPenetration()
+        else:
+            surfaces, points = query.ComputeContactSurfacesWithFallback(self._surfaces)
+        pairs = [(pair.id_A, pair.id_B) for pair in points]
+        pairs += [(surface.id_M(), surface.id_N()) for surface in surfaces]
+        collider_of = self._built.collider_of
+        return [(collider_of[a.get_value()], collider_of[b.get_value()]) for a, b in pairs]
+
+    def _query_at(self, state: Floats) -> Any:
+        """Return the query object of the geometry at q and v, in a context of its own."""
         if self._past_root is None:
             with captured_log():
                 self._past_root = self._diagram.CreateDefaultContext()
         context = self._plant.GetMyMutableContextFromRoot(self._past_root)
-        state, forces = self._past
         self._plant.SetPositionsAndVelocities(context, state)
-        self._port.FixValue(context, forces)
-        results = self._plant.get_contact_results_output_port().Eval(context)
         graph = self._built.scene_graph
-        query = graph.get_query_output_port().Eval(graph.GetMyContextFromRoot(self._past_root))
-        return read_contacts(results, query, self._built.collider_of)
+        return graph.get_query_output_port().Eval(graph.GetMyContextFromRoot(self._past_root))
 
     @_engine_errors
     def closest(self, a: int, b: int, within: float) -> TouchingPoint | None:
