@@ -18,6 +18,10 @@ from dynx.errors import ShapeError
 from dynx.model import Mechanism
 from dynx.spatial.scalar import Floats
 
+MIN_SUMMED_COLUMNS = 256
+"""Number of columns from which on rows are added one by one: S has one entry in each of its rows, so that a
+product with S takes several times as long."""
+
 Reduction = Callable[[Floats], Floats]
 
 
@@ -29,6 +33,14 @@ class Evaluation:
         self._coupling = mechanism.coupling
         self._S: Floats = np.eye(0) if self._coupling is None else self._coupling.matrix()
         self._S_T: Floats = np.ascontiguousarray(self._S.T)
+        # The row of each coordinate's own joint, where S is 1, and the rows of the joints that follow it.
+        own = (self._S == 1.0).argmax(axis=0) if self._S.size else np.zeros(0, dtype=np.intp)
+        self._own_rows = own
+        self._followers = [
+            (row, column, float(self._S[row, column]))
+            for row, column in np.argwhere(self._S).tolist()
+            if row != own[column]
+        ]
 
     def __call__(
         self,
@@ -101,12 +113,23 @@ class Evaluation:
         A, b = self._coupling.affine_map()
         return (lambda q: A.dot(q) + b) if b.any() else A.dot
 
+    def reduction(self, *, rows: bool, columns: bool) -> Reduction | None:
+        """Return the function that reduces the rows, the columns or both of a result; None for neither."""
+        if columns:
+            return self.reduce_both if rows else self.reduce_columns
+        return self.reduce_rows if rows else None
+
     def reduce_columns(self, result: Floats) -> Floats:
         """Return A S for a torque (..., nv) or a Jacobian (..., 6, nv)."""
         return np.asarray(result.dot(self._S))
 
     def reduce_rows(self, result: Floats) -> Floats:
         """Return S' A for a matrix (..., nv, n)."""
+        if result.shape[-1] >= MIN_SUMMED_COLUMNS:
+            reduced = result.take(self._own_rows, axis=-2)
+            for row, column, scale in self._followers:
+                reduced[..., column, :] += scale * result[..., row, :]
+            return reduced
         if result.ndim == 2:
             # For small arrays `dot` takes a third of the time of `matmul`.
             return np.asarray(self._S_T.dot(result))

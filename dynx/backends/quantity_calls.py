@@ -147,16 +147,12 @@ class QuantityCalls(Lifecycle, EngineHooks):
         return (self._index(names[0]), *map(self._arguments.reference, names[1:]))
 
     def _plan(self, name: str) -> _Plan:
-        quantity, evaluation, reduction = QUANTITIES[name], self._evaluation, None
-        if quantity.reduces_columns:
-            reduction = evaluation.reduce_both if quantity.reduces_rows else evaluation.reduce_columns
-        elif quantity.reduces_rows:
-            reduction = evaluation.reduce_rows
+        quantity = QUANTITIES[name]
         plan = self._plans[name] = _Plan(
             quantity.arguments,
             quantity.hook,
             quantity.shape_of(self.model, self._mechanism.nv),
-            reduction,
+            self._evaluation.reduction(rows=quantity.reduces_rows, columns=quantity.reduces_columns),
             quantity.implied_details(self.model),
             quantity.solves,
         )

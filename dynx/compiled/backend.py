@@ -352,10 +352,12 @@ class CompiledBackend(PathKernels):
             if mechanism.coupling is None:
                 return KernelCall(looped_kernel(in_tree, quantity, details), checks, **options)
             options["validate"] = False
-            looped = KernelCall(
-                looped_kernel(in_tree, quantity, details), (np.asarray,) * len(checks), **options
+            table = looped_kernel(in_tree, quantity, details)
+            looped = KernelCall(table, (np.asarray,) * len(checks), **options)
+            shape = table.outputs[0].shape
+            return CoupledCall(
+                self.model, mechanism, quantity, looped.evaluate, shape, checks, validate=self._validate
             )
-            return CoupledCall(mechanism, quantity, looped.evaluate, checks)
         if quantity not in ON_CHAINS:
             kernel = quantity_kernel(mechanism, quantity, details)
             return KernelCall(kernel, checks, **options)

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from dynx.backends.evaluation import batch_rows, common_batch
+from dynx.backends.evaluation import Evaluation, batch_rows, common_batch
+from dynx.backends.straight import straight_call
 from dynx.compiled.defect import MAX_DEFECT
 from dynx.compiled.kernels import evaluate_quantity, kernel_quantity
-from dynx.compiled.model_coordinates import reduce_columns, reduce_rows, tree_coordinates
 from dynx.errors import ArgumentError, DTypeError, ShapeError
-from dynx.model import Mechanism
+from dynx.model import Mechanism, Model
 from dynx.simd.arrays import ACCEPTED, DESCRIBED, REFUSED, address_of
 from dynx.simd.kernel import Kernel, Workspace
 from dynx.spatial.scalar import Floats
@@ -325,23 +325,36 @@ class NumericCall:
 
 
 class CoupledCall:
-    """A quantity of a robot with mimic joints, evaluated in tree coordinates by a call without them."""
+    """A quantity of a robot with mimic joints, evaluated in tree coordinates by a call without them, whose
+    results have the shape `tree_shape`."""
 
     def __init__(
-        self, mechanism: Mechanism, quantity: str, in_tree: Callable[..., Floats], checks: tuple[Check, ...]
+        self,
+        model: Model,
+        mechanism: Mechanism,
+        quantity: str,
+        in_tree: Callable[..., Floats],
+        tree_shape: tuple[int, ...],
+        checks: tuple[Check, ...],
+        *,
+        validate: bool,
     ) -> None:
-        self._mechanism, self._quantity = mechanism, kernel_quantity(quantity)
-        self._in_tree, self._checks = in_tree, checks
+        described = kernel_quantity(quantity)
+        self._evaluation = Evaluation(mechanism, vectorized=True)
+        self._reduce = self._evaluation.reduction(
+            rows=described.reduces_rows, columns=described.reduces_columns
+        )
+        self._in_tree, self._tree_shape, self._checks = in_tree, tree_shape, checks
+        of_sample = self._evaluation.of_sample(lambda _, *sample: in_tree(*sample), self._reduce)
+        self._straight = straight_call(model, of_sample, len(checks), validate=validate)
 
     def evaluate(self, q: Any, v: Any = _ABSENT, a: Any = _ABSENT, out: Floats | None = None) -> Floats:
         """Return the result (..., *shape), as `KernelCall.evaluate` does."""
-        arguments = (x for x in (q, v, a) if x is not _ABSENT)
-        arrays = [check(argument) for check, argument in zip(self._checks, arguments, strict=True)]
-        result = self._in_tree(*tree_coordinates(self._mechanism, *arrays))
-        if self._quantity.reduces_columns:
-            result = reduce_columns(self._mechanism, result)
-        if self._quantity.reduces_rows:
-            result = reduce_rows(self._mechanism, result)
+        arguments = _given(q, v, a)
+        result: Floats | None = self._straight(None, arguments)
+        if result is None:
+            arrays = [check(argument) for check, argument in zip(self._checks, arguments, strict=True)]
+            result = self._evaluation(self._in_tree, self._tree_shape, *arrays, reduce=self._reduce)
         return write_into(out, result)
 
 

@@ -9,12 +9,15 @@ import pytest
 
 from benchmarks.every_quantity import serial_arm, tree
 from dynx.backends import backend
+from dynx.backends.evaluation import MIN_SUMMED_COLUMNS, Evaluation
 from dynx.backends.quantities import QUANTITIES
 from dynx.compiled.call import MAX_COPIED_SAMPLES
 from dynx.compiled.looped.kernels import LOOPED
 from dynx.model import Model
+from dynx.model.model import Base
 from dynx.simd.target import host
 from dynx.spatial.scalar import Floats
+from tests.backends.robots import mixed_robot
 from tests.compiled.robots import ROBOTS, made, state
 from tests.error_bounds import ErrorBounds, samples_at
 
@@ -62,6 +65,41 @@ def test_results_do_not_depend_on_the_other_samples_or_on_threads(quantity: str)
         np.testing.assert_array_equal(getattr(made(model, threads=1), quantity)(*strided), whole[:size])
 
 
+@pytest.mark.parametrize("robot", ["mimic", "floating mimic"])
+@pytest.mark.parametrize("quantity", ["coriolis_matrix", "inertial_regressor", "inverse_dynamics"])
+def test_mimic_joints_are_expanded_by_stored_matrices(
+    robot: str, quantity: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Making them in each call had taken longer than the routines and than other engines."""
+    model = ROBOTS[robot]
+    call = getattr(made(model), quantity)
+    rows = _arguments(model, quantity, (3,))
+    whole = call(*rows)
+
+    def refuse(*_: object) -> None:
+        raise AssertionError("the coupling is made into a matrix")
+
+    for name in ("matrix", "affine_map", "expand_q"):
+        monkeypatch.setattr(f"dynx.model.mechanism.Coupling.{name}", refuse)
+    size = np.abs(whole).max()
+    for k in range(3):
+        np.testing.assert_allclose(call(*(x[k] for x in rows)), whole[k], rtol=0.0, atol=1e-13 * size)
+
+
+@pytest.mark.parametrize("batch", [(), (3,), (2, 3)])
+@pytest.mark.parametrize("columns", [1, MIN_SUMMED_COLUMNS])
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+def test_rows_are_reduced_by_the_transposed_coupling(
+    base: Base, columns: int, batch: tuple[int, ...]
+) -> None:
+    mechanism = mixed_robot(base, mimic=True).mechanism
+    assert mechanism.coupling is not None
+    S = mechanism.coupling.matrix()
+    A = np.random.default_rng(0).normal(size=(*batch, len(S), columns))
+    found = Evaluation(mechanism, vectorized=True).reduce_rows(A)
+    np.testing.assert_allclose(found, S.T @ A, rtol=0.0, atol=1e-14)
+
+
 def test_a_bad_argument_is_named() -> None:
     model = ROBOTS["floating"]
     q, _, _ = state(model, (300,))
@@ -71,6 +109,11 @@ def test_a_bad_argument_is_named() -> None:
             bad[-1, -1] = value
             with pytest.raises(Exception, match=what):
                 made(model).mass_matrix(bad[0] if size == 1 else bad)
+    mimic = ROBOTS["mimic"]
+    with pytest.raises(Exception, match="q"):
+        made(mimic).mass_matrix(np.full(mimic.nq, np.nan))
+    with pytest.raises(Exception, match="masked"):
+        made(mimic).mass_matrix(np.ma.array(mimic.neutral(), mask=True))
     unscaled = q[0] * np.r_[np.ones(3), np.full(4, 1.1), np.ones(model.nq - 7)]
     with pytest.raises(Exception, match="quaternion"):
         made(model).mass_matrix(unscaled)
