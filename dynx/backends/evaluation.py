@@ -19,8 +19,8 @@ from dynx.model import Mechanism
 from dynx.spatial.scalar import Floats
 
 MIN_SUMMED_COLUMNS = 256
-"""Number of columns from which on rows are added one by one: S has one entry in each of its rows, so that a
-product with S takes several times as long."""
+"""Number of columns from which on rows of one result are added one by one, as in batches: S has one entry in
+each of its rows, so that a product with S takes several times as long."""
 
 Reduction = Callable[[Floats], Floats]
 
@@ -121,23 +121,26 @@ class Evaluation:
 
     def reduce_columns(self, result: Floats) -> Floats:
         """Return A S for a torque (..., nv) or a Jacobian (..., 6, nv)."""
-        return np.asarray(result.dot(self._S))
+        if result.ndim <= 2:
+            return np.asarray(result.dot(self._S))
+        reduced = result.take(self._own_rows, axis=-1)
+        for row, column, scale in self._followers:
+            reduced[..., column] += scale * result[..., row]
+        return reduced
 
     def reduce_rows(self, result: Floats) -> Floats:
         """Return S' A for a matrix (..., nv, n)."""
-        if result.shape[-1] >= MIN_SUMMED_COLUMNS:
-            reduced = result.take(self._own_rows, axis=-2)
-            for row, column, scale in self._followers:
-                reduced[..., column, :] += scale * result[..., row, :]
-            return reduced
-        if result.ndim == 2:
+        if result.ndim == 2 and result.shape[1] < MIN_SUMMED_COLUMNS:
             # For small arrays `dot` takes a third of the time of `matmul`.
             return np.asarray(self._S_T.dot(result))
-        return np.asarray(self._S_T @ result)
+        reduced = result.take(self._own_rows, axis=-2)
+        for row, column, scale in self._followers:
+            reduced[..., column, :] += scale * result[..., row, :]
+        return reduced
 
     def reduce_both(self, result: Floats) -> Floats:
         """Return S' A S for a matrix (..., nv, nv)."""
-        return self.reduce_rows(result.dot(self._S))
+        return self.reduce_columns(self.reduce_rows(result))
 
     def _one_by_one(
         self, hook: Callable[..., Any], shape: tuple[int, ...], samples: list[Floats], args: tuple[Any, ...]

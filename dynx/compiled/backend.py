@@ -20,7 +20,8 @@ from dynx._version import __version__
 from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.backends.quantity_calls import Forces, Key
 from dynx.compiled.arguments import BatchArguments
-from dynx.compiled.call import CoupledCall, KernelCall, NumericCall, write_into
+from dynx.compiled.call import KernelCall, NumericCall, write_into
+from dynx.compiled.coupled_call import CoupledCall
 from dynx.compiled.frames import chain_of, place_of
 from dynx.compiled.ik.kernels import SolverKey, applies, frame_key, frame_solver, solver_key
 from dynx.compiled.ik.pose_calls import PoseCalls
@@ -31,8 +32,9 @@ from dynx.compiled.kernels import (
     compiles,
     kernel_quantity,
     quantity_kernel,
+    routines_evaluate,
 )
-from dynx.compiled.looped.kernels import LOOPED, looped_kernel
+from dynx.compiled.looped.kernels import looped_kernel
 from dynx.compiled.paths import PathKernels
 from dynx.compiled.simplification import has_physical_inertias, simplify_mechanism
 from dynx.ik import FrameTarget, IKOptions, IKResult, IKSolutions, Problem, spells_options
@@ -76,7 +78,10 @@ class CompiledBackend(PathKernels):
         self._arguments = BatchArguments(model)
         self._simplified = simplify_mechanism(self._mechanism)
         self._all_frames = tuple(range(len(self._frame_index)))
-        self._eliminates = self._uncoupled or has_physical_inertias(self._mechanism)
+        # Otherwise the acceleration is solved for, by the mass matrix and the bias torque.
+        self._eliminates = self._uncoupled or (
+            has_physical_inertias(self._mechanism) and compiles(self._simplified, "forward_dynamics")
+        )
         self._calls: dict[object, KernelCall | NumericCall | CoupledCall] = {}
         self._chain_kernels: dict[object, Kernel] = {}
         self._ik_solvers: dict[SolverKey, FrameSolver] = {}
@@ -346,18 +351,14 @@ class CompiledBackend(PathKernels):
             "check_result": check_result,
         }
         if not compiles(mechanism, quantity):
-            if quantity not in LOOPED or (described.solves and mechanism.coupling is not None):
+            if not routines_evaluate(mechanism, quantity):
                 return NumericCall(mechanism, quantity, details, checks, check_result=check_result)
-            in_tree = replace(mechanism, coupling=None)
+            table = looped_kernel(replace(mechanism, coupling=None), quantity, details)
             if mechanism.coupling is None:
-                return KernelCall(looped_kernel(in_tree, quantity, details), checks, **options)
-            options["validate"] = False
-            table = looped_kernel(in_tree, quantity, details)
-            looped = KernelCall(table, (np.asarray,) * len(checks), **options)
-            shape = table.outputs[0].shape
-            return CoupledCall(
-                self.model, mechanism, quantity, looped.evaluate, shape, checks, validate=self._validate
-            )
+                return KernelCall(table, checks, **options)
+            looped = KernelCall(table, (np.asarray,) * len(checks), threads=self._threads, validate=False)
+            options = {"threads": self._threads, "validate": self._validate, "shape": table.outputs[0].shape}
+            return CoupledCall(self.model, mechanism, quantity, looped.evaluate, checks, **options)
         if quantity not in ON_CHAINS:
             kernel = quantity_kernel(mechanism, quantity, details)
             return KernelCall(kernel, checks, **options)

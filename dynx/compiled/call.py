@@ -12,12 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from dynx.backends.evaluation import Evaluation, batch_rows, common_batch
-from dynx.backends.straight import straight_call
+from dynx.backends.evaluation import batch_rows, common_batch
 from dynx.compiled.defect import MAX_DEFECT
 from dynx.compiled.kernels import evaluate_quantity, kernel_quantity
 from dynx.errors import ArgumentError, DTypeError, ShapeError
-from dynx.model import Mechanism, Model
+from dynx.model import Mechanism
 from dynx.simd.arrays import ACCEPTED, DESCRIBED, REFUSED, address_of
 from dynx.simd.kernel import Kernel, Workspace
 from dynx.spatial.scalar import Floats
@@ -42,7 +41,9 @@ SCALES = np.full(8192, DEFECT_SCALE)
 """Factors of a scalar product. A library may divide a longer one over threads."""
 
 _FLOAT64 = np.dtype(np.float64)
-_ABSENT = object()
+ABSENT = object()
+"""Argument that a quantity does not have."""
+
 _NDARRAY = np.ndarray
 
 _NOT_ONE_SAMPLE = (TypeError, ValueError, NotImplementedError, BufferError)
@@ -108,7 +109,7 @@ class KernelCall:
         # even if a signal handler or a destructor makes a call during another call.
         self._workspaces = [workspace]
 
-    def evaluate(self, q: Any, v: Any = _ABSENT, a: Any = _ABSENT, out: Floats | None = None) -> Floats:
+    def evaluate(self, q: Any, v: Any = ABSENT, a: Any = ABSENT, out: Floats | None = None) -> Floats:
         """Return the result (..., *shape), in `out` if that is given.
 
         `out` is a C-contiguous float64 array of the shape of the result; its content after an error is
@@ -119,24 +120,24 @@ class KernelCall:
         except IndexError:
             workspace = self._workspace()
         if type(q) is _NDARRAY and q.ndim == 2:
-            return self._evaluate_rows(workspace, _given(q, v, a), out)
+            return self._evaluate_rows(workspace, given_arguments(q, v, a), out)
         numbers = workspace.inputs
         try:
             numbers[self._first] = q
             # The buffer of a masked array has no mask.
-            if v is _ABSENT:
+            if v is ABSENT:
                 plain = type(q) is _NDARRAY
             else:
                 numbers[self._second] = v
-                if a is _ABSENT:
+                if a is ABSENT:
                     plain = type(q) is type(v) is _NDARRAY
                 else:
                     numbers[self._third] = a
                     plain = type(q) is type(v) is type(a) is _NDARRAY
             if not plain:
-                return self._evaluate_rows(workspace, _given(q, v, a), out)
+                return self._evaluate_rows(workspace, given_arguments(q, v, a), out)
         except _NOT_ONE_SAMPLE:
-            return self._evaluate_rows(workspace, _given(q, v, a), out)
+            return self._evaluate_rows(workspace, given_arguments(q, v, a), out)
         workspace.run()
         if workspace.output_values[self._defect] < MAX_DEFECT or self._unchecked:
             if out is None:
@@ -146,7 +147,7 @@ class KernelCall:
             self._workspaces.append(workspace)
             return out
         self._workspaces.append(workspace)
-        return self._batch(_given(q, v, a), out)
+        return self._batch(given_arguments(q, v, a), out)
 
     def for_one_sample(self) -> Callable[..., Floats]:
         """Return a function of one sample, contiguous float64 arrays, which it does not check.
@@ -305,9 +306,9 @@ class NumericCall:
         self._mechanism, self._quantity, self._details = mechanism, quantity, details
         self._checks, self._check_result = checks, check_result
 
-    def evaluate(self, q: Any, v: Any = _ABSENT, a: Any = _ABSENT, out: Floats | None = None) -> Floats:
+    def evaluate(self, q: Any, v: Any = ABSENT, a: Any = ABSENT, out: Floats | None = None) -> Floats:
         """Return the result (..., *shape), as `KernelCall.evaluate` does."""
-        arguments = (x for x in (q, v, a) if x is not _ABSENT)
+        arguments = (x for x in (q, v, a) if x is not ABSENT)
         arrays = [check(argument) for check, argument in zip(self._checks, arguments, strict=True)]
         batch = common_batch(*arrays)
         spread = [np.broadcast_to(array, (*batch, array.shape[-1])) for array in arrays]
@@ -324,40 +325,6 @@ class NumericCall:
         return write_into(out, result)
 
 
-class CoupledCall:
-    """A quantity of a robot with mimic joints, evaluated in tree coordinates by a call without them, whose
-    results have the shape `tree_shape`."""
-
-    def __init__(
-        self,
-        model: Model,
-        mechanism: Mechanism,
-        quantity: str,
-        in_tree: Callable[..., Floats],
-        tree_shape: tuple[int, ...],
-        checks: tuple[Check, ...],
-        *,
-        validate: bool,
-    ) -> None:
-        described = kernel_quantity(quantity)
-        self._evaluation = Evaluation(mechanism, vectorized=True)
-        self._reduce = self._evaluation.reduction(
-            rows=described.reduces_rows, columns=described.reduces_columns
-        )
-        self._in_tree, self._tree_shape, self._checks = in_tree, tree_shape, checks
-        of_sample = self._evaluation.of_sample(lambda _, *sample: in_tree(*sample), self._reduce)
-        self._straight = straight_call(model, of_sample, len(checks), validate=validate)
-
-    def evaluate(self, q: Any, v: Any = _ABSENT, a: Any = _ABSENT, out: Floats | None = None) -> Floats:
-        """Return the result (..., *shape), as `KernelCall.evaluate` does."""
-        arguments = _given(q, v, a)
-        result: Floats | None = self._straight(None, arguments)
-        if result is None:
-            arrays = [check(argument) for check, argument in zip(self._checks, arguments, strict=True)]
-            result = self._evaluation(self._in_tree, self._tree_shape, *arrays, reduce=self._reduce)
-        return write_into(out, result)
-
-
 def write_into(out: Floats | None, result: Floats) -> Floats:
     """Return `result`; if `out` is given, copy the result into it and return `out`."""
     if out is None:
@@ -366,11 +333,11 @@ def write_into(out: Floats | None, result: Floats) -> Floats:
     return out
 
 
-def _given(q: Any, v: Any, a: Any) -> tuple[Any, ...]:
+def given_arguments(q: Any, v: Any, a: Any) -> tuple[Any, ...]:
     """Return the arguments of a call without those that were left out."""
-    if v is _ABSENT:
+    if v is ABSENT:
         return (q,)
-    return (q, v) if a is _ABSENT else (q, v, a)
+    return (q, v) if a is ABSENT else (q, v, a)
 
 
 def _is_float64(argument: Any, size: int) -> bool:

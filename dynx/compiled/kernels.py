@@ -142,11 +142,17 @@ def _pose_density(mechanism: Mechanism) -> float:
 def compiles(mechanism: Mechanism, name: str) -> bool:
     """Check whether a quantity of this mechanism is compiled, rather than evaluated by routines that are
     compiled for all robots (`dynx.compiled.looped`) or by NumPy."""
-    matrix = name in LOOPED and kernel_quantity(name).growth != "joints"
+    has_routines = routines_evaluate(mechanism, name)
+    matrix = has_routines and kernel_quantity(name).growth != "joints"
     limit = MAX_SECONDS_BESIDE_ROUTINES if matrix else MAX_COMPILE_SECONDS
-    if name not in LOOPED:
+    if not has_routines:
         limit /= UNOPTIMISED_SHARE
     return compile_seconds(mechanism, name) <= limit
+
+
+def routines_evaluate(mechanism: Mechanism, name: str) -> bool:
+    """Check whether routines can evaluate a quantity: they solve no equations that mimic joints reduce."""
+    return name in LOOPED and not (kernel_quantity(name).solves and mechanism.coupling is not None)
 
 
 def evaluate_quantity(

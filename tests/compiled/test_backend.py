@@ -16,7 +16,8 @@ from dynx.backends.derived import native_quantities
 from dynx.backends.quantities import QUANTITIES
 from dynx.compiled import kernels
 from dynx.compiled.backend import CompiledBackend
-from dynx.compiled.call import MAX_COPIED_SAMPLES, CoupledCall, KernelCall, NumericCall
+from dynx.compiled.call import MAX_COPIED_SAMPLES, KernelCall, NumericCall
+from dynx.compiled.coupled_call import CoupledCall
 from dynx.compiled.looped.kernels import LOOPED
 from dynx.compiled.simplification import has_physical_inertias
 from dynx.errors import ArgumentError, ClosedError

@@ -16,10 +16,12 @@ from dynx.compiled import kernels as compiled_kernels
 from dynx.compiled.kernels import ON_CHAINS, _fingerprint, code_size, compiles, evaluate_quantity
 from dynx.compiled.simplification import _zero_rounding_residue, simplify_mechanism
 from dynx.model import Inertial, Joint, Link, Mechanism, Model, Pose
+from dynx.model.loading import load
 from dynx.model.mechanism import build_mechanism
 from dynx.testing.strategies import models
 from tests.backends.robots import chain, mixed_robot
 from tests.compiled.robots import ROBOTS, made, state
+from tests.conftest import needs_examples
 
 
 def test_long_code_is_not_compiled() -> None:
@@ -36,6 +38,30 @@ def test_long_code_is_not_compiled() -> None:
     for robot in (mixed_robot(), mixed_robot("floating", mimic=True)):
         small = [quantity for quantity in QUANTITIES if quantity != "inertial_regressor"]
         assert all(compiles(robot.mechanism, quantity) for quantity in small)
+
+
+@needs_examples
+@pytest.mark.parametrize("name", ["talos_full", "tiago_pro"])
+def test_forward_dynamics_of_robots_with_many_mimic_joints_is_compiled(name: str) -> None:
+    """It compiles in a second, and no routine evaluates it: NumPy took milliseconds."""
+    assert compiles(load(name, base="floating").mechanism, "forward_dynamics")
+
+
+def test_forward_dynamics_too_long_to_compile_is_solved_by_compiled_matrices(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("dynx.compiled.kernels.MAX_COMPILE_SECONDS", -1.0)
+    monkeypatch.setattr("dynx.compiled.call.evaluate_quantity", _refuse)
+    model = mixed_robot("floating", mimic=True)
+    q, v, tau = state(model, (3,))
+    engine = made(model)
+    a = engine.forward_dynamics(q, v, tau)
+    np.testing.assert_allclose(engine.forward_dynamics(q[0], v[0], tau[0]), a[0], rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(engine.inverse_dynamics(q, v, a), tau, rtol=1e-9, atol=1e-9)
+
+
+def _refuse(*_: object) -> None:
+    raise AssertionError("evaluated by NumPy")
 
 
 def _star(n: int) -> Model:

@@ -86,18 +86,32 @@ def test_mimic_joints_are_expanded_by_stored_matrices(
         np.testing.assert_allclose(call(*(x[k] for x in rows)), whole[k], rtol=0.0, atol=1e-13 * size)
 
 
+@pytest.mark.parametrize("quantity", ["coriolis_matrix", "inverse_dynamics"])
+def test_long_batches_with_mimic_joints_are_evaluated_in_blocks(
+    quantity: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = ROBOTS["floating mimic"]
+    rows = _arguments(model, quantity, (7, 5))
+    whole = getattr(made(model, threads=1), quantity)(*rows)
+    monkeypatch.setattr("dynx.compiled.coupled_call.MIN_BLOCK", 4)
+    monkeypatch.setattr("dynx.compiled.coupled_call.BLOCK_NUMBERS", 0)
+    np.testing.assert_array_equal(getattr(made(model, threads=1), quantity)(*rows), whole)
+
+
 @pytest.mark.parametrize("batch", [(), (3,), (2, 3)])
 @pytest.mark.parametrize("columns", [1, MIN_SUMMED_COLUMNS])
 @pytest.mark.parametrize("base", ["fixed", "floating"])
-def test_rows_are_reduced_by_the_transposed_coupling(
+def test_rows_and_columns_are_reduced_by_the_coupling(
     base: Base, columns: int, batch: tuple[int, ...]
 ) -> None:
     mechanism = mixed_robot(base, mimic=True).mechanism
     assert mechanism.coupling is not None
     S = mechanism.coupling.matrix()
     A = np.random.default_rng(0).normal(size=(*batch, len(S), columns))
-    found = Evaluation(mechanism, vectorized=True).reduce_rows(A)
-    np.testing.assert_allclose(found, S.T @ A, rtol=0.0, atol=1e-14)
+    evaluation = Evaluation(mechanism, vectorized=True)
+    np.testing.assert_allclose(evaluation.reduce_rows(A), S.T @ A, rtol=0.0, atol=1e-14)
+    A = np.swapaxes(A, -1, -2)
+    np.testing.assert_allclose(evaluation.reduce_columns(A), A @ S, rtol=0.0, atol=1e-14)
 
 
 def test_a_bad_argument_is_named() -> None:
