@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import prod
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,10 +19,18 @@ from dynx.model import Mechanism
 from dynx.spatial.scalar import Floats
 
 MIN_SUMMED_COLUMNS = 256
-"""Number of columns from which on rows of one result are added one by one, as in batches: S has one entry in
+"""Number of columns from which on rows of one sample are added one by one, as in batches: S has one entry in
 each of its rows, so that a product with S takes several times as long."""
 
-Reduction = Callable[[Floats], Floats]
+
+class Reduction(NamedTuple):
+    """Functions that reduce a result in tree coordinates: of one sample, and with any leading axes.
+
+    Rows and columns of batches are added one by one, in an order that does not depend on the batch.
+    """
+
+    of_sample: Callable[[Floats], Floats]
+    of_batch: Callable[[Floats], Floats]
 
 
 class Evaluation:
@@ -73,7 +81,7 @@ class Evaluation:
         else:
             result = self._one_by_one(hook, shape, samples, args)
         if self._coupling is not None and reduce is not None:
-            return reduce(result)
+            return reduce.of_batch(result)
         return result
 
     def of_sample(self, function: Callable[..., Any], reduce: Reduction | None) -> Callable[..., Any]:
@@ -86,10 +94,11 @@ class Evaluation:
         if self._coupling is None:
             return function
         expand_q, S = self._expansion_of_sample(), self._S
+        reduce_sample = None if reduce is None else reduce.of_sample
 
         def reduced(backend: object, q: Floats, *velocities: Floats) -> Any:
             result = function(backend, expand_q(q), *[S.dot(v) for v in velocities])
-            return result if reduce is None else reduce(np.asarray(result))
+            return result if reduce_sample is None else reduce_sample(np.asarray(result))
 
         return reduced
 
@@ -114,15 +123,25 @@ class Evaluation:
         return (lambda q: A.dot(q) + b) if b.any() else A.dot
 
     def reduction(self, *, rows: bool, columns: bool) -> Reduction | None:
-        """Return the function that reduces the rows, the columns or both of a result; None for neither."""
+        """Return the reduction of the rows of a result, S' A, of its columns, A S, or of both; None for
+        neither."""
+        S, S_T = self._S, self._S_T
+        if rows and columns:
+            # For small arrays `dot` takes a third of the time of `matmul`.
+            return Reduction(
+                lambda A: np.asarray(S_T.dot(A.dot(S))), lambda A: self.reduce_columns(self.reduce_rows(A))
+            )
         if columns:
-            return self.reduce_both if rows else self.reduce_columns
-        return self.reduce_rows if rows else None
+            return Reduction(lambda A: np.asarray(A.dot(S)), self.reduce_columns)
+        if rows:
+            return Reduction(
+                lambda A: self.reduce_rows(A) if A.shape[1] >= MIN_SUMMED_COLUMNS else np.asarray(S_T.dot(A)),
+                self.reduce_rows,
+            )
+        return None
 
     def reduce_columns(self, result: Floats) -> Floats:
-        """Return A S for a torque (..., nv) or a Jacobian (..., 6, nv)."""
-        if result.ndim <= 2:
-            return np.asarray(result.dot(self._S))
+        """Return A S for a torque (..., nv), a Jacobian (..., 6, nv) or a matrix."""
         reduced = result.take(self._own_rows, axis=-1)
         for row, column, scale in self._followers:
             reduced[..., column] += scale * result[..., row]
@@ -130,17 +149,10 @@ class Evaluation:
 
     def reduce_rows(self, result: Floats) -> Floats:
         """Return S' A for a matrix (..., nv, n)."""
-        if result.ndim == 2 and result.shape[1] < MIN_SUMMED_COLUMNS:
-            # For small arrays `dot` takes a third of the time of `matmul`.
-            return np.asarray(self._S_T.dot(result))
         reduced = result.take(self._own_rows, axis=-2)
         for row, column, scale in self._followers:
             reduced[..., column, :] += scale * result[..., row, :]
         return reduced
-
-    def reduce_both(self, result: Floats) -> Floats:
-        """Return S' A S for a matrix (..., nv, nv)."""
-        return self.reduce_columns(self.reduce_rows(result))
 
     def _one_by_one(
         self, hook: Callable[..., Any], shape: tuple[int, ...], samples: list[Floats], args: tuple[Any, ...]
