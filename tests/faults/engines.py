@@ -40,8 +40,8 @@ ENGINES_FAULTS = (
     Fault(
         "mimic_torque_not_scaled",
         "dynx.backends.evaluation",
-        right="return np.asarray(result.dot(self._S))",
-        wrong="return np.asarray(result.dot(self._S != 0.0))",
+        right="(row, column, float(self._S[row, column]))",
+        wrong="(row, column, float(self._S[row, column] != 0.0))",
         test_file="tests/contract/test_coordinates.py",
         test="TestMimicJoints::test_reduced_answers[reference-inverse_dynamics]",
     ),
