@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -14,6 +15,12 @@ from dynx.spatial.scalar import Floats
 from dynx.viewer.colours import BLUE, RGB
 from dynx.viewer.library import HOTKEYS
 from dynx.viewer.page import Page
+
+
+def slider_step(lower: float, upper: float) -> float:
+    """Return a power of ten that is at most a thousandth of the range: the page shows as many digits of the
+    value as the step has."""
+    return float(10.0 ** math.floor(math.log10((upper - lower) / 1000.0)))
 
 
 class Slider:
@@ -77,7 +84,7 @@ class Controls:
             raise ArgumentError(f"slider {shown(name)} is from {lower} to {upper}; wanted an ascending range")
         start = 0.5 * (lower + upper) if value is None else min(max(value, lower), upper)
         handle = self._page.gui.add_slider(
-            name, float(lower), float(upper), step=(upper - lower) / 1000.0, initial_value=float(start)
+            name, float(lower), float(upper), step=slider_step(lower, upper), initial_value=float(start)
         )
         if changed is not None:
             call = _checked_function("changed", changed)

@@ -11,15 +11,13 @@ import numpy as np
 from dynx.model import Model
 from dynx.model.configuration import sampling_range
 from dynx.spatial.scalar import Floats
+from dynx.viewer.controls import slider_step
 
 _DEFAULT_RANGE = {"rad": math.pi, "m": 1.0}
 """Half the range of a joint without limits."""
 
 _BASE_RANGE = (-2.0, 2.0)
 """Range of the position of a floating base [m]."""
-
-_STEPS = 1000
-"""Number of steps of a slider."""
 
 BASE = ("base x", "base y", "base z")
 """Sliders of a floating base: its position [m]."""
@@ -51,7 +49,7 @@ class JointSliders:
         """Move the sliders to a configuration (nq,), without calling `changed`."""
         self._q = q.copy()
         for handle, value, factor in zip(self._handles, self._values(), self._factors(), strict=True):
-            handle.value = min(max(value * factor, handle.min), handle.max)
+            handle.value = _shown(value * factor, handle.min, handle.max)
 
     def _values(self) -> list[float]:
         base = self._q[:3].tolist() if self._model.floating else []
@@ -91,8 +89,8 @@ class JointSliders:
                         min=low,
                         max=high,
                         # A joint whose limits are equal has a slider that does not move.
-                        step=(high - low) / _STEPS or 1.0,
-                        initial_value=min(max(value * factor, low), high),
+                        step=slider_step(low, high) if high > low else 1.0,
+                        initial_value=_shown(value * factor, low, high),
                         hint=f"{name}: {low:.4g} to {high:.4g} {shown}",
                         disabled=high <= low,
                     )
@@ -113,6 +111,13 @@ class JointSliders:
             handle.remove()
         self._handles.clear()
         self._add()
+
+
+def _shown(value: float, low: float, high: float) -> float:
+    """Return a value with the digits that its slider has, within its range."""
+    if high > low:
+        value = round(value, max(0, -round(math.log10(slider_step(low, high)))))
+    return min(max(value, low), high)
 
 
 def _rounded_inward(low: float, high: float) -> tuple[float, float]:

@@ -12,6 +12,7 @@ from dynx.model import Model
 from dynx.model.elements import Inertial
 from dynx.model.geometry import Box, Sphere
 from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import rotation_from_quat
 from dynx.viewer.browser.client import names_element
 from dynx.viewer.colours import BLUE, RGB, SKY_BLUE, VERMILION, YELLOW
 from dynx.viewer.drawn_parts import wxyz
@@ -104,7 +105,8 @@ class Marks:
 
     def _names(self) -> Iterator[Any]:
         for name, node in self._robot.links.items():
-            yield self._scene.add_label(f"{node.name}/label", name)
+            place = centre_of(self._robot.visuals[name])
+            yield self._scene.add_label(f"{node.name}/label", name, position=place)
 
     def _centers(self) -> Iterator[Any]:
         for name, inertial in self._with_mass():
@@ -142,13 +144,28 @@ class Marks:
                 yield link.name, inertial
 
 
+def centre_of(shapes: Sequence[Any]) -> tuple[float, ...]:
+    """Return the centre (3,) [m], in the frame of their part, of the box around the nodes of its shapes; the
+    origin without shapes. The frames of links that are connected often have the same origin, where names
+    would lie over each other."""
+    corners = []
+    for node in shapes:
+        w, *xyz = node.wxyz
+        points = np.asarray(node.vertices) @ rotation_from_quat(np.array([*xyz, w])).T + node.position
+        corners += [points.min(axis=0), points.max(axis=0)]
+    if not corners:
+        return (0.0, 0.0, 0.0)
+    centre = 0.5 * (np.min(corners, axis=0) + np.max(corners, axis=0))
+    return tuple(np.asarray(centre, dtype=np.float64).tolist())
+
+
 class NamedParts:
     """The names of parts: that under the pointer, and that of at most one part that was clicked, which stays
-    beside its origin and moves with it."""
+    on it and moves with it."""
 
     def __init__(self, page: Page, parts: Mapping[str, Any], visuals: Mapping[str, Sequence[Any]]) -> None:
         """`parts` are the nodes of parts, and `visuals` those of their shapes, which are clicked."""
-        self._page, self._parts = page, parts
+        self._page, self._parts, self._visuals = page, parts, visuals
         self._label: Any = None
         self.shown: str | None = None
         """The part whose name stays."""
@@ -166,7 +183,10 @@ class NamedParts:
                 self._label = None
             self.shown = part
             if part is not None:
-                self._label = self._page.scene.add_label(f"{self._parts[part].name}/name", part)
+                place = centre_of(self._visuals[part])
+                self._label = self._page.scene.add_label(
+                    f"{self._parts[part].name}/name", part, position=place
+                )
 
     def remove(self) -> None:
         """Remove the names from the page."""

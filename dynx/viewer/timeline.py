@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from dynx.viewer.controls import slider_step
 from dynx.viewer.page import Page
 
 UPDATES_PER_SECOND = 40.0
@@ -34,7 +35,7 @@ class Timeline:
         gui = page.gui
         with gui.add_folder("time"):
             self._slider = gui.add_slider(
-                "time [s]", 0.0, self._end, step=self._end / 1000.0, initial_value=0.0
+                "time [s]", 0.0, self._end, step=slider_step(0.0, self._end), initial_value=0.0
             )
             self._button = gui.add_button("play")
             back, forward = gui.add_button("step back"), gui.add_button("step forward")

@@ -7,9 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import dynx
 from dynx.model import Inertial, Pose
+from dynx.model.geometry.visible_shapes import link_shapes
 from dynx.spatial.so3 import rotation_from_rpy
-from dynx.viewer.marks import equivalent_solid
+from dynx.viewer.controls import slider_step
+from dynx.viewer.marks import centre_of, equivalent_solid
+from dynx.viewer.triangles import triangles_of
 
 lengths = st.floats(0.01, 2.0)
 
@@ -33,3 +37,26 @@ def test_a_solid_of_the_lengths_found_has_the_inertia(
 def test_moments_that_no_body_has_are_told() -> None:
     assert not equivalent_solid(Inertial(1.0, Pose(), 1.0, 0.0, 0.0, 1.0, 0.0, 3.0), 12.0).possible
     assert equivalent_solid(Inertial(1.0, Pose(), 1.0, 0.0, 0.0, 1.0, 0.0, 2.0), 12.0).possible
+
+
+def test_names_of_links_whose_frames_coincide_lie_on_their_shapes() -> None:
+    model = dynx.load("six_axis_arm")
+    with model.view() as viewer:
+        robot = viewer.view.robot
+        for link in model.links:
+            shapes = [shape for shape, _, _ in link_shapes(model.geometry, link.name)]
+            assert len(shapes) == len(robot.visuals[link.name])
+            points = [
+                T[:3, :3] @ vertex + T[:3, 3]
+                for shape, _, T in link_shapes(model.geometry, link.name)
+                for vertex in triangles_of(shape).vertices
+            ]
+            expected = 0.5 * (np.min(points, axis=0) + np.max(points, axis=0)) if points else np.zeros(3)
+            assert np.allclose(centre_of(robot.visuals[link.name]), expected, atol=1e-6)
+
+
+@given(st.floats(-400.0, 400.0), st.floats(1e-4, 1e4))
+def test_a_slider_has_steps_of_few_digits(lower: float, extent: float) -> None:
+    step = slider_step(lower, lower + extent)
+    assert 1e-4 * extent * (1.0 - 1e-6) <= step <= 1e-3 * extent * (1.0 + 1e-6)
+    assert step == float(f"{step:.0e}")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import reduce
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -86,6 +87,11 @@ def test_the_page_shows_what_the_camera_of_the_world_sees(open_page: OpenPage) -
 
             until(lambda: common() > SAME, "the picture of the configuration")
         assert antialiased(page)
+        shapes = [node.name for nodes in viewer.view.visuals.values() for node in nodes]
+        assert len(shapes) == 8
+        assert page.page.evaluate(
+            "names => names.every(name => __viserMutable.nodeRefFromName[name])", shapes
+        )
         assert not page.errors
 
 
@@ -124,6 +130,26 @@ def test_sliders_buttons_and_keys_reach_the_program(open_page: OpenPage) -> None
         assert not again.errors
 
 
+def poses_in_page(page: Opened, paths: Mapping[str, str]) -> dict[str, Floats]:
+    """Return the pose (4, 4) in the world of the page's nodes, by the names of the parts at these paths."""
+    found = page.page.evaluate(
+        """paths => paths.map(path => {
+          const nodes = __viserMutable.nodeRefFromName, root = nodes["/" + path.split("/")[1]], chain = [];
+          for (let node = nodes[path]; node !== root; node = node.parent) {
+            node.updateMatrix();
+            chain.push([...node.matrix.elements]);
+          }
+          return chain;
+        })""",
+        list(paths),
+    )
+    poses = {}
+    for name, chain in zip(paths.values(), found, strict=True):
+        assert chain, name
+        poses[name] = reduce(lambda T, over: np.reshape(over, (4, 4)).T @ T, chain, np.eye(4))
+    return poses
+
+
 def test_the_panel_of_a_narrow_page_lies_below_the_robot(open_page: OpenPage) -> None:
     with view(dynx.load("six_axis_arm"), whole_meshes=False) as viewer:
         page = open_page(viewer.url, (400, 800))
@@ -137,6 +163,28 @@ def test_the_panel_of_a_narrow_page_lies_below_the_robot(open_page: OpenPage) ->
             lambda: all(0.0 < _pixel(client, robot.pose(link)[:3, 3])[1] < top for link in robot.links),
             "room",
         )
+        assert not page.errors
+
+
+def test_a_rollout_played_in_the_page_ends_at_its_last_configuration(open_page: OpenPage) -> None:
+    arm = dynx.load("six_axis_arm")
+    motion = dynx.trajectory.cycloidal(np.zeros(6), [0.5, -0.4, 0.3, 0.2, -0.3, 0.4], duration=0.5)
+    rollout = dynx.simulate(arm, dynx.control.ComputedTorque(arm, kp=100.0, kd=20.0), motion)
+    with rollout.view() as viewer:
+        page = open_page(viewer.url)
+        drawn = viewer.view.drawn
+        paths = {node.name: name for name, node in drawn.parts.items()}
+        start = poses_in_page(page, paths)
+        page.page.get_by_role("button", name="play", exact=True).click()
+        until(lambda: viewer.view.time == rollout.t[-1], "the end of the motion")
+        last = viewer.view.motion.at(-1)
+        assert max(np.abs(last[name] - T).max() for name, T in start.items()) > 0.1
+
+        def farthest() -> float:
+            found = poses_in_page(page, paths)
+            return max(float(np.abs(found[name] - T).max()) for name, T in last.items())
+
+        until(lambda: farthest() < 1e-5, "the last configuration in the page")
         assert not page.errors
 
 
@@ -265,6 +313,9 @@ def test_an_exported_page_plays_without_a_network(open_page: OpenPage, tmp_path:
     with rollout.view() as viewer:
         viewer.export(path)
     page = open_page(path.as_uri())
+    node = "Object.values(__viserMutable.nodePoseData).map(each => each.wxyz.join()).join()"
+    before = page.page.evaluate(node)
+    page.page.wait_for_function(f"before => {node} !== before", arg=before)
     assert [url for url in page.requests if not url.startswith(("file:", "data:", "blob:"))] == []
     assert not page.errors
 
