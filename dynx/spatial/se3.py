@@ -14,6 +14,11 @@ from dynx.spatial.so3 import quat_exp, quat_from_rotation, quat_log, rotate, ske
 
 def homogeneous(R: Array, p: Array) -> Array:
     """Return the matrix [[R, p], [0, 1]] (..., 4, 4) from R (..., 3, 3) and p (..., 3)."""
+    if R.ndim == 2 and p.ndim == 1 and R.dtype == p.dtype == np.float64:
+        # Views and concatenations take ten times as long as one small matrix.
+        T = np.zeros((4, 4))
+        T[:3, :3], T[:3, 3], T[3, 3] = R, p, 1.0
+        return T
     shape = np.broadcast_shapes(R.shape[:-2], p.shape[:-1])
     R = np.broadcast_to(R, (*shape, 3, 3))
     p = np.broadcast_to(p, (*shape, 3))

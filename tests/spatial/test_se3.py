@@ -83,3 +83,6 @@ def test_leading_axes_are_batches(quat: Floats, point: Triple) -> None:
     assert batch.shape == (2, 4, 4)
     np.testing.assert_array_equal(batch[0], batch[1])
     np.testing.assert_array_equal(batch[0, 3], [0.0, 0.0, 0.0, 1.0])
+    single = homogeneous(rotation_from_quat(quat), np.array(point))
+    assert single.tobytes() == batch[0].tobytes()
+    assert single.flags.writeable
