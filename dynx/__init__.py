@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 from dynx._version import __version__
 
 if TYPE_CHECKING:
-    from dynx import control, errors, ik, sim, trajectory
+    from dynx import control, errors, ik, sim, trajectory, world
     from dynx.agreement import AgreementReport, agree
     from dynx.backends import Backend, backend, installed_backends, register
     from dynx.compiled.derivatives import Derivatives
@@ -93,6 +93,7 @@ __all__ = [
     "simulate",
     "simulate_batch",
     "trajectory",
+    "world",
 ]
 
 _HOME = {
@@ -131,7 +132,8 @@ _HOME = {
     "simulate": "dynx.sim",
     "simulate_batch": "dynx.sim",
 }
-_SUBPACKAGES = ("control", "errors", "ik", "sim", "trajectory")
+_SUBPACKAGES = ("control", "errors", "ik", "sim", "trajectory", "world")
+_OF_EXTRAS = ("envs", "testing", "training", "viewer")
 
 
 # Hidden from type checkers, which would take any name for an attribute: they know the imports above.
@@ -140,6 +142,8 @@ if not TYPE_CHECKING:
     def __getattr__(name: str) -> Any:
         if name in _SUBPACKAGES:
             return import_module(f"dynx.{name}")
+        if name in _OF_EXTRAS:
+            raise AttributeError(f"dynx.{name} is not imported by itself; write: import dynx.{name}")
         if name not in _HOME:
             raise AttributeError(f"module 'dynx' has no attribute {name!r}{nearest_name(name)}")
         return getattr(import_module(_HOME[name]), name)

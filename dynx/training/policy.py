@@ -122,6 +122,8 @@ def read_policy_document(path: str | os.PathLike[str]) -> PolicyDocument:
     """
     where = shown(os.fspath(path), 300)
     if not Path(path).is_file():
+        if Path(path, "final.zip").is_file():
+            raise ArgumentError(f"{where} is the folder of a run; its policy is {Path(path, 'final.zip')}")
         raise ArgumentError(f"{where}: {irregularity(path) or 'there is no such file'}")
     try:
         with zipfile.ZipFile(path) as archive:
@@ -156,6 +158,13 @@ def load_policy(path: str | os.PathLike[str], task: TaskSpec | None = None) -> P
             algorithm = new_algorithm(spec.algorithm, vector, spec.hyperparameters, None)
         with open(path, "rb") as file:
             read_weights(algorithm, file, os.fspath(path))
+    except ArgumentError as error:
+        if task is None or task.id == spec.task.id:
+            raise
+        raise ArgumentError(
+            f"{shown(os.fspath(path), 300)} is a policy for {spec.task.id}, whose observations or actions "
+            f"are not those of {task.id}"
+        ) from error
     finally:
         vector.close()
     return Policy(algorithm, spec, document.steps_done, scaling_of(document))

@@ -25,6 +25,9 @@ _OPTIONS = {
 }
 """Options of the view of each kind of subject."""
 
+_PAGE_OPTIONS = ("host", "port", "dark", "whole_meshes", "open_browser")
+"""Options of `Viewer`, whatever it shows; only named in errors."""
+
 
 class View(Protocol):
     """What a page shows."""
@@ -109,6 +112,7 @@ def check_options(opened: object, options: Mapping[str, Any]) -> None:
     known = _OPTIONS[subject]
     for name, value in options.items():
         if name not in known:
+            known += _PAGE_OPTIONS
             hint = "; two rollouts are compared by Viewer((a, b))" if name == "compare" else ""
             raise ArgumentError(
                 f"no option {shown(name)} of {subject}{nearest(name, known)}; it has {', '.join(known)}{hint}"

@@ -94,3 +94,10 @@ def test_packages_resolve_and_a_misspelled_name_has_a_hint() -> None:
     code = "import dynx; dynx.sim.simulate, dynx.ik.inverse_kinematics, dynx.control.PD; dynx.simulat"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert "has no attribute 'simulat'; did you mean 'simulate'" in result.stderr
+
+
+def test_packages_of_extras_are_imported_by_name() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = dynx.__getattr__("nothing")
+    with pytest.raises(AttributeError, match=r"not imported by itself; write: import dynx\.viewer"):
+        _ = dynx.__getattr__("viewer")

@@ -108,7 +108,12 @@ def test_files_that_are_no_policy_are_refused(trained: Path, tmp_path: Path) -> 
             read_policy_document(written(tmp_path / "changed.zip", changed))
 
 
+def test_the_folder_of_a_run_names_its_policy(trained: Path) -> None:
+    with pytest.raises(ArgumentError, match=r"the folder of a run; its policy is .*final\.zip"):
+        load_policy(trained.parent)
+
+
 def test_a_policy_for_other_observations_is_refused(trained: Path) -> None:
-    with pytest.raises(ArgumentError, match="no weights that fit"):
+    with pytest.raises(ArgumentError, match=r"a policy for .*not those of Acrobot-v1"):
         load_policy(trained, TaskSpec("Acrobot-v1"))
     make(TaskSpec("Acrobot-v1")).close()

@@ -73,6 +73,7 @@ def test_a_port_that_is_taken_is_told(arm: Model) -> None:
         ({"port": 0, "q": [np.nan] * 6}, "finite"),
         ({"port": 0, "q": [0.0] * 3}, "shape"),
         ({"port": 0, "plays": True}, "no option 'plays' of a robot"),
+        ({"prot": 0}, "did you mean 'port'"),
         ({"port": 0, "collisions": "yes"}, "wanted True or False"),
     ],
 )

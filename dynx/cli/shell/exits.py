@@ -84,6 +84,10 @@ def report_failure(error: BaseException, command: str) -> int:
     if isinstance(error, (click.Abort, KeyboardInterrupt)):
         complain("interrupted")
         return INTERRUPTED
+    if isinstance(error, click.exceptions.NoArgsIsHelpError):
+        with suppress(OSError):
+            click.echo(error.format_message(), err=True)
+        return BAD_INPUT
     if isinstance(error, click.UsageError):
         where = command if error.ctx is None else error.ctx.command_path
         complain(f"{error.format_message()} (see '{where} --help')")

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import click
 
-from dynx.errors import shown
+from dynx.errors import nearest, shown
 
 GROUP = "dynx.commands"
 """Entry-point group of the commands of installed packages."""
@@ -71,6 +71,17 @@ class LazyGroup(click.Group):
                 f"the command {shown(name)} of the entry point {point.value} cannot be loaded: "
                 f"{type(error).__name__}: {error}"
             ) from error
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the name and the command that arguments begin with, and the others.
+
+        Raises UsageError, which names the nearest command, where there is none.
+        """
+        if args and self.get_command(ctx, args[0]) is None and not args[0].startswith("-"):
+            ctx.fail(f"no command {shown(args[0])}{nearest(args[0], self.list_commands(ctx))}")
+        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list of commands, one line each."""

@@ -74,15 +74,20 @@ def train(
             started = time.perf_counter()
             with progress_bar(run.steps, words="steps", enabled=not quiet) as advance:
                 reporter = _Reporter(advance, seed if len(seeds) > 1 else None, quiet)
-                trained = train_run(
-                    run,
-                    folder,
-                    # A seed that has not begun is begun: the run was ended while it learned an earlier one.
-                    resume=resume and (len(seeds) == 1 or (folder / "run.json").exists()),
-                    schedule=schedule,
-                    final_episodes=episodes,
-                    progress=reporter,
-                )
+                try:
+                    trained = train_run(
+                        run,
+                        folder,
+                        # A seed that has not begun is begun: the run was ended in an earlier one.
+                        resume=resume and (len(seeds) == 1 or (folder / "run.json").exists()),
+                        schedule=schedule,
+                        final_episodes=episodes,
+                        progress=reporter,
+                    )
+                except KeyboardInterrupt:
+                    if any((folder / "checkpoints").glob("*.zip")):
+                        log(f"{folder} has a checkpoint; the same command with --resume goes on from there")
+                    raise
             runs.append(trained)
             times.append(time.perf_counter() - started)
         interruption.finishing = True

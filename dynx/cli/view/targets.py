@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from dynx.errors import ArgumentError, RobotNotFoundError, nearest, shown
 from dynx.model import Model
-from dynx.model.library import scene_names
+from dynx.model.library import robots, scene_names
 from dynx.model.loading import load
 from dynx.model.model import Base
 
@@ -63,8 +63,8 @@ def load_robot(target: str, base: Base) -> Model:
     try:
         return load(target, base=base)
     except RobotNotFoundError as error:
-        similar = nearest(target, scene_names())
-        if similar and os.sep not in target and "." not in target:
+        if os.sep not in target and "." not in target:
+            similar = nearest(target, [*scene_names(), *(entry.name for entry in robots())])
             raise RobotNotFoundError(f"no robot and no scene {shown(target)}{similar}") from error
         raise
 

@@ -74,8 +74,8 @@ from dynx.cli.shell.options import (
 def world() -> None:
     """Run a scene of robots and bodies with contacts, and compare the engines.
 
-    SCENE is a scene file (TOML or JSON) or the name of a scene of dynx: bowling, duck, pushing, rolling,
-    slope, stack or standing.
+    SCENE is a scene file (TOML or JSON) or the name of a scene of dynx: bowling, duck, lifting, pushing,
+    rolling, slope, stack or standing.
     The final states are printed, the contacts of the last step, and for every two engines how far apart
     their motions are over time. Notes name parts that overlap at the start, and constraints that it violates.
 

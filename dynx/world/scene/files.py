@@ -77,9 +77,9 @@ def _named(name: str) -> Path:
         if name in scene_names() and path.is_file():
             return path
     known = scene_names()
-    hint = "; a scene names its robots in a .toml or .json file" if name in _robot_names() else ""
+    hint = ", and names its robots" if name in _robot_names() else ""
     raise RobotNotFoundError(
-        f"no scene {shown(name)}{nearest(name, known)}; a file of a scene ends in .toml or .json{hint}"
+        f"no scene {shown(name)} (a file of a scene ends in .toml or .json{hint}){nearest(name, known)}"
     )
 
 

@@ -33,6 +33,19 @@ def test_no_argument_gives_help() -> None:
     assert "agree" in result.output
 
 
+def test_a_mistyped_command_names_the_nearest() -> None:
+    result = CliRunner().invoke(cli, ["doctr", "ur5"])
+    assert result.exit_code == 2
+    assert "no command 'doctr'; did you mean 'doctor'?" in result.output
+
+
+def test_a_group_of_commands_without_one_gives_help() -> None:
+    result = CliRunner().invoke(cli, ["env"])
+    assert result.exit_code == 2
+    assert "Commands:\n  distance" in result.output
+    assert "error" not in result.output
+
+
 def test_the_default_of_samples_is_that_of_agree() -> None:
     text = " ".join(CliRunner().invoke(cli, ["agree", "--help"]).output.split())
     assert f"(default: {DEFAULT_SAMPLES}; with --as-loaded {DEFAULT_STATES})" in text

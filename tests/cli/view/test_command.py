@@ -169,3 +169,11 @@ def test_a_rollout_is_drawn_with_the_shapes_of_the_library(tmp_path: Path) -> No
     longer = dynx.load(text.replace('xyz="0.0 0.0 0.333"', 'xyz="0.0 0.0 0.4"', 1))
     dynx.simulate(longer, duration=0.01).save(path)
     assert not read_rollout(str(path), None).model.geometry.visuals("panda_link1")
+
+
+@needs_examples
+def test_a_mistyped_target_names_robots_and_scenes() -> None:
+    for name, nearest in (("pand", "panda"), ("stak", "stack")):
+        code, output = run(name)
+        assert code == BAD_INPUT
+        assert f"no robot and no scene '{name}'; did you mean '{nearest}'" in output
