@@ -49,22 +49,30 @@ MAX_SECONDS = 10.0
 LONGEST = 20
 """Number of rows that are printed again at the end."""
 
-LARGEST_ROBOTS = (
+ROBOTS = (
     "tiago_dual",
     "tiago",
     "g1_with_hands",
-    "alex_psyonic_hands",
     "centauro",
+    "alex_psyonic_hands",
     "human",
     "romeo",
-    "talos_full",
     "talos",
     "icub",
     "g1",
+    "tiago_pro",
     "pr2",
+    "anymal_kinova",
+    "baxter",
     "allegro_left_hand",
+    "alexander",
+    "solo12",
+    "hyq",
+    "panda",
+    "ur5",
 )
-"""Robots that are compiled by default, those with most joints of the library and a hand."""
+"""Robots that are compiled by default, from 101 joints to 6: humanoids, hands, arms on wheels and on legs,
+quadrupeds and arms of the library, the largest of those that are built alike first."""
 
 BASES: tuple[Base, ...] = ("fixed", "floating")
 
@@ -285,7 +293,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table; return 1 if a compilation takes longer than `MAX_SECONDS` or fails."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.compile_times", description=__doc__)
     parser.add_argument(
-        "--robots", nargs="+", default=LARGEST_ROBOTS, metavar="ROBOT", help="names, tree:N, serial:N, or all"
+        "--robots", nargs="+", default=ROBOTS, metavar="ROBOT", help="names, tree:N, serial:N, or all"
     )
     parser.add_argument("--bases", nargs="+", default=BASES, choices=BASES)
     parser.add_argument("--kinds", nargs="+", metavar="TEXT", help="kinds whose names contain one of these")
