@@ -147,6 +147,12 @@ def _start(model: Model, q0: ArrayLike | None) -> Floats:
     return q
 
 
+def argument_note(model: Model, q0: ArrayLike | None, avoidance: Avoidance | None) -> str:
+    """Return sentences on a q0 that was moved into the limits and on what the avoidance leaves out."""
+    notes = ("" if q0 is None else start_note(model, q0), "" if avoidance is None else avoidance.note)
+    return "; ".join(filter(None, notes))
+
+
 def start_note(model: Model, q0: ArrayLike) -> str:
     """Return a sentence if a q0 (..., nq) that was checked is outside the limits, otherwise an empty text."""
     q = np.asarray(q0, dtype=np.float64)

@@ -52,7 +52,8 @@ class IKResult:
     the result are the largest."""
 
     note: str = field(default="", kw_only=True)
-    """Sentence on what of the arguments was changed, such as a q0 outside the limits; empty if nothing."""
+    """Sentence on what of the arguments was changed, such as a q0 outside the limits, and on what `avoid`
+    leaves out, such as links without collision shapes; empty if nothing."""
 
     @property
     def status(self) -> Any:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, nearest, shown
-from dynx.ik.checking import checked_problem, start_note
+from dynx.ik.checking import argument_note, checked_problem
 from dynx.ik.clear_solutions import clear_solutions
 from dynx.ik.closed_form.checking import all_solutions as solve_closed_form
 from dynx.ik.closed_form.solutions import IKSolutions
@@ -119,7 +119,7 @@ def inverse_kinematics(
         )
     problem = checked_problem(kinematics.model, target, frame, q0, chosen)
     found = _solved(kinematics, problem, chosen.method)
-    note = "" if q0 is None else start_note(kinematics.model, q0)
+    note = argument_note(kinematics.model, q0, problem.avoidance)
     return replace(found, note=note) if note else found
 
 

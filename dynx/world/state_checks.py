@@ -53,14 +53,14 @@ def apply_state(engine: WorldEngine, state: WorldState) -> None:
             engine.set_body_state(k, *state.bodies[body.name])
 
 
-def _pair(what: str, pair: object) -> tuple[ArrayLike, ArrayLike]:
+def _pair(what: str, parts: str, pair: object) -> tuple[ArrayLike, ArrayLike]:
     if not isinstance(pair, tuple) or len(pair) != 2:
-        raise ArgumentError(f"the state of {what} is {shown(pair)}; wanted a pair")
+        raise ArgumentError(f"the state of {what} is {shown(pair)}; wanted a pair {parts}")
     return pair
 
 
 def _robot_state(robot: RobotLayout, pair: object) -> RobotState:
-    given_q, given_v = _pair(robot.name, pair)
+    given_q, given_v = _pair(robot.name, f"(q, v) with {robot.model.nq} and {robot.model.nv} numbers", pair)
     q = checked_q(robot.model, given_q, f"q of {robot.name}")
     v = checked_array(f"v of {robot.name}", given_v, robot.model.nv)
     if q.ndim != 1 or v.ndim != 1:
@@ -69,7 +69,7 @@ def _robot_state(robot: RobotLayout, pair: object) -> RobotState:
 
 
 def _body_state(body: BodyLayout, pair: object) -> BodyState:
-    pose, given_twist = _pair(body.name, pair)
+    pose, given_twist = _pair(body.name, "(T_world_body, twist) of shapes (4, 4) and (6,)", pair)
     if isinstance(pose, Pose):
         pose = pose.matrix
     # This checks the matrix; converted to roll, pitch, yaw and back it would be rounded.

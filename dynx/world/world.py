@@ -13,6 +13,7 @@ from dynx.ik.avoidance import Avoidance
 from dynx.model import Model
 from dynx.model.configuration import positive_seconds, whole_number
 from dynx.model.package_paths import StrPath
+from dynx.option_names import checks_option_names
 from dynx.registry import view
 from dynx.spatial.scalar import Floats
 from dynx.world.camera import Camera, Picture, cast_rays, draw_picture
@@ -314,6 +315,7 @@ class World:
         engine."""
         return self._queries.closest_points(self._motion.engine, self.state, a, b, within, native)
 
+    @checks_option_names
     def avoidance(
         self, robot: str | None = None, *, margin: float = MARGIN, self_margin: float | None = None
     ) -> Avoidance:

@@ -122,6 +122,7 @@ CALLS: dict[str, tuple[Callable[[World], object], type[DynxError], str]] = {
     "wrench in no axes": (lambda w: w.step(wrenches=[Wrench("brick", axes="x")]), ArgumentError, "axes"),
     "wrenches in a set": (lambda w: w.step(wrenches={1}), ArgumentError, "list of Wrench"),  # type: ignore[arg-type]
     "state with NaN": (lambda w: w.set_state(robots={"arm": ([NAN, 0], [0, 0])}), ArgumentError, "q of arm"),
+    "no pair": (lambda w: w.set_state(robots={"arm": [0.0, 0.0]}), ArgumentError, r"wanted a pair \(q, v\)"),
     "no state": (lambda w: w.set_state(), ArgumentError, "robots= or bodies="),
     "state of a removed body": (
         lambda w: w.set_state(bodies={"gone": (np.eye(4), [0] * 6)}),

@@ -124,3 +124,13 @@ def test_a_world_read_from_a_file_has_the_notes_that_hold_past_its_start(engine:
         with World.read(tmp_path / "saved.world") as read:
             assert read.notes == world.notes[1:]
             assert "longer than 0.1 s" in read.notes[0]
+
+
+def test_a_robot_without_collision_shapes_is_noted_where_there_is_something_to_pass_through() -> None:
+    robot = SceneRobot("arm", dynx.load("planar_2r"))
+    with World(Scene("s", robots=(robot,), bodies=(brick("a"),)), "pybullet") as world:
+        assert world.notes == ("no link of 'arm' has a collision shape: it passes through everything",)
+    with World(Scene("s", robots=(robot,), bodies=(brick("a"),)), "pybullet", collisions=False) as world:
+        assert world.notes == ()
+    with World(Scene("s", robots=(robot,)), "pybullet") as world:
+        assert world.notes == ()

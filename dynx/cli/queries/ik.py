@@ -75,6 +75,7 @@ def ik(
         }
         if kept is not None:
             result["status"], result["avoid"] = found.status, avoid
+            result["note"] = found.note
             result["collision"] = "" if found.collision is None else str(found.collision)
         joints = dict(zip(model.joint_names, result["q"][model.nq - len(model.joint_names) :], strict=True))
     code = DONE if result["success"] else NEGATIVE_RESULT

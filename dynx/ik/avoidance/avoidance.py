@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from threading import Lock
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
@@ -18,6 +18,10 @@ from dynx.spatial.scalar import Floats
 
 MAX_MARGIN = 10.0
 """Largest margin [m]."""
+
+
+MAX_NAMES = 3
+"""Largest number of links that a note names."""
 
 
 class NearPair(NamedTuple):
@@ -40,9 +44,16 @@ class Avoidance:
     Safe to use from several threads.
     """
 
-    def __init__(self, model: Model, parts: Sequence[Part], pairs: Iterable[tuple[int, int, float]]) -> None:
-        """`pairs` are two numbers in `parts` and the margin [m] of each pair. Raises ArgumentError for a
-        margin, and the errors of `Mesh.hull`."""
+    def __init__(
+        self,
+        model: Model,
+        parts: Sequence[Part],
+        pairs: Iterable[tuple[int, int, float]],
+        without_shapes: Sequence[str] = (),
+    ) -> None:
+        """`pairs` are two numbers in `parts` and the margin [m] of each pair; `without_shapes` are the moving
+        links that lack a collision shape. Raises ArgumentError for a margin, and the errors of `Mesh.hull`.
+        """
         self.model = model
         self.parts = tuple(parts)
         self._solids = [part.solids() for part in self.parts]
@@ -53,6 +64,9 @@ class Avoidance:
         }
         self._frames = {part.frame for part in self.parts} - {None}
         self._lock = Lock()
+        self.note = "; ".join(_notes(without_shapes, self.pairs))
+        """Sentence on links that are kept from nothing because they have no collision shape; empty if there
+        are none. Results of inverse kinematics repeat it."""
 
     pairs: tuple[Pair, ...]
     """The pairs that stay apart, with the margin of each."""
@@ -147,6 +161,16 @@ class AvoidanceSource(Protocol):
 
     def avoidance_for(self, model: Model, /) -> Avoidance:
         """Return what the robot `model` is to avoid."""
+
+
+def _notes(without_shapes: Sequence[str], pairs: Sequence[Pair]) -> Iterator[str]:
+    if without_shapes:
+        names = ", ".join(map(shown, without_shapes[:MAX_NAMES]))
+        more = f" and {len(without_shapes) - MAX_NAMES} more" if len(without_shapes) > MAX_NAMES else ""
+        have, them = ("has", "it") if len(without_shapes) == 1 else ("have", "them")
+        yield f"{names}{more} {have} no collision shape, so that avoid keeps nothing from {them}"
+    if not pairs:
+        yield "avoid keeps no bodies apart: the scene has no pair of them that may collide"
 
 
 def same_kinematics(one: Model, other: Model) -> bool:

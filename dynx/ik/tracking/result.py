@@ -47,7 +47,7 @@ class TrackResult:
     dt: float | None
     """Time between two samples [s], if velocity limits were kept."""
     note: str = ""
-    """Sentence on a q0 that was outside the limits and moved into them; empty otherwise."""
+    """Sentence on a q0 that was moved into the limits, and on what `avoid` leaves out; empty otherwise."""
 
     @property
     def ok(self) -> NDArray[np.bool_]:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.ik.avoidance import AvoidanceSource
-from dynx.ik.checking import checked_avoidance, checked_margin, start_note
+from dynx.ik.checking import argument_note, checked_avoidance, checked_margin
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.search import SearchLimits
 from dynx.ik.targets import Targets, checked_targets
@@ -171,7 +171,7 @@ def track(
         gathered("jump"),
         gathered("iterations").astype(np.int64),
         seconds,
-        "" if q0 is None else start_note(model, q0),
+        argument_note(model, q0, avoidance),
     )
 
 

@@ -44,11 +44,20 @@ def notes_on_start(engine: WorldEngine, state: WorldState) -> tuple[str, ...]:
 
 
 def notes_on_engine(engine: WorldEngine) -> Iterator[str]:
-    """Yield one sentence for each coefficient of contact that the engine does not have, and for a long step:
-    they hold at every state."""
+    """Yield one sentence for each coefficient of contact that the engine does not have, for a long step, and
+    for each robot without collision shapes: they hold at every state."""
     yield from map(str, inexact_materials(engine))
     if engine.dt > LONG_STEP:
         yield f"a step of {engine.dt:g} s is longer than {LONG_STEP:g} s: bodies may pass through one another"
+    yield from _robots_without_shapes(engine.layout)
+
+
+def _robots_without_shapes(layout: Layout) -> Iterator[str]:
+    """Yield each robot that passes through what others have in its way, because it has no collision shape."""
+    shaped = {collider.owner.robot for collider in layout.colliders}
+    for k, robot in enumerate(layout.robots):
+        if shaped and k not in shaped:
+            yield f"no link of {shown(robot.name)} has a collision shape: it passes through everything"
 
 
 def _overlaps(engine: WorldEngine) -> Iterator[str]:

@@ -8,10 +8,10 @@ from itertools import combinations
 
 import numpy as np
 
-from dynx.errors import ArgumentError, shown
+from dynx.errors import ArgumentError, DescriptionError, shown
 from dynx.ik.avoidance import Avoidance, Part
 from dynx.ik.avoidance.avoidance import same_kinematics
-from dynx.model import Model
+from dynx.model import Link, Model
 from dynx.model.geometry import Collision
 from dynx.spatial.scalar import Floats
 from dynx.world.scene.bodies import SceneBody
@@ -68,7 +68,8 @@ def robot_avoidance(
     """Return what one robot of a scene keeps away from; bodies and other robots are where they start.
 
     Bodies with mass that a `Weld` connects to the robot move with it. Pairs that the scene ignores, and links
-    that a joint connects, are not kept apart.
+    that a joint connects, are not kept apart. Raises ArgumentError for a robot none of whose moving links has
+    a shape, because such an avoidance would be kept by every configuration.
     """
     all_robots = [replace(robot, self_collision=True), *(each for each in robots if each.name != robot.name)]
     movable = list(bodies)
@@ -93,6 +94,7 @@ def robot_avoidance(
             own.append(_part(body.name, frame, T, body.shapes))
         else:
             others.append(_part(body.name, None, body.pose.matrix, body.shapes))
+    without = _links_without_shapes(robot.model, heads, own)
     parts = [*own, *others]
     number = {part.name: k for k, part in enumerate(parts)}
     pairs: list[tuple[int, int, float]] = []
@@ -107,7 +109,7 @@ def robot_avoidance(
             if not (may_collide(a.name, b.name) and _moves(robot.model, heads, a)):
                 continue
             pairs.append((number[a.name], number[b.name], margin))
-    return Avoidance(robot.model, parts, pairs)
+    return Avoidance(robot.model, parts, pairs, without)
 
 
 def _part(name: str, frame: str | None, T: Floats, shapes: Iterable[Collision]) -> Part:
@@ -115,7 +117,39 @@ def _part(name: str, frame: str | None, T: Floats, shapes: Iterable[Collision]) 
 
 
 def _moves(model: Model, heads: Mapping[str, str], part: Part) -> bool:
-    return part.frame is not None and (model.floating or heads[part.frame] != heads[model.root])
+    return part.frame is not None and _link_moves(model, heads, part.frame)
+
+
+def _link_moves(model: Model, heads: Mapping[str, str], link: str) -> bool:
+    return model.floating or heads[link] != heads[model.root]
+
+
+def _links_without_shapes(model: Model, heads: Mapping[str, str], own: Iterable[Part]) -> list[str]:
+    """Return the moving links that have a mass or a visual shape, but no collision shape.
+
+    Raises ArgumentError if no body that moves with the robot has a collision shape.
+    """
+    moving = [link for link in model.links if _link_moves(model, heads, link.name)]
+    parts = [part for part in own if _moves(model, heads, part)]
+    if moving and not parts:
+        raise ArgumentError(
+            f"no link of robot {shown(model.name)} that can move has a collision shape, so that there is "
+            "nothing to keep apart; add <collision> elements to its description"
+        )
+    return [
+        link.name for link in moving if not model.geometry.collisions(link.name) and _is_solid(model, link)
+    ]
+
+
+def _is_solid(model: Model, link: Link) -> bool:
+    """Return whether a link is more than a frame: it has a mass or a visual shape."""
+    if link.inertial is not None and link.inertial.mass > 0.0:
+        return True
+    try:
+        return bool(model.geometry.visuals(link.name))
+    except DescriptionError:
+        # A visual shape with a fault is one.
+        return True
 
 
 def _is_elsewhere(one: Model, other: Model) -> bool:

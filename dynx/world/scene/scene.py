@@ -16,6 +16,7 @@ from dynx.model import Model
 from dynx.model.configuration import checked_gravity
 from dynx.model.elements import Vector
 from dynx.model.model import STANDARD_GRAVITY
+from dynx.option_names import checks_option_names
 from dynx.world.scene.avoidance import MARGIN, robot_avoidance, robot_like
 from dynx.world.scene.bodies import SceneBody
 from dynx.world.scene.constraints import Constraint, PointToPoint, Weld
@@ -131,6 +132,7 @@ class Scene:
         """Which parts may collide, by names that are not checked again."""
         return CollisionFilter(self.robots, self.bodies, [tuple(map(self._members, p)) for p in self.ignored])
 
+    @checks_option_names
     def avoidance(
         self, robot: str | None = None, *, margin: float = MARGIN, self_margin: float | None = None
     ) -> Avoidance:
@@ -141,14 +143,24 @@ class Scene:
         are welded to the robot move with it. Pairs in `ignored` are left out. `robot` is needed if there are
         several.
 
-        Raises UnknownNameError for the robot, ArgumentError for a margin, and the errors of collision shapes.
+        Raises UnknownNameError for the robot or an option, ArgumentError for a margin, a scene without robots
+        and a robot none of whose moving links has a collision shape, and the errors of collision shapes.
         """
         if robot is None:
+            if not self.robots:
+                raise ArgumentError(
+                    f"scene {shown(self.name)} has no robot; add a SceneRobot, or use "
+                    "avoidance_for(model, margin=...), which takes the model as its robot"
+                )
             if len(self.robots) != 1:
-                raise ArgumentError(f"{self.name} has {len(self.robots)} robots; wanted the name of one")
+                names = ", ".join(shown(each.name) for each in self.robots)
+                raise ArgumentError(
+                    f"scene {shown(self.name)} has {len(self.robots)} robots; wanted the name of one: {names}"
+                )
             robot = self.robots[0].name
         return self._avoidance(self.robot(robot), margin, self_margin)
 
+    @checks_option_names
     def avoidance_for(
         self, model: Model, *, margin: float = MARGIN, self_margin: float | None = None
     ) -> Avoidance:

@@ -241,7 +241,7 @@ def test_links_that_are_close_by_the_way_they_are_modelled() -> None:
         (lambda: scene("panda"), "none with the joints and links of the backend's"),
         (lambda: _moved(), "at another base pose"),
         (lambda: scene("ur5").avoidance(margin=-0.1), r"margin is '?-0.1"),
-        (lambda: Scene(bodies=[TABLE]).avoidance(), "0 robots; wanted the name of one"),
+        (lambda: Scene(bodies=[TABLE]).avoidance(), "no robot; add a SceneRobot, or use avoidance_for"),
     ],
     ids=["no scene", "another robot", "another place", "negative", "no robot"],
 )
