@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from dynx.cli.shell.lazy import runs
-from dynx.cli.shell.options import FiniteRange, GroupedCommand, group, name_list
+from dynx.cli.shell.options import FiniteRange, GroupedCommand, group, name_list, sample_option
 
 
 @click.command(cls=GroupedCommand)
@@ -35,6 +35,7 @@ from dynx.cli.shell.options import FiniteRange, GroupedCommand, group, name_list
     click.option(
         "--base", type=click.Choice(["fixed", "floating"]), help="Base of a robot (default: fixed)."
     ),
+    sample_option("q", "Configuration of a robot (default: neutral)"),
     click.option(
         "--shapes",
         metavar="ROBOT",

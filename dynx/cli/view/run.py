@@ -7,6 +7,7 @@ from contextlib import suppress
 from typing import Any
 
 from dynx.cli.shell.exits import DONE, one_line
+from dynx.cli.shell.inputs import Numbers, configuration
 from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.output_file import check_writable
 from dynx.cli.shell.terminal import console
@@ -22,6 +23,7 @@ def view(
     duration: float | None,
     dt: float | None,
     base: Base | None,
+    q: Numbers,
     shapes: str | None,
     collisions: bool,
     whole_meshes: bool,
@@ -41,6 +43,7 @@ def view(
         "--duration": duration,
         "--dt": dt,
         "--base": base,
+        "--q": q,
         "--shapes": shapes,
         "--collisions": collisions or None,
         "--play": play or None,
@@ -51,7 +54,8 @@ def view(
     options: dict[str, Any]
     if kind == "robot":
         opened = load_robot(targets[0], base or "fixed")
-        options = {"engine": single_engine(engines), "collisions": collisions}
+        start = None if q is None else configuration(opened, q)
+        options = {"q": start, "engine": single_engine(engines), "collisions": collisions}
     elif kind == "scene":
         from dynx.cli.view.scenes import open_scene
 

@@ -16,7 +16,7 @@ _ROLLOUTS = (".npz", ".mcap")
 _TABLE = ".csv"
 
 _OPTIONS = {
-    "robot": ("--engine", "--base", "--collisions"),
+    "robot": ("--engine", "--base", "--q", "--collisions"),
     "rollout": ("--shapes", "--play"),
     "comparison of rollouts": ("--shapes", "--play"),
     "scene": ("--engine", "--duration", "--dt", "--play"),

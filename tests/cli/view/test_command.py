@@ -43,6 +43,17 @@ def test_a_rollout_a_robot_and_two_rollouts_are_exported(saved: str, tmp_path: P
         page.unlink()
 
 
+def test_a_robot_is_shown_at_a_configuration(tmp_path: Path) -> None:
+    pictures = []
+    for q in ("0", f"{dynx.load('pendulum').joint_names[0]}=1.5"):
+        picture = tmp_path / "robot.png"
+        code, output = run("pendulum", "--q", q, "--export", str(picture))
+        assert code == 0, output
+        pictures.append(picture.read_bytes())
+    assert pictures[0] != pictures[1]
+    assert "pendulum needs 1" in run("pendulum", "--q", "1,2")[1]
+
+
 def test_a_scene_is_compared_in_two_engines(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     pytest.importorskip("pybullet")
