@@ -45,13 +45,20 @@ def test_a_rollout_a_robot_and_two_rollouts_are_exported(saved: str, tmp_path: P
 
 def test_a_robot_is_shown_at_a_configuration(tmp_path: Path) -> None:
     pictures = []
-    for q in ("0", f"{dynx.load('pendulum').joint_names[0]}=1.5"):
+    robot = tmp_path / "door.urdf"
+    robot.write_text(
+        '<robot name="door"><link name="wall"/><link name="leaf"><visual><origin xyz="0.4 0 0"/><geometry>'
+        '<box size="0.8 0.1 1"/></geometry></visual></link><joint name="hinge" type="continuous">'
+        '<parent link="wall"/><child link="leaf"/><axis xyz="0 0 1"/></joint></robot>',
+        encoding="utf-8",
+    )
+    for q in ("0", "hinge=1.5"):
         picture = tmp_path / "robot.png"
-        code, output = run("pendulum", "--q", q, "--export", str(picture))
+        code, output = run(str(robot), "--q", q, "--export", str(picture))
         assert code == 0, output
         pictures.append(picture.read_bytes())
     assert pictures[0] != pictures[1]
-    assert "pendulum needs 1" in run("pendulum", "--q", "1,2")[1]
+    assert "door needs 1: hinge" in run(str(robot), "--q", "1,2")[1]
 
 
 def test_a_scene_is_compared_in_two_engines(tmp_path: Path) -> None:
