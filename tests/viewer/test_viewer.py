@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import socket
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -42,6 +44,15 @@ def test_a_robot_is_shown_at_the_configuration_given(arm: Model) -> None:
                 assert np.abs(T - expected).max() < 1e-6
                 assert np.abs(viewer.view.robot.pose(link) - expected).max() < 1e-9
     assert viewer.page.closed
+
+
+def test_the_line_that_installs_the_viewer_is_told() -> None:
+    code = "import sys; sys.modules['viser'] = None; import dynx; dynx.load('six_axis_arm').view()"
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert ended.returncode == 1
+    assert ended.stderr.splitlines()[-1].startswith(
+        "dynx.errors.NotInstalledError: the viewer needs viser: pip install 'dynx[viewer]'"
+    )
 
 
 def test_every_object_has_its_view(arm: Model, tmp_path: Path) -> None:
