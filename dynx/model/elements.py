@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -86,6 +86,10 @@ class Pose:
     def matrix(self) -> Floats:
         """Homogeneous matrix (4, 4) of the pose."""
         return homogeneous(rotation_from_rpy(np.array(self.rpy)), np.array(self.xyz))
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> Floats:
+        """Return a copy of `matrix`, so that NumPy takes a pose wherever a matrix (4, 4) is taken."""
+        return np.array(self.matrix, dtype=dtype)
 
 
 IDENTITY = Pose()

@@ -11,8 +11,8 @@ import pytest
 from dynx.agreement.tolerances import BAR
 from dynx.backends import Backend, backend, installed_backends
 from dynx.errors import ArgumentError, ClosedError, DTypeError, NotFiniteError, ShapeError, UnknownNameError
-from dynx.ik import IKResult
-from dynx.model import Link, Model
+from dynx.ik import FrameTarget, IKResult
+from dynx.model import Link, Model, Pose
 from dynx.model.loading import load
 from dynx.spatial.so3 import rotation_from_rpy
 from tests.oracles.closed_form import MODELS
@@ -27,6 +27,18 @@ TURN = rotation_from_rpy(np.array([0.3, -0.4, 2.0]))
 def engine(request: pytest.FixtureRequest) -> Iterator[Backend]:
     with backend(request.param, load(MODELS / "six_axis_arm.urdf")) as engine:
         yield engine
+
+
+def test_a_pose_object_is_a_target(engine: Backend) -> None:
+    """Alone, in a list, of one frame among several, and along a path."""
+    T = engine.forward_kinematics(0.3 * np.ones(6), "flange")
+    pose = Pose.from_matrix(T)
+    expected = engine.inverse_kinematics(pose.matrix, "flange").q
+    for target, frame in ((pose, "flange"), ({"flange": pose}, None), ([FrameTarget("flange", pose)], None)):
+        np.testing.assert_array_equal(engine.inverse_kinematics(target, frame).q, expected)
+    several = engine.inverse_kinematics([pose, pose], "flange")
+    np.testing.assert_array_equal(several.q, [expected, expected])
+    assert engine.track([pose, pose], "flange", 0.3 * np.ones(6))
 
 
 @pytest.mark.parametrize(

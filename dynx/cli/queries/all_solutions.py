@@ -23,6 +23,7 @@ def all_solutions(
     given: Numbers,
     json_path: str | None,
     *,
+    note: str,
     frame_is_default: bool,
 ) -> int:
     """Print every solution with the name of its branch; return the exit code."""
@@ -40,6 +41,7 @@ def all_solutions(
         "frame": frame,
         "target": target.tolist(),
         "given": given or {},
+        "note": note,
         "solutions": [
             {
                 "branch": branch,
@@ -58,6 +60,8 @@ def all_solutions(
     out.print(f"{title(result)}: all inverse kinematics of {one_line(frame)}", style="bold")
     if frame_is_default:
         out.print(default_frame_note(frame))
+    if note:
+        out.print(note)
     out.print(found.message, style="green" if result["solutions"] else "red")
     if result["solutions"]:
         columns = [str(k + 1) for k in range(len(result["solutions"]))]

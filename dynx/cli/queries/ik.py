@@ -9,6 +9,7 @@ from dynx.cli.queries.evaluate import document_head, title
 from dynx.cli.shell.exits import DONE, NEGATIVE_RESULT, one_line
 from dynx.cli.shell.inputs import (
     Numbers,
+    angle_note,
     chosen_frame,
     configuration,
     default_frame_note,
@@ -36,6 +37,7 @@ def ik(
     **robot: Any,
 ) -> int:
     """Print the configuration found; return the exit code."""
+    note = angle_note(target, "--to-pose", rotation_only=free == "position")
     wanted = (target_rotation if free == "position" else target_pose)(target, "--to-pose")
     if every and (free is not None or wanted.ndim == 1):
         raise ArgumentError(
@@ -56,7 +58,9 @@ def ik(
         start = None if q is None else configuration(model, q)
         if every:
             by_default = frame is None
-            return all_solutions(engine, wanted, name, start, given, json_path, frame_is_default=by_default)
+            return all_solutions(
+                engine, wanted, name, start, given, json_path, note=note, frame_is_default=by_default
+            )
         kept = None
         if scene is not None:
             kept = scene.avoidance_for(model, margin=MARGIN if margin is None else margin)
@@ -72,10 +76,13 @@ def ik(
             "rotation_error": None if free == "rotation" else float(found.rotation_error),
             "iterations": int(found.iterations),
             "restarts": int(found.restarts),
+            "status": found.status,
+            "message": found.message,
+            "proof": "" if found.proof is None else str(found.proof),
+            "note": "; ".join(filter(None, (found.note, note))),
         }
         if kept is not None:
-            result["status"], result["avoid"] = found.status, avoid
-            result["note"] = found.note
+            result["avoid"] = avoid
             result["collision"] = "" if found.collision is None else str(found.collision)
         joints = dict(zip(model.joint_names, result["q"][model.nq - len(model.joint_names) :], strict=True))
     code = DONE if result["success"] else NEGATIVE_RESULT
@@ -86,8 +93,8 @@ def ik(
     if frame is None:
         out.print(default_frame_note(name))
     out.print(_outcome(result), style="green" if result["success"] else "red")
-    if found.note:
-        out.print(found.note)
+    for line in filter(None, (found.note, note)):
+        out.print(line)
     table = Table("joint", "q", right=("q",))
     for joint, value in joints.items():
         table.add_row(one_line(joint), number(value))
@@ -106,4 +113,5 @@ def _outcome(result: dict[str, Any]) -> str:
         return f"target reached{clear}: error {error}, after {iterations} and {restarts}"
     if result.get("collision"):
         return f"in collision: {result['collision']}"
-    return f"target not reached: smallest error {error}, after {iterations} and {restarts}"
+    proof = f"; out of reach: {result['proof']}" if result["proof"] else "; not proved out of reach"
+    return f"target not reached: smallest error {error}, after {iterations} and {restarts}{proof}"

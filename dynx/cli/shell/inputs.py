@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -101,6 +102,20 @@ def target_rotation(given: Numbers, option: str) -> Floats:
     raise ArgumentError(
         f"{option}: wanted a rotation of 3 numbers (roll, pitch, yaw), 4 (a quaternion qx,qy,qz,qw) or 9 "
         f"(a matrix), or a pose of 6, 7 or 16; got {len(numbers)}"
+    )
+
+
+def angle_note(given: Numbers, option: str, *, rotation_only: bool = False) -> str:
+    """Return a sentence if roll, pitch or yaw among the numbers of `option` is beyond a full turn, as angles
+    in degrees are; otherwise an empty text. `rotation_only`: three numbers are angles, not a position."""
+    numbers = given if isinstance(given, list) else []
+    angles = numbers[3:] if len(numbers) == 6 else numbers if rotation_only and len(numbers) == 3 else []
+    largest = max(angles, key=abs, default=0.0)
+    if abs(largest) <= 2.0 * math.pi:
+        return ""
+    return (
+        f"{option}: roll, pitch and yaw are in radians; {largest:g} is beyond a full turn, and {largest:g} "
+        f"degrees would be {math.radians(largest):.6g}"
     )
 
 

@@ -33,7 +33,7 @@ def solve_programme(
     try:
         import daqp
     except ImportError:
-        raise NotInstalledError("velocity_ik needs a package: pip install 'dynx[qp]'") from None
+        raise NotInstalledError("velocity_ik needs daqp: pip install 'dynx[qp]'") from None
     # Rows of norm 1 give the tolerance one meaning for all constraints.
     rows, values = np.concatenate([A, G]), np.concatenate([b, least])
     norms = np.linalg.norm(rows, axis=1, keepdims=True)
@@ -44,6 +44,7 @@ def solve_programme(
     low = np.concatenate([np.maximum(lower, -_UNLIMITED), values])
     kinds = np.zeros(len(high), dtype=np.int32)
     kinds[equal] = _EQUALITY
+    kinds[: len(upper)][lower == upper] = _EQUALITY
     found: tuple[Floats, float, int, Any] = daqp.solve(
         np.ascontiguousarray(H), np.ascontiguousarray(g), np.ascontiguousarray(rows), high, low, kinds,
         primal_tol=PRIMAL_TOLERANCE,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,7 @@ from dynx.ik.avoidance import AvoidanceSource
 from dynx.ik.tasks import Kinematics
 from dynx.ik.velocity.dampers import dampers
 from dynx.ik.velocity.library import solve_programme
-from dynx.ik.velocity.limits import velocity_bounds
+from dynx.ik.velocity.limits import joints_outside, velocity_bounds
 from dynx.ik.velocity.tasks import VelocityTask
 from dynx.model import Model
 from dynx.model.configuration import checked_array, checked_q, is_real, positive_seconds, real_array
@@ -48,6 +48,8 @@ class VelocityResult:
     too_fast: tuple[tuple[str, str], ...] = ()
     """Pairs of bodies that approach faster than they may, because no velocity within the bounds prevents it;
     empty otherwise."""
+    note: str = ""
+    """Sentence that names joints of q outside their limits, which are brought back; empty without them."""
 
     def __bool__(self) -> bool:
         """Return whether all hard tasks are met."""
@@ -78,7 +80,9 @@ def velocity_ik(
     |v|^2`` (damping > 0), under the hard tasks and the bounds: ``q + dt v`` is within the position limits,
     |v| within `velocity_limit` (one number or (nv,), by default the model's), and with `acceleration_limit`
     [rad/s^2 or m/s^2] the joints can stop before their limits; with `v0` (nv,), the velocity before, the
-    change is at most ``acceleration_limit dt``. A base that floats has no bounds but those given.
+    change is at most ``acceleration_limit dt``. A joint outside its position limits returns to them as fast
+    as the other bounds allow, before all tasks, and `note` names it. A base that floats has no bounds but
+    those given.
 
     With `avoid`, a scene or what `Scene.avoidance` returns, the distance d of each pair of bodies that is
     near changes by at least ``-avoid_gain (d - margin)`` [m/s], before all tasks: d does not fall below the
@@ -97,10 +101,7 @@ def velocity_ik(
     position = checked_q(model, q, "q")
     if position.ndim != 1:
         raise ShapeError(f"q has shape {position.shape}; wanted ({model.nq},)")
-    wanted = [tasks] if isinstance(tasks, VelocityTask) else list(tasks)
-    for task in wanted:
-        if not isinstance(task, VelocityTask):
-            raise ArgumentError(f"tasks has {shown(task)}; wanted dynx.ik.velocity.VelocityTask")
+    wanted = _checked_tasks(tasks)
     for name, number, least in (
         ("damping", damping, "above 0"),
         ("posture_weight", posture_weight, ""),
@@ -153,7 +154,24 @@ def velocity_ik(
     assert v is not None
     at_bound = (v <= lower + AT_BOUND) | (v >= upper - AT_BOUND)
     errors = tuple(J @ v - velocity for J, velocity in rows)
-    return VelocityResult(v, success, errors, at_bound, near.active(v, AT_BOUND), near.missed(v, AT_BOUND))
+    return VelocityResult(
+        v, success, errors, at_bound, near.active(v, AT_BOUND), near.missed(v, AT_BOUND),
+        joints_outside(model, position),
+    )  # fmt: skip
+
+
+def _checked_tasks(tasks: VelocityTask | Sequence[VelocityTask]) -> list[VelocityTask]:
+    if isinstance(tasks, VelocityTask):
+        return [tasks]
+    if isinstance(tasks, str) or not isinstance(tasks, Iterable):
+        raise ArgumentError(
+            f"tasks is {shown(tasks)}; wanted dynx.ik.velocity.VelocityTask, or a list of them"
+        )
+    wanted = list(tasks)
+    for task in wanted:
+        if not isinstance(task, VelocityTask):
+            raise ArgumentError(f"tasks has {shown(task)}; wanted dynx.ik.velocity.VelocityTask")
+    return wanted
 
 
 def _quadratic(soft: list[tuple[Floats, Floats]], damping: float, nv: int) -> tuple[Floats, Floats]:

@@ -19,14 +19,17 @@ from dynx.spatial.scalar import Floats
 @checks_field_names
 @dataclass(frozen=True, eq=False)
 class VelocityTask:
-    """The velocity of one frame, its weights, and whether it must be met."""
+    """The velocity of one frame, its weights, and whether it must be met.
+
+    With neither a velocity nor a target the frame holds still: its velocity is 0.
+    """
 
     frame: str
     velocity: ArrayLike | None = None
     """Velocity (6,) of the frame's origin [m/s], then angular velocity [rad/s], in world axes; None is 0."""
     target: ArrayLike | None = None
-    """Pose T_world_target (4, 4), or position (3,) [m] with free rotation, that the frame moves towards:
-    `gain` times the error is added to `velocity`."""
+    """Pose T_world_target (4, 4) or `dynx.Pose`, or position (3,) [m] with free rotation, that the frame
+    moves towards: `gain` times the error is added to `velocity`."""
     gain: float = 1.0
     """Velocity per error [1/s]: the error falls by exp(-gain t)."""
     weights: ArrayLike = 1.0

@@ -16,6 +16,7 @@ from dynx.errors import ArgumentError, NotInstalledError, ShapeError, UnknownNam
 from dynx.ik.velocity import VelocityTask
 from dynx.ik.velocity.limits import velocity_bounds
 from dynx.ik.velocity.programme import AT_BOUND
+from dynx.model.elements import Pose
 from dynx.model.loading import load
 from dynx.testing.strategies import configurations, models
 from tests.oracles.closed_form import MODELS
@@ -128,6 +129,52 @@ def test_a_joint_brakes_before_its_limit_within_its_acceleration() -> None:
         assert (q <= ARM.upper + 1e-12).all()
 
 
+@pytest.mark.parametrize("acceleration", [None, 4.0])
+def test_joints_outside_their_limits_are_brought_back(acceleration: float | None) -> None:
+    """At the velocity limit, without overshoot, before a hard task that would keep them there."""
+    outside = np.zeros(7)
+    outside[[0, 3]] = 0.5, -0.2
+    q = np.where(outside < 0.0, ARM.lower, np.where(outside > 0.0, ARM.upper, Q)) + outside
+    still = VelocityTask(FRAME, hard=True)
+    first = ENGINE.velocity_ik(q, still, dt=DT, velocity_limit=1.5)
+    np.testing.assert_array_equal(first.v[[0, 3]], [-1.5, 1.5])
+    assert first.limited[[0, 3]].all()
+    joints = ARM.joint_names
+    assert (
+        first.note == f"q is outside the position limits [rad or m]: {joints[0]} by 0.5, {joints[3]} by 0.2"
+    )
+    v = np.zeros(7)
+    options: dict[str, Any] = {} if acceleration is None else {"acceleration_limit": acceleration}
+    for _ in range(150):
+        if acceleration is not None:
+            options["v0"] = v
+        v = ENGINE.velocity_ik(q, still, dt=DT, velocity_limit=1.5, **options).v
+        assert (np.abs(v) <= 1.5).all()
+        q = q + DT * v
+    assert (q >= ARM.lower - 1e-5).all()
+    assert (q <= ARM.upper + 1e-5).all()
+    assert ENGINE.velocity_ik(ARM.clip(q), still, dt=DT).note == ""
+
+
+def test_a_task_without_a_velocity_holds_the_frame_still() -> None:
+    found = ENGINE.velocity_ik(Q, VelocityTask(FRAME), dt=DT)
+    np.testing.assert_allclose(found.v, 0.0, atol=ROUNDING)
+
+
+def test_a_pose_object_is_a_target() -> None:
+    pose = Pose((0.3, 0.1, 0.4), (0.1, 0.2, 0.3))
+    found, expected = (
+        ENGINE.velocity_ik(Q, VelocityTask(FRAME, target=target), dt=DT).v for target in (pose, pose.matrix)
+    )
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_the_time_of_a_step_is_needed() -> None:
+    options: dict[str, Any] = {}
+    with pytest.raises(ArgumentError, match="velocity_ik needs dt="):
+        ENGINE.velocity_ik(Q, VelocityTask(FRAME), **options)
+
+
 def test_a_pose_is_approached_at_the_rate_of_its_gain() -> None:
     q = Q.copy()
     T = ENGINE.forward_kinematics(Q + 0.05, FRAME)
@@ -162,6 +209,8 @@ def test_hard_tasks_that_contradict_each_other_are_met_as_well_as_possible() -> 
         (VelocityTask(FRAME, weights=-1.0), {}, ArgumentError, "weights"),
         (VelocityTask(FRAME, target=np.eye(4), gain=-1.0), {}, ArgumentError, "gain"),
         (VelocityTask(FRAME, target=np.zeros((2, 3))), {}, ShapeError, "target"),
+        (None, {}, ArgumentError, "tasks is 'None'; wanted dynx.ik.velocity.VelocityTask"),
+        ([None], {}, ArgumentError, "tasks has 'None'"),
         ("flange", {}, ArgumentError, "wanted dynx.ik.velocity.VelocityTask"),
         (VelocityTask(FRAME), {"damping": 0.0}, ArgumentError, "damping"),
         (VelocityTask(FRAME), {"v0": np.zeros(7)}, ArgumentError, "acceleration_limit"),
@@ -191,5 +240,5 @@ def test_a_misspelt_field_of_a_task_has_the_nearest_name() -> None:
 
 def test_without_the_solver_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "daqp", None)
-    with pytest.raises(NotInstalledError, match=r"pip install 'dynx\[qp\]'"):
+    with pytest.raises(NotInstalledError, match=r"needs daqp: pip install 'dynx\[qp\]'"):
         ENGINE.velocity_ik(Q, VelocityTask(FRAME), dt=DT)
