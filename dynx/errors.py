@@ -219,7 +219,13 @@ class SimulationError(DynxError, RuntimeError):
 
 
 class DivergedError(SimulationError, ArithmeticError):
-    """The state is no longer finite, or too fast to be meaningful."""
+    """The state is no longer finite, or too fast to be meaningful.
+
+    `overshoot` is the joint whose damping is too large for the control step, as the message states it (a
+    `dynx.sim.overshoot.Overshoot`; None if there is none, and after unpickling).
+    """
+
+    overshoot: Any = None
 
 
 class ControlError(SimulationError):

@@ -1,4 +1,4 @@
-"""Overshoot of a controller's damping in discrete time: kd dt / inertia of each joint."""
+"""Overshoot of a controller's damping in discrete time: kd dt / inertia of each joint, or kd dt."""
 
 from __future__ import annotations
 
@@ -18,28 +18,49 @@ class Overshoot(NamedTuple):
     """The joint with the largest ratio kd dt / inertia, and that ratio.
 
     The velocity of a single joint changes in each control step to v' = v (1 - kd dt / inertia). If the ratio
-    is above 1 it changes sign, above 2 it also grows.
+    is above 1 it changes sign, above 2 it also grows. Computed torque multiplies kd by the inertia, so that
+    its ratio is kd dt.
     """
 
     joint: str
     ratio: float
+    gain: str
+    """Name of the gain: ``kd`` or ``damping``."""
+    by_inertia: bool
+    """Whether the gain is divided by the inertia of the joint."""
+
+    def hint(self, step: str) -> str:
+        """Return the ratio and what can be done; `step` is the control step's name, dt or control_dt."""
+        ratio = f"{self.gain} {step} / inertia" if self.by_inertia else f"{self.gain} {step}"
+        return (
+            f"{ratio} is {self.ratio:.3g} at {self.joint}, and a step is unstable above 2; smaller gains or "
+            f"a smaller {step} can help"
+        )
 
 
 def largest_overshoot(controller: Controller[Any] | None, q: Floats, control_dt: float) -> Overshoot | None:
     """Find the largest kd dt / inertia at `q` (nq,), with `control_dt` in s.
 
-    None where no ratio exceeds 1, and for a controller without a damping in N m s/rad or N s/m. The inertia
-    of each joint is the diagonal of the mass matrix of the controller's model.
+    None where no ratio exceeds 1, and for a controller without a damping of joints. The inertia of each joint
+    is the diagonal of the mass matrix of the controller's model.
     """
     inner = controller.inner if isinstance(controller, control.FrictionCompensation) else controller
-    kd = None if inner is None else _joint_damping(inner, q)
-    if inner is None or kd is None or not inner.model.joint_names:
+    if inner is None or not inner.model.joint_names:
         return None
-    inertia = joint_inertia(inner.model, q)
-    velocity_change = kd[-len(inertia) :] * control_dt
-    ratio = np.divide(velocity_change, inertia, out=np.zeros_like(inertia), where=inertia > 0.0)
+    n = len(inner.model.joint_names)
+    if isinstance(inner, control.ComputedTorque):
+        ratio, by_inertia = inner.kd[-n:] * control_dt, False
+    else:
+        kd = _joint_damping(inner, q)
+        if kd is None:
+            return None
+        inertia, by_inertia = joint_inertia(inner.model, q), True
+        ratio = np.divide(kd[-n:] * control_dt, inertia, out=np.zeros(n), where=inertia > 0.0)
     worst = int(np.argmax(ratio))
-    return Overshoot(inner.model.joint_names[worst], float(ratio[worst])) if ratio[worst] > 1.0 else None
+    if not ratio[worst] > 1.0:
+        return None
+    gain = "damping" if isinstance(inner, control.Impedance) else "kd"
+    return Overshoot(inner.model.joint_names[worst], float(ratio[worst]), gain, by_inertia)
 
 
 def _joint_damping(controller: Controller[Any], q: Floats) -> Floats | None:
@@ -47,8 +68,8 @@ def _joint_damping(controller: Controller[Any], q: Floats) -> Floats | None:
     None for a controller without one."""
     kd = fields_of(controller).get("kd")
     if kd is not None and kd.metadata.get("unit", "").startswith("N"):
-        damping: Floats = attributes_of(controller)["kd"]
-        return damping
+        # A controller of a user may have one gain for all coordinates.
+        return np.broadcast_to(np.asarray(attributes_of(controller)["kd"], dtype=float), controller.model.nv)
     if isinstance(controller, control.Impedance):
         with backend("reference", controller.model, validate=False) as engine:
             J = np.asarray(engine.jacobian(q, controller.frame))

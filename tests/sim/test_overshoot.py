@@ -7,6 +7,8 @@ import pytest
 
 import dynx
 from dynx import control
+from dynx.errors import DivergedError
+from dynx.sim import simulate
 from dynx.sim.overshoot import largest_overshoot
 
 DT = 1e-3
@@ -35,7 +37,8 @@ def test_damping_that_overshoots_nothing_is_none() -> None:
     slow = control.PD(model, kp=0.0, kd=0.999 * inertia / DT)
     assert largest_overshoot(slow, np.zeros(6), DT) is None
     # Its gains are in 1/s, not in N m s/rad.
-    assert largest_overshoot(control.ComputedTorque(model, kp=1.0, kd=1e6), np.zeros(6), DT) is None
+    slow_errors = control.ComputedTorque(model, kp=1.0, kd=0.999 / DT)
+    assert largest_overshoot(slow_errors, np.zeros(6), DT) is None
     assert largest_overshoot(None, np.zeros(6), DT) is None
 
 
@@ -53,3 +56,31 @@ def test_damping_of_a_frame_acts_on_a_joint_through_the_jacobian() -> None:
     assert found is not None
     assert found.joint == model.joint_names[int(np.argmax(ratio))]
     assert found.ratio == pytest.approx(2.0, rel=1e-9)
+
+
+def test_the_ratio_of_computed_torque_is_kd_dt() -> None:
+    model = dynx.load("ur5")
+    kd = np.array([1.0, 1.0, 40.0, 1.0, 1.0, 1.0])
+    found = largest_overshoot(control.ComputedTorque(model, kp=400.0, kd=kd), np.zeros(6), 0.1)
+    assert found is not None
+    assert found.joint == model.joint_names[2]
+    assert found.ratio == pytest.approx(4.0)
+    assert found.hint("dt").startswith(f"kd dt is 4 at {found.joint}")
+
+
+def test_a_diverged_simulation_names_the_joint_in_its_error() -> None:
+    model = dynx.load("ur10")
+    q0 = model.neutral() + 0.1
+    inertia = np.diagonal(dynx.backend("pinocchio", model).mass_matrix(q0))
+    damped = control.GravityCompensatedPD(model, kp=0.0, kd=5.0)
+    with pytest.raises(DivergedError) as raised:
+        simulate(model, damped, model.neutral(), q0=q0, v0=np.ones(6), duration=1.0)
+    ratio, name = 5.0 * DT / inertia.min(), model.joint_names[int(np.argmin(inertia))]
+    hint = f"kd dt / inertia is {ratio:.3g} at {name}, and a step is unstable above 2"
+    assert hint in str(raised.value)
+    with pytest.raises(DivergedError) as raised:
+        simulate(model, damped, model.neutral(), q0=q0, v0=np.ones(6), dt=DT / 2, control_dt=DT, duration=1.0)
+    assert hint.replace(" dt ", " control_dt ") in str(raised.value)
+    with pytest.raises(DivergedError) as raised:
+        simulate(model, None, q0=q0, v0=np.full(6, 1e5), duration=1.0)
+    assert "unstable" not in str(raised.value)

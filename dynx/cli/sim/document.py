@@ -12,7 +12,6 @@ from dynx.errors import DivergedError, SimulationError
 from dynx.model import Model
 from dynx.model.documents import pose_numbers
 from dynx.sim import Noise, Push, Rollout, RolloutInterrupted
-from dynx.sim.overshoot import largest_overshoot
 from dynx.sim.record.tracking_error import base_error, frame_error, joint_error
 from dynx.spatial.scalar import Floats
 
@@ -53,7 +52,7 @@ def document(request: SimulationRequest, rollout: Rollout, seconds: float, ended
         "passive": _is_passive(request, rollout),
         "status": _status(ended),
         "error": _error(ended),
-        "overshoot": _overshoot(request, ended),
+        "overshoot": _overshoot(ended),
         "dt": request.clock.dt,
         "steps": len(rollout),
         "steps_asked": request.clock.n_steps,
@@ -152,12 +151,11 @@ def _status(ended: EarlyEnd) -> str:
     return DIVERGED if isinstance(ended, DivergedError) else CONTROL_FAILED
 
 
-def _overshoot(request: SimulationRequest, ended: EarlyEnd) -> Entry | None:
+def _overshoot(ended: EarlyEnd) -> Entry | None:
     """Return the joint whose damping is unstable for the time step, if that may have caused divergence."""
-    if not isinstance(ended, DivergedError):
+    if not isinstance(ended, DivergedError) or ended.overshoot is None:
         return None
-    found = largest_overshoot(request.controller, np.asarray(request.scenario.q0), request.clock.control_dt)
-    return None if found is None else found._asdict()
+    return {"joint": ended.overshoot.joint, "ratio": ended.overshoot.ratio}
 
 
 def _error(ended: EarlyEnd) -> Entry | None:

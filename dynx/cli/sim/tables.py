@@ -42,8 +42,6 @@ def show(out: Console, report: Entry) -> None:
     out.print(_energy(report))
     if report["law"] != "none":
         out.print(_saturation(report))
-    if report["overshoot"] is not None:
-        out.print(_overshoot(report))
     out.print(f"simulated {number(report['simulated'])} s in {report['seconds']:.2f} s")
 
 
@@ -147,16 +145,6 @@ def _saturation(report: Entry) -> str:
     if report["settings"]["effort_limits"] is None:
         return "torques were not limited (--effort-limits urdf limits them)"
     return f"torques were saturated in {100.0 * report['saturated']:.3g} % of the steps"
-
-
-def _overshoot(report: Entry) -> str:
-    settings, found = report["settings"], report["overshoot"]
-    step = "--dt" if settings["control_dt"] == settings["dt"] else "--control-dt"
-    gain = "damping" if report["law"] == "impedance" else "kd"
-    return (
-        f"smaller gains or a smaller {step} can help: {gain} {step[2:].replace('-', '_')} / inertia is "
-        f"{found['ratio']:.3g} at {one_line(found['joint'])}, and a step is unstable above 2"
-    )
 
 
 def error_text(error: float | None) -> str:

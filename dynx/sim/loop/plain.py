@@ -25,6 +25,7 @@ from dynx.sim.loop.controller_checks import ControllerWatch, defect_of_outcome, 
 from dynx.sim.loop.record import Record
 from dynx.sim.loop.sensors import Sensors
 from dynx.sim.loop.stops import Stops
+from dynx.sim.overshoot import largest_overshoot
 from dynx.sim.plants.plant import Plant, is_own, plant_errors
 from dynx.sim.step import is_diverged, torque_sum
 from dynx.spatial.scalar import Floats, clamp
@@ -250,7 +251,19 @@ class Loop:
         return self._ended(SimulationError, k, record, f"plant {kind.__name__} failed", why)
 
     def _diverged(self, k: int, record: Record, why: str) -> SimulationError:
-        return self._ended(DivergedError, k, record, "the simulation diverged", why)
+        """Return the error of divergence, with the joint whose damping is too large for the control step."""
+        overshoot = None
+        # The message of the failure itself matters more than its explanation, which is not known for every
+        # controller of a user.
+        with suppress(Exception):
+            control_dt = self.clock.steps_per_control * self.clock.dt
+            overshoot = largest_overshoot(self.controller, record.q[0], control_dt)
+        if overshoot is not None:
+            why += f"; {overshoot.hint('dt' if self.clock.steps_per_control == 1 else 'control_dt')}"
+        error = self._ended(DivergedError, k, record, "the simulation diverged", why)
+        if isinstance(error, DivergedError):
+            error.overshoot = overshoot
+        return error
 
     def _control_failed(self, k: int, record: Record, why: str) -> SimulationError:
         name = "" if self.controller is None else self.controller.name
