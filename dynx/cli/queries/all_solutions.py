@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from dynx.backends import Backend
+from dynx.cli.queries.closed_form_frame import frame_advice
 from dynx.cli.queries.evaluate import document_head, title
 from dynx.cli.shell.exits import DONE, NEGATIVE_RESULT, one_line
 from dynx.cli.shell.inputs import Numbers, default_frame_note
@@ -34,7 +35,8 @@ def all_solutions(
     try:
         found = engine.inverse_kinematics(target, frame, q, all_solutions=True, given=given)
     except NoClosedFormError as error:
-        raise ArgumentError(_advised(error)) from None
+        advice = frame_advice(engine.model, frame, given or {}, error) if frame_is_default else ""
+        raise ArgumentError(_advised(error) + advice) from None
     assert isinstance(found, IKSolutions)
     result: dict[str, Any] = {
         **document_head(engine),
