@@ -55,13 +55,24 @@ def silent() -> Iterator[None]:
 
 
 def serve(host: str, port: int, title: str, folder: Path) -> Any:
-    """Start a server of viser, with the page in a folder instead of its own."""
+    """Start a server of viser, with the page in a folder instead of its own.
+
+    viser takes no folder, so the class that serves it is replaced while the server starts. A version of viser
+    that serves in another way shows its own page.
+    """
     infra: Any = viser.infra
     with _starting, silent():
-        # viser takes no folder, so the class that serves it is replaced while the server starts.
-        original = infra.WebsockServer
-        infra.WebsockServer = lambda **given: original(**{**given, "http_server_root": folder})
+        original: Any = getattr(infra, "WebsockServer", None)
+
+        def from_folder(*arguments: Any, **given: Any) -> Any:
+            if "http_server_root" in given:
+                given["http_server_root"] = folder
+            return original(*arguments, **given)
+
+        if original is not None:
+            infra.WebsockServer = from_folder
         try:
             return viser.ViserServer(host, port, label=title, verbose=False)
         finally:
-            infra.WebsockServer = original
+            if original is not None:
+                infra.WebsockServer = original
