@@ -43,6 +43,8 @@ class EngineRun:
     """Overlaps and violated constraints of the start, a sentence each."""
     error: DynxError | None = None
     """Why the engine ended early."""
+    interrupted: bool = False
+    """Whether Ctrl-C ended it, before the states that are missing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +81,15 @@ class WorldComparison:
         return f"<WorldComparison of {self.scene.name} by {engines}, {self.duration:.6g} s>"
 
 
+class ComparisonInterrupted(KeyboardInterrupt):
+    """Interruption of `compare_worlds` by Ctrl-C; `comparison` has the engines that ran until then."""
+
+    def __init__(self, comparison: WorldComparison) -> None:
+        last, count = comparison.runs[-1], len(comparison.runs)
+        super().__init__(f"interrupted at {last.times[-1]:.6g} s of {last.engine}, engine number {count}")
+        self.comparison = comparison
+
+
 def compare_worlds(
     scene: Scene,
     engines: Sequence[str],
@@ -95,7 +106,8 @@ def compare_worlds(
 
     The engines step `dt` / `substeps`; `settings` are those of `World` by engine. `finish` is called with
     each world at its end, and `progress` with the name of the engine and the time reached. An engine that
-    fails in a step ends its run there. Raises the errors of `World` for a scene that cannot be opened.
+    fails in a step ends its run there. Raises the errors of `World` for a scene that cannot be opened, and
+    ComparisonInterrupted, with what is done, after Ctrl-C.
     """
     n_steps = max(1, round(positive_seconds("duration", duration) / positive_seconds("dt", dt)))
     ends = np.unique(np.linspace(0, n_steps, whole_number("samples", samples, 1) + 1).round().astype(int))
@@ -110,11 +122,16 @@ def compare_worlds(
             )
             for name in engines
         ]
-        runs = tuple(_run(world, ends.tolist(), finish, progress) for world in worlds)
-    pairs = combinations(runs, 2)
-    return WorldComparison(
-        scene, dt, substeps, n_steps * dt, runs, tuple(_separation(scene, a, b) for a, b in pairs)
-    )
+        runs: list[EngineRun] = []
+        for world in worlds:
+            runs.append(_run(world, ends.tolist(), finish, progress))
+            if runs[-1].interrupted:
+                break
+    separations = tuple(_separation(scene, a, b) for a, b in combinations(runs, 2))
+    comparison = WorldComparison(scene, dt, substeps, n_steps * dt, tuple(runs), separations)
+    if runs and runs[-1].interrupted:
+        raise ComparisonInterrupted(comparison)
+    return comparison
 
 
 def _run(
@@ -123,7 +140,7 @@ def _run(
     finish: Callable[[World], object] | None,
     progress: Callable[[str, float], object] | None,
 ) -> EngineRun:
-    states, error = [world.state], None
+    states, error, interrupted = [world.state], None, False
     try:
         for begin, end in pairwise(ends):
             world.step(end - begin)
@@ -132,12 +149,16 @@ def _run(
                 progress(world.engine, world.time)
     except DynxError as raised:
         error = raised
+    except KeyboardInterrupt:
+        interrupted = True
     contacts = world.contacts()
     if finish is not None:
         finish(world)
     times = np.array([state.time for state in states])
     engine, version = world.engine, world.version
-    return EngineRun(engine, version, times, tuple(states), contacts, world.settings, world.notes, error)
+    return EngineRun(
+        engine, version, times, tuple(states), contacts, world.settings, world.notes, error, interrupted
+    )
 
 
 def _separation(scene: Scene, one: EngineRun, other: EngineRun) -> Separation:

@@ -80,7 +80,7 @@ def world() -> None:
     their motions are over time. Notes name parts that overlap at the start, and constraints that it violates.
 
     Exit code 0; 1 if an engine ended early or the engines are farther apart than --within; 2 for a scene
-    that cannot be run. After Ctrl-C the exit code is 130.
+    that cannot be run. After Ctrl-C the results so far are shown and written; the exit code is 130.
 
     \b
     Examples:

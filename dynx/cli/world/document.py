@@ -107,7 +107,7 @@ def _engine(comparison: WorldComparison, run: EngineRun) -> EngineEntry:
         "version": run.version.removeprefix(run.engine).strip(),
         "settings": dict(run.settings),
         "time": last.time,
-        "error": None if run.error is None else str(run.error),
+        "error": "interrupted" if run.interrupted else None if run.error is None else str(run.error),
         "notes": list(run.notes),
         "robots": [
             {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, failure_of, one_line
+from dynx.cli.shell.exits import BAD_INPUT, DONE, INTERRUPTED, NEGATIVE_RESULT, complain, failure_of, one_line
 from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.output_file import check_json, check_writable
 from dynx.cli.shell.progress import progress_bar
@@ -17,7 +17,7 @@ from dynx.cli.world.tables import show
 from dynx.errors import ArgumentError, DynxError
 from dynx.files.figures import picture_format
 from dynx.world import World
-from dynx.world.comparison import WorldComparison, compare_worlds
+from dynx.world.comparison import ComparisonInterrupted, WorldComparison, compare_worlds
 from dynx.world.registry import installed_worlds
 from dynx.world.scene import read_scene
 
@@ -67,16 +67,20 @@ def world(
                 before[engine] = time
                 advance(round(1e3 * sum(before.values())), f"{engine}, simulated time [ms]")
 
-            comparison = compare_worlds(
-                described,
-                chosen,
-                duration,
-                dt,
-                substeps=substeps,
-                settings=given,
-                finish=save,
-                progress=progress,
-            )
+            ended: ComparisonInterrupted | None = None
+            try:
+                comparison = compare_worlds(
+                    described,
+                    chosen,
+                    duration,
+                    dt,
+                    substeps=substeps,
+                    settings=given,
+                    finish=save,
+                    progress=progress,
+                )
+            except ComparisonInterrupted as early:
+                ended, comparison = early, early.comparison
         interruption.finishing = True
         if plot_path is not None:
             error = failure_of(plot, comparison, plot_path)
@@ -84,8 +88,12 @@ def world(
         made = document(comparison)
         error = present(made, _nothing if quiet else show, json_path)
         errors.extend([error] if error is not None else [])
+        if ended is not None:
+            complain(f"{ended} of {len(chosen)}")
     for each in errors:
         complain(str(each))
+    if ended is not None:
+        return interruption.code or INTERRUPTED
     if errors:
         return BAD_INPUT
     return NEGATIVE_RESULT if _is_negative(comparison, within) else DONE

@@ -181,14 +181,29 @@ def test_plots_begin_where_distances_are_more_than_rounding(largest: float, bott
     assert _lowest(largest) == pytest.approx(bottom)
 
 
-def test_ctrl_c_ends_the_command_with_130_and_one_line(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("last", [0, len(ENGINES) - 1])
+def test_ctrl_c_keeps_what_is_done(
+    scene: str, last: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The engines that ran, the last up to some time; files are written, and the exit code is 130."""
     step = World.step
 
     def interrupted(world: World, n: int) -> None:
         step(world, n)
-        signal.raise_signal(signal.SIGINT)
+        if world.engine == ENGINES[last] and world.time > 0.05:
+            signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr(World, "step", interrupted)
-    result = run(scene, "--engine", ENGINES[0])
+    out = tmp_path / "out.json"
+    arguments = ("--engine", ",".join(ENGINES), "--duration", "0.1", "--json", str(out))
+    result = run(scene, *arguments, "--save", str(tmp_path / "state.npz"))
     assert result.exit_code == 130
-    assert result.output.strip() == "dynx: error: interrupted"
+    assert f"s of {ENGINES[last]}, engine number {last + 1} of {len(ENGINES)}" in " ".join(
+        result.output.split()
+    )
+    found = json.loads(out.read_text())["engines"]
+    assert [each["engine"] for each in found] == list(ENGINES[: last + 1])
+    assert 0.0 < found[-1]["time"] < 0.1
+    assert [each["error"] for each in found] == [None] * last + ["interrupted"]
+    assert all(each["time"] == pytest.approx(0.1) for each in found[:-1])
+    assert len([*tmp_path.glob("state*.npz")]) == last + 1
