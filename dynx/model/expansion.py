@@ -28,9 +28,10 @@ class RobotInput:
 def expand(arguments: Sequence[str]) -> list[RobotInput]:
     """List the robots that the arguments stand for, in order, without opening a file.
 
-    A directory stands for every .urdf below it, sorted by path; as in `dynx.load`, a name of the
-    library takes precedence over a directory of that name. A directory without one, or that cannot be
-    read, becomes an input with a refusal, so that the others are still processed.
+    A directory stands for every .urdf below it, sorted by path, but for no .xacro, whose expansion runs code;
+    as in `dynx.load`, a name of the library takes precedence over a directory of that name. A directory
+    without one, or that cannot be read, becomes an input with a refusal, so that the others are still
+    processed.
     """
     found: list[RobotInput] = []
     for argument in arguments:
@@ -59,6 +60,7 @@ def _library() -> list[RobotInput]:
 
 def _below(directory: str) -> list[RobotInput]:
     paths: list[str] = []
+    n_xacro = 0
     refusals: list[RobotInput] = []
 
     def refuse(error: OSError) -> None:
@@ -67,9 +69,11 @@ def _below(directory: str) -> list[RobotInput]:
 
     for folder, _, names in os.walk(directory, onerror=refuse):
         paths += [os.path.join(folder, name) for name in names if name.lower().endswith(".urdf")]
+        n_xacro += sum(name.lower().endswith(".xacro") for name in names)
     if not paths and not refusals:
+        hint = f"; name one of its {n_xacro} .xacro files, whose expansion runs code" if n_xacro else ""
         error = RobotNotFoundError(
-            f"the directory {shown(directory, 300)} has no .urdf file in it or below it"
+            f"the directory {shown(directory, 300)} has no .urdf file in it or below it{hint}"
         )
         return [RobotInput(directory, error)]
     # A bare file name could be read as a name of the library; a path with a separator never is.

@@ -17,6 +17,7 @@ from click.testing import CliRunner, Result
 from dynx.agreement import refused_report, results_document
 from dynx.cli.shell.main import cli
 from dynx.errors import RobotNotFoundError
+from dynx.model.expansion import expand
 from tests.conftest import needs_examples
 
 QUICK = ["--backends", "reference", "--samples", "1", "--jobs", "1"]
@@ -177,9 +178,13 @@ def test_arguments_that_cannot_be_used(arguments: list[str], clue: str) -> None:
 
 @needs_examples
 def test_all_is_the_whole_of_example_robot_data() -> None:
-    from dynx.model.expansion import expand
-
     assert len(expand(["all"])) == 69
+
+
+def test_a_directory_of_xacro_files_says_why_none_is_taken(tmp_path: Path) -> None:
+    (tmp_path / "arm.xacro").write_text("<robot/>")
+    (found,) = expand([str(tmp_path)])
+    assert "has no .urdf file in it or below it; name one of its 1 .xacro files" in str(found.refusal)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to a child")
