@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NoReturn
 
+import numpy as np
+
 from dynx.errors import ClosedError, DivergedError, EngineError
 from dynx.model.configuration import DIVERGENCE_SPEED
 from dynx.world.commands import Act, Commands
@@ -44,6 +46,8 @@ class Motion:
         self._kind = engine.name
         self._good = self._read(engine), 0, 0.0
         self._state: WorldState | None = self._good[0]
+        self._begun = self._good[0]
+        """State in which the motion began: that of the scene, or the last one that was set."""
 
     @property
     def engine(self) -> WorldEngine:
@@ -101,11 +105,13 @@ class Motion:
             raise
 
     def _step_one_by_one(self, engine: WorldEngine, count: int, act: Act) -> None:
-        for taken in range(count):
-            torques = act(engine)
-            if torques is None:
-                self._diverge(f"a load is not finite after {taken} of {count} steps of the engine")
-            engine.step(1, torques)
+        # Where motors diverge, the error says so, not warnings of NumPy.
+        with np.errstate(over="ignore", invalid="ignore"):
+            for taken in range(count):
+                torques = act(engine)
+                if torques is None:
+                    self._diverge(f"a load is not finite after {taken} of {count} steps of the engine")
+                engine.step(1, torques)
 
     def change(self, change: Callable[[WorldEngine], object], clock: tuple[float, int] | None = None) -> None:
         """Set the state of the engine by a function, and `clock` where it is given."""
@@ -117,6 +123,7 @@ class Motion:
                 self._start, self._steps = clock
             self._state = None
             self._note()
+            self._begun = self._good[0]
         except BaseException as error:
             self._fail(error)
             raise
@@ -131,6 +138,7 @@ class Motion:
             self._commands.forget()
             self._start, self._steps, self._state = 0.0, 0, None
             self._note()
+            self._begun = self._good[0]
         except BaseException as error:
             self._fail(error)
             raise
@@ -189,7 +197,12 @@ class Motion:
         """Return to the last finite state; return the likely causes of the failure as part of a message."""
         loads = self._commands.last()
         self._recover()
-        causes = likely_causes(self.engine, self._good[0], loads, self._dt / self._substeps)
+        begun = self._build()
+        try:
+            apply_state(begun, self._begun)
+            causes = likely_causes(begun, self._begun, self.engine, loads, self._dt / self._substeps)
+        finally:
+            begun.close()
         return f"; likely cause: {'; '.join(causes)}" if causes else ""
 
     def _recover(self) -> None:

@@ -113,8 +113,11 @@ class PDMotor(_Servo):
 
 @dataclass(frozen=True)
 class PositionMotor(_Servo):
-    """A motor with the torque kp (target - q) + kd (velocity - v) at the end of each step, stable at any
-    gain; arguments as for `PDMotor`."""
+    """A motor with the torque kp (target - q) + kd (velocity - v) at the end of each step; arguments as
+    for `PDMotor`.
+
+    Where the other forces (Coriolis, contacts, limits) hardly change from one step to the next it is stable
+    at any gain: it uses those of the step before. In long steps stiff gains diverge (docs/world.md)."""
 
     def law(self, model: Model) -> tuple[tuple[int, ...], JointLaw]:
         return self._law(model, implicit=True)
@@ -122,7 +125,8 @@ class PositionMotor(_Servo):
 
 @dataclass(frozen=True)
 class VelocityMotor(Motor):
-    """A motor with the torque kd (velocity - v) at the end of each step, stable at any gain."""
+    """A motor with the torque kd (velocity - v) at the end of each step, with the stability of
+    `PositionMotor`."""
 
     velocity: ArrayLike
     kd: ArrayLike

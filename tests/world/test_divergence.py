@@ -191,3 +191,49 @@ def test_gravity_and_violated_constraints_are_named() -> None:
     weld = Weld("a", "b", Pose((0.0, 0.0, 0.2)))
     with World(Scene("s", bodies=cubes, constraints=(weld,)), "mujoco") as world:
         assert "likely cause: the ends of the weld of 'a' and 'b' are 5e+03 mm apart" in diverge(world)
+
+
+READY = (0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785, 0.02)
+"""Ready posture of Panda."""
+
+
+def held_panda(kp: float, q: Sequence[float] = READY) -> Scene:
+    motor = PositionMotor(0.3, kp=kp, kd=kp / 10.0)
+    return Scene(
+        "held", robots=(SceneRobot("arm", dynx.load("panda"), q=q, motors=(motor,)),), bodies=(ground(),)
+    )
+
+
+@pytest.mark.parametrize("engine", FAST_WORLDS)
+def test_motors_at_the_end_of_a_step_are_stable_in_short_steps_only(engine: str) -> None:
+    for kp in (200.0, 2e6):
+        with World(held_panda(kp), engine, 1e-3) as world:
+            world.run(0.3)
+            assert abs(world.state.robots["arm"].v).max() < 5.0
+    for kp, dt in ((200.0, 0.04), (2e4, 0.02)):
+        with World(held_panda(kp), engine, dt) as world, pytest.raises(DivergedError):
+            world.run(1.0)
+
+
+def step_and_read(world: World, n: int) -> None:
+    for _ in range(20):
+        world.step(n)
+        assert world.state.time == world.time
+
+
+def test_the_cause_is_not_a_consequence_however_often_the_state_is_read() -> None:
+    """States just before divergence have deep overlaps and positions far beyond limits."""
+    messages = []
+    for n in (20, 1):
+        with World(held_panda(200.0), "pybullet", 0.05) as world:
+            with pytest.raises(DivergedError) as raised:
+                step_and_read(world, n)
+            messages.append(str(raised.value))
+    once, often = (message.partition("likely cause: ")[2].partition("; the world")[0] for message in messages)
+    assert once == often
+    assert once.startswith("the step is too long for the motion and the gains of 'arm/panda_")
+    assert "overlap" not in once
+    beyond = (9.0, *READY[1:])
+    with World(held_panda(200.0, beyond), "pybullet", 0.05) as world, pytest.raises(DivergedError) as raised:
+        world.run(1.0)
+    assert "'arm/panda_joint1' is at 9, beyond its limits -2.897 to 2.897, at the start" in str(raised.value)

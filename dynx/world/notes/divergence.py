@@ -26,6 +26,9 @@ MIN_SPEED_CHANGE = 100.0
 MIN_MASS_RATIO = 1e4
 """Ratio of the masses of two bodies that touch from which it is a likely cause."""
 
+MIN_IMPLICIT_RATIO = 2.0
+"""Ratio of kd dt + kp dt^2 to the inertia from which a motor at the end of a step is named."""
+
 MAX_CAUSES = 3
 """Largest number of causes in a message."""
 
@@ -48,27 +51,33 @@ class LastLoads(NamedTuple):
     wrenches: Mapping[int, Floats]
 
 
-def likely_causes(engine: WorldEngine, state: WorldState, loads: LastLoads, h: float) -> list[str]:
-    """Return what probably made a world diverge in steps of `h` [s] from a state, the most likely first.
+def likely_causes(
+    begun: WorldEngine, start: WorldState, engine: WorldEngine, loads: LastLoads, h: float
+) -> list[str]:
+    """Return what probably made a world diverge in steps of `h` [s], the most likely first.
 
-    `engine` is at that state. Where nothing is conspicuous, a shorter step is recommended.
+    `begun` is at the state `start` in which the motion began, `engine` at the last finite state, in which
+    overlaps and positions beyond limits may be consequences. Where nothing is conspicuous, a shorter step is
+    recommended.
     """
-    layout = engine.layout
+    layout = begun.layout
     try:
         causes = [
             *_gravity(layout, h),
-            *_gains_and_torques(layout, state, loads, h),
+            *_gains_and_torques(layout, start, loads, h),
             *_wrenches(layout, loads, h),
-            *_overlaps(engine),
-            *islice(violations(layout, state), 1),
-            *islice((each.rstrip(",") for each in joints_beyond_limits(layout, state)), 1),
+            *_overlaps(begun),
+            *(f"{each} at the start" for each in islice(violations(layout, start), 1)),
+            *(f"{each} at the start" for each in islice(joints_beyond_limits(layout, start), 1)),
             *_light_parts(engine),
-            *unbounded_motions(layout, state),
+            *unbounded_motions(layout, start),
         ]
+        gains = "" if causes else "".join(islice(_implicit_gains(layout, start, loads, h), 1))
     except DynxError:
         # The message of the failure itself matters more than its explanation.
-        causes = []
-    return causes[:MAX_CAUSES] or ["the step is too long for the motion; try a smaller dt or more substeps"]
+        causes, gains = [], ""
+    shorter = f"the step is too long for the motion{gains}; try a smaller dt or more substeps"
+    return causes[:MAX_CAUSES] or [shorter]
 
 
 def _gravity(layout: Layout, h: float) -> Iterator[str]:
@@ -112,8 +121,29 @@ def _stiff_gains(
     yield (
         f"the gains of {shown(f'{robot}/{names[k]}')} are stiff for steps of {h:.3g} s: {gain} is "
         f"{ratio:.3g} times the inertia, and such a motor is unstable above {most}; use a PositionMotor, "
-        "which is stable at any gain, smaller gains or more substeps"
+        "which has no such bound, smaller gains or more substeps"
     )
+
+
+def _implicit_gains(layout: Layout, state: WorldState, loads: LastLoads, h: float) -> Iterator[str]:
+    """Yield, for each robot, the motor at the end of a step whose gains are the largest for the inertia.
+
+    It computes the velocity at the end of the step with the other forces of the step before. What these
+    change by in a step acts as if there were no motor; the stiffer the gains, the harder the correction.
+    """
+    for load in loads.robots:
+        robot = layout.robots[load.robot]
+        names = robot.model.joint_names
+        if load.law is None or load.implicit is None or not len(names):
+            continue
+        mobility = _mobility(load.dynamics, robot.model, state.robots[robot.name].q)[-len(names) :]
+        ratio = load.implicit * h * (load.law.kd + h * load.law.kp) * mobility
+        k = int(np.argmax(ratio))
+        if ratio[k] > MIN_IMPLICIT_RATIO:
+            yield (
+                f" and the gains of {shown(f'{robot.name}/{names[k]}')} (kd dt + kp dt^2 is {ratio[k]:.3g} "
+                "times the inertia)"
+            )
 
 
 def _wrenches(layout: Layout, loads: LastLoads, h: float) -> Iterator[str]:
@@ -126,7 +156,9 @@ def _wrenches(layout: Layout, loads: LastLoads, h: float) -> Iterator[str]:
 
 def _overlaps(engine: WorldEngine) -> Iterator[str]:
     for overlap in islice(overlaps_of(engine), 1):
-        yield f"{shown(overlap.a)} and {shown(overlap.b)} overlap by {1e3 * overlap.depth:.3g} mm"
+        yield (
+            f"{shown(overlap.a)} and {shown(overlap.b)} overlap by {1e3 * overlap.depth:.3g} mm at the start"
+        )
 
 
 def _light_parts(engine: WorldEngine) -> Iterator[str]:
