@@ -6,8 +6,8 @@ A motor acts on the joints that it names, or on all of a robot. With h the step 
 - `PDMotor` is the textbook's law kp (q* - q) + kd (v* - v) at the beginning of each step, which is unstable
   where h kd is more than about twice the inertia that the joint feels;
 - `PositionMotor` and `VelocityMotor` evaluate the same law at the *end* of the step, which is stable at any
-  gain (Tan, Liu and Turk, Stable proportional-derivative controllers, 2011). The velocity there follows from
-  the mass matrix and from the forces of the step before, those of contacts included.
+  gain in short steps (Tan, Liu and Turk, Stable proportional-derivative controllers, 2011). The velocity
+  there follows from the mass matrix and from the forces of the step before, those of contacts included.
 """
 
 from __future__ import annotations

@@ -165,10 +165,12 @@ class AvoidanceSource(Protocol):
 
 def _notes(without_shapes: Sequence[str], pairs: Sequence[Pair]) -> Iterator[str]:
     if without_shapes:
-        names = ", ".join(map(shown, without_shapes[:MAX_NAMES]))
-        more = f" and {len(without_shapes) - MAX_NAMES} more" if len(without_shapes) > MAX_NAMES else ""
+        names = [shown(name) for name in without_shapes[:MAX_NAMES]]
+        if len(without_shapes) > MAX_NAMES:
+            names.append(f"{len(without_shapes) - MAX_NAMES} more")
+        listed = " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
         have, them = ("has", "it") if len(without_shapes) == 1 else ("have", "them")
-        yield f"{names}{more} {have} no collision shape, so that avoid keeps nothing from {them}"
+        yield f"{listed} {have} no collision shape, so that avoid keeps nothing from {them}"
     if not pairs:
         yield "avoid keeps no bodies apart: the scene has no pair of them that may collide"
 

@@ -78,6 +78,8 @@ def test_moving_links_without_shapes_are_named_in_results() -> None:
     assert found.success
     assert found.note == "'l3' has no collision shape, so that avoid keeps nothing from it"
     assert found.note in found.message
+    two = Scene(bodies=[CRATE]).avoidance_for(arm(1, 2))
+    assert two.note == "'l3' and 'l4' have no collision shape, so that avoid keeps nothing from them"
     whole = engine.inverse_kinematics(
         target, "tool", q, avoid=Scene(bodies=[CRATE]).avoidance_for(arm(1, 2, 3, 4))
     )
