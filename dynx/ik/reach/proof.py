@@ -56,6 +56,14 @@ def proofs(problem: Problem, model: Model, unreached: NDArray[np.bool_]) -> NDAr
     return found
 
 
+def proof_of(model: Model, requirement: Requirement, number: int) -> str:
+    """Return the sentence that proves target `number` of a requirement (n,) out of reach; empty without."""
+    if model.floating:
+        return ""
+    at = np.array([number], dtype=np.intp)
+    return _of_frame(model, requirement, requirement.targets.batch, at).get(number, "")
+
+
 def _of_frame(
     model: Model, requirement: Requirement, batch: tuple[int, ...], at: NDArray[np.intp]
 ) -> dict[int, str]:

@@ -1,7 +1,7 @@
 """Tracking of a path of poses by a continuous sequence of configurations.
 
-`descent` solves one target after the other within bounds, `path` decides where that is not enough, and
-`tracker` checks arguments and chooses the start.
+`descent` solves one target after the other within bounds, `path` decides where that is not enough, `reason`
+says why a sample is not reached, and `tracker` checks arguments and chooses the start.
 """
 
 from dynx.ik.tracking.descent import Followed, Follower, StepBounds

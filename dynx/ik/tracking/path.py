@@ -16,6 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.residual import Residual
@@ -73,6 +74,8 @@ class TrackedPath:
     rotation_error: Floats
     jump: Floats
     iterations: Floats
+    before_failure: Floats | None = None
+    """Configuration before the first sample that is not OK."""
 
     @classmethod
     def empty(cls, n: int, nq: int) -> TrackedPath:
@@ -129,9 +132,12 @@ class PathTracker:
             failed = done + np.flatnonzero(~found.reached)
             for k in failed.tolist():
                 start = path.q[k - 1] if k else before
-                if stop and self._recover(path, k, start, targets, jumps):
-                    continue
-                path.status[k] = self._cause(path.q[k], start, targets, k)
+                recovered = stop and self._recover(path, k, start, targets, jumps)
+                if not recovered:
+                    limited = self.limiting(path.q[k], start, targets, k).any()
+                    path.status[k] = TrackStatus.LIMITED if limited else TrackStatus.HELD
+                if path.before_failure is None and path.status[k] != TrackStatus.OK:
+                    path.before_failure = start.copy()
             done += len(found)
             q = path.q[done - 1]
         return path
@@ -188,8 +194,8 @@ class PathTracker:
             parts *= 2
         return None
 
-    def _cause(self, q: Floats, before: Floats, targets: Targets, k: int) -> TrackStatus:
-        """Return LIMITED if the error presses a coordinate against a limit at q, otherwise HELD."""
+    def limiting(self, q: Floats, before: Floats, targets: Targets, k: int) -> NDArray[np.bool_]:
+        """Return the coordinates (n,) that the error at q presses against a limit."""
         coordinates, limits = self.coordinates, self._limits
         (position, rotation), *_ = part_of(targets, slice(k, k + 1)).rows((1,))
         residual = Residual(position, rotation, self._point)
@@ -200,10 +206,10 @@ class PathTracker:
         x, x_before = np.array(coordinates.values(q)), np.array(coordinates.values(before))
         bounds = StepBounds(limits.lower, limits.upper, limits.per_sample)
         lower, upper = bounds.around(x_before)
-        limited = ((x <= lower + AT_BOUND) & (pressure < -PRESSING)) | (
+        limited: NDArray[np.bool_] = ((x <= lower + AT_BOUND) & (pressure < -PRESSING)) | (
             (x >= upper - AT_BOUND) & (pressure > PRESSING)
         )
-        return TrackStatus.LIMITED if limited.any() else TrackStatus.HELD
+        return limited
 
     def _is_out_of_reach(self, q: Floats, found: Floats) -> bool:
         """Return whether a descent from q ended because a coordinate changed by as much as it may."""

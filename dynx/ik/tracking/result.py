@@ -46,6 +46,8 @@ class TrackResult:
     """Number of solver steps (..., n)."""
     dt: float | None
     """Time between two samples [s], if velocity limits were kept."""
+    reason: str = ""
+    """Why the first sample that is not OK is so, of one path; empty if all are OK, and for several paths."""
     note: str = ""
     """Sentence on a q0 that was moved into the limits, and on what `avoid` leaves out; empty otherwise."""
 
@@ -75,6 +77,7 @@ class TrackResult:
         if self.status.ndim == 1 and not self:
             first = int(np.argmin(self.ok))
             text += f"; the first that is not OK is number {first}, {TrackStatus(self.status[first]).name}"
+            text += f": {self.reason}" if self.reason else ""
         return f"{text}; {self.note}" if self.note else text
 
     def __repr__(self) -> str:

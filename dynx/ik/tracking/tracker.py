@@ -12,12 +12,14 @@ from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.ik.avoidance import AvoidanceSource
 from dynx.ik.checking import argument_note, checked_avoidance, checked_margin
 from dynx.ik.coordinates import FrameCoordinates
+from dynx.ik.problem import Requirement
 from dynx.ik.search import SearchLimits
 from dynx.ik.targets import Targets, checked_targets
 from dynx.ik.tasks import Kinematics
 from dynx.ik.tracking.avoiding import AvoidingFollower
 from dynx.ik.tracking.descent import Follower, SampleFollower, part_of
 from dynx.ik.tracking.path import PathTracker, TrackedPath, TrackLimits
+from dynx.ik.tracking.reason import FailureExplainer
 from dynx.ik.tracking.result import TrackResult
 from dynx.model import Model
 from dynx.model.configuration import (
@@ -127,13 +129,15 @@ def track(
     follower: Follower | None = None if make is None else make(frame, path, at, settings)
     if follower is None:
         follower = SampleFollower(kinematics, frame, at, settings)
-    avoidance = checked_avoidance(model, avoid)
+    plain, avoidance = follower, checked_avoidance(model, avoid)
     if avoidance is not None:
         follower = AvoidingFollower(follower, kinematics, frame, at, coordinates, settings, avoidance)
     draws = coordinates.starts(_generator(rng), max_starts)
     offset = coordinates.count - len(coordinates.indices)
     starts = np.clip(draws, limits.lower[offset:], limits.upper[offset:])
     tracker = PathTracker(kinematics, follower, frame, at, coordinates, limits, starts)
+    requirement = Requirement(frame, path, at, None, settings)
+    explainer = FailureExplainer(kinematics, tracker, plain, requirement, limits, avoidance)
 
     n = path.batch[-1]
     start = _start(model, q0, coordinates)
@@ -171,6 +175,7 @@ def track(
         gathered("jump"),
         gathered("iterations").astype(np.int64),
         seconds,
+        "" if batch else explainer.reason(found[0]),
         argument_note(model, q0, avoidance),
     )
 

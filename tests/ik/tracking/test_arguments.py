@@ -84,6 +84,34 @@ def test_results_print_their_statuses(engine: Backend) -> None:
     assert "tracking" in result._repr_html_()
 
 
+def test_the_first_sample_that_is_not_reached_has_a_reason(engine: Backend) -> None:
+    """A proof, a joint at a limit, or a jump; nothing where all samples are OK."""
+    q0, model = np.full(6, 0.2), engine.model
+    T = engine.forward_kinematics(np.linspace(0.2, 0.4, 5)[:, None] * np.ones(6), "flange")
+    assert engine.track(T, "flange", q0).reason == ""
+    far = T.copy()
+    far[3:, 0, 3] += 10.0
+    proof = str(engine.inverse_kinematics(far[3], "flange").proof)
+    result = engine.track(far, "flange", q0, jumps=False)
+    assert proof.split("the chain reaches")[-1] in result.reason
+    assert result.message.endswith(result.reason)
+    near = T.copy()
+    near[:, 0, 3] += np.linspace(0.0, 5.0, 5)
+    held = engine.track(near, "flange", q0, jumps=False)
+    assert "out of reach: " in held.reason
+    slow = engine.track(T, "flange", q0, dt=0.1, velocity_limit=[1.0, 1.0, 1e-3, 1.0, 1.0, 1.0])
+    assert "joint3" in slow.reason
+    assert slow.reason.endswith("at the velocity limit")
+    sweep = np.full((60, 6), 0.2)
+    sweep[:, 0] += np.linspace(0.0, model.upper[0] - 0.2 + 0.3, 60)
+    limited = engine.track(engine.forward_kinematics(sweep, "flange"), "flange", q0, jumps=False)
+    assert limited.reason.endswith("at the position limit")
+    assert "joint1" in limited.reason
+    jumped = engine.track(engine.forward_kinematics(sweep, "flange"), "flange", q0)
+    change = jumped.jump[np.flatnonzero(~jumped.ok)[0]]
+    assert jumped.reason.endswith(f"was found; a joint changes by {change:.3g}")
+
+
 def test_a_start_outside_the_limits_is_noted(engine: Backend) -> None:
     q0 = engine.model.neutral()
     q0[2] = 99.0

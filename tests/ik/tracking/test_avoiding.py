@@ -53,6 +53,8 @@ def test_a_path_through_a_box(name: str, jumps: bool) -> None:
     assert (followed.position_error[~held] <= 1e-6).all()
     if not jumps:
         assert not (followed.status == TrackStatus.JUMPED).any()
+        assert followed.reason.startswith("in collision: where the target is reached, ")
+        assert "box" in followed.message
     with World(described, "mujoco") as world:
         assert min(least_room(world, avoidance, q) for q in plain.q) < -ENGINE_ERROR
         assert min(least_room(world, avoidance, q) for q in followed.q) >= -ENGINE_ERROR
