@@ -28,7 +28,7 @@ class PathCalls(QuantityCalls):
         *,
         dt: float | None = None,
         velocity_limit: ArrayLike | None = None,
-        free: str | None = None,
+        free: str | Sequence[str] | None = None,
         point: ArrayLike | None = None,
         position_tolerance: float = 1e-6,
         rotation_tolerance: float = 1e-6,

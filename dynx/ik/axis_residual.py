@@ -61,7 +61,7 @@ class AxisResidual:
                 error[3:], L[3:, 3:] = to_axes @ rotation_vector(self._rotation @ R.T)[:3], to_axes
             else:
                 current = R @ self._in_frame
-                error[3:] = to_axes @ _turn_between(current, self._direction)
+                error[3:] = to_axes @ rotation_between(current, self._direction)
                 L[3:, 3:] = to_axes @ (np.eye(3) - np.outer(current, current))
         error = np.where(self._used, error, 0.0)
         distance, angle = float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))
@@ -72,7 +72,7 @@ class AxisResidual:
         return counts * excess[self._rows], distance, angle, within, counts[:, None] * L[self._rows]
 
 
-def _turn_between(a: Floats, b: Floats) -> Floats:
+def rotation_between(a: Floats, b: Floats) -> Floats:
     """Return the smallest rotation vector (3,) [rad] that turns the unit vector a to b."""
     x, y, z = a
     u, v, w = b

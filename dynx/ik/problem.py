@@ -31,6 +31,19 @@ class Requirement:
     tolerances: SearchLimits
     """Bounds on the errors."""
 
+    def task(
+        self,
+        kinematics: Kinematics,
+        coordinates: FrameCoordinates,
+        position: Floats | None,
+        rotation: Floats | None,
+    ) -> Task:
+        """Return the task of one target: a position (3,) [m] and a rotation (3, 3)."""
+        arguments = (
+            kinematics, self.frame, self.point, coordinates, self.tolerances, position, rotation
+        )  # fmt: skip
+        return FrameTask(*arguments) if self.axes is None else AxisTask(*arguments, self.axes)
+
 
 @dataclass(frozen=True, eq=False)
 class Problem:
@@ -95,12 +108,8 @@ class Problem:
             targets = [requirement.targets for requirement in self.requirements]
             rows = [((each.positions, each.rotations),) for each in targets]
         for k, sample in enumerate(zip(*rows, strict=True)):
-            tasks: list[Task] = []
-            for requirement, (position, rotation) in zip(self.requirements, sample, strict=True):
-                arguments = (
-                    kinematics, requirement.frame, requirement.point, self.coordinates,
-                    requirement.tolerances, position, rotation,
-                )  # fmt: skip
-                axes = requirement.axes
-                tasks.append(FrameTask(*arguments) if axes is None else AxisTask(*arguments, axes))
+            tasks = [
+                requirement.task(kinematics, self.coordinates, position, rotation)
+                for requirement, (position, rotation) in zip(self.requirements, sample, strict=True)
+            ]
             yield k, tasks[0] if len(tasks) == 1 else SeveralTasks(tasks)

@@ -13,9 +13,9 @@ import numpy as np
 from dynx.ik.avoidance import Avoidance
 from dynx.ik.avoidance.descent import AvoidingDescent
 from dynx.ik.coordinates import FrameCoordinates
-from dynx.ik.search import SearchLimits
+from dynx.ik.problem import Requirement
 from dynx.ik.targets import Targets
-from dynx.ik.tasks import FrameTask, Kinematics
+from dynx.ik.tasks import Kinematics
 from dynx.ik.tracking.descent import Followed, Follower, StepBounds, part_of
 from dynx.spatial.scalar import Floats
 
@@ -30,14 +30,12 @@ class AvoidingFollower:
         self,
         base: Follower,
         kinematics: Kinematics,
-        frame: str,
-        point: Floats | None,
+        requirement: Requirement,
         coordinates: FrameCoordinates,
-        limits: SearchLimits,
         avoidance: Avoidance,
     ) -> None:
         self._base, self._kinematics, self._avoidance = base, kinematics, avoidance
-        self._frame, self._point, self._coordinates, self._limits = frame, point, coordinates, limits
+        self._requirement, self._coordinates = requirement, coordinates
 
     def follow(self, q: Floats, targets: Targets, bounds: StepBounds, *, stop: bool) -> Followed:
         """Follow targets (n,) from q (nq,), each from the solution of the one before."""
@@ -77,9 +75,7 @@ class AvoidingFollower:
         """Return the sample of a target (1,) that keeps the margins, or else stays clear, near q."""
         coordinates = self._coordinates
         ((position, rotation),) = target.rows((1,))
-        task = FrameTask(
-            self._kinematics, self._frame, self._point, coordinates, self._limits, position, rotation
-        )
+        task = self._requirement.task(self._kinematics, coordinates, position, rotation)
         around = bounds.around(np.array(coordinates.values(q)))
         descent = AvoidingDescent(task, self._avoidance, self._kinematics, coordinates, around)
         moved, steps, reached = descent.run(q)

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.levenberg_marquardt import BoundedStep
-from dynx.ik.residual import Residual
-from dynx.ik.search import DAMPING, MIN_DAMPING, REQUIRED_REDUCTION, WINDOW, SearchLimits
+from dynx.ik.problem import Requirement
+from dynx.ik.search import DAMPING, MIN_DAMPING, REQUIRED_REDUCTION, WINDOW
 from dynx.ik.targets import Targets
-from dynx.ik.tasks import Kinematics
+from dynx.ik.tasks import Kinematics, Task, TaskError
 from dynx.spatial.scalar import Floats
 
 ACCEPTED_FACTOR, REJECTED_FACTOR = 0.3, 4.0
@@ -102,16 +102,14 @@ class Follower(Protocol):
 class SampleFollower:
     """Follower on any backend, which evaluates a pose and a Jacobian for every step."""
 
-    def __init__(
-        self, kinematics: Kinematics, frame: str, point: Floats | None, limits: SearchLimits
-    ) -> None:
-        self._kinematics, self._frame, self._point, self._limits = kinematics, frame, point, limits
-        self._coordinates = FrameCoordinates(kinematics.model, frame)
+    def __init__(self, kinematics: Kinematics, requirement: Requirement) -> None:
+        self._kinematics, self._requirement = kinematics, requirement
+        self._coordinates = FrameCoordinates(kinematics.model, requirement.frame)
 
     def follow(self, q: Floats, targets: Targets, bounds: StepBounds, *, stop: bool) -> Followed:
         found: list[_Sample] = []
         for position, rotation in targets.rows(targets.batch):
-            sample = self._solve(q, Residual(position, rotation, self._point), bounds, abandons=False)
+            sample = self._solve(q, self._task(position, rotation), bounds, abandons=False)
             found.append(sample)
             q = sample.q
             if stop and not sample.reached:
@@ -120,27 +118,30 @@ class SampleFollower:
 
     def descend(self, starts: Floats, targets: Targets, bounds: StepBounds) -> Followed:
         rows = zip(starts, targets.rows(targets.batch), strict=True)
-        found = [self._solve(q, Residual(p, R, self._point), bounds, abandons=True) for q, (p, R) in rows]
+        found = [self._solve(q, self._task(p, R), bounds, abandons=True) for q, (p, R) in rows]
         return _followed(found, starts.shape[-1])
 
-    def _solve(self, q: Floats, residual: Residual, bounds: StepBounds, *, abandons: bool) -> _Sample:
-        coordinates, kinematics, frame = self._coordinates, self._kinematics, self._frame
+    def _task(self, position: Floats | None, rotation: Floats | None) -> Task:
+        return self._requirement.task(self._kinematics, self._coordinates, position, rotation)
+
+    def _solve(self, q: Floats, task: Task, bounds: StepBounds, *, abandons: bool) -> _Sample:
+        coordinates = self._coordinates
         lower, upper = bounds.around(np.array(coordinates.values(q)))
         step = BoundedStep(lower.tolist(), upper.tolist())
-        best, factor = self._measured(q, residual), DAMPING
-        place = {} if self._point is None else {"point": self._point}
+        best, factor = _measured(q, task), DAMPING
         J: Floats | None = None
         recent: deque[float] = deque(maxlen=WINDOW)
-        while not best.reached and best.iterations < self._limits.max_iterations and coordinates.count:
+        most = self._requirement.tolerances.max_iterations
+        while not best.reached and best.iterations < most and coordinates.count:
             if abandons:
                 if len(recent) == WINDOW and best.squared > REQUIRED_REDUCTION * recent[0]:
                     break
                 recent.append(best.squared)
             if J is None:
-                J = kinematics.jacobian(best.q, frame, **place)[residual.rows, coordinates.columns]
+                J = task.jacobian(best.q, best.error)
             x = coordinates.values(best.q)
-            y = step(J, best.error, x, factor * best.squared + MIN_DAMPING)
-            trial = self._measured(coordinates.with_values(best.q, y), residual)
+            y = step(J, best.error.vector, x, factor * best.squared + MIN_DAMPING)
+            trial = _measured(coordinates.with_values(best.q, y), task)
             trial.iterations = best.iterations + 1
             gain = best.squared - trial.squared
             ends = abs(gain) <= MIN_RELATIVE_GAIN * best.squared
@@ -155,11 +156,12 @@ class SampleFollower:
                 break
         return best
 
-    def _measured(self, q: Floats, residual: Residual) -> _Sample:
-        error, distance, angle = residual(self._kinematics.forward_kinematics(q, self._frame))
-        limits = self._limits
-        reached = distance <= limits.position_tolerance and angle <= limits.rotation_tolerance
-        return _Sample(q, error, distance, angle, 0.5 * sum([x * x for x in error]), reached)
+
+def _measured(q: Floats, task: Task) -> _Sample:
+    error = task.error(q)
+    return _Sample(
+        q, error, error.position, error.rotation, 0.5 * sum([x * x for x in error.vector]), error.reached
+    )
 
 
 @dataclass
@@ -167,7 +169,7 @@ class _Sample:
     """A configuration and its error."""
 
     q: Floats
-    error: tuple[float, ...]
+    error: TaskError
     distance: float
     angle: float
     squared: float

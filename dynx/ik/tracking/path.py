@@ -18,8 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.ik.axis_residual import rotation_between
 from dynx.ik.coordinates import FrameCoordinates
-from dynx.ik.residual import Residual
+from dynx.ik.problem import Requirement
 from dynx.ik.targets import Targets
 from dynx.ik.tasks import Kinematics
 from dynx.ik.tracking.descent import Followed, Follower, StepBounds, part_of
@@ -107,14 +108,13 @@ class PathTracker:
         self,
         kinematics: Kinematics,
         follower: Follower,
-        frame: str,
-        point: Floats | None,
+        requirement: Requirement,
         coordinates: FrameCoordinates,
         limits: TrackLimits,
         starts: Floats,
     ) -> None:
         """`starts` (k, n) are values of the joints, at which searches for another solution begin."""
-        self._kinematics, self._frame, self._point = kinematics, frame, point
+        self._kinematics, self._requirement = kinematics, requirement
         self._follower, self._limits, self._starts = follower, limits, starts
         self.coordinates = coordinates
 
@@ -182,7 +182,9 @@ class PathTracker:
         coordinates, limits = self.coordinates, self._limits
         x = np.array(coordinates.values(q))
         bounds = StepBounds(limits.lower, limits.upper, limits.per_sample).within_reach_of(x, limits.max_step)
-        between = _Between(self._kinematics.forward_kinematics(q, self._frame), self._point, target)
+        between = _Between(
+            self._kinematics.forward_kinematics(q, self._requirement.frame), self._requirement, target
+        )
         parts, steps = 2, 0
         while parts <= MAX_DIVISIONS:
             found = self._follower.follow(q, between.targets(parts), bounds, stop=True)
@@ -198,10 +200,9 @@ class PathTracker:
         """Return the coordinates (n,) that the error at q presses against a limit."""
         coordinates, limits = self.coordinates, self._limits
         (position, rotation), *_ = part_of(targets, slice(k, k + 1)).rows((1,))
-        residual = Residual(position, rotation, self._point)
-        error = np.array(residual(self._kinematics.forward_kinematics(q, self._frame))[0])
-        place = {} if self._point is None else {"point": self._point}
-        J = self._kinematics.jacobian(q, self._frame, **place)[residual.rows, coordinates.columns]
+        task = self._requirement.task(self._kinematics, coordinates, position, rotation)
+        at_q = task.error(q)
+        error, J = np.array(at_q.vector), task.jacobian(q, at_q)
         pressure = error @ J / (np.linalg.norm(J, axis=0) * np.linalg.norm(error) + 1e-300)
         x, x_before = np.array(coordinates.values(q)), np.array(coordinates.values(before))
         bounds = StepBounds(limits.lower, limits.upper, limits.per_sample)
@@ -229,14 +230,20 @@ class PathTracker:
 class _Between:
     """Targets on the straight way from the present pose to a target, at a constant rotation axis."""
 
-    def __init__(self, T: Floats, point: Floats | None, target: Targets) -> None:
-        self._target = target
+    def __init__(self, T: Floats, requirement: Requirement, target: Targets) -> None:
+        self._target, point = target, requirement.point
         if target.positions is not None:
             self._position = T[:3, 3] if point is None else T[:3, 3] + T[:3, :3] @ point
             self._displacement = target.positions[0] - self._position
         if target.rotations is not None:
             self._rotation = T[:3, :3]
-            self._vector = quat_log(quat_from_rotation(self._rotation.T @ target.rotations[0]))
+            axes = requirement.axes
+            k = None if axes is None else axes.free_rotation
+            if k is None:
+                self._vector = quat_log(quat_from_rotation(self._rotation.T @ target.rotations[0]))
+            else:
+                turn = rotation_between(self._rotation[:, k], target.rotations[0][:, k])
+                self._vector = self._rotation.T @ turn
 
     def targets(self, parts: int) -> Targets:
         """Return the ends of this many equal parts; the last is exactly the target."""

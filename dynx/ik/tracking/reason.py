@@ -97,9 +97,9 @@ class FailureExplainer:
     def _singularity(self, q: Floats) -> str:
         """Say how close q is to a singular configuration, where no motion of the joints reduces the error."""
         coordinates, targets = self.tracker.coordinates, self.requirement.targets
-        place = {} if self.requirement.point is None else {"point": self.requirement.point}
-        J = self.kinematics.jacobian(q, self.requirement.frame, **place)[:, coordinates.columns]
-        J = J[3:] if targets.positions is None else J[:3] if targets.rotations is None else J
+        (position, rotation), *_ = part_of(targets, slice(1)).rows((1,))
+        task = self.requirement.task(self.kinematics, coordinates, position, rotation)
+        J = task.jacobian(q, task.error(q))
         if J.shape[1] < J.shape[0]:
             return f"the frame has {J.shape[0]} coordinates, and {J.shape[1]} joints move it"
         least = float(np.linalg.svd(J, compute_uv=False)[-1])

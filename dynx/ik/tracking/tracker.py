@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.ik.avoidance import AvoidanceSource
+from dynx.ik.axes import checked_axes
 from dynx.ik.checking import argument_note, checked_avoidance, checked_margin
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.problem import Requirement
@@ -58,7 +60,7 @@ def track(
     *,
     dt: float | None = None,
     velocity_limit: ArrayLike | None = None,
-    free: str | None = None,
+    free: str | Sequence[str] | None = None,
     point: ArrayLike | None = None,
     position_tolerance: float = 1e-6,
     rotation_tolerance: float = 1e-6,
@@ -72,7 +74,8 @@ def track(
     """Follow a path of targets by a continuous sequence of configurations within limits.
 
     `targets` are n poses T_world_target (..., n, 4, 4), n positions (..., n, 3) [m] whose rotation is free,
-    or with ``free="position"`` n rotations (..., n, 3, 3); `free` and `point` (3,) [m] are those of
+    or with ``free="position"`` n rotations (..., n, 3, 3); `free` (also single axes
+    of poses, such as ``"rotation_z"`` of a welding torch) and `point` (3,) [m] are those of
     `inverse_kinematics`. Leading axes are paths of their own. `targets` may also be a motion of this robot,
     such as a `dynx.trajectory.Trajectory`, whose poses of `frame` are taken every `dt` [s].
 
@@ -114,7 +117,10 @@ def track(
         raise ArgumentError(f"max_step is {shown(max_step)}; wanted a number above 0, at most pi")
     whole_number("max_starts", max_starts, 1)
     at = None if point is None else checked_vector("point", point)
-    path = _checked_path(kinematics, targets, frame, free, seconds)
+    part, axes = checked_axes(free, None, position_tolerance, rotation_tolerance, "target")
+    path = _checked_path(kinematics, targets, frame, part, seconds)
+    if axes is not None and path.rotations is None:
+        raise ArgumentError(f"free is {shown(free)}, an axis of poses (..., n, 4, 4); targets are positions")
     if at is not None and path.positions is None:
         raise ArgumentError("point is given in addition to free='position', with which it has no effect")
     coordinates = FrameCoordinates(model, frame, checked_margin(model, limit_margin))
@@ -125,18 +131,18 @@ def track(
         raise ArgumentError("jumps=True is given with dt, whose velocity limits a jump would violate")
     limits = _limits(model, coordinates, max_step, seconds, velocity_limit)
     settings = SearchLimits(float(position_tolerance), float(rotation_tolerance), MAX_STEPS, 0)
-    make = getattr(kinematics, "path_follower", None)
+    requirement = Requirement(frame, path, at, axes, settings)
+    make = getattr(kinematics, "path_follower", None) if axes is None else None
     follower: Follower | None = None if make is None else make(frame, path, at, settings)
     if follower is None:
-        follower = SampleFollower(kinematics, frame, at, settings)
+        follower = SampleFollower(kinematics, requirement)
     plain, avoidance = follower, checked_avoidance(model, avoid)
     if avoidance is not None:
-        follower = AvoidingFollower(follower, kinematics, frame, at, coordinates, settings, avoidance)
+        follower = AvoidingFollower(follower, kinematics, requirement, coordinates, avoidance)
     draws = coordinates.starts(_generator(rng), max_starts)
     offset = coordinates.count - len(coordinates.indices)
     starts = np.clip(draws, limits.lower[offset:], limits.upper[offset:])
-    tracker = PathTracker(kinematics, follower, frame, at, coordinates, limits, starts)
-    requirement = Requirement(frame, path, at, None, settings)
+    tracker = PathTracker(kinematics, follower, requirement, coordinates, limits, starts)
     explainer = FailureExplainer(kinematics, tracker, plain, requirement, limits, avoidance)
 
     n = path.batch[-1]

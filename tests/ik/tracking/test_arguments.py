@@ -12,6 +12,7 @@ from dynx import trajectory
 from dynx.backends import Backend, backend
 from dynx.errors import ArgumentError, ClosedError, NotFiniteError, ShapeError, UnknownNameError
 from dynx.model.loading import load
+from dynx.spatial.so3 import rotation_from_rpy
 from tests.oracles.closed_form import MODELS
 
 PATH = np.tile(np.eye(4), (3, 1, 1))
@@ -110,6 +111,26 @@ def test_the_first_sample_that_is_not_reached_has_a_reason(engine: Backend) -> N
     jumped = engine.track(engine.forward_kinematics(sweep, "flange"), "flange", q0)
     change = jumped.jump[np.flatnonzero(~jumped.ok)[0]]
     assert jumped.reason.endswith(f"was found; a joint changes by {change:.3g}")
+
+
+def test_a_rotation_about_the_tool_axis_may_be_free(engine: Backend) -> None:
+    """A path whose targets are turned about their z axes at random is followed as if they were not."""
+    q0, count = np.full(6, 0.2), 8
+    plain = engine.forward_kinematics(np.linspace(0.2, 0.4, count)[:, None] * np.ones(6), "flange")
+    turned = plain.copy()
+    for T, angle in zip(turned, np.random.default_rng(5).uniform(-np.pi, np.pi, count), strict=True):
+        T[:3, :3] = T[:3, :3] @ rotation_from_rpy(np.array([0.0, 0.0, angle]))
+    found = engine.track(turned, "flange", q0, free="rotation_z")
+    assert found
+    reached = engine.forward_kinematics(found.q, "flange")
+    np.testing.assert_allclose(reached[:, :3, 3], plain[:, :3, 3], atol=2e-6)
+    np.testing.assert_allclose(reached[:, :3, 2], plain[:, :3, 2], atol=2e-6)
+    assert np.abs(np.diff(found.q, axis=0)).max() <= 0.2
+    coarse = engine.track(turned[[0, -1]], "flange", q0, free="rotation_z", max_step=0.02)
+    assert coarse, coarse.message
+    assert not engine.track(turned, "flange", q0, jumps=False)
+    with pytest.raises(ArgumentError, match="an axis of poses"):
+        engine.track(plain[:, :3, 3], "flange", q0, free="rotation_z")
 
 
 def test_a_start_outside_the_limits_is_noted(engine: Backend) -> None:
