@@ -41,6 +41,7 @@ from dynx.world import (
 from tests.world.engines import WORLDS
 
 NAN, INF = math.nan, math.inf
+NO_PAIR: Any = [0.0, 0.0]
 
 
 @pytest.fixture(params=WORLDS)
@@ -122,7 +123,7 @@ CALLS: dict[str, tuple[Callable[[World], object], type[DynxError], str]] = {
     "wrench in no axes": (lambda w: w.step(wrenches=[Wrench("brick", axes="x")]), ArgumentError, "axes"),
     "wrenches in a set": (lambda w: w.step(wrenches={1}), ArgumentError, "list of Wrench"),  # type: ignore[arg-type]
     "state with NaN": (lambda w: w.set_state(robots={"arm": ([NAN, 0], [0, 0])}), ArgumentError, "q of arm"),
-    "no pair": (lambda w: w.set_state(robots={"arm": [0.0, 0.0]}), ArgumentError, r"wanted a pair \(q, v\)"),
+    "no pair": (lambda w: w.set_state(robots={"arm": NO_PAIR}), ArgumentError, r"wanted a pair \(q, v\)"),
     "no state": (lambda w: w.set_state(), ArgumentError, "robots= or bodies="),
     "state of a removed body": (
         lambda w: w.set_state(bodies={"gone": (np.eye(4), [0] * 6)}),
