@@ -12,11 +12,11 @@ from dynx.model import Model
 from dynx.model.elements import Inertial
 from dynx.model.geometry import Box, Sphere
 from dynx.spatial.scalar import Floats
-from dynx.spatial.so3 import rotation_from_quat
 from dynx.viewer.browser.client import names_element
 from dynx.viewer.colours import BLUE, RGB, SKY_BLUE, VERMILION, YELLOW
 from dynx.viewer.drawn_parts import wxyz
 from dynx.viewer.drawn_robot import DrawnRobot, size_of
+from dynx.viewer.name_labels import NameLabels, centre_of
 from dynx.viewer.page import Page
 from dynx.viewer.triangles import triangles_of
 
@@ -56,8 +56,8 @@ class Marks:
     kinds = ("frames", "joint axes", "names", "centres of mass", "inertia boxes", "inertia ellipsoids")
     """What can be shown."""
 
-    def __init__(self, scene: Any, robot: DrawnRobot) -> None:
-        self._scene, self._robot = scene, robot
+    def __init__(self, page: Page, robot: DrawnRobot) -> None:
+        self._page, self._scene, self._robot = page, page.scene, robot
         self._size = size_of(robot.model)
         self._nodes: dict[str, list[Any]] = {}
 
@@ -104,9 +104,7 @@ class Marks:
             )
 
     def _names(self) -> Iterator[Any]:
-        for name, node in self._robot.links.items():
-            place = centre_of(self._robot.visuals[name])
-            yield self._scene.add_label(f"{node.name}/label", name, position=place)
+        yield NameLabels(self._page, self._robot)
 
     def _centers(self) -> Iterator[Any]:
         for name, inertial in self._with_mass():
@@ -142,21 +140,6 @@ class Marks:
             inertial = self._model.inertial(link.name)
             if inertial.mass > 0.0:
                 yield link.name, inertial
-
-
-def centre_of(shapes: Sequence[Any]) -> tuple[float, ...]:
-    """Return the centre (3,) [m], in the frame of their part, of the box around the nodes of its shapes; the
-    origin without shapes. The frames of links that are connected often have the same origin, where names
-    would lie over each other."""
-    corners = []
-    for node in shapes:
-        w, *xyz = node.wxyz
-        points = np.asarray(node.vertices) @ rotation_from_quat(np.array([*xyz, w])).T + node.position
-        corners += [points.min(axis=0), points.max(axis=0)]
-    if not corners:
-        return (0.0, 0.0, 0.0)
-    centre = 0.5 * (np.min(corners, axis=0) + np.max(corners, axis=0))
-    return tuple(np.asarray(centre, dtype=np.float64).tolist())
 
 
 class NamedParts:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, shown
 from dynx.model.configuration import whole_number
+from dynx.spatial.scalar import Floats
 from dynx.viewer.browser.client import Client
 from dynx.viewer.library import serve, silent
 
@@ -51,9 +52,8 @@ that software draws where dynx says so itself (a note) and has prepared for it."
 
 NARROW = 576
 """Width of a page up to which viser lays the panel over the lower part of the picture [pixels]."""
-_NARROW_DISTANCE = 0.6
-"""Distance of the camera on a narrow page relative to that on a wide one: viser sees more from the same place
-there, so that a robot would be a third as large."""
+_NARROW_DISTANCE = 1.2
+"""Distance of the camera on a narrow page, whose picture is lower, relative to that on a wide one."""
 _COVERED = 0.45
 """Share of the height of a narrow page that the panel covers."""
 
@@ -88,7 +88,8 @@ class Page:
         self._server = serve(self.host, self.port, title, self._client.folder)
         self._plain, self._dark = plain, dark
         self._furnish()
-        self._server.on_client_connect(_make_room_on_narrow)
+        self._view: tuple[Floats, Floats] | None = None
+        self._server.on_client_connect(self._watch_narrow)
         self.lock = threading.RLock()
         """Held by whoever changes what the page shows."""
         self._closed = threading.Event()
@@ -162,6 +163,29 @@ class Page:
         eye = point + distance * VIEW_DIRECTION
         self._server.initial_camera.position = tuple(eye.tolist())
         self._server.initial_camera.look_at = tuple(point.tolist())
+        self._view = eye, point
+
+    def _watch_narrow(self, client: Any) -> None:
+        # The first camera of a page may come after the page is connected, and again with its reset button.
+        client.camera.on_update(lambda _: self._make_room_on_narrow(client))
+        self._make_room_on_narrow(client)
+
+    def _make_room_on_narrow(self, client: Any) -> None:
+        """Move a narrow page that shows what `look_at` says: viser lays its panel over the picture there."""
+        camera = client.camera
+        if self._view is None or camera.image_width > NARROW:
+            return
+        eye, target = self._view
+        if not (np.allclose(camera.position, eye) and np.allclose(camera.look_at, target)):
+            return
+        away = _NARROW_DISTANCE * (eye - target)
+        up = np.array(camera.up_direction, dtype=np.float64)
+        up -= (up @ away) / (away @ away) * away
+        height = 2.0 * float(np.linalg.norm(away)) * math.tan(0.5 * camera.fov)
+        target = target - _COVERED * 0.5 * height * up / np.linalg.norm(up)
+        with client.atomic():
+            camera.position = tuple((target + away).tolist())
+            camera.look_at = tuple(target.tolist())
 
     def at_end(self, action: Callable[[], None]) -> None:
         """Call `action` when what is shown at present is removed or the page is closed."""
@@ -224,22 +248,6 @@ class Page:
             f'<iframe src="{escape(self.url, quote=True)}" width="100%" height="500" '
             'style="border: 0"></iframe>'
         )
-
-
-def _make_room_on_narrow(client: Any) -> None:
-    """Move what a narrow page shows closer and above its panel, which viser lays over the picture there."""
-    camera = client.camera
-    if camera.image_width > NARROW:
-        return
-    target, eye = np.array(camera.look_at), np.array(camera.position)
-    away = _NARROW_DISTANCE * (eye - target)
-    up = np.array(camera.up_direction, dtype=np.float64)
-    up -= (up @ away) / (away @ away) * away
-    height = 2.0 * float(np.linalg.norm(away)) * math.tan(0.5 * camera.fov)
-    target = target - _COVERED * 0.5 * height * up / np.linalg.norm(up)
-    with client.atomic():
-        camera.position = tuple((target + away).tolist())
-        camera.look_at = tuple(target.tolist())
 
 
 def _free_port(host: str, port: int) -> int:

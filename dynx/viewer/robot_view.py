@@ -60,7 +60,7 @@ class RobotView:
             self.robot.move(start)
         self.notes = self.robot.notes
         """Shapes that cannot be drawn, one sentence each."""
-        self._marks = Marks(page.scene, self.robot)
+        self._marks = Marks(page, self.robot)
         self._torques = GravityTorques(page.scene, model, lambda: self._engine)
         self._ellipsoid = Manipulability(page.scene, model, lambda: self._engine)
         size = size_of(model)

@@ -84,6 +84,29 @@ def test_flights_are_those_of_gymnasium(flight: dict[str, Any], engine: str) -> 
     assert (difference <= FLIGHT_TOLERANCE).all(), difference
 
 
+def test_drake_parts_from_mujoco_where_legs_are_held_before_their_limits(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The cause that docs/reinforcement_learning.md names: MuJoCo's limit acts on a leg beyond it."""
+    if not {"drake", "mujoco"} <= set(ENGINES):
+        pytest.skip("needs Drake and MuJoCo")
+
+    def difference() -> list[float]:
+        flights = []
+        for name in ("drake", "mujoco"):
+            with TaskEnvironment(LunarLander(), name) as env:
+                env.reset(seed=0)
+                flights.append([env.step(0)[0] for _ in range(45)])
+        apart = np.abs(np.array(flights[0]) - np.array(flights[1]))
+        return [float(each) for each in apart.max(axis=1)]
+
+    held_before = difference()
+    assert max(held_before[:21]) < 1e-6
+    assert held_before[21] > 5e-3
+    monkeypatch.setattr("dynx.envs.tasks.lunar_lander.task.SPREAD_TOLERANCE", 0.0)
+    assert max(difference()) < 7e-4
+
+
 def test_equal_seeds_and_actions_give_the_same_bits(engine: str) -> None:
     def episode(env: TaskEnvironment) -> list[Any]:
         seen = [env.reset(seed=2)[0].tobytes()]
