@@ -166,6 +166,9 @@ class Page:
         self._view = eye, point
 
     def _watch_narrow(self, client: Any) -> None:
+        # The picture is as wide as the page only until the panel stands beside it.
+        if client.camera.image_width > NARROW:
+            return
         # The first camera of a page may come after the page is connected, and again with its reset button.
         client.camera.on_update(lambda _: self._make_room_on_narrow(client))
         self._make_room_on_narrow(client)
@@ -173,7 +176,7 @@ class Page:
     def _make_room_on_narrow(self, client: Any) -> None:
         """Move a narrow page that shows what `look_at` says: viser lays its panel over the picture there."""
         camera = client.camera
-        if self._view is None or camera.image_width > NARROW:
+        if self._view is None:
             return
         eye, target = self._view
         if not (np.allclose(camera.position, eye) and np.allclose(camera.look_at, target)):
