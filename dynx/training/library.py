@@ -145,8 +145,8 @@ def _policy_options(options: object) -> dict[str, Any]:
 
 def action_of(algorithm: Any, observation: Any, deterministic: bool) -> Any:
     """Return the action of the policy of an algorithm for one observation, or those for several (n, ...)."""
-    # PyTorch divides even layers of 64 units among all cores, whose waiting for one another takes 10 times as
-    # long as the layer, and 1,000 times where other programs run.
+    # PyTorch divides even layers of 64 units among all cores, whose waiting for one another takes ten times
+    # as long as the layer, and some hundred times where other programs run.
     restore = set_threads(1)
     try:
         action, _ = algorithm.predict(observation, deterministic=deterministic)

@@ -162,8 +162,8 @@ def load_policy(path: str | os.PathLike[str], task: TaskSpec | None = None) -> P
         if task is None or task.id == spec.task.id:
             raise
         raise ArgumentError(
-            f"{shown(os.fspath(path), 300)} is a policy for {spec.task.id}, whose observations or actions "
-            f"are not those of {task.id}"
+            f"{error}; it is a policy for {spec.task.id}, whose observations or actions may not be those of "
+            f"{task.id}"
         ) from error
     finally:
         vector.close()
