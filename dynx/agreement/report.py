@@ -1,9 +1,11 @@
 """The outcome of a comparison, and its JSON form (schema 1).
 
-    {"schema": 1, "dynx": version, "results": [...], "summary": {...}, "not_done": [...]}
+    {"schema": 1, "dynx": version, "results": [...], "summary": {...}, "not_done": [...],
+     "left_out": [...]}
 
 ``summary`` counts the ``robots`` that have an entry, and those among them that ``agree``, ``differ`` and are
 ``refused``; ``not_done`` counts the robots without an entry; it is 0 unless ``dynx agree`` was interrupted.
+``left_out`` are robots in xacro below a directory, which are not compared.
 
 One entry of ``results`` per robot:
 
@@ -171,6 +173,8 @@ class AgreementDocument:
     summary: AgreementSummary
     not_done: tuple[str, ...]
     """The robots that an interrupted run left out."""
+    left_out: tuple[str, ...]
+    """The robots in xacro below a directory, which are not compared."""
 
 
 def refused_report(
@@ -193,10 +197,13 @@ def refused_report(
     )
 
 
-def results_document(reports: Iterable[AgreementReport], not_done: Sequence[str] = ()) -> dict[str, Any]:
+def results_document(
+    reports: Iterable[AgreementReport], not_done: Sequence[str] = (), left_out: Sequence[str] = ()
+) -> dict[str, Any]:
     """Return the JSON document of many reports, described at the head of this file.
 
-    `not_done` names the robots of an interrupted run that have no report.
+    `not_done` names the robots of an interrupted run that have no report, `left_out` those in xacro below a
+    directory.
     """
     results = [report.to_dict() for report in reports]
     refused = sum(result["error"] is not None for result in results)
@@ -213,6 +220,7 @@ def results_document(reports: Iterable[AgreementReport], not_done: Sequence[str]
             "not_done": len(not_done),
         },
         "not_done": list(not_done),
+        "left_out": list(left_out),
     }
 
 

@@ -38,10 +38,15 @@ class DoctorDocument:
     summary: DoctorSummary
     not_done: tuple[str, ...]
     """The robots that an interrupted run left out."""
+    left_out: tuple[str, ...]
+    """The robots in xacro below a directory, which are not examined."""
 
 
-def results_document(reports: Iterable[DoctorReport], not_done: Sequence[str] = ()) -> dict[str, Any]:
-    """Make the JSON document of reports; `not_done` names the robots that an interrupted run left out."""
+def results_document(
+    reports: Iterable[DoctorReport], not_done: Sequence[str] = (), left_out: Sequence[str] = ()
+) -> dict[str, Any]:
+    """Make the JSON document of reports; `not_done` names the robots that an interrupted run left out,
+    `left_out` those in xacro below a directory."""
     reports = list(reports)
     statuses = Counter(report.status for report in reports)
     counts = {word: statuses[word] for word in get_args(Status)}
@@ -52,4 +57,5 @@ def results_document(reports: Iterable[DoctorReport], not_done: Sequence[str] = 
         "results": [report.to_dict() for report in reports],
         "summary": to_json_values(summary),
         "not_done": list(not_done),
+        "left_out": list(left_out),
     }

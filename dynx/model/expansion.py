@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from dynx.errors import DynxError, ModelError, RobotNotFoundError, shown
 from dynx.model.library import EXAMPLE_ROBOT_DATA, find, robots
+from dynx.model.xacro_robots import xacro_robots
 
 ALL = "all"
 """Argument that stands for every robot of example-robot-data; ``./all`` is a file of that name."""
@@ -25,23 +26,35 @@ class RobotInput:
     folder: str | None = None
 
 
-def expand(arguments: Sequence[str]) -> list[RobotInput]:
-    """List the robots that the arguments stand for, in order, without opening a file.
+@dataclass(frozen=True)
+class Expansion:
+    """The robots that arguments stand for, and the robots in xacro below directories that were `left_out`."""
 
-    A directory stands for every .urdf below it, sorted by path, but for no .xacro, whose expansion runs code;
-    as in `dynx.load`, a name of the library takes precedence over a directory of that name. A directory
-    without one, or that cannot be read, becomes an input with a refusal, so that the others are still
-    processed.
+    robots: tuple[RobotInput, ...]
+    left_out: tuple[str, ...] = ()
+
+
+def expand(arguments: Sequence[str]) -> Expansion:
+    """List the robots that the arguments stand for, in order.
+
+    A directory stands for every .urdf below it, sorted by path, but for no .xacro, whose expansion runs code:
+    those that are robots, and no macros of others, are listed in `Expansion.left_out`. As in `dynx.load`, a
+    name of the library takes precedence over a directory of that name. A directory without a .urdf, or that
+    cannot be read, becomes an input with a refusal, so that the others are still processed.
     """
     found: list[RobotInput] = []
+    left_out: list[str] = []
     for argument in arguments:
         if argument == ALL:
             found += _library()
         elif _is_directory(argument) and not is_library_name(argument):
-            found += _below(argument)
+            below = _below(argument)
+            found += below.robots
+            left_out += below.left_out
         else:
             found.append(RobotInput(argument))
-    return found
+    named = {each.robot for each in found}
+    return Expansion(tuple(found), tuple(path for path in dict.fromkeys(left_out) if path not in named))
 
 
 def refusals(inputs: Sequence[RobotInput]) -> dict[int, DynxError]:
@@ -58,9 +71,9 @@ def _library() -> list[RobotInput]:
     ]
 
 
-def _below(directory: str) -> list[RobotInput]:
+def _below(directory: str) -> Expansion:
     paths: list[str] = []
-    n_xacro = 0
+    xacro: list[str] = []
     refusals: list[RobotInput] = []
 
     def refuse(error: OSError) -> None:
@@ -69,15 +82,17 @@ def _below(directory: str) -> list[RobotInput]:
 
     for folder, _, names in os.walk(directory, onerror=refuse):
         paths += [os.path.join(folder, name) for name in names if name.lower().endswith(".urdf")]
-        n_xacro += sum(name.lower().endswith(".xacro") for name in names)
+        xacro += [os.path.join(folder, name) for name in names if name.lower().endswith(".xacro")]
+    left_out = tuple(xacro_robots(sorted(xacro)))
     if not paths and not refusals:
-        hint = f"; name one of its {n_xacro} .xacro files, whose expansion runs code" if n_xacro else ""
+        robots = left_out or xacro
+        hint = f"; name one of its {len(robots)} .xacro files, whose expansion runs code" if robots else ""
         error = RobotNotFoundError(
             f"the directory {shown(directory, 300)} has no .urdf file in it or below it{hint}"
         )
-        return [RobotInput(directory, error)]
+        return Expansion((RobotInput(directory, error),))
     # A bare file name could be read as a name of the library; a path with a separator never is.
-    return [RobotInput(path, folder=directory) for path in sorted(paths)] + refusals
+    return Expansion((*(RobotInput(path, folder=directory) for path in sorted(paths)), *refusals), left_out)
 
 
 def _is_directory(argument: str) -> bool:

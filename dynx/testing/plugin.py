@@ -87,7 +87,7 @@ def pytest_configure(config: pytest.Config) -> None:
     config.stash[_PLAN] = plan_robots(config, robots)
 
 
-def pytest_report_header(config: pytest.Config) -> str | None:
+def pytest_report_header(config: pytest.Config) -> list[str] | None:
     """Describe what is compared, if anything is."""
     plan = config.stash.get(_PLAN, None)
     return None if plan is None else plan.header

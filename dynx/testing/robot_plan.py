@@ -13,9 +13,10 @@ import pytest
 from dynx.backends.registry import backend_class
 from dynx.errors import DynxError, RobotNotFoundError, shown
 from dynx.loaded.registry import ENGINES
-from dynx.model.expansion import ALL, expand, is_library_name
+from dynx.model.expansion import ALL, RobotInput, expand, is_library_name
 from dynx.model.loading import load
 from dynx.model.model import Base
+from dynx.model.xacro_robots import left_out_note
 
 if TYPE_CHECKING:
     from dynx.doctor.formats import Baseline
@@ -44,6 +45,8 @@ class RobotPlan:
     as_loaded: bool = False
     tolerance: float | None = None
     baseline: Baseline | None = None
+    left_out: tuple[str, ...] = ()
+    """Robots in xacro below directories, which are not tested."""
 
     @property
     def engines(self) -> tuple[str, ...] | None:
@@ -51,12 +54,13 @@ class RobotPlan:
         return tuple(name for name in self.backends or () if name in ENGINES) or None
 
     @property
-    def header(self) -> str:
-        """Line for the head of a report."""
+    def header(self) -> list[str]:
+        """Lines for the head of a report."""
         labels = [robot.label for robot in self.robots]
         listed = ", ".join(labels[:5]) + (f" and {len(labels) - 5} more" if len(labels) > 5 else "")
         engines = ", ".join(self.backends or ["all engines"])
-        return f"dynx: {listed}; {' and '.join(self.bases)} base; {engines}"
+        lines = [f"dynx: {listed}; {' and '.join(self.bases)} base; {engines}"]
+        return [*lines, f"dynx: {left_out_note(self.left_out)}"] if self.left_out else lines
 
 
 def plan_robots(config: pytest.Config, requested: Sequence[tuple[str, Path]]) -> RobotPlan:
@@ -64,9 +68,12 @@ def plan_robots(config: pytest.Config, requested: Sequence[tuple[str, Path]]) ->
     relative. Raises UsageError for invalid ones."""
     option = config.option
     try:
-        robots = dict.fromkeys(each for robot, folder in requested for each in _found(robot, folder, config))
+        expansions = [expand([path_or_name(robot, folder)]) for robot, folder in requested]
+        robots = dict.fromkeys(_planned(each, config) for found in expansions for each in found.robots)
+        left_out = (_label(each, config.rootpath) for found in expansions for each in found.left_out)
         return RobotPlan(
             robots=tuple(robots),
+            left_out=tuple(dict.fromkeys(left_out)),
             bases=("fixed", "floating") if option.dynx_base == "both" else (option.dynx_base or "fixed",),
             backends=None if option.dynx_backends is None else _backends(option.dynx_backends),
             as_loaded=bool(option.dynx_as_loaded),
@@ -85,19 +92,16 @@ def path_or_name(robot: str, folder: Path) -> str:
     return path if os.path.lexists(path) else robot
 
 
-def _found(robot: str, folder: Path, config: pytest.Config) -> list[PlannedRobot]:
-    found = []
-    for each in expand([path_or_name(robot, folder)]):
-        if each.refusal is not None:
-            raise each.refusal
-        try:
-            load(each.robot)
-        except RobotNotFoundError:
-            raise
-        except DynxError:
-            pass  # a description that cannot be read is a failing test, not an invalid command
-        found.append(PlannedRobot(each.robot, _label(each.robot, config.rootpath)))
-    return found
+def _planned(found: RobotInput, config: pytest.Config) -> PlannedRobot:
+    if found.refusal is not None:
+        raise found.refusal
+    try:
+        load(found.robot)
+    except RobotNotFoundError:
+        raise
+    except DynxError:
+        pass  # a description that cannot be read is a failing test, not an invalid command
+    return PlannedRobot(found.robot, _label(found.robot, config.rootpath))
 
 
 def _label(robot: str, root: Path) -> str:

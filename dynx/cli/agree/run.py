@@ -60,12 +60,13 @@ def agree(
     check_json(json_path)
     for name in backends or ():  # Checked once, so that an error is not reported for every robot.
         backend_class(name)
-    inputs = expand(robots)
+    found = expand(robots)
+    inputs = found.robots
     if json_path is not None:
         require_apart([json_path], (each.robot for each in inputs), "a robot that is read")
     pose = None if base_pose is None else pose_of(base_pose, "--base-pose")
     tasks = [AgreementTask(each.robot, base, lock, backends, samples, seed, pose) for each in inputs]
-    run = agreement_run(tasks, refusals=refusals(inputs))
+    run = agreement_run(tasks, refusals=refusals(inputs), left_out=found.left_out)
     return carry_out(run, jobs, timeout, quiet, lambda: _report(run, json_path, json_samples, quiet))
 
 
@@ -73,9 +74,10 @@ def agreement_run(
     tasks: Sequence[AgreementTask],
     target: Callable[[AgreementTask], AgreementReport] = measure,
     refusals: dict[int, DynxError] | None = None,
+    left_out: Sequence[str] = (),
 ) -> AgreementRun:
     """Prepare the run of ``dynx agree``."""
-    return Run(tasks, target, refused, _problem, _verdict, "comparing", refusals)
+    return Run(tasks, target, refused, _problem, _verdict, "comparing", refusals, left_out)
 
 
 def _verdict(report: AgreementReport) -> str:
@@ -90,7 +92,7 @@ def _problem(report: AgreementReport) -> str | None:
 
 def _report(run: AgreementRun, json_path: str | None, json_samples: bool, quiet: bool) -> int:
     """Write the document, the tables and the errors; return the exit code."""
-    document = results_document(run.results, run.not_done)
+    document = results_document(run.results, run.not_done, run.left_out)
     entries: list[dict[str, Any]] = document["results"]
     # The document is written first, so that it is not lost if a pipe closes while the table is written.
     error = failure_of(write_json, document if json_samples else summarized(document), json_path)

@@ -42,17 +42,18 @@ def compare(
     outputs = Outputs(json=json_path)
     outputs.check()
     check_engines(engines)
-    inputs = expand(robots)
+    found = expand(robots)
+    inputs = found.robots
     outputs.keep_apart((each.robot for each in inputs), (), None)
     tasks = [DoctorTask(each.robot, base, engines, samples, seed, causes=False) for each in inputs]
-    run = doctor_run(tasks, refusals=refusals(inputs))
+    run = doctor_run(tasks, refusals=refusals(inputs), left_out=found.left_out)
     return carry_out(run, jobs, timeout, quiet, lambda: _conclude(run, outputs, engines, quiet))
 
 
 def _conclude(run: DoctorRun, outputs: Outputs, engines: tuple[str, ...] | None, quiet: bool) -> int:
     reports = run.results
-    errors = outputs.write(reports, run.not_done)
-    outputs.echo(reports, run.not_done)
+    errors = outputs.write(reports, run.not_done, run.left_out)
+    outputs.echo(reports, run.not_done, run.left_out)
     if not quiet:
         out = console(err=outputs.on_stdout)
         if len(run.tasks) == 1:

@@ -58,11 +58,13 @@ class Conclusion:
         """Write and show everything; return the exit code."""
         reports = self._run.results
         # Files are written first, so that they are not lost if a pipe closes while a table is written.
-        errors = self._outputs.write(reports, self._run.not_done, self._baseline, command_line())
+        errors = self._outputs.write(
+            reports, self._run.not_done, self._run.left_out, self._baseline, command_line()
+        )
         self._problems += map(str, errors)
         mended = self._mend()
         saved = [self._save_counterexamples(report) for report in reports]
-        self._outputs.echo(reports, self._run.not_done)
+        self._outputs.echo(reports, self._run.not_done, self._run.left_out)
         if not quiet:
             self._show(console(err=self._outputs.on_stdout), saved, mended)
         refusals = [refusal(report) for report in reports if report.error is not None]

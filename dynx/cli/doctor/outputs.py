@@ -66,20 +66,22 @@ class Outputs:
         self,
         reports: Sequence[DoctorReport],
         not_done: Sequence[str],
+        left_out: Sequence[str] = (),
         baseline: Baseline | None = None,
         command: str | None = None,
     ) -> list[DynxError]:
         """Write all files; return the errors of those that cannot be written.
 
-        `command` is the command line that the HTML page shows.
+        `not_done` and `left_out` are the robots without a report: of an interrupted run, and those in xacro
+        below a directory. `command` is the command line that the HTML page shows.
         """
         texts: dict[str | None, Callable[[], str]] = {
             None if self.on_stdout else self.json: lambda: (
-                json_text(results_document(reports, not_done)) + "\n"
+                json_text(results_document(reports, not_done, left_out)) + "\n"
             ),
-            self.html: lambda: html_page(reports, command=command, baseline=baseline),
-            self.junit: lambda: junit_xml(reports, baseline),
-            self.sarif: lambda: json_text(sarif_document(reports, baseline, not_done)) + "\n",
+            self.html: lambda: html_page(reports, command=command, baseline=baseline, left_out=left_out),
+            self.junit: lambda: junit_xml(reports, baseline, left_out),
+            self.sarif: lambda: json_text(sarif_document(reports, baseline, not_done, left_out)) + "\n",
             self.baseline: lambda: self._baseline_text(reports),
         }
 
@@ -89,10 +91,12 @@ class Outputs:
         errors = [failure_of(write, path) for path in texts if path is not None]
         return [error for error in errors if error is not None]
 
-    def echo(self, reports: Sequence[DoctorReport], not_done: Sequence[str]) -> None:
+    def echo(
+        self, reports: Sequence[DoctorReport], not_done: Sequence[str], left_out: Sequence[str] = ()
+    ) -> None:
         """Write the JSON document to standard output where it goes there."""
         if self.on_stdout:
-            echo_json(results_document(reports, not_done))
+            echo_json(results_document(reports, not_done, left_out))
 
     def _baseline_text(self, reports: Sequence[DoctorReport]) -> str:
         return json_text(baseline_document(reports, os.path.dirname(self.baseline or ""))) + "\n"

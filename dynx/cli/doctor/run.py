@@ -47,7 +47,8 @@ def doctor(
     choices = tuple(checked_choices(choose).items())
     check_engines(engines)
     baseline = None if baseline_path is None else load_baseline(baseline_path)
-    inputs = expand(robots)
+    found = expand(robots)
+    inputs = found.robots
     bases: tuple[Base, ...] = ("fixed", "floating") if base == "both" else (base,)
     targets = planned_targets(inputs, fix, in_place=in_place, bases=len(bases))
     outputs.keep_apart((each.robot for each in inputs), () if in_place else targets, baseline_path)
@@ -58,6 +59,7 @@ def doctor(
             for each, one in examined
         ],
         refusals=refusals([each for each, _ in examined]),
+        left_out=found.left_out,
     )
     conclusion = Conclusion(run, outputs, baseline, targets, in_place, counterexamples, engines)
     return carry_out(run, jobs, timeout, quiet, lambda: conclusion.reach(quiet=quiet))
@@ -67,9 +69,10 @@ def doctor_run(
     tasks: Sequence[DoctorTask],
     target: Callable[[DoctorTask], DoctorReport] = examine,
     refusals: dict[int, DynxError] | None = None,
+    left_out: Sequence[str] = (),
 ) -> DoctorRun:
     """Prepare the run of ``dynx doctor`` or of ``dynx agree --as-loaded``."""
-    return Run(tasks, target, refused, _problem, _verdict, "examining", refusals)
+    return Run(tasks, target, refused, _problem, _verdict, "examining", refusals, left_out)
 
 
 def _verdict(report: DoctorReport) -> str:

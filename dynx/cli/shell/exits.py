@@ -48,6 +48,12 @@ def complain(message: str) -> None:
         click.echo(f"dynx: error: {one_line(message)}", err=True)
 
 
+def remark(message: str) -> None:
+    """Write a note to standard error, as one line, whatever ``--quiet`` and ``--json`` say."""
+    with suppress(OSError):
+        click.echo(f"dynx: note: {one_line(message)}", err=True)
+
+
 def failure_of(call: Callable[..., object], *args: object) -> DynxError | None:
     """Call a function and return its error, or None, so that results are still shown if it fails."""
     try:

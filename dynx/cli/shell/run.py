@@ -7,11 +7,12 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Generic, Protocol, TypeVar
 
-from dynx.cli.shell.exits import complain, short_line
+from dynx.cli.shell.exits import complain, remark, short_line
 from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.progress import log, progress_bar
 from dynx.cli.shell.terminal import counted
 from dynx.errors import DynxError
+from dynx.model.xacro_robots import left_out_note
 from dynx.simd.machine import core_count
 from dynx.workers import Workers
 
@@ -39,7 +40,8 @@ class Run(Generic[Task, Result]):
     process ended without one, and of the tasks numbered in `refusals`, which never start.
     The progress bar counts the results by ``problem(result)``, a word such as ``differ`` or None; without
     any its text is `activity`. Where standard error is no terminal, such as the log of a CI service, each of
-    several robots gets a line with ``verdict(result)`` when it is done.
+    several robots gets a line with ``verdict(result)`` when it is done. `left_out` are the robots found that
+    have no task.
     """
 
     def __init__(
@@ -51,8 +53,10 @@ class Run(Generic[Task, Result]):
         verdict: Callable[[Result], str],
         activity: str,
         refusals: Mapping[int, DynxError] | None = None,
+        left_out: Sequence[str] = (),
     ) -> None:
         self.tasks = list(tasks)
+        self.left_out = tuple(left_out)
         self.seconds = 0.0
         self._target = target
         self._refused = refused
@@ -134,4 +138,6 @@ def carry_out(
             complain(f"interrupted: {len(run.not_done)} of {counted(len(run.tasks), 'robot')} not done")
         interruption.finishing = True
         code = conclude()
+        if run.left_out:
+            remark(left_out_note(run.left_out))
     return code if interruption.code is None else interruption.code

@@ -21,6 +21,7 @@ from dynx.doctor.formats.text_changes import changes, excerpt
 from dynx.doctor.formats.vote import largest_error
 from dynx.doctor.report import DoctorReport
 from dynx.files.pages import page_environment, page_text
+from dynx.model.xacro_robots import left_out_note
 
 if TYPE_CHECKING:
     from dynx.files.pages import Environment
@@ -34,9 +35,14 @@ LOWEST_BAR = -16
 
 
 def html_page(
-    reports: Sequence[DoctorReport], *, command: str | None = None, baseline: Baseline | None = None
+    reports: Sequence[DoctorReport],
+    *,
+    command: str | None = None,
+    baseline: Baseline | None = None,
+    left_out: Sequence[str] = (),
 ) -> str:
-    """Make the page, in ASCII, with the `command` line that reproduces it."""
+    """Make the page, in ASCII, with the `command` line that reproduces it and the robots `left_out`, in xacro
+    below a directory."""
     entries = {cause.rule: cause.entry for report in reports for cause in causes(report) if cause.entry}
     page = template_environment().get_template("doctor.html.j2")
     return page_text(
@@ -46,6 +52,7 @@ def html_page(
         counts=Counter(report.status for report in reports),
         rules=[entries[rule] for rule in sorted(entries)],
         baseline=baseline,
+        left_out=left_out_note([wording.name(robot) for robot in left_out]) if left_out else "",
         command=command,
         footer=_footer(reports),
     )

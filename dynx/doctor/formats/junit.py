@@ -7,7 +7,7 @@ practice passes, with its text as output. A difference in the baseline is skippe
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from xml.etree import ElementTree
 
 from dynx.doctor.formats import wording
@@ -22,12 +22,19 @@ _SHOWN_PLACES = 50
 
 KNOWN = "known: in the baseline"
 
+_CAN_BE_EXAMINED = "the file can be examined"
 
-def junit_xml(reports: Iterable[DoctorReport], baseline: Baseline | None = None) -> str:
-    """Make the document, in ASCII."""
+
+def junit_xml(
+    reports: Iterable[DoctorReport], baseline: Baseline | None = None, left_out: Sequence[str] = ()
+) -> str:
+    """Make the document, in ASCII. The robots `left_out`, in xacro below a directory, are skipped tests."""
     root = Element("testsuites", name="dynx doctor")
     for report in reports:
         root.append(_suite(report, baseline))
+    for robot in left_out:
+        skipped: list[tuple[str, Element | None]] = [(_CAN_BE_EXAMINED, _result("skipped", wording.LEFT_OUT))]
+        root.append(_suite_of(wording.name(robot), 0.0, skipped))
     for key in ("tests", "failures", "errors", "skipped"):
         root.set(key, str(sum(int(suite.get(key, "0")) for suite in root)))
     ElementTree.indent(root)
@@ -36,10 +43,17 @@ def junit_xml(reports: Iterable[DoctorReport], baseline: Baseline | None = None)
 
 
 def _suite(report: DoctorReport, baseline: Baseline | None) -> Element:
-    title = f"{wording.name(report.robot)}, {report.base} base"
-    suite = Element("testsuite", name=title, time=f"{report.seconds:.3f}")
     new = None if baseline is None else baseline.compare(report).new
-    for name, result in _cases(report, new):
+    title = f"{wording.name(report.robot)}, {report.base} base"
+    suite = _suite_of(title, report.seconds, _cases(report, new))
+    if report.unread_meshes:
+        ElementTree.SubElement(suite, "system-out").text = f"not examined: {wording.unread_meshes(report)}"
+    return suite
+
+
+def _suite_of(title: str, seconds: float, cases: Iterable[tuple[str, Element | None]]) -> Element:
+    suite = Element("testsuite", name=title, time=f"{seconds:.3f}")
+    for name, result in cases:
         # A dot would be read as the end of a package by some services.
         case = ElementTree.SubElement(suite, "testcase", classname=title.replace(".", "_"), name=name)
         if result is not None:
@@ -48,8 +62,6 @@ def _suite(report: DoctorReport, baseline: Baseline | None) -> Element:
     suite.set("tests", str(len(suite)))
     for key, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
         suite.set(key, str(outcomes.count(tag)))
-    if report.unread_meshes:
-        ElementTree.SubElement(suite, "system-out").text = f"not examined: {wording.unread_meshes(report)}"
     return suite
 
 
@@ -57,7 +69,7 @@ def _cases(report: DoctorReport, new: Collection[Difference] | None) -> Iterator
     """Yield the name of each test case with its result; None for one that passes."""
     if report.error is not None:
         message = wording.name(report.error.message, 2000)
-        yield "the file can be examined", _result("error", message, report.error.type)
+        yield _CAN_BE_EXAMINED, _result("error", message, report.error.type)
         return
     yield from _quantities(report, accepted=new is not None and not new)
     for cause in causes(report):

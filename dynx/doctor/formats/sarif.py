@@ -48,11 +48,14 @@ _OWN_RULES = {
 
 
 def sarif_document(
-    reports: Iterable[DoctorReport], baseline: Baseline | None = None, not_done: Sequence[str] = ()
+    reports: Iterable[DoctorReport],
+    baseline: Baseline | None = None,
+    not_done: Sequence[str] = (),
+    left_out: Sequence[str] = (),
 ) -> dict[str, Any]:
     """Make the document. Differences in the baseline are marked as suppressed.
 
-    `not_done` names the robots that an interrupted run left out.
+    `not_done` names the robots that an interrupted run left out, `left_out` those in xacro below a directory.
     """
     reports = list(reports)
     merged: dict[str, dict[str, Any]] = {}
@@ -66,6 +69,7 @@ def sarif_document(
     numbers = {rule["id"]: number for number, rule in enumerate(rules)}
     results = [{**result, "ruleIndex": numbers[result["ruleId"]]} for result in merged.values()]
     notes = [f"{wording.name(robot)} was not examined: the run was interrupted" for robot in not_done]
+    notes += [f"{wording.name(robot)} {wording.LEFT_OUT}" for robot in left_out]
     if len(results) > MAX_RESULTS:
         notes.append(f"{len(results) - MAX_RESULTS} of {len(results)} results were left out")
         results = sorted(results, key=_severity, reverse=True)[:MAX_RESULTS]

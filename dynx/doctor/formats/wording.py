@@ -21,6 +21,11 @@ CALLS = {
 }
 """Titles of the calls after loading, by `RunTimeCall.comparison`."""
 
+LEFT_OUT = (
+    "was not examined, as it is in xacro, whose expansion runs code of the file: name it if you trust it"
+)
+"""What became of a robot in xacro below a directory."""
+
 SHAPE_RULES = "DX501 to DX503, DX517"
 """Rules that compare mass and inertia of a link with the size of its shapes."""
 

@@ -42,7 +42,7 @@ def test_the_document_has_the_shape_of_the_schema() -> None:
     result = agree("ur5", "nosuchrobot", "--json", "-")
     assert result.exit_code == 2
     made: dict[str, Any] = json.loads(result.stdout)
-    assert set(made) == {"schema", "dynx", "results", "summary", "not_done"}
+    assert set(made) == {"schema", "dynx", "results", "summary", "not_done", "left_out"}
     assert made["schema"] == 1
     good, bad = made["results"]
     keys = "robot source base backends nq nv samples seed agree error seconds quantities"
@@ -178,12 +178,12 @@ def test_arguments_that_cannot_be_used(arguments: list[str], clue: str) -> None:
 
 @needs_examples
 def test_all_is_the_whole_of_example_robot_data() -> None:
-    assert len(expand(["all"])) == 69
+    assert len(expand(["all"]).robots) == 69
 
 
 def test_a_directory_of_xacro_files_says_why_none_is_taken(tmp_path: Path) -> None:
     (tmp_path / "arm.xacro").write_text("<robot/>")
-    (found,) = expand([str(tmp_path)])
+    (found,) = expand([str(tmp_path)]).robots
     assert "has no .urdf file in it or below it; name one of its 1 .xacro files" in str(found.refusal)
 
 
@@ -239,3 +239,16 @@ def test_one_robot_is_singular() -> None:
     refused = results_document([refused_report("x", RobotNotFoundError("no x"))])
     show_summary(Console(file=out), refused["summary"], 1.0)
     assert out.getvalue() == "1 robot: 0 agree, 0 differ, 1 refused; took 1.0 s\n"
+
+
+@pytest.mark.parametrize("quiet", [[], ["--quiet"]])
+def test_robots_in_xacro_below_a_directory_are_named(quiet: list[str], tmp_path: Path) -> None:
+    robot = tmp_path / "arm.urdf.xacro"
+    robot.write_text('<robot name="arm"><link name="base"/></robot>')
+    (tmp_path / "arm.urdf").write_text('<robot name="arm"><link name="base"/></robot>')
+    target = tmp_path / "out.json"
+    result = CliRunner().invoke(cli, ["agree", str(tmp_path), *QUICK, "--json", str(target), *quiet])
+    assert result.exit_code == 0
+    assert "dynx: note: 1 robot in xacro was not examined" in result.stderr
+    assert str(robot) in result.stderr
+    assert json.loads(target.read_text())["left_out"] == [str(robot)]
