@@ -14,6 +14,9 @@ from dynx.registry import ClassRegistry
 from dynx.rules import catalogue
 from dynx.rules.rule import Rule
 
+_MAX_SUGGESTIONS = 6
+"""Largest number of rules that the error about an unknown one names."""
+
 OTHERS: ClassRegistry[Rule] = ClassRegistry(
     "rule", "dynx.rules", {}, lambda: Rule, error=DynxError, unknown=UnknownNameError
 )
@@ -43,12 +46,31 @@ def all_rules() -> tuple[Rule, ...]:
 
 
 def find_rule(name: str) -> Rule:
-    """Return the rule of that id or name, in any case; raises UnknownNameError with the nearest name."""
+    """Return the rule of that id or name, in any case.
+
+    Raises UnknownNameError with the rules that have `name` in id, name or title, or else with the nearest
+    names.
+    """
     for rule in all_rules():
         if name.lower() in (rule.id.lower(), rule.name):
             return rule
     known = [word for rule in all_rules() for word in (rule.id, rule.name)]
-    raise UnknownNameError(f"no rule {shown(name)}{nearest(name, known)}")
+    raise UnknownNameError(f"no rule {shown(name)}{_rules_with(name) or nearest(name, known)}")
+
+
+def _rules_with(part: str) -> str:
+    """Make a clause with the rules that have `part` in id or name, or else in the title; empty without
+    any."""
+    word = part.strip().lower()
+    if not word:
+        return ""
+    by_name = [rule for rule in all_rules() if word in rule.id.lower() or word in rule.name]
+    found = by_name or [rule for rule in all_rules() if word in rule.title.lower()]
+    if not found:
+        return ""
+    listed = ", ".join(f"{rule.id} {rule.name}" for rule in found[:_MAX_SUGGESTIONS])
+    more = len(found) - _MAX_SUGGESTIONS
+    return f"; rules with it: {listed}{f' and {more} more' if more > 0 else ''}"
 
 
 @cache

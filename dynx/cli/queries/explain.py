@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import re
+import textwrap
 from collections.abc import Iterator
 from typing import Any
 
 from rich.markdown import Markdown
 
-from dynx.cli.shell.tables import Table
 from dynx.cli.shell.terminal import console, counted, write_json
 from dynx.rules import Rule, all_rules, find_rule
 
 _MAX_WIDTH = 100
-"""Width of prose on a terminal, at most [columns]."""
+"""Width of prose on a terminal and of the list of rules, at most [columns]."""
 
 
 def explain(rule: str | None, json_path: str | None) -> None:
@@ -42,11 +42,16 @@ def _as_dict(rule: Rule) -> dict[str, Any]:
 
 
 def _list(rules: tuple[Rule, ...]) -> None:
-    table = Table("id", "name", "kind", "engines", "title")
-    for rule in rules:
-        table.add_row(rule.id, rule.name, rule.kind, ", ".join(rule.engines) or "-", rule.title)
     out = console()
-    out.print(table)
+    width = min(out.width, _MAX_WIDTH)
+    indent = " " * (2 + max(len(rule.id) for rule in rules))
+    for rule in rules:
+        engines = f": {', '.join(rule.engines)}" if rule.engines else ""
+        text = f"{rule.id:<{len(indent)}}{rule.name}: {rule.title} ({rule.kind}{engines})"
+        lines = textwrap.wrap(
+            text, width, subsequent_indent=indent, break_on_hyphens=False, break_long_words=False
+        )
+        out.print("\n".join(lines))
     out.print(f"\n{counted(len(rules), 'rule')}; dynx explain ID prints the page of a rule")
 
 
