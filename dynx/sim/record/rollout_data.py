@@ -45,7 +45,7 @@ class Summary(NamedTuple):
     def __str__(self) -> str:
         """Return the largest error and torque with joint and unit; without motors, the energy's drift."""
         sentences = []
-        if np.isnan(self.max_error).any():
+        if not self.has_errors:
             sentences.append("no reference")
         elif self.max_error.size:
             sentences.append(f"largest error {self._largest(self.max_error)}")
@@ -56,6 +56,29 @@ class Summary(NamedTuple):
             # Where motors do work, the energy changes by that and does not drift.
             sentences.append(f"energy drift {self.energy_drift:.2g} of the largest kinetic energy")
         return ", ".join(sentences)
+
+    @property
+    def has_errors(self) -> bool:
+        """False without a reference, where errors are NaN."""
+        return not (self.max_error.size and np.isnan(self.max_error).all())
+
+    def __repr__(self) -> str:
+        return f"<Summary: {self}>"
+
+    def _repr_html_(self) -> str:
+        return self.to_html("summary")
+
+    def to_html(self, title: str) -> str:
+        """Return a table with a row for each coordinate under `title`; without a reference it has no
+        errors."""
+        columns = {"max speed": self.max_speed, "max torque": self.max_torque}
+        if self.has_errors:
+            columns = {"max error": self.max_error, "RMS error": self.rms_error, **columns}
+        rows = (
+            (name, unit, *(f"{x:.3g}" for x in numbers))
+            for name, unit, *numbers in zip(self.coordinates, self.units, *columns.values(), strict=True)
+        )
+        return html_grid(f"{title}: {self}", ("coordinate", "unit", *columns), rows)
 
     def _largest(self, values: Floats, units: Mapping[str, str] | None = None) -> str:
         k = int(np.argmax(values))
@@ -165,11 +188,4 @@ class RolloutData:
         return f"<Rollout of {self.model.name}: {len(self)} steps to {self.t[-1]:.6g} s>"
 
     def _repr_html_(self) -> str:
-        found = self.summary()
-        head = ("coordinate", "unit", "max error", "RMS error", "max speed", "max torque")
-        columns = (found.max_error, found.rms_error, found.max_speed, found.max_torque)
-        rows = (
-            (name, unit, *(f"{x:.3g}" for x in numbers))
-            for name, unit, *numbers in zip(found.coordinates, found.units, *columns, strict=True)
-        )
-        return html_grid(f"{repr(self)[1:-1]}: {found}", head, rows)
+        return self.summary().to_html(repr(self)[1:-1])

@@ -35,6 +35,16 @@ def test_a_summary_names_joints_and_units(driven: Rollout) -> None:
     assert "energy drift" in str(fallen.summary())
 
 
+def test_a_rollout_without_a_reference_shows_no_errors(driven: Rollout) -> None:
+    fallen = simulate(ARM, None, plant="compiled", duration=0.02, q0=REST)
+    for shown in (fallen._repr_html_(), fallen.summary()._repr_html_(), repr(fallen.summary())):
+        assert "no reference" in shown
+        assert "nan" not in shown
+    assert "max error" not in fallen._repr_html_()
+    assert "max error" in driven._repr_html_()
+    assert repr(driven.summary()).startswith("<Summary: largest error ")
+
+
 def test_notebooks_show_tables(driven: Rollout) -> None:
     solved = dynx.backend("reference", ARM).inverse_kinematics([0.3, 0.2, 0.4], "tool0")
     many = simulate_batch(ARM, control.PD(ARM, kp=100.0, kd=10.0), REST, rollouts=2, duration=0.01)
