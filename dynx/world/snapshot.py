@@ -19,6 +19,12 @@ from dynx.files.reading import checked_path, open_regular, printable
 from dynx.files.writing import write_bytes
 
 MAGIC = WORLD_FILE + b"1\n"
+SUFFIX = ".world"
+_OTHER_SUFFIXES: dict[tuple[str, ...], str] = {
+    (".toml", ".json"): "; dynx.world.write_scene writes a scene to .toml and .json",
+    (".npz", ".mcap", ".csv"): "; Rollout.save writes the record of a simulation to .npz, .mcap and .csv",
+    (".html", ".png", ".gif"): "; World.view(...).export writes pages and pictures to .html, .png and .gif",
+}
 MAX_BYTES = 1 << 30
 """Largest file that is read."""
 
@@ -64,8 +70,22 @@ class Snapshot:
             )
 
 
+def check_world_suffix(path: str | os.PathLike[str]) -> None:
+    """Raise ArgumentError for a file whose suffix belongs to another kind of file than a world's."""
+    name = printable(checked_path(path))
+    suffix = os.path.splitext(name)[1].lower()
+    if suffix in ("", SUFFIX):
+        return
+    other = next((use for suffixes, use in _OTHER_SUFFIXES.items() if suffix in suffixes), "")
+    raise ArgumentError(
+        f"{name}: a world with its state is written to {SUFFIX} or to a file without a suffix, which "
+        f"World.read reads{other}"
+    )
+
+
 def write_snapshot(path: str | os.PathLike[str], snapshot: Snapshot, world: dict[str, Any]) -> None:
     """Write a snapshot, and the document of its world, to a file (see the module)."""
+    check_world_suffix(path)
     header = {
         "world": world,
         "engine": snapshot.engine,

@@ -244,10 +244,11 @@ class World:
         self._motion.change(load, (snapshot.start, snapshot.steps))
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Write the world and its state to a file, from which `read` continues bit for bit.
+        """Write the world and its state to a file, from which `read` continues bit for bit; its suffix is
+        .world, or it has none.
 
-        Raises DescriptionError for a collision shape that a file cannot have, and ArgumentError for a file
-        that cannot be written.
+        Raises DescriptionError for a collision shape that a file cannot have, and ArgumentError for another
+        suffix and for a file that cannot be written.
         """
         given = {"engine": self.engine, "options": dict(self.options), "settings": dict(self.settings)}
         write_snapshot(path, self.save(), {"scene": scene_document(self.scene), **given})

@@ -131,3 +131,9 @@ def test_files_of_another_kind_name_the_function_that_reads_them(engine: str, tm
         World.read(npz)
     with pytest.raises(ArgumentError, match=r"a scene is read by dynx.world.read_scene"):
         World.read(toml)
+
+
+def test_a_suffix_is_checked_before_a_file_is_written(engine: str, tmp_path: Path) -> None:
+    with World(small(), engine) as world, pytest.raises(ArgumentError, match="a file without a suffix"):
+        world.write(tmp_path / "a.txt")
+    assert not (tmp_path / "a.txt").exists()

@@ -58,8 +58,8 @@ from dynx.cli.shell.options import (
         "--save",
         "save_path",
         metavar="FILE",
-        help="File for the final state of the world, which dynx.world.World.read continues; with several "
-        "engines the name of each stands before the suffix.",
+        help="File, with the suffix .world or none, for the final state of the world, which "
+        "dynx.world.World.read continues; with several engines the name of each stands before the suffix.",
     ),
     click.option(
         "--export",

@@ -20,6 +20,7 @@ from dynx.world import World
 from dynx.world.comparison import ComparisonInterrupted, WorldComparison, compare_worlds
 from dynx.world.registry import installed_worlds
 from dynx.world.scene import read_scene
+from dynx.world.snapshot import check_world_suffix
 
 
 def world(
@@ -46,6 +47,8 @@ def world(
     for path in (plot_path, save_path):
         if path is not None:
             check_writable(path)
+    if save_path is not None:
+        check_world_suffix(save_path)
     if plot_path is not None:
         picture_format(plot_path)
     chosen = engines or installed_worlds()

@@ -196,7 +196,7 @@ def test_ctrl_c_keeps_what_is_done(
     monkeypatch.setattr(World, "step", interrupted)
     out = tmp_path / "out.json"
     arguments = ("--engine", ",".join(ENGINES), "--duration", "0.1", "--json", str(out))
-    result = run(scene, *arguments, "--save", str(tmp_path / "state.npz"))
+    result = run(scene, *arguments, "--save", str(tmp_path / "state.world"))
     assert result.exit_code == 130
     assert f"s of {ENGINES[last]}, engine number {last + 1} of {len(ENGINES)}" in " ".join(
         result.output.split()
@@ -206,4 +206,12 @@ def test_ctrl_c_keeps_what_is_done(
     assert 0.0 < found[-1]["time"] < 0.1
     assert [each["error"] for each in found] == [None] * last + ["interrupted"]
     assert all(each["time"] == pytest.approx(0.1) for each in found[:-1])
-    assert len([*tmp_path.glob("state*.npz")]) == last + 1
+    assert len([*tmp_path.glob("state*.world")]) == last + 1
+
+
+def test_a_file_of_another_kind_is_refused_before_the_run(scene: str, tmp_path: Path) -> None:
+    result = run(scene, "--save", str(tmp_path / "end.npz"))
+    assert result.exit_code == 2
+    assert "a world with its state is written to .world" in result.stderr
+    assert "Rollout.save" in result.stderr
+    assert not (tmp_path / "end.npz").exists()
