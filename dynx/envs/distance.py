@@ -65,6 +65,15 @@ class EngineDistance:
     tolerance: float
     records: tuple[EpisodeRecord, ...]
     differences: tuple[EpisodeDifference, ...]
+    observation_names: tuple[str, ...] = ()
+    """Names of the entries of the observation; empty where the environment does not name them."""
+
+    def entry_name(self, entry: int | None) -> str | None:
+        """Return the name of an entry of the observation, or ``entry 3`` without names; None for None."""
+        if entry is None:
+            return None
+        names = self.observation_names
+        return names[entry] if entry < len(names) else f"entry {entry}"
 
     def of(self, a: str, b: str) -> list[EpisodeDifference]:
         """Return the differences of two engines, one for each seed."""
@@ -105,9 +114,11 @@ def engine_distance(
     whole_number("steps", steps, 1)
     records: list[EpisodeRecord] = []
     actions: dict[int, list[Any]] = {}
+    names: tuple[str, ...] = ()
     for engine in engines:
         env = make(engine)
         try:
+            names = getattr(env.unwrapped, "observation_names", names)
             for seed in seeds:
                 record, taken = _run(env, engine, seed, steps, actions.get(seed), policy)
                 actions.setdefault(seed, taken)
@@ -121,7 +132,7 @@ def engine_distance(
         for a, b in combinations(engines, 2)
         for seed in seeds
     )
-    return EngineDistance(tuple(engines), tolerance, tuple(records), differences)
+    return EngineDistance(tuple(engines), tolerance, tuple(records), differences, names)
 
 
 def _run(

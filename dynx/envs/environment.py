@@ -63,6 +63,8 @@ class TaskEnvironment(Env[Any, Any]):
         self.render_mode = render_mode
         self.metadata = {**self.metadata, "render_fps": round(1.0 / task.control_dt)}
         self.observation_space = task.observation_space
+        self.observation_names = task.observation_names
+        """Names of the entries of the observation; empty where the task does not name them."""
         self.action_space = task.action_space
         self._size = (whole_number("width", width, 1, MAX_SIDE), whole_number("height", height, 1, MAX_SIDE))
         self._phase = "before reset"

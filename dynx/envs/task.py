@@ -7,7 +7,7 @@ the order of calls, and leaves the motion to the `Episodes` that the task opens 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
@@ -20,6 +20,9 @@ from dynx.envs.randomization.randomization import Randomization
 from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError, nearest, shown
 
 Kind = TypeVar("Kind", bound="Task")
+
+XYZ = ("x", "y", "z")
+"""Names of the components of a vector."""
 
 ENVIRONMENT_OPTIONS = ("engine", "render_mode", "randomize", "width", "height")
 """Options of every environment, beside those of its task."""
@@ -54,6 +57,11 @@ class Task(ABC):
     @abstractmethod
     def observation_space(self) -> Space[Any]:
         """Space of the observations."""
+
+    @property
+    def observation_names(self) -> tuple[str, ...]:
+        """Names of the entries of the observation; empty where a task does not name them."""
+        return ()
 
     @property
     @abstractmethod
@@ -133,3 +141,8 @@ def checked_engine(kind: type[Task], engine: str | None) -> str:
             f"{kind.__name__} does not run on engine {shown(engine)}{nearest(str(engine), known)}"
         )
     return engine
+
+
+def component_names(vector: str, components: Sequence[str] = XYZ) -> tuple[str, ...]:
+    """Return the names of the components of a vector in an observation, such as ``goal x``."""
+    return tuple(f"{vector} {component}" for component in components)

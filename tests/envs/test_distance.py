@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import io
 from typing import Any
 
 import gymnasium
 import numpy as np
 import pytest
 from gymnasium import spaces
+from rich.console import Console
 
 import dynx.envs  # noqa: F401  (registers the environments)
+from dynx.cli.env.document import document
+from dynx.cli.env.tables import show
 from dynx.envs.distance import engine_distance
 from dynx.envs.ids import bare_name, task_id
+from dynx.envs.registration import task_class
 from dynx.errors import ArgumentError, UnknownNameError
 
 
@@ -50,6 +55,7 @@ def test_a_planted_difference_is_found_at_its_step_and_entry() -> None:
     found = engine_distance(Drifting, ["one", "other"], seeds=[3], steps=12, tolerance=0.1)
     (difference,) = found.of("one", "other")
     assert (difference.step, difference.entry, difference.largest) == (5, 1, 0.5)
+    assert found.entry_name(difference.entry) == "entry 1"
     assert engine_distance(Drifting, ["one", "other"], seeds=[3], tolerance=0.6).differences[0].step is None
 
 
@@ -87,3 +93,28 @@ def test_short_names_of_tasks() -> None:
     assert bare_name("dynx/CartPole-v0") == bare_name("CartPole-v1") == "CartPole"
     with pytest.raises(UnknownNameError, match="did you mean 'CartPole'"):
         task_id("CartPol")
+
+
+@pytest.mark.parametrize("env_id", [each for each in gymnasium.registry if each.startswith("dynx/")])
+def test_the_tasks_of_dynx_name_each_entry_of_their_observation(env_id: str) -> None:
+    task = task_class(gymnasium.registry[env_id].kwargs["task"])()
+    names = task.observation_names
+    assert (len(names),) == task.observation_space.shape
+    assert len(set(names)) == len(names)
+
+
+def test_the_table_names_what_parts_first() -> None:
+    class Named(Drifting):
+        observation_names = ("sum", "jump")
+
+    found = engine_distance(Named, ["one", "other", "short"], seeds=[3, 4], steps=12, tolerance=0.1)
+    report = document("task", {}, found, [])
+    assert [each["first_entry"] for each in report["pairs"]] == ["jump", None, "jump"]
+    assert [each["entry_name"] for each in report["pairs"][0]["episodes"]] == ["jump", "jump"]
+    out = Console(file=io.StringIO(), width=200)
+    show(out, report)
+    rows = [line.split() for line in out.file.getvalue().splitlines()]  # type: ignore[attr-defined]  # StringIO
+    assert rows[3][:7] == ["one,", "other", "2", "of", "2", "5", "jump"]
+    assert "end of the episode" in " ".join(rows[4])
+    same = document("task", {}, engine_distance(Named, ["one", "same"], seeds=[3], steps=12), [])
+    assert same["pairs"][0]["first_entry"] is None

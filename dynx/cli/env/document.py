@@ -34,7 +34,8 @@ class TasksDocument(TypedDict):
 
 
 class EpisodeEntry(TypedDict):
-    """One episode on two engines: the step at which they part (null: never), and the entry that differs most.
+    """One episode on two engines: the step at which they part (null: never), and the entry of the observation
+    that differs most there, with its name (null where an engine only ends the episode earlier).
 
     `largest` is the largest difference of an entry over the steps that both have. `returns` and `lengths` are
     those of the two engines.
@@ -43,17 +44,22 @@ class EpisodeEntry(TypedDict):
     seed: int
     step: int | None
     entry: int | None
+    entry_name: str | None
     largest: float
     returns: list[float]
     lengths: list[int]
 
 
 class PairEntry(TypedDict):
-    """Two engines: how many episodes part, the first and the median step of those, and each episode."""
+    """Two engines: how many episodes part, the first and the median step of those, and each episode.
+
+    `first_entry` names the entry of the observation that differs most at the first step.
+    """
 
     engines: list[str]
     parted: int
     first_step: int | None
+    first_entry: str | None
     median_step: float | None
     largest: float
     mean_returns: list[float]
@@ -101,18 +107,20 @@ def document(
         "options": options,
         "engines": list(found.engines),
         "tolerance": found.tolerance,
-        "pairs": [_pair(found.of(a, b)) for a, b in combinations(found.engines, 2)],
+        "pairs": [_pair(found, found.of(a, b)) for a, b in combinations(found.engines, 2)],
         "policies": policies,
     }
 
 
-def _pair(episodes: Sequence[EpisodeDifference]) -> PairEntry:
+def _pair(found: EngineDistance, episodes: Sequence[EpisodeDifference]) -> PairEntry:
     steps = [each.step for each in episodes if each.step is not None]
+    first = min((each.step, k) for k, each in enumerate(episodes) if each.step is not None)[1] if steps else 0
     returns = np.array([each.returns for each in episodes])
     return {
         "engines": list(episodes[0].engines),
         "parted": len(steps),
         "first_step": min(steps, default=None),
+        "first_entry": found.entry_name(episodes[first].entry),
         "median_step": float(np.median(steps)) if steps else None,
         "largest": max(each.largest for each in episodes),
         "mean_returns": returns.mean(axis=0).tolist(),
@@ -121,6 +129,7 @@ def _pair(episodes: Sequence[EpisodeDifference]) -> PairEntry:
                 "seed": each.seed,
                 "step": each.step,
                 "entry": each.entry,
+                "entry_name": found.entry_name(each.entry),
                 "largest": each.largest,
                 "returns": list(each.returns),
                 "lengths": list(each.lengths),

@@ -22,22 +22,31 @@ def show(out: Console, report: Entry) -> None:
         style="bold",
     )
     right = ("parted", "first step", "median step", "largest difference", "returns")
-    table = Table("engines", *right, right=right)
+    columns = (*right[:2], "parts first", *right[2:])
+    table = Table("engines", *columns, right=right)
     for pair in report["pairs"]:
         table.add_row(
             ", ".join(pair["engines"]),
             f"{pair['parted']} of {len(pair['episodes'])}",
             "never" if pair["first_step"] is None else str(pair["first_step"]),
+            _first_entry(pair),
             "never" if pair["median_step"] is None else f"{pair['median_step']:g}",
             f"{pair['largest']:.2e}",
             ", ".join(f"{each:.5g}" for each in pair["mean_returns"]),
         )
     out.print(table)
     out.print(
-        f"two engines part where an entry of the observation differs by more than {report['tolerance']:g}"
+        f"two engines part where an entry of the observation differs by more than {report['tolerance']:g}; "
+        "the one that differs most at the first step is named"
     )
     if report["policies"]:
         _show_policies(out, report)
+
+
+def _first_entry(pair: Entry) -> str:
+    if pair["first_step"] is None:
+        return ""
+    return "end of the episode" if pair["first_entry"] is None else one_line(pair["first_entry"])
 
 
 def _show_policies(out: Console, report: Entry) -> None:

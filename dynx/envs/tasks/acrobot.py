@@ -95,6 +95,13 @@ class Acrobot(RobotTask):
         high = np.array([1.0, 1.0, 1.0, 1.0, *MAX_SPEEDS], dtype=np.float32)
         return spaces.Box(-high, high, dtype=np.float32)
 
+    @property
+    def observation_names(self) -> tuple[str, ...]:
+        """Names of the entries of the observation."""
+        joints = self.model.joint_names
+        angles = [f"{function} of the {joint} angle" for joint in joints for function in ("cosine", "sine")]
+        return (*angles, *(f"{joint} velocity" for joint in joints))
+
     @cached_property
     def action_space(self) -> spaces.Discrete:
         """Torques of -1, 0 and 1 N m."""

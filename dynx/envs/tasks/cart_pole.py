@@ -115,6 +115,11 @@ class CartPole(RobotTask):
         high = np.array([2.0 * MAX_POSITION, LARGEST, 2.0 * MAX_ANGLE, LARGEST], dtype=np.float32)
         return spaces.Box(-high, high, dtype=np.float32)
 
+    @property
+    def observation_names(self) -> tuple[str, ...]:
+        """Names of the entries of the observation."""
+        return "cart position", "cart velocity", "pole angle", "pole velocity"
+
     @cached_property
     def action_space(self) -> spaces.Discrete:
         """Left and right."""

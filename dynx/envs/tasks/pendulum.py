@@ -95,6 +95,11 @@ class Pendulum(RobotTask):
         high = np.array([1.0, 1.0, MAX_SPEED], dtype=np.float32)
         return spaces.Box(-high, high, dtype=np.float32)
 
+    @property
+    def observation_names(self) -> tuple[str, ...]:
+        """Names of the entries of the observation."""
+        return "cosine of the angle", "sine of the angle", "velocity"
+
     @cached_property
     def action_space(self) -> spaces.Box:
         """Torque, relative or in N m."""

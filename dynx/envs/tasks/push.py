@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dynx.backends import Backend, backend
 from dynx.envs.library import spaces
+from dynx.envs.task import component_names
 from dynx.envs.world.scene_task import Episode
 from dynx.envs.world.task import WorldTask
 from dynx.errors import ArgumentError, nearest, shown
@@ -99,6 +100,19 @@ class Push(WorldTask):
     def observation_space(self) -> spaces.Box:
         """Positions, velocities and rotations."""
         return spaces.Box(-LARGEST, LARGEST, (24,), dtype=np.float32)
+
+    @property
+    def observation_names(self) -> tuple[str, ...]:
+        """Names of the entries of the observation."""
+        return (
+            *component_names("finger tip position"),
+            *component_names("finger tip velocity"),
+            *component_names("cube position"),
+            *component_names("cube rotation", ("xx", "xy", "xz", "yx", "yy", "yz")),
+            *component_names("cube linear velocity"),
+            *component_names("cube angular velocity"),
+            *component_names("goal"),
+        )
 
     @cached_property
     def action_space(self) -> spaces.Box:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.envs.library import spaces
+from dynx.envs.task import component_names
 from dynx.envs.world.scene_task import Episode
 from dynx.envs.world.task import WorldTask
 from dynx.errors import ArgumentError, shown
@@ -72,6 +73,19 @@ class Quadruped(WorldTask):
     def observation_space(self) -> spaces.Box:
         """Velocities, directions, angles and the last action."""
         return spaces.Box(-LARGEST, LARGEST, (self.observation_size,), dtype=np.float32)
+
+    @property
+    def observation_names(self) -> tuple[str, ...]:
+        """Names of the entries of the observation."""
+        joints = self.model.joint_names
+        return (
+            *component_names("trunk linear velocity"),
+            *component_names("trunk angular velocity"),
+            *component_names("gravity direction"),
+            *(f"{joint} angle" for joint in joints),
+            *(f"{joint} velocity" for joint in joints),
+            *(f"{joint} last action" for joint in joints),
+        )
 
     @cached_property
     def action_space(self) -> spaces.Box:

@@ -17,6 +17,7 @@ from dynx.control.dynamics import Dynamics
 from dynx.envs.library import spaces
 from dynx.envs.robot.state import State
 from dynx.envs.robot.task import RobotTask
+from dynx.envs.task import component_names
 from dynx.envs.task_options import refuse_unknown_choice
 from dynx.errors import UnsupportedFeatureError
 from dynx.model import Model
@@ -107,6 +108,18 @@ class Reach(RobotTask):
     def observation_space(self) -> spaces.Box:
         """Positions and velocities, bounded by the largest float32."""
         return spaces.Box(-LARGEST, LARGEST, (2 * self.model.nv + 9,), np.float32)
+
+    @property
+    def observation_names(self) -> tuple[str, ...]:
+        """Names of the entries of the observation."""
+        joints = self.model.joint_names
+        return (
+            *(f"{joint} position" for joint in joints),
+            *(f"{joint} velocity" for joint in joints),
+            *component_names(f"{self.tool} position"),
+            *component_names("vector to the goal"),
+            *component_names("rotation error"),
+        )
 
     @cached_property
     def action_space(self) -> spaces.Box:

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.envs.task import component_names
 from dynx.envs.tasks.quadruped import DOG, SPEED_WIDTH, Quadruped, vertical_axis
 from dynx.envs.world.scene_task import Episode
 from dynx.errors import ArgumentError, shown
@@ -47,6 +48,11 @@ class Walk(Quadruped):
         largest = (self.max_speed, 0.5 * self.max_speed, self.max_yaw_rate)
         drawn = episode.rng.uniform(-1.0, 1.0, 3) * largest
         episode.memory.velocity = checked_velocity(drawn if velocity is None else velocity)
+
+    @property
+    def observation_names(self) -> tuple[str, ...]:
+        """Names of the entries of the observation."""
+        return (*super().observation_names, *component_names("wanted velocity", ("x", "y", "yaw")))
 
     def observation(self, episode: Episode) -> NDArray[np.float32]:
         """Return the observation of `Quadruped`, and the wanted velocity."""

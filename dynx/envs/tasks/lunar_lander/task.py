@@ -116,6 +116,12 @@ class LunarLander(WorldTask):
         low = np.array([*(-high[:6]), 0.0, 0.0], dtype=np.float32)
         return spaces.Box(low, high, dtype=np.float32)
 
+    @property
+    def observation_names(self) -> tuple[str, ...]:
+        """Names of the entries of the observation."""
+        motion = ("x", "z", "velocity x", "velocity z", "angle", "rate")
+        return (*motion, *(f"contact of the {leg} leg" for leg in LEGS))
+
     @cached_property
     def action_space(self) -> Space[Any]:
         """One of four, or two throttles."""
