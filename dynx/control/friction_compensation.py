@@ -35,12 +35,19 @@ class FrictionCompensation(Wrapper[ControllerState], pure=True):
         self,
         inner: Controller[ControllerState],
         *,
-        damping: Coefficients = True,
-        friction: Coefficients = True,
+        damping: Coefficients | None = None,
+        friction: Coefficients | None = None,
         slip: float = SLIP,
         speed: str = "measured",
     ) -> None:
-        """The coefficients are those of `JointFriction`; by default those of the model's description."""
+        """The coefficients are those of `JointFriction`. Without both they are those of the description.
+
+        Of one alone the other is not compensated, because a plant without damping, as is the default of
+        `simulate`, is driven away by a torque along its speed.
+        """
+        if damping is None and friction is None:
+            damping = friction = True
+        damping, friction = (False if each is None else each for each in (damping, friction))
         if speed not in SPEEDS:
             raise ArgumentError(f"speed is {shown(speed)}; wanted one of {', '.join(SPEEDS)}")
         super().__init__(inner)

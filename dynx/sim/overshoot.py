@@ -1,4 +1,5 @@
-"""Overshoot of a controller's damping in discrete time: kd dt / inertia of each joint, or kd dt."""
+"""Likely causes of divergence: overshoot of a controller's damping in discrete time (kd dt / inertia of each
+joint, or kd dt), and friction that is compensated beyond that of the plant."""
 
 from __future__ import annotations
 
@@ -10,6 +11,7 @@ from dynx import control
 from dynx.backends import backend
 from dynx.control.base import Controller
 from dynx.control.content import attributes_of, fields_of
+from dynx.control.friction import JointFriction
 from dynx.sim.named_controllers import joint_inertia
 from dynx.spatial.scalar import Floats
 
@@ -61,6 +63,30 @@ def largest_overshoot(controller: Controller[Any] | None, q: Floats, control_dt:
         return None
     gain = "damping" if isinstance(inner, control.Impedance) else "kd"
     return Overshoot(inner.model.joint_names[worst], float(ratio[worst]), gain, by_inertia)
+
+
+def overcompensated_friction(controller: Controller[Any] | None, plant: JointFriction) -> str | None:
+    """Return a sentence on the joint whose friction a compensation by the measured speed exceeds most.
+
+    Such a joint is driven away in the direction of its motion. None where no coefficient is above that of
+    the `plant`, and for coefficients that are not those of coordinates (mimic joints of a description).
+    """
+    if not isinstance(controller, control.FrictionCompensation) or controller.speed != "measured":
+        return None
+    own = controller.losses
+    for name, unit in (("damping", "N m s/rad or N s/m"), ("friction", "N m or N")):
+        ours, theirs = getattr(own, name), getattr(plant, name)
+        if ours.shape != theirs.shape or len(ours) != len(own.model.joint_names):
+            continue
+        worst = int(np.argmax(ours - theirs))
+        if ours[worst] > theirs[worst]:
+            joint = own.model.joint_names[worst]
+            return (
+                f"the compensation adds {name} of {ours[worst]:.4g} {unit} at {joint}, "
+                f"where the plant has {theirs[worst]:.4g}, and so drives the joint away; compensate at most "
+                'that, or with speed="setpoint"'
+            )
+    return None
 
 
 def _joint_damping(controller: Controller[Any], q: Floats) -> Floats | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -84,3 +86,24 @@ def test_a_diverged_simulation_names_the_joint_in_its_error() -> None:
     with pytest.raises(DivergedError) as raised:
         simulate(model, None, q0=q0, v0=np.full(6, 1e5), duration=1.0)
     assert "unstable" not in str(raised.value)
+
+
+def test_friction_that_is_compensated_beyond_that_of_the_plant_is_named() -> None:
+    model = dynx.load("ur5")
+    law = control.FrictionCompensation(control.PD(model, kp=20.0, kd=0.5), damping=[0, 0, 0, 0, 9, 0])
+    options: dict[str, Any] = {"duration": 0.5, "q0": np.zeros(6), "plant": "compiled"}
+    with pytest.raises(DivergedError, match=r"of 9 N m s/rad .* at wrist_2_joint, where the plant has 2"):
+        simulate(model, law, np.full(6, 0.1), damping=2.0, **options)
+    damped = simulate(model, law, np.full(6, 0.1), damping=9.0, **options)
+    assert np.abs(damped.v).max() < 100.0
+
+
+def test_one_coefficient_of_a_compensation_leaves_the_other_out() -> None:
+    model = dynx.load("kinova")
+    inner = control.PD(model, kp=20.0, kd=0.5)
+    dry = control.FrictionCompensation(inner, friction=0.4)
+    viscous = control.FrictionCompensation(inner, damping=0.4)
+    np.testing.assert_array_equal(dry.losses.damping, 0.0)
+    np.testing.assert_array_equal(dry.losses.friction, 0.4)
+    np.testing.assert_array_equal(viscous.losses.friction, 0.0)
+    np.testing.assert_array_equal(viscous.losses.damping, 0.4)

@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from dataclasses import replace
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from dynx.backends.solvability import Solvability
 from dynx.compiled.parametric import ParametricDynamics
-from dynx.control.base import Controller, gains_of
+from dynx.control.base import Controller
 from dynx.control.friction import Coefficients
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
@@ -37,7 +38,7 @@ from dynx.sim.batch.rows import (
 from dynx.sim.batch.slip_bounds import refuse_small_slips
 from dynx.sim.batch.stopping import BatchStops
 from dynx.sim.batch.store import Store
-from dynx.sim.batch.traced_controller import innermost
+from dynx.sim.batch.traced_controller import gain_shapes, innermost
 from dynx.sim.clock import Clock
 from dynx.sim.loop.noise import Noise
 from dynx.sim.plants.disturbances import Push
@@ -110,7 +111,8 @@ def simulate_batch(
 
     - `parameters` (n, p) of `parametric`, a `dynx.parametric` of the model: payloads, inertias, damping, dry
       friction and armature that the controller does not know
-    - `gains`: arrays (n,) or (n, size) by the name of a gain of the controller, as ``{"kp": ...}``
+    - `gains`: arrays (n,) or (n, size) by the name of a gain of the controller, as ``{"kp": ...}``; of a
+      controller of your own by the name of a public attribute that is a number or an array of numbers
     - `damping`, `friction`, `armature` (n,), (n, 1) or (n, joints); a number, numbers (joints,) or True hold
       for all rollouts, as in `simulate`
     - `q0` (n, nq), `v0` (n, nv); one row holds for all rollouts. The default is the start of the reference,
@@ -197,7 +199,7 @@ def simulate_batch(
         fixed["parameters"] = rows.of("parameters", chosen, len(parametric.parameters.names))
     refuse_small_slips(acting, parametric, clock.dt, start["q"], fixed)
     for name, values in (gains or {}).items():
-        size = gains_of(innermost(controller))[name].size
+        size = prod(gain_shapes(innermost(controller))[name])
         fixed[f"gain_{name}"] = rows.of(name, columns_of(name, values), size, spread=True)
     n = rows.count
     refuse_ambiguous(given, joints, n)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property, partial
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -16,13 +17,13 @@ import numpy as np
 from dynx.compiled.kernels import evaluate_quantity
 from dynx.compiled.parametric import ParametricDynamics
 from dynx.compiled.simplification import simplify_mechanism
-from dynx.control.base import Controller, chain_of, gains_of
+from dynx.control.base import Controller, chain_of
 from dynx.control.content import content_of
 from dynx.errors import ArgumentError, TraceError, UnsupportedFeatureError, shown
 from dynx.model import Mechanism, Model
 from dynx.rbd.elimination import factorize_mass_matrix, solve_with_factors
 from dynx.sim.batch.disturbances import BatchDisturbances
-from dynx.sim.batch.traced_controller import innermost, traced_controller
+from dynx.sim.batch.traced_controller import gain_shapes, innermost, traced_controller
 from dynx.sim.loop.controller_checks import (
     ControllerWatch,
     defect_of_next_state,
@@ -70,7 +71,7 @@ class FusedStep:
 
     def __post_init__(self) -> None:
         inner = innermost(self.controller)
-        known = gains_of(inner)
+        known = gain_shapes(inner)
         for name in self.gains:
             if name not in known:
                 raise ArgumentError(
@@ -183,8 +184,8 @@ class FusedStep:
                 sizes |= {"noise_q": nv, "noise_v": nv}
             if self.controller.random_size:
                 sizes["random"] = self.controller.random_size
-            known = gains_of(innermost(self.controller))
-            sizes |= {f"gain_{name}": known[name].size for name in self.gains}
+            known = gain_shapes(innermost(self.controller))
+            sizes |= {f"gain_{name}": prod(known[name]) for name in self.gains}
             if self.limit is not None:
                 sizes["steps_held"] = 1
         state = self.controller.initial_state()

@@ -6,10 +6,13 @@ from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from dynx.compiled.kernels import evaluate_quantity
 from dynx.compiled.simplification import simplify_mechanism
-from dynx.control.base import Controller, chain_of, rebind
+from dynx.control.base import Controller, chain_of, gains_of, rebind
 from dynx.control.code_content import is_foreign
+from dynx.control.content import attributes_of, fields_of
 from dynx.control.dynamics import Dynamics, Evaluation
 from dynx.model import Mechanism
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
@@ -55,12 +58,36 @@ def traced_controller(controller: Controller[Any], gains: Mapping[str, Array]) -
     """Return the controller with array code as its engine, and other gains in its innermost controller."""
     last = innermost(controller)
     if is_foreign(type(last)):
-        gains = {name: traced_array(gain) for name, gain in gains.items()}
+        shapes = gain_shapes(last)
+        gains = {name: _like_attribute(traced_array(gain), shapes[name]) for name, gain in gains.items()}
     return rebind(
         controller,
         lambda dynamics: dynamics if isinstance(dynamics, ArrayDynamics) else ArrayDynamics(dynamics.model),
         lambda each: gains if each is last else {},
     )
+
+
+def gain_shapes(controller: Controller[Any]) -> dict[str, tuple[int, ...]]:
+    """Return the shapes of the numbers of a controller that may differ between the rollouts of a batch.
+
+    These are its gains. Of a class outside dynx they are all public attributes that are a real number (shape
+    ()) or an array of numbers, except fields that are declared as parameters.
+    """
+    shapes = {name: gain.shape for name, gain in gains_of(controller).items()}
+    if not is_foreign(type(controller)):
+        return shapes
+    declared = {name for name, each in fields_of(controller).items() if each.metadata}
+    for name, value in attributes_of(controller).items():
+        real = isinstance(value, float | int | np.floating | np.integer) and not isinstance(value, bool)
+        numbers = isinstance(value, np.ndarray) and value.dtype.kind in "fi"
+        if name not in declared and not name.startswith("_") and (real or numbers):
+            shapes[name] = np.shape(value)
+    return shapes
+
+
+def _like_attribute(gain: Array, shape: tuple[int, ...]) -> Array:
+    """Return the input (size,) in the shape of the attribute in whose place it stands."""
+    return gain[0] if shape == () else gain.reshape(shape)
 
 
 def innermost(controller: Controller[Any]) -> Controller[Any]:

@@ -25,7 +25,7 @@ from dynx.sim.loop.controller_checks import ControllerWatch, defect_of_outcome, 
 from dynx.sim.loop.record import Record
 from dynx.sim.loop.sensors import Sensors
 from dynx.sim.loop.stops import Stops
-from dynx.sim.overshoot import largest_overshoot
+from dynx.sim.overshoot import largest_overshoot, overcompensated_friction
 from dynx.sim.plants.plant import Plant, is_own, plant_errors
 from dynx.sim.step import is_diverged, torque_sum
 from dynx.spatial.scalar import Floats, clamp
@@ -252,14 +252,17 @@ class Loop:
 
     def _diverged(self, k: int, record: Record, why: str) -> SimulationError:
         """Return the error of divergence, with the joint whose damping is too large for the control step."""
-        overshoot = None
+        overshoot = beyond = None
         # The message of the failure itself matters more than its explanation, which is not known for every
         # controller of a user.
         with suppress(Exception):
             control_dt = self.clock.steps_per_control * self.clock.dt
             overshoot = largest_overshoot(self.controller, record.q[0], control_dt)
+            beyond = overcompensated_friction(self.controller, self.plant.disturbances.friction)
         if overshoot is not None:
             why += f"; {overshoot.hint('dt' if self.clock.steps_per_control == 1 else 'control_dt')}"
+        if beyond is not None:
+            why += f"; {beyond}"
         error = self._ended(DivergedError, k, record, "the simulation diverged", why)
         if isinstance(error, DivergedError):
             error.overshoot = overshoot

@@ -47,7 +47,9 @@ MassScale = float | Mapping[str, float]
 """One factor for all links, or one for each of some links."""
 
 
-def plant_model(model: Model, payload: Payload | Sequence[Payload] | None, mass_scale: MassScale) -> Model:
+def plant_model(
+    model: Model, payload: Payload | Sequence[Payload] | None = None, mass_scale: MassScale = 1.0
+) -> Model:
     """Scale the masses and inertia tensors of `model`, then fix the payloads to their frames.
 
     Raises UnknownNameError for an unknown frame or link, ArgumentError for an invalid factor or payload.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,9 +14,9 @@ import pytest
 import dynx
 from dynx import control
 from dynx.backends import installed_backends
-from dynx.control.base import Controller, Measurement
+from dynx.control.base import Controller, Measurement, parameter
 from dynx.control.dynamics import EngineDynamics
-from dynx.errors import ControlError, UnsupportedFeatureError
+from dynx.errors import ArgumentError, ControlError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.sim import Scenario, Simulation, simulate, simulate_batch
 from dynx.trajectory.base import Setpoint
@@ -86,6 +87,37 @@ def test_gains_and_starts_that_differ_between_rollouts() -> None:
         alone = Own(saturated)
         alone.limit = limits[row]
         assert_same(many, row, simulate(ARM, alone, GOAL, q0=q0[row], plant="compiled", duration=0.05))
+
+
+@dataclass(frozen=True)
+class Fields(Controller[None], pure=True):
+    """A controller whose numbers are plain fields, as a user writes them."""
+
+    model: Model
+    stiffness: float
+    coupling: np.ndarray[Any, Any]
+    limit: float = parameter("N m")
+    axis: int = 1
+
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Any, None]:
+        error = self.stiffness * (setpoint.q - measurement.q)
+        return self.coupling @ error - 2.0 * measurement.v, None
+
+
+def test_plain_fields_of_an_own_controller_differ_between_rollouts() -> None:
+    rng = np.random.default_rng(4)
+    stiffness, coupling = np.array([20.0, 40.0]), np.eye(6) + rng.uniform(-0.2, 0.2, (2, 6, 6))
+    gains = {"stiffness": stiffness, "coupling": coupling.reshape(2, 36)}
+    law = Fields(ARM, 1.0, np.eye(6), 5.0)
+    options: dict[str, Any] = {"q0": np.zeros(6), "duration": 0.05}
+    many = simulate_batch(ARM, law, GOAL, gains=gains, record_every=1, **options)
+    for row in range(2):
+        alone = Fields(ARM, stiffness[row], coupling[row], 5.0)
+        assert_same(many, row, simulate(ARM, alone, GOAL, plant="compiled", **options))
+    with pytest.raises(ArgumentError, match=r"no gain 'stifness'; it has stiffness, coupling, axis"):
+        simulate_batch(ARM, law, GOAL, gains={"stifness": [1.0]}, **options)
+    with pytest.raises(ArgumentError, match="no gain 'limit'"):
+        simulate_batch(ARM, law, GOAL, gains={"limit": [1.0]}, **options)
 
 
 class Averaging(Controller[np.ndarray[Any, Any]]):
