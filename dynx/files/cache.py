@@ -62,6 +62,21 @@ def keep(name: str, content: bytes) -> None:
         _evict(folder)
 
 
+def source_hash(*sources: Path) -> str:
+    """Return a hash of Python files and of the Python files in folders and in the folders below them.
+
+    It is a part of the names under which their results are kept, so that no result of another source is used.
+    """
+    digest = sha256()
+    for source in sources:
+        files = sorted(source.rglob("*.py")) if source.is_dir() else [source]
+        for file in files:
+            name, text = file.relative_to(source).as_posix(), file.read_bytes()
+            digest.update(f"{name} {len(text)}\n".encode())
+            digest.update(text)
+    return digest.hexdigest()
+
+
 def _cache_folder() -> Path | None:
     """Return the cache folder, created if necessary, or None if the cache is off or unusable."""
     if os.environ.get("DYNX_CACHE", "").strip().lower() in OFF_WORDS:

@@ -21,7 +21,7 @@ import numpy as np
 
 from dynx._version import __version__
 from dynx.errors import CompileError
-from dynx.files.cache import keep, read_cached
+from dynx.files.cache import keep, read_cached, source_hash
 from dynx.simd.call_table import RoutineCode
 from dynx.simd.emit import Settings
 from dynx.simd.image import Code, Image, compile_image, compile_routines
@@ -112,18 +112,6 @@ def source_version(*modules: ModuleType) -> str:
     files = (Path(str(module.__file__)) for module in modules)
     sources = (file.parent if file.name == "__init__.py" else file for file in files)
     return f"{__version__} {np.__version__} {source_hash(*sources)}"
-
-
-def source_hash(*sources: Path) -> str:
-    """Return a hash of Python files and of the Python files in folders and in the folders below them."""
-    digest = sha256()
-    for source in sources:
-        files = sorted(source.rglob("*.py")) if source.is_dir() else [source]
-        for file in files:
-            name, text = file.relative_to(source).as_posix(), file.read_bytes()
-            digest.update(f"{name} {len(text)}\n".encode())
-            digest.update(text)
-    return digest.hexdigest()
 
 
 def _image_of(content: bytes, target: Target) -> Image:

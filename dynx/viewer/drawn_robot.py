@@ -17,7 +17,9 @@ from dynx.rbd.link_poses import link_poses
 from dynx.spatial.scalar import Floats
 from dynx.viewer.colours import GREY, ORANGE, RGB
 from dynx.viewer.drawn_parts import DrawnParts, wxyz
-from dynx.viewer.triangles import TRIANGLE_BUDGET, Triangles, budgets, hull_of, triangles_of, turned_outwards
+from dynx.viewer.surfaces.orientation import turned_outwards
+from dynx.viewer.surfaces.reduction import TRIANGLE_BUDGET, budgets, reduced
+from dynx.viewer.surfaces.triangles import Triangles, hull_of
 
 COLLISION_OPACITY = 0.4
 GHOST_OPACITY = 0.3
@@ -109,7 +111,7 @@ class DrawnRobot(DrawnParts):
                     add_triangles(
                         self._scene,
                         f"{self.links[name].name}/visual{k}",
-                        triangles_of(shape, budget),
+                        reduced(shape, budget),
                         T,
                         self._look.colour or rgb_of(rgba),
                         opacity,

@@ -10,7 +10,7 @@ from dynx.model import Model
 from dynx.model.geometry import Mesh
 from dynx.viewer.drawn_parts import DrawnParts
 from dynx.viewer.drawn_robot import AS_DESCRIBED, DrawnRobot, Look, add_triangles, rgb_of
-from dynx.viewer.triangles import triangles_of
+from dynx.viewer.surfaces.reduction import reduced
 from dynx.world.scene import SceneBody
 
 
@@ -82,11 +82,10 @@ def _add_body(scene: Any, node: Any, body: SceneBody, look: Look) -> Iterator[An
     rgba = body.material.rgba
     opacity = look.opacity or (None if rgba[3] == 1.0 else rgba[3])
     for k, placed in enumerate(body.shapes):
-        budget = look.triangles if isinstance(placed.shape, Mesh) else None
         yield add_triangles(
             scene,
             f"{node.name}/shape{k}",
-            triangles_of(placed.shape, budget),
+            reduced(placed.shape, look.triangles),
             placed.origin.matrix,
             look.colour or rgb_of(rgba),
             opacity,

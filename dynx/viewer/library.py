@@ -16,13 +16,14 @@ from dynx.errors import NotInstalledError
 
 try:
     import viser
+    from fast_simplification import __version__ as SIMPLIFY_VERSION
     from fast_simplification import simplify
     from PIL import Image
     from viser import uplot
 except ImportError as error:
     raise NotInstalledError(f"the viewer needs viser: pip install 'dynx[viewer]' ({error})") from error
 
-__all__ = ["CLIENT", "HOTKEYS", "Image", "serve", "silent", "simplify", "uplot"]
+__all__ = ["CLIENT", "HOTKEYS", "SIMPLIFY_VERSION", "Image", "serve", "silent", "simplify", "uplot"]
 
 CLIENT = Path(viser.__file__).parent / "client" / "build" / "index.html"
 """The page of viser."""

@@ -18,7 +18,7 @@ from dynx.viewer.drawn_parts import wxyz
 from dynx.viewer.drawn_robot import DrawnRobot, size_of
 from dynx.viewer.name_labels import NameLabels, centre_of
 from dynx.viewer.page import Page
-from dynx.viewer.triangles import triangles_of
+from dynx.viewer.surfaces.triangles import triangles_of
 
 INERTIA_OPACITY = 0.45
 

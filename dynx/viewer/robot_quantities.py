@@ -14,7 +14,7 @@ from dynx.spatial.scalar import Floats
 from dynx.viewer.colours import BLUE, VERMILION
 from dynx.viewer.drawn_parts import wxyz
 from dynx.viewer.drawn_robot import size_of
-from dynx.viewer.triangles import triangles_of
+from dynx.viewer.surfaces.triangles import triangles_of
 
 if TYPE_CHECKING:
     from dynx.backends import Backend

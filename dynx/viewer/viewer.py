@@ -19,7 +19,7 @@ from dynx.viewer.controls import Controls
 from dynx.viewer.drawn_robot import Look
 from dynx.viewer.page import DEFAULT_HOST, DEFAULT_PORT, Page
 from dynx.viewer.subjects import check_options, is_world, open_subject, title_of, view_of
-from dynx.viewer.triangles import TRIANGLE_BUDGET, has_graphics_processor
+from dynx.viewer.surfaces.reduction import TRIANGLE_BUDGET, has_graphics_processor
 
 PICTURE_SIZE = (960, 720)
 """Width and height of an exported picture [pixels]."""

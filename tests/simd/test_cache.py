@@ -16,9 +16,9 @@ import platformdirs
 import pytest
 
 import dynx
-from dynx.files.cache import keep
+from dynx.files.cache import keep, source_hash
 from dynx.simd import cache
-from dynx.simd.cache import load_kernel, program_recipe, source_hash, source_version
+from dynx.simd.cache import load_kernel, program_recipe, source_version
 from dynx.simd.emit import Settings
 from dynx.simd.kernel import Kernel
 from dynx.simd.program import Program

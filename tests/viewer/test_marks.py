@@ -14,7 +14,7 @@ from dynx.spatial.so3 import rotation_from_rpy
 from dynx.viewer.controls import slider_step
 from dynx.viewer.marks import equivalent_solid
 from dynx.viewer.name_labels import centre_of
-from dynx.viewer.triangles import triangles_of
+from dynx.viewer.surfaces.triangles import triangles_of
 
 lengths = st.floats(0.01, 2.0)
 

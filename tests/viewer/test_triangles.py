@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,16 +13,11 @@ from hypothesis import strategies as st
 
 import dynx
 from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Shape, Sphere, solid_properties
-from dynx.viewer.triangles import (
-    FEWEST_TRIANGLES,
-    TRIANGLE_BUDGET,
-    Triangles,
-    _distinct_rows,
-    budgets,
-    hull_of,
-    triangles_of,
-    turned_outwards,
-)
+from dynx.viewer.library import simplify
+from dynx.viewer.surfaces import reduction
+from dynx.viewer.surfaces.orientation import turned_outwards
+from dynx.viewer.surfaces.reduction import FEWEST_TRIANGLES, TRIANGLE_BUDGET, budgets, reduced
+from dynx.viewer.surfaces.triangles import Triangles, distinct_rows, hull_of, triangles_of
 from tests.conftest import needs_examples
 
 SOLIDS: list[Shape] = [Box((0.1, 0.2, 0.3)), Sphere(0.4), Cylinder(0.2, 0.5), Capsule(0.1, 0.3)]
@@ -86,15 +83,62 @@ def test_reduced_meshes_keep_their_box_and_their_budget(robot: str) -> None:
     parts = budgets({mesh: meshes.count(mesh) for mesh in meshes})
     wanted = sum(min(parts[mesh], len(mesh.triangles[1])) for mesh in meshes)
     assert wanted <= TRIANGLE_BUDGET + FEWEST_TRIANGLES * len(meshes)
-    reduced = {mesh: triangles_of(mesh, parts[mesh]) for mesh in meshes}
-    assert sum(len(reduced[mesh].faces) for mesh in meshes) <= 1.1 * wanted
+    drawn = {mesh: reduced(mesh, parts[mesh]) for mesh in meshes}
+    assert sum(len(drawn[mesh].faces) for mesh in meshes) <= 1.1 * wanted
     moved = []
-    for mesh, triangles in reduced.items():
+    for mesh, triangles in drawn.items():
         corners = mesh.triangles[0][np.unique(mesh.triangles[1])]
         size = np.ptp(corners, axis=0).max()
         for corner in (np.min, np.max):
             moved.extend(np.abs(corner(triangles.vertices, axis=0) - corner(corners, axis=0)) / size)
     assert np.mean(moved) < 0.02
+
+
+def ball(folder: Path) -> Mesh:
+    """Return a mesh with the triangles of a sphere."""
+    vertices, faces = triangles_of(Sphere(0.4))
+    lines = [f"v {x} {y} {z}" for x, y, z in vertices.tolist()] + [f"f {a} {b} {c}" for a, b, c in faces + 1]
+    path = folder / "ball.obj"
+    path.write_text("\n".join(lines))
+    return Mesh(str(path))
+
+
+def test_reduced_meshes_are_kept_on_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DYNX_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.delenv("DYNX_CACHE", raising=False)
+    counts = list[int]()
+
+    def counted(*given: Any, target_count: int) -> Any:
+        counts.append(target_count)
+        return simplify(*given, target_count=target_count)
+
+    monkeypatch.setattr(reduction, "simplify", counted)
+    mesh = ball(tmp_path)
+
+    def again(mesh: Mesh, budget: int) -> Triangles:
+        reduction._reduced.cache_clear()
+        return reduced(mesh, budget)
+
+    first = again(mesh, 200)
+    assert 4 <= len(first.faces) <= 200 < len(mesh.triangles[1])
+    kept = again(mesh, 200)
+    assert all(map(np.array_equal, first, kept))
+    assert [array.dtype for array in first] == [array.dtype for array in kept]
+    assert counts == [200]
+    # Another budget, scale or content of the file is another mesh.
+    again(mesh, 100)
+    larger = again(Mesh(mesh.file, (2.0, 2.0, 2.0)), 200)
+    assert np.ptp(larger.vertices) == pytest.approx(2.0 * np.ptp(first.vertices), rel=0.05)
+    Path(mesh.file).write_text(Path(mesh.file).read_text().replace("v 0.0 0.0 -0.4", "v 0.0 0.0 -0.5"))
+    again(Mesh(mesh.file), 200)
+    assert counts == [200, 100, 200, 200]
+    for file in (tmp_path / "cache").rglob("*.triangles"):
+        file.write_bytes(file.read_bytes()[:-1])
+    assert all(map(np.array_equal, again(mesh, 200), first))
+    monkeypatch.setenv("DYNX_CACHE", "0")
+    assert all(map(np.array_equal, again(mesh, 200), first))
+    assert counts[4:] == [200, 200]
+    reduction._reduced.cache_clear()
 
 
 @needs_examples
@@ -118,6 +162,6 @@ numbers = st.integers(0, 3)
 def test_distinct_rows_are_found(given_rows: list[tuple[int, int, int]], scale: int) -> None:
     # The large scale exceeds what one number holds.
     rows = np.array(given_rows) * [1, 1, scale]
-    first, number = _distinct_rows(rows)
+    first, number = distinct_rows(rows)
     assert np.array_equal(rows[first][number], rows)
     assert len(first) == len(set(map(tuple, rows.tolist())))

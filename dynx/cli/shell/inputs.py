@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dynx.backends.base import Backend
-from dynx.backends.registry import backend
 from dynx.cli.shell.exits import one_line
 from dynx.errors import ArgumentError, NotInstalledError, UnknownNameError, nearest, shown
 from dynx.model import Model, Pose
@@ -19,6 +18,9 @@ from dynx.model.topology import longest_chain_end
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_quat, rotation_from_rpy
+
+if TYPE_CHECKING:
+    from dynx.backends import Backend
 
 Numbers = Sequence[float] | Mapping[str, float] | None
 """Value of an option such as ``--q``: a list, values by joint, or None where it was not given."""
@@ -46,6 +48,9 @@ def open_backend(
     robot: str, base: Base, lock: Locks, base_pose: Sequence[float] | None, backend_name: str | None
 ) -> Backend:
     """Open the backend of a robot by its name; None is Pinocchio if it is installed, else `compiled`."""
+    # Commands that open none start sooner.
+    from dynx.backends import backend
+
     model = load_robot(robot, base, lock, base_pose)
     if backend_name is not None:
         return backend(backend_name, model)

@@ -27,6 +27,8 @@ GOOD = {
     "continued.obj": obj().replace(b"f 2 3 4", b"f 2 \\\n3 4"),
     "triangles.dae": dae(),
     "lists.dae": dae("polylist", vcount="3 3 3 3"),
+    "real_numbers.dae": dae("polylist", vcount="3.0 3 3e0 3"),
+    "signs_and_lines.dae": dae("polylist", vcount="+3\n\t 3\r\n003 3 "),
     "plain.gltf": gltf(),
     "image.gltf": gltf(images=[{"uri": "../../secret.png"}], textures=[{"source": 0}]),
 }
@@ -49,6 +51,15 @@ DAMAGED = {
     "no_face.obj": (b"v 0 0 0\n", "holds no triangle"),
     "range.dae": (dae(p="0 2 1 0 1 9"), "names a point that is not among the 4"),
     "negative.dae": (dae(p="0 2 -1"), "names a point that is not among the 4"),
+    "large.dae": (dae(p="0 2 99999999999999999999"), "names a point that is not among the 4"),
+    "joined.dae": (dae(p="0 2 1-1"), "could not convert"),
+    # Counts whose sum overflows to that of the corners.
+    "sum.dae": (
+        dae("polylist", vcount="9223372036854775807 9223372036854775807 14"),
+        "number of corners is none of 0 to 12",
+    ),
+    "half.dae": (dae("polylist", vcount="3 3 3.5 2.5"), "number of corners is none of 0 to 12"),
+    "nan.dae": (dae("polylist", vcount="3 3 3 nan"), "number of corners is none of 0 to 12"),
     "count.dae": (dae("polylist", vcount="3 3"), "has 12 corners, not 6"),
     "skew.dae": (dae(node="<skew>45 0 1 0 1 0 0</skew>"), "<skew> is not supported"),
     "entity.dae": (b"<!DOCTYPE a [<!ENTITY b 'c'>]>" + dae(), "document type"),

@@ -1,0 +1,1 @@
+"""Surfaces of shapes as triangles for the page."""
