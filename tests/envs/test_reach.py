@@ -6,14 +6,19 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import dynx
 from dynx.backends import installed_backends
 from dynx.envs.environment import TaskEnvironment
 from dynx.envs.robot.state import State
-from dynx.envs.tasks.reach import SERVO_RATE, Reach
+from dynx.envs.tasks.reach import ROTATION_WEIGHT, SERVO_RATE, Reach
 from dynx.envs.vector.environment import RobotVectorEnvironment
 from dynx.errors import ArgumentError, UnknownNameError
+from dynx.sim.batch.traced_controller import ArrayDynamics
+from dynx.spatial.so3 import rotation_about
+from tests.envs.scripted import Reaching, run
 
 N = 4
 
@@ -50,6 +55,33 @@ def test_the_goal_is_a_pose_of_the_frame_and_has_no_error() -> None:
     env.episodes.state = State(q_goal, np.zeros(model.nv), state.memory)
     _, distance, rotation = task.errors(env.episodes._robot, env.episodes.state)
     assert max(np.linalg.norm(distance), np.linalg.norm(rotation)) < 1e-12
+
+
+@given(st.floats(0.0, 3.14), st.integers(0, 2**32 - 1))
+def test_the_rotation_error_grows_up_to_half_a_turn(angle: float, seed: int) -> None:
+    task, rng = Reach(robot="six_axis_arm"), np.random.default_rng(seed)
+    robot = ArrayDynamics(task.model)
+    state = task.start(rng.random(task.random_size))
+    axis = rng.normal(size=3)
+    axis /= np.linalg.norm(axis)
+    T = robot.forward_kinematics(state.q, task.tool)
+    R_goal = np.asarray(rotation_about(axis, np.array(angle))) @ T[:3, :3]
+    turned = state._replace(memory=np.concatenate([T[:3, 3], R_goal.ravel()]))
+    _, distance, rotation = task.errors(robot, turned)
+    assert np.abs(distance).max() < 1e-12
+    assert rotation == pytest.approx(angle * axis, abs=1e-7)
+    reward = task.reward(robot, turned, np.zeros(6), turned)
+    assert reward == pytest.approx(-ROTATION_WEIGHT * angle, abs=1e-7)
+
+
+@pytest.mark.parametrize("actions", ["torque", "velocity"])
+def test_every_goal_is_reached_by_joint_control(actions: str) -> None:
+    with TaskEnvironment(Reach(actions=actions), "compiled") as env:
+        for seed in range(5):
+            still, *_ = run(env, lambda *_: np.zeros(6), 200, seed)
+            total, _, info = run(env, Reaching(env), 200, seed)
+            assert max(info["distance"], info["angle"]) < 1e-3
+            assert total > 0.7 * still
 
 
 def test_velocities_follow_the_action_and_gravity_is_carried() -> None:

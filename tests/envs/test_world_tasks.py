@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -10,13 +10,14 @@ import pytest
 
 import dynx.envs  # noqa: F401  (registers the environments)
 from dynx.envs.environment import TaskEnvironment
-from dynx.envs.tasks.push import NEAR, TIP_START, Push
+from dynx.envs.tasks.push import FINGER_WEIGHT, NEAR, TIP_START, Push
 from dynx.envs.tasks.quadruped import POSTURE
 from dynx.envs.tasks.stand import Stand
 from dynx.envs.tasks.walk import Walk
 from dynx.envs.world.task import WorldTask
 from dynx.errors import ArgumentError, UnknownNameError
 from dynx.world.registry import installed_worlds
+from tests.envs.scripted import Controller, posture, pushing, run, trot
 
 ENGINES = installed_worlds()
 TASKS = (Push(), Stand(), Walk())
@@ -67,7 +68,7 @@ def test_a_straight_push_brings_the_cube_to_the_goal(engine: str) -> None:
 
 def test_the_posture_stands_on_every_engine(engine: str) -> None:
     with TaskEnvironment(Stand(), engine) as env:
-        env.reset(seed=1)
+        env.reset(seed=1, options={"disturbance": 1.0})
         total = 0.0
         for _ in range(90):
             observation, reward, terminated, _, _ = env.step(np.zeros(len(POSTURE), dtype=np.float32))
@@ -106,29 +107,70 @@ def test_walking_is_rewarded_by_the_velocity() -> None:
     assert rewards[0] - rewards[1] == pytest.approx(expected, abs=1e-5)
 
 
-def trot(step: int) -> Any:
-    """Return the action of a trot: diagonal pairs of legs in turn."""
-    phase = 2.0 * np.pi * 4.0 * 0.02 * step + np.array([0.0, np.pi, np.pi, 0.0])
-    lift = 0.3 * np.maximum(np.sin(phase), 0.0)
-    thigh = 0.4 * np.cos(phase + 0.6) + lift + 0.3
-    return np.stack([np.zeros(4), thigh, -3.0 * lift], axis=1).ravel().astype(np.float32)
-
-
 def test_a_trot_walks_and_earns_more_than_the_posture(engine: str) -> None:
-    def episode(env: TaskEnvironment, action_of: Callable[[int], Any]) -> tuple[float, float]:
-        env.reset(seed=0, options={"velocity": (0.5, 0.0, 0.0), "disturbance": 0.0})
+    def episode(env: TaskEnvironment, controller: Controller) -> tuple[float, float]:
+        observation, _ = env.reset(seed=0, options={"velocity": (0.5, 0.0, 0.0), "disturbance": 0.0})
         total, speeds = 0.0, []
         for step in range(100):
-            observation, reward, terminated, *_ = env.step(action_of(step))
+            action = controller(step, observation).astype(np.float32)
+            observation, reward, terminated, *_ = env.step(action)
             assert not terminated
             total += reward
             speeds.append(float(observation[0]))
         return total, float(np.mean(speeds[50:]))
 
     with TaskEnvironment(Walk(), engine) as env:
-        (walking, speed), (standing, _) = episode(env, trot), episode(env, lambda _: np.zeros(len(POSTURE)))
+        (walking, speed), (standing, _) = episode(env, trot), episode(env, posture)
     assert speed == pytest.approx(0.47, abs=0.08)
     assert walking > standing + 15.0
+
+
+def test_a_trot_follows_the_wanted_velocity() -> None:
+    with TaskEnvironment(Walk(), ENGINES[0]) as env:
+        for velocity in [(-0.5, 0.0, 0.0), (0.4, 0.2, -0.4), (-0.4, -0.2, 0.4)]:
+            walking, *_ = run(env, trot, 100, 0, velocity=velocity)
+            standing, *_ = run(env, posture, 100, 0, velocity=velocity)
+            assert walking > standing + 10.0
+
+
+def test_rewards_of_quadrupeds_are_not_negative() -> None:
+    for task in (Stand(), Walk()):
+        rng = np.random.default_rng(0)
+        with TaskEnvironment(task, ENGINES[0]) as env:
+            env.reset(seed=0)
+            rewards = [env.step(rng.choice([-1.0, 1.0], 12).astype(np.float32))[1] for _ in range(15)]
+        assert min(rewards) == 0.0
+
+
+def test_the_disturbance_of_an_option_is_that_of_reset(engine: str) -> None:
+    with TaskEnvironment(Stand(disturbance=2.0), engine) as one, TaskEnvironment(Stand(), engine) as other:
+        first, _ = one.reset(seed=3)
+        second, _ = other.reset(seed=3, options={"disturbance": 2.0})
+    assert np.array_equal(first, second)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 3])
+def test_a_scripted_push_succeeds(engine: str, seed: int) -> None:
+    with TaskEnvironment(Push(), engine) as env:
+        total, observation, info = run(env, pushing, 100, seed)
+        still, *_ = run(env, lambda *_: np.zeros(3), 100, seed)
+    assert info["is_success"]
+    assert np.linalg.norm(observation[6:8] - observation[21:23]) < 0.02
+    assert total > 0.6 * still
+
+
+def test_the_shaped_reward_draws_the_fingers_behind_the_cube() -> None:
+    options = {"cube": (0.5, 0.0), "goal": (0.6, 0.0)}
+    backwards = np.array([-1.0, 0.0, 0.0], dtype=np.float32)
+    rewards = {}
+    for kind in ("shaped", "dense"):
+        with TaskEnvironment(Push(reward_kind=kind), ENGINES[0]) as env:
+            env.reset(seed=0, options=options)
+            rewards[kind] = [env.step(action)[1] for action in (backwards, *3 * [-backwards])]
+    # The fingers do not reach the cube: they are at (0.35, 0, 0.03), the place to push from (0.45, 0, 0.025).
+    assert np.ptp(rewards["dense"]) < 1e-4
+    assert (np.diff(rewards["shaped"]) > 0.0).all()
+    assert rewards["shaped"][1] == pytest.approx(-0.1 - FINGER_WEIGHT * np.hypot(0.1, 0.005), abs=2e-3)
 
 
 def test_wrong_options_are_refused() -> None:
@@ -150,6 +192,8 @@ def test_wrong_options_are_refused() -> None:
             env.reset(options={"velocity": (1.0, np.nan, 0.0)})
         with pytest.raises(ArgumentError, match="disturbance is 'big'; wanted a number from 0 to 5"):
             env.reset(options={"disturbance": "big"})
+    with pytest.raises(ArgumentError, match="disturbance is '-1'; wanted a number from 0 to 5"):
+        Stand(disturbance=-1)
 
 
 def test_a_task_is_a_world_task() -> None:

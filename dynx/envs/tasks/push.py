@@ -58,7 +58,9 @@ DOWN = np.diag([1.0, -1.0, -1.0])
 """Rotation of fingers that point down."""
 LARGEST = 100.0
 """Bound of the numbers of an observation."""
-REWARDS = ("dense", "sparse")
+REWARDS = ("shaped", "dense", "sparse")
+FINGER_WEIGHT = 0.25
+"""Reward for a metre from the finger tips to where they push, over that for a metre from cube to goal."""
 
 
 @dataclass(frozen=True)
@@ -69,12 +71,14 @@ class Push(WorldTask):
     keep pointing down and stay in a box above the table. Observation (24,): position and velocity of the
     finger tips; position of the cube, the first two rows of its rotation, its linear and angular velocity
     (clipped at 100); the goal [m, m/s, rad/s]. Reward: minus the distance [m] of the cube from the goal
-    (``dense``), or -1 until it is within 5 cm and 0 there (``sparse``). ``info["is_success"]`` tells whether
-    it is. Episodes do not terminate; ``reset(options={"cube": (0.5, 0.0), "goal": (0.6, 0.1)})`` sets the
+    (``dense``); that less a quarter of the distance of the finger tips from the side of the cube that is away
+    from the goal (``shaped``), because random motions seldom touch the cube, and till then nothing else
+    changes; or -1 until it is within 5 cm and 0 there (``sparse``). ``info["is_success"]`` tells whether it
+    is. Episodes do not terminate; ``reset(options={"cube": (0.5, 0.0), "goal": (0.6, 0.1)})`` sets the
     places.
     """
 
-    reward_kind: str = "dense"
+    reward_kind: str = "shaped"
 
     control_dt = 0.05
     substeps = 10
@@ -182,9 +186,21 @@ class Push(WorldTask):
         return float(np.linalg.norm(cube - episode.memory.goal))
 
     def reward(self, episode: Episode, action: Any) -> float:
-        """Return minus the distance, or -1 where it is too large."""
+        """Return minus the distances, or -1 where that of the cube is too large."""
         distance = self.distance(episode)
-        return -distance if self.reward_kind == "dense" else -float(distance > NEAR)
+        if self.reward_kind == "sparse":
+            return -float(distance > NEAR)
+        if self.reward_kind == "dense":
+            return -distance
+        tip = self.kinematics.forward_kinematics(episode.world.state.robots[ARM].q, TIP)[:3, 3]
+        return -distance - FINGER_WEIGHT * float(np.linalg.norm(tip - self.pushing_place(episode)))
+
+    def pushing_place(self, episode: Episode) -> Floats:
+        """Return the place (3,) [m] of the finger tips from which they push the cube to the goal: an edge's
+        length from its center, less where the cube is almost at the goal."""
+        cube = episode.world.state.bodies[CUBE].position
+        away: Floats = np.asarray(cube - episode.memory.goal)
+        return np.asarray(cube + SIZE * away / max(self.distance(episode), NEAR))
 
     def info(self, episode: Episode) -> dict[str, Any]:
         """Return whether the cube is at the goal."""

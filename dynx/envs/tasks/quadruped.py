@@ -104,10 +104,7 @@ class Quadruped(WorldTask):
 
         Raises ArgumentError for a disturbance that is no number from 0 to `MAX_DISTURBANCE`.
         """
-        if not is_real(disturbance) or not 0.0 <= disturbance <= MAX_DISTURBANCE:
-            raise ArgumentError(
-                f"disturbance is {shown(disturbance)}; wanted a number from 0 to {MAX_DISTURBANCE:g}"
-            )
+        self.require_disturbance(disturbance)
         rng, memory = episode.rng, episode.memory
         rpy = disturbance * rng.uniform(-0.1, 0.1, 3)
         height = START_HEIGHT + disturbance * rng.uniform(0.03, 0.06)
@@ -133,6 +130,13 @@ class Quadruped(WorldTask):
         down = [-x for x in vertical_axis(q)]
         parts = [v[:6], down, q[7:] - POSTURE, v[6:], episode.memory.action]
         return np.concatenate(parts).clip(-LARGEST, LARGEST).astype(np.float32)
+
+    def require_disturbance(self, disturbance: float) -> None:
+        """Raise ArgumentError for a disturbance that is no number from 0 to `MAX_DISTURBANCE`."""
+        if not is_real(disturbance) or not 0.0 <= disturbance <= MAX_DISTURBANCE:
+            raise ArgumentError(
+                f"disturbance is {shown(disturbance)}; wanted a number from 0 to {MAX_DISTURBANCE:g}"
+            )
 
     def costs(self, episode: Episode) -> float:
         """Return the costs of motor power [W] and of changes of the action."""

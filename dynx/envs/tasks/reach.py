@@ -26,6 +26,7 @@ from dynx.model.loading import load
 from dynx.rbd.kinematics import ancestry
 from dynx.sim.batch.traced_controller import ArrayDynamics
 from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.se3 import homogeneous, pose_error
 from dynx.world import Camera
 
 ACTIONS = ("torque", "velocity")
@@ -64,8 +65,8 @@ class Reach(RobotTask):
     dynamics approaches at a rate of 20 /s.
 
     Observation (2 nv + 9,): q, v, position of the frame [m], the vector from it to the goal [m], and the
-    rotation error in world axes: the axis times the sine of the angle. Reward: -(distance + 0.2 rotation
-    error + 0.001 action^2). An episode never terminates. `info` has the ``distance`` [m].
+    rotation vector from it to the goal [rad], in world axes. Reward: -(distance [m] + 0.2 angle [rad] + 0.001
+    action^2). An episode never terminates. `info` has the ``distance`` [m] and the ``angle`` [rad].
     """
 
     robot: str = "ur5"
@@ -142,7 +143,7 @@ class Reach(RobotTask):
         return ArrayDynamics(self.model)
 
     @cached_property
-    def _inertia(self) -> Floats:
+    def inertia(self) -> Floats:
         """Inertia of each joint at the neutral configuration."""
         M = np.asarray(self._arrays.mass_matrix(self.model.neutral()), dtype=np.float64)
         return np.array(np.diag(M))
@@ -159,19 +160,17 @@ class Reach(RobotTask):
         """Return the torque of an action."""
         q, v, _ = state
         if self.actions == "torque":
-            push = self._inertia * (MAX_ACCELERATION * action - DAMPING_RATE * v)
+            push = self.inertia * (MAX_ACCELERATION * action - DAMPING_RATE * v)
             tau: Array = robot.gravity_torque(q) + push
         else:
             tau = robot.inverse_dynamics(q, v, SERVO_RATE * (MAX_SPEED * action - v))
         return tau
 
     def errors(self, robot: Dynamics, state: State) -> tuple[Array, Array, Array]:
-        """Return the position of the frame, the vector to the goal, and the rotation error (3,) each."""
+        """Return the position of the frame, and the vector and rotation vector to the goal, (3,) each."""
         T = robot.forward_kinematics(state.q, self.tool)
-        R, R_goal = T[:3, :3], state.memory[3:].reshape(3, 3)
-        # Half the sum of the cross products of the axes is the rotation's axis times the sine of its angle.
-        rotation = 0.5 * sum(np.cross(R[:, k], R_goal[:, k]) for k in range(3))
-        return T[:3, 3], state.memory[:3] - T[:3, 3], np.asarray(rotation)
+        T_goal = homogeneous(state.memory[3:].reshape(3, 3), state.memory[:3])
+        return T[:3, 3], *pose_error(T_goal, T)
 
     def observation(self, robot: Dynamics, state: State) -> Array:
         """Return q, v, position and errors of the frame."""
@@ -184,8 +183,9 @@ class Reach(RobotTask):
         return -(lengths[0] + ROTATION_WEIGHT * lengths[1] + ACTION_WEIGHT * np.sum(action * action))
 
     def info(self, robot: Dynamics, state: State) -> dict[str, Any]:
-        """Return the distance to the goal [m]."""
-        return {"distance": float(np.linalg.norm(self.errors(robot, state)[1]))}
+        """Return the ``distance`` [m] and the ``angle`` [rad] to the goal."""
+        _, distance, rotation = self.errors(robot, state)
+        return {"distance": float(np.linalg.norm(distance)), "angle": float(np.linalg.norm(rotation))}
 
     @cached_property
     def camera(self) -> Camera:

@@ -23,8 +23,8 @@ class Walk(Quadruped):
     Action and observation are those of `Quadruped`; the observation ends with the wanted velocity (48,):
     forward and to the left [m/s], and the yaw rate [rad/s], in the axes of the trunk. Reward:
     exp(-error^2 / 0.25) of the velocity, half of that of the yaw rate, less vertical motion, roll and pitch
-    rates, a leaning trunk, motor power and changes of the action. ``reset(options={"velocity": (0.5, 0.0,
-    0.0)})`` sets the velocity.
+    rates, a leaning trunk, motor power and changes of the action, but not below 0. ``reset(options={
+    "velocity": (0.5, 0.0, 0.0)})`` sets the velocity.
     """
 
     max_speed: float = 0.6
@@ -65,7 +65,8 @@ class Walk(Quadruped):
         leaning_x, leaning_y, _ = vertical_axis(q)
         tracking = np.exp(-(error @ error) / SPEED_WIDTH) + 0.5 * np.exp(-(turning**2) / SPEED_WIDTH)
         shaking = 2.0 * v[2] ** 2 + 0.05 * (v[3:5] @ v[3:5]) + 0.5 * (leaning_x**2 + leaning_y**2)
-        return float(tracking - shaking) - self.costs(episode)
+        # Were rewards negative, a policy that does not walk yet would earn more by falling, which ends them.
+        return max(float(tracking - shaking) - self.costs(episode), 0.0)
 
     def info(self, episode: Episode) -> dict[str, Any]:
         """Return the wanted ``velocity`` (3,)."""
