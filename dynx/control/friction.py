@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.control.gains import checked_gain
-from dynx.errors import ArgumentError, GainError, shown
+from dynx.errors import ArgumentError, GainError, UnknownNameError, shown
 from dynx.model import Model
-from dynx.model.configuration import is_real
+from dynx.model.configuration import is_real, real_array
 from dynx.spatial.scalar import Array, Floats, sign, tanh
 
 SLIP = 1e-2
@@ -22,8 +22,9 @@ SLIP = 1e-2
 MIN_SLIP = 1e-9
 """Smallest slip speed above 0 [rad/s or m/s]; the division overflows for smaller ones."""
 
-Coefficients = bool | ArrayLike
-"""Coefficients: True for the description's, False for zero, one number, or one per joint coordinate."""
+Coefficients = bool | ArrayLike | Mapping[str, ArrayLike]
+"""Coefficients: True for the description's, False for zero, one number, one per joint coordinate, or numbers
+by the name of the joint (`coefficients_by_joint`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,8 +120,9 @@ class JointFriction:
         if isinstance(given, bool):
             return own if given else np.zeros(model.mechanism.nv if through else model.nv)
         base = 6 if model.floating else 0
-        refuse_unordered(name, given, model.nv - base)
-        coefficients = checked_gain(name, given, model.nv - base, per="one for each joint")
+        refuse_text(name, given, model.nv - base)
+        numbers = coefficients_by_joint(model, name, given)
+        coefficients = checked_gain(name, numbers, model.nv - base, per="one for each joint")
         # Given coefficients apply to joints that own a coordinate, not to the base or to mimic joints.
         owners = [joint.mimic is None for joint in model.joints if joint.moves]
         joints = np.zeros(len(owners) if through else len(coefficients))
@@ -135,10 +137,34 @@ def checked_slip(name: str, slip: object) -> float:
     raise ArgumentError(f"{name} is {shown(slip)}; wanted a speed: 0, or {MIN_SLIP:g} or more")
 
 
-def refuse_unordered(name: str, given: object, joints: int, own: str = "True") -> None:
-    """Raise GainError for coefficients that are a text or a mapping; `own` stands for the description's."""
-    if isinstance(given, str | Mapping):
+def coefficients_by_joint(
+    model: Model, name: str, given: ArrayLike | Mapping[str, ArrayLike], others: float = 0.0
+) -> ArrayLike:
+    """Return numbers by the name of the joint as an array (joints,) or, with a number for each of n rollouts,
+    (n, joints); joints that are not named have `others`. Anything but a mapping is returned unchanged.
+
+    Raises UnknownNameError for a joint without a coordinate, GainError for numbers of different lengths.
+    """
+    if not isinstance(given, Mapping):
+        return given
+    base = 6 if model.floating else 0
+    columns = [np.asarray(others) for _ in range(model.nv - base)]
+    for joint, value in given.items():
+        try:
+            column = model.coordinate_index(joint) - base
+        except UnknownNameError as error:
+            raise UnknownNameError(f"{name}: {error}") from None
+        columns[column] = real_array(f"{name} of {shown(joint)}", value)
+    lengths = {column.shape for column in columns if column.shape}
+    if len(lengths) > 1 or any(len(shape) > 1 for shape in lengths):
+        raise GainError(f"{name} by joint: wanted one number for each joint, or one for each rollout")
+    return np.stack(np.broadcast_arrays(*columns), axis=-1) if columns else np.zeros(0)
+
+
+def refuse_text(name: str, given: object, joints: int, own: str = "True") -> None:
+    """Raise GainError for coefficients that are a text; `own` stands for the description's."""
+    if isinstance(given, str):
         raise GainError(
             f"{name} is {shown(given)}; wanted one number, an array ({joints},) in the order of the joints, "
-            f"or {own} for the values of the description"
+            f"numbers by joint as in {{joint: number}}, or {own} for the values of the description"
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from dynx.control.base import Controller, ControllerState, Measurement, Wrapper, parameter
-from dynx.control.friction import SLIP, Coefficients, JointFriction
+from dynx.control.friction import SLIP, Coefficients, JointFriction, coefficients_by_joint
 from dynx.control.gains import checked_gain
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
@@ -74,4 +74,6 @@ class FrictionCompensation(Wrapper[ControllerState], pure=True):
 
 def _coefficients(model: Model, name: str, given: Coefficients) -> bool | Floats:
     """True or False as given, numbers as an array with one for each joint."""
-    return given if isinstance(given, bool) else checked_gain(name, given, len(model.joint_names))
+    if isinstance(given, bool):
+        return given
+    return checked_gain(name, coefficients_by_joint(model, name, given), len(model.joint_names))

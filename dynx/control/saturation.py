@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.control.base import Controller, ControllerState, Measurement, Wrapper, parameter
-from dynx.control.friction import refuse_unordered
+from dynx.control.friction import coefficients_by_joint, refuse_text
 from dynx.errors import GainError, LimitError, shown
 from dynx.model import Model
 from dynx.model.configuration import real_array
@@ -46,9 +47,11 @@ class Saturated(Wrapper[ControllerState], pure=True):
         return f"{self.inner.name}, saturated"
 
 
-def checked_limit(model: Model, limit: ArrayLike | None, name: str = "limit") -> Floats:
-    """Return the effort limits (nv,): the model's, or one number or one for each joint; LimitError where one
-    is 0.
+def checked_limit(
+    model: Model, limit: ArrayLike | Mapping[str, ArrayLike] | None, name: str = "limit"
+) -> Floats:
+    """Return the effort limits (nv,): the model's, or one number, one for each joint, or numbers by joint, of
+    which those not named are unlimited; LimitError where one is 0.
 
     A missing limit is infinite. Many descriptions write ``effort="0"`` for an unknown limit; as a limit it
     would forbid any torque.
@@ -57,8 +60,8 @@ def checked_limit(model: Model, limit: ArrayLike | None, name: str = "limit") ->
     efforts: Floats = model.effort_limit
     if limit is not None:
         n = model.nv - base
-        refuse_unordered(name, limit, n, "None" if name == "limit" else "True")
-        given = real_array(name, limit)
+        refuse_text(name, limit, n, "None" if name == "limit" else "True")
+        given = real_array(name, coefficients_by_joint(model, name, limit, others=np.inf))
         if base and given.shape == (model.nv,) and (given[:base] == np.inf).all():
             given = given[base:]
         if given.shape not in ((), (n,)) or not (given >= 0.0).all():

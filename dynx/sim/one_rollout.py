@@ -55,7 +55,7 @@ def simulate(
     friction: Coefficients = False,
     friction_slip: float = 0.0,
     armature: Coefficients = False,
-    effort_limits: bool | ArrayLike = False,
+    effort_limits: Coefficients = False,
     position_limits: bool = False,
     payload: Payload | Sequence[Payload] | None = None,
     mass_scale: MassScale = 1.0,
@@ -91,9 +91,10 @@ def simulate(
     `dt`; a reference that has ended before is held at its end.
 
     **Joints**, the same in every plant: `damping`, dry `friction` and `armature`, each True for those of the
-    description, one number or one for each joint. Dry friction holds a joint at rest up to its magnitude and
-    opposes the motion beyond (`dynx.sim.plants.friction_law`), at any step; with `friction_slip` [rad/s or
-    m/s] above 0 it is smoothed over that speed instead, so that loaded joints creep (`JointFriction`).
+    description, one number, one for each joint, or numbers by joint, ``{"elbow_joint": 0.5}``, where joints
+    that are not named have none. Dry friction holds a joint at rest up to its magnitude and opposes the
+    motion beyond (`dynx.sim.plants.friction_law`), at any step; with `friction_slip` [rad/s or m/s] above 0
+    it is smoothed over that speed instead, so that loaded joints creep (`JointFriction`).
     `effort_limits`, True for the model's, saturate torques and are recorded; `position_limits` are inelastic
     stops (`Stops`); `pushes` are external wrenches.
 

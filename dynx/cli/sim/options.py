@@ -21,7 +21,7 @@ TUTORIAL_OPTIONS = {
 _number_option = partial(click.option, type=finite_number, metavar="NUMBER")
 _seconds_option = partial(click.option, type=finite_number, metavar="SECONDS")
 _gain_option = partial(click.option, type=gain, metavar="NUMBERS")
-_coefficients_option = partial(click.option, type=coefficients, metavar="urdf|NUMBERS")
+_coefficients_option = partial(click.option, type=coefficients, metavar="urdf|NUMBERS|joint=NUMBER,...")
 _configuration_option = partial(click.option, type=number_list, metavar="Q")
 
 robot = group(
@@ -191,13 +191,13 @@ disturbances = group(
     ),
     _coefficients_option(
         "--damping",
-        help="Viscous damping of the joints [N m s/rad or N s/m]: urdf for that of the description, or "
-        "numbers (default: 0).",
+        help="Viscous damping of the joints [N m s/rad or N s/m]: urdf for that of the description, numbers, "
+        "or numbers by joint, the others having none (default: 0).",
     ),
     _coefficients_option(
         "--friction",
         help="Coulomb friction of the joints [N m or N], which holds them at rest up to its magnitude: urdf "
-        "for that of the description, or numbers (default: 0).",
+        "for that of the description, numbers, or numbers by joint, the others having none (default: 0).",
     ),
     _number_option(
         "--friction-slip",
@@ -206,13 +206,13 @@ disturbances = group(
     ),
     _coefficients_option(
         "--armature",
-        help="Rotor inertia of the joints [kg m^2 or kg]: urdf for that of the description, or numbers "
-        "(default: 0).",
+        help="Rotor inertia of the joints [kg m^2 or kg]: urdf for that of the description, numbers, or "
+        "numbers by joint, the others having none (default: 0).",
     ),
     _coefficients_option(
         "--effort-limits",
-        help="Limits at which torques are saturated [N m or N]: urdf for those of the description, or "
-        "numbers (default: unlimited).",
+        help="Limits at which torques are saturated [N m or N]: urdf for those of the description, numbers, "
+        "or numbers by joint, the others being unlimited (default: unlimited).",
     ),
     click.option(
         "--position-limits", is_flag=True, help="Inelastic stops at the position limits of the joints."

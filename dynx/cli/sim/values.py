@@ -8,14 +8,14 @@ from typing import NamedTuple
 
 import click
 
-from dynx.cli.shell.options import finite_number, plain_numbers
+from dynx.cli.shell.options import finite_number, number_list, plain_numbers
 from dynx.errors import shown
 
 URDF = "urdf"
 """Value that selects the coefficients of the robot description."""
 
-Coefficients = float | list[float] | bool
-"""One number for all joints, one for each, or True for those of the robot description."""
+Coefficients = float | list[float] | dict[str, float] | bool
+"""One number for all joints, one for each, numbers by joint, or True for those of the robot description."""
 
 # The name of the frame can contain colons, so the numbers are matched from the end.
 _PUSH = re.compile(
@@ -48,8 +48,14 @@ def gain(text: str) -> float | list[float]:
 
 
 def coefficients(text: str) -> Coefficients:
-    """Read the word ``urdf``, or numbers as `gain` does."""
-    return True if text.strip() == URDF else gain(text)
+    """Read the word ``urdf``, ``joint=value`` pairs, or numbers as `gain` does."""
+    if text.strip() == URDF:
+        return True
+    if "=" in text:
+        named = number_list(text)
+        assert isinstance(named, dict)
+        return named
+    return gain(text)
 
 
 def vector(text: str) -> list[float]:

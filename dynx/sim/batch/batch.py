@@ -92,7 +92,7 @@ def simulate_batch(
     friction: Coefficients = False,
     friction_slip: float = 0.0,
     armature: Coefficients = False,
-    effort_limits: bool | ArrayLike = False,
+    effort_limits: Coefficients = False,
     position_limits: bool = False,
     payload: Payload | Sequence[Payload] | None = None,
     mass_scale: MassScale = 1.0,
@@ -114,7 +114,7 @@ def simulate_batch(
     - `gains`: arrays (n,) or (n, size) by the name of a gain of the controller, as ``{"kp": ...}``; of a
       controller of your own by the name of a public attribute that is a number or an array of numbers
     - `damping`, `friction`, `armature` (n,), (n, 1) or (n, joints); a number, numbers (joints,) or True hold
-      for all rollouts, as in `simulate`
+      for all rollouts, as in `simulate`; numbers by joint can be (n,), ``{"elbow_joint": [0.1, 0.2]}``
     - `q0` (n, nq), `v0` (n, nv); one row holds for all rollouts. The default is the start of the reference,
       and rest if `q0` is given
     - `noise` of the measurements: rollout k has the noise of ``simulate`` with ``Noise(..., rollout=k)``

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.control.friction import refuse_unordered
+from dynx.control.friction import coefficients_by_joint, refuse_text
 from dynx.errors import ArgumentError, GainError
 from dynx.model import Model
 from dynx.model.configuration import checked_array, real_array, whole_number
@@ -40,6 +40,9 @@ def split_rows(
     if isinstance(model, Scenario) and fixed["plant"] == PLANT:
         del fixed["plant"]
     scenario = scenario_of(model, None, fixed)
+    own |= {
+        name: coefficients_by_joint(scenario.model, name, own[name]) for name in COEFFICIENTS if name in own
+    }
     joints = joints_of(scenario.model)
     rows = {name: value for name, value in own.items() if _has_rows(name, value, joints)}
     return replace(scenario, **{name: own[name] for name in own if name not in rows}), rows
@@ -62,7 +65,7 @@ def _has_rows(name: str, value: Any, joints: int) -> bool:
 def coefficient_rows(name: str, values: ArrayLike, joints: int) -> Floats:
     """Return the coefficients of each rollout (n, joints), from one number or one for each joint per rollout.
     Raises GainError for invalid coefficients."""
-    refuse_unordered(name, values, joints)
+    refuse_text(name, values, joints)
     array = real_array(name, values)
     rows = array[:, None] if array.ndim == 1 else array
     if rows.ndim != 2 or rows.shape[1] not in (1, joints):

@@ -18,7 +18,13 @@ from dynx.backends import Backend
 from dynx.backends.hooks import solve_mass_matrix
 from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.control.dynamics import EngineDynamics
-from dynx.control.friction import Coefficients, JointFriction, checked_slip, refuse_unordered
+from dynx.control.friction import (
+    Coefficients,
+    JointFriction,
+    checked_slip,
+    coefficients_by_joint,
+    refuse_text,
+)
 from dynx.control.gains import checked_gain
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
@@ -225,6 +231,7 @@ def _armature_matrix(model: Model, armature: Coefficients) -> Floats:
     if isinstance(armature, bool):
         return JointDynamicsTerms(model).armature if armature else np.zeros((model.nv, model.nv))
     base = 6 if model.floating else 0
-    refuse_unordered("armature", armature, model.nv - base)
-    joints = checked_gain("armature", armature, model.nv - base, per="one for each joint")
+    refuse_text("armature", armature, model.nv - base)
+    numbers = coefficients_by_joint(model, "armature", armature)
+    joints = checked_gain("armature", numbers, model.nv - base, per="one for each joint")
     return np.diag(np.concatenate([np.zeros(base), joints]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, fields, replace
 from typing import Any, NamedTuple
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.control.base import Controller, refuse_other_than_controller
-from dynx.control.friction import Coefficients
+from dynx.control.friction import Coefficients, coefficients_by_joint
 from dynx.errors import ArgumentError, nearest, shown
 from dynx.model import Model
 from dynx.model.masks import refuse_mask
@@ -43,6 +44,10 @@ SCHEMA = "dynx.scenario/1"
 
 NUMBERS = ("reference", "q0", "v0", "damping", "friction", "armature", "effort_limits")
 """Fields that may be given as lists of numbers, and are kept as arrays."""
+
+
+BY_JOINT = {"damping": 0.0, "friction": 0.0, "armature": 0.0, "effort_limits": math.inf}
+"""Fields that may be given as numbers by joint, and the value of the joints that are not named."""
 
 
 class Difference(NamedTuple):
@@ -92,7 +97,7 @@ class Scenario:
     friction: Coefficients = False
     friction_slip: float = 0.0
     armature: Coefficients = False
-    effort_limits: bool | ArrayLike = False
+    effort_limits: Coefficients = False
     position_limits: bool = False
     payload: Payload | Sequence[Payload] | None = None
     mass_scale: MassScale = 1.0
@@ -131,8 +136,11 @@ class Scenario:
         if not isinstance(self.noise, Noise | Unknown | None):
             raise ArgumentError(f"noise is {shown(self.noise)}; wanted a dynx.Noise, as in Noise(v=1e-3)")
         for name in NUMBERS:
-            refuse_mask(name, getattr(self, name))
-            object.__setattr__(self, name, _as_array(getattr(self, name)))
+            value = getattr(self, name)
+            if name in BY_JOINT:
+                value = coefficients_by_joint(self.model, name, value, BY_JOINT[name])
+            refuse_mask(name, value)
+            object.__setattr__(self, name, _as_array(value))
         payload = () if self.payload is None else self.payload
         kinds: dict[str, tuple[Any, type]] = {"payload": (payload, Payload), "pushes": (self.pushes, Push)}
         for name, (given, kind) in kinds.items():

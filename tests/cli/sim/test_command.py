@@ -271,3 +271,14 @@ def test_one_factor_for_all_links_and_another_for_one() -> None:
     assert forearm is not None
     made = document("ur5", *SHORT, "--mass-scale", "1.1", "--mass-scale", "forearm_link=2")
     assert made["total_mass"] == pytest.approx(1.1 * arm.total_mass + 0.9 * forearm.mass)
+
+
+def test_coefficients_by_joint_are_those_of_a_list() -> None:
+    by_joint = ["--friction", "elbow_joint=0.5", "--effort-limits", "elbow_joint=20,wrist_1_joint=9"]
+    settings = document("ur5", *SHORT, *by_joint)["settings"]
+    assert settings["joints"]["friction"] == [0.0, 0.0, 0.5, 0.0, 0.0, 0.0]
+    assert settings["effort_limits"] == [None, None, 20.0, 9.0, None, None]
+    refused = sim("ur5", *SHORT, "--friction", "elbow=0.5")
+    assert refused.exit_code == 2
+    assert "friction: " in refused.stderr
+    assert "'elbow_joint'" in refused.stderr

@@ -9,7 +9,13 @@ import pytest
 
 import dynx
 from dynx.control import ComputedTorque, FrictionCompensation, GravityCompensatedPD, PositionMotor
-from dynx.errors import ArgumentError, GainError, SingularMassMatrixError, UnsupportedFeatureError
+from dynx.errors import (
+    ArgumentError,
+    GainError,
+    SingularMassMatrixError,
+    UnknownNameError,
+    UnsupportedFeatureError,
+)
 from dynx.model import Link, Model
 from dynx.sim import Payload, Push, plant_model, simulate, simulate_batch
 from dynx.sim.batch.kernel import FusedStep
@@ -235,7 +241,13 @@ def test_what_no_option_can_be_is_refused(arm: Model) -> None:
         (ArgumentError, "6 joints and 6 rollouts", {"friction": six, "armature": np.ones((6, 6))}),
         (ArgumentError, "3 rows, damping says 4", {"damping": np.ones(4), "friction": np.ones((3, 6))}),
         (ArgumentError, "slip", {"friction": 0.1, "friction_slip": -1.0}),
-        (GainError, r"an array \(6,\) in the order of the joints", {"friction": {"elbow_joint": 2.0}}),
+        (UnknownNameError, "^friction: .*'elbow_joint'", {"friction": {"elbow": 2.0}}),
+        (GainError, "negative", {"friction": {"elbow_joint": [2.0, -1.0]}}),
+        (
+            GainError,
+            "one for each rollout",
+            {"friction": {"elbow_joint": np.ones(2), "wrist_1_joint": np.ones(3)}},
+        ),
         (GainError, "or True for the values of the description", {"damping": "urdf"}),
     ]
     for error, said, options in bad:
