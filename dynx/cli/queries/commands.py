@@ -200,7 +200,8 @@ def mass() -> None:
     "--all-solutions",
     "every",
     is_flag=True,
-    help="Show every solution of a pose and the name of its branch, for arms that have a closed form.",
+    help="Show every solution of a pose and the name of its branch, for arms that have a closed form; with "
+    "--avoid also which of them are in collision.",
 )
 @click.option(
     "--given",
@@ -225,7 +226,8 @@ def ik() -> None:
     """Compute inverse kinematics: a configuration, within limits, that brings a frame to a target.
 
     Exit code 0 if the frame reaches the target, which forward kinematics checks; 1 if not, and then the
-    best configuration found is shown. With --all-solutions, 1 if the pose has no solution.
+    best configuration found is shown. With --all-solutions, 1 if the pose has no solution, or with --avoid
+    none that keeps all margins.
 
     \b
     Examples:

@@ -45,8 +45,6 @@ def ik(
         )
     if given is not None and not every:
         raise ArgumentError("--given has an effect only with --all-solutions; --lock fixes a joint otherwise")
-    if avoid is not None and every:
-        raise ArgumentError("--avoid chooses one solution; --all-solutions shows all, in collision or not")
     if margin is not None and avoid is None:
         raise ArgumentError("--margin is the distance that --avoid SCENE keeps; give the scene as well")
     if wanted.ndim == 1:
@@ -56,14 +54,16 @@ def ik(
         model = engine.model
         name = chosen_frame(model, frame)
         start = None if q is None else configuration(model, q)
-        if every:
-            by_default = frame is None
-            return all_solutions(
-                engine, wanted, name, start, given, json_path, note=note, frame_is_default=by_default
-            )
         kept = None
         if scene is not None:
             kept = scene.avoidance_for(model, margin=MARGIN if margin is None else margin)
+        if every:
+            by_default = frame is None
+            return all_solutions(
+                *(engine, wanted, name, start, given, kept, avoid, json_path),
+                note=note,
+                frame_is_default=by_default,
+            )
         found = engine.inverse_kinematics(wanted, name, start, free=free, avoid=kept)
         result = {
             **document_head(engine),

@@ -36,8 +36,14 @@ OF_TARGET = "so it is in every configuration that reaches the target"
 
 def inevitable_sentence(avoidance: Avoidance, blockers: Sequence[NearPair], reason: str) -> str:
     """Return that a pair is too close in every solution, and the reason."""
-    worst = max(blockers, key=lambda each: each.pair.margin - each.separation.lower)
-    return f"{pair_sentence(avoidance, worst)}; {reason}"
+    return f"{closest_sentence(avoidance, blockers)}; {reason}"
+
+
+def closest_sentence(avoidance: Avoidance, near: Sequence[NearPair]) -> str:
+    """Return how close the pair is that lacks most of its margin; empty without pairs that are too close."""
+    if not near:
+        return ""
+    return pair_sentence(avoidance, max(near, key=lambda each: each.pair.margin - each.separation.lower))
 
 
 def pair_sentence(avoidance: Avoidance, near: NearPair) -> str:
