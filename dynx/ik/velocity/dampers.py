@@ -33,6 +33,8 @@ class Dampers:
     """Least rates (m,) of the distances [m/s]; positive for a pair that is closer than its margin."""
     names: tuple[tuple[str, str], ...]
     """Names of the bodies of each pair."""
+    note: str = ""
+    """What the avoidance leaves out (`Avoidance.note`)."""
 
     def missed(self, v: Floats, tolerance: float) -> tuple[tuple[str, str], ...]:
         """Return the pairs that approach faster than they may, by more than `tolerance` [m/s]."""
@@ -63,4 +65,4 @@ def dampers(
     near = avoidance.near(kinematics, q, FREE_SPEED / gain)
     room = np.array([each.separation.lower - each.pair.margin for each in near])
     names = tuple(avoidance.names(each.pair) for each in near)
-    return Dampers(avoidance.gradients(kinematics, q, near), -gain * room, names)
+    return Dampers(avoidance.gradients(kinematics, q, near), -gain * room, names, avoidance.note)

@@ -49,7 +49,8 @@ class VelocityResult:
     """Pairs of bodies that approach faster than they may, because no velocity within the bounds prevents it;
     empty otherwise."""
     note: str = ""
-    """Sentence that names joints of q outside their limits, which are brought back; empty without them."""
+    """Sentences that name joints of q outside their limits, which are brought back, and the links that
+    `avoid` keeps nothing from; empty without them."""
 
     def __bool__(self) -> bool:
         """Return whether all hard tasks are met."""
@@ -156,7 +157,7 @@ def velocity_ik(
     errors = tuple(J @ v - velocity for J, velocity in rows)
     return VelocityResult(
         v, success, errors, at_bound, near.active(v, AT_BOUND), near.missed(v, AT_BOUND),
-        joints_outside(model, position),
+        "; ".join(filter(None, (joints_outside(model, position), near.note))),
     )  # fmt: skip
 
 

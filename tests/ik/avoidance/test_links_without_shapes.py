@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from click.testing import CliRunner
 import dynx
 from dynx.cli.shell.main import cli
 from dynx.errors import ArgumentError, UnknownNameError
+from dynx.ik.velocity import VelocityTask
 from dynx.model import Model, Pose
 from dynx.world import Scene, SceneRobot, Weld, box
 
@@ -78,6 +80,12 @@ def test_moving_links_without_shapes_are_named_in_results() -> None:
     assert found.success
     assert found.note == "'l3' has no collision shape, so that avoid keeps nothing from it"
     assert found.note in found.message
+    if importlib.util.find_spec("daqp") is not None:
+        task = VelocityTask("tool")
+        assert engine.velocity_ik(q, task, dt=0.01, avoid=scene).note == found.note
+        outside = np.array([-7.0, 0.3, 0.3, 0.3])
+        both = engine.velocity_ik(outside, task, dt=0.01, avoid=scene).note
+        assert both.endswith(f"; {found.note}")
     two = Scene(bodies=[CRATE]).avoidance_for(arm(1, 2))
     assert two.note == "'l3' and 'l4' have no collision shape, so that avoid keeps nothing from them"
     whole = engine.inverse_kinematics(
