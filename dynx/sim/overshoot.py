@@ -91,11 +91,16 @@ def overcompensated_friction(controller: Controller[Any] | None, plant: JointFri
 
 def _joint_damping(controller: Controller[Any], q: Floats) -> Floats | None:
     """Return the damping gain of each coordinate (n,) [N m s/rad or N s/m] while the others are at rest;
-    None for a controller without one."""
+    None for a controller without one, and for one whose ``kd`` is not numbers."""
     kd = fields_of(controller).get("kd")
-    if kd is not None and kd.metadata.get("unit", "").startswith("N"):
-        # A controller of a user may have one gain for all coordinates.
-        return np.broadcast_to(np.asarray(attributes_of(controller)["kd"], dtype=float), controller.model.nv)
+    if kd is not None and str(kd.metadata.get("unit", "")).startswith("N"):
+        # A controller of a user may have one gain for all coordinates, or keep something else under the name.
+        try:
+            gain = np.asarray(attributes_of(controller).get("kd"), dtype=float)
+        except (AttributeError, TypeError, ValueError):
+            return None
+        n = controller.model.nv
+        return np.broadcast_to(gain, n) if gain.shape in ((), (1,), (n,)) else None
     if isinstance(controller, control.Impedance):
         with backend("reference", controller.model, validate=False) as engine:
             J = np.asarray(engine.jacobian(q, controller.frame))

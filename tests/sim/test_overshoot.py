@@ -9,7 +9,7 @@ import pytest
 
 import dynx
 from dynx import control
-from dynx.errors import DivergedError
+from dynx.errors import DivergedError, SingularMassMatrixError
 from dynx.sim import simulate
 from dynx.sim.overshoot import largest_overshoot
 
@@ -107,3 +107,26 @@ def test_one_coefficient_of_a_compensation_leaves_the_other_out() -> None:
     np.testing.assert_array_equal(dry.losses.friction, 0.4)
     np.testing.assert_array_equal(viscous.losses.friction, 0.0)
     np.testing.assert_array_equal(viscous.losses.damping, 0.4)
+
+
+@pytest.mark.parametrize("kd", ["much", None, [1.0, 2.0], {"elbow_joint": 1.0}])
+def test_a_controller_with_another_kd_has_no_known_overshoot(kd: object) -> None:
+    model = dynx.load("ur5")
+    law = control.PD(model, kp=0.0, kd=1.0)
+    object.__setattr__(law, "kd", kd)
+    assert largest_overshoot(law, np.zeros(6), DT) is None
+
+
+def test_only_failures_of_dynx_hide_the_explanation_of_a_divergence(monkeypatch: pytest.MonkeyPatch) -> None:
+    def diverge(error: Exception) -> None:
+        def fail(*_: object) -> None:
+            raise error
+
+        monkeypatch.setattr("dynx.sim.loop.plain.largest_overshoot", fail)
+        simulate(dynx.load("ur5"), None, v0=np.full(6, 1e5), duration=1.0, plant="reference")
+
+    with pytest.raises(DivergedError) as raised:
+        diverge(SingularMassMatrixError("no inertia"))
+    assert raised.value.overshoot is None
+    with pytest.raises(ZeroDivisionError, match="a defect"):
+        diverge(ZeroDivisionError("a defect"))

@@ -17,7 +17,7 @@ import numpy as np
 
 from dynx.control.base import Controller, Measurement
 from dynx.control.engine_motors import EngineMotor
-from dynx.errors import ControlError, DivergedError, SimulationError, shown
+from dynx.errors import ControlError, DivergedError, DynxError, SimulationError, shown
 from dynx.model.configuration import DIVERGENCE_SPEED
 from dynx.model.masks import refuse_mask
 from dynx.sim.clock import Clock
@@ -253,9 +253,9 @@ class Loop:
     def _diverged(self, k: int, record: Record, why: str) -> SimulationError:
         """Return the error of divergence, with the joint whose damping is too large for the control step."""
         overshoot = beyond = None
-        # The message of the failure itself matters more than its explanation, which is not known for every
-        # controller of a user.
-        with suppress(Exception):
+        # The message of the failure itself matters more than its explanation, for which the mass matrix or
+        # the Jacobian of the controller's model may not be available.
+        with suppress(DynxError):
             control_dt = self.clock.steps_per_control * self.clock.dt
             overshoot = largest_overshoot(self.controller, record.q[0], control_dt)
             beyond = overcompensated_friction(self.controller, self.plant.disturbances.friction)
