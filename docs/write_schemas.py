@@ -14,6 +14,7 @@ from typing import Any
 
 from dynx.agreement.report import AgreementDocument
 from dynx.bench.document import BenchDocument
+from dynx.cli.compare.document import CompareDocument
 from dynx.cli.contacts.document import ContactsDocument
 from dynx.cli.env.document import EnvDistanceDocument, TasksDocument
 from dynx.cli.play.document import PlayDocument
@@ -35,6 +36,7 @@ def schemas() -> dict[str, dict[str, Any]]:
         "agree": json_schema(AgreementDocument, "dynx agree --json"),
         "baseline": json_schema(BaselineDocument, "dynx doctor --write-baseline", omits_defaults=True),
         "bench": json_schema(BenchDocument, "dynx bench --json"),
+        "compare": json_schema(CompareDocument, "dynx compare --json"),
         "contacts": json_schema(ContactsDocument, "dynx contacts --json"),
         "doctor": json_schema(DoctorDocument, "dynx doctor --json"),
         "env-distance": json_schema(EnvDistanceDocument, "dynx env distance --json"),

@@ -48,6 +48,7 @@ if TYPE_CHECKING:
         Scenario,
         ScenePlant,
         Simulation,
+        compare_rollouts,
         simulate,
         simulate_batch,
     )
@@ -73,6 +74,7 @@ __all__ = [
     "agree",
     "backend",
     "compare_as_loaded",
+    "compare_rollouts",
     "control",
     "diagnose",
     "errors",
@@ -116,6 +118,7 @@ _HOME = {
     "agree": "dynx.agreement",
     "backend": "dynx.backends",
     "compare_as_loaded": "dynx.doctor",
+    "compare_rollouts": "dynx.sim",
     "diagnose": "dynx.doctor",
     "inertial_parameters": "dynx.rbd.regressor",
     "installed_backends": "dynx.backends",

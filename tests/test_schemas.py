@@ -15,13 +15,14 @@ from jsonschema import Draft202012Validator
 
 from dynx import agree, diagnose, load
 from dynx.agreement import refused_report, results_document
+from dynx.cli.compare.document import document as compare_document
 from dynx.cli.shell.main import cli
 from dynx.control import PD
 from dynx.doctor import results_document as doctor_document
 from dynx.doctor.formats.baseline import baseline_document
 from dynx.errors import DescriptionError
 from dynx.files.documents import json_text
-from dynx.sim import Noise, Payload, Push
+from dynx.sim import Noise, Payload, Push, compare_rollouts, simulate
 from dynx.sim.scenario.scenario import Scenario
 from dynx.trajectory import cycloidal
 from dynx.world import read_scene
@@ -101,6 +102,19 @@ def test_documents_of_commands_keep_their_schema(name: str, arguments: list[str]
     result = CliRunner().invoke(cli, [*arguments, "--json"])
     assert result.exit_code == code, result.output
     assert errors(name, json.loads(result.stdout)) == []
+
+
+def test_comparisons_of_rollouts_keep_their_schema() -> None:
+    model = load("double_pendulum")
+    rest = np.zeros(model.nv)
+    law = PD(model, kp=1.0, kd=0.1)
+    runs = [
+        simulate(model, law, rest, q0=rest + 0.1, plant="reference", duration=0.01, damping=damping)
+        for damping in (0.0, 0.5)
+    ]
+    for rerun in (True, False):
+        comparison = compare_rollouts(*runs, rerun=rerun)
+        assert errors("compare", compare_document(comparison, "a.npz", "b.npz")) == []
 
 
 def test_documents_of_scenarios_keep_their_schema() -> None:

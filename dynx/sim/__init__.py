@@ -2,6 +2,7 @@
 
 from dynx.sim.batch.batch import BatchInterrupted, simulate_batch
 from dynx.sim.batch.rollouts import BatchRollouts
+from dynx.sim.comparison.comparison import RolloutComparison, compare_rollouts
 from dynx.sim.loop.noise import Noise
 from dynx.sim.one_rollout import RolloutInterrupted, simulate
 from dynx.sim.plants.disturbances import Push
@@ -23,6 +24,7 @@ __all__ = [
     "Plant",
     "Push",
     "Rollout",
+    "RolloutComparison",
     "RolloutInterrupted",
     "Scenario",
     "ScenePlant",
@@ -31,6 +33,7 @@ __all__ = [
     "State",
     "StepResult",
     "Summary",
+    "compare_rollouts",
     "plant_model",
     "register_plant",
     "simulate",

@@ -24,6 +24,9 @@ COMMANDS = {
     "world": LazyCommand(
         "dynx.cli.world.command:world", "Run a scene with contacts on several engines, and compare them."
     ),
+    "compare": LazyCommand(
+        "dynx.cli.compare.command:compare", "Compare two rollouts, and find out why they part."
+    ),
     "view": LazyCommand("dynx.cli.view.command:view", "Show a robot, a rollout or a scene in the browser."),
     "env": LazyCommand(
         "dynx.cli.env.command:env", "List tasks of reinforcement learning; compare the engines on one."

@@ -1,4 +1,4 @@
-"""Files of rollouts: the format follows from the suffix; `load` reads ``.npz`` and ``.mcap``."""
+"""Files of rollouts: the format follows from the suffix."""
 
 from __future__ import annotations
 
@@ -15,8 +15,11 @@ from dynx.errors import ArgumentError, shown
 from dynx.files.arrays import ArrayFile, read_arrays
 from dynx.files.reading import checked_path
 from dynx.files.writing import atomic_file
+from dynx.model import Model
 from dynx.model.documents import robot_document, robot_from_document
+from dynx.model.model import refuse_other_than_model
 from dynx.sim.record.csv_file import write_csv
+from dynx.sim.record.csv_reading import load_csv
 from dynx.sim.record.mcap_file import write_mcap
 from dynx.sim.record.mcap_reading import load_mcap
 from dynx.sim.record.rollout_data import RolloutData
@@ -51,14 +54,24 @@ def save(rollout: RolloutData, path: str | os.PathLike[str]) -> None:
         write(rollout, file)
 
 
-def load(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Read the fields of a rollout from a ``.npz`` or a ``.mcap`` of `save`.
+def load(path: str | os.PathLike[str], model: Model | None = None) -> dict[str, Any]:
+    """Read the fields of a rollout from a ``.npz`` or a ``.mcap`` of `save`, or of `model` from a ``.csv``.
 
     The model is read from the URDF text in the file; no array is unpickled. A ``.mcap`` has neither the
     scenario nor what surrounds the robot, and whole nanoseconds (`load_mcap`). Raises ArgumentError for any
     other file, NotInstalledError for ``.mcap`` without mcap.
     """
-    if Path(checked_path(path)).suffix.lower() == ".mcap":
+    suffix = Path(checked_path(path)).suffix.lower()
+    if suffix == ".csv":
+        if model is None:
+            raise ArgumentError(
+                f"{shown(path, 300)} does not have its robot: give it as model=, or save the rollout as .npz"
+            )
+        refuse_other_than_model(model)
+        return load_csv(path, model)
+    if model is not None:
+        raise ArgumentError(f"{shown(path, 300)} has its robot; model= is for .csv files")
+    if suffix == ".mcap":
         return load_mcap(path)
     file = read_arrays(path, "a rollout", SCHEMA)
     with _reading("the robot", file):

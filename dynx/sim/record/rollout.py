@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from typing import Any
 
+from dynx.model import Model
 from dynx.registry import view
 from dynx.sim.record.formats import load, save
 from dynx.sim.record.plot import plot
@@ -25,10 +26,14 @@ class Rollout(RolloutData):
         return view(self, **options)
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Rollout:
+    def load(cls, path: str | os.PathLike[str], model: Model | None = None) -> Rollout:
         """Read a file of `save`: ``.npz`` to the last bit, or ``.mcap``, which has times in whole
         nanoseconds and neither scenario nor surroundings.
 
+        A ``.csv`` of `save`, or the log of a robot from elsewhere, is read as a rollout of `model`: its
+        columns are ``t`` and ``q:JOINT``, and where they are known ``v:JOINT``, ``a:JOINT`` and ``tau:JOINT``
+        (`dynx.sim.record.csv_reading.load_csv`).
+
         Raises ArgumentError for any other file, NotInstalledError for ``.mcap`` without mcap.
         """
-        return cls(**load(path))
+        return cls(**load(path, model))

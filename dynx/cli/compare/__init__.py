@@ -1,0 +1,1 @@
+"""``dynx compare``: two rollouts, how far apart they are, and why."""

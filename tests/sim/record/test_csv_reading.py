@@ -1,0 +1,92 @@
+"""Tables of rollouts and logs of robots are read to the last bit, or refused with line and column."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dynx
+from dynx.errors import ArgumentError
+from dynx.sim import Rollout, simulate
+
+ARM = dynx.load("double_pendulum")
+
+
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+def test_a_table_of_dynx_keeps_every_bit(tmp_path: Path, base: str) -> None:
+    robot = dynx.load("double_pendulum", base=base)
+    start = robot.random(3)
+    rollout = simulate(robot, None, q0=start, plant="compiled", duration=0.05)
+    rollout.save(tmp_path / "run.csv")
+    read = Rollout.load(tmp_path / "run.csv", robot)
+    for name in ("t", "q", "v", "a", "tau"):
+        np.testing.assert_array_equal(getattr(read, name), getattr(rollout, name))
+    assert read.scenario is None
+
+
+def test_a_log_of_positions_has_rates_by_differences(tmp_path: Path) -> None:
+    t = np.linspace(0.0, 1.0, 101)
+    q = np.column_stack([t**2, -3.0 * t])
+    path = tmp_path / "log.csv"
+    header = "stamp, time," + ",".join(ARM.joint_names)
+    np.savetxt(path, np.column_stack([np.arange(101), t, q]), delimiter=",", header=header, comments="")
+    read = Rollout.load(path, ARM)
+    np.testing.assert_allclose(read.v[1:-1], np.column_stack([2.0 * t, np.full(101, -3.0)])[1:-1], atol=1e-12)
+    assert np.isnan(read.tau).all()
+    assert len(read) == 100
+
+
+def test_rates_of_a_floating_base_are_in_its_axes(tmp_path: Path) -> None:
+    robot = dynx.load("double_pendulum", base="floating")
+    v = np.array([0.3, -0.1, 0.2, 0.5, 0.4, -0.6, 1.0, 2.0])
+    t = np.linspace(0.0, 0.1, 101)
+    q = robot.integrate(robot.random(1), t[:, None] * v)
+    columns = ["x", "y", "z", "qx", "qy", "qz", "qw", *robot.joint_names]
+    header = "t," + ",".join(f"q:{each}" for each in columns)
+    np.savetxt(
+        tmp_path / "log.csv",
+        np.column_stack([t, q]),
+        delimiter=",",
+        header=header,
+        comments="",
+        fmt="%.17g",
+    )
+    read = Rollout.load(tmp_path / "log.csv", robot)
+    np.testing.assert_allclose(read.v, np.tile(v, (101, 1)), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "is empty"),
+        ("t,q:joint1\n0,0\n1,0\n", "has no column 'q:joint2' or 'joint2'; did you mean 'q:joint1'"),
+        ("q:joint1,q:joint2\n0,0\n", "has no column 't' or 'time' or 'timestamp'"),
+        ("t,joint1,joint2\n0,0,0\n1,x,0\n", ":3: column 'joint1' has 'x'; wanted a number"),
+        ("t,joint1,joint2\n0,0,0\n1,nan,0\n", ":3: column 'joint1' has 'nan'"),
+        ("t,joint1,joint2\n0,0,0\n1,0\n", ":3: column 'joint2' has ''; wanted a number"),
+        ("t,joint1,joint2\n0,0,0\n1,0,0\n\n1,0,0\n", "do not increase at line 5"),
+        ("t,joint1,joint2\n0,0,0\n", "wanted two rows or more"),
+    ],
+)
+def test_what_is_no_log_is_refused_with_its_place(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ArgumentError) as raised:
+        Rollout.load(path, ARM)
+    assert said in str(raised.value)
+    assert "log.csv" in str(raised.value)
+
+
+def test_robots_are_given_for_tables_only(tmp_path: Path) -> None:
+    rollout = simulate(ARM, None, plant="compiled", duration=0.002)
+    rollout.save(tmp_path / "run.csv")
+    rollout.save(tmp_path / "run.npz")
+    with pytest.raises(ArgumentError, match="does not have its robot: give it as model="):
+        Rollout.load(tmp_path / "run.csv")
+    with pytest.raises(ArgumentError, match=r"has its robot; model= is for \.csv files"):
+        Rollout.load(tmp_path / "run.npz", ARM)
+    (tmp_path / "folder.csv").mkdir()
+    with pytest.raises(ArgumentError, match="is a directory"):
+        Rollout.load(tmp_path / "folder.csv", ARM)
