@@ -249,9 +249,11 @@ class TraceError(CompileError, TypeError):
 
 
 def located(message: str, source: str | None, line: int | None) -> str:
-    """Prefix `message` with ``source:line``, as compilers do."""
+    """Prefix `message` with ``source:line``, as compilers do; a xacro file has other lines than its URDF."""
     if source is None:
         return message if line is None else f"line {line}: {message}"
+    if source.endswith(".xacro") and line is not None:
+        return f"{source}, line {line} of its URDF: {message}"
     return f"{source}: {message}" if line is None else f"{source}:{line}: {message}"
 
 

@@ -17,7 +17,7 @@ from dynx.model.model import STANDARD_GRAVITY, Base, Model
 from dynx.model.package_paths import StrPath, data_folders, environment_folders, resolve_package
 from dynx.model.urdf.geometry import urdf_geometry
 from dynx.model.urdf.reader import read_urdf
-from dynx.model.xacro_reading import expand_xacro
+from dynx.model.xacro_reading import expand_xacro, split_arguments
 from dynx.option_names import checks_option_names
 
 _SUFFIXES = (".urdf", ".xacro", ".xml")
@@ -40,7 +40,8 @@ def load(
     - URDF text: a `str` or `bytes` whose first character, after white space or a byte-order mark, is ``<``;
     - a path: any `os.PathLike`, or a `str` with a separator or with the suffix .urdf, .xacro or .xml (.xacro
       needs the extra ``xacro``, which evaluates expressions of a file as Python code: expand only files that
-      you trust). Such a string is never looked up as a name;
+      you trust). Such a string is never looked up as a name. Arguments of a xacro file follow its path in a
+      `str`, as ROS writes them: ``"ur.urdf.xacro name:=ur ur_type:=ur5e"``;
     - ``package://NAME/FILE``: a file of a package in `package_dirs`, in ROS_PACKAGE_PATH or
       AMENT_PREFIX_PATH, or of the Python package ``pybullet_data``; never one outside the package;
     - the name of a robot in the library, see ``dynx robots``. It takes precedence over a file of that name in
@@ -91,10 +92,11 @@ def read_description(
         return x, "<string>", None
     if not isinstance(x, str | os.PathLike):
         raise ArgumentError(f"cannot load {type(x).__name__}; wanted a path, URDF text, a name or a Model")
-    path = _path_of(x, package_dirs)
+    named, arguments = split_arguments(x) if isinstance(x, str) else (x, {})
+    path = _path_of(named, package_dirs)
     name = PurePath(path).name.split(".")[0]
     if path.endswith(".xacro"):
-        return expand_xacro(path, package_dirs), printable(path), name
+        return expand_xacro(path, package_dirs, arguments), printable(path), name
     return read_file(path), printable(path), name
 
 

@@ -21,7 +21,10 @@ def depth_first(links: list[Link], joints: list[Joint], source: str) -> tuple[li
     no link at all, or more than MAX_LINKS links.
     """
     if not links:
-        raise DescriptionError("the robot has no link", source=source)
+        hint = "; a xacro file that defines macros only is read by the file that calls them"
+        raise DescriptionError(
+            f"the robot has no link{hint if source.endswith('.xacro') else ''}", source=source
+        )
     if len(links) > MAX_LINKS:
         raise DescriptionError(
             f"the robot has {len(links)} links; at most {MAX_LINKS} are accepted", source=source

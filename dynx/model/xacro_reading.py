@@ -2,9 +2,10 @@
 
 xacro evaluates expressions of the file with Python's ``eval``, reads the files that it names, prints to the
 terminal, and finds packages by a function that only ROS provides. It therefore runs in a child process, which
-can be terminated and in which that function can be replaced without affecting the process that uses dynx. The
-child imports nothing from the current directory, and its time, memory and output are bounded. That protects
-against mistakes, not against malice: expand only files that you trust.
+can be terminated and in which that function can be replaced without affecting the process that uses dynx:
+``$(find NAME)`` searches around the file as the search for meshes does. The child imports nothing from the
+current directory, and its time, memory and output are bounded. That protects against mistakes, not against
+malice: expand only files that you trust.
 """
 
 from __future__ import annotations
@@ -12,24 +13,34 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
+import re
+import shlex
 import signal
 import subprocess
 import sys
 import sysconfig
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from dynx.errors import DescriptionError, NotInstalledError, escaped
+from dynx.errors import ArgumentError, DescriptionError, NotInstalledError, escaped, nearest, shown
 from dynx.files.reading import MAX_BYTES, printable, read_file
-from dynx.model.package_paths import StrPath, find_package
+from dynx.model.package_paths import StrPath, environment_folders, find_package
+from dynx.model.package_search import package_of
 
 TIMEOUT = 60.0
 """Longest duration of an expansion [s]."""
 
 MAX_MEMORY = 2 * 2**30
 """Largest memory of an expansion [bytes], besides that of the interpreter; bounded on Linux."""
+
+_WITH_ARGUMENTS = re.compile(r"(?P<path>.*\.xacro)\s+(?P<arguments>\w+:=.*)", re.DOTALL)
+
+_ARGUMENT = re.compile(r"(\w+):=(.*)", re.DOTALL)
+
+_SCHEME = "package://"
+"""Beginning of the path in a package that was not found."""
 
 _TEXT, _REASON = b"+", b"-"
 """First byte of the reply of the child process: the text or the reason of a failure follows."""
@@ -45,16 +56,46 @@ spec = spec_from_file_location("dynx", task["dynx"])
 sys.modules["dynx"] = module_from_spec(spec)
 spec.loader.exec_module(sys.modules["dynx"])
 from dynx.model.xacro_reading import expand_here
-expand_here(task["file"], task["roots"])
+expand_here(task["file"], task["roots"], task["arguments"])
 """
 
 
-def expand_xacro(path: str, package_dirs: Iterable[StrPath] = ()) -> bytes:
-    """Return the URDF text of the xacro file; ``$(find NAME)`` looks in `package_dirs` only.
+def split_arguments(path: str) -> tuple[str, dict[str, str]]:
+    """Split ``FILE.xacro name:=value ...``, as ROS writes it, into the path and the arguments.
+
+    A value with blanks stands in quotes. A path without arguments is returned as it is. Raises ArgumentError
+    for a part after the path that is no argument.
+    """
+    match = _WITH_ARGUMENTS.fullmatch(path)
+    if match is None:
+        return path, {}
+    try:
+        parts = shlex.split(match["arguments"])
+    except ValueError as error:
+        raise ArgumentError(f"arguments of {shown(match['path'], 300)}: {error}") from None
+    arguments = {}
+    for part in parts:
+        argument = _ARGUMENT.fullmatch(part)
+        if argument is None:
+            raise ArgumentError(
+                f"{shown(part)} is no argument of {shown(match['path'], 300)}; wanted name:=value"
+            )
+        arguments[argument[1]] = argument[2]
+    return match["path"], arguments
+
+
+def expand_xacro(
+    path: str, package_dirs: Iterable[StrPath] = (), arguments: Mapping[str, str] | None = None
+) -> bytes:
+    """Return the URDF text of the xacro file, for the values of its arguments (``<xacro:arg>``).
+
+    ``$(find NAME)`` looks in `package_dirs`, then in the repository and the folders around the file, then in
+    ROS_PACKAGE_PATH and AMENT_PREFIX_PATH. The path of a mesh in a package that is in none of them becomes
+    ``package://NAME/...``; a file that is included from there is an error. Line numbers of the text differ
+    from those of the file.
 
     Raises NotInstalledError without xacro, DescriptionError if the expansion fails, takes longer than
-    `TIMEOUT`, needs more than `MAX_MEMORY` or makes more than `MAX_BYTES` of text. Line numbers of the text
-    differ from those of the file.
+    `TIMEOUT`, needs more than `MAX_MEMORY` or makes more than `MAX_BYTES` of text.
     """
     read_file(path)  # Raises for a FIFO or a directory, which xacro would block on.
     if importlib.util.find_spec("xacro") is None:
@@ -65,6 +106,7 @@ def expand_xacro(path: str, package_dirs: Iterable[StrPath] = ()) -> bytes:
     task = {
         "file": os.path.abspath(path),
         "roots": [os.path.abspath(os.fspath(root)) for root in package_dirs],
+        "arguments": dict(arguments or {}),
         "import_path": _import_path(),
         "dynx": str(Path(__file__).resolve().parent.parent / "__init__.py"),
     }
@@ -139,30 +181,51 @@ def _kill(process: subprocess.Popen[bytes]) -> None:
             os.killpg(process.pid, signal.SIGKILL)
 
 
-def expand_here(path: str, roots: list[str]) -> None:
+def expand_here(path: str, roots: list[str], arguments: dict[str, str]) -> None:
     """Run in the child process: write the text of the file or the reason of a failure to standard output."""
     import xacro
     from xacro import substitution_args
 
     def find(package: str) -> str:
-        return str(find_package(package, roots))
+        found = _package(package, path, roots)
+        return f"{_SCHEME}{package}" if found is None else str(found)
+
+    def full_path(named: str) -> str:
+        if _SCHEME in named:
+            missing = named.partition(_SCHEME)[2].partition("/")[0]
+            raise DescriptionError(
+                f"package {shown(missing)} was not found around the file, nor in "
+                f"{'package_dirs, ' if roots else ''}ROS_PACKAGE_PATH or AMENT_PREFIX_PATH"
+            )
+        return str(path_of(named))
 
     # Text substitution and $(eval ...) both use the function of this module.
     substitution_args._eval_find = find
     substitution_args._eval_dict["find"] = find
+    # Every file that is included or loaded passes this one; a mesh or a setting of a simulator does not.
+    path_of, xacro.abs_filename_spec = xacro.abs_filename_spec, full_path
     with os.fdopen(os.dup(1), "wb") as output:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, 1)
         os.dup2(nowhere, 2)
         try:
             _bound_memory()
-            text = xacro.process_file(path).toprettyxml(indent="  ", encoding="utf-8")
+            document = xacro.process_file(path, mappings=arguments)
+            text = document.toprettyxml(indent="  ", encoding="utf-8")
+            text = text.replace(b"file://package://", b"package://")
             reply = _TEXT + text
             if len(text) > MAX_BYTES:
                 reply = _REASON + f"its text is larger than {MAX_BYTES // 1024**2} MiB".encode()
         except BaseException as error:  # any failure becomes one line for the parent process
             reply = _REASON + _reason_of(error).encode("utf-8", "replace")
         output.write(reply)
+
+
+def _package(name: str, path: str, roots: list[str]) -> Path | None:
+    """Return the folder of a package that a xacro file names; None if nothing has it."""
+    with suppress(DescriptionError):
+        return find_package(name, roots)
+    return package_of(name, Path(os.path.realpath(path)).parent, environment_folders())
 
 
 def _reason_of(error: BaseException) -> str:
@@ -172,8 +235,23 @@ def _reason_of(error: BaseException) -> str:
     while origin is not None:
         if isinstance(origin, MemoryError):
             return f"it needs more than {MAX_MEMORY / 2**30:g} GiB of memory"
+        if isinstance(origin, DescriptionError):  # of a package
+            return str(origin)
+        if type(origin).__name__ == "ArgException":  # the class of xacro for $(arg NAME) without a value
+            return f"argument {shown(str(origin))} has no value; give it as 'FILE.xacro {origin}:=VALUE'"
+        if isinstance(origin, OSError) and isinstance(origin.filename, str):  # of a file that it includes
+            return f"{origin.strerror}: {shown(origin.filename, 200)}{_similar(origin.filename)}"
         origin = origin.__context__
-    return f"{type(error).__name__}: {' '.join(str(error).split())}"
+    kind = type(error).__name__
+    return ("" if kind == "XacroException" else f"{kind}: ") + " ".join(str(error).split())
+
+
+def _similar(path: str) -> str:
+    """Return a clause with the nearest name in the folder of a file; empty where no name is near."""
+    hint = ""
+    with suppress(OSError):
+        hint = nearest(os.path.basename(path), sorted(os.listdir(os.path.dirname(path) or ".")))
+    return hint if "did you mean" in hint else ""
 
 
 def _bound_memory() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from dynx.errors import DynxError
 from dynx.model import Model
 from dynx.model.geometry import Mesh, Shape
-from dynx.model.geometry.links import Colour
+from dynx.model.geometry.links import Collision, Colour, Visual
 from dynx.model.geometry.visible_shapes import link_shapes
 from dynx.rbd.link_poses import link_poses
 from dynx.spatial.scalar import Floats
@@ -131,15 +131,19 @@ class DrawnRobot(DrawnParts):
 
     def _visible_shapes(self, link: str) -> list[tuple[Shape, Colour, Floats]]:
         """Return the shapes by which a link is drawn, without those that cannot be read."""
+        drawn = list(link_shapes(self.model.geometry, link))
+        geometry = self.model.geometry
+        for shapes_of in (geometry.visuals, *(() if drawn else (geometry.collisions,))):
+            self._note_fault(shapes_of, link)
+        return drawn
+
+    def _note_fault(self, shapes_of: Callable[[str], Sequence[Visual | Collision]], link: str) -> None:
+        """Keep the reason why shapes of a link cannot be read, if there is one."""
         try:
-            for each in self.model.geometry.visuals(link):
+            for each in shapes_of(link):
                 _readable(each.shape)
         except DynxError as error:
             self._faults.setdefault(link, []).append(str(error))
-        try:
-            return [(_readable(shape), rgba, T) for shape, rgba, T in link_shapes(self.model.geometry, link)]
-        except DynxError:
-            return []
 
     def _shares(self, shapes: Any) -> dict[Mesh, int]:
         count = Counter(shape for shape in shapes if isinstance(shape, Mesh))

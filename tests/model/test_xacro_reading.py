@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from dynx.errors import DescriptionError, NotInstalledError, RobotNotFoundError
+from dynx.errors import ArgumentError, DescriptionError, NotInstalledError, RobotNotFoundError
 from dynx.model import xacro_reading
+from dynx.model.geometry import Mesh
 from dynx.model.loading import load
 from tests.model.descriptions import joint
 
@@ -64,8 +65,85 @@ def test_macros_and_includes_from_packages_are_expanded(robot: Path) -> None:
 
 @needs_xacro
 def test_a_package_outside_the_roots_is_not_found(robot: Path) -> None:
-    with pytest.raises(DescriptionError, match=r"xacro failed: .*package 'parts' was not found"):
+    with pytest.raises(
+        DescriptionError, match=r"xacro failed: package 'parts' was not found around the file"
+    ):
         load(robot)
+
+
+@needs_xacro
+def test_packages_of_the_repository_are_found_without_folders(robot: Path) -> None:
+    (robot.parent / ".git").mkdir()
+    (robot.parent / "packages/parts").rename(robot.parent / "packages/parts-main")
+    (robot.parent / "packages/parts-main/package.xml").write_text("<package><name>parts</name></package>")
+    assert load(robot).joint_names == ("j1", "j2")
+
+
+@needs_xacro
+def test_arguments_follow_the_path(tmp_path: Path) -> None:
+    path = tmp_path / "an arm.urdf.xacro"
+    path.write_text(
+        f"""<robot name="$(arg name)" {XMLNS}><xacro:arg name="links" default="1"/>
+        <xacro:if value="$(eval links == 2)"><link name="$(arg name) tool"/></xacro:if>
+        <xacro:unless value="$(eval links == 2)"><link name="base"/></xacro:unless></robot>"""
+    )
+    assert [link.name for link in load(f"{path} name:=b").links] == ["base"]
+    model = load(f"{path} name:='my arm' links:=2")
+    assert (model.name, model.links[0].name, model.source) == ("my arm", "my arm tool", str(path))
+    with pytest.raises(
+        DescriptionError, match=r"argument 'name' has no value; give it as 'FILE.xacro name:="
+    ):
+        load(path)
+    for wrong in ("name:=a b", "name:='a"):
+        with pytest.raises(ArgumentError, match=r"no argument of|No closing quotation"):
+            load(f"{path} {wrong}")
+
+
+@needs_xacro
+def test_a_package_that_only_a_mesh_names_may_be_missing(tmp_path: Path) -> None:
+    path = tmp_path / "robot.xacro"
+    path.write_text(
+        f"""<robot name="r" {XMLNS}><link name="base"><visual><geometry>
+        <mesh filename="file://$(find looks)/base.stl"/></geometry></visual></link>
+        <gazebo><parameters>$(find control)/gains.yaml</parameters></gazebo></robot>"""
+    )
+    shape = load(path).geometry.visuals("base")[0].shape
+    assert isinstance(shape, Mesh)
+    with pytest.raises(DescriptionError, match=r"package 'looks' was not found"):
+        _ = shape.triangles
+
+
+@needs_xacro
+@pytest.mark.parametrize(
+    "text",
+    [
+        '<xacro:include filename="$(find gone)/arm.xacro"/>',
+        '<xacro:include filename="$(find gone)/*.xacro"/>',
+        "<xacro:property name=\"p\" value=\"${xacro.load_yaml('$(find gone)/p.yaml')}\"/><a b='${p}'/>",
+    ],
+)
+def test_a_file_of_a_missing_package_is_an_error(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "robot.xacro"
+    path.write_text(f'<robot name="r" {XMLNS}><link name="base"/>{text}</robot>')
+    with pytest.raises(DescriptionError, match=r"xacro failed: package 'gone' was not found around the file"):
+        load(path)
+
+
+@needs_xacro
+def test_an_included_file_that_is_not_there_is_named_with_the_nearest(tmp_path: Path) -> None:
+    (tmp_path / "wheels.xacro").write_text(f"<robot {XMLNS}/>")
+    path = tmp_path / "robot.xacro"
+    path.write_text(f'<robot name="r" {XMLNS}><xacro:include filename="wheel.xacro"/></robot>')
+    with pytest.raises(DescriptionError, match=r"No such file.*wheel\.xacro'; did you mean 'wheels\.xacro'"):
+        load(path)
+
+
+@needs_xacro
+def test_a_file_of_macros_is_no_robot(tmp_path: Path) -> None:
+    path = tmp_path / "arm.xacro"
+    path.write_text(ARM)
+    with pytest.raises(DescriptionError, match="has no link; a xacro file that defines macros only"):
+        load(path)
 
 
 @needs_xacro
@@ -154,3 +232,14 @@ def test_memory_that_ran_out_is_named_with_its_limit() -> None:
     error.__context__ = MemoryError()
     limit = xacro_reading.MAX_MEMORY / 2**30
     assert xacro_reading._reason_of(error) == f"it needs more than {limit:g} GiB of memory"
+
+
+@needs_xacro
+def test_lines_are_those_of_the_expanded_text(tmp_path: Path) -> None:
+    path = tmp_path / "x.xacro"
+    path.write_text('<robot name="r"><link name="a"/><link name="a"/></robot>')
+    with pytest.raises(
+        DescriptionError, match=r"x\.xacro, line \d+ of its URDF: two links are named 'a'"
+    ) as caught:
+        load(path)
+    assert caught.value.line is not None

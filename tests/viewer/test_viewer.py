@@ -315,6 +315,19 @@ def test_pictures_and_films_are_drawn_without_a_browser(arm: Model, tmp_path: Pa
     assert (tmp_path / "robot.png").stat().st_size > 1000
 
 
+def test_a_picture_leaves_out_what_cannot_be_read(tmp_path: Path) -> None:
+    """A page leaves out such shapes; a picture once refused a robot for a collision shape."""
+    text = """<robot name="r">
+      <link name="seen"><visual><geometry><box size="1 1 1"/></geometry></visual>
+        <collision><geometry><cylinder radius="1" length="0"/></geometry></collision></link>
+      <link name="lost"><collision><geometry><mesh filename="package://none/a.stl"/></geometry></collision></link>
+      <joint name="j" type="fixed"><parent link="seen"/><child link="lost"/></joint></robot>"""
+    with view(dynx.load(text)) as viewer:
+        viewer.export(tmp_path / "robot.png")
+        assert any("link 'lost' is not read" in note for note in viewer.notes)
+    assert (tmp_path / "robot.png").stat().st_size > 1000
+
+
 def test_errors_of_the_loads_are_shown_and_end_the_motion() -> None:
     def failing(world: World) -> dict[str, Any]:
         raise ValueError("no load")

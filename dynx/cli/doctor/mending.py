@@ -12,6 +12,7 @@ from dynx.errors import ArgumentError, shown
 from dynx.files.reading import read_file
 from dynx.files.writing import write_bytes
 from dynx.model.expansion import RobotInput, is_library_name
+from dynx.model.xacro_reading import split_arguments
 from dynx.model.xml.source import XmlSource
 
 
@@ -58,13 +59,13 @@ def targets(inputs: Sequence[RobotInput], out: str) -> list[str]:
 def in_place_targets(inputs: Sequence[RobotInput]) -> list[str]:
     """Return the inputs as the files to write; ArgumentError for an input that is no file of the user."""
     for each in inputs:
+        if split_arguments(each.robot)[0].endswith(".xacro"):
+            raise ArgumentError(
+                f"{shown(each.robot, 200)} is xacro source; --fix writes the URDF that it expands to"
+            )
         if each.refusal is None and (not os.path.isfile(each.robot) or is_library_name(each.robot)):
             raise ArgumentError(
                 f"--in-place needs files, and {shown(each.robot, 200)} is none (--fix writes a new one)"
-            )
-        if each.robot.endswith(".xacro"):
-            raise ArgumentError(
-                f"{shown(each.robot, 200)} is xacro source; --fix writes the URDF that it expands to"
             )
         if each.refusal is None:
             check_writable(each.robot)
@@ -111,6 +112,6 @@ def _require_unchanged(path: str, report: DoctorReport) -> None:
 def _name(each: RobotInput) -> str:
     if each.folder is not None:
         return os.path.relpath(each.robot, each.folder)
-    name = PurePath(each.robot).name
+    name = PurePath(split_arguments(each.robot)[0]).name
     stem = name.removesuffix(".xacro").removesuffix(".urdf")
     return f"{stem or 'robot'}.urdf"

@@ -87,7 +87,8 @@ def show_verdict(out: Console, report: DoctorReport) -> None:
     out.print(f"{short_line(report.robot)}, {report.base} base: {one_line(report.verdict)}", style=style)
     mass = "" if report.total_mass is None else f"total mass {report.total_mass:.4g} kg"
     where = "" if report.source is None else short_line(report.source)
-    out.print(f"({'; '.join(filter(None, (where, mass)))})", style="dim")
+    expanded = "lines are those of the URDF that it expands to" if where.endswith(".xacro") else ""
+    out.print(f"({'; '.join(filter(None, (where, expanded, mass)))})", style="dim")
 
 
 def show_engines(out: Console, report: DoctorReport) -> None:

@@ -142,6 +142,7 @@ def cli(ctx: click.Context) -> None:
     """One interface over several rigid-body dynamics engines, and tests that they agree.
 
     ROBOT is the path of a URDF or xacro file, or a name from `dynx robots`.
+    Arguments of a xacro file follow in the same word: "ur.xacro name:=ur".
     """
     if ctx.invoked_subcommand is None:
         click.echo(ctx.get_help())

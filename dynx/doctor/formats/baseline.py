@@ -20,6 +20,7 @@ from dynx.doctor.report import DoctorReport
 from dynx.errors import ArgumentError, shown
 from dynx.files.documents import read_document, to_json_values
 from dynx.files.reading import read_file
+from dynx.model.xacro_reading import split_arguments
 
 SCHEMA = 1
 
@@ -142,7 +143,9 @@ def differences(report: DoctorReport, folder: str) -> tuple[Difference, ...]:
 def robot_key(report: DoctorReport, folder: str) -> str:
     """Return the robot's name, or its path from the folder of the baseline, with forward slashes."""
     path = report.robot
-    looks_like_path = any(sep in path for sep in (os.sep, "/")) or PurePath(path).suffix in (
+    looks_like_path = any(sep in path for sep in (os.sep, "/")) or PurePath(
+        split_arguments(path)[0]
+    ).suffix in (
         ".urdf",
         ".xacro",
     )

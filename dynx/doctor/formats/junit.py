@@ -14,6 +14,7 @@ from dynx.doctor.formats import wording
 from dynx.doctor.formats.baseline import Baseline, Difference
 from dynx.doctor.formats.causes import Cause, causes
 from dynx.doctor.report import DoctorReport, Finding
+from dynx.errors import located
 
 Element = ElementTree.Element
 
@@ -126,6 +127,6 @@ def _result(tag: str, message: str, kind: str | None = None, text: str | None = 
 
 def _place(finding: Finding, report: DoctorReport) -> str:
     where = wording.name(report.source or report.robot, 300)
-    line = "" if finding.line is None else f":{finding.line}"
     message = wording.name(finding.message, 1000)
-    return f"{where}{line}: {wording.part(finding)}: {message} ({wording.finding_effect(finding)})"
+    text = f"{wording.part(finding)}: {message} ({wording.finding_effect(finding)})"
+    return located(text, where, finding.line)

@@ -22,6 +22,7 @@ from dynx.doctor.formats import wording
 from dynx.doctor.formats.baseline import UNEXPLAINED, Baseline, Place
 from dynx.doctor.formats.causes import advice, catalogue_entry, causes, severity
 from dynx.doctor.report import DoctorReport, Finding, Unexplained
+from dynx.errors import located
 
 SCHEMA_URI = "https://json.schemastore.org/sarif-2.1.0.json"
 
@@ -124,7 +125,7 @@ def _results(report: DoctorReport, baseline: Baseline | None) -> Iterator[dict[s
 def _refusal(report: DoctorReport) -> dict[str, Any]:
     assert report.error is not None
     # The place is in the result itself.
-    where = f"{report.source}:" if report.error_line is None else f"{report.source}:{report.error_line}:"
+    where = located("", report.source, report.error_line).strip()
     message = wording.name(report.error.message.removeprefix(where).strip() or report.error.type, 2000)
     return _result(report, REFUSED, "error", message, report.error_line)
 
@@ -163,6 +164,8 @@ def _result(
     location = artifact_location(report)
     parts = ["" if part is None else f"={part}" for part in (location["uri"], rule, *identity)]
     digest = hashlib.sha256("\0".join(parts).encode("utf-8", "backslashreplace")).hexdigest()[:32]
+    if location["uri"].endswith(".xacro"):
+        line = None  # Lines are those of the URDF that it expands to.
     region = {"startLine": max(line or 1, 1)}
     return {
         "ruleId": rule,

@@ -5,22 +5,13 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable
-from functools import lru_cache
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 from dynx.errors import DescriptionError, nearest, shown
 from dynx.files.reading import irregularity
-from dynx.model.package_paths import StrPath, environment_folders, find_package, resolve_package
-
-_PACKAGE_FILES = ("package.xml", "manifest.xml")
-"""Files that mark the root folder of a ROS package."""
-
-_PACKAGE_PARTS = ("meshes", "mesh", "urdf")
-"""Folders of a package that describes a robot."""
-
-_PARTS = frozenset({"description", "model", "models", "robot", "robots", "urdf", "urdfs", "xacro"})
-"""Names of folders that by convention lie beside the folder of the meshes."""
+from dynx.model.package_paths import StrPath, environment_folders, resolve_package
+from dynx.model.package_search import enclosing_folder, package_of
 
 _THREE_SLASHES = re.compile("^package:///+")
 
@@ -32,7 +23,7 @@ class MeshNotFoundError(Exception):
 def find_mesh(filename: str, source: str, package_dirs: Iterable[StrPath] = ()) -> Path | None:
     """Find the file of a mesh named in the description `source` (a path); None where its folder is unknown.
 
-    ``package://NAME/FILE`` is searched in the folders above the description and in ROS_PACKAGE_PATH and
+    ``package://NAME/FILE`` is searched around the description (`package_search`) and in ROS_PACKAGE_PATH and
     AMENT_PREFIX_PATH; a package in none of them may be installed elsewhere, so the result is None. A relative
     path starts from the description's folder. Raises MeshNotFoundError where the folder is known and the
     file is not in it.
@@ -72,7 +63,7 @@ def reason_unknown(filename: str, source: str) -> str:
     if filename.startswith("package://"):
         name = filename.removeprefix("package://").partition("/")[0]
         try:
-            found = _package(name, Path(os.path.realpath(source)).parent, environment_folders())
+            found = package_of(name, Path(os.path.realpath(source)).parent, environment_folders())
         except (OSError, ValueError, RuntimeError):
             found = None
         outside = f"{shown(filename, 200)} is outside its package"
@@ -112,62 +103,12 @@ def _existing(path: Path, root: Path, described: str) -> Path | None:
     raise MeshNotFoundError(f"no file {described}{hint}")
 
 
-# Cached, because a robot has dozens of meshes.
-@lru_cache(maxsize=256)
-def enclosing_folder(folder: Path) -> Path:
-    """Return the folder of all files that come with a description: the repository, else the package.
-
-    Without either it is the description's own folder, or the one above where the name of the folder shows
-    that it holds descriptions only.
-    """
-    above = [each for each in (folder, *folder.parents) if _is_private(each)]
-    for markers in ((".git",), _PACKAGE_FILES):
-        for each in above:
-            if any((each / marker).exists() for marker in markers):
-                return each
-    beside = folder.name.lower() in _PARTS or "urdf" in folder.name.lower()
-    return folder.parent if beside and folder.parent in above else folder
-
-
-def _is_private(folder: Path) -> bool:
-    """Check whether a folder can belong to one description: not the root, a home folder, or one above it."""
-    home = Path(os.path.realpath(os.path.expanduser("~")))
-    return folder != folder.parent and not home.is_relative_to(folder)
-
-
 def _in_package(uri: str, folder: Path) -> Path | None:
     name, _, inside = uri.removeprefix("package://").partition("/")
-    package = _package(name, folder, environment_folders())
+    package = package_of(name, folder, environment_folders())
     if package is None:
         return None
     return _existing(package / inside, package, f"{shown(inside, 200)} in package {shown(name)}")
-
-
-# Cached, because a description names its few packages hundreds of times.
-@lru_cache(maxsize=256)
-def _package(name: str, folder: Path, elsewhere: tuple[Path, ...]) -> Path | None:
-    """Find a package: a folder of the description, one above it or beside one of these if it is marked as a
-    package or, above, has the usual parts of one, or in a folder of the environment.
-
-    The name alone is no evidence, because the description chooses it.
-    """
-    enclosing = enclosing_folder(folder)
-    for root in (folder, *folder.parents):
-        found = _find(name, [root]) if _is_private(root) else None
-        if found is None:
-            continue
-        marked = any((found / marker).is_file() for marker in _PACKAGE_FILES)
-        above = folder.is_relative_to(found) and any((found / part).is_dir() for part in _PACKAGE_PARTS)
-        if marked or above or found.is_relative_to(enclosing):
-            return found
-    return _find(name, elsewhere)
-
-
-def _find(name: str, roots: Iterable[Path]) -> Path | None:
-    try:
-        return find_package(name, roots)
-    except DescriptionError:
-        return None
 
 
 def _similar(path: Path) -> str:

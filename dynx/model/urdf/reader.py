@@ -21,6 +21,9 @@ from dynx.model.xml.reading import Element, read_xml
 _OPAQUE = frozenset(
     ["visual", "collision", "contact", "material", "transmission", "gazebo", "sensor", "ros2_control"]
 )
+_SRDF = frozenset(["group", "group_state", "disable_collisions", "virtual_joint"])
+"""Elements of SRDF, whose root is named as that of URDF."""
+
 _KNOWN = _OPAQUE | {"link", "joint", "plugin", "static"}
 
 
@@ -69,6 +72,11 @@ def _require_robot(root: Element, reading: Reading) -> None:
     if root.tag != "robot":
         other = {"sdf": " (SDF is not read)", "mujoco": " (MJCF is not read)"}.get(root.tag, "")
         raise reading.error(root, f"the root element is <{escaped(root.tag)}>; wanted <robot>{other}")
+    tags = {child.tag for child in root.children}
+    if tags & _SRDF and "link" not in tags:
+        raise reading.error(
+            root, "this is an SRDF file, which has groups of joints and no robot; wanted a URDF file"
+        )
 
 
 def _unread_part(root: Element) -> Note | None:

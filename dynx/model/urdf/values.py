@@ -154,7 +154,7 @@ class Reading:
     ) -> DescriptionError:
         hint = ""
         if "${" in text or "$(" in text:
-            hint = "; this is xacro that was not expanded: expand the file with xacro"
+            hint = "; this is xacro that was not expanded: name the file .xacro, which dynx expands"
         elif "," in text:
             hint = "; decimals take a point, and numbers are separated by white space"
         message = f"{attribute} in <{element.tag}> of {what} is {shown(text)}; wanted {wanted}{hint}"

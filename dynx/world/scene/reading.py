@@ -16,6 +16,7 @@ from dynx.model.elements import IDENTITY, ZERO
 from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
 from dynx.model.geometry.sizes import finite_numbers, finite_vector
 from dynx.model.loading import load, read_model
+from dynx.model.xacro_reading import split_arguments
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_quat
 from dynx.world.motors import Motor, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
@@ -131,7 +132,10 @@ def _model(given: RobotDocument, paths: ScenePaths | None) -> Model:
         raise ArgumentError(
             "robot is a name or a file, which a document from elsewhere may not name; wanted urdf"
         )
-    robot = paths.find(given.robot, "robot") if _is_file(given.robot) else given.robot
+    robot = given.robot
+    file, _ = split_arguments(robot)
+    if _is_file(file):
+        robot = paths.find(file, "robot") + robot.removeprefix(file)
     return load(
         robot,
         base=given.base,

@@ -275,7 +275,10 @@ def test_one_robot_goes_to_a_file_and_several_to_a_folder(tmp_path: Path) -> Non
     assert targets_of(f"{out}.urdf", RobotInput("ur5")) == [f"{out}.urdf"]
     assert targets_of(str(tmp_path), RobotInput("ur5")) == [str(tmp_path / "ur5.urdf")]
     several = targets_of(
-        out, RobotInput("ur5"), RobotInput("x/arm.urdf.xacro"), RobotInput("d/e/f.urdf", folder="d")
+        out,
+        RobotInput("ur5"),
+        RobotInput("x/arm.urdf.xacro side:=left"),
+        RobotInput("d/e/f.urdf", folder="d"),
     )
     assert several == [f"{out}/ur5.urdf", f"{out}/arm.urdf", f"{out}/e/f.urdf"]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from dynx.errors import DescriptionError
-from dynx.model.geometry import mesh_files
+from dynx.model import package_search
 from dynx.model.geometry.mesh_files import MeshNotFoundError, find_mesh
 from dynx.model.package_paths import resolve_package
 from dynx.rules.geometry.meshes import mesh_box
@@ -129,7 +129,7 @@ def test_a_folder_above_is_no_package_by_its_name_alone(tmp_path: Path, name: st
     assert find_mesh(name, str(robot)) is None
     # With the parts of a package it is one.
     (tmp_path / "data/meshes").mkdir()
-    mesh_files._package.cache_clear()
+    package_search.package_of.cache_clear()
     assert find_mesh("package://data/other/a.stl", str(robot)) == tmp_path / "data/other/a.stl"
 
 
@@ -140,7 +140,7 @@ def test_packages_beside_the_description_are_found_by_their_marker(robot: Path) 
     name = "package://hand_description/a.stl"
     assert find_mesh(name, str(robot)) is None
     (mesh.parent / "package.xml").write_text("<package/>")
-    mesh_files._package.cache_clear()
+    package_search.package_of.cache_clear()
     found = find_mesh(name, str(robot))
     assert found is not None
     assert found.samefile(mesh)
@@ -156,7 +156,7 @@ def test_paths_may_climb_within_the_package_or_repository(tmp_path: Path, marker
     mesh.write_bytes(b"")
     assert find_mesh("../../meshes/a.stl", str(robot)) is None
     (tmp_path / "repository" / marker).mkdir()
-    mesh_files.enclosing_folder.cache_clear()
+    package_search.enclosing_folder.cache_clear()
     assert find_mesh("../../meshes/a.stl", str(robot)) == mesh
     with pytest.raises(MeshNotFoundError):
         find_mesh("../../meshes/b.stl", str(robot))

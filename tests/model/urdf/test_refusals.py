@@ -11,6 +11,11 @@ from dynx.model.loading import load
 from tests.model.descriptions import INERTIAL, chain, joint, link, robot
 
 BAD: dict[str, tuple[str, int | None, str]] = {
+    "semantic description": (
+        "<robot name='r'>\n<group name='arm'/></robot>",
+        1,
+        "this is an SRDF file, which has groups of joints and no robot; wanted a URDF file",
+    ),
     "no robot": ("\n<sdf/>", 2, "the root element is <sdf>; wanted <robot> (SDF is not read)"),
     "two robots": (robot('<link name="a"/>') + "<robot", 4, "wanted one root element"),
     "no link": (robot(""), None, "the robot has no link"),

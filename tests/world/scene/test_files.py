@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 from pathlib import Path
 from typing import Any
@@ -261,3 +262,14 @@ def test_a_document_from_elsewhere_reads_no_file_of_the_user(tmp_path: Path) -> 
     given = {"name": "b", "shape": {"mesh": str(tmp_path / "cube.stl")}}
     with pytest.raises(DescriptionError, match="outside the folder of the scene"):
         scene_from_document({"schema": "dynx.scene/1", "bodies": [given]})
+
+
+@pytest.mark.skipif(importlib.util.find_spec("xacro") is None, reason="xacro is not installed")
+def test_a_robot_in_xacro_has_arguments(tmp_path: Path) -> None:
+    (tmp_path / "arm.xacro").write_text(
+        '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="$(arg link)"/></robot>'
+    )
+    (tmp_path / "scene.toml").write_text(
+        'schema = "dynx.scene/1"\n[[robots]]\nname = "r"\nrobot = "arm.xacro link:=base"\n'
+    )
+    assert read_scene(tmp_path / "scene.toml").robots[0].model.links[0].name == "base"

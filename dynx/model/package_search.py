@@ -1,0 +1,137 @@
+"""Search for the packages of a description: in its repository, around it, and in the environment."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from functools import lru_cache
+from pathlib import Path
+
+from dynx.errors import DescriptionError
+from dynx.model.package_paths import find_package
+
+MANIFESTS = ("package.xml", "manifest.xml")
+"""Files that mark the root folder of a ROS package; the first states its name."""
+
+MAX_FOLDERS = 5000
+"""Largest number of folders of a repository that are searched for a package."""
+
+_MAX_MANIFEST = 2**16
+"""Largest part of a manifest that is read for its name [bytes]."""
+
+_PACKAGE_PARTS = ("meshes", "mesh", "urdf")
+"""Folders of a package that describes a robot."""
+
+_DESCRIPTION_FOLDERS = frozenset(
+    {"description", "model", "models", "robot", "robots", "urdf", "urdfs", "xacro"}
+)
+"""Names of folders that by convention lie beside the folder of the meshes."""
+
+_COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
+_NAME = re.compile(rb"<name>\s*([^<\s]+)\s*</name>")
+
+
+# Cached, because a robot has dozens of meshes.
+@lru_cache(maxsize=256)
+def enclosing_folder(folder: Path) -> Path:
+    """Return the folder of all files that come with a description: the repository, else the package.
+
+    Without either it is the description's own folder, or the one above where the name of the folder shows
+    that it holds descriptions only.
+    """
+    above = [each for each in (folder, *folder.parents) if _is_private(each)]
+    for markers in ((".git",), MANIFESTS):
+        for each in above:
+            if any((each / marker).exists() for marker in markers):
+                return each
+    beside = folder.name.lower() in _DESCRIPTION_FOLDERS or "urdf" in folder.name.lower()
+    return folder.parent if beside and folder.parent in above else folder
+
+
+# Cached, because a description names its few packages hundreds of times.
+@lru_cache(maxsize=256)
+def package_of(name: str, folder: Path, elsewhere: tuple[Path, ...]) -> Path | None:
+    """Find a package for the descriptions in `folder`; None if nothing around them is the package.
+
+    It is a folder of that name: one of the description, or one above it or beside one of these if it is
+    marked as a package or, above, has the usual parts of one. Else it is the nearest package of the
+    repository whose manifest states the name, as ROS names packages, or a folder of the environment,
+    `elsewhere`. The name alone is no evidence outside the repository, because the description chooses it.
+    """
+    enclosing = enclosing_folder(folder)
+    for root in (folder, *folder.parents):
+        found = _find(name, [root]) if _is_private(root) else None
+        if found is None:
+            continue
+        marked = any((found / marker).is_file() for marker in MANIFESTS)
+        above = folder.is_relative_to(found) and any((found / part).is_dir() for part in _PACKAGE_PARTS)
+        if marked or above or found.is_relative_to(enclosing):
+            return found
+    return _by_manifest(name, folder, enclosing) or _find(name, elsewhere)
+
+
+def _by_manifest(name: str, folder: Path, enclosing: Path) -> Path | None:
+    """Return the package below `enclosing` of that name that has the most folders in common with `folder`."""
+    if not any((enclosing / marker).exists() for marker in (".git", *MANIFESTS)):
+        return None  # A folder of downloads, say, which is as large as it may be.
+    found = [package for package, stated in _packages(enclosing) if stated == name]
+
+    def nearness(package: Path) -> tuple[int, int, str]:
+        return -len(os.path.commonpath([package, folder])), len(package.parts), str(package)
+
+    return min(found, key=nearness, default=None)
+
+
+@lru_cache(maxsize=16)
+def _packages(root: Path) -> tuple[tuple[Path, str], ...]:
+    """Return the packages below a folder, each with the name that its manifest states."""
+    return tuple((folder, name) for folder in _folders(root) if (name := _stated_name(folder)))
+
+
+def _folders(root: Path) -> Iterator[Path]:
+    """Yield a folder and those below it, the outer ones first, without hidden ones and symbolic links."""
+    level = [root]
+    count = 0
+    while level:
+        below: list[Path] = []
+        for folder in level:
+            yield folder
+            count += 1
+            if count >= MAX_FOLDERS:
+                return
+            with suppress(OSError):
+                entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
+                below += [
+                    Path(entry.path)
+                    for entry in entries
+                    if not entry.name.startswith(".") and entry.is_dir(follow_symlinks=False)
+                ]
+        level = below
+
+
+def _stated_name(folder: Path) -> str:
+    """Return the name that the manifest of a package states; empty if the folder has none."""
+    manifest = folder / MANIFESTS[0]
+    try:
+        if manifest.is_symlink() or not manifest.is_file():
+            return ""
+        with open(manifest, "rb") as file:
+            stated = _NAME.search(_COMMENT.sub(b"", file.read(_MAX_MANIFEST)))
+    except OSError:
+        return ""
+    return stated[1].decode("utf-8", "replace") if stated else ""
+
+
+def _is_private(folder: Path) -> bool:
+    """Check whether a folder can belong to one description: not the root, a home folder, or one above it."""
+    home = Path(os.path.realpath(os.path.expanduser("~")))
+    return folder != folder.parent and not home.is_relative_to(folder)
+
+
+def _find(name: str, roots: Iterable[Path]) -> Path | None:
+    try:
+        return find_package(name, roots)
+    except DescriptionError:
+        return None

@@ -1,0 +1,69 @@
+"""Packages of a description, by folder and by the name that their manifests state."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from dynx.model import package_search
+from dynx.model.package_search import package_of
+
+
+def _package(folder: Path, name: str) -> Path:
+    folder.mkdir(parents=True)
+    (folder / "package.xml").write_text(f"<package><!-- <name>old</name> --><name>{name}</name></package>")
+    return folder
+
+
+@pytest.fixture
+def repository(tmp_path: Path) -> Path:
+    root = tmp_path / "robots-main"
+    (root / ".git").mkdir(parents=True)
+    (root / "src/arm/urdf").mkdir(parents=True)
+    return root
+
+
+def test_a_package_is_found_anywhere_in_the_repository_by_the_name_of_its_manifest(repository: Path) -> None:
+    urdf = repository / "src/arm/urdf"
+    tool = _package(repository / "hardware/tools/gripper-v2", "gripper")
+    itself = _package(repository / "src/arm/config", "arm_config")
+    assert package_of("gripper", urdf, ()) == tool
+    assert package_of("arm_config", urdf, ()) == itself
+    assert package_of("old", urdf, ()) is None
+    assert package_of("gripper", repository.parent, ()) is None
+
+
+def test_the_root_of_a_repository_is_a_package_by_its_manifest(repository: Path) -> None:
+    (repository / "package.xml").write_text("<package><name> robots </name></package>")
+    assert package_of("robots", repository / "src/arm/urdf", ()) == repository
+
+
+def test_of_two_packages_of_a_name_the_nearer_one_counts(repository: Path) -> None:
+    far = _package(repository / "archive/gripper-v1", "gripper")
+    near = _package(repository / "src/tools/gripper-v2", "gripper")
+    assert package_of("gripper", repository / "src/arm/urdf", ()) == near
+    assert package_of("gripper", repository / "archive", ()) == far
+
+
+def test_hidden_folders_links_and_folders_outside_are_not_searched(repository: Path) -> None:
+    outside = _package(repository.parent / "elsewhere/gripper-v1", "gripper")
+    _package(repository / ".cache/gripper-v1", "gripper")
+    (repository / "linked").symlink_to(outside.parent)
+    assert package_of("gripper", repository / "src/arm/urdf", ()) is None
+
+
+def test_the_environment_comes_last(repository: Path) -> None:
+    installed = _package(repository.parent / "share/gripper", "gripper")
+    folder = repository / "src/arm/urdf"
+    assert package_of("gripper", folder, (installed.parent,)) == installed
+    package_search.package_of.cache_clear()
+    package_search._packages.cache_clear()
+    own = _package(repository / "tools/gripper-v2", "gripper")
+    assert package_of("gripper", folder, (installed.parent,)) == own
+
+
+def test_the_search_of_a_large_repository_ends(repository: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(package_search, "MAX_FOLDERS", 3)
+    _package(repository / "a/b/c/gripper-v1", "gripper")
+    assert package_of("gripper", repository / "src/arm/urdf", ()) is None
