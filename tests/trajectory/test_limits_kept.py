@@ -7,6 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import dynx
+from dynx import load
+from dynx.errors import ArgumentError, TrajectoryError
 from dynx.spatial.scalar import Floats
 from dynx.trajectory import Trajectory, s_curve, time_optimal, time_optimal_path, trapezoidal
 from dynx.trajectory.time_scaling import TimeScaledTrajectory
@@ -175,6 +178,76 @@ def test_between_two_waypoints_the_path_is_straight_and_as_fast_as_a_trapezoid(
     motion = time_optimal_path([q0, q1], velocity=velocity, acceleration=acceleration)
     best = trapezoidal(q0, q1, velocity=velocity, acceleration=acceleration)
     assert best.duration <= motion.duration <= (1.02 + 1e-3) * best.duration
+
+
+SLIDER = """
+<robot name="slider">
+  <link name="rail"/>
+  <joint name="lift" type="prismatic">
+    <parent link="rail"/><child link="cart"/><axis xyz="0 0 1"/>
+    <limit lower="-9" upper="9" effort="40" velocity="100"/>
+    <dynamics damping="2.0" friction="3.0"/>
+  </joint>
+  <link name="cart">
+    <inertial><mass value="2"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+</robot>
+"""
+
+
+def test_a_limit_of_effort_is_one_of_acceleration_for_a_mass_that_slides() -> None:
+    pytest.importorskip("toppra")
+    level = load(SLIDER).with_gravity((0.0, 0.0, 0.0))
+    points = [[0.0], [2.0]]
+    by_force = time_optimal_path(points, effort=True, model=level)
+    by_acceleration = time_optimal_path(points, acceleration=20.0, model=level)
+    assert by_force.duration == pytest.approx(by_acceleration.duration, rel=1e-6)
+    # The weight of 19.62 N is taken from the force, and helps to brake: v^2/2 = up s = down (2 - s).
+    heavy = time_optimal_path(points, effort=True, model=load(SLIDER))
+    up, down = 20.0 - 9.81, 20.0 + 9.81
+    speed = np.sqrt(2.0 * 2.0 / (1.0 / up + 1.0 / down))
+    assert heavy.duration == pytest.approx(speed / up + speed / down, rel=5e-3)
+
+
+@pytest.mark.parametrize(("name", "velocity"), [("ur10", 20.0), ("z1", 20.0), ("kinova", None)])
+@pytest.mark.parametrize("joint_dynamics", [False, True])
+def test_a_path_respects_limits_of_effort_and_uses_them(
+    name: str, velocity: float | None, joint_dynamics: bool
+) -> None:
+    pytest.importorskip("toppra")
+    model = load(name)
+    points = model.clip(0.6 * np.clip(model.random(5, 4), -2.0, 2.0))
+    motion = time_optimal_path(
+        points,
+        effort=True,
+        velocity=velocity,
+        joint_dynamics=joint_dynamics,
+        model=model,
+        backend="reference",
+    )
+    q, v, a = motion(np.linspace(0.0, motion.duration, 3000))
+    with dynx.backend("compiled", model) as engine:
+        tau = engine.inverse_dynamics(q, v, a, joint_dynamics=joint_dynamics)
+    largest = model.velocity_limit if velocity is None else velocity
+    used = np.maximum(np.abs(tau) / model.effort_limit, np.abs(v) / largest)
+    assert used.max() <= 1.0
+    assert used.max(axis=1).mean() >= 0.9
+
+
+def test_effort_that_does_not_hold_the_robot_is_refused() -> None:
+    pytest.importorskip("toppra")
+    model, points = load(SLIDER), [[0.0], [1.0]]
+    with pytest.raises(TrajectoryError, match=r"effort limit of lift is 15, but gravity .* need 19\.62"):
+        time_optimal_path(points, effort=15.0, model=model)
+    assert time_optimal_path(points, effort=21.0, model=model).duration > 0.5
+    with pytest.raises(TrajectoryError, match=r"effort limit of lift is 21, but .* need 22\.62"):
+        time_optimal_path(points, effort=21.0, joint_dynamics=True, model=model)
+    with pytest.raises(TrajectoryError, match="the limit of effort of joint 'lift' is 0"):
+        time_optimal_path(points, effort=0.0, model=model)
+    with pytest.raises(ArgumentError, match="effort is limited for a robot; wanted its model="):
+        time_optimal_path(points, effort=20.0, velocity=1.0)
+    with pytest.raises(ArgumentError, match="neither acceleration nor effort is limited"):
+        time_optimal_path(points, model=model)
 
 
 @given(st.integers(0, 1000))
