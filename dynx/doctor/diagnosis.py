@@ -106,6 +106,7 @@ def diagnose(
     except DynxError as error:
         report = refused_report(str(_label(robot)), error, base=base)
     seconds = time.perf_counter() - started
+    tolerance = max(report.tolerance, tolerance)
     return replace(report, samples=samples, seed=seed, tolerance=tolerance, seconds=seconds)
 
 
@@ -132,6 +133,7 @@ def compare_as_loaded(
     except DynxError as error:
         report = refused_report(str(_label(robot)), error, base=base)
     seconds = time.perf_counter() - started
+    tolerance = max(report.tolerance, tolerance)
     return replace(report, samples=samples, seed=seed, tolerance=tolerance, seconds=seconds)
 
 
@@ -175,6 +177,7 @@ def _diagnosis_of(
 ) -> DoctorReport:
     progress("loading")
     examiner, before, report = _loaded(case, examiner, tolerance)
+    tolerance = report.tolerance
     reference, report = before.reference, with_meshes(report, case.source)
     rules = _rules_for(examiner)
     found = with_original_lines(detections(case, rules), case.source, readable(case).case.source)

@@ -28,9 +28,20 @@ from dynx.model.xml.source import XmlSource
 from dynx.rules import LEVELS, CallingRule, Case, Detection, Rule, all_rules
 from dynx.rules.geometry import is_found, named_meshes, parts_with_meshes, reason_unread
 
+REFERENCE_MARGIN = 10.0
+"""Smallest error that counts as a difference, in errors of the reference values: engines round, too."""
+
+MAX_RAISED_TOLERANCE = 1e-9
+"""Largest tolerance for want of accuracy: beyond it a difference is more than rounding."""
+
 
 def first_report(case: Case, before: Examination, tolerance: float) -> DoctorReport:
-    """Report a case as engines load it, before any search for causes."""
+    """Report a case as engines load it, before any search for causes.
+
+    Where the reference values themselves are less accurate than `tolerance`, because large terms cancel (a
+    centre of mass that is written in millimetres), that of the report is raised by `REFERENCE_MARGIN`.
+    """
+    referee = referee_error(before.reference)
     descriptions = [each.description for each in before.outputs.values() if each.description is not None]
     model = before.reference.model
     return DoctorReport(
@@ -41,9 +52,9 @@ def first_report(case: Case, before: Examination, tolerance: float) -> DoctorRep
         kinematics_only=before.reference.kinematics_only,
         engines=tuple(_engine_result(case, name, before) for name in before.outputs),
         residual=_residual(before),
-        tolerance=tolerance,
+        tolerance=max(tolerance, min(REFERENCE_MARGIN * referee, MAX_RAISED_TOLERANCE)),
         pairs=_pairs(before),
-        referee=referee_error(before.reference),
+        referee=referee,
         model_difference=tuple(model_difference(model, descriptions)),
         text=case.source.text,
         form=case.source.form,

@@ -200,3 +200,38 @@ def test_a_model_is_examined_as_the_file_it_writes() -> None:
     assert isinstance(report, DoctorReport)
     assert report.robot == model.name
     assert report.explained
+
+
+MILLIMETRES = """<robot name="millimetres">
+  <link name="base"/>
+  <joint name="yaw" type="revolute">
+    <parent link="base"/><child link="upper"/><axis xyz="0 0 1"/>
+    <limit lower="-3" upper="3" effort="40" velocity="3"/>
+  </joint>
+  <link name="upper"><inertial>
+    <origin xyz="0 0 150"/><mass value="2"/>
+    <inertia ixx="0.01" iyy="0.01" izz="0.001" ixy="0" ixz="0" iyz="0"/>
+  </inertial></link>
+  <joint name="elbow" type="revolute">
+    <parent link="upper"/><child link="hand"/><origin xyz="0 0 0.3" rpy="0 0 90"/><axis xyz="0 1 0"/>
+    <limit lower="-3" upper="3" effort="40" velocity="3"/>
+  </joint>
+  <link name="hand"><inertial>
+    <mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>
+  </inertial></link>
+</robot>"""
+
+
+def test_rounding_of_the_reference_values_is_no_difference() -> None:
+    report = diagnose(MILLIMETRES)
+    assert BAR / 10.0 < report.referee < 1e-10  # terms of 45,000 kg m^2 cancel in an inertia of 1 kg m^2
+    assert report.tolerance == pytest.approx(10.0 * report.referee)
+    assert report.alike, report.unexplained
+    assert compare_as_loaded(MILLIMETRES).tolerance == report.tolerance
+    # Differences beyond rounding are found all the same.
+    lame = MILLIMETRES.replace("</inertial></link>\n</robot>", "</inertial></link>\n", 1)
+    lame += '<joint name="tip" type="fixed"><parent link="hand"/><child link="tool"/></joint>'
+    lame += '<link name="tool"/></robot>'
+    found = diagnose(lame, engines=BOTH)
+    assert [finding.rule for finding in found.differences] == ["DX101"]
+    assert found.explained

@@ -126,7 +126,7 @@ def show_errors(out: Console, report: DoctorReport, *, mended: bool = True) -> N
         sentence(out, "forward dynamics is not compared: the mass matrix is singular", 1, "dim")
     known = f", reference values accurate to {report.referee:.0e}" if report.referee else ""
     out.print(
-        f" tolerance {report.tolerance:g}, {counted(report.samples, 'sample')}, seed {report.seed}{known}",
+        f" tolerance {report.tolerance:.3g}, {counted(report.samples, 'sample')}, seed {report.seed}{known}",
         style="dim",
     )
 
