@@ -66,6 +66,11 @@ from dynx.cli.shell.options import FiniteRange, choice_pair, json_option, name_l
 @click.option("--junit", metavar="FILE", help="File for the reports as JUnit XML.")
 @click.option("--sarif", metavar="FILE", help="File for the reports as SARIF 2.1.0.")
 @click.option(
+    "--github",
+    is_flag=True,
+    help="Findings as annotations of GitHub Actions on standard output, without those in the baseline.",
+)
+@click.option(
     "--baseline",
     "baseline_path",
     metavar="FILE",

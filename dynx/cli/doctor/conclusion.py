@@ -64,7 +64,7 @@ class Conclusion:
         self._problems += map(str, errors)
         mended = self._mend()
         saved = [self._save_counterexamples(report) for report in reports]
-        self._outputs.echo(reports, self._run.not_done, self._run.left_out)
+        self._outputs.echo(reports, self._run.not_done, self._run.left_out, self._baseline)
         if not quiet:
             self._show(console(err=self._outputs.on_stdout), saved, mended)
         refusals = [refusal(report) for report in reports if report.error is not None]

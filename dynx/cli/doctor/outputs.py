@@ -7,10 +7,19 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+import click
+
 from dynx.cli.shell.exits import failure_of
 from dynx.cli.shell.output_file import check_writable, make_folder, require_apart
 from dynx.cli.shell.terminal import echo_json
-from dynx.doctor.formats import baseline_document, html_page, junit_xml, sarif_document, wording
+from dynx.doctor.formats import (
+    baseline_document,
+    github_annotations,
+    html_page,
+    junit_xml,
+    sarif_document,
+    wording,
+)
 from dynx.doctor.formats.baseline import Baseline
 from dynx.doctor.report import Counterexample, DoctorReport, Unexplained
 from dynx.doctor.report_document import results_document
@@ -30,10 +39,14 @@ class Outputs:
     junit: str | None = None
     sarif: str | None = None
     baseline: str | None = None
+    github: bool = False
+    """Whether standard output has the findings as annotations of GitHub Actions, too."""
 
     def check(self) -> None:
         """Raise ArgumentError for a path that cannot be written, or that is given twice."""
-        paths = [path for path in vars(self).values() if path is not None]
+        if self.github and self.on_stdout:
+            raise ArgumentError("--github and --json - both write to standard output; give --json a file")
+        paths = [path for path in vars(self).values() if isinstance(path, str)]
         for path in paths:
             if path != STDOUT or path is not self.json:
                 check_writable(path)
@@ -92,9 +105,16 @@ class Outputs:
         return [error for error in errors if error is not None]
 
     def echo(
-        self, reports: Sequence[DoctorReport], not_done: Sequence[str], left_out: Sequence[str] = ()
+        self,
+        reports: Sequence[DoctorReport],
+        not_done: Sequence[str],
+        left_out: Sequence[str] = (),
+        baseline: Baseline | None = None,
     ) -> None:
-        """Write the JSON document to standard output where it goes there."""
+        """Write annotations and the JSON document to standard output where they go there."""
+        if self.github:
+            for line in github_annotations(sarif_document(reports, baseline)):
+                click.echo(line)
         if self.on_stdout:
             echo_json(results_document(reports, not_done, left_out))
 

@@ -34,6 +34,7 @@ def doctor(
     html: str | None,
     junit: str | None,
     sarif: str | None,
+    github: bool,
     baseline_path: str | None,
     write_baseline: str | None,
     counterexamples: str,
@@ -42,7 +43,7 @@ def doctor(
     quiet: bool,
 ) -> int:
     """Examine each robot; return the exit code."""
-    outputs = Outputs(json_path, html, junit, sarif, write_baseline)
+    outputs = Outputs(json_path, html, junit, sarif, write_baseline, github)
     outputs.check()
     choices = tuple(checked_choices(choose).items())
     check_engines(engines)

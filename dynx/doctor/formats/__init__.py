@@ -5,6 +5,7 @@ anything, so each format escapes them.
 """
 
 from dynx.doctor.formats.baseline import Baseline, baseline_document, read_baseline
+from dynx.doctor.formats.github import github_annotations
 from dynx.doctor.formats.html import html_page
 from dynx.doctor.formats.junit import junit_xml
 from dynx.doctor.formats.sarif import sarif_document
@@ -12,6 +13,7 @@ from dynx.doctor.formats.sarif import sarif_document
 __all__ = [
     "Baseline",
     "baseline_document",
+    "github_annotations",
     "html_page",
     "junit_xml",
     "read_baseline",

@@ -351,3 +351,12 @@ def test_every_engine_is_in_one_group(errors: list[float]) -> None:
     found = vote(report)
     assert sorted(name for group in found.groups for name in group) == [e.engine for e in report.engines]
     assert set(found.right) == {e.engine for e in report.engines if e.before["mass matrix"] <= 1e-12}
+
+
+def test_annotations_go_to_standard_output(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert conclude([differing()], tmp_path, outputs=Outputs(github=True)) == 1
+    out = capsys.readouterr().out
+    assert out.splitlines()[0].startswith("::error file=")
+    with pytest.raises(ArgumentError, match="--github and --json - both write to standard output"):
+        Outputs(json="-", github=True).check()
+    Outputs(json=str(tmp_path / "out.json"), github=True).check()

@@ -1,0 +1,42 @@
+"""Workflow commands of GitHub Actions: findings at their lines in a pull request, without an upload.
+
+A command is a line of the log such as ``::error file=a.urdf,line=8,title=DX101::message``. GitHub shows ten
+errors, ten warnings and ten notices of a step, so the most severe come first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+from urllib.parse import unquote
+
+_COMMANDS = {"error": "error", "warning": "warning", "note": "notice"}
+
+
+def github_annotations(sarif: Mapping[str, Any]) -> list[str]:
+    """Return the command of each result of a document of `sarif_document`, but those in the baseline."""
+    (run,) = sarif["runs"]
+    names = {rule["id"]: rule["name"] for rule in run["tool"]["driver"]["rules"]}
+    found = [each for each in run["results"] if not each.get("suppressions")]
+    found.sort(key=lambda each: list(_COMMANDS).index(each["level"]))
+    return [_annotation(each, names[each["ruleId"]]) for each in found]
+
+
+def _annotation(result: Mapping[str, Any], name: str) -> str:
+    place = result["locations"][0]["physicalLocation"]
+    rule = result["ruleId"]
+    properties = {
+        "file": unquote(place["artifactLocation"]["uri"]),
+        "line": str(place["region"]["startLine"]),
+        "title": rule if name == rule else f"{rule} {name}",
+    }
+    written = ",".join(f"{key}={_escaped_property(value)}" for key, value in properties.items())
+    return f"::{_COMMANDS[result['level']]} {written}::{_escaped(result['message']['text'])}"
+
+
+def _escaped(text: str) -> str:
+    return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+def _escaped_property(text: str) -> str:
+    return _escaped(text).replace(":", "%3A").replace(",", "%2C")
