@@ -63,6 +63,11 @@ class Controls:
         self._page = page
         self._count = 0
 
+    @property
+    def _open_page(self) -> Page:
+        self._page.check_open()
+        return self._page
+
     def slider(
         self,
         name: str,
@@ -83,7 +88,7 @@ class Controls:
         if not lower < upper:
             raise ArgumentError(f"slider {shown(name)} is from {lower} to {upper}; wanted an ascending range")
         start = 0.5 * (lower + upper) if value is None else min(max(value, lower), upper)
-        handle = self._page.gui.add_slider(
+        handle = self._open_page.gui.add_slider(
             name, float(lower), float(upper), step=slider_step(lower, upper), initial_value=float(start)
         )
         if changed is not None:
@@ -96,7 +101,7 @@ class Controls:
     def button(self, name: str, pressed: Callable[[], object]) -> None:
         """Add a button; `pressed()` is called when it is pressed."""
         call = _checked_function("pressed", pressed)
-        handle = self._page.gui.add_button(_checked_label("name of a button", name))
+        handle = self._open_page.gui.add_button(_checked_label("name of a button", name))
         handle.on_click(lambda _: self._called(call))
 
     def on_key(self, key: str, pressed: Callable[[], object]) -> None:
@@ -112,14 +117,14 @@ class Controls:
                 f"key is {shown(key)}; wanted a letter, a digit, or one of "
                 f"{', '.join(each for each in HOTKEYS if len(each) > 1)}"
             )
-        command = self._page.gui.add_command(f"key {wanted}", hotkey=known[wanted.lower()])
+        command = self._open_page.gui.add_command(f"key {wanted}", hotkey=known[wanted.lower()])
         command.on_trigger(lambda _: self._called(call))
 
     def text(self, text: str, position: ArrayLike) -> Mark:
         """Write text at a position (3,) [m] in the world."""
         label = _checked_label("text", text)
         point = checked_vector("position", position)
-        return Mark(self._page.scene.add_label(self._path("text"), label, position=point))
+        return Mark(self._open_page.scene.add_label(self._path("text"), label, position=point))
 
     def line(self, points: ArrayLike, colour: RGB = BLUE, thickness: float = 0.005) -> Mark:
         """Draw the line through points (n, 3) [m] of the world, with a thickness [m]."""
@@ -128,7 +133,7 @@ class Controls:
             raise ArgumentError(f"points has shape {array.shape}; wanted (n, 3) with at least 2 points")
         segments = np.stack([array[:-1], array[1:]], axis=1).astype(np.float32)
         return Mark(
-            self._page.scene.add_line_segments(
+            self._open_page.scene.add_line_segments(
                 self._path("line"), segments, _checked_colour(colour), thickness=float(thickness)
             )
         )
@@ -151,7 +156,7 @@ class Controls:
         try:
             function(*arguments)
         except Exception as error:
-            for client in self._page.server.get_clients().values():
+            for client in self._open_page.server.get_clients().values():
                 client.add_notification(f"error: {type(error).__name__}", str(error), color="red")
             raise
 

@@ -27,6 +27,9 @@ _SMALL = 0.05
 _NOTHING = 1e-12
 """Values below which they count as zero."""
 
+_PADDING = (8, 16, 0, 0)
+"""Space above, right of, below and left of a plot for half of a number at the end of an axis [pixels]."""
+
 _LARGEST_LEGEND = 7
 """Number of curves up to which the legend is shown."""
 
@@ -60,6 +63,7 @@ class Curves:
             },
             legend=uplot.Legend(show=len(names) <= _LARGEST_LEGEND),
             aspect=1.6,
+            padding=_PADDING,
         )
 
     def put(self, now: float, *, at_once: bool = False) -> None:

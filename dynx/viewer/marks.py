@@ -147,13 +147,14 @@ class NamedParts:
     on it and moves with it."""
 
     def __init__(self, page: Page, parts: Mapping[str, Any], visuals: Mapping[str, Sequence[Any]]) -> None:
-        """`parts` are the nodes of parts, and `visuals` those of their shapes, which are clicked."""
+        """`parts` are the nodes of parts, below which all their shapes lie, and `visuals` those of the shapes
+        that are clicked."""
         self._page, self._parts, self._visuals = page, parts, visuals
         self._label: Any = None
         self.shown: str | None = None
         """The part whose name stays."""
-        names = {node.name: name for name, nodes in visuals.items() for node in nodes}
-        self._names = page.gui.add_html(names_element(names), order=math.inf)
+        page.part_names = {node.name: name for name, node in parts.items()}
+        self._names = page.gui.add_html(names_element(page.part_names), order=math.inf)
         for name, nodes in visuals.items():
             for node in nodes:
                 node.on_click(lambda _, name=name: self.show(None if name == self.shown else name))

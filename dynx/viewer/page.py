@@ -89,6 +89,8 @@ class Page:
         self._plain, self._dark = plain, dark
         self._furnish()
         self._view: tuple[Floats, Floats] | None = None
+        self.part_names: dict[str, str] = {}
+        """The names of parts by the paths of their nodes."""
         self._server.on_client_connect(self._watch_narrow)
         self.lock = threading.RLock()
         """Held by whoever changes what the page shows."""
@@ -201,10 +203,10 @@ class Page:
         Raises ArgumentError for a page that is closed.
         """
         with self.lock:
-            if self.closed:
-                raise ArgumentError(f"the page at {self.url} is closed")
+            self.check_open()
             self._end_shown()
             self.ended = threading.Event()
+            self.part_names = {}
             with self.together():
                 self.scene.reset()
                 self.gui.reset()
@@ -221,6 +223,11 @@ class Page:
     def closed(self) -> bool:
         """True after `close`."""
         return self._closed.is_set()
+
+    def check_open(self) -> None:
+        """Raise ArgumentError for a page that is closed."""
+        if self.closed:
+            raise ArgumentError(f"the page at {self.url} is closed")
 
     def wait(self, seconds: float | None = None) -> bool:
         """Wait until the page is closed, or for `seconds`; return True once it is."""

@@ -106,8 +106,10 @@ class Viewer(Controls):
         state of a world that the program steps (``steps=False``).
 
         The page shows as many of these as it can; the last is always among them. Raises ArgumentError for a
-        robot without q, a world with one, and a recorded motion, which has a timeline.
+        robot without q, a world with one, a recorded motion, which has a timeline, and a viewer that is
+        closed.
         """
+        self.page.check_open()
         view = self.view
         if view.duration is None:
             if q is not None:
@@ -127,6 +129,7 @@ class Viewer(Controls):
         The page turns around the part as before. With `first_person` it looks from the origin of the part
         along its x axis, with its z axis up. Raises ArgumentError for an unknown part.
         """
+        self.page.check_open()
         self.view.camera.follow(part, first_person=first_person)
 
     def on_part_clicked(self, clicked: Any) -> None:
@@ -139,6 +142,7 @@ class Viewer(Controls):
 
         Raises ArgumentError where no page is open: `World.camera` draws without a browser.
         """
+        self.page.check_open()
         clients = self.page.server.get_clients()
         if not clients:
             raise ArgumentError(f"no page is open at {self.url}; World.camera draws pictures without one")
@@ -169,6 +173,7 @@ class Viewer(Controls):
         from dynx.viewer.export.film import camera_for, picture_of, write_film, write_picture
         from dynx.viewer.export.recording import write_recording
 
+        self.page.check_open()
         view = self.view
         suffix = os.path.splitext(checked_path(path))[1].lower()
         if suffix == ".png":

@@ -8,10 +8,11 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, ClosedError, DynxError, shown
+from dynx.errors import ArgumentError, ClosedError, DynxError, nearest, shown
+from dynx.model.configuration import checked_array
 from dynx.model.geometry import HeightField, Plane
-from dynx.spatial.scalar import Floats
 from dynx.viewer.contact_arrows import ContactArrows
 from dynx.viewer.drawn_robot import AS_DESCRIBED, Look
 from dynx.viewer.drawn_scene import DrawnScene
@@ -73,7 +74,7 @@ class WorldView:
             page.scene, 0.3 * self._size / (STANDARD_WEIGHT * (mass or 1.0)), 0.006 * self._size
         )
         self._spring = Spring(page.scene, 0.3 * self._size)
-        self._push: Floats | None = None
+        self._pushes: list[Wrench] = []
         self._running = threading.Event()
         if not any(_is_ground(body) for body in scene.bodies):
             page.add_ground(20.0, 1.0)
@@ -177,7 +178,7 @@ class WorldView:
             if self._ended.is_set():
                 return
             try:
-                if self._loads is None and not self._spring.pulls and self._push is None:
+                if self._loads is None and not self._spring.pulls and not self._pushes:
                     self.world.step(n)
                     n = 0
                 for _ in range(n):
@@ -186,10 +187,8 @@ class WorldView:
                         raise ArgumentError(
                             f"loads returned {shown(name)}; wanted {', '.join(sorted(_LOADS))}"
                         )
-                    wrenches = [*given.pop("wrenches", ()), *self._spring.wrenches(self.world)]
-                    if self._push is not None and self._part.value != _NO_PART:
-                        wrenches.append(Wrench(self._part.value, self._push / self.world.dt))
-                        self._push = None
+                    pushes, self._pushes = self._pushes, []
+                    wrenches = [*given.pop("wrenches", ()), *self._spring.wrenches(self.world), *pushes]
                     self.world.step(1, wrenches=wrenches, **given)
             except ClosedError:
                 self._end()
@@ -200,6 +199,20 @@ class WorldView:
                 kind = "" if isinstance(error, DynxError) else f"{type(error).__name__}: "
                 self._message.value = f"{kind}{error}"
             self.draw()
+
+    def push(self, part: str, impulse: ArrayLike) -> None:
+        """Push a part in the next step with an impulse (3,) [N s], along the axes of the world and at the
+        origin of the part.
+
+        Raises ArgumentError for an unknown part and for an impulse that is no three finite numbers.
+        """
+        if part not in self.drawn.parts:
+            raise ArgumentError(f"no part {shown(part)}{nearest(str(part), self.drawn.parts)}")
+        given = checked_array("impulse", impulse, 3)
+        if given.ndim != 1:
+            raise ArgumentError(f"impulse has shape {given.shape}; wanted (3,)")
+        with self._page.lock:
+            self._pushes.append(Wrench(part, given / self.world.dt))
 
     def _end(self) -> None:
         self.pause()
@@ -255,7 +268,11 @@ class WorldView:
 
         def pushed(_: Any) -> None:
             with self._page.lock:
-                self._push = np.array(impulse.value, dtype=np.float64)
+                if self._part.value == _NO_PART:
+                    self._message.value = "choose the part that is pushed"
+                    return
+                self._message.value = ""
+                self.push(self._part.value, impulse.value)
 
         collisions.on_update(show)
         forces.on_update(show)

@@ -30,6 +30,10 @@ PATIENCE = 180.0
 """Longest wait for the page [s]: software draws slowly beside other tests."""
 
 
+PICTURE = 2000.0
+"""Time in which software draws a picture beside other tests [ms]."""
+
+
 class Opened:
     """A page of a viewer that is open in the browser, with everything it printed and asked for."""
 
@@ -45,6 +49,9 @@ class Opened:
         """Open an address and wait until the page draws."""
         self.page.goto(url)
         self.page.wait_for_selector("canvas[data-engine]", timeout=1e3 * PATIENCE)
+
+
+OpenPage = Callable[..., Opened]
 
 
 @pytest.fixture(scope="session")
@@ -103,3 +110,20 @@ def poses_of_nodes(drawn: DrawnParts) -> dict[str, Floats]:
         above = next((poses[each] for each, n in drawn.parts.items() if n.name == over), np.eye(4))
         poses[name] = above @ T
     return poses
+
+
+def pixel_of(client: Any, point: Floats) -> Floats:
+    """Return where the camera of a page sees a point (3,) of the world (2,) [pixels]."""
+    camera = client.camera
+    w, x, y, z = camera.wxyz
+    T = homogeneous(rotation_from_quat(np.array([x, y, z, w])), camera.position)
+    seen = np.linalg.inv(T) @ [*point, 1.0]
+    height, width = camera.image_height, camera.image_width
+    focal = 0.5 * height / np.tan(0.5 * camera.fov)
+    return np.array([0.5 * width + focal * seen[0] / seen[2], 0.5 * height + focal * seen[1] / seen[2]])
+
+
+def antialiased(page: Opened) -> bool:
+    """Return whether the page draws each pixel several times, to smooth edges."""
+    context = "document.querySelector('canvas[data-engine]').getContext('webgl2')"
+    return bool(page.page.evaluate(f"{context}.getContextAttributes().antialias"))

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import reduce
-from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -13,25 +12,17 @@ import pytest
 
 import dynx
 from dynx.errors import ArgumentError
-from dynx.model import Model, Pose
+from dynx.model import Model
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
 from dynx.viewer import Viewer, view
-from dynx.viewer.browser.client import HOVERED
+from dynx.viewer.motion import PARTED, separation
 from dynx.world import Scene, World
 from dynx.world.camera import Camera, draw_picture
 from dynx.world.scene import SceneRobot, read_scene
 from dynx.world.state import RobotState, WorldState
 from tests.conftest import needs_examples
-from tests.viewer.conftest import PATIENCE, Opened, connected, until
-
-OpenPage = Callable[..., Opened]
-
-PICTURE = 2000.0
-"""Time in which software draws a picture beside other tests [ms]."""
-
-MESSAGE = 160.0
-"""Height of the part of a page on which viser tells that software draws [pixels]."""
+from tests.viewer.conftest import PATIENCE, PICTURE, Opened, OpenPage, antialiased, connected, pixel_of, until
 
 SAME = 0.93
 """Share of the pixels of a silhouette that two renderers have in common; edges differ by a pixel."""
@@ -60,12 +51,6 @@ def drawn_silhouette(model: Model, q: Floats, camera: Camera) -> Any:
     scene = Scene("robot", robots=[SceneRobot("robot", model)])
     state = WorldState(0.0, {"robot": RobotState(q, np.zeros(model.nv))}, {})
     return draw_picture(scene, state, camera).segmentation >= 0
-
-
-def antialiased(page: Opened) -> bool:
-    """Return whether the page draws each pixel several times, to smooth edges."""
-    context = "document.querySelector('canvas[data-engine]').getContext('webgl2')"
-    return bool(page.page.evaluate(f"{context}.getContextAttributes().antialias"))
 
 
 @needs_examples
@@ -160,7 +145,7 @@ def test_the_panel_of_a_narrow_page_lies_below_the_robot(open_page: OpenPage) ->
         top = panel.bounding_box()["y"]
         robot = viewer.view.robot
         until(
-            lambda: all(0.0 < _pixel(client, robot.pose(link)[:3, 3])[1] < top for link in robot.links),
+            lambda: all(0.0 < pixel_of(client, robot.pose(link)[:3, 3])[1] < top for link in robot.links),
             "room",
         )
         assert not page.errors
@@ -200,7 +185,7 @@ def test_dragging_the_handle_solves_inverse_kinematics(open_page: OpenPage) -> N
             T = engine.forward_kinematics(before, frame)
             scale = float(viewer.view._handle._node.scale)
             # The arrow along z is held at a point of its shaft.
-            held, towards = (_pixel(client, (T @ [0.0, 0.0, s * scale, 1.0])[:3]) for s in (0.6, 1.0))
+            held, towards = (pixel_of(client, (T @ [0.0, 0.0, s * scale, 1.0])[:3]) for s in (0.6, 1.0))
             mouse = page.page.mouse
             # The arrow is found under the pointer when a picture has been drawn.
             for action in (lambda: mouse.move(*held), mouse.down):
@@ -237,70 +222,34 @@ def test_the_camera_moves_with_a_part(open_page: OpenPage) -> None:
         assert not page.errors
 
 
-def test_a_click_names_a_body_of_a_world_and_the_pointer_drags_it(open_page: OpenPage) -> None:
-    with World(read_scene("stack")) as world, world.view() as viewer:
+def test_the_page_pushes_a_part_and_jumps_to_where_motions_part(open_page: OpenPage) -> None:
+    scene = read_scene("slope")
+    body = next(body for body in scene.bodies if not body.fixed)
+    with World(scene) as world, world.view() as viewer:
         page = open_page(viewer.url)
-        (client,) = connected(viewer)
-        pixels = {name: _pixel(client, body.position) for name, body in world.state.bodies.items()}
-        # Below the message on software, which lies over the upper left of the page.
-        name, held = min(
-            ((name, pixel) for name, pixel in pixels.items() if pixel[1] > MESSAGE),
-            key=lambda each: each[1][1],
-        )
-        mouse = page.page.mouse
-        mouse.move(*held)
-        page.page.wait_for_timeout(PICTURE)
-        mouse.click(*held)
-        until(lambda: viewer.view.names.shown == name, "the name of the part that was clicked")
-        steps = [lambda x=x: mouse.move(held[0] + x, held[1]) for x in (30.0, 60.0)]
-        for action in (mouse.down, *steps):
-            action()
-            page.page.wait_for_timeout(PICTURE)
-
-        def pulled() -> Floats:
-            found = viewer.view._spring.wrenches(world)
-            return np.asarray(found[0].force) if found else np.zeros(3)
-
-        until(lambda: np.linalg.norm(pulled()) > 1e-3, "the spring")
-        # From the camera's place, right in the picture is along (1, 1, 0).
-        assert pulled() @ [1.0, 1.0, 0.0] > 0.9 * np.sqrt(2.0) * np.linalg.norm(pulled())
-        mouse.up()
-        until(lambda: not viewer.view._spring.pulls, "the end of the pull")
-        # A node of viser that can be dragged calls preventDefault on a press of the pointer, for which
-        # react-three-fiber listens passively, so that Chromium says that the call has no effect.
-        assert all("passive event listener" in error for error in page.errors)
-
-
-def test_the_name_of_the_part_under_the_pointer_is_shown(open_page: OpenPage, tmp_path: Path) -> None:
-    name = "<b>upper & 'arm'</b>"
-    path = tmp_path / "robot.urdf"
-    box = '<visual><geometry><box size="0.3 0.3 0.3"/></geometry></visual>'
-    path.write_text(
-        f'<robot name="r"><link name="base">{box}</link><link name="{escape(name)}">{box}</link>'
-        f'<joint name="j" type="prismatic"><parent link="base"/><child link="{escape(name)}"/>'
-        '<origin xyz="0 0 0.6"/><axis xyz="0 0 1"/>'
-        '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
-    )
-    with view(dynx.load(path), whole_meshes=False) as viewer:
+        push = page.page.get_by_role("button", name="push", exact=True)
+        push.click()
+        until(lambda: "choose the part" in viewer.view._message.value, "the message")
+        viewer.view._part.value = body.name
+        push.click()
+        until(lambda: viewer.view._pushes, "the push")
+        assert not viewer.view._message.value
+        before = world.state.bodies[body.name].twist
+        page.page.get_by_role("button", name="one step").click()
+        until(lambda: world.time > 0.0, "the step")
+        # 1 N s along x, up to what gravity and friction add in a step.
+        gained = world.state.bodies[body.name].twist[0] - before[0]
+        assert gained == pytest.approx(1.0 / (body.mass or np.inf), rel=0.2)
+        assert not page.errors
+    arm = dynx.load("six_axis_arm")
+    runs = [dynx.simulate(arm, duration=0.2, q0=arm.neutral() + at) for at in (0.0, 1e-3)]
+    with view(tuple(runs)) as viewer:
         page = open_page(viewer.url)
-        (client,) = connected(viewer)
-        label = page.page.locator(f"#{HOVERED}")
-        for part in ("base", name):
-            pixel = _pixel(client, viewer.view.robot.pose(part)[:3, 3])
-            page.page.mouse.move(*pixel)
-            page.page.wait_for_function(
-                "([id, part]) => document.getElementById(id)?.textContent === part", arg=[HOVERED, part]
-            )
-            assert label.is_visible()
-            left = label.bounding_box()["x"]
-            page.page.mouse.move(*(pixel + 4.0))
-            page.page.wait_for_function(
-                "([id, left]) => document.getElementById(id).getBoundingClientRect().x > left",
-                arg=[HOVERED, left],
-            )
-        assert not antialiased(page)
-        page.page.mouse.move(20.0, 430.0)
-        label.wait_for(state="hidden")
+        viewer.view.go_to(0.2)
+        page.page.get_by_role("button", name="jump to where they part").click()
+        distance, _ = separation(viewer.view.motion, viewer.view.ghost)
+        first = int(np.argmax(distance > PARTED))
+        until(lambda: viewer.view.time == viewer.view.motion.t[first], "the time at which they part")
         assert not page.errors
 
 
@@ -320,26 +269,6 @@ def test_an_exported_page_plays_without_a_network(open_page: OpenPage, tmp_path:
     assert not page.errors
 
 
-def test_names_of_a_file_are_shown_and_not_run(open_page: OpenPage, tmp_path: Path) -> None:
-    name = "&lt;img src=x onerror=&quot;window.ran=1&quot;&gt;"
-    path = tmp_path / "robot.urdf"
-    link = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
-    path.write_text(
-        f'<robot name="{name}"><link name="{name}">{link}</link><link name="b/c">{link}</link>'
-        f'<joint name="{name}" type="revolute"><parent link="{name}"/><child link="b/c"/>'
-        '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
-    )
-    with view(dynx.load(path)) as viewer:
-        viewer.view._marks.show("names", True)
-        viewer.text("<script>window.ran = 1</script>", (0.0, 0.0, 0.5))
-        page = open_page(viewer.url)
-        connected(viewer)
-        page.page.get_by_label("joint axes").check()
-        page.page.wait_for_timeout(500.0)
-        assert page.page.evaluate("window.ran") is None
-        assert not page.errors
-
-
 def test_a_screenshot_needs_an_open_page(open_page: OpenPage) -> None:
     with view(dynx.load("pendulum")) as viewer:
         with pytest.raises(ArgumentError, match="no page is open"):
@@ -349,16 +278,3 @@ def test_a_screenshot_needs_an_open_page(open_page: OpenPage) -> None:
         picture = viewer.screenshot((160, 100), timeout=PATIENCE)
         assert picture.shape == (100, 160, 3)
         assert len(np.unique(picture)) > 1
-
-
-def _pixel(client: Any, point: Floats) -> Floats:
-    """Return where the camera of a page sees a point (3,) of the world (2,) [pixels]."""
-    camera = client.camera
-    w, x, y, z = camera.wxyz
-    T = Pose.from_matrix(np.eye(4)).matrix
-    T[:3, :3] = dynx.rotation_from_quat([x, y, z, w])
-    T[:3, 3] = camera.position
-    seen = np.linalg.inv(T) @ [*point, 1.0]
-    height, width = camera.image_height, camera.image_width
-    focal = 0.5 * height / np.tan(0.5 * camera.fov)
-    return np.array([0.5 * width + focal * seen[0] / seen[2], 0.5 * height + focal * seen[1] / seen[2]])

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 import dynx
-from dynx.errors import ArgumentError
+from dynx.errors import ArgumentError, DynxError
 from dynx.model import Model
 from dynx.viewer import Viewer, view
 from dynx.viewer.spring import Pull
-from dynx.world import World
+from dynx.world import World, Wrench
 from dynx.world.scene import read_scene
 from tests.conftest import EXAMPLES_INSTALLED, needs_examples
 from tests.viewer.conftest import poses_of_nodes, until
@@ -209,6 +209,43 @@ def test_a_program_shows_its_own_states(arm: Model) -> None:
             viewer.update(q)
     with dynx.simulate(arm, duration=0.1).view() as viewer, pytest.raises(ArgumentError, match="recorded"):
         viewer.update()
+
+
+def test_a_viewer_that_was_closed_is_told(arm: Model, tmp_path: Path) -> None:
+    viewer = view(arm)
+    viewer.close()
+    viewer.close()
+    for act in (
+        lambda: viewer.update(arm.neutral()),
+        lambda: viewer.show(arm),
+        lambda: viewer.follow(None),
+        lambda: viewer.screenshot(),
+        lambda: viewer.export(tmp_path / "page.html"),
+        lambda: viewer.slider("gain", 0.0, 1.0),
+        lambda: viewer.button("press", lambda: None),
+        lambda: viewer.text("here", (0.0, 0.0, 0.0)),
+        lambda: viewer.on_key("k", lambda: None),
+    ):
+        with pytest.raises(ArgumentError, match=f"{viewer.url} is closed"):
+            act()
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_push_gives_a_body_its_impulse_once() -> None:
+    scene = read_scene("slope")
+    body = next(body for body in scene.bodies if not body.fixed)
+    with World(scene) as world, World(scene) as alone, world.view() as viewer:
+        viewer.view.push(body.name, (0.0, 0.5, 0.0))
+        viewer.view.step(4)
+        alone.step(1, wrenches=[Wrench(body.name, np.array([0.0, 0.5, 0.0]) / world.dt)])
+        alone.step(3)
+        pushed, expected = world.state.bodies[body.name], alone.state.bodies[body.name]
+        assert np.allclose(pushed.twist, expected.twist, rtol=0.0, atol=1e-12)
+        assert np.allclose(pushed.position, expected.position, rtol=0.0, atol=1e-12)
+        with pytest.raises(ArgumentError, match=f"no part .*{body.name}"):
+            viewer.view.push(f"{body.name}s", (0.0, 0.5, 0.0))
+        with pytest.raises(DynxError, match="impulse"):
+            viewer.view.push(body.name, (0.0, np.nan, 0.0))
 
 
 def test_notes_that_are_alike_are_one(tmp_path: Path) -> None:

@@ -21,13 +21,23 @@ _FOR_SOFTWARE = """
   HTMLCanvasElement.prototype.getContext = function (kind, options) {
     return context.call(this, kind, kind.startsWith("webgl") ? {...options, antialias: false} : options);
   };
-  Object.defineProperty(window, "devicePixelRatio", {get: () => 2 / 3});
+  const whole = window.devicePixelRatio, ratio = 2 / 3;
+  Object.defineProperty(window, "devicePixelRatio", {get: () => ratio});
+  // Plots, whose canvas is small and has letters, keep the resolution.
+  for (const side of ["width", "height"]) {
+    const given = Object.getOwnPropertyDescriptor(HTMLCanvasElement.prototype, side);
+    Object.defineProperty(HTMLCanvasElement.prototype, side, {...given, set(pixels) {
+      const factor = this.parentNode?.className === "u-wrap" ? whole / ratio : 1;
+      given.set.call(this, Math.round(factor * pixels));
+      if (factor !== 1) this.getContext("2d").setTransform(factor, 0, 0, factor, 0, 0);
+    }});
+  }
 """
 """Draws each pixel once instead of four times, which halves the time of a picture drawn by software, and lets
 viser, which lowers the resolution by a quarter where pictures come slowly, lower it by half."""
 
-# viser's page notes what the pointer is over, to outline it, and tells no program of it. Where a version of
-# it keeps that note elsewhere, no name is shown.
+# A program is not told what the pointer is over. Where a version of viser keeps its scene elsewhere, no name
+# is shown.
 _NAMES_ON_HOVER = (
     f"const NAMES = {json.dumps(NAMES)}, HOVERED = {json.dumps(HOVERED)};"
     + """
@@ -37,24 +47,32 @@ _NAMES_ON_HOVER = (
     + "max-width: 20em; padding: 0.2em 0.5em; border-radius: 3px; font: 13px sans-serif;"
     + "overflow-wrap: anywhere;"
     + "color: white; background: rgba(0, 0, 0, 0.8)";
-  let text = null, names = [];
-  const hovered = () => {
+  let text = null, names = [], latest = null;
+  const hovered = (event) => {
     const page = window.__viserMutable, source = document.getElementById(NAMES)?.dataset.names;
-    const under = page?.scene?.__r3f?.root?.getState?.().internal?.hovered;
-    if (!source || !under?.size) return null;
+    const picture = page?.scene?.__r3f?.root?.getState?.();
+    if (!picture || !source) return null;
+    const canvas = picture.gl.domElement, box = canvas.getBoundingClientRect();
+    if (!canvas.parentNode.contains(event.target)) return null;
     if (source !== text) names = Object.entries(JSON.parse(text = source));
-    for (const {eventObject} of under.values()) {
-      const found = names.find(([path]) => {
-        const node = page.nodeRefFromName[path];
-        return node && (node === eventObject || node.parent === eventObject);
-      });
-      if (found) return found[1];
-    }
-    return null;
+    const parts = new Map(names.map(([path, name]) => [page.nodeRefFromName[path], name]));
+    const drawn = new Map();
+    const visit = (object, part) => {
+      if (!object.visible) return;
+      part = parts.get(object) ?? part;
+      if (part !== undefined && object.isMesh) drawn.set(object, part);
+      for (const below of object.children) visit(below, part);
+    };
+    visit(picture.scene, undefined);
+    const x = (event.clientX - box.left) / box.width, y = (event.clientY - box.top) / box.height;
+    picture.raycaster.setFromCamera({x: 2 * x - 1, y: 1 - 2 * y}, picture.camera);
+    const [first] = picture.raycaster.intersectObjects([...drawn.keys()], false);
+    return first ? drawn.get(first.object) : null;
   };
-  // The page handles the event first.
-  addEventListener("pointermove", (event) => setTimeout(() => {
-    const name = event.pointerType === "touch" || event.buttons ? null : hovered();
+  const show = () => {
+    const event = latest;
+    latest = null;
+    const name = event.pointerType === "touch" || event.buttons ? null : hovered(event);
     if (!label.parentNode) document.body.append(label);
     label.style.display = name === null ? "none" : "block";
     if (name === null) return;
@@ -62,7 +80,11 @@ _NAMES_ON_HOVER = (
     const left = event.clientX + 14, top = event.clientY + 18;
     label.style.left = Math.max(0, Math.min(left, innerWidth - label.offsetWidth)) + "px";
     label.style.top = Math.max(0, Math.min(top, innerHeight - label.offsetHeight)) + "px";
-  }));
+  };
+  addEventListener("pointermove", (event) => {
+    if (latest === null) requestAnimationFrame(show);
+    latest = event;
+  });
 """
 )
 
@@ -74,9 +96,7 @@ class Client:
         """Without `antialiasing` edges are jagged, and software draws twice as fast."""
         self._folder = tempfile.TemporaryDirectory(prefix="dynx-page-", ignore_cleanup_errors=True)
         script = _NAMES_ON_HOVER if antialiasing else _FOR_SOFTWARE + _NAMES_ON_HOVER
-        page = CLIENT.read_text(encoding="utf-8")
-        head, end, rest = page.partition("</head>")
-        text = f"{head}<script>(() => {{{script}}})();</script>{end}{rest}" if end else page
+        text = _with_script(CLIENT.read_text(encoding="utf-8"), script)
         (self.folder / "index.html").write_text(text, encoding="utf-8")
 
     @property
@@ -90,7 +110,21 @@ class Client:
 
 
 def names_element(names: Mapping[str, str]) -> str:
-    """Return the HTML element by which the page knows the name of the part of each node."""
+    """Return the HTML element by which the page knows the names of parts by the paths of their nodes."""
     return (
         f'<div id="{NAMES}" style="display: none" data-names="{escape(json.dumps(names), quote=True)}"></div>'
     )
+
+
+def with_names(page: str, names: Mapping[str, str]) -> str:
+    """Return a page of viser's that needs no server, with the names of parts by the paths of their nodes."""
+    body = page.rfind("</body>")
+    if body < 0:
+        return page
+    return _with_script(f"{page[:body]}{names_element(names)}{page[body:]}", _NAMES_ON_HOVER)
+
+
+def _with_script(page: str, script: str) -> str:
+    """Return a page with a script that runs before its own."""
+    head, end, rest = page.partition("</head>")
+    return f"{head}<script>(() => {{{script}}})();</script>{end}{rest}" if end else page

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dynx.errors import ArgumentError, shown
 from dynx.files.reading import checked_path
 from dynx.files.writing import write_bytes
+from dynx.viewer.browser.client import with_names
 from dynx.viewer.page import Page
 
 UPDATES_PER_SECOND = 30.0
@@ -39,4 +40,4 @@ def write_recording(
         # The last picture stays for a moment before the recording begins again.
         recorder.insert_sleep(1.0 if count else 0.0)
         text = recorder.as_html(dark)
-    write_bytes(path, text.encode())
+    write_bytes(path, with_names(text, page.part_names).encode())

@@ -1,0 +1,138 @@
+"""The pointer in the page: names of what it is over, a click, and a drag."""
+
+from __future__ import annotations
+
+import time
+from html import escape
+from pathlib import Path
+
+import numpy as np
+
+import dynx
+from dynx.spatial.scalar import Floats
+from dynx.viewer import view
+from dynx.viewer.browser.client import HOVERED
+from dynx.world import World
+from dynx.world.scene import read_scene
+from tests.viewer.conftest import PATIENCE, PICTURE, Opened, OpenPage, antialiased, connected, pixel_of, until
+
+MESSAGE = 160.0
+"""Height of the part of a page on which viser tells that software draws [pixels]."""
+
+PIXEL = """path => {
+  const page = __viserMutable, picture = page.scene.__r3f.root.getState();
+  const place = picture.camera.position.clone();
+  page.nodeRefFromName[path].getWorldPosition(place).project(picture.camera);
+  const box = picture.gl.domElement.getBoundingClientRect();
+  return [box.left + 0.5 * (place.x + 1) * box.width, box.top + 0.5 * (1 - place.y) * box.height];
+}"""
+"""Script that returns where the page draws the origin of a node [pixels]."""
+
+
+def test_a_click_names_a_body_of_a_world_and_the_pointer_drags_it(open_page: OpenPage) -> None:
+    with World(read_scene("stack")) as world, world.view() as viewer:
+        page = open_page(viewer.url)
+        (client,) = connected(viewer)
+        pixels = {name: pixel_of(client, body.position) for name, body in world.state.bodies.items()}
+        # Below the message on software, which lies over the upper left of the page.
+        name, held = min(
+            ((name, pixel) for name, pixel in pixels.items() if pixel[1] > MESSAGE),
+            key=lambda each: each[1][1],
+        )
+        mouse = page.page.mouse
+        mouse.move(*held)
+        page.page.wait_for_timeout(PICTURE)
+        mouse.click(*held)
+        until(lambda: viewer.view.names.shown == name, "the name of the part that was clicked")
+        steps = [lambda x=x: mouse.move(held[0] + x, held[1]) for x in (30.0, 60.0)]
+        for action in (mouse.down, *steps):
+            action()
+            page.page.wait_for_timeout(PICTURE)
+
+        def pulled() -> Floats:
+            found = viewer.view._spring.wrenches(world)
+            return np.asarray(found[0].force) if found else np.zeros(3)
+
+        until(lambda: np.linalg.norm(pulled()) > 1e-3, "the spring")
+        # From the camera's place, right in the picture is along (1, 1, 0).
+        assert pulled() @ [1.0, 1.0, 0.0] > 0.9 * np.sqrt(2.0) * np.linalg.norm(pulled())
+        mouse.up()
+        until(lambda: not viewer.view._spring.pulls, "the end of the pull")
+        # A node of viser that can be dragged calls preventDefault on a press of the pointer, for which
+        # react-three-fiber listens passively, so that Chromium says that the call has no effect.
+        assert all("passive event listener" in error for error in page.errors)
+
+
+def test_the_name_of_the_part_under_the_pointer_is_shown(open_page: OpenPage, tmp_path: Path) -> None:
+    name = "<b>upper & 'arm'</b>"
+    path = tmp_path / "robot.urdf"
+    box = '<geometry><box size="0.3 0.3 0.3"/></geometry>'
+    box = f"<visual>{box}</visual><collision>{box}</collision>"
+    path.write_text(
+        f'<robot name="r"><link name="base">{box}</link><link name="{escape(name)}">{box}</link>'
+        f'<joint name="j" type="prismatic"><parent link="base"/><child link="{escape(name)}"/>'
+        '<origin xyz="0 0 0.6"/><axis xyz="0 0 1"/>'
+        '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+    )
+    with view(dynx.load(path), whole_meshes=False) as viewer:
+        page = open_page(viewer.url)
+        (client,) = connected(viewer)
+        label = page.page.locator(f"#{HOVERED}")
+        for part in ("base", name):
+            pixel = pixel_of(client, viewer.view.robot.pose(part)[:3, 3])
+            page.page.mouse.move(*pixel)
+            page.page.wait_for_function(
+                "([id, part]) => document.getElementById(id)?.textContent === part", arg=[HOVERED, part]
+            )
+            assert label.is_visible()
+            left = label.bounding_box()["x"]
+            page.page.mouse.move(*(pixel + 4.0))
+            page.page.wait_for_function(
+                "([id, left]) => document.getElementById(id).getBoundingClientRect().x > left",
+                arg=[HOVERED, left],
+            )
+        assert not antialiased(page)
+        page.page.mouse.move(20.0, 430.0)
+        label.wait_for(state="hidden")
+
+        def hovered(page: Opened, part: str, *, shown: bool) -> None:
+            label, path = page.page.locator(f"#{HOVERED}"), viewer.view.robot.links[part].name
+            end = time.monotonic() + PATIENCE
+            while (label.is_visible() and label.text_content() == part) != shown:
+                assert time.monotonic() < end, (part, shown)
+                # What the page draws comes after what it is told.
+                pixel = np.array(page.page.evaluate(PIXEL, path))
+                page.page.mouse.move(*(pixel + np.random.default_rng().uniform(-3.0, 3.0, 2)))
+                page.page.wait_for_timeout(50.0)
+
+        viewer.view.robot.show(visuals=False, collisions=False)
+        hovered(page, name, shown=False)
+        viewer.view.robot.show(visuals=False, collisions=True)
+        hovered(page, name, shown=True)
+        assert not page.errors
+        exported = tmp_path / "page.html"
+        viewer.export(exported)
+        recorded = open_page(exported.as_uri())
+        for part in ("base", name):
+            hovered(recorded, part, shown=True)
+        assert not recorded.errors
+
+
+def test_names_of_a_file_are_shown_and_not_run(open_page: OpenPage, tmp_path: Path) -> None:
+    name = "&lt;img src=x onerror=&quot;window.ran=1&quot;&gt;"
+    path = tmp_path / "robot.urdf"
+    link = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    path.write_text(
+        f'<robot name="{name}"><link name="{name}">{link}</link><link name="b/c">{link}</link>'
+        f'<joint name="{name}" type="revolute"><parent link="{name}"/><child link="b/c"/>'
+        '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>'
+    )
+    with view(dynx.load(path)) as viewer:
+        viewer.view._marks.show("names", True)
+        viewer.text("<script>window.ran = 1</script>", (0.0, 0.0, 0.5))
+        page = open_page(viewer.url)
+        connected(viewer)
+        page.page.get_by_label("joint axes").check()
+        page.page.wait_for_timeout(500.0)
+        assert page.page.evaluate("window.ran") is None
+        assert not page.errors
