@@ -185,9 +185,8 @@ def _notes(model: Model, names: list[str]) -> tuple[str, ...]:
     notes = [str(note) for note in model.notes]
     singular = singular_coordinates(model)
     if singular:
-        listed = ", ".join(singular[:6]) + (" ..." if len(singular) > 6 else "")
         notes.append(
-            f"the mass matrix is singular (nothing that {listed} moves has inertia): "
+            f"the mass matrix is singular ({singular.reason}): "
             "forward dynamics has no solution, and each backend must refuse it"
         )
     if len(names) == 1:

@@ -1,12 +1,14 @@
 """Detection of robots whose mass matrix is singular at every configuration, and of the joints that cause it.
 
-A joint makes it singular if nothing that it moves has inertia. Engines then return NaN, zero or garbage;
-every backend of dynx raises the same error.
+A joint makes it singular if nothing that it moves has inertia, and several do if they can move together so
+that nothing with inertia moves, such as a floating base without mass and the joint on it. Engines then return
+NaN, zero or garbage; every backend of dynx raises the same error.
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,25 +24,43 @@ class Solvability:
 
     def __init__(self, model: Model) -> None:
         self._model = model
-        self._singular: dict[bool, tuple[str, ...]] = {}
+        self._singular: dict[bool, SingularCoordinates] = {}
 
     def refuse_singular(self, joint_dynamics: bool) -> None:
         """Raise SingularMassMatrixError, naming the joints, if M is singular at every q."""
         if joint_dynamics not in self._singular:
             self._singular[joint_dynamics] = singular_coordinates(self._model, joint_dynamics)
-        names = self._singular[joint_dynamics]
-        if names:
-            listed = ", ".join(shown(name) for name in names[:6])
-            listed += f" and {len(names) - 6} more" if len(names) > 6 else ""
+        found = self._singular[joint_dynamics]
+        if found:
             raise SingularMassMatrixError(
-                f"{self._model.name} has no unique acceleration: nothing that {listed} moves has "
-                "inertia (lock the joint, or give its links an <inertial>)"
+                f"{self._model.name} has no unique acceleration: {found.reason} (lock the joint, or give "
+                "its links an <inertial>)"
             )
 
 
+class SingularCoordinates(NamedTuple):
+    """Names of the coordinates in the null space of M at every configuration: joints, or ``base``."""
+
+    alone: tuple[str, ...] = ()
+    """Coordinates that move nothing with inertia."""
+    together: tuple[str, ...] = ()
+    """Coordinates that move something with inertia, and can move together so that nothing of it moves."""
+
+    def __bool__(self) -> bool:
+        return bool(self.alone or self.together)
+
+    @property
+    def reason(self) -> str:
+        """Why M is singular, without a full stop."""
+        clauses = [f"nothing that {_listed(self.alone)} moves has inertia"] if self.alone else []
+        if self.together:
+            clauses.append(f"{_listed(self.together)} can move together so that nothing with inertia moves")
+        return ", and ".join(clauses)
+
+
 @lru_cache(maxsize=64)
-def singular_coordinates(model: Model, joint_dynamics: bool = False) -> tuple[str, ...]:
-    """Return the names of the coordinates in the null space of M at every configuration: joints, or ``base``.
+def singular_coordinates(model: Model, joint_dynamics: bool = False) -> SingularCoordinates:
+    """Return the coordinates that make M singular at every configuration.
 
     Determined at three random configurations, where M scaled to a unit diagonal has an eigenvalue below nv
     times the rounding error of its entries. The result is cached, because it takes as long as some hundred
@@ -54,23 +74,35 @@ def singular_coordinates(model: Model, joint_dynamics: bool = False) -> tuple[st
         M = S.T @ M @ S
     if joint_dynamics:
         M = M + JointDynamicsTerms(model).armature
-    always = set.intersection(*(set(_null_coordinates(each)) for each in M))
+    found = [_null_coordinates(each) for each in M]
+    massless = set.intersection(*(alone for alone, _ in found))
+    mixed = set.intersection(*(alone | together for alone, together in found)) - massless
     base = 6 if model.floating else 0
-    names = ["base" if k < base else model.joint_names[k - base] for k in sorted(always)]
-    return tuple(dict.fromkeys(names))
+
+    def names(numbers: set[int]) -> tuple[str, ...]:
+        each = ["base" if k < base else model.joint_names[k - base] for k in sorted(numbers)]
+        return tuple(dict.fromkeys(each))
+
+    alone = names(massless)
+    return SingularCoordinates(alone, tuple(name for name in names(mixed) if name not in alone))
 
 
-def _null_coordinates(M: Floats) -> list[int]:
+def _listed(names: tuple[str, ...]) -> str:
+    return ", ".join(map(shown, names[:6])) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
+
+
+def _null_coordinates(M: Floats) -> tuple[set[int], set[int]]:
+    """Return the numbers of the coordinates with a diagonal of zero, and those of other null vectors."""
     diagonal = np.diagonal(M)
     if not len(diagonal):
-        return []
+        return set(), set()
     smallest = 1e-20 * max(float(np.max(np.abs(diagonal))), np.finfo(float).tiny)
     massless = np.flatnonzero(diagonal <= smallest)
     scale = 1.0 / np.sqrt(np.where(diagonal > smallest, diagonal, 1.0))
     scaled = M * scale[:, None] * scale[None, :]
     if not np.isfinite(scaled).all():
-        return []  # overflow: undecided
+        return set(), set()  # overflow: undecided
     values, vectors = np.linalg.eigh(scaled)
     null = vectors[:, np.abs(values) < len(M) * 4 * np.finfo(float).eps]
     mixed = np.flatnonzero(np.max(np.abs(null), axis=1, initial=0.0) > 1e-3)
-    return sorted({*massless.tolist(), *mixed.tolist()})
+    return set(massless.tolist()), set(mixed.tolist())

@@ -26,7 +26,7 @@ from dynx.loaded import loader_class
 from dynx.loaded.difference import model_difference
 from dynx.model.xml.source import XmlSource
 from dynx.rules import LEVELS, CallingRule, Case, Detection, Rule, all_rules
-from dynx.rules.geometry import is_found, named_meshes, parts_with_meshes, reason_unread
+from dynx.rules.geometry import is_found, is_found_above, named_meshes, parts_with_meshes, reason_unread
 
 REFERENCE_MARGIN = 10.0
 """Smallest error that counts as a difference, in errors of the reference values: engines round, too."""
@@ -72,7 +72,12 @@ def with_meshes(report: DoctorReport, source: XmlSource) -> DoctorReport:
         reason = reason_unread(file, source.source)
         if reason is not None:
             lacking = set() if is_found(file, source.source) else parts[file]
-            refusing = tuple(name for name, kind in kinds.items() if lacking & {*kind.refuses_without})
+            above = is_found_above(file, source.source)
+            refusing = tuple(
+                name
+                for name, kind in kinds.items()
+                if lacking & {*kind.refuses_without} and not (above and kind.searches_above)
+            )
             unread.append(UnreadMesh(file, link.attributes.get("name", ""), mesh.line, reason, refusing))
     return replace(report, meshes=len(named), unread_meshes=tuple(unread))
 

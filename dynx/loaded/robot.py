@@ -43,6 +43,9 @@ class LoadedRobot(ABC):
     """The parts of a link, ``visual`` or ``collision``, for whose missing mesh file the engine refuses the
     whole description."""
 
+    searches_above: ClassVar[bool] = False
+    """True if the engine searches meshes in the folders above the description (`find_above`)."""
+
     loads_meshes: ClassVar[bool] = False
     """True if mesh collision shapes change the dynamics of a link that states its inertia."""
 

@@ -280,6 +280,21 @@ def test_a_joint_that_moves_no_inertia_is_named(kind: type[Backend]) -> None:
     assert np.isfinite(engine.inverse_dynamics(np.zeros(3), np.ones(3), np.ones(3))).all()
 
 
+@each_kind
+def test_coordinates_that_cancel_each_other_are_named_as_such(kind: type[Backend]) -> None:
+    """The massless base moves the arm, which has inertia; it and the first joint can move without the arm."""
+    arm = chain(2)
+    links = [Link("mount"), *arm.links[1:], Link("feather")]
+    joints = [replace(arm.joints[0], parent="mount"), *arm.joints[1:]]
+    floating = kind(Model.build("light base", links[:-1], joints, base="floating"))
+    with pytest.raises(SingularMassMatrixError, match=r": 'base', '\w+' can move together so"):
+        floating.forward_dynamics(floating.model.neutral(), np.zeros(8), np.zeros(8))
+    spinner = Joint("spinner", "continuous", "link2", "feather")
+    both = kind(Model.build("both", links, [*joints, spinner], base="floating"))
+    with pytest.raises(SingularMassMatrixError, match=r"that 'spinner' moves .*, and 'base', '\w+' can"):
+        both.forward_dynamics(both.model.neutral(), np.zeros(9), np.zeros(9))
+
+
 def test_solving_with_a_singular_mass_matrix_raises() -> None:
     with pytest.raises(SingularMassMatrixError, match="is singular"):
         solve_mass_matrix(np.zeros((2, 2)), np.ones(2))

@@ -17,8 +17,10 @@ from dynx.doctor.report import DoctorReport
 from dynx.engines.silence import silence
 from dynx.errors import EngineError
 from dynx.loaded import ENGINES, installed_engines, loader_class
+from dynx.model.geometry import Mesh
 from dynx.model.geometry.formats.stl import STL_FACET
 from tests.doctor.formats.test_sarif import require_valid
+from tests.model.geometry.mesh_files import stl
 
 ARM = """<robot name="arm">
   <link name="base"/>
@@ -166,6 +168,43 @@ def test_the_engines_refuse_such_a_file(engine: str, part: str, tmp_path: Path) 
     assert refused == (part in kind.refuses_without)
     report = diagnose(path, engines=[engine], samples=1, counterexamples=False)
     assert report.refused_without_meshes == ((engine,) if refused else ())
+
+
+@pytest.mark.skipif("pybullet" not in installed_engines(), reason="PyBullet is not installed")
+@pytest.mark.parametrize(
+    ("filename", "found"),
+    [
+        ("/meshes/base.stl", True),
+        ("meshes/base.stl", True),
+        ("package://elsewhere/base.stl", False),
+        ("package://meshes/base.stl", True),
+        ("model://meshes/base.stl", True),
+        ("package://none/meshes/base.stl", False),
+        ("/none/meshes/base.stl", False),
+    ],
+)
+def test_a_mesh_that_only_pybullet_finds_is_said_to_be_found(
+    filename: str, found: bool, tmp_path: Path
+) -> None:
+    """Raw PyBullet loads the file exactly where the report does not say that it refuses it."""
+    path = tmp_path / "repository/urdf/arm.urdf"
+    (tmp_path / "repository/meshes").mkdir(parents=True)
+    (tmp_path / "repository/.git").mkdir()
+    (tmp_path / "repository/meshes/base.stl").write_bytes(stl())
+    path.parent.mkdir()
+    path.write_text(ARM.replace("package://arm_description/meshes/tool.stl", filename))
+    try:
+        with silence(), loader_class("pybullet")(path, load(path)):
+            loaded = True
+    except EngineError:
+        loaded = False
+    assert loaded == found
+    report = diagnose(path, engines=["pybullet", "mujoco"], samples=1, counterexamples=False)
+    assert ("pybullet" in report.refused_without_meshes) == (not found)
+    assert all(("PyBullet alone finds" in mesh.reason) == found for mesh in report.unread_meshes)
+    [visual] = load(path).geometry.visuals("tool")
+    assert isinstance(visual.shape, Mesh)
+    assert (visual.shape.fault is None) == found
 
 
 def test_of_text_without_a_file_no_mesh_is_looked_for() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from dynx.errors import (
     DynxError,
     EngineError,
     EngineLimitError,
+    SingularMassMatrixError,
     UnknownNameError,
 )
 from dynx.model.geometry import Box, Collision, Mesh, Plane
@@ -321,3 +323,11 @@ def test_an_interpenetrating_start_is_allowed_and_reported(engine: str) -> None:
         assert min(contact.distance for contact in world.contacts()) < -0.04
         world.step(100)
         assert np.isfinite(world.state.bodies["a"].T_world_body).all()
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+def test_a_floating_base_without_mass_is_refused_alike(engine: str) -> None:
+    arm = dynx.load("planar_2r", base="floating")
+    light = replace(arm, links=tuple(replace(link, inertial=None) for link in arm.links))
+    with pytest.raises(SingularMassMatrixError, match=r"nothing that 'base', .* moves has inertia"):
+        World(Scene("s", robots=(SceneRobot("arm", light),)), engine)

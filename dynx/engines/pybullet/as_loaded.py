@@ -54,6 +54,7 @@ class LoadedPyBullet(LoadedRobot):
     name: ClassVar[str] = "pybullet"
     CALLS: ClassVar[Mapping[str, str]] = CALLS
     refuses_without: ClassVar[tuple[str, ...]] = ("visual", "collision")
+    searches_above: ClassVar[bool] = True
 
     def __init__(self, path: Path, model: Model, calls: Collection[str] = ()) -> None:
         engine = bullet()

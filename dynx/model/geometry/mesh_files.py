@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
@@ -12,6 +13,8 @@ from dynx.errors import DescriptionError, nearest, shown
 from dynx.files.reading import irregularity
 from dynx.model.package_paths import StrPath, environment_folders, resolve_package
 from dynx.model.package_search import enclosing_folder, package_of
+
+_BULLET_SCHEMES = re.compile("^(package|model)://")
 
 _THREE_SLASHES = re.compile("^package:///+")
 
@@ -53,6 +56,37 @@ def find_mesh(filename: str, source: str, package_dirs: Iterable[StrPath] = ()) 
         return _existing(path, enclosing_folder(folder), shown(filename, 200))
     except (OSError, ValueError, RuntimeError):  # The name is invalid, or symbolic links form a cycle.
         return None
+
+
+def find_above(filename: str, source: str) -> Path | None:
+    """Find the file of a mesh as PyBullet alone does: below the folder of the description `source`, or below
+    a folder above it, whatever the path begins with; None without one within the `enclosing_folder`.
+
+    So ``/meshes/a.stl``, ``meshes/a.stl`` beside the folder ``urdf``, and ``package://`` with the name of a
+    folder above lead to files that other engines miss.
+    """
+    inside = _BULLET_SCHEMES.sub("", filename).lstrip("/")
+    if not inside.strip() or not os.path.isfile(source):
+        return None
+    with suppress(OSError, ValueError, RuntimeError):
+        folder = Path(os.path.realpath(source)).parent
+        root = enclosing_folder(folder)
+        for above in (folder, *folder.parents):
+            if not above.is_relative_to(root):
+                break
+            real = Path(os.path.realpath(above / inside))
+            if real.is_relative_to(root) and real.is_file():
+                return real
+    return None
+
+
+def found_by_bullet(filename: str, source: str) -> str:
+    """Return a clause that says where PyBullet alone finds a mesh that `find_mesh` does not; else nothing."""
+    found = find_above(filename, source)
+    if found is None:
+        return ""
+    where = os.path.relpath(found, Path(os.path.realpath(source)).parent)
+    return f"; PyBullet alone finds {shown(Path(where).as_posix(), 200)}"
 
 
 def reason_unknown(filename: str, source: str) -> str:

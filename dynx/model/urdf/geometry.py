@@ -22,7 +22,7 @@ from dynx.model.geometry import (
     Sphere,
     Visual,
 )
-from dynx.model.geometry.mesh_files import MeshNotFoundError, find_mesh, reason_unknown
+from dynx.model.geometry.mesh_files import MeshNotFoundError, find_above, find_mesh, reason_unknown
 from dynx.model.package_paths import StrPath
 from dynx.model.urdf.origins import read_origin, reads_quaternions
 from dynx.model.urdf.values import Reading
@@ -138,6 +138,7 @@ class _ShapeReader:
             reason = None if path else reason_unknown(filename, reading.source)
         except MeshNotFoundError as error:
             path, reason = None, str(error)
+        path = path or find_above(filename, reading.source)
         if path is not None:
             return Mesh(str(path), scale)
         return Mesh(filename, scale, reading.error(shape, f"the mesh of {what} is not read: {reason}"))

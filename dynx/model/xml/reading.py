@@ -199,6 +199,8 @@ def _explain(code: int, begun: bool) -> str:
     reason = expat.ErrorString(code) or "unknown error"
     if reason == expat.errors.XML_ERROR_JUNK_AFTER_DOC_ELEMENT:
         return "content follows the root element; wanted one root element"
+    if reason == expat.errors.XML_ERROR_NO_ELEMENTS and not begun:
+        return "the text has no element; wanted <robot name=...>"
     if reason in (
         expat.errors.XML_ERROR_NO_ELEMENTS,
         expat.errors.XML_ERROR_UNCLOSED_TOKEN,
@@ -207,4 +209,4 @@ def _explain(code: int, begun: bool) -> str:
         return f"not complete XML: the text ends too early ({reason})"
     if not begun and reason in (expat.errors.XML_ERROR_SYNTAX, expat.errors.XML_ERROR_INVALID_TOKEN):
         return "not XML: wanted an element such as <robot name=...>"
-    return f"not well-formed XML: {reason.removeprefix('not well-formed ')}"
+    return f"not well-formed XML: {reason.removeprefix('not well-formed ').strip('()')}"

@@ -9,8 +9,10 @@ PyBullet 3.2.7 refuses the whole file ("Cannot load URDF file") for a mesh in ``
 ``<collision>``, and so does Drake 1.51 with a scene graph; MuJoCo 4.0 does for ``<collision>`` alone, since
 it discards what is only visual. A texture in ``<visual>`` is missed by Drake with a scene graph alone; one in
 a material of the robot is DX426. Pinocchio's ``buildModelFromUrdf`` reads no mesh, its ``buildGeomFromUrdf``
-raises. PyBullet also searches folders of its own (``setAdditionalSearchPath``), so it may find meshes that
-others do not. Dynamics does not depend on shapes, and dynx reads the file without them.
+raises. PyBullet takes every path, ``/meshes/a.stl`` too, as relative to the folder of the description and to
+each folder above it, and searches folders of its own (``setAdditionalSearchPath``), so it may find meshes
+that others do not; the message says which file it finds in the package or repository. Dynamics does not
+depend on shapes, and dynx reads the file without them.
 
 The description does not say which file was meant, so no edit removes the cause; the message gives the nearest
 name.
@@ -19,7 +21,7 @@ name.
 from collections.abc import Iterable
 
 from dynx.rules import Case, Detection, Rule
-from dynx.rules.geometry import MeshNotFoundError, find_mesh
+from dynx.rules.geometry import MeshNotFoundError, find_mesh, found_by_bullet
 from dynx.rules.geometry.shapes import geometry_elements
 from dynx.rules.geometry.textures import visual_textures
 
@@ -41,4 +43,5 @@ class MeshNotFound(Rule):
                 try:
                     find_mesh(filename, case.source.source)
                 except MeshNotFoundError as error:
-                    yield Detection(name, None, element.line, str(error))
+                    where = found_by_bullet(filename, case.source.source)
+                    yield Detection(name, None, element.line, f"{error}{where}")

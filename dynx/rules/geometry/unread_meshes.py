@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from dynx.model.geometry.mesh_files import MeshNotFoundError, find_mesh, reason_unknown
+from dynx.model.geometry.mesh_files import (
+    MeshNotFoundError,
+    find_above,
+    find_mesh,
+    found_by_bullet,
+    reason_unknown,
+)
 from dynx.model.xml.source import SourceElement, XmlSource
 from dynx.rules.geometry.meshes import is_mesh_format, mesh_box
 from dynx.rules.geometry.shapes import geometry_elements
@@ -38,14 +44,19 @@ def is_found(filename: str, source: str) -> bool:
         return False
 
 
+def is_found_above(filename: str, source: str) -> bool:
+    """Check whether an engine finds a mesh that searches the folders above the description `source`."""
+    return find_above(filename, source) is not None
+
+
 def reason_unread(filename: str, source: str) -> str | None:
     """Return the reason why a mesh of the description `source` (a path) is not read; None if it is."""
     try:
         path = find_mesh(filename, source)
     except MeshNotFoundError as error:
-        return str(error)
+        return f"{error}{found_by_bullet(filename, source)}"
     if path is None:
-        return reason_unknown(filename, source)
+        return f"{reason_unknown(filename, source)}{found_by_bullet(filename, source)}"
     if mesh_box(path) is not None:
         return None
     if not is_mesh_format(path):

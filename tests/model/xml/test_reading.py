@@ -91,15 +91,15 @@ def test_null_characters_after_the_end_are_noted() -> None:
 @pytest.mark.parametrize(
     ("text", "line", "message"),
     [
-        ("", 1, "ends too early"),
-        ("  \n ", 2, "ends too early"),
+        ("", 1, "the text has no element; wanted <robot name=...>"),
+        ("  \n ", 2, "the text has no element"),
         ("robot", 1, "not XML"),
         ("\n\n{}", 3, "not XML"),
         ("<a>\n<b>\n", 3, "ends too early"),
         ("<a>\n<b", 2, "ends too early"),
         ("<a>\n<![CDATA[", 2, "ends too early"),
         ("<a>\n<b></a>", 2, "mismatched tag"),
-        ("<a>\n<b x=1/></a>", 2, "not well-formed"),
+        ("<a>\n<b x=1/></a>", 2, "not well-formed XML: invalid token"),
         ("<a>\n<b x='1' x='2'/></a>", 2, "duplicate attribute"),
         ("<a>\n&#0;</a>", 2, "invalid character number"),
         ("<a/>\ntext", 2, "one root element"),

@@ -163,7 +163,8 @@ def _require_inertias(name: str, tree: BulletTree) -> None:
     bodies = [link.inertia for link in tree.links]
     if tree.floating and not tree.root.mass > 0.0:
         raise EngineLimitError(
-            f"the base of {name} floats and has no mass, which Bullet would fix to the world"
+            f"the base of {name} floats and has no mass, which Bullet would fix to the world; give its "
+            "root link an <inertial>, or choose another engine"
         )
     for body in [tree.root, *bodies]:
         if body.mass < 0.0 or body.moments.min() < 0.0:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from dynx.backends import Backend, backend
+from dynx.backends.solvability import Solvability
 from dynx.control.engine_motors import MotorCommand
 from dynx.engines.pybullet.world.client import WorldClient
 from dynx.engines.pybullet.world.objects import UNLIMITED, BulletObject
@@ -58,6 +59,8 @@ class BulletRobot:
             for k in limited
         }
         mechanism = model.extended_mechanism
+        if model.floating and not model.mechanism.root.mass > 0.0:
+            Solvability(model).refuse_singular(joint_dynamics=False)
         self.object = BulletObject(client, mechanism, colliders, files, folder, limits)
         self._client = client
         self._coupling = model.mechanism.coupling
