@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib import import_module
+from types import FunctionType
 from typing import Any
 
 from dynx.envs.environment import TaskEnvironment
@@ -44,6 +45,12 @@ def task_class(task: str | type[Task]) -> type[Task]:
         found = getattr(import_module(module), name)
     if not (isinstance(found, type) and issubclass(found, Task)):
         raise ArgumentError(f"task is {shown(task)}; wanted a subclass of dynx.envs.Task")
+    for base in found.__mro__[1:]:
+        for name, method in vars(base).items():
+            if isinstance(method, FunctionType) and not callable(getattr(found, name)):
+                raise ArgumentError(
+                    f"{name} of {found.__name__} is a {type(getattr(found, name)).__name__}; wanted a method"
+                )
     return found
 
 

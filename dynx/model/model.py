@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
+from dynx.files.notebook import html_grid
 from dynx.model import configuration, locking, topology
 from dynx.model.elements import IDENTITY, Frame, Inertial, Joint, Link, Note, Pose, Vector
 from dynx.model.geometry import Geometry
@@ -265,6 +266,21 @@ class Model:
 
     def __repr__(self) -> str:
         return f"<Model {self.name}: {self.base} base, nq {self.nq}, nv {self.nv}, {len(self.links)} links>"
+
+    def _repr_html_(self) -> str:
+        rows = (
+            (
+                joint.name,
+                joint.type,
+                joint.parent,
+                joint.child,
+                *(f"{x:.4g}" for x in (joint.limits.lower, joint.limits.upper)),
+                *(f"{x:.4g}" for x in (joint.limits.velocity, joint.limits.effort)),
+            )
+            for joint in self.coordinate_joints
+        )
+        head = ("joint", "type", "parent", "child", "lower", "upper", "velocity", "effort")
+        return html_grid(f"{repr(self)[1:-1]}, {self.total_mass:.6g} kg", head, rows)
 
     def __getstate__(self) -> dict[str, Any]:
         fields = self.__dataclass_fields__

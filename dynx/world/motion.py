@@ -13,7 +13,7 @@ from dynx.world.commands import Act, Commands
 from dynx.world.engine import Torque, WorldEngine
 from dynx.world.layout import Layout
 from dynx.world.notes.divergence import likely_causes
-from dynx.world.state import WorldState, has_diverged
+from dynx.world.state import PartStates, WorldState, has_diverged
 from dynx.world.state_checks import apply_state
 
 STEPS_BETWEEN_CHECKS = 1000
@@ -177,7 +177,7 @@ class Motion:
     def _read(self, engine: WorldEngine) -> WorldState:
         robots = {robot.name: engine.robot_state(k) for k, robot in enumerate(self._layout.robots)}
         bodies = {body.name: engine.body_state(k) for k, body in enumerate(self._layout.bodies)}
-        return WorldState(self.time, robots, bodies)
+        return WorldState(self.time, PartStates(robots), PartStates(bodies))
 
     def _diverge(self, reason: str) -> NoReturn:
         """Return to the last state that was finite, and raise DivergedError."""

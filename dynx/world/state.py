@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import hypot, isfinite
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from dynx.errors import UnknownNameError, nearest, shown
 from dynx.model.configuration import DIVERGENCE_SPEED
 from dynx.spatial.scalar import Floats
+
+Part = TypeVar("Part")
 
 
 class RobotState(NamedTuple):
@@ -33,6 +36,13 @@ class BodyState(NamedTuple):
     def position(self) -> Floats:
         """Origin (3,) of the body frame in the world [m]."""
         return self.T_world_body[:3, 3]
+
+
+class PartStates(dict[str, Part]):
+    """States by name; a name that does not exist is answered with the nearest."""
+
+    def __missing__(self, name: object) -> Part:
+        raise UnknownNameError(f"the world has no state of {shown(name)}{nearest(str(name), self)}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import dynx.envs  # noqa: F401  (registers the environments)
+from dynx.envs import register_task
 from dynx.envs.environment import TaskEnvironment
 from dynx.envs.tasks.push import FINGER_WEIGHT, NEAR, TIP_START, Push
 from dynx.envs.tasks.quadruped import POSTURE
@@ -199,3 +200,11 @@ def test_wrong_options_are_refused() -> None:
 def test_a_task_is_a_world_task() -> None:
     assert all(isinstance(task, WorldTask) for task in TASKS)
     assert set(Push.engines()) >= set(ENGINES)
+
+
+def test_a_part_of_a_task_that_is_no_method_is_named() -> None:
+    class Wrong(WorldTask):
+        scene = property(lambda self: None)
+
+    with pytest.raises(ArgumentError, match="scene of Wrong is a property; wanted a method"):
+        register_task("test/Wrong-v0", Wrong)

@@ -99,3 +99,11 @@ def test_what_is_no_model_is_refused_with_an_example() -> None:
         refuse_other_than_model("ur5")
     with pytest.raises(ArgumentError, match=r"of type float; wanted a Model, such as dynx\.load\(\.\.\.\)"):
         refuse_other_than_model(3.0)
+
+
+def test_a_notebook_shows_the_joints() -> None:
+    model = load("double_pendulum")
+    page = model._repr_html_()
+    assert page.count("<tr>") == 1 + model.nv
+    assert "<td>joint1</td>" in page
+    assert "fixed base, nq 2, nv 2" in page

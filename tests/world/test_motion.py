@@ -9,10 +9,11 @@ from numpy.testing import assert_allclose
 import dynx
 from dynx import Pose
 from dynx.control.open_loop import OpenLoop
+from dynx.errors import UnknownNameError
 from dynx.model import configuration
 from dynx.model.elements import IDENTITY
 from dynx.model.geometry import Box, Collision
-from dynx.world import Scene, SceneBody, SceneRobot, World, Wrench, box
+from dynx.world import Scene, SceneBody, SceneRobot, World, Wrench, box, read_scene
 from tests.world.engines import WORLDS
 
 pytestmark = pytest.mark.parametrize("engine", WORLDS)
@@ -155,3 +156,11 @@ def test_substeps_divide_a_step(engine: str) -> None:
         assert fine.time == pytest.approx(coarse.time)
         for one, other in zip(fine.state.bodies["brick"], coarse.state.bodies["brick"], strict=True):
             assert (one == other).all()
+
+
+def test_a_name_without_a_state_is_answered_with_the_nearest(engine: str) -> None:
+    with World(read_scene("stack"), engine) as world:
+        state = world.state
+        assert "box_9" not in state.bodies
+        with pytest.raises(UnknownNameError, match=r"no state of 'bx_1'; did you mean 'box_1'"):
+            state.bodies["bx_1"]

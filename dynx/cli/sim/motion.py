@@ -150,8 +150,13 @@ def limit_message(error: LimitError, robot: str, *, ignorable: bool) -> str:
     if not error.violations:  # not a limit of joints
         return str(error)
     listed = "; ".join(map(_violation, error.violations))
-    too_fast = any(each.quantity == "velocity" for each in error.violations)
-    hints = ["a longer --duration lowers velocities"] * too_fast
+    speeds = [each for each in error.violations if each.quantity == "velocity"]
+    hints = ["a longer --duration lowers velocities"] * any(each.limit != 0.0 for each in speeds)
+    still = [each.joint for each in speeds if each.limit == 0.0]
+    if still:
+        hints.append(
+            f'<limit velocity="0"> of {shown(still[0])} means that it must not move: write its largest speed'
+        )
     hints += ["--ignore-limits simulates it nevertheless"] * ignorable
     hint = f" ({'; '.join(hints)})" if hints else ""
     return f"the motion violates {counted(len(error.violations), 'limit')} of {robot}: {listed}{hint}"

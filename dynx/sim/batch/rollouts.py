@@ -14,6 +14,7 @@ from dynx.errors import ArgumentError, shown
 from dynx.files.arrays import SCHEMA_ENTRY, read_arrays, write_arrays
 from dynx.files.figures import new_figure, save_figure
 from dynx.files.notebook import html_table
+from dynx.sim.record.csv_file import coordinate_names
 from dynx.sim.scenario.scenario import Scenario
 from dynx.spatial.scalar import Floats
 
@@ -72,6 +73,25 @@ class BatchRollouts:
         if not len(worst):
             return np.full(len(levels), np.nan)
         return np.asarray(np.quantile(worst, levels, method="inverted_cdf"))
+
+    def columns(self) -> dict[str, Any]:
+        """Return columns (n,) with a row for each rollout, by name, for `pandas.DataFrame`.
+
+        They are `done`, `diverged` and `worst`, and of each coordinate the largest and the RMS error, the
+        last position and velocity, and the share of steps at the effort limit.
+        """
+        positions, rates = coordinate_names(self.scenario.model)
+        found: dict[str, Any] = {"done": self.done, "diverged": self.diverged, "worst": self.worst}
+        blocks = {
+            "max_error": (rates, self.max_error),
+            "rms_error": (rates, self.rms_error),
+            "q": (positions, self.q),
+            "v": (rates, self.v),
+            "saturated": (rates, self.saturated),
+        }
+        for kind, (names, block) in blocks.items():
+            found |= {f"{kind}:{name}": column for name, column in zip(names, block.T, strict=True)}
+        return found
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a ``.npz`` that `load` reads, atomically.

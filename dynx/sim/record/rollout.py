@@ -7,16 +7,18 @@ from typing import Any
 
 from dynx.model import Model
 from dynx.registry import view
+from dynx.sim.record.csv_file import columns
 from dynx.sim.record.formats import load, save
 from dynx.sim.record.plot import plot
 from dynx.sim.record.rollout_data import RolloutData
 
 
 class Rollout(RolloutData):
-    """The record of one simulation: its data (`RolloutData`), files and plot."""
+    """The record of one simulation: its data (`RolloutData`), columns, files and plot."""
 
     save = save
     plot = plot
+    columns = columns
 
     def view(self, **options: Any) -> Any:
         """Play the rollout in the browser; return the `dynx.viewer.Viewer`, which takes the options.

@@ -62,6 +62,9 @@ class Picture:
             raise ArgumentError(f"what is {shown(what)}; wanted 'rgb', 'depth' or 'segmentation'")
         write_bytes(path, png_bytes(pixels))
 
+    def _repr_png_(self) -> bytes:
+        return png_bytes(self.rgb)
+
     def __repr__(self) -> str:
         height, width = self.depth.shape
         seen = sorted({self.names[k] for k in np.unique(self.segmentation) if k >= 0})

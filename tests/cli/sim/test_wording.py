@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -302,3 +303,17 @@ def test_the_plot_of_a_floating_base_names_its_axes() -> None:
     assert "error q* - q [m] (base axes)" in labels
     assert "force [N] (base axes)" in labels
     assert sum("axes" in label for label in labels) == 3
+
+
+def test_a_velocity_limit_of_zero_is_named_as_the_cause(tmp_path: Path) -> None:
+    robot = tmp_path / "still.urdf"
+    robot.write_text(
+        '<robot name="still"><link name="a"/><joint name="j" type="revolute"><parent link="a"/>'
+        '<child link="b"/><axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="9" velocity="0"/></joint>'
+        '<link name="b"><inertial><mass value="1"/>'
+        '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>',
+        encoding="utf-8",
+    )
+    said = sim(str(robot), "--to", "0.5").output
+    assert "<limit velocity=\"0\"> of 'j' means that it must not move: write its largest speed" in said
+    assert "longer --duration" not in said

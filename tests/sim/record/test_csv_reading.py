@@ -8,14 +8,16 @@ import numpy as np
 import pytest
 
 import dynx
+from dynx.control import PD
 from dynx.errors import ArgumentError
+from dynx.model.model import Base
 from dynx.sim import Rollout, simulate
 
 ARM = dynx.load("double_pendulum")
 
 
 @pytest.mark.parametrize("base", ["fixed", "floating"])
-def test_a_table_of_dynx_keeps_every_bit(tmp_path: Path, base: str) -> None:
+def test_a_table_of_dynx_keeps_every_bit(tmp_path: Path, base: Base) -> None:
     robot = dynx.load("double_pendulum", base=base)
     start = robot.random(3)
     rollout = simulate(robot, None, q0=start, plant="compiled", duration=0.05)
@@ -90,3 +92,24 @@ def test_robots_are_given_for_tables_only(tmp_path: Path) -> None:
     (tmp_path / "folder.csv").mkdir()
     with pytest.raises(ArgumentError, match="is a directory"):
         Rollout.load(tmp_path / "folder.csv", ARM)
+
+
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+def test_columns_are_those_of_the_table(tmp_path: Path, base: Base) -> None:
+    robot = dynx.load("double_pendulum", base=base)
+    rollout = simulate(robot, None, robot.random(3), plant="compiled", duration=0.05, check_reference=False)
+    found = rollout.columns()
+    rollout.save(tmp_path / "run.csv")
+    header = (tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()[0].split(",")
+    assert set(found) == {*header} - {"energy"}
+    table = np.genfromtxt(tmp_path / "run.csv", delimiter=",", skip_header=1)
+    for name, column in found.items():
+        np.testing.assert_array_equal(column, table[:, header.index(name)])
+
+
+def test_columns_of_a_batch_have_a_row_for_each_rollout() -> None:
+    many = dynx.simulate_batch(ARM, PD(ARM, kp=1.0, kd=0.1), np.zeros(2), q0=ARM.random(1, 3), duration=0.01)
+    found = many.columns()
+    assert all(len(column) == 3 for column in found.values())
+    np.testing.assert_array_equal(found["q:joint2"], many.q[:, 1])
+    np.testing.assert_array_equal(found["worst"], many.worst)

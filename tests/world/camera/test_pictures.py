@@ -110,6 +110,7 @@ def test_pictures_in_png_files_hold_colour_depth_and_parts(tmp_path: Path) -> No
         picture = world.camera(Camera.look_at((2.5, 0.0, 1.5), (0.3, 0.0, 0.3), size=(64, 48), far=60.0))
     for what in ("rgb", "depth", "segmentation"):
         picture.write_png(tmp_path / f"{what}.png", what)
+    assert picture._repr_png_() == (tmp_path / "rgb.png").read_bytes()
     read = {what: np.array(Image.open(tmp_path / f"{what}.png")) for what in ("rgb", "depth", "segmentation")}
     assert np.array_equal(read["rgb"], picture.rgb)
     assert np.array_equal(read["segmentation"], picture.segmentation + 1)
