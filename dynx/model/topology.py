@@ -21,7 +21,7 @@ def depth_first(links: list[Link], joints: list[Joint], source: str) -> tuple[li
     no link at all, or more than MAX_LINKS links.
     """
     if not links:
-        hint = "; a xacro file that defines macros only is read by the file that calls them"
+        hint = "; a xacro file without links of its own is read by the file that includes it"
         raise DescriptionError(
             f"the robot has no link{hint if source.endswith('.xacro') else ''}", source=source
         )

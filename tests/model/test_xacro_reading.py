@@ -142,7 +142,7 @@ def test_an_included_file_that_is_not_there_is_named_with_the_nearest(tmp_path: 
 def test_a_file_of_macros_is_no_robot(tmp_path: Path) -> None:
     path = tmp_path / "arm.xacro"
     path.write_text(ARM)
-    with pytest.raises(DescriptionError, match="has no link; a xacro file that defines macros only"):
+    with pytest.raises(DescriptionError, match="has no link; a xacro file without links of its own"):
         load(path)
 
 

@@ -96,6 +96,31 @@ def test_no_engine_refuses_the_mended_file(shape: str, choice: str, tmp_path: Pa
     assert not any(refused(remedy.case.source.text, engine, tmp_path) for engine in INSTALLED)
 
 
+@pytest.mark.parametrize("tag", ["collision", "visual"])
+@pytest.mark.parametrize(
+    ("origin", "shape"),
+    [
+        ('<origin rpy="${3.0/2} 0 0"/>', '<box size="1 1 1"/>'),
+        ("", '<sphere radius="${radius}"/>'),
+        ("", '<cylinder radius="${1/2}" length="$(arg l)"/>'),
+    ],
+)
+def test_mujoco_alone_refuses_an_expression_in_a_collision(
+    tag: str, origin: str, shape: str, tmp_path: Path
+) -> None:
+    text = f"<{tag}>{origin}<geometry>{shape}</geometry></{tag}>"
+    case = case_of(link("base"), link("arm", text), joint("elbow", "base", "arm"))
+    refusing = {engine for engine in INSTALLED if refused(case.source.text, engine, tmp_path)}
+    assert refusing == ({"mujoco"} if tag == "collision" else set()).intersection(INSTALLED)
+    found = find_rule("DX429").detect(case)
+    assert [each.link for each in found] == (["arm"] if tag == "collision" else [])
+    if found:
+        _, remedy = mended("DX429", case)
+        assert ("<collision>" in remedy.case.source.text) == bool(origin)
+        assert "${" not in remedy.case.source.text
+        assert not any(refused(remedy.case.source.text, engine, tmp_path) for engine in INSTALLED)
+
+
 def test_a_mesh_without_file_reaches_the_engines() -> None:
     report = diagnose(shaped("<mesh/>"), samples=1)
     refusing = {each.engine for each in report.engines if each.refused is not None}

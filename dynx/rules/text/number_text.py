@@ -6,19 +6,24 @@ other understandable text has one fault, and a plain text that was probably mean
 
 from __future__ import annotations
 
+import ast
 import math
+import operator
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
 LARGEST = "1.7976931348623157e+308"
 """The largest double, which every engine can read and which stands for "no limit"."""
 
-Fault = Literal["comma", "separator", "rest", "count", "blank", "tab", "infinite", "empty", "minus", "word"]
+Fault = Literal[
+    "comma", "separator", "rest", "count", "blank", "tab", "infinite", "empty", "minus", "expression", "word"
+]
 """Fault of a text: a decimal ``comma``, a ``separator`` other than blanks in a vector, a ``rest`` behind a
 number, a wrong ``count``, a ``blank`` behind a single number, a ``tab`` or line break in a vector, an
-``infinite`` number, an ``empty`` number or vector, a ``minus`` that is not the hyphen of ASCII, a ``word``
-without a number."""
+``infinite`` number, an ``empty`` number or vector, a ``minus`` that is not the hyphen of ASCII, an
+``expression`` of xacro that was not expanded, a ``word`` without a number."""
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _COMMA = re.compile(r"[+-]?(?:[0-9]+,[0-9]*|,[0-9]+)(?:[eE][+-]?[0-9]+)?")
@@ -29,6 +34,15 @@ _HEXADECIMAL = re.compile(r"[+-]?0[xX](?:[0-9a-fA-F]+\.?[0-9a-fA-F]*|\.[0-9a-fA-
 _MINUS = re.compile("[\u2010-\u2015\u2212\ufe63\uff0d](?=[0-9.])")
 _BLANKS = " \t\r\n"
 """The white space of XML, which every engine skips in front of a number and not every one behind it."""
+
+_ARITHMETIC = re.compile(r"\$\{([0-9.eEpi+*/() -]{1,200})\}")
+_SIGNS: dict[type, Callable[[float], float]] = {ast.UAdd: operator.pos, ast.USub: operator.neg}
+_OPERATIONS: dict[type, Callable[[float, float], float]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+}
 
 _UNEXPANDED = ("${", "$(")
 
@@ -54,8 +68,7 @@ def decimal(value: float) -> str:
 
 
 def misspelled_number(text: str) -> Misspelling | None:
-    """Return the fault of a text that should be one number; None where it is plain or an expression of
-    xacro."""
+    """Return the fault of a text that should be one number; None where it is plain."""
     word = text.strip()
     if not word:
         return Misspelling("empty", "")
@@ -65,20 +78,21 @@ def misspelled_number(text: str) -> Misspelling | None:
         return Misspelling("minus", hyphens)
     if sign := _infinite_sign(word):
         return Misspelling("infinite", sign.removeprefix("+") + LARGEST)
-    return _misspelled_word(word) or (None if _unexpanded(word) else Misspelling("word", ""))
+    if is_unexpanded(word):
+        return _expression(word, 1)
+    return _misspelled_word(word) or Misspelling("word", "")
 
 
 def misspelled_vector(text: str) -> Misspelling | None:
-    """Return the fault of a text that should be three numbers; None where it is plain or an expression of
-    xacro."""
+    """Return the fault of a text that should be three numbers; None where it is plain."""
     words = text.split()
     if not words:
         return Misspelling("empty", "")
     hyphens = [_MINUS.sub("-", word) for word in words]
     if hyphens != words and len(words) == 3 and all(map(is_number, hyphens)):
         return Misspelling("minus", " ".join(hyphens))
-    if _unexpanded(text):
-        return None
+    if is_unexpanded(text):
+        return _expression(text, 3)
     if all(map(is_number, words)):
         if len(words) != 3:
             return Misspelling("count", " ".join([*words, "0", "0"][:3]))
@@ -94,7 +108,7 @@ def misspelled_vector(text: str) -> Misspelling | None:
 
 
 def _misspelled_word(word: str) -> Misspelling | None:
-    if _unexpanded(word):
+    if is_unexpanded(word):
         return None
     if _COMMA.fullmatch(word):
         return Misspelling("comma", word.replace(",", "."), word.replace(",", ""))
@@ -118,8 +132,38 @@ def _hexadecimal(word: str) -> Misspelling | None:
         return None
 
 
-def _unexpanded(text: str) -> bool:
+def is_unexpanded(text: str) -> bool:
+    """Check whether a text has an expression of xacro, ``${...}`` or ``$(...)``."""
     return any(mark in text for mark in _UNEXPANDED)
+
+
+def _expression(text: str, count: int) -> Misspelling:
+    """Return the fault of a text with expressions; `meant` has their values where all are mere arithmetic."""
+    plain = _ARITHMETIC.sub(lambda found: _value(found.group(1)), text)
+    words = plain.split()
+    return Misspelling(
+        "expression", " ".join(words) if len(words) == count and all(map(is_number, words)) else ""
+    )
+
+
+def _value(arithmetic: str) -> str:
+    """Return the value of an expression of numbers, pi and + - * /; a question mark for any other."""
+    try:
+        return decimal(_evaluated(ast.parse(arithmetic.strip(), mode="eval").body))
+    except (SyntaxError, ValueError, ArithmeticError, RecursionError, MemoryError):
+        return "?"
+
+
+def _evaluated(node: ast.expr) -> float:
+    if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
+        return float(node.value)
+    if isinstance(node, ast.Name) and node.id == "pi":
+        return math.pi
+    if isinstance(node, ast.UnaryOp) and type(node.op) in _SIGNS:
+        return _SIGNS[type(node.op)](_evaluated(node.operand))
+    if isinstance(node, ast.BinOp) and type(node.op) in _OPERATIONS:
+        return _OPERATIONS[type(node.op)](_evaluated(node.left), _evaluated(node.right))
+    raise ValueError(f"{type(node).__name__} is no arithmetic")
 
 
 def _word_fault(word: str) -> Misspelling | None:

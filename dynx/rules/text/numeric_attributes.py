@@ -69,9 +69,14 @@ def _of_link(link: SourceElement) -> Iterator[NumericAttribute]:
         if child.tag == "inertial":
             yield from _below(child, _IN_INERTIAL)
         elif child.tag in ("visual", "collision"):
-            yield from _below(child, _IN_SHAPE)
-            for geometry in child.all("geometry"):
-                yield from _below(geometry, _IN_GEOMETRY)
+            yield from shape_attributes(child)
+
+
+def shape_attributes(part: SourceElement) -> Iterator[NumericAttribute]:
+    """Yield the numeric attributes of a ``<visual>`` or a ``<collision>``, in document order."""
+    yield from _below(part, _IN_SHAPE)
+    for geometry in part.all("geometry"):
+        yield from _below(geometry, _IN_GEOMETRY)
 
 
 def _below(parent: SourceElement, table: dict[str, dict[str, int]]) -> Iterator[NumericAttribute]:

@@ -1,4 +1,4 @@
-"""Planters of DX425 to DX427: defects of collision shapes and materials that decide whether a file loads."""
+"""Planters of DX425 to DX429: defects of collision shapes and materials that decide whether a file loads."""
 
 from __future__ import annotations
 
@@ -22,6 +22,21 @@ def without_size(site: Site) -> PlantedDefect:
     )
     text = f"<collision>\n  <geometry>\n    {shape}\n  </geometry>\n</collision>"
     return site.defect("DX425", site.source.insertion(link, text), link=name)
+
+
+def unexpanded_number(site: Site) -> PlantedDefect:
+    """A collision of a file that was written for xacro, and never expanded."""
+    name, link = site.pick_link(lambda each: True, "link")
+    origin, shape = site.rng.choice(
+        [
+            ('<origin rpy="${pi/2} 0 0"/>', '<box size="0.1 0.1 0.1"/>'),
+            ('<origin xyz="0 ${width / 2} 0"/>', '<sphere radius="0.1"/>'),
+            ("", '<sphere radius="${wheel_radius}"/>'),
+            ("", '<cylinder radius="${0.1 / 2}" length="$(arg length)"/>'),
+        ]
+    )
+    text = f"<collision>\n  {origin}\n  <geometry>\n    {shape}\n  </geometry>\n</collision>"
+    return site.defect("DX429", site.source.insertion(link, text), link=name)
 
 
 def lost_texture(site: Site) -> PlantedDefect:
@@ -72,6 +87,7 @@ def visual_incomplete(site: Site) -> PlantedDefect:
 PLANTERS = (
     Planter("DX428", visual_incomplete),
     Planter("DX425", without_size),
+    Planter("DX429", unexpanded_number),
     Planter("DX426", lost_texture),
     Planter("DX427", without_colour),
 )

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.rules.text.number_text import decimal, is_number, misspelled_number, misspelled_vector
+from dynx.rules.text.number_text import Misspelling, decimal, is_number, misspelled_number, misspelled_vector
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 decimals = numbers.map(repr).filter(lambda text: "." in text)
@@ -129,8 +129,27 @@ def test_words_of_a_vector_are_zero(written: str, meant: str) -> None:
 
 @pytest.mark.parametrize("written", ["${mass}", "2.5${unit}", "$(optenv XYZ 1 2 3)", "${a} 0 0"])
 def test_what_xacro_did_not_expand_is_not_understood(written: str) -> None:
-    assert misspelled_number(written) is None
-    assert misspelled_vector(written) is None
+    assert misspelled_number(written) == Misspelling("expression", "")
+    assert misspelled_vector(written) == Misspelling("expression", "")
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        ("${3.0/2}", "1.5"),
+        ("-${pi - pi}", "-0"),
+        ("${-(1 + 2) * 0.5}", "-1.5"),
+        ("${1/0}", ""),
+        ("${9**9**9}", ""),
+        ("${__import__('os')}", ""),
+        ("${'a' * 3}", ""),
+        ("${" + "(" * 150 + "1" + ")" * 30 + "}", ""),
+    ],
+)
+def test_arithmetic_of_xacro_has_its_value(written: str, meant: str) -> None:
+    assert misspelled_number(written) == Misspelling("expression", meant)
+    vector = misspelled_vector(f"{written} 0 ${{1 + 1}}")
+    assert vector == Misspelling("expression", f"{meant} 0 2" if meant else "")
 
 
 @pytest.mark.parametrize("minus", ["\u2212", "\u2013", "\uff0d"])
