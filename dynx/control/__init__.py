@@ -9,6 +9,7 @@ from dynx.control.friction import JointFriction
 from dynx.control.friction_compensation import FrictionCompensation
 from dynx.control.gravity_compensation import GravityCompensatedPD
 from dynx.control.impedance import Impedance
+from dynx.control.motors_and_encoders import Encoders, MotorLag
 from dynx.control.open_loop import OpenLoop
 from dynx.control.operational_space import OperationalSpace
 from dynx.control.pd import PD
@@ -26,6 +27,7 @@ __all__ = [
     "ComputedTorque",
     "Controller",
     "DiscreteComputedTorque",
+    "Encoders",
     "EngineMotor",
     "FeedForward",
     "FrictionCompensation",
@@ -34,6 +36,7 @@ __all__ = [
     "JointFriction",
     "Measurement",
     "ModelBased",
+    "MotorLag",
     "OpenLoop",
     "OperationalSpace",
     "PDMotor",
