@@ -100,13 +100,25 @@ def reason_unknown(filename: str, source: str) -> str:
             found = package_of(name, Path(os.path.realpath(source)).parent, environment_folders())
         except (OSError, ValueError, RuntimeError):
             found = None
-        outside = f"{shown(filename, 200)} is outside its package"
-        return f"package {shown(name)} was not found" if found is None else outside
+        if found is not None:
+            return f"{shown(filename, 200)} is outside its package"
+        return f"package {shown(name)} was not found{_possible_package(filename, source)}"
     if "$(" in filename:
         return "only xacro and launch files expand $(...)"
     if "://" in filename and not filename.startswith("file://"):
         return f"dynx reads no {shown(filename.partition('://')[0] + '://')}"
     return f"{shown(filename, 200)} is outside the folder of the description"
+
+
+def _possible_package(uri: str, source: str) -> str:
+    """Return a clause with the folder that has the file of a mesh and may be its package under another name;
+    else nothing."""
+    inside = uri.removeprefix("package://").partition("/")[2]
+    found = find_above(inside, source)
+    if found is None or not found.as_posix().endswith(f"/{inside}"):
+        return ""
+    folder = found.as_posix().removesuffix(f"/{inside}")
+    return f"; if it is {shown(folder, 300)}, a package.xml there can state its name"
 
 
 def _in_user_folder(filename: str, root: Path) -> Path | None:
@@ -132,6 +144,9 @@ def _existing(path: Path, root: Path, described: str) -> Path | None:
     other = irregularity(real)
     if other:
         raise MeshNotFoundError(f"{described} {other}")
+    slashed = Path(os.path.realpath(str(path).replace("\\", "/")))
+    if slashed != real and slashed.is_relative_to(root) and slashed.is_file():
+        raise MeshNotFoundError(f"no file {described}; with / in place of each backslash it is there")
     # A path such as "." leads to the root itself, and what lies beside that is not listed.
     hint = _similar(real) if real != root else ""
     raise MeshNotFoundError(f"no file {described}{hint}")

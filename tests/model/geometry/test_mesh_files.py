@@ -9,7 +9,7 @@ import pytest
 
 from dynx.errors import DescriptionError
 from dynx.model import package_search
-from dynx.model.geometry.mesh_files import MeshNotFoundError, find_mesh
+from dynx.model.geometry.mesh_files import MeshNotFoundError, find_mesh, reason_unknown
 from dynx.model.package_paths import resolve_package
 from dynx.rules.geometry.meshes import mesh_box
 
@@ -181,3 +181,21 @@ def test_a_fifo_is_not_opened(robot: Path) -> None:
         find_mesh(uri, str(robot))
     with pytest.raises(DescriptionError, match=r"pipe\.stl' is a FIFO"):
         resolve_package(uri, [robot.parents[2]])
+
+
+@pytest.mark.skipif(os.sep == "\\", reason="a backslash separates folders")
+@pytest.mark.parametrize("name", ["..\\meshes\\Base.stl", "package://arm_description/meshes\\Base.stl"])
+def test_backslashes_of_windows_are_named(robot: Path, name: str) -> None:
+    with pytest.raises(MeshNotFoundError, match="with / in place of each backslash it is there"):
+        find_mesh(name, str(robot))
+
+
+def test_a_package_of_another_name_is_suggested(robot: Path) -> None:
+    (robot.parents[1] / ".git").mkdir()
+    name = "package://arm/meshes/Base.stl"
+    assert find_mesh(name, str(robot)) is None
+    assert f"if it is '{robot.parents[1]}', a package.xml there" in reason_unknown(name, str(robot))
+    (robot.parents[1] / "package.xml").write_text("<package><name>arm</name></package>")
+    package_search.package_of.cache_clear()
+    package_search._packages.cache_clear()
+    assert find_mesh(name, str(robot)) == robot.parents[1] / "meshes/Base.stl"
