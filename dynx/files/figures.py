@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from functools import cache
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +14,32 @@ from dynx.files.writing import atomic_file
 RESOLUTION = 200
 """Pixels per inch of a saved picture."""
 
+NOTEBOOK_RESOLUTION = 100
+"""Pixels per inch of a picture in a notebook."""
+
 
 def new_figure(width: float, height: float) -> Any:
     """Make a `matplotlib.figure.Figure` of that size [in]. Raises NotInstalledError without matplotlib."""
+    return _figure_class()(figsize=(width, height), layout="constrained")
+
+
+@cache
+def _figure_class() -> type[Any]:
+    """Return the class of figures that notebooks show as pictures, with or without ``%matplotlib inline``."""
     try:
         from matplotlib.figure import Figure
     except ImportError as error:
         raise NotInstalledError("a plot needs matplotlib: pip install 'dynx[plot]'") from error
-    return Figure(figsize=(width, height), layout="constrained")
+
+    class NotebookFigure(Figure):
+        """A figure that draws itself where matplotlib has no window and no notebook to draw in."""
+
+        def _repr_png_(self) -> bytes:
+            data = BytesIO()
+            self.savefig(data, format="png", dpi=NOTEBOOK_RESOLUTION)
+            return data.getvalue()
+
+    return NotebookFigure
 
 
 def picture_format(path: str | os.PathLike[str]) -> str:

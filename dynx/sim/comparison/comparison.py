@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 from dynx.errors import DynxError
+from dynx.files.notebook import html_grid
 from dynx.sim.comparison.factors import Factor, Mixture
 from dynx.sim.comparison.separation import Separation, separation
 from dynx.sim.one_rollout import simulate
@@ -76,6 +77,18 @@ class RolloutComparison:
         acting = sum(cause.acts(self.tolerance) for cause in self.causes)
         proof = "proved" if self.proved else "not proved"
         return f"<RolloutComparison: {self.separation.largest:.3g} apart, causes: {acting}, {proof}>"
+
+    def _repr_html_(self) -> str:
+        rows = (
+            (
+                each.factor.name,
+                each.factor.ours,
+                each.factor.theirs,
+                *("" if effect is None else f"{effect:.2g}" for effect in (each.alone, each.without)),
+            )
+            for each in self.causes
+        )
+        return html_grid(repr(self)[1:-1], ("difference", "ours", "theirs", "alone", "without it"), rows)
 
 
 def compare_rollouts(

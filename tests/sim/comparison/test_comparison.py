@@ -49,6 +49,7 @@ def test_one_cause_is_proved_and_another_difference_has_no_effect() -> None:
     assert not found.alike
     assert found.proved
     assert (found.remaining, found.repeated) == (0.0, 0.0)
+    assert found._repr_html_().count("<tr>") == 1 + len(found.causes)
     payload, plant = found.causes
     assert payload.factor.name == "payload"
     assert payload.alone == pytest.approx(found.separation.largest, rel=1e-9)
