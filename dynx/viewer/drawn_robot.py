@@ -19,10 +19,12 @@ from dynx.viewer.colours import GREY, ORANGE, RGB
 from dynx.viewer.drawn_parts import DrawnParts, wxyz
 from dynx.viewer.surfaces.orientation import turned_outwards
 from dynx.viewer.surfaces.reduction import TRIANGLE_BUDGET, budgets, reduced
-from dynx.viewer.surfaces.triangles import Triangles, hull_of
+from dynx.viewer.surfaces.triangles import Triangles, hull_of, resized
 
 COLLISION_OPACITY = 0.4
 GHOST_OPACITY = 0.3
+GHOST_SIZE = 0.99
+"""Size of the shapes of a ghost: inside those that it coincides with, or the picture would flicker there."""
 
 
 class Look(NamedTuple):
@@ -34,6 +36,8 @@ class Look(NamedTuple):
     """Opacity from 0 to 1; None for that of each shape."""
     triangles: int | None = TRIANGLE_BUDGET
     """Largest number of triangles of all visual meshes; None draws them whole."""
+    size: float = 1.0
+    """Size of each shape, about its middle, relative to its own."""
 
 
 AS_DESCRIBED = Look()
@@ -111,7 +115,7 @@ class DrawnRobot(DrawnParts):
                     add_triangles(
                         self._scene,
                         f"{self.links[name].name}/visual{k}",
-                        reduced(shape, budget),
+                        resized(reduced(shape, budget), self._look.size),
                         T,
                         self._look.colour or rgb_of(rgba),
                         opacity,

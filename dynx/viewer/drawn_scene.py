@@ -11,6 +11,7 @@ from dynx.model.geometry import Mesh
 from dynx.viewer.drawn_parts import DrawnParts
 from dynx.viewer.drawn_robot import AS_DESCRIBED, DrawnRobot, Look, add_triangles, rgb_of
 from dynx.viewer.surfaces.reduction import reduced
+from dynx.viewer.surfaces.triangles import resized
 from dynx.world.scene import SceneBody
 
 
@@ -85,7 +86,7 @@ def _add_body(scene: Any, node: Any, body: SceneBody, look: Look) -> Iterator[An
         yield add_triangles(
             scene,
             f"{node.name}/shape{k}",
-            reduced(placed.shape, look.triangles),
+            resized(reduced(placed.shape, look.triangles), look.size),
             placed.origin.matrix,
             look.colour or rgb_of(rgba),
             opacity,

@@ -12,9 +12,10 @@ from dynx.spatial.scalar import Floats
 from dynx.viewer.colours import BLUE, SKY_BLUE, css
 from dynx.viewer.contact_arrows import ContactArrows
 from dynx.viewer.curves import Curves
-from dynx.viewer.drawn_robot import AS_DESCRIBED, GHOST_OPACITY, Look
+from dynx.viewer.drawn_robot import AS_DESCRIBED, GHOST_OPACITY, GHOST_SIZE, Look
 from dynx.viewer.drawn_scene import DrawnScene
 from dynx.viewer.following_camera import FollowingCamera
+from dynx.viewer.framing import box_around, has_ground
 from dynx.viewer.marks import NamedParts
 from dynx.viewer.motion import PARTED, Motion, separation
 from dynx.viewer.page import Page
@@ -56,9 +57,10 @@ class MotionView:
         self.title = title or motion.name
         """Name of what is shown."""
         self._start = float(motion.t[0])
-        low, high = _extent(motion)
+        low, high = box_around(motion.poses, motion.bodies)
         self._size = max(float(np.linalg.norm(high - low)), 0.3)
-        page.add_ground(20.0, 1.0)
+        if not has_ground(motion.bodies):
+            page.add_ground(20.0, 1.0)
         with page.together():
             self.drawn = DrawnScene(page.scene, "/motion", motion.robots, motion.bodies, look)
             self._ghost_drawn = None if ghost is None else self._draw_ghost(ghost, look)
@@ -111,7 +113,7 @@ class MotionView:
     def _draw_ghost(self, ghost: Motion, look: Look) -> DrawnScene:
         # What never moves is the same in both.
         moving = [body for body in ghost.bodies if body.name in ghost.poses]
-        seen_through = look._replace(colour=SKY_BLUE, opacity=GHOST_OPACITY)
+        seen_through = look._replace(colour=SKY_BLUE, opacity=GHOST_OPACITY, size=GHOST_SIZE)
         return DrawnScene(self._page.scene, "/second", ghost.robots, moving, seen_through)
 
     def _show(self, time: float) -> None:
@@ -193,7 +195,7 @@ class MotionView:
                     jump = gui.add_button("jump to where they part")
                     at = float(self.motion.t[first]) - self._start
                     jump.on_click(lambda _: self._jump_to(at))
-                gui.add_text("they part", f"{text} {1e3 * PARTED:g} mm", disabled=True)
+                gui.add_text("they part", f"{text} {1e3 * PARTED:g} mm", multiline=True, disabled=True)
                 ends = {each.name: float(each.t[-1]) for each in (self.motion, self.ghost)}
                 shorter = min(ends, key=lambda name: ends[name])
                 if ends[shorter] < max(ends.values()) - step:
@@ -206,13 +208,6 @@ class MotionView:
         for each in curves:
             with gui.add_folder(each.title, expand_by_default=False):
                 self._curves.append(Curves(gui, each.title, each.t, each.values, each.names))
-
-
-def _extent(motion: Motion) -> tuple[Floats, Floats]:
-    """Return the corners (3,) of the box around the origins of everything that moves."""
-    origins = [T[..., :3, 3].reshape(-1, 3) for T in motion.poses.values()]
-    points = np.concatenate(origins) if origins else np.zeros((1, 3))
-    return points.min(axis=0), points.max(axis=0)
 
 
 def _legend(solid: str, ghost: str) -> str:

@@ -192,7 +192,7 @@ class RobotView:
             frame = gui.add_dropdown("frame", self.model.frame_names, initial_value=self._handle.frame)
             drag = gui.add_checkbox("drag it", initial_value=False)
             kept = gui.add_dropdown("target", tuple(_FREE), initial_value="pose")
-            self._message = gui.add_text("result", "", disabled=True)
+            self._message = gui.add_text("result", "", multiline=True, disabled=True)
 
         def changed(_: Any) -> None:
             with self._page.lock, self._page.together():

@@ -12,18 +12,17 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ClosedError, DynxError, nearest, shown
 from dynx.model.configuration import checked_array
-from dynx.model.geometry import HeightField, Plane
 from dynx.viewer.contact_arrows import ContactArrows
 from dynx.viewer.drawn_robot import AS_DESCRIBED, Look
 from dynx.viewer.drawn_scene import DrawnScene
 from dynx.viewer.following_camera import FollowingCamera
+from dynx.viewer.framing import box_around, has_ground
 from dynx.viewer.marks import NamedParts
 from dynx.viewer.motion import Motion, motion_of_state
 from dynx.viewer.page import Page
 from dynx.viewer.spring import Spring
 from dynx.world import World, Wrench
 from dynx.world.camera.drawing import part_poses
-from dynx.world.scene import SceneBody
 
 UPDATES_PER_SECOND = 30.0
 """Rate at which the page is moved."""
@@ -66,8 +65,7 @@ class WorldView:
         poses = dict(part_poses(scene, world.state))
         moving = [*(f"{r.name}/{link.name}" for r in scene.robots for link in r.model.links)]
         moving += [body.name for body in scene.bodies if not body.fixed]
-        points = np.array([poses[name][:3, 3] for name in moving]) if moving else np.zeros((1, 3))
-        low, high = points.min(axis=0), points.max(axis=0)
+        low, high = box_around({name: poses[name][None] for name in moving}, scene.bodies)
         self._size = max(float(np.linalg.norm(high - low)), 0.5)
         mass = sum(r.model.total_mass for r in scene.robots) + sum(b.mass or 0.0 for b in scene.bodies)
         self._arrows = ContactArrows(
@@ -76,7 +74,7 @@ class WorldView:
         self._spring = Spring(page.scene, 0.3 * self._size)
         self._pushes: list[Wrench] = []
         self._running = threading.Event()
-        if not any(_is_ground(body) for body in scene.bodies):
+        if not has_ground(scene.bodies):
             page.add_ground(20.0, 1.0)
         self._add_controls(moving, steps=steps)
         self.camera = FollowingCamera(page, self.drawn)
@@ -238,7 +236,7 @@ class WorldView:
             once = gui.add_button("one step", visible=steps)
             reset = gui.add_button("reset", visible=steps)
             self._factor = gui.add_slider("speed", 0.05, 2.0, step=0.05, initial_value=1.0, visible=steps)
-            self._message = gui.add_text("error", "", disabled=True)
+            self._message = gui.add_text("error", "", multiline=True, disabled=True)
         with gui.add_folder("show"):
             collisions = gui.add_checkbox("collision shapes", initial_value=False)
             forces = gui.add_checkbox("contact forces", initial_value=True)
@@ -321,7 +319,3 @@ class WorldView:
                 if self._ended.is_set():
                     return
                 self._rate.value = f"{(self.world.time - before) / spent:.2f}"
-
-
-def _is_ground(body: SceneBody) -> bool:
-    return any(isinstance(placed.shape, Plane | HeightField) for placed in body.shapes)

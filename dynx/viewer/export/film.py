@@ -15,6 +15,7 @@ from dynx.model.geometry.links import Colour
 from dynx.model.geometry.visible_shapes import link_shapes
 from dynx.spatial.scalar import Floats
 from dynx.viewer.colours import SKY_BLUE
+from dynx.viewer.framing import box_around
 from dynx.viewer.library import Image
 from dynx.viewer.motion import Motion
 from dynx.viewer.page import VIEW_DIRECTION
@@ -54,9 +55,8 @@ def picture_of(motions: tuple[Motion, ...], time: float, camera: Camera) -> NDAr
 
 
 def camera_for(motion: Motion, size: tuple[int, int] = SIZE) -> Camera:
-    """Return a camera that sees everything that moves, from where the page begins."""
-    points = np.concatenate([T[:, :3, 3] for T in motion.poses.values()] or [np.zeros((1, 3))])
-    low, high = points.min(axis=0), points.max(axis=0)
+    """Return the camera with which the page begins."""
+    low, high = box_around(motion.poses, motion.bodies)
     middle, diagonal = 0.5 * (low + high), max(float(np.linalg.norm(high - low)), 0.3)
     eye = middle + _DISTANCE * diagonal * VIEW_DIRECTION
     return Camera.look_at(eye, middle, size=size)

@@ -51,6 +51,15 @@ def hull_of(shape: Shape) -> Triangles:
     return Triangles.of(*shape.hull) if isinstance(shape, Mesh) else triangles_of(shape)
 
 
+def resized(triangles: Triangles, factor: float) -> Triangles:
+    """Return triangles of another size, about the middle of the box around them."""
+    if factor == 1.0:
+        return triangles
+    vertices = triangles.vertices
+    middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+    return Triangles.of(middle + factor * (vertices - middle), triangles.faces)
+
+
 def distinct_rows(rows: NDArray[np.integer[Any]]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return where each distinct row of non-negative integers (n, 3) occurs first, and the number of each row
     among these.

@@ -1,0 +1,76 @@
+"""The camera begins with a view of most of a motion, and ghosts lie inside what they coincide with."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import dynx
+from dynx.model.geometry import Box, Sphere
+from dynx.spatial.scalar import Floats
+from dynx.viewer import view
+from dynx.viewer.drawn_robot import GHOST_SIZE
+from dynx.viewer.framing import box_around, has_ground
+from dynx.viewer.surfaces.triangles import resized, triangles_of
+from dynx.world import World
+from dynx.world.scene import box, ground, read_scene
+
+
+def along_x(x: Floats) -> Floats:
+    """Return poses (n, 4, 4) at the places x (n,)."""
+    T = np.tile(np.eye(4), (len(x), 1, 1))
+    T[:, 0, 3] = x
+    return T
+
+
+@given(st.floats(0.0, 1e3), st.integers(2, 50))
+def test_one_part_that_leaves_does_not_make_the_others_small(end: float, count: int) -> None:
+    still = {f"pin{k}": along_x(np.full(count, 0.1 * k)) for k in range(11)}
+    low, high = box_around({**still, "ball": along_x(np.linspace(-1.0, end, count))})
+    # All parts at the start, and then no more than the part of the way that most parts are on.
+    assert low[0] == -1.0
+    assert 1.0 <= high[0] <= 1.0 + 1e-9 or end < 1.0
+
+
+@given(st.lists(st.floats(-10.0, 10.0), min_size=1, max_size=20))
+def test_the_box_holds_the_start_and_lies_within_all_places(places: list[float]) -> None:
+    x = np.array(places)
+    low, high = box_around({"part": along_x(x)})
+    assert x.min() <= low[0] <= x[0] <= high[0] <= x.max()
+
+
+def test_shapes_of_bodies_count() -> None:
+    cube = box("cube", (0.2, 0.2, 0.2), mass=1.0)
+    low, high = box_around({"cube": along_x(np.zeros(2))}, [cube])
+    assert -low == pytest.approx(np.full(3, 0.1 * np.sqrt(3.0)), rel=1e-6)
+    assert high == pytest.approx(-low)
+    both = {"cube": along_x(np.zeros(2)), "ground": along_x(np.full(2, 5.0))}
+    assert np.array_equal(box_around(both, [cube, ground()]), (low, high))
+    assert np.array_equal(box_around({"ground": both["ground"]}, [ground()])[0], [5.0, 0.0, 0.0])
+    assert np.array_equal(box_around({}), np.zeros((2, 3)))
+
+
+def test_a_scene_with_a_ground_gets_no_other() -> None:
+    assert has_ground([box("cube", (1.0, 1.0, 1.0), mass=1.0), ground()])
+    assert not has_ground([box("cube", (1.0, 1.0, 1.0), mass=1.0)])
+    with World(read_scene("stack")) as world, world.view() as viewer:
+        assert viewer.page.scene.get_handle_by_name("/ground") is None
+    with dynx.load("six_axis_arm").view() as viewer:
+        assert viewer.page.scene.get_handle_by_name("/ground") is not None
+
+
+def test_a_ghost_lies_inside_what_it_coincides_with() -> None:
+    for shape in (Box((0.1, 0.2, 0.3)), Sphere(0.4)):
+        whole = triangles_of(shape)
+        ghost = resized(whole, GHOST_SIZE)
+        assert (np.abs(ghost.vertices) <= np.abs(whole.vertices)).all()
+        assert np.ptp(ghost.vertices, axis=0) == pytest.approx(GHOST_SIZE * np.ptp(whole.vertices, axis=0))
+    rollout = dynx.simulate("ur5", duration=0.1)
+    with view((rollout, rollout), names=("a", "b"), whole_meshes=False) as viewer:
+        drawn = [each.visuals for each in (viewer.view.drawn, viewer.view._ghost_drawn)]
+        for name, nodes in drawn[0].items():
+            for node, inner in zip(nodes, drawn[1][name], strict=True):
+                sizes = [np.ptp(each.vertices, axis=0).max() for each in (inner, node)]
+                assert sizes[0] == pytest.approx(GHOST_SIZE * sizes[1], rel=1e-5)
