@@ -16,6 +16,9 @@ from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint, Trajectory
 from dynx.trajectory.limit_check import check
 
+UNCHECKED = "check_reference=False simulates it nevertheless"
+"""Advice in the errors of limits."""
+
 SetpointOf = Callable[[Floats], Setpoint]
 """From times (n,) to setpoints (n, nq), (n, nv), (n, nv)."""
 
@@ -36,7 +39,10 @@ def checked_reference(model: Model, reference: Any, *, within_limits: bool) -> S
             f"{model.name} has nq {model.nq} and nv {model.nv}"
         )
     if within_limits:
-        check(model, reference, effort=False)
+        try:
+            check(model, reference, effort=False)
+        except LimitError as error:
+            raise LimitError(f"{error}\n  ({UNCHECKED})", error.violations) from None
     return reference
 
 
@@ -76,7 +82,7 @@ def _held(model: Model, q: Any, within_limits: bool) -> SetpointOf:
             if not low <= x <= high
         ]
         if found:
-            raise LimitError(f"the reference of {model.name} breaks limits: {found[0]}", found)
+            raise LimitError(f"the reference of {model.name} breaks limits: {found[0]} ({UNCHECKED})", found)
 
     def at(times: Floats) -> Setpoint:
         rest = np.zeros((len(times), model.nv))
