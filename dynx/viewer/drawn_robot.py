@@ -137,8 +137,9 @@ class DrawnRobot(DrawnParts):
         """Return the shapes by which a link is drawn, without those that cannot be read."""
         drawn = list(link_shapes(self.model.geometry, link))
         geometry = self.model.geometry
-        for shapes_of in (geometry.visuals, *(() if drawn else (geometry.collisions,))):
-            self._note_fault(shapes_of, link)
+        self._note_fault(geometry.visuals, link)
+        if not drawn and link not in self._faults:
+            self._note_fault(geometry.collisions, link)
         return drawn
 
     def _note_fault(self, shapes_of: Callable[[str], Sequence[Visual | Collision]], link: str) -> None:
@@ -205,7 +206,9 @@ def _grouped(faults: Mapping[str, list[str]]) -> list[str]:
     links: dict[str, list[str]] = {}
     for link, messages in faults.items():
         for message in messages:
-            links.setdefault(message.rpartition(": ")[2], []).append(link)
+            named = links.setdefault(message.rpartition(": ")[2], [])
+            if link not in named:
+                named.append(link)
     grouped = []
     for reason, names in links.items():
         if len(names) == 1:

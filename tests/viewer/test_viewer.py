@@ -251,7 +251,7 @@ def test_a_push_gives_a_body_its_impulse_once() -> None:
 def test_notes_that_are_alike_are_one(tmp_path: Path) -> None:
     links = [
         f'<link name="l{k}"><visual><geometry><mesh filename="package://none/{k}.stl"/></geometry></visual>'
-        "</link>"
+        f'<collision><geometry><mesh filename="package://none/{k}.stl"/></geometry></collision></link>'
         for k in range(4)
     ]
     joints = [
@@ -264,6 +264,8 @@ def test_notes_that_are_alike_are_one(tmp_path: Path) -> None:
         assert viewer.notes == (
             "shapes of 4 links (l0, l1, l2, ...) are not drawn: package 'none' was not found",
         )
+        viewer.view.robot.show(visuals=True, collisions=True)
+        assert viewer.notes[0].startswith("shapes of 4 links (l0, l1, l2, ...)")
 
 
 @needs_examples

@@ -12,7 +12,7 @@ from urllib.parse import unquote, urlsplit
 from dynx.errors import DescriptionError, nearest, shown
 from dynx.files.reading import irregularity
 from dynx.model.package_paths import StrPath, environment_folders, resolve_package
-from dynx.model.package_search import enclosing_folder, package_of
+from dynx.model.package_search import MANIFESTS, enclosing_folder, package_of
 
 _BULLET_SCHEMES = re.compile("^(package|model)://")
 
@@ -118,6 +118,8 @@ def _possible_package(uri: str, source: str) -> str:
     if found is None or not found.as_posix().endswith(f"/{inside}"):
         return ""
     folder = found.as_posix().removesuffix(f"/{inside}")
+    if os.path.exists(os.path.join(folder, MANIFESTS[0])):
+        return f"; {shown(folder, 300)} has the file, and its package.xml states another name"
     return f"; if it is {shown(folder, 300)}, a package.xml there can state its name"
 
 

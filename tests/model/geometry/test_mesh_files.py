@@ -199,3 +199,4 @@ def test_a_package_of_another_name_is_suggested(robot: Path) -> None:
     package_search.package_of.cache_clear()
     package_search._packages.cache_clear()
     assert find_mesh(name, str(robot)) == robot.parents[1] / "meshes/Base.stl"
+    assert "states another name" in reason_unknown("package://leg/meshes/Base.stl", str(robot))
