@@ -111,6 +111,7 @@ def _show_separations(out: Console, separations: Sequence[Entry]) -> None:
     table = Table(
         "engines",
         *headings,
+        "first",
         "largest [m]",
         "end [m]",
         "of",
@@ -123,12 +124,19 @@ def _show_separations(out: Console, separations: Sequence[Entry]) -> None:
         table.add_row(
             ", ".join(each["engines"]),
             *times,
+            _first_apart(each, distances[0]),
             f"{max(each['distance']):.2e}",
             f"{each['distance'][-1]:.2e}",
             one_line(each["farthest"][int(np.argmax(each["distance"]))]),
         )
     out.print("\ndistance of the motions, the largest of all bodies and moving links, and when it exceeds")
     out.print(table)
+
+
+def _first_apart(separation: Entry, distance: float) -> str:
+    """Return the part that is farther apart than `distance` first; empty if none is."""
+    beyond = np.array(separation["distance"]) > distance
+    return one_line(separation["farthest"][int(np.argmax(beyond))]) if beyond.any() else ""
 
 
 def _tell_rest(out: Console, rest: int, noun: str, plural: str) -> None:

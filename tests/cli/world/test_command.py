@@ -5,15 +5,18 @@ from __future__ import annotations
 import json
 import signal
 from importlib.util import find_spec
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
+from rich.console import Console
 
 import dynx
 from dynx.cli.shell.main import cli
 from dynx.cli.world.plot import _lowest
+from dynx.cli.world.tables import _show_separations
 from dynx.world import World, read_scene, world_names
 from tests.world.engines import WORLDS
 
@@ -215,3 +218,17 @@ def test_a_file_of_another_kind_is_refused_before_the_run(scene: str, tmp_path: 
     assert "a world with its state is written to .world" in result.stderr
     assert "Rollout.save" in result.stderr
     assert not (tmp_path / "end.npz").exists()
+
+
+def test_the_part_that_is_apart_first_is_named() -> None:
+    separation = {
+        "engines": ["a", "b"],
+        "times": [0.0, 1.0, 2.0],
+        "distance": [0.0, 0.002, 0.5],
+        "farthest": ["cube", "ball", "cube"],
+        "parted": [{"distance": 1e-3, "time": 1.0}, {"distance": 1.0, "time": None}],
+    }
+    out = StringIO()
+    _show_separations(Console(file=out, width=200), [separation])
+    (*_, row) = out.getvalue().splitlines()
+    assert row.split() == ["a,", "b", "1", "s", "never", "ball", "5.00e-01", "5.00e-01", "cube"]
