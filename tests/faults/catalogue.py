@@ -12,6 +12,7 @@ from tests.faults.fault import Fault
 from tests.faults.rigid_body import RIGID_BODY_FAULTS
 from tests.faults.simulation import SIMULATION_FAULTS
 from tests.faults.training import TRAINING_FAULTS
+from tests.faults.viewer import VIEWER_FAULTS
 from tests.faults.worlds import WORLDS_FAULTS
 
 FAULTS_BY_AREA: dict[str, tuple[Fault, ...]] = {
@@ -24,6 +25,7 @@ FAULTS_BY_AREA: dict[str, tuple[Fault, ...]] = {
     "environments": ENVIRONMENTS_FAULTS,
     "simulation": SIMULATION_FAULTS,
     "training": TRAINING_FAULTS,
+    "viewer": VIEWER_FAULTS,
     "worlds": WORLDS_FAULTS,
 }
 FAULTS: tuple[Fault, ...] = tuple(fault for faults in FAULTS_BY_AREA.values() for fault in faults)

@@ -11,6 +11,7 @@ OPTIONAL = {
     "mujoco": "mujoco",
     "drake": "pydrake",
     "tests/training/": "stable_baselines3",
+    "tests/viewer/": "viser",
 }
 """Part of the name of a module or test -> the top-level module that it then needs, and that may be absent."""
 

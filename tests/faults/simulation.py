@@ -72,7 +72,7 @@ SIMULATION_FAULTS = (
     Fault(
         "trajectory_path_limits_not_checked_between_nodes",
         "dynx.trajectory.time_optimal_path",
-        right="return max(1.0, too_fast, too_sudden) * (1.0 + STRETCH_MARGIN)",
+        right="return max(1.0, too_fast, too_sudden, too_strong) * (1.0 + STRETCH_MARGIN)",
         wrong="return 1.0",
         test_file="tests/trajectory/test_limits_kept.py",
         test="test_a_path_respects_limits_and_passes_the_waypoints",
@@ -207,7 +207,7 @@ SIMULATION_FAULTS = (
     ),
     Fault(
         "cached_kernels_of_packages_inside_outlive_their_source",
-        "dynx.simd.cache",
+        "dynx.files.cache",
         right='source.rglob("*.py")',
         wrong='source.glob("*.py")',
         test_file="tests/simd/test_cache.py",

@@ -62,6 +62,7 @@ def test_a_scene_with_a_ground_gets_no_other() -> None:
 
 
 def test_a_ghost_lies_inside_what_it_coincides_with() -> None:
+    assert GHOST_SIZE < 1.0
     for shape in (Box((0.1, 0.2, 0.3)), Sphere(0.4)):
         whole = triangles_of(shape)
         ghost = resized(whole, GHOST_SIZE)

@@ -65,6 +65,14 @@ def test_every_object_has_its_view(arm: Model, tmp_path: Path) -> None:
         assert world.time == pytest.approx(3 * world.dt)
 
 
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs more than one loopback address")
+def test_other_machines_are_let_in_only_if_asked(arm: Model) -> None:
+    for options, let_in in (({}, False), ({"host": "0.0.0.0"}, True)):
+        with arm.view(**options) as viewer, socket.socket() as other:
+            # Every address of the network 127 is this machine's; the page has one of them, or all.
+            assert (other.connect_ex(("127.0.0.2", viewer.page.port)) == 0) == let_in
+
+
 def test_a_port_that_is_taken_is_told(arm: Model) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
