@@ -90,7 +90,7 @@ VIEWER_FAULTS = (
         "dynx.viewer.spring",
         right="T[:3, :3].T @ (pull.taken - T[:3, 3])",
         wrong="np.zeros(3)",
-        test_file="tests/viewer/test_viewer.py",
+        test_file="tests/viewer/test_world_view.py",
         test="test_the_pointer_drags_a_part_by_the_point_taken",
     ),
     Fault(
@@ -98,7 +98,7 @@ VIEWER_FAULTS = (
         "dynx.viewer.world_view",
         right="Wrench(part, given / self.world.dt)",
         wrong="Wrench(part, given)",
-        test_file="tests/viewer/test_viewer.py",
+        test_file="tests/viewer/test_world_view.py",
         test="test_a_push_gives_a_body_its_impulse_once",
     ),
     Fault(
@@ -106,7 +106,7 @@ VIEWER_FAULTS = (
         "dynx.viewer.world_view",
         right="pushes, self._pushes = self._pushes, []",
         wrong="pushes = self._pushes",
-        test_file="tests/viewer/test_viewer.py",
+        test_file="tests/viewer/test_world_view.py",
         test="test_a_push_gives_a_body_its_impulse_once",
     ),
     Fault(

@@ -13,11 +13,10 @@ import numpy as np
 import pytest
 
 import dynx
-from dynx.errors import ArgumentError, DynxError
+from dynx.errors import ArgumentError
 from dynx.model import Model
 from dynx.viewer import Viewer, view
-from dynx.viewer.spring import Pull
-from dynx.world import World, Wrench
+from dynx.world import World
 from dynx.world.scene import read_scene
 from tests.conftest import EXAMPLES_INSTALLED, needs_examples
 from tests.viewer.conftest import poses_of_nodes, until
@@ -159,44 +158,6 @@ def test_a_page_gets_one_message_for_each_joint_that_moves(arm: Model) -> None:
         assert 0 < buffer.message_counter - before <= arm.nv + 4
 
 
-def test_a_world_is_stepped_in_its_own_time() -> None:
-    with World(read_scene("stack")) as world, world.view(play=True) as viewer:
-        until(lambda: world.time > 0.1, "the world to move")
-        viewer.view.pause()
-        viewer.view.reset()
-        assert world.time == 0.0
-
-
-def test_a_spring_pulls_a_body_to_its_handle() -> None:
-    scene = read_scene("slope")
-    body = next(each for each in scene.bodies if not each.fixed)
-    with World(scene) as world, world.view() as viewer:
-        before = world.state.bodies[body.name].position.copy()
-        viewer.view._spring.hold(world, body.name)
-        viewer.view._spring._node.position = before + np.array([0.0, 0.0, 1.0])
-        viewer.view.step(300)
-        assert world.state.bodies[body.name].position[2] > before[2] + 0.1
-
-
-def test_the_pointer_drags_a_part_by_the_point_taken() -> None:
-    scene = read_scene("slope")
-    body = next(each for each in scene.bodies if not each.fixed)
-    with World(scene) as world, world.view() as viewer:
-        before = world.state.bodies[body.name].T_world_body
-        taken = before[:3, 3] + before[:3, :3] @ np.array([0.05, 0.0, 0.05])
-        viewer.view._spring.pull(Pull(body.name, taken, taken + np.array([0.0, 0.0, 1.0])))
-        viewer.view.step(1)
-        (wrench,) = viewer.view._spring.wrenches(world)
-        assert np.allclose(wrench.point, [0.05, 0.0, 0.05], atol=1e-12)
-        viewer.view.step(300)
-        lifted = world.state.bodies[body.name].position[2]
-        assert lifted > before[2, 3] + 0.1
-        viewer.view._spring.pull(None)
-        viewer.view.step(600)
-        assert not viewer.view._spring.pulls
-        assert world.state.bodies[body.name].position[2] < lifted
-
-
 def test_a_program_shows_its_own_states(arm: Model) -> None:
     with view(arm) as viewer:
         q = arm.random(3)
@@ -237,23 +198,6 @@ def test_a_viewer_that_was_closed_is_told(arm: Model, tmp_path: Path) -> None:
         with pytest.raises(ArgumentError, match=f"{viewer.url} is closed"):
             act()
     assert not list(tmp_path.iterdir())
-
-
-def test_a_push_gives_a_body_its_impulse_once() -> None:
-    scene = read_scene("slope")
-    body = next(body for body in scene.bodies if not body.fixed)
-    with World(scene) as world, World(scene) as alone, world.view() as viewer:
-        viewer.view.push(body.name, (0.0, 0.5, 0.0))
-        viewer.view.step(4)
-        alone.step(1, wrenches=[Wrench(body.name, np.array([0.0, 0.5, 0.0]) / world.dt)])
-        alone.step(3)
-        pushed, expected = world.state.bodies[body.name], alone.state.bodies[body.name]
-        assert np.allclose(pushed.twist, expected.twist, rtol=0.0, atol=1e-12)
-        assert np.allclose(pushed.position, expected.position, rtol=0.0, atol=1e-12)
-        with pytest.raises(ArgumentError, match=f"no part .*{body.name}"):
-            viewer.view.push(f"{body.name}s", (0.0, 0.5, 0.0))
-        with pytest.raises(DynxError, match="impulse"):
-            viewer.view.push(body.name, (0.0, np.nan, 0.0))
 
 
 def test_notes_that_are_alike_are_one(tmp_path: Path) -> None:
@@ -373,27 +317,6 @@ def test_a_picture_leaves_out_what_cannot_be_read(tmp_path: Path) -> None:
         viewer.export(tmp_path / "robot.png")
         assert any("link 'lost' is not read" in note for note in viewer.notes)
     assert (tmp_path / "robot.png").stat().st_size > 1000
-
-
-def test_errors_of_the_loads_are_shown_and_end_the_motion() -> None:
-    def failing(world: World) -> dict[str, Any]:
-        raise ValueError("no load")
-
-    for loads, message in ((failing, "ValueError: no load"), (lambda world: {"force": 1.0}, "'force'")):
-        with World(read_scene("slope")) as world, world.view(loads=loads, play=True) as viewer:
-            until(lambda: message in viewer.view._message.value, message)  # noqa: B023
-            assert not viewer.view.playing
-            assert world.time == 0.0
-    with World(read_scene("slope")) as world, pytest.raises(ArgumentError, match="wanted a function"):
-        world.view(loads=3)
-
-
-def test_a_world_that_was_closed_is_told() -> None:
-    world = World(read_scene("slope"))
-    with world.view(play=True) as viewer:
-        until(lambda: world.time > 0.0, "the world to move")
-        world.close()
-        until(lambda: "closed" in viewer.view._message.value, "the end of the world")
 
 
 def test_two_rollouts_are_compared_by_their_names(arm: Model) -> None:
