@@ -121,6 +121,35 @@ def test_mujoco_alone_refuses_an_expression_in_a_collision(
         assert not any(refused(remedy.case.source.text, engine, tmp_path) for engine in INSTALLED)
 
 
+@pytest.mark.parametrize(
+    ("kind", "inside", "refusing"),
+    [
+        ("fixed", '<limit lower="${x}" upper="1" effort="1" velocity="1"/>', {"pinocchio"}),
+        ("fixed", '<dynamics damping="${1/2}"/>', {"pinocchio"}),
+        ("fixed", '<mimic joint="k" multiplier="${k}"/>', {"pinocchio", "drake"}),
+        ("continuous", '<safety_controller soft_lower_limit="${x}" k_velocity="1"/>', {"pinocchio"}),
+        ("continuous", '<calibration rising="${x}"/>', {"pinocchio"}),
+        ("continuous", '<limit lower="${x}" effort="1" velocity="1"/>', {"pinocchio", "drake"}),
+    ],
+)
+def test_an_expression_that_dynx_does_not_read_is_explained(
+    kind: str, inside: str, refusing: set[str]
+) -> None:
+    ends = '<parent link="base"/><child link="arm"/><axis xyz="0 0 1"/>'
+    joint_text = f'<joint name="elbow" type="{kind}">{ends}{inside}</joint>'
+    text = case_of(link("base"), link("arm"), joint_text).source.text
+    report = diagnose(text, samples=1, counterexamples=False)
+    found = {each.engine for each in report.engines if each.refused is not None}
+    assert found == refusing.intersection(INSTALLED)
+    assert report.explained
+    others = {"DX208"} if "mimic" in inside else set()  # The joint that it follows is missing.
+    assert {each.rule for each in report.differences} - others == ({"DX429"} if found else set())
+    if found:
+        assert report.mended is not None
+        assert "${" not in report.mended
+        assert ("effort" in report.mended) == (kind == "continuous" and "effort" in inside)
+
+
 def test_a_mesh_without_file_reaches_the_engines() -> None:
     report = diagnose(shaped("<mesh/>"), samples=1)
     refusing = {each.engine for each in report.engines if each.refused is not None}

@@ -58,7 +58,7 @@ def numeric_attributes(source: XmlSource) -> Iterator[NumericAttribute]:
         if part.tag == "link":
             yield from _of_link(part)
         elif part.tag == "joint":
-            yield from _below(part, _IN_JOINT)
+            yield from joint_attributes(part)
             # MuJoCo alone reads the axis of these joints, see DX219.
             if part.attributes.get("type") not in _WITHOUT_AXIS:
                 yield from _below(part, {"axis": {"xyz": 3}})
@@ -70,6 +70,11 @@ def _of_link(link: SourceElement) -> Iterator[NumericAttribute]:
             yield from _below(child, _IN_INERTIAL)
         elif child.tag in ("visual", "collision"):
             yield from shape_attributes(child)
+
+
+def joint_attributes(joint: SourceElement) -> Iterator[NumericAttribute]:
+    """Yield the numeric attributes of a joint but those of its axis, in document order."""
+    yield from _below(joint, _IN_JOINT)
 
 
 def shape_attributes(part: SourceElement) -> Iterator[NumericAttribute]:
