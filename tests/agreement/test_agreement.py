@@ -88,10 +88,10 @@ def test_a_singular_mass_matrix_is_refused_alike_and_noted() -> None:
     assert any("point" in note and "singular" in note for note in report.notes)
 
 
-@pytest.mark.parametrize(("n_joints", "listed"), [(6, "joint5 moves"), (7, "joint5 ... moves")])
+@pytest.mark.parametrize(("n_joints", "listed"), [(6, "'joint5' moves"), (7, "'joint5' and 1 more moves")])
 def test_at_most_six_joints_without_inertia_are_listed(n_joints: int, listed: str) -> None:
     notes = agree(massless_chain(n_joints), ["reference"], samples=1).notes
-    assert any(f"joint4, {listed}" in note for note in notes)
+    assert any(f"'joint4', {listed}" in note for note in notes)
 
 
 @pytest.mark.parametrize("base", BASES)
@@ -199,7 +199,7 @@ def test_reference_and_pinocchio_agree_about_random_robots(model: Model) -> None
     assert report.agree, (report.differences, report.suspects)
 
 
-@pytest.mark.parametrize(("n", "listed"), [(6, "joint5 moves"), (8, "joint5 ... moves")])
+@pytest.mark.parametrize(("n", "listed"), [(6, "'joint5' moves"), (8, "'joint5' and 2 more moves")])
 def test_a_long_list_of_joints_that_move_nothing_is_cut(n: int, listed: str) -> None:
     report = agree(massless_chain(n), backends=["reference"], samples=1)
     assert any(listed in note for note in report.notes)

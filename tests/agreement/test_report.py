@@ -47,7 +47,7 @@ def test_the_document_has_the_form_that_is_documented() -> None:
     wrong = agree(arm(), [ReferenceBackend(arm()), GravityUpsideDown(arm())], samples=2)
     refused = refused_report("shell", DescriptionError("the robot has no link", source="a.urdf", line=3))
     document = json.loads(json.dumps(results_document([fine, wrong, refused]), allow_nan=False))
-    assert set(document) == {"schema", "dynx", "results", "summary", "not_done"}
+    assert set(document) == {"schema", "dynx", "results", "summary", "not_done", "left_out"}
     assert document["schema"] == 1
     assert document["dynx"] == __version__
     assert document["summary"] == {"robots": 3, "agree": 1, "differ": 1, "refused": 1, "not_done": 0}

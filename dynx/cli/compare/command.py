@@ -46,7 +46,7 @@ def compare() -> None:
     \b
     Examples:
       dynx sim so101 --to elbow_flex=0.4 --save a.npz
-      dynx sim so101 --to elbow_flex=0.4 --plant mujoco --payload gripper_link:0.1 --save b.npz
+      dynx sim so101 --to elbow_flex=0.4 --payload gripper_link:0.1 --save b.npz
       dynx compare a.npz b.npz
       dynx compare log.csv a.npz --tolerance 0.01
     """
