@@ -35,7 +35,7 @@ SCENARIO = Scenario(
     payload=Payload("forearm", 1.0, [0.0, 0.0, 0.0]),
     check_reference=False,
 )
-LOADERS = {"rollout": Rollout.load, "batch": BatchRollouts.load}
+LOADERS: dict[str, Callable[[Path], Any]] = {"rollout": Rollout.load, "batch": BatchRollouts.load}
 TEXTS = {"rollout": "robot", "batch": "scenario"}
 
 
