@@ -20,18 +20,18 @@ NOTEBOOK_RESOLUTION = 100
 
 def new_figure(width: float, height: float) -> Any:
     """Make a `matplotlib.figure.Figure` of that size [in]. Raises NotInstalledError without matplotlib."""
-    return _figure_class()(figsize=(width, height), layout="constrained")
-
-
-@cache
-def _figure_class() -> type[Any]:
-    """Return the class of figures that notebooks show as pictures, with or without ``%matplotlib inline``."""
     try:
         from matplotlib.figure import Figure
     except ImportError as error:
         raise NotInstalledError("a plot needs matplotlib: pip install 'dynx[plot]'") from error
+    return _notebook_figure(Figure)(figsize=(width, height), layout="constrained")
 
-    class NotebookFigure(Figure):
+
+@cache
+def _notebook_figure(figure_class: type[Any]) -> type[Any]:
+    """Return the class of figures that notebooks show as pictures, with or without ``%matplotlib inline``."""
+
+    class NotebookFigure(figure_class):  # type: ignore[misc]
         """A figure that draws itself where matplotlib has no window and no notebook to draw in."""
 
         def _repr_png_(self) -> bytes:

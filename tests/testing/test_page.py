@@ -1,4 +1,4 @@
-"""docs/testing.md: its workflow is YAML, and its commands have the options that it uses."""
+"""docs/testing.md: its workflow and hook are YAML, and its commands have the options that it uses."""
 
 from __future__ import annotations
 
@@ -36,20 +36,38 @@ class Options:
 
 
 def workflow_commands() -> Iterator[str]:
+    """Yield the commands of the workflow, of the step that stands for one of its steps, and of the hook."""
     yaml = import_module("yaml")
-    (text,) = blocks("yaml", PAGE)
-    document = yaml.safe_load(text)
-    assert document["permissions"]["security-events"] == "write"
-    for job in document["jobs"].values():
-        for step in job["steps"]:
-            assert ("run" in step) != ("uses" in step)
-            if "run" in step:
-                yield from step["run"].splitlines()
+    workflow, step, hooks = map(yaml.safe_load, blocks("yaml", PAGE))
+    assert workflow["permissions"]["security-events"] == "write"
+    for each in [*(step for job in workflow["jobs"].values() for step in job["steps"]), *step]:
+        assert ("run" in each) != ("uses" in each)
+        if "run" in each:
+            yield from each["run"].splitlines()
+    (repository,) = hooks["repos"]
+    (hook,) = repository["hooks"]
+    for each in (hook, own_hook()):
+        yield f"{each['entry']} robots/my.urdf"  # pre-commit appends the files of the commit
+
+
+def own_hook() -> Any:
+    (hook,) = import_module("yaml").safe_load((ROOT / ".pre-commit-hooks.yaml").read_text(encoding="utf-8"))
+    return hook
 
 
 def commands() -> list[str]:
     shown = [line for block in blocks("sh", PAGE) for line in block.splitlines()]
     return [*shown, *workflow_commands()]
+
+
+def test_the_hook_of_the_page_takes_the_files_of_dynx_own_hook() -> None:
+    *_, hooks = map(import_module("yaml").safe_load, blocks("yaml", PAGE))
+    (shown,) = hooks["repos"][0]["hooks"]
+    own = own_hook()
+    assert all(shown[key] == own[key] for key in ("id", "files", "require_serial"))
+    taken = re.compile(own["files"])
+    assert all(taken.search(name) for name in ("robots/my.urdf", "my.urdf.xacro"))
+    assert not any(taken.search(name) for name in ("my.xacro", "my.urdf.md"))
 
 
 def test_commands_have_the_options() -> None:
