@@ -15,13 +15,16 @@ from dynx.viewer.curves import Curves
 from dynx.viewer.drawn_robot import AS_DESCRIBED, GHOST_OPACITY, GHOST_SIZE, Look
 from dynx.viewer.drawn_scene import DrawnScene
 from dynx.viewer.following_camera import FollowingCamera
-from dynx.viewer.framing import box_around, has_ground
+from dynx.viewer.framing import GROUND_CELLS, box_around, has_ground
 from dynx.viewer.marks import NamedParts
 from dynx.viewer.motion import PARTED, Motion, separation
 from dynx.viewer.page import Page
 from dynx.viewer.timeline import Timeline
 
 _NO_PART = "none"
+
+_SHARE = 0.8
+"""Share of the picture that the motion takes at the start."""
 
 _LONGEST_ARROW = 0.3
 """Length of the largest contact force, as a share of the size of the motion."""
@@ -57,10 +60,10 @@ class MotionView:
         self.title = title or motion.name
         """Name of what is shown."""
         self._start = float(motion.t[0])
-        low, high = box_around(motion.poses, motion.bodies)
-        self._size = max(float(np.linalg.norm(high - low)), 0.3)
+        low, high = box_around(motion.poses, motion.bodies, motion.robots)
+        self._size = float(np.linalg.norm(high - low)) or 0.3
         if not has_ground(motion.bodies):
-            page.add_ground(20.0, 1.0)
+            page.add_ground(self._size, GROUND_CELLS)
         with page.together():
             self.drawn = DrawnScene(page.scene, "/motion", motion.robots, motion.bodies, look)
             self._ghost_drawn = None if ghost is None else self._draw_ghost(ghost, look)
@@ -82,7 +85,7 @@ class MotionView:
         """The camera of the page."""
         self.names = NamedParts(page, self.drawn.parts, self.drawn.visuals)
         """The names of the part under the pointer and of that which was clicked."""
-        page.look_at(0.5 * (low + high), 1.3 * self._size)
+        page.look_at(low, high, _SHARE)
 
     @property
     def motions(self) -> tuple[Motion, ...]:
@@ -203,11 +206,11 @@ class MotionView:
                         "compared", f"until {ends[shorter]:.4g} s, where {shorter} ends", disabled=True
                     )
                 self._curves.append(
-                    Curves(gui, "distance [m]", self.motion.t, distance[:, None], ["largest distance"])
+                    Curves(self._page, "distance [m]", self.motion.t, distance[:, None], ["largest distance"])
                 )
         for each in curves:
             with gui.add_folder(each.title, expand_by_default=False):
-                self._curves.append(Curves(gui, each.title, each.t, each.values, each.names))
+                self._curves.append(Curves(self._page, each.title, each.t, each.values, each.names))
 
 
 def _legend(solid: str, ghost: str) -> str:

@@ -8,22 +8,19 @@ import threading
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from html import escape
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, shown
 from dynx.model.configuration import whole_number
 from dynx.spatial.scalar import Floats
 from dynx.viewer.browser.client import Client
+from dynx.viewer.framing import VIEW_DIRECTION, fitting_distance, round_length
 from dynx.viewer.library import serve, silent
 
 DEFAULT_HOST = "127.0.0.1"
 DEFAULT_PORT = 8080
-
-VIEW_DIRECTION = np.array([1.0, -1.0, 0.7]) / math.sqrt(2.49)
-"""Unit vector (3,) from what is seen to the camera."""
 
 _SKY = 1.8
 """Intensity of the light from above and, in another colour, from below, in a plain picture."""
@@ -34,8 +31,9 @@ _SUN = 2.2
 _SUN_PLACE = (1.0, -2.0, 3.0)
 """Place of the lamp relative to what it shines on."""
 
-_MAX_LINES = 60
-"""Largest number of lines of the ground in each direction, in a plain picture."""
+_PIECES = 8
+"""Number of pieces of each line of the ground in a plain picture. Of a long piece that goes past the camera
+parts are missing, or lie before what hides them."""
 _LINE_COLOUR = {False: (170, 170, 170), True: (70, 70, 70)}
 """Colour of the lines of the ground on a light and on a dark page."""
 
@@ -52,10 +50,32 @@ that software draws where dynx says so itself (a note) and has prepared for it."
 
 NARROW = 576
 """Width of a page up to which viser lays the panel over the lower part of the picture [pixels]."""
-_NARROW_DISTANCE = 1.2
-"""Distance of the camera on a narrow page, whose picture is lower, relative to that on a wide one."""
 _COVERED = 0.45
 """Share of the height of a narrow page that the panel covers."""
+
+_NEAREST = 0.05
+"""Least distance of the camera at the start [m]; nearer than 0.01 m it sees nothing."""
+
+
+class _FirstView(NamedTuple):
+    """A box that the camera sees at the start."""
+
+    low: Floats
+    high: Floats
+    """Corners (3,) [m]."""
+    tangent: float
+    """Tangent of half the angle that the box may take."""
+
+    @property
+    def target(self) -> Floats:
+        """The middle of the box (3,) [m]."""
+        return 0.5 * (self.low + self.high)
+
+    def away(self, wide: float = 1.0, high: float = 1.0) -> Floats:
+        """Return the vector (3,) [m] from the target to the camera, in a picture of which the box may take
+        the width and the height given, as shares of the height of the picture."""
+        wanted = fitting_distance(self.low, self.high, wide * self.tangent, high * self.tangent)
+        return max(wanted, _NEAREST) * VIEW_DIRECTION
 
 
 class Page:
@@ -88,7 +108,7 @@ class Page:
         self._server = serve(self.host, self.port, title, self._client.folder)
         self._plain, self._dark = plain, dark
         self._furnish()
-        self._view: tuple[Floats, Floats] | None = None
+        self._view: _FirstView | None = None
         self.part_names: dict[str, str] = {}
         """The names of parts by the paths of their nodes."""
         self._server.on_client_connect(self._watch_narrow)
@@ -142,30 +162,32 @@ class Page:
         context: AbstractContextManager[Any] = self._server.atomic()
         return context
 
-    def add_ground(self, side: float, cell: float, height: float = 0.0) -> None:
-        """Add a square grid with the side and the distance between lines [m], at a height [m]."""
+    def add_ground(self, size: float, cells: int, height: float = 0.0) -> None:
+        """Add a square grid at a height [m], with so many cells along each side, whose length is a round one
+        of about half the `size` of what stands on it [m]."""
+        cell = round_length(0.5 * size)
+        side = cells * cell
         if not self._plain:
             self.scene.add_grid(
-                "/ground", side, side, cell_size=0.1, section_size=cell, position=(0.0, 0.0, height)
+                "/ground", side, side, cell_size=0.2 * cell, section_size=cell, position=(0.0, 0.0, height)
             )
             return
-        half = 0.5 * side
-        along = np.linspace(-half, half, min(round(side / cell), _MAX_LINES) + 1)
-        ends = np.full_like(along, half)
-        level = np.full_like(along, height)
-        rows = np.stack([np.stack([-ends, along, level], -1), np.stack([ends, along, level], -1)], axis=1)
-        lines = np.concatenate([rows, rows[:, :, [1, 0, 2]]]).astype(np.float32)
+        across, along = np.linspace(-0.5, 0.5, cells + 1), np.linspace(-0.5, 0.5, _PIECES + 1)
+        x, y = np.broadcast_arrays(along * side, across[:, None] * side)
+        points = np.stack([x, y, np.full_like(x, height)], axis=-1)
+        pieces = np.stack([points[:, :-1], points[:, 1:]], axis=2).reshape(-1, 2, 3)
+        lines = np.concatenate([pieces, pieces[:, :, [1, 0, 2]]]).astype(np.float32)
         self.scene.add_line_segments(
             "/ground", lines, _LINE_COLOUR[self._dark], thickness=1.0, thickness_units="screen"
         )
 
-    def look_at(self, target: ArrayLike, distance: float) -> None:
-        """Begin with a camera that sees `target` (3,) from a distance [m]."""
-        point = np.asarray(target, dtype=np.float64)
-        eye = point + distance * VIEW_DIRECTION
-        self._server.initial_camera.position = tuple(eye.tolist())
-        self._server.initial_camera.look_at = tuple(point.tolist())
-        self._view = eye, point
+    def look_at(self, low: Floats, high: Floats, share: float) -> None:
+        """Begin with a camera for which the box between two corners (3,) [m] takes a `share` of the height of
+        the picture, or of its width, and no more."""
+        tangent = share * math.tan(0.5 * self._server.initial_camera.fov)
+        self._view = view = _FirstView(low, high, tangent)
+        self._server.initial_camera.position = tuple((view.target + view.away()).tolist())
+        self._server.initial_camera.look_at = tuple(view.target.tolist())
 
     def _watch_narrow(self, client: Any) -> None:
         # The picture is as wide as the page only until the panel stands beside it.
@@ -180,10 +202,10 @@ class Page:
         camera = client.camera
         if self._view is None:
             return
-        eye, target = self._view
-        if not (np.allclose(camera.position, eye) and np.allclose(camera.look_at, target)):
+        view, target = self._view, self._view.target
+        if not (np.allclose(camera.position, target + view.away()) and np.allclose(camera.look_at, target)):
             return
-        away = _NARROW_DISTANCE * (eye - target)
+        away = view.away(camera.image_width / camera.image_height, 1.0 - _COVERED)
         up = np.array(camera.up_direction, dtype=np.float64)
         up -= (up @ away) / (away @ away) * away
         height = 2.0 * float(np.linalg.norm(away)) * math.tan(0.5 * camera.fov)

@@ -19,6 +19,7 @@ from dynx.viewer.browser.copy_button import CopyButton
 from dynx.viewer.drawn_robot import AS_DESCRIBED, DrawnRobot, Look, size_of
 from dynx.viewer.following_camera import FollowingCamera
 from dynx.viewer.frame_handle import FrameHandle
+from dynx.viewer.framing import box_around
 from dynx.viewer.joint_sliders import JointSliders
 from dynx.viewer.marks import Marks, NamedParts
 from dynx.viewer.page import Page
@@ -27,6 +28,12 @@ from dynx.viewer.robot_quantities import GravityTorques, Manipulability
 if TYPE_CHECKING:
     from dynx.backends import Backend
     from dynx.viewer.motion import Motion
+
+_SHARE = 0.7
+"""Share of the picture that the robot takes at the start: its joints will move it."""
+
+_CELLS = 10
+"""Number of cells along each side of the ground."""
 
 _FREE = {"pose": None, "position": "rotation", "rotation": "position"}
 """What the handle keeps of a frame, and what `inverse_kinematics` then leaves free."""
@@ -76,11 +83,11 @@ class RobotView:
         """The names of the part under the pointer and of that which was clicked."""
         self._handle.put(start)
         self._show(start)
-        origins = np.array([self.robot.pose(link)[:3, 3] for link in self.robot.links])
+        places = {f"{model.name}/{link}": self.robot.pose(link)[None] for link in self.robot.links}
+        low, high = box_around(places, robots={model.name: model})
         # A humanoid whose base is its pelvis stands above the ground, too.
-        lowest = min(float(origins[:, 2].min()), 0.0)
-        page.add_ground(4.0, 0.5, lowest)
-        page.look_at(0.5 * (origins.min(axis=0) + origins.max(axis=0)), 1.5 * size)
+        page.add_ground(float(np.linalg.norm(high - low)) or size, _CELLS, min(float(low[2]), 0.0))
+        page.look_at(low, high, _SHARE)
 
     @property
     def title(self) -> str:
@@ -135,11 +142,12 @@ class RobotView:
 
     def _show(self, q: Floats) -> None:
         self.robot.move(q)
+        self._report("")
         try:
             self._torques.move(q)
             self._ellipsoid.move(q, self._handle.frame)
         except DynxError as error:
-            self._message.value = str(error)
+            self._report(str(error))
         self._code.value = f"q = np.array({q.tolist()})"
         self._copy.put(self._code.value)
 
@@ -152,7 +160,12 @@ class RobotView:
         with self._page.lock, self._page.together():
             self._sliders.put(q)
             self._show(q)
-            self._message.value = message
+            if message:
+                self._report(message)
+
+    def _report(self, message: str) -> None:
+        """Show what became of the target, or an error; an empty message is hidden."""
+        self._message.value, self._message.visible = message, bool(message)
 
     # -- controls -----------------------------------------------------------------------------
 
@@ -192,7 +205,7 @@ class RobotView:
             frame = gui.add_dropdown("frame", self.model.frame_names, initial_value=self._handle.frame)
             drag = gui.add_checkbox("drag it", initial_value=False)
             kept = gui.add_dropdown("target", tuple(_FREE), initial_value="pose")
-            self._message = gui.add_text("result", "", multiline=True, disabled=True)
+            self._message = gui.add_text("result", "", multiline=True, disabled=True, visible=False)
 
         def changed(_: Any) -> None:
             with self._page.lock, self._page.together():

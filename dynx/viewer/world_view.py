@@ -16,7 +16,7 @@ from dynx.viewer.contact_arrows import ContactArrows
 from dynx.viewer.drawn_robot import AS_DESCRIBED, Look
 from dynx.viewer.drawn_scene import DrawnScene
 from dynx.viewer.following_camera import FollowingCamera
-from dynx.viewer.framing import box_around, has_ground
+from dynx.viewer.framing import GROUND_CELLS, box_around, has_ground
 from dynx.viewer.marks import NamedParts
 from dynx.viewer.motion import Motion, motion_of_state
 from dynx.viewer.page import Page
@@ -31,6 +31,9 @@ STANDARD_WEIGHT = 9.81
 """Force [N] on a mass of 1 kg, for the scale of the arrows."""
 
 _NO_PART = "none"
+
+_SHARE = 0.6
+"""Share of the picture that what can move takes at the start."""
 
 _LOADS = ("motors", "torques", "wrenches")
 
@@ -65,8 +68,9 @@ class WorldView:
         poses = dict(part_poses(scene, world.state))
         moving = [*(f"{r.name}/{link.name}" for r in scene.robots for link in r.model.links)]
         moving += [body.name for body in scene.bodies if not body.fixed]
-        low, high = box_around({name: poses[name][None] for name in moving}, scene.bodies)
-        self._size = max(float(np.linalg.norm(high - low)), 0.5)
+        robots = {robot.name: robot.model for robot in scene.robots}
+        low, high = box_around({name: poses[name][None] for name in moving}, scene.bodies, robots)
+        self._size = float(np.linalg.norm(high - low)) or 0.5
         mass = sum(r.model.total_mass for r in scene.robots) + sum(b.mass or 0.0 for b in scene.bodies)
         self._arrows = ContactArrows(
             page.scene, 0.3 * self._size / (STANDARD_WEIGHT * (mass or 1.0)), 0.006 * self._size
@@ -75,7 +79,7 @@ class WorldView:
         self._pushes: list[Wrench] = []
         self._running = threading.Event()
         if not has_ground(scene.bodies):
-            page.add_ground(20.0, 1.0)
+            page.add_ground(self._size, GROUND_CELLS)
         self._add_controls(moving, steps=steps)
         self.camera = FollowingCamera(page, self.drawn)
         """The camera of the page."""
@@ -84,7 +88,7 @@ class WorldView:
         if steps:
             self._spring.hold_by_pointer({name: self.drawn.visuals[name] for name in moving})
         self.draw()
-        page.look_at(0.5 * (low + high), 1.5 * self._size)
+        page.look_at(low, high, _SHARE)
         page.at_end(self._running.set)
         if steps:
             self._thread = threading.Thread(target=self._run, name="dynx world", daemon=True)
@@ -195,7 +199,7 @@ class WorldView:
             except Exception as error:
                 self.pause()
                 kind = "" if isinstance(error, DynxError) else f"{type(error).__name__}: "
-                self._message.value = f"{kind}{error}"
+                self._report(f"{kind}{error}")
             self.draw()
 
     def push(self, part: str, impulse: ArrayLike) -> None:
@@ -212,15 +216,19 @@ class WorldView:
         with self._page.lock:
             self._pushes.append(Wrench(part, given / self.world.dt))
 
+    def _report(self, message: str) -> None:
+        """Show an error; an empty one is hidden."""
+        self._message.value, self._message.visible = message, bool(message)
+
     def _end(self) -> None:
         self.pause()
-        self._message.value = "the world was closed"
+        self._report("the world was closed")
 
     def reset(self) -> None:
         """Return to the start."""
         with self._page.lock:
             self.world.reset()
-            self._message.value = ""
+            self._report("")
             self._spring.hold(self.world, self._held())
             self.draw()
 
@@ -229,14 +237,14 @@ class WorldView:
     def _add_controls(self, moving: list[str], *, steps: bool) -> None:
         gui = self._page.gui
         with gui.add_folder("world"):
-            gui.add_text("engine", f"{self.world.engine} {self.world.version}", disabled=True)
+            gui.add_text("engine", self.world.version, disabled=True)
             self._clock = gui.add_text("time", "", disabled=True)
             self._rate = gui.add_text("speed reached", "", disabled=True, visible=steps)
             self._button = gui.add_button("play", visible=steps)
             once = gui.add_button("one step", visible=steps)
             reset = gui.add_button("reset", visible=steps)
             self._factor = gui.add_slider("speed", 0.05, 2.0, step=0.05, initial_value=1.0, visible=steps)
-            self._message = gui.add_text("error", "", multiline=True, disabled=True)
+            self._message = gui.add_text("error", "", multiline=True, disabled=True, visible=False)
         with gui.add_folder("show"):
             collisions = gui.add_checkbox("collision shapes", initial_value=False)
             forces = gui.add_checkbox("contact forces", initial_value=True)
@@ -267,9 +275,9 @@ class WorldView:
         def pushed(_: Any) -> None:
             with self._page.lock:
                 if self._part.value == _NO_PART:
-                    self._message.value = "choose the part that is pushed"
+                    self._report("choose the part that is pushed")
                     return
-                self._message.value = ""
+                self._report("")
                 self.push(self._part.value, impulse.value)
 
         collisions.on_update(show)

@@ -10,7 +10,7 @@ import pytest
 import dynx
 from dynx.errors import ArgumentError
 from dynx.spatial.scalar import Floats
-from dynx.viewer.curves import _power
+from dynx.viewer.curves import Curves, _power
 from dynx.viewer.export.film import film_length
 from dynx.viewer.motion import (
     MAX_FRAMES,
@@ -135,3 +135,29 @@ def test_runs_of_a_scene_are_as_far_apart_as_their_comparison_says() -> None:
     compared = compare_worlds(scene, ["pybullet", "mujoco"], 0.2, samples=10)
     a, b = (motion_of_run(scene, run) for run in compared.runs)
     assert np.allclose(separation(a, b)[0], compared.separations[0].distance, atol=1e-12)
+
+
+def test_one_of_many_curves_is_chosen_and_keeps_its_colour_while_the_time_moves() -> None:
+    names = [f"joint{k}" for k in range(9)]
+    t = np.linspace(0.0, 1.0, 11)
+    values = np.outer(t, np.arange(9.0))
+    with Page(port=0) as page:
+        curves = Curves(page, "torque", t, values, names)
+        plot = curves._plot
+        colours = [each["stroke"] for each in plot.series[1:]]
+        assert not plot.legend["show"]
+        curves._pick("joint3")
+        curves.put(0.5, at_once=True)
+        time, row = plot.data
+        assert np.array_equal(time, t)
+        assert np.array_equal(row[:6], values[:6, 3])
+        assert np.isnan(row[6:]).all()
+        assert plot.legend["show"]
+        assert plot.series[1]["stroke"] == colours[3]
+        assert plot.series[1]["label"].startswith("joint3")
+        low, high = plot.scales["y"]["range"]
+        assert low < 0.0 < 3.0 < high < 3.5
+        curves._pick("(all)")
+        assert len(plot.data) == 10
+        curves.put(1.0, at_once=True)
+        assert np.array_equal(np.stack(plot.data[1:], axis=1), values)

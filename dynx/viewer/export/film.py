@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import os
 from collections.abc import Callable, Iterator
 
@@ -15,10 +16,9 @@ from dynx.model.geometry.links import Colour
 from dynx.model.geometry.visible_shapes import link_shapes
 from dynx.spatial.scalar import Floats
 from dynx.viewer.colours import SKY_BLUE
-from dynx.viewer.framing import box_around
+from dynx.viewer.framing import VIEW_DIRECTION, box_around, fitting_distance
 from dynx.viewer.library import Image
 from dynx.viewer.motion import Motion
-from dynx.viewer.page import VIEW_DIRECTION
 from dynx.world.camera import Camera, cast_rays
 from dynx.world.camera.drawing import DrawnShape
 from dynx.world.camera.picture import png_bytes
@@ -32,8 +32,8 @@ MAX_PICTURES = 500
 SIZE = (480, 360)
 """Width and height of a picture of a film [pixels]."""
 
-_DISTANCE = 1.1
-"""Distance of the camera, relative to the diagonal of the box around everything that moves."""
+_SHARE = 0.9
+"""Share of the picture that the box around everything that moves takes."""
 
 Progress = Callable[[int], object]
 """Called with the number of pictures that are drawn."""
@@ -55,11 +55,12 @@ def picture_of(motions: tuple[Motion, ...], time: float, camera: Camera) -> NDAr
 
 
 def camera_for(motion: Motion, size: tuple[int, int] = SIZE) -> Camera:
-    """Return the camera with which the page begins."""
-    low, high = box_around(motion.poses, motion.bodies)
-    middle, diagonal = 0.5 * (low + high), max(float(np.linalg.norm(high - low)), 0.3)
-    eye = middle + _DISTANCE * diagonal * VIEW_DIRECTION
-    return Camera.look_at(eye, middle, size=size)
+    """Return a camera that sees the box around a motion, from the direction in which the page begins."""
+    low, high = box_around(motion.poses, motion.bodies, motion.robots)
+    middle = 0.5 * (low + high)
+    upward = _SHARE * math.tan(0.5 * Camera.field_of_view)
+    distance = fitting_distance(low, high, upward * size[0] / size[1], upward)
+    return Camera.look_at(middle + distance * VIEW_DIRECTION, middle, size=size)
 
 
 def write_picture(path: str | os.PathLike[str], rgb: NDArray[np.uint8]) -> None:
