@@ -28,9 +28,6 @@ _INNER = (0.1, 0.9)
 _SIGNS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 """Directions (8, 3) from the middle of a box to its corners."""
 
-GROUND_CELLS = 40
-"""Number of cells along each side of the ground of what moves."""
-
 _UNSIZED = 0.5
 """Distance of the camera from a point [m]."""
 

@@ -15,7 +15,7 @@ from dynx.viewer.curves import Curves
 from dynx.viewer.drawn_robot import AS_DESCRIBED, GHOST_OPACITY, GHOST_SIZE, Look
 from dynx.viewer.drawn_scene import DrawnScene
 from dynx.viewer.following_camera import FollowingCamera
-from dynx.viewer.framing import GROUND_CELLS, box_around, has_ground
+from dynx.viewer.framing import box_around, has_ground
 from dynx.viewer.marks import NamedParts
 from dynx.viewer.motion import PARTED, Motion, separation
 from dynx.viewer.page import Page
@@ -63,7 +63,7 @@ class MotionView:
         low, high = box_around(motion.poses, motion.bodies, motion.robots)
         self._size = float(np.linalg.norm(high - low)) or 0.3
         if not has_ground(motion.bodies):
-            page.add_ground(self._size, GROUND_CELLS)
+            page.add_ground(self._size)
         with page.together():
             self.drawn = DrawnScene(page.scene, "/motion", motion.robots, motion.bodies, look)
             self._ghost_drawn = None if ghost is None else self._draw_ghost(ghost, look)

@@ -31,7 +31,9 @@ _SUN = 2.2
 _SUN_PLACE = (1.0, -2.0, 3.0)
 """Place of the lamp relative to what it shines on."""
 
-_PIECES = 8
+_CELLS = 12
+"""Number of cells along each side of the ground."""
+_PIECES = 6
 """Number of pieces of each line of the ground in a plain picture. Of a long piece that goes past the camera
 parts are missing, or lie before what hides them."""
 _LINE_COLOUR = {False: (170, 170, 170), True: (70, 70, 70)}
@@ -162,17 +164,17 @@ class Page:
         context: AbstractContextManager[Any] = self._server.atomic()
         return context
 
-    def add_ground(self, size: float, cells: int, height: float = 0.0) -> None:
-        """Add a square grid at a height [m], with so many cells along each side, whose length is a round one
-        of about half the `size` of what stands on it [m]."""
+    def add_ground(self, size: float, height: float = 0.0) -> None:
+        """Add a square grid at a height [m], whose cells have a round length of about half the `size` of what
+        stands on it [m]."""
         cell = round_length(0.5 * size)
-        side = cells * cell
+        side = _CELLS * cell
         if not self._plain:
             self.scene.add_grid(
                 "/ground", side, side, cell_size=0.2 * cell, section_size=cell, position=(0.0, 0.0, height)
             )
             return
-        across, along = np.linspace(-0.5, 0.5, cells + 1), np.linspace(-0.5, 0.5, _PIECES + 1)
+        across, along = np.linspace(-0.5, 0.5, _CELLS + 1), np.linspace(-0.5, 0.5, _PIECES + 1)
         x, y = np.broadcast_arrays(along * side, across[:, None] * side)
         points = np.stack([x, y, np.full_like(x, height)], axis=-1)
         pieces = np.stack([points[:, :-1], points[:, 1:]], axis=2).reshape(-1, 2, 3)

@@ -32,9 +32,6 @@ if TYPE_CHECKING:
 _SHARE = 0.7
 """Share of the picture that the robot takes at the start: its joints will move it."""
 
-_CELLS = 10
-"""Number of cells along each side of the ground."""
-
 _FREE = {"pose": None, "position": "rotation", "rotation": "position"}
 """What the handle keeps of a frame, and what `inverse_kinematics` then leaves free."""
 
@@ -86,7 +83,7 @@ class RobotView:
         places = {f"{model.name}/{link}": self.robot.pose(link)[None] for link in self.robot.links}
         low, high = box_around(places, robots={model.name: model})
         # A humanoid whose base is its pelvis stands above the ground, too.
-        page.add_ground(float(np.linalg.norm(high - low)) or size, _CELLS, min(float(low[2]), 0.0))
+        page.add_ground(float(np.linalg.norm(high - low)) or size, min(float(low[2]), 0.0))
         page.look_at(low, high, _SHARE)
 
     @property

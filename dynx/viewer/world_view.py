@@ -16,7 +16,7 @@ from dynx.viewer.contact_arrows import ContactArrows
 from dynx.viewer.drawn_robot import AS_DESCRIBED, Look
 from dynx.viewer.drawn_scene import DrawnScene
 from dynx.viewer.following_camera import FollowingCamera
-from dynx.viewer.framing import GROUND_CELLS, box_around, has_ground
+from dynx.viewer.framing import box_around, has_ground
 from dynx.viewer.marks import NamedParts
 from dynx.viewer.motion import Motion, motion_of_state
 from dynx.viewer.page import Page
@@ -79,7 +79,7 @@ class WorldView:
         self._pushes: list[Wrench] = []
         self._running = threading.Event()
         if not has_ground(scene.bodies):
-            page.add_ground(self._size, GROUND_CELLS)
+            page.add_ground(self._size)
         self._add_controls(moving, steps=steps)
         self.camera = FollowingCamera(page, self.drawn)
         """The camera of the page."""
