@@ -16,10 +16,12 @@ from dynx.errors import EngineLimitError, UnsupportedFeatureError
 from dynx.spatial.scalar import Floats
 from dynx.world.camera.drawing import Drawing, DrawnShape
 from dynx.world.camera.view import Camera
+from dynx.world.geometry.first_hits import first_hits
+from dynx.world.geometry.owner_poses import OwnerPoses
 from dynx.world.layout import Layout
 from dynx.world.materials import EffectiveCoefficient
 from dynx.world.settings import Setting
-from dynx.world.state import BodyState, RobotState
+from dynx.world.state import BodyState, RobotState, WorldState
 
 
 class TouchingPoint(NamedTuple):
@@ -164,9 +166,21 @@ class WorldEngine(ABC):
         """
         raise EngineLimitError(f"{self.name} has no distances of its own; leave native out for those of dynx")
 
-    @abstractmethod
     def cast_rays(self, origins: Floats, directions: Floats, length: float) -> Sequence[RayHit]:
-        """Return the first hit of every ray, from origins (n, 3) along unit directions (n, 3)."""
+        """Return the first hit of every ray, from origins (n, 3) along unit directions (n, 3).
+
+        dynx intersects the shapes in closed form; an engine overrides this where its own rays are as exact.
+        """
+        robots = {each.name: self.robot_state(k) for k, each in enumerate(self.layout.robots)}
+        bodies = {each.name: self.body_state(k) for k, each in enumerate(self.layout.bodies)}
+        poses = OwnerPoses(self.layout, WorldState(0.0, robots, bodies))
+        hits = first_hits(self.layout, poses, origins, directions, length)
+        return [
+            RayHit(None if number < 0 else number, distance, normal)
+            for number, distance, normal in zip(
+                hits.number.tolist(), hits.distance.tolist(), hits.normal, strict=True
+            )
+        ]
 
     # -- pictures -----------------------------------------------------------------------------
 

@@ -26,7 +26,6 @@ from dynx.errors import UnsupportedFeatureError
 from dynx.spatial.branchless import quat_exp
 from dynx.spatial.so3 import rotation_from_quat
 from dynx.world.engine import RayHit, WorldEngine
-from dynx.world.geometry.ray_casting import cast_on_shape
 from dynx.world.settings import Setting
 from dynx.world.state import BodyState
 
@@ -91,17 +90,6 @@ class ExactFlight(WorldEngine):
 
     def closest(self, a, b, within):
         raise UnsupportedFeatureError("'exact_flight' computes no distances")
-
-    def cast_rays(self, origins, directions, length):
-        hits = [RayHit(None, np.inf, np.full(3, np.nan)) for _ in origins]
-        for number, collider in enumerate(self.layout.colliders):
-            for placed in collider.shapes:
-                T = self._T[collider.owner.body] @ placed.T
-                distances, normals = cast_on_shape(placed.shape, T, origins, directions)
-                for ray, (distance, normal) in enumerate(zip(distances, normals)):
-                    if distance <= min(length, hits[ray].distance):
-                        hits[ray] = RayHit(number, float(distance), normal)
-        return hits
 
     @property
     def version(self):

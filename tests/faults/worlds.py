@@ -159,6 +159,22 @@ WORLDS_FAULTS = (
         test="test_what_cannot_move_or_is_joined_does_not_collide",
     ),
     Fault(
+        "ball_around_a_shape_about_its_origin",
+        "dynx.world.geometry.first_hits",
+        right="away = origins - (T[:3, :3] @ middle + T[:3, 3])",
+        wrong="away = origins - T[:3, 3]",
+        test_file="tests/world/test_rays.py",
+        test="test_rays_hit_a_hull_of_many_faces_where_its_triangles_are",
+    ),
+    Fault(
+        "rays_that_begin_inside_a_ball_miss",
+        "dynx.world.geometry.first_hits",
+        right="& (along <= radius)",
+        wrong="& (along <= -radius)",
+        test_file="tests/world/test_rays.py",
+        test="test_no_hit_is_lost_to_the_balls_around_shapes",
+    ),
+    Fault(
         "world_box_around_a_cylinder_of_its_radius",
         "dynx.world.geometry.boxes",
         right="reach = np.abs(R[:, 2]) * shape.length / 2 + shape.radius * across",

@@ -23,9 +23,8 @@ from dynx.model.geometry import HeightField, Plane
 from dynx.rbd.kinematics import body_poses
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
-from dynx.world.engine import RayHit, Torque, TouchingPoint, WorldEngine
+from dynx.world.engine import Torque, TouchingPoint, WorldEngine
 from dynx.world.engine_failures import translate_failures
-from dynx.world.geometry.ray_casting import cast_on_shape
 from dynx.world.layout import WORLD, Collider, Layout
 from dynx.world.materials import EffectiveCoefficient
 from dynx.world.settings import Setting
@@ -227,21 +226,6 @@ class DrakeWorld(WorldEngine):
                 near = distance(one.shape, T_first @ one.T, other.shape, T_second @ other.T)
                 found.append(TouchingPoint(a, b, near.point_a, near.point_b, near.normal, near.distance))
         return found
-
-    @_engine_errors
-    def cast_rays(self, origins: Floats, directions: Floats, length: float) -> Sequence[RayHit]:
-        nearest: Floats = np.full(len(origins), np.inf)
-        numbers, normals = np.full(len(origins), -1), np.full((len(origins), 3), np.nan)
-        for number, collider in enumerate(self.layout.colliders):
-            T = self._pose(collider)
-            for placed in collider.shapes:
-                distance, normal = cast_on_shape(placed.shape, T @ placed.T, origins, directions)
-                nearer = (distance < nearest) & (distance <= length)
-                nearest[nearer], numbers[nearer], normals[nearer] = distance[nearer], number, normal[nearer]
-        return [
-            RayHit(None if number < 0 else int(number), float(distance), normal)
-            for number, distance, normal in zip(numbers, nearest, normals, strict=True)
-        ]
 
     def _query(self) -> Any:
         """Return Drake's query of the shapes at the present state."""

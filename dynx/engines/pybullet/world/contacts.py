@@ -1,4 +1,4 @@
-"""Contacts, distances and rays of a Bullet world, by the numbers of colliders."""
+"""Contacts and distances of a Bullet world, by the numbers of colliders."""
 
 from __future__ import annotations
 
@@ -10,12 +10,7 @@ import numpy as np
 from dynx.engines.pybullet.world.client import WorldClient
 from dynx.engines.pybullet.world.filters import Place
 from dynx.spatial.scalar import Floats
-from dynx.world.engine import RayHit, TouchingPoint
-
-RAYS_PER_CALL = 4096
-"""Number of rays in one call; Bullet takes at most 16,384."""
-
-_NO_NORMAL = np.full(3, np.nan)
+from dynx.world.engine import TouchingPoint
 
 
 class ContactReader:
@@ -58,23 +53,6 @@ class ContactReader:
                 )
                 found += [_touching(a, b, point, 0.0, None) for point in points or ()]
         return min(found, key=lambda point: point.distance, default=None)
-
-    def cast_rays(self, origins: Floats, directions: Floats, length: float) -> list[RayHit]:
-        """Return the first hit of each ray."""
-        hits: list[RayHit] = []
-        ends = origins + length * directions
-        for start in range(0, len(origins), RAYS_PER_CALL):
-            part = slice(start, start + RAYS_PER_CALL)
-            reported = self._client.call(
-                self._client.engine.rayTestBatch, origins[part].tolist(), ends[part].tolist()
-            )
-            for body, link, fraction, _, normal in reported:
-                collider = self._collider.get((body, link))
-                if collider is None:
-                    hits.append(RayHit(None, np.inf, _NO_NORMAL))
-                else:
-                    hits.append(RayHit(collider, fraction * length, np.array(normal)))
-        return hits
 
 
 def _friction(point: Sequence[Any]) -> Floats:

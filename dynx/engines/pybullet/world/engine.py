@@ -31,7 +31,7 @@ from dynx.engines.pybullet.world.shapes import ShapeFiles, is_ground, load_groun
 from dynx.errors import EngineError
 from dynx.model.mechanism import ROOT
 from dynx.spatial.scalar import Floats
-from dynx.world.engine import RayHit, Torque, TouchingPoint, WorldEngine
+from dynx.world.engine import Torque, TouchingPoint, WorldEngine
 from dynx.world.layout import Collider, Layout
 from dynx.world.materials import EffectiveCoefficient
 from dynx.world.settings import Setting
@@ -196,9 +196,6 @@ class BulletWorld(WorldEngine):
 
     def closest(self, a: int, b: int, within: float) -> TouchingPoint | None:
         return self._contacts.closest(a, b, within)
-
-    def cast_rays(self, origins: Floats, directions: Floats, length: float) -> Sequence[RayHit]:
-        return self._contacts.cast_rays(origins, directions, length)
 
     # -- end ----------------------------------------------------------------------------------
 
