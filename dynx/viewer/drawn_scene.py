@@ -38,7 +38,11 @@ class DrawnScene(DrawnParts):
             for robot, drawn in self.robots.items()
             for link, node in drawn.links.items()
         }
-        faults = [f"{name}: {fault}" for name, drawn in self.robots.items() for fault in drawn.notes]
+        faults = [
+            fault if fault.startswith(f"{name} ") else f"{name}: {fault}"
+            for name, drawn in self.robots.items()
+            for fault in drawn.notes
+        ]
         start = {
             f"{robot}/{link}": drawn.pose(link)
             for robot, drawn in self.robots.items()

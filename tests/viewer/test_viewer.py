@@ -325,3 +325,11 @@ def test_two_rollouts_are_compared_by_their_names(arm: Model) -> None:
         assert [motion.name for motion in viewer.view.motions] == ["a", "b"]
     with pytest.raises(ArgumentError, match=r"Viewer\(\(a, b\)\)"):
         rollout.view(compare=rollout)
+
+
+@needs_examples
+def test_notes_on_a_motion_name_the_robot_once() -> None:
+    rollout = dynx.simulate("ur5", duration=0.1)
+    with rollout.view(whole_meshes=False) as viewer:
+        (note,) = viewer.notes
+        assert note.startswith("ur5 is drawn with ")
