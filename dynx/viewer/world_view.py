@@ -192,15 +192,17 @@ class WorldView:
                     pushes, self._pushes = self._pushes, []
                     wrenches = [*given.pop("wrenches", ()), *self._spring.wrenches(self.world), *pushes]
                     self.world.step(1, wrenches=wrenches, **given)
+                # The state is read here, where a motion that diverged in these steps is found.
+                self.draw()
             except ClosedError:
                 self._end()
-                return
             # Loads are the user's own code, which may raise anything; the page is where the user looks.
             except Exception as error:
                 self.pause()
                 kind = "" if isinstance(error, DynxError) else f"{type(error).__name__}: "
                 self._report(f"{kind}{error}")
-            self.draw()
+                # After an error the world is at an earlier state.
+                self.draw()
 
     def push(self, part: str, impulse: ArrayLike) -> None:
         """Push a part in the next step with an impulse (3,) [N s], along the axes of the world and at the
@@ -237,7 +239,9 @@ class WorldView:
     def _add_controls(self, moving: list[str], *, steps: bool) -> None:
         gui = self._page.gui
         with gui.add_folder("world"):
-            gui.add_text("engine", self.world.version, disabled=True)
+            # Versions of some engines begin with the name of the engine.
+            version = self.world.version.removeprefix(self.world.engine).strip()
+            gui.add_text("engine", f"{self.world.engine} {version}", disabled=True)
             self._clock = gui.add_text("time", "", disabled=True)
             self._rate = gui.add_text("speed reached", "", disabled=True, visible=steps)
             self._button = gui.add_button("play", visible=steps)

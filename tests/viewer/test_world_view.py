@@ -82,6 +82,21 @@ def test_errors_of_the_loads_are_shown_and_end_the_motion() -> None:
         world.view(loads=3)
 
 
+def test_a_world_that_diverges_is_paused_and_goes_on_after_a_reset() -> None:
+    scene = read_scene("slope")
+    body = next(each for each in scene.bodies if not each.fixed)
+    with World(scene) as world, world.view() as viewer:
+        viewer.view.push(body.name, (1e12, 0.0, 0.0))
+        viewer.view.play()
+        until(lambda: "diverged" in viewer.view._message.value, "the error of the world that diverged")
+        until(lambda: not viewer.view.playing, "the pause")
+        assert viewer.view._clock.value == f"{world.time:.3f} s"
+        viewer.view.reset()
+        assert not viewer.view._message.value
+        viewer.view.play()
+        until(lambda: world.time > 0.05, "the world to move again")
+
+
 def test_a_world_that_was_closed_is_told() -> None:
     world = World(read_scene("slope"))
     with world.view(play=True) as viewer:
