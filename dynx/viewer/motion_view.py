@@ -53,6 +53,7 @@ class MotionView:
         compare: bool = False,
         play: bool = False,
         title: str = "",
+        notes: Sequence[str] = (),
     ) -> None:
         """With `compare` the distance between the two motions is drawn below, and a button jumps to where
         they part; otherwise the second is a reference, which can be hidden."""
@@ -67,8 +68,8 @@ class MotionView:
         with page.together():
             self.drawn = DrawnScene(page.scene, "/motion", motion.robots, motion.bodies, look)
             self._ghost_drawn = None if ghost is None else self._draw_ghost(ghost, look)
-        self.notes = self.drawn.faults
-        """Shapes that cannot be drawn, one sentence each."""
+        self.notes = (*notes, *self.drawn.faults)
+        """`notes` of the motions, and shapes that cannot be drawn, one sentence each."""
         largest = max(
             (float(np.linalg.norm(a.forces, axis=1).max(initial=0.0)) for a in motion.contacts), default=0.0
         )

@@ -160,10 +160,15 @@ def _motion_view(page: Page, opened: Any, look: Look, options: dict[str, Any]) -
         names = options.pop("names", ("first", "second"))
         first, second = (motion_of_rollout(each, name) for each, name in zip(opened, names, strict=True))
         return MotionView(page, first, second, look=look, compare=True, title=title_of(opened), **options)
-    first, *others = (motion_of_run(opened.scene, run) for run in opened.runs[:2])
-    return MotionView(
-        page, first, *others, look=look, compare=bool(others), title=title_of(opened), **options
-    )
+    runs = opened.runs[:2]
+    first, *others = (motion_of_run(opened.scene, run) for run in runs)
+    notes = [
+        f"{run.engine}: {note}"
+        for run in runs
+        for note in (*run.notes, *([] if run.error is None else [f"the motion ends early: {run.error}"]))
+    ]
+    options |= {"compare": bool(others), "title": title_of(opened), "notes": notes}
+    return MotionView(page, first, *others, look=look, **options)
 
 
 def _curves(rollout: Rollout) -> list[Series]:

@@ -81,6 +81,40 @@ def test_a_scene_is_recorded_in_one_engine(tmp_path: Path) -> None:
     assert page.is_file()
 
 
+DIVERGING = """
+schema = "dynx.scene/1"
+name = "overlapping"
+
+[[bodies]]
+name = "bar"
+shape = { box = [0.6, 0.1, 0.1] }
+pose = [0.0, 0.0, 0.0]
+
+[[bodies]]
+name = "block"
+shape = { box = [0.2, 0.2, 0.2] }
+mass = 1.0
+pose = [0.1, 0.0, 0.0]
+
+[[robots]]
+name = "arm"
+robot = "pendulum"
+motors = [{ kind = "pd", target = 1.0, kp = 1e15, kd = 1e15 }]
+"""
+"""Scene with an overlap, and with gains that are stiff for its step."""
+
+
+def test_a_motion_that_ends_early_is_explained(tmp_path: Path) -> None:
+    pytest.importorskip("pybullet")
+    scene, page = tmp_path / "scene.toml", tmp_path / "page.html"
+    scene.write_text(DIVERGING, encoding="utf-8")
+    arguments = (str(scene), "--engine", "pybullet", "--duration", "0.1", "--export", str(page))
+    code, output = run(*arguments)
+    assert code == 0, output
+    assert "note: pybullet: 'bar' and 'block' overlap" in output
+    assert "note: pybullet: the motion ends early: the world of overlapping diverged" in output
+
+
 @needs_examples
 def test_a_rollout_is_drawn_with_the_shapes_of_a_robot(tmp_path: Path) -> None:
     path, page = tmp_path / "run.npz", tmp_path / "page.html"
