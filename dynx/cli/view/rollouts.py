@@ -49,19 +49,33 @@ def _with_shapes(model: Model, robot: Model) -> Model:
     return replace(model, geometry=geometry)
 
 
+def has_shapes(rollout: Rollout) -> bool:
+    """Check whether the robot of a rollout has visual or collision shapes."""
+    return any(link.visuals or link.collisions for link in rollout.model.geometry.links.values())
+
+
 def _of_library(model: Model) -> Model | None:
-    """Return the robot of the library with the name, links and joints of a model; None without one."""
-    entry = next((each for each in robots() if model.name in (each.name, *each.aliases)), None)
-    if entry is None:
-        return None
-    try:
-        robot = load(entry.name)
-    except DynxError:
-        return None
+    """Return the robot of the library with the name, links and joints of a model; None without one.
+
+    The name of a robot in its description, which a rollout has, is often another than that of its entry, so
+    all of them are compared (0.3 s) unless an entry with the name has these joints.
+    """
+    entries = sorted(robots(), key=lambda entry: model.name not in (entry.name, *entry.aliases))
+    for entry in entries:
+        try:
+            robot = load(entry.name)
+        except DynxError:
+            continue
+        if model.name in (robot.name, entry.name, *entry.aliases) and _has_parts_of(robot, model):
+            return robot
+    return None
+
+
+def _has_parts_of(robot: Model, model: Model) -> bool:
     there = {joint.name: joint for joint in robot.joints}
-    if any(link.name not in robot.geometry.links for link in model.links):
-        return None
-    return robot if all(_same(joint, there.get(joint.name)) for joint in model.joints) else None
+    return all(link.name in robot.geometry.links for link in model.links) and all(
+        _same(joint, there.get(joint.name)) for joint in model.joints
+    )
 
 
 def _same(joint: Joint, other: Joint | None) -> bool:

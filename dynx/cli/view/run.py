@@ -51,6 +51,7 @@ def view(
     check_options(kind, given)
     moves = {"play": play and export_path is None}
     opened: object
+    hints: tuple[str, ...] = ()
     options: dict[str, Any]
     if kind == "robot":
         opened = load_robot(targets[0], base or "fixed")
@@ -62,11 +63,13 @@ def view(
         opened = open_scene(targets[0], export_path, compare, engines, duration, dt)
         options = moves
     else:
-        from dynx.cli.view.rollouts import read_rollout
+        from dynx.cli.view.rollouts import has_shapes, read_rollout
 
-        opened = tuple(read_rollout(target, shapes) for target in targets)
+        rollouts = tuple(read_rollout(target, shapes) for target in targets)
+        if shapes is None and not all(map(has_shapes, rollouts)):
+            hints = ("--shapes ROBOT, a name or a file, draws a rollout with the shapes of its robot",)
         options = moves | {"names": tuple(map(os.path.basename, targets))} if compare else moves
-        opened = opened if compare else opened[0]
+        opened = rollouts if compare else rollouts[0]
     with Viewer(
         opened,
         host=host,
@@ -77,7 +80,7 @@ def view(
         **options,
     ) as viewer:
         out = console()
-        for note in viewer.notes:
+        for note in (*viewer.notes, *hints):
             out.print(f"note: {one_line(note)}", style="yellow")
         if export_path is not None:
             _export(viewer, export_path)

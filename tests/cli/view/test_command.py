@@ -123,10 +123,12 @@ def test_a_rollout_is_drawn_with_the_shapes_of_a_robot(tmp_path: Path) -> None:
     code, output = run(str(path), "--export", str(page))
     assert code == 0, output
     assert "has no shapes" in output
+    assert "note: --shapes ROBOT" in output
     bare = page.stat().st_size
     code, output = run(str(path), "--shapes", "ur5", "--export", str(page))
     assert code == 0, output
     assert "has no shapes" not in output
+    assert "--shapes ROBOT" not in output
     assert page.stat().st_size > bare + 50_000
     code, output = run(str(path), "--shapes", "pendulum", "--export", str(page))
     assert code == BAD_INPUT
@@ -221,6 +223,19 @@ def test_a_rollout_is_drawn_with_the_shapes_of_the_library(tmp_path: Path) -> No
     longer = dynx.load(text.replace('xyz="0.0 0.0 0.333"', 'xyz="0.0 0.0 0.4"', 1))
     dynx.simulate(longer, duration=0.01).save(path)
     assert not read_rollout(str(path), None).model.geometry.visuals("panda_link1")
+
+
+@needs_examples
+@pytest.mark.parametrize("name", ["xarm7", "solo12", "go2", "double_pendulum_simple", "anymal_c"])
+def test_a_robot_of_the_library_is_found_by_the_name_in_its_description(name: str, tmp_path: Path) -> None:
+    robot = dynx.load(name)
+    assert robot.name != name
+    path = tmp_path / "run.npz"
+    dynx.simulate(robot, duration=0.01).save(path)
+    drawn = read_rollout(str(path), None).model.geometry
+    assert {link for link in drawn.links if drawn.links[link].visuals} == {
+        link for link in robot.geometry.links if robot.geometry.links[link].visuals
+    }
 
 
 @needs_examples
