@@ -65,10 +65,10 @@ class Motion:
 def motion_of_rollout(rollout: Rollout, name: str = "") -> Motion:
     """Return the motion of a rollout, with the other robots and the bodies of its scene.
 
-    Raises ArgumentError for a state that is not finite.
+    Raises ArgumentError for a state that is not finite, and for times that do not ascend.
     """
+    _require_motion(name or rollout.model.name, rollout.t, rollout.q, "q")
     frames = _frames(rollout.t)
-    _require_finite(rollout.q[frames], name or rollout.model.name)
     plant = rollout.scenario.plant if rollout.scenario is not None else None
     around = rollout.surroundings
     simulated = str(plant.robot) if isinstance(plant, ScenePlant) else rollout.model.name
@@ -94,9 +94,13 @@ def motion_of_rollout(rollout: Rollout, name: str = "") -> Motion:
 
 
 def motion_of_reference(rollout: Rollout) -> Motion | None:
-    """Return the motion that the robot of a rollout should have followed; None without a reference."""
+    """Return the motion that the robot of a rollout should have followed; None without a reference.
+
+    Raises ArgumentError for a state that is not finite, and for times that do not ascend.
+    """
     if rollout.reference is None:
         return None
+    _require_motion(rollout.model.name, rollout.t, rollout.reference.q, "q of the reference")
     frames = _frames(rollout.t)
     plant = rollout.scenario.plant if rollout.scenario is not None else None
     name = str(plant.robot) if isinstance(plant, ScenePlant) else rollout.model.name
@@ -167,10 +171,25 @@ def _poses(robot: str, model: Model, q: Floats) -> dict[str, Floats]:
     return {f"{robot}/{link}": np.broadcast_to(T, (n, 4, 4)) for link, T in link_poses(model, q)}
 
 
-def _require_finite(q: Floats, name: str) -> None:
-    bad = np.flatnonzero(~np.isfinite(q).all(axis=1))
-    if bad.size:
-        raise ArgumentError(f"{name} cannot be shown: its configuration number {bad[0]} is not finite")
+def _require_motion(name: str, t: Floats, q: Floats, what: str) -> None:
+    # A file may have been written or changed by another program.
+    wrong = np.flatnonzero(~np.isfinite(t))
+    if wrong.size:
+        raise ArgumentError(f"{name} cannot be shown: the time of state {wrong[0]} is {t[wrong[0]]}")
+    wrong = np.flatnonzero(np.diff(t) < 0.0)
+    if wrong.size:
+        k = int(wrong[0])
+        raise ArgumentError(
+            f"{name} cannot be shown: its times must ascend; after {t[k]:g} s comes {t[k + 1]:g} s "
+            f"(state {k + 1})"
+        )
+    states, entries = np.nonzero(~np.isfinite(q))
+    if states.size:
+        k, entry = int(states[0]), int(entries[0])
+        raise ArgumentError(
+            f"{name} cannot be shown: entry {entry} of {what} is {q[k, entry]} at {t[k]:g} s "
+            f"(state {k} of {len(t)})"
+        )
 
 
 def _some(names: Mapping[str, Floats]) -> str:

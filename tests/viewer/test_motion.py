@@ -116,9 +116,22 @@ def test_small_values_of_a_plot_have_a_power_of_ten(largest: float, power: int) 
 
 def test_what_is_not_finite_is_refused(rollout: dynx.Rollout) -> None:
     q = rollout.q.copy()
-    q[-1, 2] = np.nan
-    with pytest.raises(ArgumentError, match=r"configuration number \d+ is not finite"):
+    q[50, 2] = np.nan
+    with pytest.raises(ArgumentError, match=r"entry 2 of q is nan at 0\.05 s \(state 50 of 501\)"):
         motion_of_rollout(replace(rollout, q=q))
+    assert rollout.reference is not None
+    reference = rollout.reference._replace(q=q)
+    with pytest.raises(ArgumentError, match="entry 2 of q of the reference is nan"):
+        motion_of_reference(replace(rollout, reference=reference))
+
+
+def test_times_that_do_not_ascend_are_refused(rollout: dynx.Rollout) -> None:
+    t = rollout.t.copy()
+    t[7] = np.nan
+    with pytest.raises(ArgumentError, match="the time of state 7 is nan"):
+        motion_of_rollout(replace(rollout, t=t))
+    with pytest.raises(ArgumentError, match=r"times must ascend; after 0\.5 s comes 0\.499 s"):
+        motion_of_rollout(replace(rollout, t=rollout.t[::-1]))
 
 
 def test_motions_without_a_common_part_are_refused(rollout: dynx.Rollout) -> None:
