@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import math
 import socket
 import threading
@@ -288,13 +289,24 @@ def _free_port(host: str, port: int) -> int:
     """Return the port, or a free one for 0. Raises ArgumentError for one that cannot be listened on."""
     try:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
+    except (OSError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise ArgumentError(
+            f"host {shown(host)} is not found: {reason}; wanted an address of this machine, such as "
+            "127.0.0.1, or 0.0.0.0 for all of them"
+        ) from None
+    try:
         with socket.socket(family, socket.SOCK_STREAM) as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             probe.bind((host, port))
             return int(probe.getsockname()[1])
-    except (OSError, UnicodeError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        remedy = (
+            "wanted an address of this machine"
+            if error.errno == errno.EADDRNOTAVAIL
+            else "choose another port, or 0 for any that is free"
+        )
         raise ArgumentError(
-            f"port {port} of {shown(host)} cannot be listened on: {reason}; choose another port, or 0 for "
-            "any that is free"
+            f"port {port} of {shown(host)} cannot be listened on: {reason}; {remedy}"
         ) from None

@@ -114,15 +114,25 @@ def check_options(opened: object, options: Mapping[str, Any]) -> None:
         if name not in known:
             known += _PAGE_OPTIONS
             hint = "; two rollouts are compared by Viewer((a, b))" if name == "compare" else ""
+            # Without a similar name `nearest` lists some, and here all are listed.
+            similar = nearest(name, known)
+            similar = similar if "did you mean" in similar else ""
             raise ArgumentError(
-                f"no option {shown(name)} of {subject}{nearest(name, known)}; it has {', '.join(known)}{hint}"
+                f"no option {shown(name)} of {subject}{similar}; it has {', '.join(known)}{hint}"
             )
-        if name in ("collisions", "play", "steps") and not isinstance(value, bool):
-            raise ArgumentError(f"{name} is {shown(value)}; wanted True or False")
+        if name in ("collisions", "play", "steps"):
+            check_switches({name: value})
         if name == "loads" and value is not None and not callable(value):
             raise ArgumentError(f"loads is of type {type(value).__name__}; wanted a function of the world")
         if name == "names" and not (isinstance(value, tuple | list) and len(value) == 2):
             raise ArgumentError(f"names is {shown(value)}; wanted the names of two motions")
+
+
+def check_switches(switches: Mapping[str, object]) -> None:
+    """Raise ArgumentError for a switch, by its name, that is neither True nor False."""
+    for name, value in switches.items():
+        if not isinstance(value, bool):
+            raise ArgumentError(f"{name} is {shown(value)}; wanted True or False")
 
 
 def title_of(opened: Any) -> str:

@@ -18,7 +18,7 @@ from dynx.spatial.scalar import Floats
 from dynx.viewer.controls import Controls
 from dynx.viewer.drawn_robot import Look
 from dynx.viewer.page import DEFAULT_HOST, DEFAULT_PORT, Page
-from dynx.viewer.subjects import check_options, is_world, open_subject, title_of, view_of
+from dynx.viewer.subjects import check_options, check_switches, is_world, open_subject, title_of, view_of
 from dynx.viewer.surfaces.reduction import TRIANGLE_BUDGET, has_graphics_processor
 
 PICTURE_SIZE = (960, 720)
@@ -55,6 +55,8 @@ class Viewer(Controls):
         graphics processor. Raises the errors of what is shown, ArgumentError for a port that is taken, and
         NotInstalledError without the extra ``viewer``.
         """
+        meshes = {} if whole_meshes is None else {"whole_meshes": whole_meshes}
+        check_switches({"dark": dark, "open_browser": open_browser, **meshes})
         whole = has_graphics_processor() if whole_meshes is None else whole_meshes
         self._look = Look(triangles=None if whole else TRIANGLE_BUDGET)
         opened: Any = open_subject(shown)

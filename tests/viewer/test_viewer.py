@@ -87,12 +87,16 @@ def test_a_port_that_is_taken_is_told(arm: Model) -> None:
         ({"port": 70_000}, "wanted 0 to 65535"),
         ({"port": -1}, "port"),
         ({"port": 0, "host": ""}, "wanted an address of this machine"),
-        ({"port": 0, "host": "203.0.113.1"}, "cannot be listened on"),
+        ({"port": 0, "host": "203.0.113.1"}, "cannot be listened on: .*; wanted an address of this machine"),
+        ({"port": 0, "host": "999.1.1.1"}, "host '999.1.1.1' is not found: .* such as 127.0.0.1"),
         ({"port": 0, "q": [np.nan] * 6}, "finite"),
         ({"port": 0, "q": [0.0] * 3}, "shape"),
         ({"port": 0, "plays": True}, "no option 'plays' of a robot"),
         ({"prot": 0}, "did you mean 'port'"),
+        ({"port": 0, "play": True}, "no option 'play' of a robot; it has q, engine, .*, open_browser$"),
         ({"port": 0, "collisions": "yes"}, "wanted True or False"),
+        ({"port": 0, "dark": "yes"}, "dark is 'yes'; wanted True or False"),
+        ({"port": 0, "whole_meshes": 3}, "whole_meshes is '3'; wanted True or False"),
     ],
 )
 def test_wrong_arguments_are_told(arm: Model, options: dict[str, Any], message: str) -> None:
