@@ -10,29 +10,43 @@ import numpy as np
 
 from dynx.model import Model
 from dynx.model.configuration import sampling_range
+from dynx.model.rotations import quat_from_rpy, rpy_from_quat
 from dynx.spatial.scalar import Floats
 from dynx.viewer.controls import slider_step
 
 _DEFAULT_RANGE = {"rad": math.pi, "m": 1.0}
 """Half the range of a joint without limits."""
 
-_BASE_RANGE = (-2.0, 2.0)
-"""Range of the position of a floating base [m]."""
+_BASE_REACH = 2.0
+"""Half the range of the position of a floating base, around that at the start [m]."""
 
-BASE = ("base x", "base y", "base z")
-"""Sliders of a floating base: its position [m]."""
+_BASE_UNITS = {
+    "base x": "m",
+    "base y": "m",
+    "base z": "m",
+    "base roll": "rad",
+    "base pitch": "rad",
+    "base yaw": "rad",
+}
+"""Sliders of a floating base: its position, and the angles of R = Rz(yaw) Ry(pitch) Rx(roll)."""
+
+_ANGLE_RANGES = ((-math.pi, math.pi), (-math.pi / 2, math.pi / 2), (-math.pi, math.pi))
+"""Ranges of the angles of a floating base, within which each rotation has one triple [rad]."""
 
 
 class JointSliders:
     """The sliders of a robot, and its configuration.
 
-    A floating base has three more, for its position; its rotation is changed by dragging a frame.
+    A floating base has six more, for its position and its rotation. Where a configuration is beyond the range
+    of a slider, the range grows to it: the page shows the configuration as it is.
     """
 
     def __init__(self, gui: Any, model: Model, q: Floats, changed: Callable[[Floats], None]) -> None:
         """`changed(q)` is called when a slider was moved in the page."""
         self._gui, self._model, self._changed = gui, model, changed
         self._q = q.copy()
+        self._base = self._base_of(q)
+        self._base_ranges = [(x - _BASE_REACH, x + _BASE_REACH) for x in self._base[:3]] + [*_ANGLE_RANGES]
         self._degrees = True
         self._handles: list[Any] = []
         self._unit = gui.add_dropdown("angles in", ("degrees", "radians"), initial_value="degrees")
@@ -47,22 +61,34 @@ class JointSliders:
 
     def put(self, q: Floats) -> None:
         """Move the sliders to a configuration (nq,), without calling `changed`."""
-        self._q = q.copy()
-        for handle, value, factor in zip(self._handles, self._values(), self._factors(), strict=True):
-            handle.value = _shown(value * factor, handle.min, handle.max)
+        self._q, self._base = q.copy(), self._base_of(q)
+        rows = zip(self._handles, self._values(), self._factors(), self._ranges(), strict=True)
+        for handle, value, factor, (low, high) in rows:
+            low, high = _range_around(value * factor, low * factor, high * factor)
+            # Each assignment is a message to the page.
+            if (handle.min, handle.max) != (low, high):
+                handle.min, handle.max = low, high
+            handle.value = _shown(value * factor, low, high)
+
+    def _base_of(self, q: Floats) -> list[float]:
+        """Return the values of the sliders of the base at a configuration: none, or six."""
+        return [*q[:3].tolist(), *rpy_from_quat(q[3:7]).tolist()] if self._model.floating else []
 
     def _values(self) -> list[float]:
-        base = self._q[:3].tolist() if self._model.floating else []
-        return [*base, *self._q[self._offset :].tolist()]
+        return [*self._base, *self._q[self._offset :].tolist()]
 
     @property
     def _offset(self) -> int:
         return 7 if self._model.floating else 0
 
+    @property
+    def _units(self) -> list[str]:
+        base = _BASE_UNITS.values() if self._model.floating else ()
+        return [*base, *(joint.unit for joint in self._model.coordinate_joints)]
+
     def _factors(self) -> list[float]:
         turn = 180.0 / math.pi if self._degrees else 1.0
-        joints = [turn if joint.unit == "rad" else 1.0 for joint in self._model.coordinate_joints]
-        return [*([1.0] * 3 if self._model.floating else []), *joints]
+        return [turn if unit == "rad" else 1.0 for unit in self._units]
 
     def _ranges(self) -> list[tuple[float, float]]:
         lower, upper = self._model.lower[self._offset :], self._model.upper[self._offset :]
@@ -70,18 +96,15 @@ class JointSliders:
             sampling_range(float(low), float(high), _DEFAULT_RANGE[joint.unit])
             for low, high, joint in zip(lower, upper, self._model.coordinate_joints, strict=True)
         ]
-        return [*([_BASE_RANGE] * 3 if self._model.floating else []), *joints]
+        return [*(self._base_ranges if self._model.floating else []), *joints]
 
     def _add(self) -> None:
-        names = [*(BASE if self._model.floating else ()), *self._model.joint_names]
-        units = [
-            *(["m"] * 3 if self._model.floating else []),
-            *(j.unit for j in self._model.coordinate_joints),
-        ]
-        rows = zip(names, units, self._values(), self._factors(), self._ranges(), strict=True)
+        names = [*(_BASE_UNITS if self._model.floating else ()), *self._model.joint_names]
+        rows = zip(names, self._units, self._values(), self._factors(), self._ranges(), strict=True)
         with self._folder:
             for k, (name, unit, value, factor, (low, high)) in enumerate(rows):
-                low, high = _rounded_inward(low * factor, high * factor)
+                hint = "{:.4g} to {:.4g}".format(*_rounded_inward(low * factor, high * factor))
+                low, high = _range_around(value * factor, low * factor, high * factor)
                 shown = "deg" if unit == "rad" and self._degrees else unit
                 self._handles.append(
                     self._gui.add_slider(
@@ -91,7 +114,7 @@ class JointSliders:
                         # A joint whose limits are equal has a slider that does not move.
                         step=slider_step(low, high) if high > low else 1.0,
                         initial_value=_shown(value * factor, low, high),
-                        hint=f"{name}: {low:.4g} to {high:.4g} {shown}",
+                        hint=f"{name}: {hint} {shown}",
                         disabled=high <= low,
                     )
                 )
@@ -100,9 +123,18 @@ class JointSliders:
     def _moved(self, k: int, event: Any) -> None:
         if event.client is None:  # Set by `put`, not in the page.
             return
-        base = 3 if self._model.floating else 0
-        at = k if k < base else self._offset + k - base
-        self._q[at] = float(self._handles[k].value) / self._factors()[k]
+        handle = self._handles[k]
+        # While a number is typed, the page sends it also where it is beyond the range.
+        value = min(max(float(handle.value), handle.min), handle.max) / self._factors()[k]
+        if k >= len(self._base):
+            self._q[self._offset + k - len(self._base)] = value
+        else:
+            # The angles of the sliders are kept: at a pitch of 90 degrees the rotation does not tell them.
+            self._base[k] = value
+            if k < 3:
+                self._q[k] = value
+            else:
+                self._q[3:7] = quat_from_rpy(self._base[3:])
         self._changed(self.q)
 
     def _change_unit(self) -> None:
@@ -118,6 +150,13 @@ def _shown(value: float, low: float, high: float) -> float:
     if high > low:
         value = round(value, max(0, -round(math.log10(slider_step(low, high)))))
     return min(max(value, low), high)
+
+
+def _range_around(value: float, low: float, high: float) -> tuple[float, float]:
+    """Return the range of a slider with few digits, which holds the value also where it is beyond."""
+    low, high = _rounded_inward(low, high)
+    within = high - low <= 0.0 or low - slider_step(low, high) < value < high + slider_step(low, high)
+    return (low, high) if within else (min(low, value), max(high, value))
 
 
 def _rounded_inward(low: float, high: float) -> tuple[float, float]:

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -138,6 +139,40 @@ def test_controls_of_a_program_have_values(arm: Model) -> None:
         viewer.text("here", (0.0, 0.0, 1.0)).remove()
         viewer.line([[0.0] * 3, [1.0] * 3]).remove()
         slider.remove()
+
+
+def test_sliders_show_a_configuration_beyond_their_ranges() -> None:
+    model = dynx.load("six_axis_arm", base="floating")
+    q = model.neutral()
+    q[:7] = [5.0, 0.0, 0.3, 0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]
+    with view(model, q=q) as viewer:
+        sliders = viewer.view._sliders._handles
+        assert [handle.value for handle in sliders[:6]] == [5.0, 0.0, 0.3, 0.0, 0.0, 90.0]
+        assert (sliders[0].min, sliders[0].max) == (3.0, 7.0)
+        q[0], q[7] = -20.0, model.upper[7] + 1.0
+        viewer.update(q)
+        assert (sliders[0].value, sliders[0].min, sliders[0].max) == (-20.0, -20.0, 7.0)
+        assert sliders[6].value == pytest.approx(np.degrees(q[7]), abs=0.1)
+        viewer.update(model.neutral())
+        assert sliders[6].max <= np.degrees(model.upper[7])
+
+
+def test_sliders_turn_a_floating_base() -> None:
+    model = dynx.load("six_axis_arm", base="floating")
+    with view(model) as viewer:
+        sliders = viewer.view._sliders
+        sliders._handles[5].value = 90.0
+        sliders._moved(5, SimpleNamespace(client=0))
+        assert np.allclose(viewer.view.q[:7], [0.0, 0.0, 0.0, 0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)])
+        assert np.array_equal(
+            viewer.view.robot.pose(model.root)[:3, :3].round(9), [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+        )
+        # At a pitch of 90 degrees the other two angles stay as they were set.
+        sliders._handles[4].value = 90.0
+        sliders._moved(4, SimpleNamespace(client=0))
+        sliders._handles[4].value = 0.0
+        sliders._moved(4, SimpleNamespace(client=0))
+        assert np.allclose(dynx.rpy_from_quat(viewer.view.q[3:7]), [0.0, 0.0, np.pi / 2])
 
 
 def test_a_rollout_plays_to_its_end(arm: Model) -> None:
