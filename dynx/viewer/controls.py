@@ -87,7 +87,9 @@ class Controls:
                 )
         if not lower < upper:
             raise ArgumentError(f"slider {shown(name)} is from {lower} to {upper}; wanted an ascending range")
-        start = 0.5 * (lower + upper) if value is None else min(max(value, lower), upper)
+        start = 0.5 * (lower + upper) if value is None else value
+        if not lower <= start <= upper:
+            raise ArgumentError(f"value of slider {shown(name)} is {value}; wanted {lower} to {upper}")
         handle = self._open_page.gui.add_slider(
             name, float(lower), float(upper), step=slider_step(lower, upper), initial_value=float(start)
         )
@@ -107,7 +109,8 @@ class Controls:
     def on_key(self, key: str, pressed: Callable[[], object]) -> None:
         """Call `pressed()` when a key is pressed in the page: such as ``"r"`` or ``"arrowup"``.
 
-        The keys stand in the list of commands of the page, too.
+        The keys stand in the list of commands of the page, too. Raises ArgumentError for a key that the page
+        uses itself, as P where it plays.
         """
         call = _checked_function("pressed", pressed)
         wanted = _checked_label("key", key)
@@ -117,6 +120,9 @@ class Controls:
                 f"key is {shown(key)}; wanted a letter, a digit, or one of "
                 f"{', '.join(each for each in HOTKEYS if len(each) > 1)}"
             )
+        taken = self._open_page.reserved_keys.get(known[wanted.lower()])
+        if taken is not None:
+            raise ArgumentError(f"key {shown(key)} is that of the page: {taken}; choose another")
         command = self._open_page.gui.add_command(f"key {wanted}", hotkey=known[wanted.lower()])
         command.on_trigger(lambda _: self._called(call))
 

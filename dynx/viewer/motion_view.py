@@ -76,6 +76,8 @@ class MotionView:
         self._arrows = ContactArrows(
             page.scene, _LONGEST_ARROW * self._size / (largest or 1.0), 0.006 * self._size
         )
+        self.legend = _legend(motion.name, ghost.name) if compare and ghost is not None else ""
+        """HTML that says which of two motions is solid; empty without `compare`."""
         self._trace: Any = None
         self._curves: list[Curves] = []
         self._add_switches(compare=compare)
@@ -137,8 +139,8 @@ class MotionView:
     def _add_switches(self, *, compare: bool) -> None:
         gui = self._page.gui
         with gui.add_folder("show"):
-            if compare and self.ghost is not None:
-                gui.add_html(_legend(self.motion.name, self.ghost.name))
+            if self.legend:
+                gui.add_html(self.legend)
             collisions = gui.add_checkbox("collision shapes", initial_value=False)
             ghost = None
             if self.ghost is not None:

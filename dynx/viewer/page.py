@@ -16,7 +16,7 @@ import numpy as np
 from dynx.errors import ArgumentError, shown
 from dynx.model.configuration import whole_number
 from dynx.spatial.scalar import Floats
-from dynx.viewer.browser.client import Client
+from dynx.viewer.browser.client import NO_SOFTWARE_MESSAGE, Client
 from dynx.viewer.framing import VIEW_DIRECTION, fitting_distance, round_length
 from dynx.viewer.library import serve, silent
 
@@ -41,7 +41,7 @@ _LINE_COLOUR = {False: (170, 170, 170), True: (70, 70, 70)}
 """Colour of the lines of the ground on a light and on a dark page."""
 
 _STYLE = """<style>
-#webgl-software-rendering { display: %s; }
+%s
 @media (max-width: %dpx) {
   .mantine-Notifications-root { --notifications-container-width: calc(100vw - 2em) !important; }
   .mantine-Paper-root[style*="position: fixed"] { width: 100%% !important; max-height: %d%% !important; }
@@ -107,13 +107,16 @@ class Page:
         if wanted > 65535:
             raise ArgumentError(f"port is {wanted}; wanted 0 to 65535")
         self.host, self.port = host, _free_port(host, wanted)
-        self._client = Client(antialiasing=not plain)
+        self._client = Client(title, antialiasing=not plain)
         self._server = serve(self.host, self.port, title, self._client.folder)
-        self._plain, self._dark = plain, dark
+        self.plain, self.dark = plain, dark
+        """Whether the page is drawn as software does fastest, and whether it is dark."""
         self._furnish()
         self._view: _FirstView | None = None
         self.part_names: dict[str, str] = {}
         """The names of parts by the paths of their nodes."""
+        self.reserved_keys: dict[str, str] = {}
+        """What the keys do that the page itself uses."""
         self._server.on_client_connect(self._watch_narrow)
         self.lock = threading.RLock()
         """Held by whoever changes what the page shows."""
@@ -125,14 +128,14 @@ class Page:
     def _furnish(self) -> None:
         """Set what is the same whatever is shown: theme, style, place of the panel, and light."""
         self._server.gui.configure_theme(
-            dark_mode=self._dark, show_logo=False, show_share_button=False, control_width="medium"
+            dark_mode=self.dark, show_logo=False, show_share_button=False, control_width="medium"
         )
         # Beside the picture, not over it.
         self._server.gui.main_panel.dock_right()
         self._server.scene.set_up_direction("+z")
-        style = _STYLE % ("none" if self._plain else "block", NARROW, round(100.0 * _COVERED))
+        style = _STYLE % (NO_SOFTWARE_MESSAGE if self.plain else "", NARROW, round(100.0 * _COVERED))
         self._server.gui.add_html(style, order=math.inf)
-        if self._plain:
+        if self.plain:
             scene = self._server.scene
             scene.configure_environment_map(None)
             scene.configure_default_lights(False)
@@ -170,7 +173,7 @@ class Page:
         stands on it [m]."""
         cell = round_length(0.5 * size)
         side = _CELLS * cell
-        if not self._plain:
+        if not self.plain:
             self.scene.add_grid(
                 "/ground", side, side, cell_size=0.2 * cell, section_size=cell, position=(0.0, 0.0, height)
             )
@@ -181,7 +184,7 @@ class Page:
         pieces = np.stack([points[:, :-1], points[:, 1:]], axis=2).reshape(-1, 2, 3)
         lines = np.concatenate([pieces, pieces[:, :, [1, 0, 2]]]).astype(np.float32)
         self.scene.add_line_segments(
-            "/ground", lines, _LINE_COLOUR[self._dark], thickness=1.0, thickness_units="screen"
+            "/ground", lines, _LINE_COLOUR[self.dark], thickness=1.0, thickness_units="screen"
         )
 
     def look_at(self, low: Floats, high: Floats, share: float) -> None:
@@ -217,6 +220,11 @@ class Page:
             camera.position = tuple((target + away).tolist())
             camera.look_at = tuple(target.tolist())
 
+    def on_own_key(self, key: str, what: str, pressed: Callable[[], None]) -> None:
+        """Call `pressed()` when a key is pressed that the page itself uses, for `what`."""
+        self.reserved_keys[key] = what
+        self.gui.add_command(what, hotkey=key).on_trigger(lambda _: pressed())
+
     def at_end(self, action: Callable[[], None]) -> None:
         """Call `action` when what is shown at present is removed or the page is closed."""
         self._at_end.append(action)
@@ -231,7 +239,8 @@ class Page:
             self.check_open()
             self._end_shown()
             self.ended = threading.Event()
-            self.part_names = {}
+            self.part_names, self.reserved_keys = {}, {}
+            self._client.entitle(title)
             with self.together():
                 self.scene.reset()
                 self.gui.reset()
@@ -279,6 +288,8 @@ class Page:
         return f"<Page at {self.url}{', closed' if self.closed else ''}>"
 
     def _repr_html_(self) -> str:
+        if self.closed:
+            return f"<code>{escape(repr(self))}</code>"
         return (
             f'<iframe src="{escape(self.url, quote=True)}" width="100%" height="500" '
             'style="border: 0"></iframe>'

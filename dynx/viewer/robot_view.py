@@ -108,6 +108,9 @@ class RobotView:
         """Zero: a robot stands still."""
         return 0.0
 
+    legend = ""
+    """Empty: one robot needs none."""
+
     duration: float | None = 0.0
     """Zero: a robot stands still."""
 

@@ -40,6 +40,10 @@ class View(Protocol):
         """Name of the subject."""
 
     @property
+    def legend(self) -> str:
+        """HTML that says which of two motions is solid; empty for one."""
+
+    @property
     def visuals(self) -> Mapping[str, Sequence[Any]]:
         """The nodes of the visual shapes of each part."""
 

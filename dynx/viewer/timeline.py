@@ -42,12 +42,10 @@ class Timeline:
             self._speed = gui.add_dropdown("speed", SPEEDS, initial_value="1")
             self._loop = gui.add_checkbox("loop", initial_value=False)
         self._slider.on_update(self._scrubbed)
-        self._button.on_click(lambda _: self.pause() if self.playing else self.play())
+        self._button.on_click(lambda _: self.play_or_pause())
         back.on_click(lambda _: self._move(-self._step))
         forward.on_click(lambda _: self._move(self._step))
-        gui.add_command("play or pause", hotkey="P").on_trigger(
-            lambda _: self.pause() if self.playing else self.play()
-        )
+        page.on_own_key("P", "play or pause", self.play_or_pause)
         page.at_end(self._running.set)
         self._thread = threading.Thread(target=self._play, name="dynx timeline", daemon=True)
         self.go_to(0.0)
@@ -71,6 +69,13 @@ class Timeline:
             self.go_to(0.0)
         self._button.label = "pause"
         self._running.set()
+
+    def play_or_pause(self) -> None:
+        """Pause what plays, and play what does not."""
+        if self.playing:
+            self.pause()
+        else:
+            self.play()
 
     def pause(self) -> None:
         """Stop playing."""

@@ -61,7 +61,6 @@ class Viewer(Controls):
         self._look = Look(triangles=None if whole else TRIANGLE_BUDGET)
         opened: Any = open_subject(shown)
         check_options(opened, options)
-        self._dark = dark
         self.page = Page(host, port, title=f"dynx: {title_of(opened)}", dark=dark, plain=not whole)
         if open_browser:
             # The browser starts and loads the page while the shapes are read.
@@ -189,7 +188,8 @@ class Viewer(Controls):
         elif view.duration is None:
             raise ArgumentError("a live world cannot be exported; simulate it, and export the rollout")
         else:
-            write_recording(path, self.page, view.go_to, view.duration, dark=self._dark)
+            title = f"dynx: {view.title}"
+            write_recording(path, self.page, view.go_to, view.duration, title=title, legend=view.legend)
 
     def wait(self, seconds: float | None = None) -> bool:
         """Wait until the page is closed, or for `seconds`; return True once it is."""

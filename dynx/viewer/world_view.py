@@ -121,6 +121,9 @@ class WorldView:
             self.draw()
             return True
 
+    legend = ""
+    """Empty: one world needs none."""
+
     @property
     def title(self) -> str:
         """Name of the scene."""
@@ -155,6 +158,13 @@ class WorldView:
         """Let the page step the world."""
         self._button.label = "pause"
         self._running.set()
+
+    def play_or_pause(self) -> None:
+        """Pause what plays, and play what does not."""
+        if self.playing:
+            self.pause()
+        else:
+            self.play()
 
     def pause(self) -> None:
         """Stop stepping."""
@@ -257,12 +267,11 @@ class WorldView:
             self._pull = gui.add_checkbox("pull by a spring", initial_value=False)
             impulse = gui.add_vector3("push [N s]", initial_value=(1.0, 0.0, 0.0), step=0.1)
             push = gui.add_button("push")
-        self._button.on_click(lambda _: self.pause() if self.playing else self.play())
+        self._button.on_click(lambda _: self.play_or_pause())
         once.on_click(lambda _: self._step_once())
         reset.on_click(lambda _: self.reset())
-        gui.add_command("play or pause", hotkey="P").on_trigger(
-            lambda _: self.pause() if self.playing else self.play()
-        )
+        if steps:
+            self._page.on_own_key("P", "play or pause", self.play_or_pause)
 
         def show(_: Any) -> None:
             with self._page.lock:

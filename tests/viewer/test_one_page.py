@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import urllib.request
+from html import escape
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import pytest
@@ -28,7 +30,7 @@ def test_a_notebook_shows_the_page_inline() -> None:
         source = re.search(r'<iframe src="(http://127\.0\.0\.1:\d+)"', output.data["text/html"])
         assert source is not None
         with urllib.request.urlopen(source[1], timeout=30.0) as page:
-            assert b"<title>Viser" in page.read()
+            assert b"<title>dynx: six_axis_arm</title>" in page.read()
 
 
 def test_one_page_shows_one_thing_after_another() -> None:
@@ -46,6 +48,8 @@ def test_one_page_shows_one_thing_after_another() -> None:
         for name, body in expected.items():
             assert np.allclose(shown[name][:3, 3], body.position, atol=1e-5)
         viewer.show(arm, q=arm.random(0))
+        with urllib.request.urlopen(url, timeout=30.0) as page:
+            assert b"<title>dynx: six_axis_arm</title>" in page.read()
         assert np.array_equal(viewer.view.q, arm.random(0))
         assert viewer.url == url
         with pytest.raises(ArgumentError, match="no option 'play'"):
@@ -53,6 +57,20 @@ def test_one_page_shows_one_thing_after_another() -> None:
         assert not viewer.page.closed
     with pytest.raises(ArgumentError, match="is closed"):
         viewer.show(arm)
+
+
+def test_a_title_is_no_html() -> None:
+    name = "a</title><script>alert(1)</script>"
+    robot = dynx.load(f"<robot name={quoteattr(name)}><link name='base'/></robot>")
+    with robot.view() as viewer, urllib.request.urlopen(viewer.url, timeout=30.0) as page:
+        assert f"<title>dynx: {escape(name)}</title>".encode() in page.read()
+
+
+def test_a_closed_viewer_shows_no_page_in_a_notebook() -> None:
+    with dynx.load("six_axis_arm").view() as viewer:
+        assert "<iframe" in viewer._repr_html_()
+    assert "<iframe" not in viewer._repr_html_()
+    assert "closed" in viewer._repr_html_()
 
 
 def test_a_world_with_the_same_parts_replaces_another_below_the_same_controls() -> None:

@@ -269,6 +269,20 @@ def test_an_exported_page_plays_without_a_network(open_page: OpenPage, tmp_path:
     assert not page.errors
 
 
+def test_an_exported_comparison_says_which_motion_is_solid(open_page: OpenPage, tmp_path: Path) -> None:
+    rollout = dynx.simulate("six_axis_arm", duration=0.1)
+    path, name = tmp_path / "both.html", "<b id=bold>a.npz"
+    with view((rollout, rollout), names=(name, "b.npz"), whole_meshes=False) as viewer:
+        viewer.export(path)
+    page = open_page(path.as_uri())
+    assert page.page.get_by_text(f"solid: {name}").is_visible()
+    assert page.page.get_by_text("see-through: b.npz").is_visible()
+    assert page.page.locator("#bold").count() == 0
+    assert page.page.title() == "dynx: two rollouts"
+    assert not page.page.locator("#webgl-software-rendering").is_visible()
+    assert not page.errors
+
+
 def test_a_screenshot_needs_an_open_page(open_page: OpenPage) -> None:
     with view(dynx.load("pendulum")) as viewer:
         with pytest.raises(ArgumentError, match="no page is open"):

@@ -117,6 +117,7 @@ def test_wrong_controls_are_told(arm: Model) -> None:
             lambda: viewer.slider("x", 1.0, 0.0),
             lambda: viewer.slider("", 0.0, 1.0),
             lambda: viewer.slider("x", 0.0, np.nan),
+            lambda: viewer.slider("x", 0.0, 1.0, value=1.5),
             lambda: viewer.slider("x", 0.0, 1.0, changed=3),  # type: ignore[arg-type]
             lambda: viewer.button("x", None),  # type: ignore[arg-type]
             lambda: viewer.on_key("no key", print),
@@ -364,6 +365,20 @@ def test_two_rollouts_are_compared_by_their_names(arm: Model) -> None:
         assert [motion.name for motion in viewer.view.motions] == ["a", "b"]
     with pytest.raises(ArgumentError, match=r"Viewer\(\(a, b\)\)"):
         rollout.view(compare=rollout)
+
+
+def test_keys_of_the_page_are_not_taken(arm: Model) -> None:
+    with dynx.simulate(arm, duration=0.1).view() as viewer:
+        with pytest.raises(ArgumentError, match="key 'p' is that of the page: play or pause"):
+            viewer.on_key("p", print)
+        viewer.on_key("o", print)
+        viewer.show(arm)
+        viewer.on_key("p", print)
+    with World(read_scene("slope")) as world:
+        with world.view(steps=False) as viewer:
+            viewer.on_key("p", print)
+        with world.view() as viewer, pytest.raises(ArgumentError, match="key 'P'"):
+            viewer.on_key("P", print)
 
 
 @needs_examples

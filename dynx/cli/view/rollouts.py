@@ -28,7 +28,7 @@ def read_rollout(path: str, shapes: str | None) -> Rollout:
     """
     if not os.path.isfile(path):
         other = irregularity(path)
-        raise RobotNotFoundError(f"no file {shown(path, 300)}: {other or 'there is none'}")
+        raise RobotNotFoundError(f"no file {shown(path, 300)}{f': {other}' if other else ''}")
     rollout = Rollout.load(path)
     model = rollout.model
     if shapes is None:

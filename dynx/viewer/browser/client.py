@@ -16,6 +16,15 @@ NAMES = "dynx-names"
 HOVERED = "dynx-hovered"
 """Identifier of the element that shows the name of the part under the pointer."""
 
+NO_SOFTWARE_MESSAGE = "#webgl-software-rendering { display: none; }"
+"""Style that hides the message of viser that software draws."""
+
+_LEGEND_STYLE = (
+    "position: fixed; left: 0.5em; top: 0.5em; max-width: 20em; padding: 0.1em; border-radius: 3px; "
+    "font-family: sans-serif; color: black; background: rgba(255, 255, 255, 0.8)"
+)
+"""Style of the legend, which is read before any picture."""
+
 _FOR_SOFTWARE = """
   const context = HTMLCanvasElement.prototype.getContext;
   HTMLCanvasElement.prototype.getContext = function (kind, options) {
@@ -92,12 +101,16 @@ _NAMES_ON_HOVER = (
 class Client:
     """A folder with the page, for the time of a server."""
 
-    def __init__(self, *, antialiasing: bool) -> None:
+    def __init__(self, title: str, *, antialiasing: bool) -> None:
         """Without `antialiasing` edges are jagged, and software draws twice as fast."""
         self._folder = tempfile.TemporaryDirectory(prefix="dynx-page-", ignore_cleanup_errors=True)
         script = _NAMES_ON_HOVER if antialiasing else _FOR_SOFTWARE + _NAMES_ON_HOVER
-        text = _with_script(CLIENT.read_text(encoding="utf-8"), script)
-        (self.folder / "index.html").write_text(text, encoding="utf-8")
+        self._text = _with_script(CLIENT.read_text(encoding="utf-8"), script)
+        self.entitle(title)
+
+    def entitle(self, title: str) -> None:
+        """Give the page another title, which its tab shows when it is loaded."""
+        (self.folder / "index.html").write_text(_with_title(self._text, title), encoding="utf-8")
 
     @property
     def folder(self) -> Path:
@@ -116,12 +129,28 @@ def names_element(names: Mapping[str, str]) -> str:
     )
 
 
-def with_names(page: str, names: Mapping[str, str]) -> str:
-    """Return a page of viser's that needs no server, with the names of parts by the paths of their nodes."""
+def standalone(
+    page: str, title: str, names: Mapping[str, str], *, legend: str = "", software: bool = False
+) -> str:
+    """Return a page of viser's that needs no server, with a title, the names of parts by the paths of their
+    nodes, and HTML that is laid over the corner of the picture.
+
+    With `software` the page does not say that software draws it: its meshes were reduced for that.
+    """
     body = page.rfind("</body>")
     if body < 0:
         return page
-    return _with_script(f"{page[:body]}{names_element(names)}{page[body:]}", _NAMES_ON_HOVER)
+    added = names_element(names)
+    if legend:
+        added += f'<div style="{_LEGEND_STYLE}">{legend}</div>'
+    if software:
+        added += f"<style>{NO_SOFTWARE_MESSAGE}</style>"
+    return _with_script(_with_title(f"{page[:body]}{added}{page[body:]}", title), _NAMES_ON_HOVER)
+
+
+def _with_title(page: str, title: str) -> str:
+    """Return a page of viser's with another title."""
+    return page.replace("<title>Viser</title>", f"<title>{escape(title)}</title>", 1)
 
 
 def _with_script(page: str, script: str) -> str:

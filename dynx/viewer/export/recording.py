@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dynx.errors import ArgumentError, shown
 from dynx.files.reading import checked_path
 from dynx.files.writing import write_bytes
-from dynx.viewer.browser.client import with_names
+from dynx.viewer.browser.client import standalone
 from dynx.viewer.page import Page
 
 UPDATES_PER_SECOND = 30.0
@@ -21,11 +21,13 @@ def write_recording(
     show: Callable[[float], None],
     duration: float,
     *,
-    dark: bool = False,
+    title: str,
+    legend: str = "",
 ) -> None:
     """Write an HTML file in which the scene of the page plays as `show(time)` places it, for `duration` [s].
 
-    A duration of 0 gives a still scene. Raises ArgumentError for a file that cannot be written.
+    A duration of 0 gives a still scene; `legend` is HTML over the corner of the picture. Raises
+    ArgumentError for a file that cannot be written.
     """
     if not checked_path(path).lower().endswith((".html", ".htm")):
         wanted = "wanted .html (a page), .gif (a film) or .png (a picture)"
@@ -39,5 +41,6 @@ def write_recording(
             show(duration * k / count)
         # The last picture stays for a moment before the recording begins again.
         recorder.insert_sleep(1.0 if count else 0.0)
-        text = recorder.as_html(dark)
-    write_bytes(path, with_names(text, page.part_names).encode())
+        text = recorder.as_html(page.dark)
+    text = standalone(text, title, page.part_names, legend=legend, software=page.plain)
+    write_bytes(path, text.encode())
