@@ -42,7 +42,11 @@ CHECKS_PER_INTERVAL = 8
 """Times between two grid points at which the limits are checked."""
 
 DAMPING_PASSES = 4
-"""Number of runs of TOPP-RA with viscous damping, each with the damping near the speeds of the last."""
+"""Number of runs of TOPP-RA with viscous damping, each with the damping near the speeds of the motion before.
+
+Damping is concave in the square of the speed, so that a tangent is nowhere below it: with the tangents at a
+motion within the limits TOPP-RA finds no slower one where the effort acts against damping.
+"""
 
 MIN_DAMPED_SPEED = 0.05
 """Least speed, relative to the largest along the path, at whose tangent viscous damping is taken."""
@@ -101,9 +105,16 @@ def time_optimal_path(
         efforts = None if engine is None else effort_limits(effort, joint_dynamics, ends, engine)
         best, speeds = None, None
         for _ in range(DAMPING_PASSES if efforts is not None and efforts.is_viscous else 1):
-            grid, speeds = _speeds(s_points, points, V, A, efforts, speeds)
+            try:
+                grid, speeds = _speeds(s_points, points, V, A, efforts, speeds)
+            except TrajectoryError:
+                # Away from their speeds the tangents exceed the damping, and may leave no motion.
+                if best is None:
+                    raise
+                break
             law = _motion_law(grid, speeds)
-            law = _stretch(law, _stretch_factor(_follow(path, law, points), V, A, efforts))
+            factor = _stretch_factor(_follow(path, law, points), V, A, efforts)
+            law, speeds = _stretch(law, factor), speeds / factor
             best = law if best is None or law.breaks[-1] < best.breaks[-1] else best
         assert best is not None
         return _follow(path, best, points)

@@ -250,6 +250,21 @@ def test_effort_that_does_not_hold_the_robot_is_refused() -> None:
         time_optimal_path(points, model=model)
 
 
+@pytest.mark.parametrize("damping", [50.0, 1e4])
+def test_strong_damping_slows_a_path_down(damping: float) -> None:
+    """Damping takes what gravity and friction leave of the effort: the speed of the end of an acceleration."""
+    pytest.importorskip("toppra")
+    model = load(SLIDER.replace('damping="2.0"', f'damping="{damping}"'))
+    motion = time_optimal_path([[0.0], [1.0]], effort=25.0, joint_dynamics=True, model=model)
+    speed = (25.0 - 2.0 * 9.81 - 3.0) / damping
+    # Speeding up and braking take some mass / damping [s], far less than the motion.
+    assert motion.duration == pytest.approx(1.0 / speed, rel=0.03)
+    q, v, a = motion(np.linspace(0.0, motion.duration, 3000))
+    with dynx.backend("reference", model) as engine:
+        tau = engine.inverse_dynamics(q, v, a, joint_dynamics=True)
+    assert np.abs(tau).max() <= 25.0
+
+
 @given(st.integers(0, 1000))
 def test_limits_of_a_floating_base(seed: int) -> None:
     model = floating()
