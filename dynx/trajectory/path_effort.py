@@ -20,6 +20,9 @@ from dynx.spatial.scalar import Floats
 from dynx.trajectory.displacement import Ends
 from dynx.trajectory.motion_limits import checked_limit
 
+NEGLIGIBLE = 1e-12
+"""Part of the largest torque of an acceleration below which that of another joint is rounding."""
+
 
 class PathTorque(NamedTuple):
     """Coefficients (n, nv) of torque along a path [N m or N]: a s'' + b s'^2 + viscous s' + dry + gravity."""
@@ -64,23 +67,45 @@ class EffortLimits:
         whole = self.engine.inverse_dynamics(q, v, a, joint_dynamics=True)
         return np.asarray(whole - self.engine.inverse_dynamics(q, v, a))
 
-    def require_hold(self, model: Model, torque: PathTorque) -> None:
+    def require_hold(self, torque: PathTorque) -> None:
         """Raise TrajectoryError if a joint cannot bear gravity and dry friction at some place of the path."""
         constant = np.abs(torque.gravity + torque.dry)
         with np.errstate(invalid="ignore"):
             ratio = constant / self.limit
         place, k = np.unravel_index(int(np.argmax(np.nan_to_num(ratio))), ratio.shape)
         if not ratio[place, k] < 1.0:
+            # As many digits as tell the need from the limit.
+            needed, limit = constant[place, k], self.limit[k]
+            digits = next((n for n in (4, 6, 10) if f"{needed:.{n}g}" != f"{limit:.{n}g}"), 6)
             raise TrajectoryError(
-                f"the effort limit of {model.joint_names[k]} is {self.limit[k]:g}, but gravity and dry "
-                f"friction along the path need {constant[place, k]:.4g}: no motion is slow enough"
+                f"the effort limit of {self.engine.model.joint_names[k]} is {limit:.{digits}g}, but gravity "
+                f"and dry friction along the path need {needed:.{digits}g}: no motion is slow enough"
+            )
+
+    def require_dependence(self, torque: PathTorque) -> None:
+        """Raise ArgumentError if no limited torque depends on the acceleration between two grid points."""
+        known = np.isfinite(self.limit)
+        magnitude = np.abs(torque.a)
+        smallest = NEGLIGIBLE * magnitude.max(axis=1, initial=0.0)
+        free = (magnitude[:, known] <= smallest[:, None]).all(axis=1)
+        unbounded = np.flatnonzero(free[:-1] & free[1:])
+        if unbounded.size:
+            k = int(np.argmax(magnitude[unbounded[0]]))
+            raise ArgumentError(
+                f"the effort of {self.engine.model.joint_names[k]} is unlimited, and nothing else limits its "
+                "acceleration along the path; wanted acceleration= as well"
             )
 
     def slowdown(self, q: Floats, v: Floats, a: Floats) -> float:
         """Return the least factor of the duration, at least 1, with which a motion keeps the limits at these
-        states (n, nv)."""
+        states (n, nv).
+
+        Raises TrajectoryError if no factor is enough.
+        """
         # At 1/u times the duration v is u v and a is u^2 a: as a path with parameter u t.
         torque = self.along(q, v, a)
+        # Gravity can be largest between the grid points of TOPP-RA.
+        self.require_hold(torque)
         constant = torque.dry + torque.gravity
         with np.errstate(invalid="ignore", divide="ignore"):
             fractions = [

@@ -77,7 +77,8 @@ def time_optimal_path(
     overshoot the waypoints (`dynx.trajectory.check` checks position limits). Only for a fixed base.
 
     Raises NotInstalledError without the extra ``trajectory``, TrajectoryError if no such motion is found or a
-    joint cannot bear gravity along the path, ArgumentError for invalid arguments.
+    joint cannot bear gravity along the path, ArgumentError for invalid arguments and where nothing limits an
+    acceleration.
     """
     points = checked_waypoints(waypoints)
     configuration("a waypoint", points[0], model)
@@ -146,10 +147,11 @@ def _speeds(
     parts = np.linspace(0.0, 1.0, GRID_POINTS_PER_SEGMENT, endpoint=False)
     grid = np.append((s_points[:-1, None] + parts * np.diff(s_points)[:, None]).ravel(), 1.0)
     limits: list[Any] = [JointVelocityConstraint(np.stack([-V, V], axis=-1))]
-    if np.isfinite(A).all():
+    unlimited = not np.isfinite(A).all()
+    if not unlimited:
         limits.append(JointAccelerationConstraint(np.stack([-A, A], axis=-1)))
-    if efforts is not None and np.isfinite(efforts.limit).any():
-        limits.append(_effort_constraint(efforts, damped_at))
+    if efforts is not None and (unlimited or np.isfinite(efforts.limit).any()):
+        limits.append(_effort_constraint(efforts, damped_at, unlimited))
     path = toppra.SplineInterpolator(s_points, points, bc_type="not-a-knot")
     _, speeds, *_ = TOPPRA(limits, path, gridpoints=grid).compute_parameterization(0.0, 0.0)
     if speeds is None or not np.isfinite(speeds).all() or not (speeds[:-1] + speeds[1:] > 0.0).all():
@@ -157,8 +159,8 @@ def _speeds(
     return grid, np.asarray(speeds, dtype=np.float64)
 
 
-def _effort_constraint(efforts: EffortLimits, damped_at: Floats | None) -> Any:
-    """Return TOPP-RA's constraint on the torque along the path.
+def _effort_constraint(efforts: EffortLimits, damped_at: Floats | None, alone: bool) -> Any:
+    """Return TOPP-RA's constraint on the torque along the path; `alone` if nothing else limits accelerations.
 
     It is linear in the square of ds/dt. Viscous damping, which is linear in ds/dt, is replaced by its tangent
     at the speeds `damped_at`, and left out without them.
@@ -182,9 +184,11 @@ def _effort_constraint(efforts: EffortLimits, damped_at: Floats | None) -> Any:
         def compute_constraint_params(self, path: Any, gridpoints: Floats, *_: Any, **__: Any) -> Any:
             q, slope, curvature = (np.asarray(path(gridpoints, order)) for order in (0, 1, 2))
             torque = efforts.along(q, slope, curvature)
-            efforts.require_hold(efforts.engine.model, torque)
             # The motion ends at rest, where dry friction no longer helps to brake.
             torque.dry[-1] = 0.0
+            efforts.require_hold(torque)
+            if alone:
+                efforts.require_dependence(torque)
             if damped_at is not None:
                 speed = np.maximum(damped_at, MIN_DAMPED_SPEED * damped_at.max())[:, None]
                 torque = torque._replace(

@@ -250,9 +250,69 @@ def test_effort_that_does_not_hold_the_robot_is_refused() -> None:
         time_optimal_path(points, model=model)
 
 
+PENDULUM = """
+<robot name="pendulum">
+  <link name="wall"/>
+  <joint name="hinge" type="continuous">
+    <parent link="wall"/><child link="rod"/><axis xyz="0 1 0"/><limit effort="40" velocity="100"/>
+  </joint>
+  <link name="rod">
+    <inertial>
+      <origin xyz="1 0 0"/><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>
+    </inertial>
+  </link>
+</robot>
+"""
+
+
+@pytest.mark.parametrize("lack", [1e-5, 1e-6])
+def test_gravity_that_is_largest_between_grid_points_is_refused(lack: float) -> None:
+    """Gravity needs 9.81 cos q; the grid points nearest to q = 0 are at -0.005 and 0.015 of 2 rad."""
+    pytest.importorskip("toppra")
+    with pytest.raises(
+        TrajectoryError, match=r"effort limit of hinge is 9\.8099.*, but gravity .* need 9\.81"
+    ):
+        time_optimal_path([[-1.005], [0.995]], effort=9.81 * (1.0 - lack), model=load(PENDULUM))
+
+
+def test_the_end_of_a_path_is_held_without_friction() -> None:
+    """Friction helps to lower a weight, down to the end, where the joint bears all of the weight."""
+    pytest.importorskip("toppra")
+    with pytest.raises(TrajectoryError, match=r"effort limit of lift is 18, but gravity .* need 19\.62"):
+        time_optimal_path([[1.0], [0.0]], effort=18.0, joint_dynamics=True, model=load(SLIDER))
+
+
+def test_an_acceleration_that_no_effort_limits_is_refused() -> None:
+    pytest.importorskip("toppra")
+    unlimited = load(SLIDER.replace('effort="40"', ""))
+    wanted = "the effort of lift is unlimited, and nothing else limits its acceleration"
+    with pytest.raises(ArgumentError, match=wanted):
+        time_optimal_path([[0.0], [1.0]], effort=True, model=unlimited)
+    motion = time_optimal_path([[0.0], [1.0]], effort=True, acceleration=4.0, model=unlimited)
+    assert motion.duration == pytest.approx(1.0, rel=1e-3)
+    gantry = load(
+        SLIDER.replace("</robot>", "")
+        + """
+  <joint name="across" type="prismatic">
+    <parent link="cart"/><child link="hook"/><axis xyz="1 0 0"/>
+    <limit lower="-9" upper="9" velocity="100"/>
+  </joint>
+  <link name="hook">
+    <inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+</robot>
+"""
+    )
+    with pytest.raises(ArgumentError, match="the effort of across is unlimited"):
+        time_optimal_path([[0.0, 0.0], [0.0, 1.0]], effort=True, model=gantry)
+    # On a slope the force of the lift limits the acceleration across, too.
+    motion = time_optimal_path([[0.0, 0.0], [1.0, 1.0]], effort=True, model=gantry)
+    assert np.abs(motion(np.linspace(0.0, motion.duration, 1000)).a).max() <= (40.0 + 3.0 * 9.81) / 3.0
+
+
 @pytest.mark.parametrize("damping", [50.0, 1e4])
 def test_strong_damping_slows_a_path_down(damping: float) -> None:
-    """Damping takes what gravity and friction leave of the effort: the speed of the end of an acceleration."""
+    """The joint reaches the speed at which damping takes what gravity and friction leave of the effort."""
     pytest.importorskip("toppra")
     model = load(SLIDER.replace('damping="2.0"', f'damping="{damping}"'))
     motion = time_optimal_path([[0.0], [1.0]], effort=25.0, joint_dynamics=True, model=model)
