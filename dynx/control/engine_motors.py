@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.control.base import Controller, Measurement, gain, parameter
+from dynx.control.base import Controller, Measurement, gain, parameter, refuse_other_than_controller
 from dynx.control.gains import checked_gain
 from dynx.control.joint_space import JointSpace
 from dynx.control.saturation import checked_limit
@@ -52,7 +52,8 @@ class EngineMotor(JointSpace[None]):
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """Raise UnsupportedFeatureError: the engine's solver determines the torque during the step."""
         raise UnsupportedFeatureError(
-            f"{self.name} is a motor inside PyBullet, so it runs with plant='pybullet' only"
+            f"{self.name} is a motor inside PyBullet, so it runs with plant='pybullet' only, and inside no "
+            "other controller"
         )
 
     @abstractmethod
@@ -169,9 +170,15 @@ class TorqueMotor(EngineMotor):
     inner: Controller[None] = field()
 
     def __init__(self, inner: Controller[None]) -> None:
-        """`inner` is a controller without a state."""
+        """`inner` is a controller without a state; UnsupportedFeatureError for one that has a state."""
+        refuse_other_than_controller("the inner controller", inner)
         super().__init__(inner.model)
         self._wrap(inner)
+        if inner.initial_state() is not None:
+            raise UnsupportedFeatureError(
+                f"{inner.name} has a state, and TorqueMotor takes a controller without one; plant='pybullet' "
+                "applies the torque of any controller without TorqueMotor"
+            )
 
     def command(self, measurement: Measurement, setpoint: Setpoint) -> MotorCommand:
         """Return the joint torques of the inner controller."""

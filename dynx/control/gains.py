@@ -24,7 +24,7 @@ def checked_gain(name: str, gain: ArrayLike, length: int, *, per: str = "one for
     if not np.isfinite(array).all():
         raise GainError(f"{name} is not finite")
     if (array < 0.0).any():
-        raise GainError(f"{name} is negative ({float(array.min()):g}), which would drive the robot away")
+        raise GainError(f"{name} is negative ({float(array.min()):g}); wanted 0 or more")
     full = np.array(np.broadcast_to(array, (length,)))
     full.setflags(write=False)
     return full

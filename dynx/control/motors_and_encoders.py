@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from dynx.control.base import Controller, Measurement, Wrapper, parameter
 from dynx.control.gains import checked_gain
 from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
-from dynx.model.configuration import is_real, positive_seconds
+from dynx.model.configuration import is_real, positive_seconds, real_array
 from dynx.spatial.scalar import Array, Floats, arctan2
 from dynx.trajectory.base import Setpoint
 
@@ -85,11 +85,12 @@ class MotorLag(_Between, pure=True):
         """
         dt = self._with_step(inner, control_dt)
         if not is_real(delay) or not 0.0 <= delay <= MAX_DELAY_STEPS * dt:
-            raise ArgumentError(f"delay is {shown(delay)}; wanted 0 to {MAX_DELAY_STEPS} control steps [s]")
+            most = f"{MAX_DELAY_STEPS * dt:g} s ({MAX_DELAY_STEPS} control steps)"
+            raise ArgumentError(f"delay is {shown(delay)}; wanted 0 to {most}")
         if abs(delay / dt - round(delay / dt)) > 1e-6:
             raise ArgumentError(f"delay is {delay:g} s; wanted a multiple of control_dt = {dt:g} s")
         nv = inner.model.nv
-        start = np.zeros(nv) if initial is None else np.array(initial, dtype=float)
+        start = np.zeros(nv) if initial is None else real_array("initial", initial).copy()
         if start.shape != (nv,) or not np.isfinite(start).all():
             raise ArgumentError(f"initial is {shown(initial)}; wanted {nv} finite torques")
         start.setflags(write=False)

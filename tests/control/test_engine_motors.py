@@ -6,13 +6,22 @@ import numpy as np
 import pytest
 
 from dynx.backends import installed_backends
-from dynx.control import PD, ComputedTorque, Measurement, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
+from dynx.control import (
+    PD,
+    ComputedTorque,
+    Measurement,
+    MotorLag,
+    PDMotor,
+    PositionMotor,
+    TorqueMotor,
+    VelocityMotor,
+)
 from dynx.control.engine_motors import MotorCommand
 from dynx.engines.pybullet.canonical_urdf import bullet_tree
 from dynx.engines.pybullet.inertia import ballast_for
 from dynx.engines.pybullet.library import bullet
 from dynx.engines.pybullet.stepping import SteppingClient
-from dynx.errors import ArgumentError, GainError, UnsupportedFeatureError
+from dynx.errors import ArgumentError, ControlError, GainError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.model.mechanism import build_mechanism
@@ -69,6 +78,20 @@ def test_a_torque_motor_is_the_law_within() -> None:
     bare = simulate(robot, law, motion, plant="pybullet", duration=0.2)
     np.testing.assert_array_equal(motor.q, bare.q)
     assert apart(motor.tau, bare.tau) <= PLANTS_AGREE
+
+
+def test_motors_of_the_engine_neither_wrap_a_state_nor_are_wrapped() -> None:
+    robot = tutorial_robot()
+    lag = MotorLag(PD(robot, kp=1.0, kd=1.0), control_dt=1e-3, time_constant=1e-3)
+    with pytest.raises(
+        UnsupportedFeatureError, match="PD, with motor lag has a state, and TorqueMotor takes"
+    ):
+        TorqueMotor(lag)  # type: ignore[arg-type]  # the mistake that is tested
+    with pytest.raises(ArgumentError, match="the inner controller is of type Model"):
+        TorqueMotor(robot)  # type: ignore[arg-type]  # the mistake that is tested
+    wrapped = MotorLag(PositionMotor(robot), control_dt=1e-3)
+    with pytest.raises(ControlError, match="plant='pybullet' only, and inside no other controller"):
+        simulate(robot, wrapped, np.zeros(6), plant="pybullet", duration=0.01)
 
 
 def test_a_motor_that_may_not_pull_does_not() -> None:

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.control import PID, ComputedTorque, Controller, Encoders, Measurement, MotorLag, OpenLoop
-from dynx.errors import ArgumentError, GainError, UnsupportedFeatureError
+from dynx.errors import ArgumentError, DTypeError, GainError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.sim import Scenario, Simulation, simulate, simulate_batch
@@ -140,10 +140,14 @@ def test_arguments_that_no_motor_or_encoder_has() -> None:
         ArgumentError, match=r"delay is 0\.0015 s; wanted a multiple of control_dt = 0\.001 s"
     ):
         MotorLag(inner, control_dt=DT, delay=1.5e-3)
-    with pytest.raises(ArgumentError, match="wanted 0 to 10000 control steps"):
+    with pytest.raises(ArgumentError, match=r"wanted 0 to 10 s \(10000 control steps\)"):
         MotorLag(inner, control_dt=DT, delay=-1e-3)
     with pytest.raises(ArgumentError, match="wanted 6 finite torques"):
         MotorLag(inner, control_dt=DT, initial=[1.0])
+    with pytest.raises(DTypeError, match="initial has dtype complex128; wanted real numbers"):
+        MotorLag(inner, control_dt=DT, initial=[1j] * 6)
+    with pytest.raises(GainError, match=r"resolution is negative \(-1\); wanted 0 or more"):
+        Encoders(inner, resolution=-1.0, control_dt=DT)
     with pytest.raises(ArgumentError, match="resolution is 0; wanted"):
         Encoders(inner, resolution=0.0, control_dt=DT)
     with pytest.raises(ArgumentError, match=r"control_dt is 0\.002 s, but PID .*has steps of 0\.001 s"):
