@@ -35,7 +35,8 @@ TIMEOUT = 60.0
 MAX_MEMORY = 2 * 2**30
 """Largest memory of an expansion [bytes], besides that of the interpreter; bounded on Linux."""
 
-_WITH_ARGUMENTS = re.compile(r"(?P<path>.*\.xacro)\s+(?P<arguments>\w+:=.*)", re.DOTALL)
+# Without the colon an argument is a mistake, which is named.
+_WITH_ARGUMENTS = re.compile(r"(?P<path>.*\.xacro)\s+(?P<arguments>\w+:?=.*)", re.DOTALL)
 
 _ARGUMENT = re.compile(r"(\w+):=(.*)", re.DOTALL)
 
@@ -94,7 +95,8 @@ def expand_xacro(
     ``package://NAME/...``; a file that is included from there is an error. Line numbers of the text differ
     from those of the file.
 
-    Raises NotInstalledError without xacro, DescriptionError if the expansion fails, takes longer than
+    Raises NotInstalledError without xacro, DescriptionError if the file has no argument of a name (xacro
+    ignores it, so a misspelt one would leave the default), or the expansion fails, takes longer than
     `TIMEOUT`, needs more than `MAX_MEMORY` or makes more than `MAX_BYTES` of text.
     """
     read_file(path)  # Raises for a FIFO or a directory, which xacro would block on.
@@ -181,6 +183,32 @@ def _kill(process: subprocess.Popen[bytes]) -> None:
             os.killpg(process.pid, signal.SIGKILL)
 
 
+class _Arguments(dict[str, str]):
+    """Values of arguments by name, which remembers the names that xacro looked up.
+
+    xacro adds the defaults of the arguments that the file declares.
+    """
+
+    def __init__(self, given: Mapping[str, str]) -> None:
+        super().__init__(given)
+        self._unused = set(given)
+
+    def __contains__(self, name: object) -> bool:
+        self._unused.discard(str(name))
+        return super().__contains__(name)
+
+    def __getitem__(self, name: str) -> str:
+        self._unused.discard(name)
+        return super().__getitem__(name)
+
+    def refuse_unused(self) -> None:
+        """Raise DescriptionError for a given argument that xacro did not look up, such as a misspelt one."""
+        if self._unused:
+            name = min(self._unused)
+            known = sorted({*self} - self._unused)
+            raise DescriptionError(f"the file has no argument {shown(name)}{nearest(name, known)}")
+
+
 def expand_here(path: str, roots: list[str], arguments: dict[str, str]) -> None:
     """Run in the child process: write the text of the file or the reason of a failure to standard output."""
     import xacro
@@ -210,7 +238,9 @@ def expand_here(path: str, roots: list[str], arguments: dict[str, str]) -> None:
         os.dup2(nowhere, 2)
         try:
             _bound_memory()
-            document = xacro.process_file(path, mappings=arguments)
+            values = _Arguments(arguments)
+            document = xacro.process_file(path, mappings=values)
+            values.refuse_unused()
             text = document.toprettyxml(indent="  ", encoding="utf-8")
             text = text.replace(b"file://package://", b"package://")
             reply = _TEXT + text

@@ -100,6 +100,28 @@ def test_arguments_follow_the_path(tmp_path: Path) -> None:
 
 
 @needs_xacro
+def test_an_argument_that_the_file_does_not_have_is_named_with_the_nearest(tmp_path: Path) -> None:
+    """xacro ignores it, and the robot would have the default."""
+    path = tmp_path / "robot.xacro"
+    path.write_text(
+        f"""<robot name="r" {XMLNS}>
+  <xacro:arg name="mass" default="1"/><xacro:arg name="tool" default="false"/>
+  <link name="base"/>
+  <xacro:if value="$(arg tool)"><xacro:arg name="reach" default="1"/></xacro:if>
+  <link name="tip$(eval mass + 0)"/>
+  <joint name="j" type="fixed"><parent link="base"/><child link="tip$(eval mass + 0)"/></joint>
+</robot>"""
+    )
+    assert load(f"{path} mass:=3").links[1].name == "tip3"
+    with pytest.raises(DescriptionError, match=r"the file has no argument 'mas'; did you mean 'mass'\?"):
+        load(f"{path} mas:=3")
+    with pytest.raises(DescriptionError, match=r"the file has no argument 'reach'; known: mass, tool"):
+        load(f"{path} mass:=3 reach:=2")
+    with pytest.raises(ArgumentError, match=r"'mass=3' is no argument of .*; wanted name:=value"):
+        load(f"{path} mass=3")
+
+
+@needs_xacro
 def test_a_package_that_only_a_mesh_names_may_be_missing(tmp_path: Path) -> None:
     path = tmp_path / "robot.xacro"
     path.write_text(
