@@ -68,6 +68,8 @@ def test_the_hook_of_the_page_takes_the_files_of_dynx_own_hook() -> None:
     taken = re.compile(own["files"])
     assert all(taken.search(name) for name in ("robots/my.urdf", "my.urdf.xacro"))
     assert not any(taken.search(name) for name in ("my.xacro", "my.urdf.md"))
+    # The environment that pre-commit makes has the dependencies of dynx, and no extra.
+    assert any(each.startswith("xacro") for each in own["additional_dependencies"])
 
 
 def test_commands_have_the_options() -> None:
