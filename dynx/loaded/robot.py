@@ -44,7 +44,7 @@ class LoadedRobot(ABC):
     whole description."""
 
     searches_above: ClassVar[bool] = False
-    """True if the engine searches meshes in the folders above the description (`find_above`)."""
+    """True if the engine searches meshes in the folders above the description (`find_by_bullet`)."""
 
     loads_meshes: ClassVar[bool] = False
     """True if mesh collision shapes change the dynamics of a link that states its inertia."""

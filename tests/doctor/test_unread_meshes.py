@@ -181,6 +181,9 @@ def test_the_engines_refuse_such_a_file(engine: str, part: str, tmp_path: Path) 
         ("model://meshes/base.stl", True),
         ("package://none/meshes/base.stl", False),
         ("/none/meshes/base.stl", False),
+        ("file://meshes/base.stl", True),
+        ("/meshes/base.glb", False),
+        ("/meshes/base.stl/", False),
     ],
 )
 def test_a_mesh_that_only_pybullet_finds_is_said_to_be_found(
@@ -190,7 +193,8 @@ def test_a_mesh_that_only_pybullet_finds_is_said_to_be_found(
     path = tmp_path / "repository/urdf/arm.urdf"
     (tmp_path / "repository/meshes").mkdir(parents=True)
     (tmp_path / "repository/.git").mkdir()
-    (tmp_path / "repository/meshes/base.stl").write_bytes(stl())
+    for name in ("base.stl", "base.glb"):
+        (tmp_path / "repository/meshes" / name).write_bytes(stl())
     path.parent.mkdir()
     path.write_text(ARM.replace("package://arm_description/meshes/tool.stl", filename))
     try:
@@ -204,7 +208,7 @@ def test_a_mesh_that_only_pybullet_finds_is_said_to_be_found(
     assert all(("PyBullet alone finds" in mesh.reason) == found for mesh in report.unread_meshes)
     [visual] = load(path).geometry.visuals("tool")
     assert isinstance(visual.shape, Mesh)
-    assert (visual.shape.fault is None) == found
+    assert (visual.shape.fault is None) == (found or "base.glb" in filename)
 
 
 def test_of_text_without_a_file_no_mesh_is_looked_for() -> None:

@@ -14,7 +14,10 @@ from dynx.files.reading import irregularity
 from dynx.model.package_paths import StrPath, environment_folders, resolve_package
 from dynx.model.package_search import MANIFESTS, enclosing_folder, package_of
 
-_BULLET_SCHEMES = re.compile("^(package|model)://")
+_BULLET_SCHEMES = re.compile("^(file|package|model)://")
+
+_BULLET_FORMATS = (".stl", ".obj", ".dae")
+"""Ends of the names of meshes that PyBullet reads; it refuses a description with others."""
 
 _THREE_SLASHES = re.compile("^package:///+")
 
@@ -66,7 +69,8 @@ def find_above(filename: str, source: str) -> Path | None:
     folder above lead to files that other engines miss.
     """
     inside = _BULLET_SCHEMES.sub("", filename).lstrip("/")
-    if not inside.strip() or not os.path.isfile(source):
+    # `realpath` drops a slash at the end, with which the path names no file.
+    if not inside.strip() or inside.endswith("/") or not os.path.isfile(source):
         return None
     with suppress(OSError, ValueError, RuntimeError):
         folder = Path(os.path.realpath(source)).parent
@@ -80,9 +84,14 @@ def find_above(filename: str, source: str) -> Path | None:
     return None
 
 
+def find_by_bullet(filename: str, source: str) -> Path | None:
+    """Find the file of a mesh by `find_above`; None for a format that PyBullet does not read."""
+    return find_above(filename, source) if filename.lower().endswith(_BULLET_FORMATS) else None
+
+
 def found_by_bullet(filename: str, source: str) -> str:
     """Return a clause that says where PyBullet alone finds a mesh that `find_mesh` does not; else nothing."""
-    found = find_above(filename, source)
+    found = find_by_bullet(filename, source)
     if found is None:
         return ""
     where = os.path.relpath(found, Path(os.path.realpath(source)).parent)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from dynx.model.geometry.mesh_files import MeshNotFoundError, find_above, find_mesh
+from dynx.model.geometry.mesh_files import MeshNotFoundError, find_by_bullet, find_mesh
 from dynx.model.xml.source import SourceElement
 from dynx.rules.geometry.meshes import Box, mesh_box
 
@@ -32,6 +32,6 @@ def bullet_box(filename: str, source: str) -> tuple[Box, str] | None:
         path = find_mesh(filename, source)
     except MeshNotFoundError:
         path = None
-    path = path or find_above(filename, source)
+    path = path or find_by_bullet(filename, source)
     box = None if path is None else mesh_box(path, by_bullet=True)
     return None if path is None or box is None else (box, path.suffix.lower())

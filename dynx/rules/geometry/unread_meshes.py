@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from dynx.model.geometry.mesh_files import (
     MeshNotFoundError,
-    find_above,
+    find_by_bullet,
     find_mesh,
     found_by_bullet,
     reason_unknown,
@@ -46,7 +46,7 @@ def is_found(filename: str, source: str) -> bool:
 
 def is_found_above(filename: str, source: str) -> bool:
     """Check whether an engine finds a mesh that searches the folders above the description `source`."""
-    return find_above(filename, source) is not None
+    return find_by_bullet(filename, source) is not None
 
 
 def reason_unread(filename: str, source: str) -> str | None:
