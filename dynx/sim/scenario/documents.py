@@ -176,9 +176,10 @@ def in_words(document: Document) -> str:
             inside = ", ".join(f"{name} {in_words(each)}" for name, each in document["fields"].items())
             return f"{document[CLASS].rpartition(':')[2]}({inside})"
         if CONTROLLER in document:
-            given = dict(document[CONTROLLER])
-            name = given.pop(CONTROLLER)
-            return f"{name}({', '.join(f'{key} {in_words(each)}' for key, each in given.items())})"
+            inner = document[CONTROLLER]
+            name = inner if isinstance(inner, str) else inner[CONTROLLER]
+            given = ", ".join(f"{key} {in_words(each)}" for key, each in arguments_of(document).items())
+            return f"{name}({given})"
         if document == SAME_MODEL or MODEL in document:
             return "of the scenario's model" if document == SAME_MODEL else "of another model"
         if SCENE in document:
@@ -189,6 +190,13 @@ def in_words(document: Document) -> str:
         return shown(document)
     text = str(document)
     return text if len(text) <= MAX_WORDS_LENGTH else f"{text[:MAX_WORDS_LENGTH]}..."
+
+
+def arguments_of(document: Document) -> dict[str, Document]:
+    """Return the arguments in the document of a registered controller, or of one inside another."""
+    inside = isinstance(document[CONTROLLER], str)
+    given = document if inside else document[CONTROLLER]
+    return {name: each for name, each in given.items() if name != CONTROLLER}
 
 
 def _decoded(document: Document, model: Model | None) -> Any:

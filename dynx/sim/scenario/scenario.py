@@ -33,6 +33,7 @@ from dynx.sim.scenario.documents import (
     MODEL,
     Document,
     Unknown,
+    arguments_of,
     decode,
     encode,
 )
@@ -310,9 +311,12 @@ def _parts_of(document: Document) -> dict[str, Document] | None:
     code = {"code of the class": document[CODE]} if CODE in document else {}
     if CLASS in document:
         return {f"class {document[CLASS]}": True, **document["fields"], **code}
+    if isinstance(document.get(CONTROLLER), str):
+        # A controller inside another one has its model, and no entry for it.
+        return {f"class {document[CONTROLLER]}": True, **arguments_of(document)}
     if CONTROLLER in document:
-        given = dict(document[CONTROLLER])
-        return {f"class {given.pop(CONTROLLER)}": True, MODEL: document.get(MODEL), **given, **code}
+        kind = document[CONTROLLER][CONTROLLER]
+        return {f"class {kind}": True, MODEL: document.get(MODEL), **arguments_of(document), **code}
     if FINGERPRINT in document:
         return {f"class {document[FINGERPRINT]}": True, **document.get(CONTROLLER_NUMBERS, {}), **code}
     return None

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.control import PD, PID, ComputedTorque
+from dynx.control import PD, PID, ComputedTorque, Saturated
 from dynx.errors import ArgumentError
 from dynx.model.loading import load
 from dynx.sim import Noise, Payload, Push, Rollout, Scenario, simulate
@@ -181,3 +181,21 @@ def test_equal_scenarios_written_otherwise_resume(tmp_path: Path) -> None:
         resume=part,
     )
     assert np.array_equal(same.q, WHOLE.q)
+
+
+def test_a_gain_of_a_controller_inside_another_is_refused_by_name() -> None:
+    scenario, other, integral = (
+        replace(SCENARIO, controller=Saturated(inner, limit=5.0))
+        for inner in (
+            PD(ARM, kp=400, kd=40),
+            PD(ARM, kp=400, kd=41),
+            PID(ARM, kp=400, ki=1, kd=40, control_dt=2e-3),
+        )
+    )
+    assert [each.field for each in scenario.differences(other)] == ["controller.inner.kd"]
+    assert [each.field for each in scenario.differences(integral)] == ["controller.inner"]
+    whole = simulate(scenario)
+    with pytest.raises(ArgumentError, match=r"had controller\.inner\.kd \[40\.0, .*; now it is \[41\.0, "):
+        simulate(other, resume=whole)
+    with pytest.raises(ArgumentError, match=r"had controller\.inner PD\(kp \[.*; now it is PID\(kp \["):
+        simulate(integral, resume=whole)
