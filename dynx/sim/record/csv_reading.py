@@ -6,7 +6,7 @@ import csv
 import io
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from dynx.errors import ArgumentError, nearest, shown
 from dynx.files.reading import checked_path, irregularity
 from dynx.model import Model
+from dynx.model.configuration import checked_q
 from dynx.spatial.scalar import Floats
 
 TIMES = ("t", "time", "timestamp")
@@ -27,12 +28,12 @@ def load_csv(path: str | os.PathLike[str], model: Model) -> dict[str, Any]:
     """Read the fields of a rollout of `model` from a table whose first line names the columns.
 
     Needed are times [s], in a column `t`, `time` or `timestamp`, and the position ``q:JOINT`` (or ``JOINT``)
-    of every joint [rad or m], for a floating base ``q:x`` to ``q:qw`` as well. Where velocities ``v:JOINT``
-    are missing they are central differences of the positions, and accelerations ``a:JOINT`` differences of
-    the velocities. Torques ``tau:JOINT`` [N m or N] that are missing are NaN. Other columns are ignored.
+    of every joint [rad or m], for a floating base ``q:x`` to ``q:qw`` as well. A velocity ``v:JOINT`` that is
+    missing is the central difference of the positions, an acceleration ``a:JOINT`` the difference of the
+    velocities. A torque ``tau:JOINT`` [N m or N] that is missing is NaN. Other columns are ignored.
 
-    Raises ArgumentError for a file that cannot be read, a missing column, text that is no number, and times
-    that do not increase.
+    Raises ArgumentError for a file that cannot be read, a column that is missing or there twice, text that is
+    no number, a quaternion of another length than 1, and times that do not increase.
     """
     name = shown(checked_path(path), 300)
     problem = irregularity(path)
@@ -42,26 +43,36 @@ def load_csv(path: str | os.PathLike[str], model: Model) -> dict[str, Any]:
         with open(path, newline="", encoding="utf-8-sig") as file:
             rows = list(csv.reader(io.StringIO(file.read()), skipinitialspace=True))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ArgumentError(f"{name} cannot be read as a table: {error}") from None
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise ArgumentError(f"{name} cannot be read as a table: {reason}") from None
     if not rows:
         raise ArgumentError(f"{name} is empty; wanted a line of names of columns")
     header = [each.strip() for each in rows[0]]
     body = [(number, row) for number, row in enumerate(rows[1:], start=2) if any(map(str.strip, row))]
-    columns = {each: k for k, each in reversed(list(enumerate(header)))}
-    table = _Table(name, columns, body)
+    table = _Table(name, header, body)
     t = table.column(TIMES)
-    if len(t) < 2 or not (np.diff(t) > 0.0).all():
-        later = np.flatnonzero(np.diff(t) <= 0.0)
-        place = f" at line {body[int(later[0]) + 1][0]}" if len(later) else ""
-        raise ArgumentError(f"{name} has times that do not increase{place}; wanted two rows or more")
+    if len(t) < 2:
+        raise ArgumentError(f"{name} has too few rows of numbers ({len(t)}); wanted 2 or more")
+    later = np.flatnonzero(np.diff(t) <= 0.0)
+    if len(later):
+        k = int(later[0])
+        raise ArgumentError(
+            f"{name}:{body[k + 1][0]}: the time {t[k + 1]:.12g} s follows {t[k]:.12g} s; "
+            "wanted times that increase"
+        )
     base = model.floating
     positions = [*(POSE if base else ()), *model.joint_names]
     rates = [*(TWIST if base else ()), *model.joint_names]
-    q = table.block("q", positions, plain=not base)
-    v = table.block("v", rates) if table.has("v", rates) else _rates(model, t, q)
-    a = table.block("a", rates)[:-1] if table.has("a", rates) else np.diff(v, axis=0) / np.diff(t)[:, None]
-    unknown = np.full((len(t) - 1, model.nv), math.nan)
-    tau = table.block("tau", rates)[:-1] if table.has("tau", rates) else unknown
+    try:
+        q = checked_q(model, table.positions(positions, plain=not base))
+        v = table.filled("v", rates, _rates(model, t, q))
+        a = table.filled("a", rates, np.diff(v, axis=0) / np.diff(t)[:, None])
+        tau = table.filled("tau", rates, np.full((len(t) - 1, model.nv), math.nan))
+    except ArgumentError as error:
+        # Numbers that are too large, and quaternions of another length than 1, are found by the model.
+        raise (
+            error if name in str(error) else ArgumentError(f"{name} has invalid positions: {error}")
+        ) from None
     return {
         "model": model,
         "t": t,
@@ -78,22 +89,25 @@ def load_csv(path: str | os.PathLike[str], model: Model) -> dict[str, Any]:
 class _Table:
     """Columns of text by name, converted to numbers where they are read."""
 
-    def __init__(
-        self, path: str, columns: Mapping[str, int], rows: Sequence[tuple[int, Sequence[str]]]
-    ) -> None:
-        self._path, self._columns, self._rows = path, columns, rows
-
-    def has(self, kind: str, names: Sequence[str]) -> bool:
-        """Return True if there is a column of this kind for every name."""
-        return all(f"{kind}:{name}" in self._columns for name in names)
+    def __init__(self, path: str, header: Sequence[str], rows: Sequence[tuple[int, Sequence[str]]]) -> None:
+        self._path, self._header, self._rows = path, header, rows
 
     def column(self, names: Sequence[str], *, last: bool = True) -> Floats:
         """Return the first column of these names; without `last` its last number may be missing."""
-        found = next((name for name in names if name in self._columns), None)
+        found = next((name for name in names if name in self._header), None)
         if found is None:
             wanted = " or ".join(map(shown, names))
-            raise ArgumentError(f"{self._path} has no column {wanted}{nearest(names[0], self._columns)}")
-        k, numbers = self._columns[found], np.full(len(self._rows), math.nan)
+            separator = next((each for each in ";\t" if self._header and each in self._header[0]), None)
+            if separator is not None and len(self._header) == 1:
+                raise ArgumentError(
+                    f"{self._path} is separated by {separator!r}; wanted commas between columns"
+                )
+            raise ArgumentError(f"{self._path} has no column {wanted}{nearest(names[0], self._header)}")
+        if self._header.count(found) > 1:
+            raise ArgumentError(
+                f"{self._path} has {self._header.count(found)} columns {shown(found)}; wanted one"
+            )
+        k, numbers = self._header.index(found), np.full(len(self._rows), math.nan)
         for row, (line, cells) in enumerate(self._rows):
             text = cells[k].strip() if k < len(cells) else ""
             try:
@@ -105,15 +119,23 @@ class _Table:
                     ) from None
                 continue
             if not math.isfinite(numbers[row]) and last:
-                raise ArgumentError(f"{self._path}:{line}: column {shown(found)} has {shown(text)}")
+                raise ArgumentError(
+                    f"{self._path}:{line}: column {shown(found)} has {shown(text)}; wanted a finite number"
+                )
         return numbers
 
-    def block(self, kind: str, names: Sequence[str], *, plain: bool = False) -> Floats:
-        """Return the columns of this kind (rows, names); with `plain` the name alone is one, too."""
-        states = kind in ("q", "v")
-        wanted = ([f"{kind}:{name}", *([name] if plain else [])] for name in names)
-        found = [self.column(each, last=states) for each in wanted]
+    def positions(self, names: Sequence[str], *, plain: bool) -> Floats:
+        """Return the positions (rows, names); with `plain` a column may have the name alone."""
+        found = [self.column([f"q:{name}", *([name] if plain else [])]) for name in names]
         return np.column_stack(found) if found else np.zeros((len(self._rows), 0))
+
+    def filled(self, kind: str, names: Sequence[str], rest: Floats) -> Floats:
+        """Return `rest` with the columns of this kind that there are, in as many rows."""
+        found: Floats = rest.copy()
+        for k, name in enumerate(names):
+            if f"{kind}:{name}" in self._header:
+                found[:, k] = self.column([f"{kind}:{name}"], last=kind == "v")[: len(rest)]
+        return found
 
 
 def _rates(model: Model, t: Floats, q: Floats) -> Floats:

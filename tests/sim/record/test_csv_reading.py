@@ -66,10 +66,13 @@ def test_rates_of_a_floating_base_are_in_its_axes(tmp_path: Path) -> None:
         ("t,q:joint1\n0,0\n1,0\n", "has no column 'q:joint2' or 'joint2'; did you mean 'q:joint1'"),
         ("q:joint1,q:joint2\n0,0\n", "has no column 't' or 'time' or 'timestamp'"),
         ("t,joint1,joint2\n0,0,0\n1,x,0\n", ":3: column 'joint1' has 'x'; wanted a number"),
-        ("t,joint1,joint2\n0,0,0\n1,nan,0\n", ":3: column 'joint1' has 'nan'"),
+        ("t,joint1,joint2\n0,0,0\n1,nan,0\n", ":3: column 'joint1' has 'nan'; wanted a finite number"),
         ("t,joint1,joint2\n0,0,0\n1,0\n", ":3: column 'joint2' has ''; wanted a number"),
-        ("t,joint1,joint2\n0,0,0\n1,0,0\n\n1,0,0\n", "do not increase at line 5"),
-        ("t,joint1,joint2\n0,0,0\n", "wanted two rows or more"),
+        ("t,joint1,joint2\n0,0,0\n1,0,0\n\n1,0,0\n", ":5: the time 1 s follows 1 s; wanted times"),
+        ("t,joint1,joint2\n0,0,0\n", "has too few rows of numbers (1); wanted 2 or more"),
+        ("t;joint1;joint2\n0;0,5;0\n", "is separated by ';'; wanted commas between columns"),
+        ("t,joint1,joint2,joint1\n0,0,0,1\n1,0,0,1\n", "has 2 columns 'joint1'; wanted one"),
+        ("t,joint1,joint2\n0,1e200,0\n1,0,0\n", "has invalid positions: q[0, 0] is 1e+200"),
     ],
 )
 def test_what_is_no_log_is_refused_with_its_place(tmp_path: Path, text: str, said: str) -> None:
@@ -79,6 +82,24 @@ def test_what_is_no_log_is_refused_with_its_place(tmp_path: Path, text: str, sai
         Rollout.load(path, ARM)
     assert said in str(raised.value)
     assert "log.csv" in str(raised.value)
+
+
+def test_velocities_of_some_joints_are_read_and_those_of_the_others_computed(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("t,joint1,joint2,v:joint2,tau:joint1\n0,0,0,7,5\n1,2,4,8,6\n2,4,8,9,\n", encoding="utf-8")
+    read = Rollout.load(path, ARM)
+    np.testing.assert_array_equal(read.v, [[2.0, 7.0], [2.0, 8.0], [2.0, 9.0]])
+    np.testing.assert_array_equal(read.a, [[0.0, 1.0], [0.0, 1.0]])
+    np.testing.assert_array_equal(read.tau, [[5.0, np.nan], [6.0, np.nan]])
+
+
+def test_a_quaternion_of_another_length_is_refused_with_the_file(tmp_path: Path) -> None:
+    robot = dynx.load("double_pendulum", base="floating")
+    columns = ["x", "y", "z", "qx", "qy", "qz", "qw", *robot.joint_names]
+    lines = ["t," + ",".join(f"q:{each}" for each in columns), "0,0,0,0,0,0,0,1,0,0", "1,0,0,0,0,0,0,2,0,0"]
+    (tmp_path / "log.csv").write_text("\n".join(lines), encoding="utf-8")
+    with pytest.raises(ArgumentError, match=r"log\.csv' has invalid positions: .*length 2; wanted length 1"):
+        Rollout.load(tmp_path / "log.csv", robot)
 
 
 def test_robots_are_given_for_tables_only(tmp_path: Path) -> None:
