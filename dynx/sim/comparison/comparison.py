@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
-from dynx.errors import DynxError
+from dynx.errors import ArgumentError, DynxError, shown
 from dynx.files.notebook import html_grid
+from dynx.model.configuration import is_real
 from dynx.sim.comparison.factors import Factor, Mixture
 from dynx.sim.comparison.separation import Separation, separation
 from dynx.sim.one_rollout import simulate
@@ -76,7 +78,8 @@ class RolloutComparison:
             return f"<RolloutComparison: alike to {self.separation.largest:.2g}>"
         acting = sum(cause.acts(self.tolerance) for cause in self.causes)
         proof = "proved" if self.proved else "not proved"
-        return f"<RolloutComparison: {self.separation.largest:.3g} apart, causes: {acting}, {proof}>"
+        count = f"{acting} of {len(self.causes)} differences"
+        return f"<RolloutComparison: {self.separation.largest:.3g} apart, causes: {count}, {proof}>"
 
     def _repr_html_(self) -> str:
         rows = (
@@ -107,8 +110,17 @@ def compare_rollouts(
     distance [rad or m] up to which rollouts are alike. Without `rerun` the differences are listed only.
     `progress` is called with the number of reruns done and their total number.
 
-    Raises ArgumentError for rollouts of robots with other coordinates, or without a common time.
+    Raises ArgumentError for rollouts of robots with other coordinates, or without a common time, for anything
+    but a Rollout, and for an invalid tolerance.
     """
+    for name, each in (("first", ours), ("second", theirs)):
+        if not isinstance(each, Rollout):
+            raise ArgumentError(
+                f"the {name} rollout is of type {type(each).__name__}; wanted a dynx.Rollout, which "
+                "simulate returns and Rollout.load reads"
+            )
+    if not is_real(tolerance) or not 0.0 <= tolerance < math.inf:
+        raise ArgumentError(f"tolerance is {shown(tolerance)}; wanted a number of rad or m, 0 or more")
     apart = separation(ours, theirs)
     notes = [*_departures("the first", ours), *_departures("the second", theirs)]
     if ours.scenario is None or theirs.scenario is None:
@@ -122,7 +134,7 @@ def compare_rollouts(
     causes = [Cause(factor, None, None) for factor in mixture.factors]
     remaining = repeated = None
     if rerun and apart.largest > tolerance:
-        trials = _Trials(mixture, float(apart.times[-1]), progress, 2 + 2 * len(names))
+        trials = _Trials(mixture, float(apart.times[-1]), progress)
         repeated, first = trials.distance((), ours)
         remaining, last = trials.distance(names, theirs)
         reruns = (("the first", first), ("the second", last))
@@ -138,9 +150,9 @@ def compare_rollouts(
 class _Trials:
     """Reruns of mixed scenarios; each is simulated once."""
 
-    def __init__(self, mixture: Mixture, duration: float, progress: Progress | None, total: int) -> None:
-        self._mixture, self._duration = mixture, duration
-        self._progress, self._total, self._done = progress, total, 0
+    def __init__(self, mixture: Mixture, duration: float, progress: Progress | None) -> None:
+        self._mixture, self._duration, self._progress = mixture, duration, progress
+        self._total = _number_of_reruns(len(mixture.factors))
         self._known: dict[frozenset[str], tuple[Rollout | None, str | None]] = {}
 
     def cause(self, factor: Factor, names: Collection[str]) -> Cause:
@@ -172,9 +184,15 @@ class _Trials:
             partial = getattr(error, "rollout", None)
             return (partial if isinstance(partial, Rollout) and len(partial) else None), str(error)
         finally:
-            self._done += 1
             if self._progress is not None:
-                self._progress(min(self._done, self._total), self._total)
+                self._progress(len(self._known) + 1, self._total)
+
+
+def _number_of_reruns(n: int) -> int:
+    """Return how many scenarios there are with none, one, all but one and all of n differences."""
+    if n > MAX_FACTORS:
+        return 2
+    return 2 + 2 * n if n > 2 else 2**n
 
 
 def _departures(name: str, rollout: Rollout) -> list[str]:

@@ -20,7 +20,8 @@ class Separation:
     """Distance of two rollouts at the times that both have."""
 
     times: Floats
-    """Times (n,) [s]: those of the rollout with the longer steps, up to the end of the shorter one."""
+    """Times (n,) [s]: those of the rollout with the longer steps, up to the end of the shorter one; those of
+    the other where only one of them is in the common time."""
     names: tuple[str, ...]
     """The coordinates of v, then the bodies of a scene that both rollouts have."""
     units: tuple[str, ...]
@@ -63,13 +64,15 @@ def separation(ours: Rollout, theirs: Rollout) -> Separation:
             f"{other.base} base and joints {', '.join(other.joint_names) or 'none'}"
         )
     begin, end = max(ours.t[0], theirs.t[0]), min(ours.t[-1], theirs.t[-1])
-    coarse = max(ours, theirs, key=_step)
-    slack = SAME_TIME * _step(coarse)
-    times = coarse.t[(coarse.t >= begin - slack) & (coarse.t <= end + slack)]
+    fine, coarse = sorted((theirs, ours), key=_step)
+    times = _times_within(coarse, begin, end)
+    if times.size < 2:
+        # One state tells nothing of a motion: a log in ms would be like any simulation from the same start.
+        times = max(times, _times_within(fine, begin, end), key=len)
     if not times.size:
         raise ArgumentError(
-            f"the rollouts have no common time: one is from {ours.t[0]:g} to {ours.t[-1]:g} s, the other "
-            f"from {theirs.t[0]:g} to {theirs.t[-1]:g} s"
+            f"the rollouts have no common time: one is from {ours.t[0]:.12g} to {ours.t[-1]:.12g} s, "
+            f"the other from {theirs.t[0]:.12g} to {theirs.t[-1]:.12g} s"
         )
     with np.errstate(invalid="ignore", over="ignore"):
         apart = np.abs(one.difference(_configurations(ours, times), _configurations(theirs, times)))
@@ -82,6 +85,11 @@ def separation(ours: Rollout, theirs: Rollout) -> Separation:
         (*units, *(joint.unit for joint in one.coordinate_joints), *("m" for _ in bodies)),
         np.where(np.isnan(both := np.column_stack([apart, *gaps])), np.inf, both),
     )
+
+
+def _times_within(rollout: Rollout, begin: float, end: float) -> Floats:
+    slack = SAME_TIME * _step(rollout)
+    return rollout.t[(rollout.t >= begin - slack) & (rollout.t <= end + slack)]
 
 
 def _step(rollout: Rollout) -> float:
