@@ -77,7 +77,7 @@ def document(comparison: RolloutComparison, first: str, second: str) -> CompareD
         "tolerance": comparison.tolerance,
         "alike": comparison.alike,
         "proved": comparison.proved,
-        "duration": float(apart.times[-1]),
+        "duration": float(apart.times[-1] - apart.times[0]),
         "largest": _finite(apart.largest),
         "parted": [_parting(apart, each) for each in sorted({comparison.tolerance, *THRESHOLDS})],
         "coordinates": [_coordinate(apart, column) for column in range(len(apart.names))],

@@ -51,6 +51,8 @@ def _read(first: str, second: str, robot: str | None) -> tuple[Rollout, Rollout]
     """Read both files; a table has the robot that is given, or that of the other file."""
     paths = (first, second)
     tables = [_is_table(path) for path in paths]
+    if robot is not None and not any(tables):
+        raise ArgumentError("--robot is the robot of a .csv file; both of these files have their own")
     model = None if robot is None else load(robot)
     complete = {path: Rollout.load(path) for path, table in zip(paths, tables, strict=True) if not table}
     if model is None and complete:

@@ -33,14 +33,26 @@ def verdict(report: Entry) -> str:
     if report["alike"]:
         apart = f"{_distance(report['largest'])} rad or m apart in {report['duration']:.6g} s"
         return f"{names} are alike: {apart}"
-    causes = [each for each in report["causes"] if each["acts"]]
-    if report["proved"]:
-        return f"{names} part, for {counted(len(causes), 'cause')}, proved"
-    if causes:
-        return f"{names} part; {counted(len(causes), 'cause')}, not proved"
-    if report["causes"] and report["repeated"] is None:
+    if report["causes"] and not _is_simulated(report):
         return f"{names} part; their differences were not simulated"
-    return f"{names} part, for no cause that is known"
+    acting = sum(each["acts"] for each in report["causes"])
+    unknown = sum(_is_unknown(each) for each in report["causes"])
+    rest = f"; the effect of {counted(unknown, 'difference')} is not known" if unknown else ""
+    causes = counted(acting, "cause") if acting else "all their differences together"
+    if report["proved"]:
+        return f"{names} part, for {causes}, proved{rest}"
+    if acting:
+        return f"{names} part; {causes}, not proved{rest}"
+    return f"{names} part, for no cause that is known{rest}"
+
+
+def _is_simulated(report: Entry) -> bool:
+    return report["repeated"] is not None or report["remaining"] is not None
+
+
+def _is_unknown(cause: Entry) -> bool:
+    """Return True for a difference that may be a cause, because an effect of it is not known."""
+    return not cause["acts"] and None in (cause["alone"], cause["without"])
 
 
 def _show_partings(out: Console, report: Entry) -> None:
@@ -82,7 +94,9 @@ def _show_causes(out: Console, report: Entry) -> None:
         return
     table = Table("difference", "in A", "in B", "alone", "left by it", "", right=("alone", "left by it"))
     for each in causes[:MAX_ROWS]:
-        word = "cause" if each["acts"] else "no effect" if each["alone"] is not None else ""
+        word = "cause" if each["acts"] else "not known" if _is_unknown(each) else "no effect"
+        if not _is_simulated(report):
+            word = ""
         table.add_row(
             one_line(each["name"]),
             short_line(each["first"]),
@@ -100,7 +114,7 @@ def _show_causes(out: Console, report: Entry) -> None:
     for each in causes[:MAX_ROWS]:
         if each["obstacle"] is not None:
             out.print(f"{one_line(each['name'])}: {one_line(each['obstacle'])}", style="yellow")
-    if report["remaining"] is not None or report["repeated"] is not None:
+    if _is_simulated(report):
         out.print(
             f"proof: a rerun of A is {_distance(report['repeated'])} from A; with all differences taken over "
             f"it is {_distance(report['remaining'])} from B (tolerance {report['tolerance']:g})"

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from rich.console import Console
 
 import dynx
 from dynx import control
 from dynx.cli.compare.document import document
-from dynx.cli.compare.tables import verdict
+from dynx.cli.compare.tables import show, verdict
 from dynx.cli.shell.main import cli
 from dynx.sim import Payload, compare_rollouts, simulate
 
@@ -74,6 +76,8 @@ def test_unusable_input(folder: Path) -> None:
         ((folder / "a.npz", folder / "none.npz"), "none.npz"),
         ((folder / "log.csv", folder / "log.csv"), "a .csv file does not have its robot: name it by --robot"),
         ((folder / "log.csv", folder / "log.csv", "--robot", "ur5"), "no column 'q:shoulder_pan_joint'"),
+        ((folder / "a.npz", folder / "b.npz", "--robot", "so101"), "--robot is the robot of a .csv file"),
+        ((folder / "a.npz", folder / "none.csv"), "cannot be read as a table: No such file or directory"),
     ):
         result = run(*arguments)
         assert result.exit_code == 2
@@ -88,3 +92,30 @@ def test_verdicts_without_a_proof(folder: Path) -> None:
     assert (
         verdict(document(compare_rollouts(ours, log), "a", "b")) == "a and b part, for no cause that is known"
     )
+
+
+def test_a_verdict_says_which_effects_are_not_known(folder: Path) -> None:
+    ours, theirs = (dynx.Rollout.load(folder / name) for name in ("a.npz", "b.npz"))
+    report: dict[str, Any] = {**document(compare_rollouts(ours, theirs), "a", "b")}
+    (payload,) = report["causes"]
+    small = {**payload, "alone": 1e-12, "without": 1e-12, "acts": False}
+    unknown = {**small, "without": None}
+    for causes, said in (
+        ([payload, small], "a and b part, for 1 cause, proved"),
+        ([small, small], "a and b part, for all their differences together, proved"),
+        ([payload, unknown], "a and b part, for 1 cause, proved; the effect of 1 difference is not known"),
+    ):
+        assert verdict({**report, "causes": causes}) == said
+    part = {**report, "proved": False}
+    assert verdict({**part, "causes": [payload]}) == "a and b part; 1 cause, not proved"
+    assert verdict({**part, "causes": [small]}) == "a and b part, for no cause that is known"
+    console = Console(record=True, width=200)
+    show(console, {**report, "causes": [payload, small, unknown]})
+    words = [line.rstrip() for line in console.export_text().splitlines() if line.startswith(" payload")]
+    assert [line.split("   ")[-1].strip() for line in words] == ["cause", "no effect", "not known"]
+
+
+def test_the_duration_is_that_of_the_common_time(folder: Path) -> None:
+    ours, theirs = (dynx.Rollout.load(folder / name) for name in ("a.npz", "b.npz"))
+    later = [replace(each, t=each.t + 5.0, scenario=None) for each in (ours, theirs)]
+    assert document(compare_rollouts(*later), "a", "b")["duration"] == pytest.approx(0.1, abs=1e-12)
