@@ -82,7 +82,9 @@ def test_anything_but_a_rollout_is_refused() -> None:
 
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_progress_ends_with_the_last_rerun(count: int) -> None:
-    options: dict[str, Any] = dict(list({"damping": 0.01, "armature": 0.1, "friction": 0.001}.items())[:count])
+    options: dict[str, Any] = dict(
+        list({"damping": 0.01, "armature": 0.1, "friction": 0.001}.items())[:count]
+    )
     assert THEIRS.scenario is not None
     plain: dict[str, Any] = {"damping": False}
     theirs = simulate(replace(THEIRS.scenario, **(plain | options)))
