@@ -1,4 +1,4 @@
-"""Intersections of rays with shapes, in closed form, for engines that have none of their own.
+"""Intersections of rays with shapes, in closed form, where an engine has none of its own or misses shapes.
 
 A ray that begins inside a solid hits the surface where it leaves; the normal is the outward one there. A
 plane is hit from above only. A height field is a surface without thickness.
