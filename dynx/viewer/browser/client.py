@@ -45,6 +45,16 @@ _FOR_SOFTWARE = """
 """Draws each pixel once instead of four times, which halves the time of a picture drawn by software, and lets
 viser, which lowers the resolution by a quarter where pictures come slowly, lower it by half."""
 
+_PRESSES = """
+  const listen = EventTarget.prototype.addEventListener;
+  EventTarget.prototype.addEventListener = function (kind, listener, options) {
+    const given = kind === "pointerdown" && options?.passive ? {...options, passive: false} : options;
+    return listen.call(this, kind, listener, given);
+  };
+"""
+"""Lets viser prevent the default of a press on a part that is dragged: react-three-fiber listens passively,
+and a browser then reports an error."""
+
 # A program is not told what the pointer is over. Where a version of viser keeps its scene elsewhere, no name
 # is shown.
 _NAMES_ON_HOVER = (
@@ -104,7 +114,7 @@ class Client:
     def __init__(self, title: str, *, antialiasing: bool) -> None:
         """Without `antialiasing` edges are jagged, and software draws twice as fast."""
         self._folder = tempfile.TemporaryDirectory(prefix="dynx-page-", ignore_cleanup_errors=True)
-        script = _NAMES_ON_HOVER if antialiasing else _FOR_SOFTWARE + _NAMES_ON_HOVER
+        script = _PRESSES + _NAMES_ON_HOVER if antialiasing else _FOR_SOFTWARE + _PRESSES + _NAMES_ON_HOVER
         self._text = _with_script(CLIENT.read_text(encoding="utf-8"), script)
         self.entitle(title)
 
