@@ -36,7 +36,8 @@ class Spring:
         self._pull: Pull | None = None
         self._point = np.zeros(3)
         self._mass = 1.0
-        self._before: Floats | None = None
+        self._before: tuple[float, Floats] | None = None
+        """Time [s] of the step before, and the place (3,) [m] of the point that is held."""
         self._held: str | None = None
 
     @property
@@ -83,11 +84,18 @@ class Spring:
             self._held, self._before, self._mass = holder, None, _mass(world, part)
             self._point = np.zeros(3) if pull is None else T[:3, :3].T @ (pull.taken - T[:3, 3])
         place = T[:3, :3] @ self._point + T[:3, 3]
-        velocity = (place - (place if self._before is None else self._before)) / world.dt
-        self._before = place
+        velocity = self._velocity(world, place)
         goal = np.asarray(self._node.position if pull is None else pull.pointer, dtype=np.float64)
         force = self._mass * _FREQUENCY * (_FREQUENCY * (goal - place) - 2.0 * velocity)
         return [Wrench(part, force, point=self._point)]
+
+    def _velocity(self, world: World, place: Floats) -> Floats:
+        """Return the velocity (3,) [m/s] of the point that is held, from its place in the step before; zero
+        where the world is not one step later, as after a reset."""
+        before, self._before = self._before, (world.time, place)
+        if before is None or not math.isclose(world.time - before[0], world.dt, rel_tol=0.01):
+            return np.zeros(3)
+        return (place - before[1]) / world.dt
 
 
 def _pose(world: World, part: str) -> Floats:

@@ -32,6 +32,8 @@ STANDARD_WEIGHT = 9.81
 
 _NO_PART = "none"
 
+_NO_PART_CHOSEN = "choose the part that is pushed"
+
 _SHARE = 0.6
 """Share of the picture that what can move takes at the start."""
 
@@ -240,6 +242,7 @@ class WorldView:
         """Return to the start."""
         with self._page.lock:
             self.world.reset()
+            self._pushes.clear()
             self._report("")
             self._spring.hold(self.world, self._held())
             self.draw()
@@ -284,11 +287,13 @@ class WorldView:
         def hold(_: Any) -> None:
             with self._page.lock:
                 self._spring.hold(self.world, self._held())
+                if self._message.value == _NO_PART_CHOSEN:
+                    self._report("")
 
         def pushed(_: Any) -> None:
             with self._page.lock:
                 if self._part.value == _NO_PART:
-                    self._report("choose the part that is pushed")
+                    self._report(_NO_PART_CHOSEN)
                     return
                 self._report("")
                 self.push(self._part.value, impulse.value)
@@ -320,11 +325,14 @@ class WorldView:
         while not self._ended.is_set():
             self._running.wait()
             began, start = time.monotonic(), self.world.time
+            factor = float(self._factor.value)
             while self._running.is_set() and not self._ended.is_set():
                 if self._closed():
                     self._end()
                     break
-                factor = float(self._factor.value)
+                if factor != float(self._factor.value):  # The time so far was at the other speed.
+                    factor = float(self._factor.value)
+                    began, start = time.monotonic(), self.world.time
                 behind = start + (time.monotonic() - began) * factor - self.world.time
                 n = round(behind / self.world.dt)
                 # Where the machine is too slow, the world falls behind instead of the page standing still.

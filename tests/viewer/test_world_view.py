@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from dynx.errors import ArgumentError, DynxError
 from dynx.viewer.spring import Pull
+from dynx.viewer.world_view import _NO_PART_CHOSEN
 from dynx.world import World, Wrench
 from dynx.world.scene import read_scene
 from tests.viewer.conftest import until
@@ -67,6 +69,47 @@ def test_a_push_gives_a_body_its_impulse_once() -> None:
             viewer.view.push(f"{body.name}s", (0.0, 0.5, 0.0))
         with pytest.raises(DynxError, match="impulse"):
             viewer.view.push(body.name, (0.0, np.nan, 0.0))
+
+
+def test_a_reset_leaves_no_push_and_no_velocity_of_the_spring() -> None:
+    scene = read_scene("slope")
+    body = next(each for each in scene.bodies if not each.fixed)
+    with World(scene) as world, world.view() as viewer:
+        held = world.state.bodies[body.name].position.copy()
+        viewer.view._pull.value = True
+        viewer.view._part.value = body.name
+        until(lambda: viewer.view._spring.pulls, "the spring")
+        viewer.view._spring._node.position = held + np.array([0.0, 0.0, 1.0])
+        viewer.view.step(300)
+        assert world.state.bodies[body.name].position[2] > held[2] + 0.1
+        viewer.view.push(body.name, (0.0, 0.5, 0.0))
+        viewer.view.reset()
+        assert not viewer.view._pushes
+        # The handle is on the part again, which rests: the spring does not pull.
+        (wrench,) = viewer.view._spring.wrenches(world)
+        assert np.abs(wrench.force).max() < 1e-9
+
+
+def test_a_lower_speed_does_not_stop_a_world() -> None:
+    with World(read_scene("slope")) as world, world.view() as viewer:
+        viewer.view._factor.value = 2.0
+        viewer.view.play()
+        until(lambda: world.time > 2.0, "two seconds")
+        before = world.time
+        viewer.view._factor.value = 0.5
+        time.sleep(0.5)
+        assert world.time > before
+
+
+def test_the_request_for_a_part_to_push_goes_when_one_is_chosen() -> None:
+    with World(read_scene("slope")) as world, world.view() as viewer:
+        viewer.view._report(_NO_PART_CHOSEN)
+        viewer.view._part.value = viewer.view._part.options[1]
+        until(lambda: not viewer.view._message.visible, "the end of the request")
+        viewer.view._report("an error")
+        viewer.view._part.value = viewer.view._part.options[0]
+        time.sleep(0.2)
+        assert viewer.view._message.value == "an error"
 
 
 def test_errors_of_the_loads_are_shown_and_end_the_motion() -> None:
