@@ -43,10 +43,22 @@ class Curves:
     The legend of many curves would be higher than the plot, so that one of them is chosen by its name.
     """
 
-    def __init__(self, page: Page, title: str, t: Floats, values: Floats, names: Sequence[str]) -> None:
-        """`values` (n, m) are those of m quantities `names` at the times t (n,) [s]."""
+    def __init__(
+        self,
+        page: Page,
+        title: str,
+        t: Floats,
+        values: Floats,
+        names: Sequence[str],
+        span: tuple[float, float] | None = None,
+    ) -> None:
+        """`values` (n, m) are those of m quantities `names` at the times t (n,) [s].
+
+        The axis of time covers the times `span` [s]; by default from the first to the last of t.
+        """
         picked = np.unique(np.linspace(0, len(t) - 1, min(len(t), MAX_POINTS)).round().astype(int))
         self._t, self._values = np.ascontiguousarray(t[picked]), np.array(values[picked], dtype=np.float64)
+        self._span = span or (float(self._t[0]), float(self._t[-1]))
         self._drawn_at = -math.inf
         self._period = max(1.0 / UPDATES_PER_SECOND, self._values.size / VALUES_PER_SECOND)
         power = _power(self._values)
@@ -101,7 +113,7 @@ class Curves:
         low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
         margin = 0.05 * (high - low) or max(abs(high), 1.0) * 0.05
         return {
-            "x": uplot.Scale(time=False, auto=False, range=(float(self._t[0]), float(self._t[-1]))),
+            "x": uplot.Scale(time=False, auto=False, range=self._span),
             "y": uplot.Scale(range=(low - margin, high + margin)),
         }
 

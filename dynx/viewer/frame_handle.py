@@ -38,8 +38,7 @@ class FrameHandle:
         backend that solves for it."""
         self._model, self._engine, self._moved = model, engine, moved
         self.frame = frame
-        self.free: str | None = None
-        """What of the pose is free: ``"rotation"``, ``"position"``, or None."""
+        self._free: str | None = None
         self.q = model.neutral()
         """The configuration from which the next drag begins."""
         self._latest: Floats | None = None
@@ -47,6 +46,20 @@ class FrameHandle:
         self._busy = threading.Lock()
         self._node = scene.add_transform_controls("/handle", scale=size, depth_test=False, visible=False)
         self._node.on_update(self._dragged)
+
+    @property
+    def free(self) -> str | None:
+        """What of the pose is free: ``"rotation"``, ``"position"``, or None.
+
+        The handle has no rings where rotation is free, and neither arrows nor squares where position is.
+        """
+        return self._free
+
+    @free.setter
+    def free(self, free: str | None) -> None:
+        self._free = free
+        self._node.disable_rotations = free == "rotation"
+        self._node.disable_axes = self._node.disable_sliders = free == "position"
 
     @property
     def visible(self) -> bool:

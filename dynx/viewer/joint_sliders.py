@@ -155,7 +155,12 @@ def _shown(value: float, low: float, high: float) -> float:
 def _range_around(value: float, low: float, high: float) -> tuple[float, float]:
     """Return the range of a slider with few digits, which holds the value also where it is beyond."""
     low, high = _rounded_inward(low, high)
-    within = high - low <= 0.0 or low - slider_step(low, high) < value < high + slider_step(low, high)
+    if high <= low:
+        # Neither value nor ends of the slider of a joint that cannot move have more digits than others.
+        low = high = float(f"{low:.4g}")
+        value = float(f"{value:.4g}")
+        return min(low, value), max(high, value)
+    within = low - slider_step(low, high) < value < high + slider_step(low, high)
     return (low, high) if within else (min(low, value), max(high, value))
 
 

@@ -211,9 +211,11 @@ class MotionView:
                 self._curves.append(
                     Curves(self._page, "distance [m]", self.motion.t, distance[:, None], ["largest distance"])
                 )
+        # There is one torque fewer than there are states; the axes of all curves are alike.
+        span = (self._start, self._start + self.duration)
         for each in curves:
             with gui.add_folder(each.title, expand_by_default=False):
-                self._curves.append(Curves(self._page, each.title, each.t, each.values, each.names))
+                self._curves.append(Curves(self._page, each.title, each.t, each.values, each.names, span))
 
 
 def _legend(solid: str, ghost: str) -> str:
