@@ -11,6 +11,8 @@ from dynx.spatial.scalar import Floats
 from dynx.viewer.drawn_parts import DrawnParts
 from dynx.viewer.page import Page
 
+_NO_PART = "none"
+
 _FREE, _FOLLOWS, _FIRST_PERSON = "free", "moves with", "looks from"
 
 
@@ -23,7 +25,8 @@ class FollowingCamera:
         gui = page.gui
         with gui.add_folder("camera", expand_by_default=False):
             self._mode = gui.add_dropdown("it is", (_FREE, _FOLLOWS, _FIRST_PERSON), initial_value=_FREE)
-            self._part = gui.add_dropdown("part", tuple(drawn.parts))
+            # An empty scene has no part.
+            self._part = gui.add_dropdown("part", tuple(drawn.parts) or (_NO_PART,))
         self._mode.on_update(lambda _: self._start())
         self._part.on_update(lambda _: self._start())
         drawn.on_placed(self._move)
@@ -45,8 +48,8 @@ class FollowingCamera:
     def _start(self) -> None:
         with self._page.lock:
             self._before = None
-            T = self._drawn.pose(self._part.value)
-            self._move({self._part.value: T})
+            part = self._part.value
+            self._move({part: self._drawn.pose(part)} if part in self._drawn.parts else {})
 
     def _move(self, poses: Mapping[str, Floats]) -> None:
         mode = self._mode.value

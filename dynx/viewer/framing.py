@@ -52,14 +52,18 @@ def box_around(
     `poses` (n, 4, 4) are those of parts at n times; a part counts with its shapes if it is one of `bodies`
     or a link of `robots` (as ``robot/link``), and otherwise with its origin. The box holds all parts at the
     start, and along each axis all of their later places but the outer tenth at each end: a ball that rolls
-    away does not make everything else small. Bodies that are fixed do not count where others are.
+    away does not make everything else small. Bodies that are fixed do not count where others are, and where
+    all are fixed, planes do not.
     """
     if not poses:
         return np.zeros(3), np.zeros(3)
     given = {body.name: body for body in bodies if body.name in poses}
     # A floor may be of any size.
-    poses = {name: T for name, T in poses.items() if name not in given or not given[name].fixed} or poses
-    boxes = {name: _body_box(given[name]) for name in poses if name in given and not given[name].fixed}
+    floors = {name for name, body in given.items() if body.fixed}
+    if not poses.keys() - floors:
+        floors = {name for name in floors if has_plane(given[name])}
+    poses = {name: T for name, T in poses.items() if name not in floors} or poses
+    boxes = {name: _body_box(given[name]) for name in poses if name in given and name not in floors}
     for robot, model in (robots or {}).items():
         boxes |= {f"{robot}/{link}": box for link, box in link_boxes(model).items()}
     lower, upper = [], []
@@ -87,6 +91,11 @@ def link_boxes(model: Model) -> dict[str, PartBox]:
 def has_ground(bodies: Iterable[SceneBody]) -> bool:
     """Check whether a body is a ground: a plane or a height field."""
     return any(isinstance(placed.shape, Plane | HeightField) for body in bodies for placed in body.shapes)
+
+
+def has_plane(body: SceneBody) -> bool:
+    """Check whether a body has a shape without an end."""
+    return any(isinstance(placed.shape, Plane) for placed in body.shapes)
 
 
 def fitting_distance(low: Floats, high: Floats, across: float, upward: float) -> float:

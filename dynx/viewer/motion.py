@@ -33,7 +33,10 @@ PARTED = 1e-3
 
 
 class Arrows(NamedTuple):
-    """Contact forces: the points (m, 3) [m] at which they act, and the forces (m, 3) [N], in world axes."""
+    """Contact forces: the points (m, 3) [m] at which they act, and the forces (m, 3) [N], in world axes.
+
+    A force is that on the first part of a contact, or on the second where the first is fixed.
+    """
 
     points: Floats
     forces: Floats
@@ -62,6 +65,12 @@ class Motion:
         return {name: rows[k] for name, rows in self.poses.items()}
 
 
+def fixed_bodies(scene: Scene) -> frozenset[str]:
+    """Return the names of the bodies that do not move, of whose contacts the force on the other part is
+    drawn: that on the ground lies below the ground."""
+    return frozenset(body.name for body in scene.bodies if body.fixed)
+
+
 def motion_of_rollout(rollout: Rollout, name: str = "") -> Motion:
     """Return the motion of a rollout, with the other robots and the bodies of its scene.
 
@@ -85,6 +94,8 @@ def motion_of_rollout(rollout: Rollout, name: str = "") -> Motion:
         poses |= {body: rows[frames] for body, rows in around.bodies.items()}
         table = around.contacts
         force = table.normal_force[:, None] * table.normal + table.friction_force
+        fixed = fixed_bodies(plant.scene)
+        force[[table.names[a] in fixed for a in table.a.tolist()]] *= -1.0
         point = 0.5 * (table.point_a + table.point_b)
         # Contacts belong to steps, of which there is one fewer than states.
         steps = np.minimum(frames, table.n_steps - 1)
@@ -135,6 +146,8 @@ def separation(a: Motion, b: Motion) -> tuple[Floats, tuple[str, ...]]:
     distance is NaN. Raises ArgumentError for motions without a common part or without a common time.
     """
     common = [name for name in a.poses if name in b.poses]
+    if not a.poses and not b.poses:
+        raise ArgumentError(f"{a.name} and {b.name} cannot be compared: nothing moves in them")
     if not common:
         raise ArgumentError(
             f"{a.name} and {b.name} have no part in common: {_some(a.poses)}; {_some(b.poses)}"

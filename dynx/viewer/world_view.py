@@ -18,7 +18,7 @@ from dynx.viewer.drawn_scene import DrawnScene
 from dynx.viewer.following_camera import FollowingCamera
 from dynx.viewer.framing import box_around, has_ground
 from dynx.viewer.marks import NamedParts
-from dynx.viewer.motion import Motion, motion_of_state
+from dynx.viewer.motion import Motion, fixed_bodies, motion_of_state
 from dynx.viewer.page import Page
 from dynx.viewer.spring import Spring
 from dynx.world import World, Wrench
@@ -71,7 +71,8 @@ class WorldView:
         moving = [*(f"{r.name}/{link.name}" for r in scene.robots for link in r.model.links)]
         moving += [body.name for body in scene.bodies if not body.fixed]
         robots = {robot.name: robot.model for robot in scene.robots}
-        low, high = box_around({name: poses[name][None] for name in moving}, scene.bodies, robots)
+        seen = {name: poses[name][None] for name in moving or poses}
+        low, high = box_around(seen, scene.bodies, robots)
         self._size = float(np.linalg.norm(high - low)) or 0.5
         mass = sum(r.model.total_mass for r in scene.robots) + sum(b.mass or 0.0 for b in scene.bodies)
         self._arrows = ContactArrows(
@@ -180,10 +181,10 @@ class WorldView:
             self.drawn.place(dict(part_poses(self.world.scene, state)))
             self._clock.value = f"{state.time:.3f} s"
             if self._arrows.shown:
-                found = self.world.contacts()
+                found, fixed = self.world.contacts(), fixed_bodies(self.world.scene)
                 self._arrows.put(
                     np.array([c.point for c in found]).reshape(-1, 3),
-                    np.array([c.force for c in found]).reshape(-1, 3),
+                    np.array([-c.force if c.a in fixed else c.force for c in found]).reshape(-1, 3),
                 )
 
     def step(self, n: int = 1) -> None:

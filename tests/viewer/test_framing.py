@@ -54,6 +54,9 @@ def test_shapes_of_bodies_count() -> None:
     assert np.array_equal(box_around(both, [cube, ground()]), (low, high))
     assert np.array_equal(box_around({"ground": both["ground"]}, [ground()])[0], [5.0, 0.0, 0.0])
     assert np.array_equal(box_around({}), np.zeros((2, 3)))
+    table = box("table", (0.2, 0.2, 0.2))
+    fixed = {"table": both["cube"], "ground": both["ground"]}
+    assert np.array_equal(box_around(fixed, [table, ground()]), (low, high))
 
 
 @needs_examples

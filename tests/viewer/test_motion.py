@@ -9,9 +9,10 @@ import pytest
 
 import dynx
 from dynx.errors import ArgumentError
+from dynx.sim import ScenePlant
 from dynx.spatial.scalar import Floats
 from dynx.viewer.curves import Curves, _power
-from dynx.viewer.export.film import film_length
+from dynx.viewer.export.film import camera_for, film_length, picture_of
 from dynx.viewer.motion import (
     MAX_FRAMES,
     Motion,
@@ -22,6 +23,7 @@ from dynx.viewer.motion import (
 )
 from dynx.viewer.motion_view import MotionView
 from dynx.viewer.page import Page
+from dynx.world import Scene, SceneRobot, box, ground
 from dynx.world.comparison import compare_worlds
 from dynx.world.scene import read_scene
 
@@ -139,6 +141,40 @@ def test_motions_without_a_common_part_are_refused(rollout: dynx.Rollout) -> Non
     renamed = replace(motion, poses={f"other/{name}": T for name, T in motion.poses.items()})
     with pytest.raises(ArgumentError, match="no part in common"):
         separation(motion, renamed)
+    still = replace(motion, poses={})
+    with pytest.raises(ArgumentError, match="nothing moves in them"):
+        separation(still, still)
+
+
+def test_a_picture_of_two_motions_that_coincide_shows_the_solid_one() -> None:
+    cube = box("cube", (0.2, 0.2, 0.2), mass=1.0)
+    poses = np.broadcast_to(np.eye(4), (2, 4, 4)).copy()
+    poses[1, :3, 3] = [0.3, -0.3, 0.3]
+    motion = Motion("m", np.array([0.0, 1.0]), {"cube": poses}, {}, (cube,))
+    later = replace(motion, poses={"cube": poses[::-1]})
+    camera = camera_for(motion, (160, 120))
+    alone = picture_of((motion,), 0.0, camera)
+    assert len(np.unique(alone.reshape(-1, 3), axis=0)) > 2
+    # A motion by rounding is none.
+    close = replace(motion, poses={"cube": poses + 1e-9})
+    assert np.array_equal(picture_of((motion, close), 0.0, camera), alone)
+    both = picture_of((motion, later), 0.0, camera)
+    changed = (both != alone).any(axis=2)
+    assert changed.sum() > 100
+    # Sky blue, in any light.
+    assert (both[changed][:, 2] > both[changed][:, 0]).all()
+
+
+def test_contact_forces_of_a_rollout_are_those_on_what_can_move() -> None:
+    arm = dynx.load("six_axis_arm")
+    cube = box("cube", (0.1, 0.1, 0.1), mass=0.5, pose=dynx.Pose((3.0, 0.0, 0.05)))
+    scene = Scene("rest", robots=(SceneRobot("arm", arm),), bodies=(ground(), cube))
+    controller = dynx.control.ComputedTorque(arm, kp=100.0, kd=20.0)
+    rollout = dynx.simulate(arm, controller, np.zeros(6), plant=ScenePlant(scene, "arm"), duration=0.3)
+    assert rollout.surroundings is not None
+    assert rollout.surroundings.contacts.force_on("ground")[-1, 2] < 0.0
+    forces = motion_of_rollout(rollout).contacts[-1].forces
+    assert forces.sum(axis=0) == pytest.approx([0.0, 0.0, 0.5 * 9.81], abs=0.05)
 
 
 def test_runs_of_a_scene_are_as_far_apart_as_their_comparison_says() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from dynx.errors import ArgumentError, DynxError
 from dynx.viewer.spring import Pull
 from dynx.viewer.world_view import _NO_PART_CHOSEN
-from dynx.world import World, Wrench
+from dynx.world import Scene, World, Wrench, box, ground
 from dynx.world.scene import read_scene
 from tests.viewer.conftest import until
 
@@ -110,6 +111,20 @@ def test_the_request_for_a_part_to_push_goes_when_one_is_chosen() -> None:
         viewer.view._part.value = viewer.view._part.options[0]
         time.sleep(0.2)
         assert viewer.view._message.value == "an error"
+
+
+def test_an_empty_scene_and_one_that_never_moves_are_shown(tmp_path: Path) -> None:
+    table = box("table", (1.0, 1.0, 0.4))
+    for scene, follows in ((Scene("empty"), None), (Scene("fixed", bodies=(ground(), table)), "table")):
+        with World(scene) as world, world.view() as viewer:
+            viewer.view.step(3)
+            viewer.view.camera._mode.value = "moves with"
+            viewer.follow(follows)
+            with pytest.raises(ArgumentError, match="no part 'tabel'"):
+                viewer.follow("tabel")
+            # The camera is outside of all shapes.
+            assert np.linalg.norm(viewer.page.server.initial_camera.position) > 0.4
+            viewer.export(tmp_path / "world.png")
 
 
 def test_errors_of_the_loads_are_shown_and_end_the_motion() -> None:

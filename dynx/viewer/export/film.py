@@ -35,6 +35,9 @@ SIZE = (480, 360)
 _SHARE = 0.9
 """Share of the picture that the box around everything that moves takes."""
 
+_COINCIDENT = 0.005
+"""Share of its depth by which a second motion has to be nearer than the first, to be seen before it."""
+
 Progress = Callable[[int], object]
 """Called with the number of pictures that are drawn."""
 
@@ -43,15 +46,21 @@ _OPAQUE_SKY_BLUE: Colour = (SKY_BLUE[0] / 255.0, SKY_BLUE[1] / 255.0, SKY_BLUE[2
 
 def picture_of(motions: tuple[Motion, ...], time: float, camera: Camera) -> NDArray[np.uint8]:
     """Return colours (height, width, 3) of motions at a time [s]; all but the first are sky blue."""
-    shapes = []
+    rgb, depth = None, np.zeros(0)
     for number, motion in enumerate(motions):
+        shapes = []
         poses = motion.at(motion.frame_at(time))
         for part, shape, rgba, T in _shapes(motion):
             colour = rgba if number == 0 else _OPAQUE_SKY_BLUE
             if rgba[3] > 0.0 and (part in poses or number == 0):
                 shapes.append(DrawnShape(0, shape, colour, poses.get(part, np.eye(4)) @ T))
-    drawing = cast_rays(shapes, camera.pose.matrix, camera)
-    return drawing.rgb.reshape(camera.size[1], camera.size[0], 3)
+        drawing = cast_rays(shapes, camera.pose.matrix, camera)
+        if rgb is None:
+            rgb, depth = drawing.rgb, drawing.depth
+        else:
+            nearer = drawing.depth < (1.0 - _COINCIDENT) * depth
+            rgb, depth = np.where(nearer[:, None], drawing.rgb, rgb), np.where(nearer, drawing.depth, depth)
+    return np.asarray(rgb).reshape(camera.size[1], camera.size[0], 3)
 
 
 def camera_for(motion: Motion, size: tuple[int, int] = SIZE) -> Camera:
