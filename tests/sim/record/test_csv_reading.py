@@ -13,12 +13,12 @@ from dynx.errors import ArgumentError
 from dynx.model.model import Base
 from dynx.sim import Rollout, simulate
 
-ARM = dynx.load("double_pendulum")
+ARM = dynx.load("dynx_double_pendulum")
 
 
 @pytest.mark.parametrize("base", ["fixed", "floating"])
 def test_a_table_of_dynx_keeps_every_bit(tmp_path: Path, base: Base) -> None:
-    robot = dynx.load("double_pendulum", base=base)
+    robot = dynx.load("six_axis_arm", base=base)
     start = robot.random(3)
     rollout = simulate(robot, None, q0=start, plant="compiled", duration=0.05)
     rollout.save(tmp_path / "run.csv")
@@ -41,7 +41,7 @@ def test_a_log_of_positions_has_rates_by_differences(tmp_path: Path) -> None:
 
 
 def test_rates_of_a_floating_base_are_in_its_axes(tmp_path: Path) -> None:
-    robot = dynx.load("double_pendulum", base="floating")
+    robot = dynx.load("dynx_double_pendulum", base="floating")
     v = np.array([0.3, -0.1, 0.2, 0.5, 0.4, -0.6, 1.0, 2.0])
     t = np.linspace(0.0, 0.1, 101)
     q = robot.integrate(robot.random(1), t[:, None] * v)
@@ -63,16 +63,16 @@ def test_rates_of_a_floating_base_are_in_its_axes(tmp_path: Path) -> None:
     ("text", "said"),
     [
         ("", "is empty"),
-        ("t,q:joint1\n0,0\n1,0\n", "has no column 'q:joint2' or 'joint2'; did you mean 'q:joint1'"),
-        ("q:joint1,q:joint2\n0,0\n", "has no column 't' or 'time' or 'timestamp'"),
-        ("t,joint1,joint2\n0,0,0\n1,x,0\n", ":3: column 'joint1' has 'x'; wanted a number"),
-        ("t,joint1,joint2\n0,0,0\n1,nan,0\n", ":3: column 'joint1' has 'nan'; wanted a finite number"),
-        ("t,joint1,joint2\n0,0,0\n1,0\n", ":3: column 'joint2' has ''; wanted a number"),
-        ("t,joint1,joint2\n0,0,0\n1,0,0\n\n1,0,0\n", ":5: the time 1 s follows 1 s; wanted times"),
-        ("t,joint1,joint2\n0,0,0\n", "has too few rows of numbers (1); wanted 2 or more"),
-        ("t;joint1;joint2\n0;0,5;0\n", "is separated by ';'; wanted commas between columns"),
-        ("t,joint1,joint2,joint1\n0,0,0,1\n1,0,0,1\n", "has 2 columns 'joint1'; wanted one"),
-        ("t,joint1,joint2\n0,1e200,0\n1,0,0\n", "has invalid positions: q[0, 0] is 1e+200"),
+        ("t,q:shoulder\n0,0\n1,0\n", "has no column 'q:elbow' or 'elbow'"),
+        ("q:shoulder,q:elbow\n0,0\n", "has no column 't' or 'time' or 'timestamp'"),
+        ("t,shoulder,elbow\n0,0,0\n1,x,0\n", ":3: column 'shoulder' has 'x'; wanted a number"),
+        ("t,shoulder,elbow\n0,0,0\n1,nan,0\n", ":3: column 'shoulder' has 'nan'; wanted a finite number"),
+        ("t,shoulder,elbow\n0,0,0\n1,0\n", ":3: column 'elbow' has ''; wanted a number"),
+        ("t,shoulder,elbow\n0,0,0\n1,0,0\n\n1,0,0\n", ":5: the time 1 s follows 1 s; wanted times"),
+        ("t,shoulder,elbow\n0,0,0\n", "has too few rows of numbers (1); wanted 2 or more"),
+        ("t;shoulder;elbow\n0;0,5;0\n", "is separated by ';'; wanted commas between columns"),
+        ("t,shoulder,elbow,shoulder\n0,0,0,1\n1,0,0,1\n", "has 2 columns 'shoulder'; wanted one"),
+        ("t,shoulder,elbow\n0,1e200,0\n1,0,0\n", "has invalid positions: q[0, 0] is 1e+200"),
     ],
 )
 def test_what_is_no_log_is_refused_with_its_place(tmp_path: Path, text: str, said: str) -> None:
@@ -86,7 +86,9 @@ def test_what_is_no_log_is_refused_with_its_place(tmp_path: Path, text: str, sai
 
 def test_velocities_of_some_joints_are_read_and_those_of_the_others_computed(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
-    path.write_text("t,joint1,joint2,v:joint2,tau:joint1\n0,0,0,7,5\n1,2,4,8,6\n2,4,8,9,\n", encoding="utf-8")
+    path.write_text(
+        "t,shoulder,elbow,v:elbow,tau:shoulder\n0,0,0,7,5\n1,2,4,8,6\n2,4,8,9,\n", encoding="utf-8"
+    )
     read = Rollout.load(path, ARM)
     np.testing.assert_array_equal(read.v, [[2.0, 7.0], [2.0, 8.0], [2.0, 9.0]])
     np.testing.assert_array_equal(read.a, [[0.0, 1.0], [0.0, 1.0]])
@@ -94,7 +96,7 @@ def test_velocities_of_some_joints_are_read_and_those_of_the_others_computed(tmp
 
 
 def test_a_quaternion_of_another_length_is_refused_with_the_file(tmp_path: Path) -> None:
-    robot = dynx.load("double_pendulum", base="floating")
+    robot = dynx.load("dynx_double_pendulum", base="floating")
     columns = ["x", "y", "z", "qx", "qy", "qz", "qw", *robot.joint_names]
     lines = ["t," + ",".join(f"q:{each}" for each in columns), "0,0,0,0,0,0,0,1,0,0", "1,0,0,0,0,0,0,2,0,0"]
     (tmp_path / "log.csv").write_text("\n".join(lines), encoding="utf-8")
@@ -117,7 +119,7 @@ def test_robots_are_given_for_tables_only(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("base", ["fixed", "floating"])
 def test_columns_are_those_of_the_table(tmp_path: Path, base: Base) -> None:
-    robot = dynx.load("double_pendulum", base=base)
+    robot = dynx.load("six_axis_arm", base=base)
     rollout = simulate(robot, None, robot.random(3), plant="compiled", duration=0.05, check_reference=False)
     found = rollout.columns()
     rollout.save(tmp_path / "run.csv")
@@ -132,5 +134,5 @@ def test_columns_of_a_batch_have_a_row_for_each_rollout() -> None:
     many = dynx.simulate_batch(ARM, PD(ARM, kp=1.0, kd=0.1), np.zeros(2), q0=ARM.random(1, 3), duration=0.01)
     found = many.columns()
     assert all(len(column) == 3 for column in found.values())
-    np.testing.assert_array_equal(found["q:joint2"], many.q[:, 1])
+    np.testing.assert_array_equal(found["q:elbow"], many.q[:, 1])
     np.testing.assert_array_equal(found["worst"], many.worst)
