@@ -51,7 +51,7 @@ def test_the_backends_of_dynx_are_known_without_package_metadata(monkeypatch: py
     assert backend_names() == BUILT_IN
     for name in installed_backends():
         assert backend_class(name).name == name
-    assert {"reference", "pinocchio"} <= set(installed_backends())
+    assert {"reference", "compiled"} <= set(installed_backends())
 
 
 def test_every_installed_engine_can_be_used() -> None:

@@ -12,6 +12,7 @@ from dynx.errors import DescriptionError, RobotNotFoundError
 from dynx.model import library
 from dynx.model.library import DYNX_MODELS, EXAMPLE_ROBOT_DATA, find, robots
 from dynx.model.loading import load
+from tests.conftest import needs_examples
 
 EXAMPLES = [entry for entry in robots() if entry.source == EXAMPLE_ROBOT_DATA]
 OWN = [entry for entry in robots() if entry.source == DYNX_MODELS]
@@ -36,6 +37,7 @@ LOADERS = {
 }
 
 
+@needs_examples
 def test_every_installed_file_has_exactly_one_name() -> None:
     installed = metadata.distribution(EXAMPLE_ROBOT_DATA)
     files = {Path(str(installed.locate_file(f))) for f in installed.files or [] if f.name.endswith(".urdf")}
@@ -97,6 +99,7 @@ def test_every_robot_loads_but_the_empty_shell(entry: library.RobotEntry) -> Non
         assert model.source == str(entry.path)
 
 
+@needs_examples
 def test_an_unknown_name_offers_the_nearest() -> None:
     with pytest.raises(RobotNotFoundError, match=r"no robot 'ur_5'.*did you mean 'ur5'"):
         find("ur_5")

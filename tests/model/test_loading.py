@@ -20,6 +20,7 @@ from dynx.errors import (
 )
 from dynx.model.library import find
 from dynx.model.loading import load
+from tests.conftest import needs_examples
 from tests.model.descriptions import joint, robot
 
 TEXT = joint()
@@ -53,6 +54,7 @@ def test_errors_name_the_file_and_the_line(here: Path) -> None:
         load("x.urdf")
 
 
+@needs_examples
 def test_a_name_takes_precedence_over_a_file_and_a_path_over_a_name(here: Path) -> None:
     Path("ur5").write_text(TEXT)
     assert load("ur5").name == "ur5"
@@ -60,6 +62,7 @@ def test_a_name_takes_precedence_over_a_file_and_a_path_over_a_name(here: Path) 
     assert load("./ur5").nq == load(Path("ur5")).nq == 1
 
 
+@needs_examples
 def test_a_suffix_is_never_looked_up_as_a_name(here: Path) -> None:
     with pytest.raises(RobotNotFoundError, match=r"no such file: 'ur5\.urdf'; the library has 'ur5'"):
         load("ur5.urdf")

@@ -102,8 +102,8 @@ def test_what_is_no_model_is_refused_with_an_example() -> None:
 
 
 def test_a_notebook_shows_the_joints() -> None:
-    model = load("double_pendulum")
+    model = load("dynx_double_pendulum")
     page = model._repr_html_()
     assert page.count("<tr>") == 1 + model.nv
-    assert "<td>joint1</td>" in page
+    assert "<td>shoulder</td>" in page
     assert "fixed base, nq 2, nv 2" in page
