@@ -165,6 +165,23 @@ def test_a_picture_of_two_motions_that_coincide_shows_the_solid_one() -> None:
     assert (both[changed][:, 2] > both[changed][:, 0]).all()
 
 
+def test_a_picture_of_a_robot_without_shapes_shows_its_links(rollout: dynx.Rollout) -> None:
+    motion = motion_of_rollout(rollout)
+    (model,) = motion.robots.values()
+    assert not any(model.geometry.visuals(link.name) for link in model.links)
+    camera = camera_for(motion, (160, 120))
+    picture = picture_of((motion,), 0.5, camera)
+    background = picture[0, 0]
+    poses, T_camera_world = motion.at(-1), np.linalg.inv(camera.pose.matrix)
+    focal = 0.5 * 120 / np.tan(0.5 * camera.field_of_view)
+    for joint in model.joints:
+        ends = [poses[f"{model.name}/{name}"][:3, 3] for name in (joint.parent, joint.child)]
+        x, y, z = (T_camera_world @ [*(0.5 * (ends[0] + ends[1])), 1.0])[:3]
+        column, row = round(80 + focal * x / z - 0.5), round(60 + focal * y / z - 0.5)
+        if np.linalg.norm(ends[1] - ends[0]) > 0.0:
+            assert (picture[row, column] != background).any(), joint.name
+
+
 def test_contact_forces_of_a_rollout_are_those_on_what_can_move() -> None:
     arm = dynx.load("six_axis_arm")
     cube = box("cube", (0.1, 0.1, 0.1), mass=0.5, pose=dynx.Pose((3.0, 0.0, 0.05)))

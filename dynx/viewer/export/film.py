@@ -11,11 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.files.writing import write_bytes
-from dynx.model.geometry import Shape
+from dynx.model import Model
+from dynx.model.geometry import Cylinder, Shape
 from dynx.model.geometry.links import Colour
 from dynx.model.geometry.visible_shapes import link_shapes
 from dynx.spatial.scalar import Floats
-from dynx.viewer.colours import SKY_BLUE
+from dynx.spatial.se3 import homogeneous
+from dynx.spatial.so3 import rotation_from_rpy
+from dynx.viewer.colours import GREY, SKY_BLUE
+from dynx.viewer.drawn_robot import size_of
 from dynx.viewer.framing import VIEW_DIRECTION, box_around, fitting_distance
 from dynx.viewer.library import Image
 from dynx.viewer.motion import Motion
@@ -34,6 +38,11 @@ SIZE = (480, 360)
 
 _SHARE = 0.9
 """Share of the picture that the box around everything that moves takes."""
+
+_OPAQUE_GREY: Colour = (GREY[0] / 255.0, GREY[1] / 255.0, GREY[2] / 255.0, 1.0)
+
+_STICK_RADIUS = 0.015
+"""Radius of the sticks of a robot without shapes, as a share of its size."""
 
 _COINCIDENT = 0.005
 """Share of its depth by which a second motion has to be nearer than the first, to be seen before it."""
@@ -115,10 +124,26 @@ def _duration(motions: tuple[Motion, ...]) -> float:
 def _shapes(motion: Motion) -> Iterator[tuple[str, Shape, Colour, Floats]]:
     """Yield the shapes of every part with the name of the part; those of a fixed body in the world."""
     for robot, model in motion.robots.items():
-        for link in model.links:
-            for shape, rgba, T in link_shapes(model.geometry, link.name):
-                yield f"{robot}/{link.name}", shape, rgba, T
+        shapes = [
+            (link.name, shape, rgba, T)
+            for link in model.links
+            for shape, rgba, T in link_shapes(model.geometry, link.name)
+        ]
+        for link, shape, rgba, T in shapes or _sticks(model):
+            yield f"{robot}/{link}", shape, rgba, T
     for body in motion.bodies:
         pose = np.eye(4) if body.name in motion.poses else body.pose.matrix
         for placed in body.shapes:
             yield body.name, placed.shape, body.material.rgba, pose @ placed.origin.matrix
+
+
+def _sticks(model: Model) -> Iterator[tuple[str, Shape, Colour, Floats]]:
+    """Yield the sticks of a robot without shapes, by link: one to the frame of each of its children."""
+    for joint in model.joints:
+        end = joint.origin.matrix[:3, 3]
+        length = float(np.linalg.norm(end))
+        if length > 0.0:
+            # The z axis of the stick is turned to the child.
+            rpy = np.array([0.0, math.acos(end[2] / length), math.atan2(end[1], end[0])])
+            T = np.asarray(homogeneous(rotation_from_rpy(rpy), 0.5 * end))
+            yield joint.parent, Cylinder(_STICK_RADIUS * size_of(model), length), _OPAQUE_GREY, T
