@@ -49,7 +49,7 @@ class FrameHandle:
 
     @property
     def free(self) -> str | None:
-        """What of the pose is free: ``"rotation"``, ``"position"``, or None.
+        """Free part of the pose: ``"rotation"``, ``"position"``, or None.
 
         The handle has no rings where rotation is free, and neither arrows nor squares where position is.
         """

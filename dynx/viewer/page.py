@@ -110,13 +110,13 @@ class Page:
         self._client = Client(title, antialiasing=not plain)
         self._server = serve(self.host, self.port, title, self._client.folder)
         self.plain, self.dark = plain, dark
-        """Whether the page is drawn as software does fastest, and whether it is dark."""
+        """True for a page drawn as software does fastest, and for a dark page."""
         self._furnish()
         self._view: _FirstView | None = None
         self.part_names: dict[str, str] = {}
         """The names of parts by the paths of their nodes."""
         self.reserved_keys: dict[str, str] = {}
-        """What the keys do that the page itself uses."""
+        """Actions of the keys that the page itself uses, by key."""
         self._server.on_client_connect(self._watch_narrow)
         self.lock = threading.RLock()
         """Held by whoever changes what the page shows."""
