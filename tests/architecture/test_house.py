@@ -1,35 +1,20 @@
-"""docs/architecture.md describes the code as it is, and the code keeps the sizes that it promises."""
+"""docs/architecture.md describes the code as it is."""
 
 from __future__ import annotations
 
 import re
 from itertools import pairwise
 from pathlib import Path
-from statistics import median
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
 PROJECT = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-
-MAX_LINES = 400
-MAX_MEDIAN_LINES = 110
-MAX_MODULES_IN_FOLDER = 25
-FOLDERS_OF_INDEPENDENT_MODULES = {Path("dynx/rules/catalogue")}
-"""Folders whose modules are entries of one list, so that their number means nothing."""
 
 
 def rooms() -> set[str]:
     """Return the names of the folders and modules directly in dynx, without those that every package has."""
     entries = (path for path in (ROOT / "dynx").iterdir() if not path.name.startswith("_"))
     return {path.stem for path in entries if path.is_dir() or path.suffix == ".py"}
-
-
-def sources() -> dict[Path, int]:
-    """Return the number of lines of each module of the project that is not empty."""
-    folders = ("dynx", "tests", "benchmarks", "docs")
-    paths = (path for folder in folders for path in ROOT.glob(f"{folder}/**/*.py"))
-    counted = {path.relative_to(ROOT): len(path.read_text(encoding="utf-8").splitlines()) for path in paths}
-    return {path: lines for path, lines in counted.items() if lines}
 
 
 def layers(text: str) -> list[list[str]]:
@@ -57,19 +42,3 @@ def test_recipes_name_tests_that_exist() -> None:
     named = re.findall(r"`(tests/architecture/test_recipe_\w+\.py)`", PAGE)
     assert len(named) == 7
     assert all((ROOT / path).exists() for path in named)
-
-
-def test_no_module_is_long() -> None:
-    assert [path for path, lines in sources().items() if lines > MAX_LINES] == []
-
-
-def test_modules_are_small() -> None:
-    assert median(sources().values()) <= MAX_MEDIAN_LINES
-
-
-def test_no_folder_is_a_heap() -> None:
-    folders: dict[Path, int] = {}
-    for path in sources():
-        folders[path.parent] = folders.get(path.parent, 0) + 1
-    heaps = {folder for folder, n in folders.items() if n > MAX_MODULES_IN_FOLDER}
-    assert heaps <= FOLDERS_OF_INDEPENDENT_MODULES
