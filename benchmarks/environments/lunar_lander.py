@@ -20,7 +20,7 @@ import numpy as np
 from gymnasium.envs.box2d import lunar_lander
 
 import dynx.envs  # noqa: F401  (registers the environments)
-from dynx.world.registry import installed_worlds
+from dynx.steppers.registry import installed_worlds
 
 BOX2D = "Box2D"
 heuristic: Callable[[Any, Any], int] = lunar_lander.heuristic

@@ -10,8 +10,8 @@ from dynx.contacts.case import Case
 from dynx.contacts.registry import BUILT_IN, find_case, find_cases
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model.configuration import positive_seconds, whole_number
-from dynx.world.registry import installed_worlds, world_class
-from dynx.world.settings import checked_settings
+from dynx.steppers.registry import installed_worlds, world_class
+from dynx.steppers.settings import checked_settings
 
 MIN_STEP, MAX_STEP = 1e-6, 0.1
 """Smallest and largest step [s]: runs at shorter steps take hours, and in longer ones bodies never touch."""

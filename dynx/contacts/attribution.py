@@ -23,7 +23,7 @@ from dynx.contacts.runner import Runner
 from dynx.contacts.series import Series
 from dynx.contacts.trend import judge
 from dynx.contacts.verdict import Attribution, Outcome, Verdict
-from dynx.world.registry import world_class
+from dynx.steppers.registry import world_class
 
 LEAST_GAIN = 2.0
 """Factor by which a change has to reduce the error at the smallest step to be its cause."""

@@ -19,9 +19,9 @@ from dynx.errors import (
     located,
     shown,
 )
+from dynx.steppers.registry import register, world_names
+from dynx.steppers.stepper import Stepper
 from dynx.world import World
-from dynx.world.engine import WorldEngine
-from dynx.world.registry import register, world_names
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Run:
     trial: str
     dt: float
     settings: Mapping[str, Any]
-    kind: type[WorldEngine] | None = None
+    kind: type[Stepper] | None = None
     """Class of an engine that the running program registered, which a worker process does not know."""
 
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from dynx.contacts.case import Case, Figure
 from dynx.contacts.run import Measured, Run, Unmeasured
 from dynx.errors import ArgumentError, shown
-from dynx.world.registry import world_class
+from dynx.steppers.registry import world_class
 
 
 class TrialOfEngine(NamedTuple):

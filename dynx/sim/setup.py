@@ -13,7 +13,6 @@ from dynx.control.saturation import checked_limit
 from dynx.errors import ArgumentError
 from dynx.model import Model
 from dynx.model.configuration import checked_array, checked_q, whole_number
-from dynx.sim.clock import MAX_STEPS, Clock
 from dynx.sim.loop.controller_checks import check_controller
 from dynx.sim.loop.references import SetpointOf, checked_reference
 from dynx.sim.plants.disturbances import Disturbances
@@ -24,6 +23,7 @@ from dynx.sim.scenario.documents import Unknown
 from dynx.sim.scenario.scenario import Scenario
 from dynx.simd.machine import require_memory
 from dynx.spatial.scalar import Floats
+from dynx.steppers.clock import MAX_STEPS, Clock
 from dynx.trajectory.base import Trajectory
 
 

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ClosedError, SimulationError, shown
 from dynx.model.configuration import checked_array
-from dynx.sim.clock import multiple, refuse_too_many_steps
 from dynx.sim.loop.controller_checks import ControllerWatch
 from dynx.sim.loop.plain import Loop, LoopState
 from dynx.sim.loop.record import Record
@@ -31,6 +30,7 @@ from dynx.sim.snapshot import Snapshot, State
 from dynx.sim.step import at_limit
 from dynx.simd.machine import require_memory
 from dynx.spatial.scalar import Floats
+from dynx.steppers.clock import multiple, refuse_too_many_steps
 from dynx.trajectory.base import Trajectory
 
 Progress = Callable[[int, int], object]

@@ -2,7 +2,7 @@
 
 The plain executor evaluates them on floats; the staged executor and batches trace them on symbols. Other
 parts that they share are `clamp` (`dynx.spatial.scalar`), the law of friction and semi-implicit Euler
-(`dynx.sim.plants`), control steps and the delay (`dynx.sim.clock`), and the checks of what a controller
+(`dynx.sim.plants`), control steps and the delay (`dynx.steppers.clock`), and the checks of what a controller
 returns (`dynx.sim.loop.controller_checks`).
 """
 

@@ -14,10 +14,10 @@ from dynx.model import Model
 from dynx.rbd.link_poses import link_poses
 from dynx.sim import Rollout, ScenePlant
 from dynx.spatial.scalar import Floats
+from dynx.steppers.state import WorldState
 from dynx.world.camera.drawing import part_poses
 from dynx.world.comparison import EngineRun
 from dynx.world.scene import Scene, SceneBody
-from dynx.world.state import WorldState
 
 FRAME_RATE = 60.0
 """Largest number of frames a second of the motion."""

@@ -80,7 +80,7 @@ def open_subject(shown_object: object) -> object:
     if isinstance(shown_object, Rollout | World | WorldComparison):
         return shown_object
     if isinstance(shown_object, Scene):
-        from dynx.world.registry import installed_worlds
+        from dynx.steppers.registry import installed_worlds
 
         return World(shown_object, installed_worlds()[0])
     if isinstance(shown_object, tuple | list):

@@ -1,14 +1,15 @@
 """Scenes of robots and bodies, and worlds in which they move and touch, on every engine alike."""
 
+from dynx.steppers.materials import InexactMaterial
+from dynx.steppers.registry import register as register_world
+from dynx.steppers.registry import unregister as unregister_world
+from dynx.steppers.registry import world_names
+from dynx.steppers.state import BodyState, RobotState, WorldState
 from dynx.world.camera import Camera, Picture
 from dynx.world.comparison import WorldComparison, compare_worlds
 from dynx.world.contacts import ClosestPoints, Contact, RayHits
 from dynx.world.loads import Wrench
-from dynx.world.materials import InexactMaterial
 from dynx.world.motors import Motor, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
-from dynx.world.registry import register as register_world
-from dynx.world.registry import unregister as unregister_world
-from dynx.world.registry import world_names
 from dynx.world.scene import (
     Material,
     PointToPoint,
@@ -30,7 +31,6 @@ from dynx.world.scene import (
     write_scene,
 )
 from dynx.world.snapshot import Snapshot
-from dynx.world.state import BodyState, RobotState, WorldState
 from dynx.world.surroundings import ContactTable, Surroundings
 from dynx.world.world import World
 

@@ -13,8 +13,8 @@ from dynx.errors import ArgumentError, ShapeError, UnknownNameError, nearest, sh
 from dynx.model import Model
 from dynx.model.configuration import checked_array
 from dynx.spatial.scalar import Floats
-from dynx.world.engine import Torque, WorldEngine
-from dynx.world.layout import Layout, RobotLayout
+from dynx.steppers.layout import Layout, RobotLayout
+from dynx.steppers.stepper import Stepper, Torque
 from dynx.world.loads import RobotLoads, Wrench, checked_torques, found_robot
 from dynx.world.motors import Motor
 from dynx.world.notes.divergence import LastLoads, RobotLoad
@@ -22,7 +22,7 @@ from dynx.world.snapshot import Memory
 
 MotorsOf = Mapping[str, "Motor | MotorCommand | Sequence[Motor]"]
 
-Act = Callable[[WorldEngine], list[Torque] | None]
+Act = Callable[[Stepper], list[Torque] | None]
 """Apply the wrenches and motors of the next step to the engine, and return the torques that act in it; None
 if one of them is not finite."""
 
@@ -79,7 +79,7 @@ class Commands:
         self._more_than_torques = True
 
     def hold(
-        self, engine: WorldEngine, torques: Mapping[str, ArrayLike] | None, count: int
+        self, engine: Stepper, torques: Mapping[str, ArrayLike] | None, count: int
     ) -> Sequence[Torque] | None:
         """Return what the engine applies in the next `count` steps where these torques alone act in them.
 
@@ -93,7 +93,7 @@ class Commands:
             self._end_other_loads(engine)
         return held
 
-    def _end_other_loads(self, engine: WorldEngine) -> None:
+    def _end_other_loads(self, engine: Stepper) -> None:
         """End the wrenches on bodies and the engine's own motors, and forget what motors keep."""
         self._more_than_torques = False
         if self._pushed:
@@ -123,7 +123,7 @@ class Commands:
         self._forget_steps(motored)
         begun = False
 
-        def act(engine: WorldEngine) -> list[Torque] | None:
+        def act(engine: Stepper) -> list[Torque] | None:
             nonlocal begun
             if not begun:
                 begun = True
@@ -197,7 +197,7 @@ class Commands:
     def _named_robots(self) -> list[tuple[str, RobotLayout]]:
         return [(name, self._layout.robots[k]) for name, k in self._robots.items()]
 
-    def _push(self, engine: WorldEngine, pushes: Mapping[int, Sequence[Wrench]]) -> None:
+    def _push(self, engine: Stepper, pushes: Mapping[int, Sequence[Wrench]]) -> None:
         total = self._no_wrench.copy()
         for k, wrenches in pushes.items():
             T, center = engine.body_state(k).T_world_body, self._layout.bodies[k].center
@@ -206,7 +206,7 @@ class Commands:
         engine.set_wrenches(total)
         self._pushed = bool(pushes)
 
-    def _command(self, engine: WorldEngine, commands: Mapping[int, MotorCommand]) -> None:
+    def _command(self, engine: Stepper, commands: Mapping[int, MotorCommand]) -> None:
         for k in self._commanded - commands.keys():
             engine.command_motors(k, None)
         for k, command in commands.items():

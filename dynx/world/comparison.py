@@ -15,9 +15,9 @@ from dynx.model.configuration import positive_seconds, whole_number
 from dynx.model.mechanism import ROOT
 from dynx.rbd.kinematics import body_poses
 from dynx.spatial.scalar import Floats
+from dynx.steppers.state import WorldState
 from dynx.world.contacts import Contact
 from dynx.world.scene import Scene
-from dynx.world.state import WorldState
 from dynx.world.world import World
 
 SEPARATIONS = (1e-3, 1e-2, 1e-1)

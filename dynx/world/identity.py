@@ -11,7 +11,7 @@ import numpy as np
 
 from dynx.model import Model
 from dynx.model.geometry import Mesh
-from dynx.world.layout import Layout
+from dynx.steppers.layout import Layout
 
 
 def identity(layout: Layout, options: Mapping[str, Any]) -> str:

@@ -19,10 +19,10 @@ from dynx.model.configuration import checked_array, checked_entries, real_array
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross
-from dynx.world.engine import Torque
-from dynx.world.layout import BodyLayout, RobotLayout
+from dynx.steppers.layout import BodyLayout, RobotLayout
+from dynx.steppers.state import BodyState
+from dynx.steppers.stepper import Torque
 from dynx.world.motors import JointLaw, Motor, combine
-from dynx.world.state import BodyState
 
 _FLOAT64 = np.dtype(np.float64)
 

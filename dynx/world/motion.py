@@ -9,11 +9,11 @@ import numpy as np
 
 from dynx.errors import ClosedError, DivergedError, EngineError
 from dynx.model.configuration import DIVERGENCE_SPEED
+from dynx.steppers.layout import Layout
+from dynx.steppers.state import PartStates, WorldState, has_diverged
+from dynx.steppers.stepper import Stepper, Torque
 from dynx.world.commands import Act, Commands
-from dynx.world.engine import Torque, WorldEngine
-from dynx.world.layout import Layout
 from dynx.world.notes.divergence import likely_causes
-from dynx.world.state import PartStates, WorldState, has_diverged
 from dynx.world.state_checks import apply_state
 
 STEPS_BETWEEN_CHECKS = 1000
@@ -28,7 +28,7 @@ class Motion:
     """
 
     def __init__(
-        self, layout: Layout, commands: Commands, build: Callable[[], WorldEngine], dt: float, substeps: int
+        self, layout: Layout, commands: Commands, build: Callable[[], Stepper], dt: float, substeps: int
     ) -> None:
         """`build` opens the scene in a new engine, at its start."""
         self._layout = layout
@@ -40,8 +40,8 @@ class Motion:
         self._steps, self._start, self._unchecked = 0, 0.0, 0
         self._interrupted = False
         engine = build()
-        self._engine: WorldEngine | None = engine
-        self.ready: WorldEngine | None = engine
+        self._engine: Stepper | None = engine
+        self.ready: Stepper | None = engine
         """The engine, or None where `engine` must be called: after an interruption, and after `close`."""
         self._kind = engine.name
         self._good = self._read(engine), 0, 0.0
@@ -50,7 +50,7 @@ class Motion:
         """State in which the motion began: that of the scene, or the last one that was set."""
 
     @property
-    def engine(self) -> WorldEngine:
+    def engine(self) -> Stepper:
         """Engine at the present state; ClosedError after `close`."""
         if self._interrupted:
             self._recover()
@@ -80,7 +80,7 @@ class Motion:
         assert self._state is not None
         return self._state
 
-    def advance(self, engine: WorldEngine, n: int, torques: Sequence[Torque], act: Act | None = None) -> None:
+    def advance(self, engine: Stepper, n: int, torques: Sequence[Torque], act: Act | None = None) -> None:
         """Take `n` steps of `dt` in `engine`, the present one, in which `torques` act; or the loads that
         `act` applies before each step of the engine.
 
@@ -104,7 +104,7 @@ class Motion:
             self._fail(error)
             raise
 
-    def _step_one_by_one(self, engine: WorldEngine, count: int, act: Act) -> None:
+    def _step_one_by_one(self, engine: Stepper, count: int, act: Act) -> None:
         # Where motors diverge, the error says so, not warnings of NumPy.
         with np.errstate(over="ignore", invalid="ignore"):
             for taken in range(count):
@@ -113,7 +113,7 @@ class Motion:
                     self._diverge(f"a load is not finite after {taken} of {count} steps of the engine")
                 engine.step(1, torques)
 
-    def change(self, change: Callable[[WorldEngine], object], clock: tuple[float, int] | None = None) -> None:
+    def change(self, change: Callable[[Stepper], object], clock: tuple[float, int] | None = None) -> None:
         """Set the state of the engine by a function, and `clock` where it is given."""
         engine = self.engine
         try:
@@ -174,7 +174,7 @@ class Motion:
         self._good = state, self._steps, self._start
         self._unchecked = 0
 
-    def _read(self, engine: WorldEngine) -> WorldState:
+    def _read(self, engine: Stepper) -> WorldState:
         robots = {robot.name: engine.robot_state(k) for k, robot in enumerate(self._layout.robots)}
         bodies = {body.name: engine.body_state(k) for k, body in enumerate(self._layout.bodies)}
         return WorldState(self.time, PartStates(robots), PartStates(bodies))

@@ -12,7 +12,7 @@ from dynx.errors import EngineLimitError
 from dynx.model.elements import Pose
 from dynx.model.geometry import Collision, Mesh
 from dynx.spatial.scalar import Floats
-from dynx.world.layout import (
+from dynx.steppers.layout import (
     WORLD,
     Anchor,
     BodyLayout,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from dynx.model import Pose
+from dynx.steppers.state import WorldState
 from dynx.world.scene import Scene
-from dynx.world.state import WorldState
 
 
 def scene_at(scene: Scene, state: WorldState) -> Scene:

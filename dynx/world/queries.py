@@ -11,13 +11,15 @@ from dynx.distance import Distance
 from dynx.errors import ArgumentError, ShapeError, UnknownNameError, shown
 from dynx.model.configuration import MAX_MAGNITUDE, checked_array, checked_vector, is_real
 from dynx.spatial.scalar import Floats
+from dynx.steppers.layout import Layout
+from dynx.steppers.state import WorldState
+from dynx.steppers.stepper import Stepper, TouchingPoint
 from dynx.world.contacts import ClosestPoints, Contact, RayHits
-from dynx.world.engine import TouchingPoint, WorldEngine
 from dynx.world.geometry.boxes import collider_box
 from dynx.world.geometry.distances import Distances
-from dynx.world.layout import Layout
+from dynx.world.geometry.first_hits import first_hits
+from dynx.world.geometry.owner_poses import OwnerPoses
 from dynx.world.scene import Scene
-from dynx.world.state import WorldState
 
 MAX_RAY_LENGTH = 1e4
 """Length of rays without a given one [m]."""
@@ -35,7 +37,7 @@ class Queries:
         self._distances = Distances(layout)
         self._number = {name: k for k, name in enumerate(self._names)}
 
-    def contacts(self, engine: WorldEngine, part: str | None = None) -> tuple[Contact, ...]:
+    def contacts(self, engine: Stepper, part: str | None = None) -> tuple[Contact, ...]:
         """Return the contacts of the last step, of a part or all, ordered by the parts of the scene."""
         points = sorted(map(_ordered, engine.contacts()), key=lambda point: (point.a, point.b))
         if part is not None:
@@ -56,7 +58,7 @@ class Queries:
             for p in points
         )
 
-    def touching_pairs(self, engine: WorldEngine) -> frozenset[tuple[str, str]]:
+    def touching_pairs(self, engine: Stepper) -> frozenset[tuple[str, str]]:
         """Return the names of the parts that touch, ordered by the parts of the scene."""
         names = self._names
         return frozenset(
@@ -64,7 +66,7 @@ class Queries:
         )
 
     def closest_points(
-        self, engine: WorldEngine, state: WorldState, a: str, b: str, within: float, native: bool
+        self, engine: Stepper, state: WorldState, a: str, b: str, within: float, native: bool
     ) -> tuple[ClosestPoints, ...]:
         """Return the nearest points of each pair of parts, nearest pair first, by dynx or by the engine."""
         if not is_real(within) or not 0.0 <= within < MAX_MAGNITUDE:
@@ -110,7 +112,12 @@ class Queries:
         return collider_box(self._layout, self._layout.colliders[number], state)
 
     def cast_rays(
-        self, engine: WorldEngine, origins: ArrayLike, directions: ArrayLike, length: float
+        self,
+        engine: Stepper,
+        state: WorldState,
+        origins: ArrayLike,
+        directions: ArrayLike,
+        length: float,
     ) -> RayHits:
         """Return the first hit of each ray."""
         starts, along = checked_array("origins", origins, 3), checked_array("directions", directions, 3)
@@ -129,8 +136,10 @@ class Queries:
         norms = np.linalg.norm(along, axis=-1, keepdims=True)
         if (norms == 0.0).any():
             raise ArgumentError(f"directions[{int(np.argmin(norms))}] is zero; wanted a direction")
-        hits = engine.cast_rays(np.array(starts), along / norms, float(length))
-        unit = along / norms
+        starts, unit = np.array(starts), along / norms
+        hits = engine.cast_rays(starts, unit, float(length))
+        if hits is None:
+            hits = first_hits(self._layout, OwnerPoses(self._layout, state), starts, unit, float(length))
         distances = np.array([np.inf if hit.collider is None else hit.distance for hit in hits])
         missed = np.array([hit.collider is None for hit in hits], dtype=bool)[:, None]
         reach = np.where(np.isfinite(distances), distances, 0.0)[:, None]

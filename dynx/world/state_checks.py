@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 from dynx.errors import ArgumentError, ShapeError, UnknownNameError, nearest, shown
 from dynx.model import Pose
 from dynx.model.configuration import checked_array, checked_q, is_real
-from dynx.world.engine import WorldEngine
-from dynx.world.layout import BodyLayout, Layout, RobotLayout
-from dynx.world.state import BodyState, RobotState, WorldState
+from dynx.steppers.layout import BodyLayout, Layout, RobotLayout
+from dynx.steppers.state import BodyState, RobotState, WorldState
+from dynx.steppers.stepper import Stepper
 
 Parts = Mapping[str, tuple[ArrayLike, ArrayLike]]
 
@@ -43,7 +43,7 @@ def checked_state(layout: Layout, state: WorldState | None, robots: Parts, bodie
     )
 
 
-def apply_state(engine: WorldEngine, state: WorldState) -> None:
+def apply_state(engine: Stepper, state: WorldState) -> None:
     """Set the robots and the moving bodies of a checked state."""
     for k, robot in enumerate(engine.layout.robots):
         if robot.name in state.robots:

@@ -16,29 +16,29 @@ from dynx.model.package_paths import StrPath
 from dynx.option_names import checks_option_names
 from dynx.registry import view
 from dynx.spatial.scalar import Floats
+from dynx.steppers.materials import InexactMaterial, inexact_materials, open_engine
+from dynx.steppers.registry import renderer_of, world_class
+from dynx.steppers.settings import changed_settings, checked_settings, checked_switches
+from dynx.steppers.state import BodyState, RobotState, WorldState
+from dynx.steppers.stepper import Stepper
 from dynx.world.camera import Camera, Picture, cast_rays, draw_picture
 from dynx.world.commands import Commands, MotorsOf, with_scene_motors
 from dynx.world.contacts import ClosestPoints, Contact, RayHits
-from dynx.world.engine import WorldEngine
 from dynx.world.identity import identity
 from dynx.world.loads import Wrench
-from dynx.world.materials import InexactMaterial, inexact_materials, open_engine
 from dynx.world.motion import Motion
 from dynx.world.notes.overlaps import Overlap, overlaps_of
 from dynx.world.notes.start_notes import notes_on_engine, notes_on_start
 from dynx.world.preparation import prepare
 from dynx.world.present import scene_at
 from dynx.world.queries import MAX_RAY_LENGTH, Queries
-from dynx.world.registry import renderer_of, world_class
 from dynx.world.running import run_for
 from dynx.world.scene import Scene
 from dynx.world.scene.avoidance import MARGIN
 from dynx.world.scene.paths import ScenePaths
 from dynx.world.scene.reading import scene_from_document
 from dynx.world.scene.writing import scene_document
-from dynx.world.settings import changed_settings, checked_settings, checked_switches
 from dynx.world.snapshot import Snapshot, read_snapshot, write_snapshot
-from dynx.world.state import BodyState, RobotState, WorldState
 from dynx.world.state_checks import apply_state, checked_state
 
 SHORTEST_STEP = 1e-9
@@ -237,7 +237,7 @@ class World:
             raise ArgumentError(f"snapshot is of type {type(snapshot).__name__}; wanted one of World.save")
         snapshot.require(self.engine, engine.version, self.identity)
 
-        def load(engine: WorldEngine) -> None:
+        def load(engine: Stepper) -> None:
             engine.load(snapshot.data)
             self._commands.remember(snapshot.memory)
 
@@ -337,7 +337,7 @@ class World:
 
     def cast_rays(self, origins: ArrayLike, directions: ArrayLike, length: float = MAX_RAY_LENGTH) -> RayHits:
         """Return what rays from `origins` (n, 3) along `directions` (n, 3) hit first within `length` [m]."""
-        return self._queries.cast_rays(self._motion.engine, origins, directions, length)
+        return self._queries.cast_rays(self._motion.engine, self.state, origins, directions, length)
 
     def camera(self, camera: Camera, renderer: str | None = None) -> Picture:
         """Return what a camera sees, drawn by dynx or by the renderer of an engine (``"pybullet"``)."""
@@ -374,5 +374,5 @@ class World:
         in_effect = self._kind.settings_in_effect(self.settings, self.dt / self.substeps)
         yield from changed_settings(given, self.settings, in_effect)
 
-    def _build(self) -> WorldEngine:
+    def _build(self) -> Stepper:
         return open_engine(self._kind, self._layout, self.dt / self.substeps, self.settings)

@@ -25,12 +25,12 @@ import numpy as np
 from dynx.errors import UnsupportedFeatureError
 from dynx.spatial.branchless import quat_exp
 from dynx.spatial.so3 import rotation_from_quat
-from dynx.world.engine import RayHit, WorldEngine
-from dynx.world.settings import Setting
-from dynx.world.state import BodyState
+from dynx.steppers.stepper import RayHit, Stepper
+from dynx.steppers.settings import Setting
+from dynx.steppers.state import BodyState
 
 
-class ExactFlight(WorldEngine):
+class ExactFlight(Stepper):
     name = "exact_flight"
     settings = {"drag": Setting(0.0, "linear drag of the air [1/s]")}
 

@@ -17,10 +17,10 @@ import numpy as np
 from dynx.model.geometry import Box, Cylinder, Plane, Sphere
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_exp, rotation_from_quat
-from dynx.world.engine import RayHit, Torque, TouchingPoint, WorldEngine
-from dynx.world.layout import Collider, Layout
-from dynx.world.settings import Setting
-from dynx.world.state import BodyState, RobotState
+from dynx.steppers.layout import Collider, Layout
+from dynx.steppers.settings import Setting
+from dynx.steppers.state import BodyState, RobotState
+from dynx.steppers.stepper import RayHit, Stepper, Torque, TouchingPoint
 
 TINY = 1e-9
 """Distance [m], speed [m/s] and time [s] that count as zero."""
@@ -52,7 +52,7 @@ class Solid:
         return inverse
 
 
-class ExactWorld(WorldEngine):
+class ExactWorld(Stepper):
     """Exact motion of plates and round bodies, unless a setting falsifies it."""
 
     name: ClassVar[str] = "exact"

@@ -9,8 +9,8 @@ import pytest
 
 from dynx.contacts import case_names, find_case
 from dynx.contacts.run import Measured, Run, carry_out
+from dynx.steppers.registry import installed_worlds
 from dynx.world import Material
-from dynx.world.registry import installed_worlds
 
 RIGID = {"contact_erp": 0.0, "contact_slop": 0.0, "rebound_time_constant": 1e6}
 """Settings with which Bullet does not push apart what penetrates."""

@@ -12,7 +12,7 @@ from dynx.contacts import Figure, find_case
 from dynx.contacts.cases.stack import BOXES, EDGE
 from dynx.contacts.run import Measured, Run, carry_out
 from dynx.contacts.scenes import G
-from dynx.world.registry import installed_worlds
+from dynx.steppers.registry import installed_worlds
 
 WITHOUT_HOPS = {"impedance": (0.02, 0.9, 1.0, 0.5, 2.0), "time_constant": 1e-6, "substeps": 8}
 """Contacts of MuJoCo that give way under a weight by more than friction pushes a body up that slides."""

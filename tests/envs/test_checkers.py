@@ -15,7 +15,7 @@ from gymnasium.utils.env_checker import check_env as check_by_gymnasium
 import dynx.envs  # noqa: F401  (registers the environments)
 from dynx.backends import installed_backends
 from dynx.envs.registration import NAMESPACE, TASKS, task_class
-from dynx.world.registry import installed_worlds
+from dynx.steppers.registry import installed_worlds
 
 INSTALLED = {*installed_backends(), *installed_worlds()}
 PAIRS = [(name, engine) for name, task in TASKS.items() for engine in task_class(task).engines()]

@@ -31,7 +31,7 @@ from dynx.envs.tasks.lunar_lander.craft import (
 from dynx.envs.tasks.lunar_lander.task import LunarLander
 from dynx.envs.tasks.lunar_lander.thrust import force_at_center, main_thrust, side_thrust
 from dynx.errors import ArgumentError
-from dynx.world.registry import installed_worlds
+from dynx.steppers.registry import installed_worlds
 
 FLIGHTS = json.loads((Path(__file__).parent / "data" / "lunar_lander_flights.json").read_text())
 FLIGHT_TOLERANCE = (0.001, 0.002, 0.005, 0.01, 0.005, 0.008, 0.0, 0.0)

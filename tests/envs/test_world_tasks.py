@@ -17,7 +17,7 @@ from dynx.envs.tasks.stand import Stand
 from dynx.envs.tasks.walk import Walk
 from dynx.envs.world.task import WorldTask
 from dynx.errors import ArgumentError, UnknownNameError
-from dynx.world.registry import installed_worlds
+from dynx.steppers.registry import installed_worlds
 from tests.envs.scripted import Controller, posture, pushing, run, trot
 
 ENGINES = installed_worlds()

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from dynx.control import PD, DiscreteComputedTorque
 from dynx.model import Model
 from dynx.sim import BatchRollouts, Rollout, Scenario, Simulation, simulate, simulate_batch
-from dynx.sim.clock import Clock
+from dynx.steppers.clock import Clock
 from dynx.trajectory import cycloidal, s_curve
 from tests.backends.robots import chain
 from tests.sim.bars import tutorial_motion, tutorial_robot

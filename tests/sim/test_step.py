@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.model.configuration import DIVERGENCE_SPEED
-from dynx.sim.clock import Clock
 from dynx.sim.step import (
     MAX_SQUARED_SPEED,
     held_at_limits,
@@ -19,6 +18,7 @@ from dynx.sim.step import (
     torque_sum,
     with_disturbances,
 )
+from dynx.steppers.clock import Clock
 
 NUMBERS = st.floats(-4.0, 4.0)
 

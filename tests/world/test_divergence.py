@@ -14,8 +14,8 @@ import pytest
 import dynx
 from dynx import Pose
 from dynx.errors import DivergedError, EngineError, SingularMassMatrixError
+from dynx.steppers.stepper import Torque
 from dynx.world import PDMotor, PositionMotor, Scene, SceneRobot, Weld, World, Wrench, box, ground
-from dynx.world.engine import Torque
 from tests.world.engines import FAST_WORLDS, WORLDS
 
 

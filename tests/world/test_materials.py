@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 
 from dynx import Pose
 from dynx.errors import UnsupportedFeatureError
+from dynx.steppers.mean_coefficients import contact_priorities, pair_terms
 from dynx.world import Material, Scene, World, box, contact_material, ground, sphere
-from dynx.world.scene.contact_priorities import contact_priorities
-from dynx.world.scene.pair_terms import pair_terms
 from tests.world.engines import WORLDS
 from tests.world.materials import (
     SLIDERS,

@@ -8,6 +8,7 @@ import pytest
 import dynx
 from dynx import Pose
 from dynx.model import Inertial, Joint, Link, Model
+from dynx.steppers.layout import RobotLayout
 from dynx.world import (
     PDMotor,
     PositionMotor,
@@ -18,7 +19,6 @@ from dynx.world import (
     World,
     ground,
 )
-from dynx.world.layout import RobotLayout
 from dynx.world.loads import RobotLoads
 from dynx.world.preparation import prepare
 from tests.world.engines import FAST_WORLDS, WORLDS

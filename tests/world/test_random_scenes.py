@@ -17,9 +17,9 @@ import dynx
 from dynx.engines.mujoco.world.engine import MujocoWorld
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import rotation_from_rpy
+from dynx.steppers.stepper import Torque, TouchingPoint
 from dynx.testing.strategies import scenes
 from dynx.world import Material, Scene, SceneRobot, World, box, capsule, ground
-from dynx.world.engine import Torque, TouchingPoint
 from tests.world.engines import WORLDS
 from tests.world.random_scenes.attribution import cause_of
 from tests.world.random_scenes.drawing import resting_scene_of, scene_of

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 import dynx
 from dynx import Pose
 from dynx.model.geometry import Mesh
+from dynx.model.geometry.ray_casting import cast_on_shape
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import scenes
 from dynx.world import Scene, SceneBody, World
 from dynx.world.geometry.first_hits import first_hits
 from dynx.world.geometry.owner_poses import OwnerPoses
-from dynx.world.geometry.ray_casting import cast_on_shape
 from tests.conftest import needs_examples
 from tests.world.engines import WORLDS
 
@@ -80,7 +80,8 @@ def test_no_hit_is_lost_to_the_balls_around_shapes(scene: Scene, seed: int) -> N
             nearest = np.minimum(nearest, cast_on_shape(placed.shape, T, origins, directions)[0])
     found = first_hits(layout, poses, origins, directions, 1e3)
     within = nearest <= 1e3
-    assert np.array_equal(found.distance[within], nearest[within])
-    assert np.array_equal(found.number >= 0, within)
-    assert np.isinf(found.distance[~within]).all()
-    assert np.isnan(found.normal[~within]).all()
+    distance = np.array([hit.distance for hit in found])
+    assert np.array_equal(distance[within], nearest[within])
+    assert np.array_equal([hit.collider is not None for hit in found], within)
+    assert np.isinf(distance[~within]).all()
+    assert np.isnan([hit.normal for hit, hits in zip(found, within, strict=True) if not hits]).all()

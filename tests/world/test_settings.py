@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from dynx.errors import ArgumentError, UnknownNameError
+from dynx.steppers.registry import world_class
+from dynx.steppers.settings import Setting, checked_settings
 from dynx.world import Scene, World, box, ground
-from dynx.world.registry import world_class
-from dynx.world.settings import Setting, checked_settings
 from tests.world.engines import WORLDS
 
 PAGE = (Path(__file__).parents[2] / "docs" / "world.md").read_text(encoding="utf-8")

@@ -22,8 +22,8 @@ from dynx.contacts import STEPS, Case, Conformance, conform, find_cases
 from dynx.contacts.candidates import SUBSTEPS
 from dynx.errors import ArgumentError
 from dynx.files.writing import write_text
-from dynx.world.registry import installed_worlds
-from dynx.world.settings import Setting
+from dynx.steppers.registry import installed_worlds
+from dynx.steppers.settings import Setting
 
 
 def contacts(

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
-from dynx.world.registry import world_class
-from dynx.world.settings import Setting
+from dynx.steppers.registry import world_class
+from dynx.steppers.settings import Setting
 
 WORDS = {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}
 """Words for truth values of settings."""

@@ -17,11 +17,11 @@ from dynx.control.saturation import checked_limit
 from dynx.errors import ArgumentError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.sim import Noise, Payload, Push, Rollout, Scenario
-from dynx.sim.clock import Clock
 from dynx.sim.named_controllers import ControllerRequest, Gains, named_controller
 from dynx.sim.plants.registry import require_plant
 from dynx.sim.setup import step_bytes
 from dynx.simd.machine import require_memory
+from dynx.steppers.clock import Clock
 
 GAINS = ("kp", "kd", "ki", "natural_frequency", "damping_ratio", "posture_kp", "posture_kd")
 SCENARIO_FIELDS = ("plant", "integrator", "dt", "substeps", "control_dt", "delay", "position_limits")

@@ -17,10 +17,10 @@ from dynx.cli.sim.motion import limit_message
 from dynx.cli.sim.tutorial_tables import show
 from dynx.errors import ArgumentError, LimitError
 from dynx.model.loading import load
-from dynx.sim.clock import Clock
 from dynx.sim.named_controllers import NATURAL_FREQUENCY
 from dynx.sim.tutorial import DURATION, GRAVITY, MODES, ROBOT, Outcome, Row, Tutorial, tutorial
 from dynx.sim.tutorial_plot import plot_rows
+from dynx.steppers.clock import Clock
 
 SCHEMA = 1
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dynx.cli.shell.progress import progress_bar
 from dynx.cli.view.targets import single_engine
 from dynx.errors import ArgumentError
+from dynx.steppers.registry import installed_worlds
 from dynx.viewer.motion import FRAME_RATE, MAX_FRAMES
 from dynx.world import World
 from dynx.world.comparison import WorldComparison, compare_worlds
-from dynx.world.registry import installed_worlds
 from dynx.world.scene import read_scene
 
 DEFAULT_STEP = 1e-3

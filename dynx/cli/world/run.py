@@ -16,9 +16,9 @@ from dynx.cli.world.plot import plot
 from dynx.cli.world.tables import show
 from dynx.errors import ArgumentError, DynxError
 from dynx.files.figures import picture_format
+from dynx.steppers.registry import installed_worlds
 from dynx.world import World
 from dynx.world.comparison import ComparisonInterrupted, WorldComparison, compare_worlds
-from dynx.world.registry import installed_worlds
 from dynx.world.scene import read_scene
 from dynx.world.snapshot import check_world_suffix
 

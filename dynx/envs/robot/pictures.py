@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from dynx.envs.robot.array_task import ArrayTask
 from dynx.envs.robot.state import State
+from dynx.steppers.state import RobotState, WorldState
 from dynx.world import Scene, SceneRobot
 from dynx.world.camera import cast_rays, draw_picture
-from dynx.world.state import RobotState, WorldState
 
 ROBOT = "robot"
 """Name of the robot in the scene that is drawn."""

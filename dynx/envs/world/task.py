@@ -5,7 +5,7 @@ from __future__ import annotations
 from dynx.envs.task import Episodes
 from dynx.envs.world.episodes import WorldEpisodes
 from dynx.envs.world.scene_task import SceneTask
-from dynx.world.registry import world_names
+from dynx.steppers.registry import world_names
 
 DEFAULT_ENGINE = "pybullet"
 """Engine that runs a task unless another is named."""

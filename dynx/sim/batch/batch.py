@@ -39,7 +39,6 @@ from dynx.sim.batch.slip_bounds import refuse_small_slips
 from dynx.sim.batch.stopping import BatchStops
 from dynx.sim.batch.store import Store
 from dynx.sim.batch.traced_controller import gain_shapes, innermost
-from dynx.sim.clock import Clock
 from dynx.sim.loop.noise import Noise
 from dynx.sim.plants.disturbances import Push
 from dynx.sim.plants.model_error import MassScale, Payload
@@ -48,6 +47,7 @@ from dynx.sim.setup import Setup, require_duration
 from dynx.simd.machine import require_memory
 from dynx.simd.threads import checked_threads
 from dynx.spatial.scalar import Floats
+from dynx.steppers.clock import Clock
 from dynx.trajectory.base import Setpoint, Trajectory
 
 PART = 1024

@@ -14,10 +14,10 @@ import numpy as np
 from dynx.compiled.kernels import evaluate_quantity
 from dynx.control.friction import JointFriction
 from dynx.model import Mechanism, Model
-from dynx.sim.clock import Clock
 from dynx.sim.plants.disturbances import Disturbances, Push
 from dynx.sim.step import with_disturbances
 from dynx.spatial.scalar import Array, Floats
+from dynx.steppers.clock import Clock
 
 WRENCH = 6
 """Size of the wrench of one push."""

@@ -10,10 +10,10 @@ import numpy as np
 
 from dynx.sim.batch.settling import Settling
 from dynx.sim.batch.stopping import BatchStops
-from dynx.sim.clock import Clock
 from dynx.sim.loop.noise import BLOCK_STEPS, NoiseStream, Purpose
 from dynx.simd.kernel import Kernel
 from dynx.spatial.scalar import Floats
+from dynx.steppers.clock import Clock
 from dynx.trajectory.base import Setpoint
 
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from dynx.errors import ArgumentError
 from dynx.model import Model
-from dynx.sim.clock import Clock
 from dynx.sim.comparison import robot_factors, scene_factors
 from dynx.sim.comparison.words import documents_apart, plant_in_words
 from dynx.sim.plants.scene_plant import ScenePlant
@@ -25,6 +24,7 @@ from dynx.sim.scenario.documents import (
     encode,
 )
 from dynx.sim.scenario.scenario import Scenario, field_names
+from dynx.steppers.clock import Clock
 
 IRRELEVANT = ("duration", "check_reference")
 """Fields that change no motion at times that both rollouts have."""

@@ -15,7 +15,7 @@ from dynx.control.content import attributes_of, entered
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
 from dynx.model.configuration import whole_number
-from dynx.sim.clock import TIME_ROUNDING, Clock
+from dynx.steppers.clock import TIME_ROUNDING, Clock
 
 MAX_DEPTH = 4
 """Depth to which objects inside the attributes of a controller are compared."""

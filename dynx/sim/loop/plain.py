@@ -20,7 +20,6 @@ from dynx.control.engine_motors import EngineMotor
 from dynx.errors import ControlError, DivergedError, DynxError, SimulationError, shown
 from dynx.model.configuration import DIVERGENCE_SPEED
 from dynx.model.masks import refuse_mask
-from dynx.sim.clock import Clock
 from dynx.sim.loop.controller_checks import ControllerWatch, defect_of_outcome, defect_of_torque
 from dynx.sim.loop.record import Record
 from dynx.sim.loop.sensors import Sensors
@@ -29,6 +28,7 @@ from dynx.sim.overshoot import largest_overshoot, overcompensated_friction
 from dynx.sim.plants.plant import Plant, is_own, plant_errors
 from dynx.sim.step import is_diverged, torque_sum
 from dynx.spatial.scalar import Floats, clamp
+from dynx.steppers.clock import Clock
 from dynx.trajectory.base import Setpoint
 
 FLOAT64 = np.dtype(np.float64)

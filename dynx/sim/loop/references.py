@@ -11,8 +11,8 @@ from dynx.control.base import Controller
 from dynx.errors import ArgumentError, LimitError, LimitViolation
 from dynx.model import Model
 from dynx.model.configuration import checked_q
-from dynx.sim.clock import Clock
 from dynx.spatial.scalar import Floats
+from dynx.steppers.clock import Clock
 from dynx.trajectory.base import Setpoint, Trajectory
 from dynx.trajectory.limit_check import check
 

@@ -6,10 +6,10 @@ from typing import Any
 
 from dynx.control.base import Controller, Measurement
 from dynx.model import Model
-from dynx.sim.clock import Clock
 from dynx.sim.loop.noise import Noise, Purpose
 from dynx.sim.step import measure
 from dynx.spatial.scalar import Floats
+from dynx.steppers.clock import Clock
 
 
 class Sensors:

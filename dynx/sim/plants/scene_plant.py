@@ -8,9 +8,9 @@ from typing import Any
 
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model import Model
-from dynx.world.registry import world_class
+from dynx.steppers.registry import world_class
+from dynx.steppers.settings import checked_settings
 from dynx.world.scene import Scene, SceneRobot
-from dynx.world.settings import checked_settings
 
 
 @dataclass(frozen=True)

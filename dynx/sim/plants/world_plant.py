@@ -17,10 +17,10 @@ from dynx.sim.plants.disturbances import Disturbances
 from dynx.sim.plants.plant import Plant, StepResult
 from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.spatial.scalar import Floats
+from dynx.steppers.state import WorldState
 from dynx.world import Contact, World
 from dynx.world.scene import Scene
 from dynx.world.snapshot import Snapshot
-from dynx.world.state import WorldState
 from dynx.world.surroundings import ContactTable, Surroundings
 
 

@@ -18,7 +18,6 @@ from dynx.model import Model
 from dynx.model.masks import refuse_mask
 from dynx.model.model import refuse_other_than_model
 from dynx.registry import DEFAULT_ENGINE
-from dynx.sim.clock import TIME_ROUNDING, Clock
 from dynx.sim.loop.noise import Noise
 from dynx.sim.plants.disturbances import Push
 from dynx.sim.plants.model_error import MassScale, Payload
@@ -38,6 +37,7 @@ from dynx.sim.scenario.documents import (
     encode,
 )
 from dynx.sim.scenario.documents import NUMBERS as CONTROLLER_NUMBERS
+from dynx.steppers.clock import TIME_ROUNDING, Clock
 from dynx.trajectory.base import Trajectory
 
 SCHEMA = "dynx.scenario/1"

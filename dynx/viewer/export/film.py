@@ -18,13 +18,13 @@ from dynx.model.geometry.visible_shapes import link_shapes
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_rpy
+from dynx.steppers.camera import DrawnShape
 from dynx.viewer.colours import GREY, SKY_BLUE
 from dynx.viewer.drawn_robot import size_of
 from dynx.viewer.framing import VIEW_DIRECTION, box_around, fitting_distance
 from dynx.viewer.library import Image
 from dynx.viewer.motion import Motion
 from dynx.world.camera import Camera, cast_rays
-from dynx.world.camera.drawing import DrawnShape
 from dynx.world.camera.picture import png_bytes
 
 PICTURES_PER_SECOND = 12.5

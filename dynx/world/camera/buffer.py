@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.model.geometry import HeightField, Mesh, Shape
+from dynx.model.geometry.ray_casting import cast_on_shape
 from dynx.spatial.scalar import Floats
-from dynx.world.camera.view import Camera
+from dynx.steppers.camera import Camera
 from dynx.world.geometry.boxes import shape_box
-from dynx.world.geometry.ray_casting import cast_on_shape
 
 MAX_PAIRS = 1_000_000
 """Largest number of pairs of a triangle and a pixel that are computed at once."""

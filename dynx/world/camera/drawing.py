@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dynx.errors import ArgumentError
-from dynx.model.geometry import Shape
 from dynx.model.geometry.visible_shapes import link_shapes
 from dynx.rbd.link_poses import link_poses
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import inverse
+from dynx.steppers.camera import Camera, Draw, Drawing, DrawnShape
+from dynx.steppers.state import WorldState
 from dynx.world.camera.buffer import DepthBuffer
 from dynx.world.camera.picture import Picture
-from dynx.world.camera.view import Camera
 from dynx.world.scene import Scene
-from dynx.world.state import WorldState
 
 BACKGROUND = (0.85, 0.9, 0.95)
 """Colour of pixels in which nothing is seen."""
@@ -28,28 +25,6 @@ AMBIENT = 0.35
 
 LAMP = np.array([-0.36, -0.48, -0.8])
 """Unit vector (3,) towards the lamp, above and to the left of the camera, in the axes of the camera."""
-
-
-class DrawnShape(NamedTuple):
-    """A shape, its colour, its pose in the world (4, 4), and the number of its part."""
-
-    part: int
-    shape: Shape
-    rgba: tuple[float, float, float, float]
-    T: Floats
-
-
-class Drawing(NamedTuple):
-    """The sight in each of the n pixels, by rows: colour (n, 3), depth (n,) [m], and the number (n,) of
-    the shape, -1 for none, whose depth is infinite."""
-
-    rgb: NDArray[np.uint8]
-    depth: Floats
-    number: NDArray[np.intp]
-
-
-Draw = Callable[[Sequence[DrawnShape], Floats, Camera], Drawing]
-"""A renderer: it draws shapes as a camera at a pose (4, 4) in the world sees them."""
 
 
 def cast_rays(shapes: Sequence[DrawnShape], T_world_camera: Floats, camera: Camera) -> Drawing:

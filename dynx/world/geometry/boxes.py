@@ -6,9 +6,9 @@ import numpy as np
 
 from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
 from dynx.spatial.scalar import Floats
+from dynx.steppers.layout import Collider, Layout
+from dynx.steppers.state import WorldState
 from dynx.world.geometry.owner_poses import owner_pose
-from dynx.world.layout import Collider, Layout
-from dynx.world.state import WorldState
 
 Corners = tuple[Floats, Floats]
 

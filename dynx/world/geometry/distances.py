@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from dynx.distance import Distance
 from dynx.distance.solids import Solid, distance_of_solids
 from dynx.spatial.scalar import Floats
+from dynx.steppers.layout import Layout
+from dynx.steppers.state import WorldState
 from dynx.world.geometry.owner_poses import OwnerPoses
-from dynx.world.layout import Layout
-from dynx.world.state import WorldState
 
 
 class Distances:

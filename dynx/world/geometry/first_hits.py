@@ -4,40 +4,31 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dynx.model.geometry import HeightField, Plane, Shape
+from dynx.model.geometry.ray_casting import cast_on_shape
 from dynx.spatial.scalar import Floats
+from dynx.steppers.layout import Layout
+from dynx.steppers.stepper import RayHit
 from dynx.world.geometry.boxes import shape_box
 from dynx.world.geometry.owner_poses import OwnerPoses
-from dynx.world.geometry.ray_casting import cast_on_shape
-from dynx.world.layout import Layout
 
 _ROUNDING = 1.0 + 1e-9
 """Factor by which a ball around a shape is enlarged, so that rounding loses no hit on its surface."""
 
 
-class FirstHits(NamedTuple):
-    """The number of the collider (n,) that each ray hits first, -1 for none; the distance (n,) [m], infinite
-    for none; and the outward normal (n, 3) there, NaN for none."""
-
-    number: NDArray[np.intp]
-    distance: Floats
-    normal: Floats
-
-
 def first_hits(
     layout: Layout, poses: OwnerPoses, origins: Floats, directions: Floats, length: float
-) -> FirstHits:
+) -> list[RayHit]:
     """Return what rays from `origins` (n, 3) along unit `directions` (n, 3) hit first within `length` [m].
 
     Only rays that pass the ball around a shape are intersected with it.
     """
     n = len(origins)
-    hits = FirstHits(np.full(n, -1), np.full(n, np.inf), np.full((n, 3), np.nan))
+    first, nearest, normals = np.full(n, -1), np.full(n, np.inf), np.full((n, 3), np.nan)
     for number, collider in enumerate(layout.colliders):
         T_world_owner = poses[collider.owner]
         for placed in collider.shapes:
@@ -46,11 +37,14 @@ def first_hits(
             if not rays.size:
                 continue
             distance, normal = cast_on_shape(placed.shape, T, origins[rays], directions[rays])
-            first = (distance < hits.distance[rays]) & (distance <= length)
-            rays = rays[first]
-            hits.number[rays] = number
-            hits.distance[rays], hits.normal[rays] = distance[first], normal[first]
-    return hits
+            nearer = (distance < nearest[rays]) & (distance <= length)
+            rays = rays[nearer]
+            first[rays] = number
+            nearest[rays], normals[rays] = distance[nearer], normal[nearer]
+    return [
+        RayHit(None if number < 0 else number, distance, normal)
+        for number, distance, normal in zip(first.tolist(), nearest.tolist(), normals, strict=True)
+    ]
 
 
 def _near(shape: Shape, T: Floats, origins: Floats, directions: Floats) -> NDArray[np.bool_]:

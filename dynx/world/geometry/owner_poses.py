@@ -7,8 +7,8 @@ import numpy as np
 from dynx.rbd.kinematics import Poses, body_poses
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
-from dynx.world.layout import WORLD, Layout, Owner
-from dynx.world.state import WorldState
+from dynx.steppers.layout import WORLD, Layout, Owner
+from dynx.steppers.state import WorldState
 
 
 class OwnerPoses:

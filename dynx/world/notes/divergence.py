@@ -12,13 +12,13 @@ from dynx.backends import Backend
 from dynx.errors import DynxError, shown
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
-from dynx.world.engine import WorldEngine
-from dynx.world.layout import Layout, Owner
+from dynx.steppers.layout import Layout, Owner
+from dynx.steppers.state import WorldState
+from dynx.steppers.stepper import Stepper
 from dynx.world.motors import JointLaw
 from dynx.world.notes.overlaps import overlaps_of
 from dynx.world.notes.start_notes import joints_beyond_limits, violations
 from dynx.world.notes.unbounded_motions import unbounded_motions
-from dynx.world.state import WorldState
 
 MIN_SPEED_CHANGE = 100.0
 """Change of a velocity [rad/s or m/s] in one step from which a torque or force is a likely cause."""
@@ -52,7 +52,7 @@ class LastLoads(NamedTuple):
 
 
 def likely_causes(
-    begun: WorldEngine, start: WorldState, engine: WorldEngine, loads: LastLoads, h: float
+    begun: Stepper, start: WorldState, engine: Stepper, loads: LastLoads, h: float
 ) -> list[str]:
     """Return what probably made a world diverge in steps of `h` [s], the most likely first.
 
@@ -154,14 +154,14 @@ def _wrenches(layout: Layout, loads: LastLoads, h: float) -> Iterator[str]:
             yield f"a force changes the velocity of {shown(body.name)} by {change:.3g} m/s in one step"
 
 
-def _overlaps(engine: WorldEngine) -> Iterator[str]:
+def _overlaps(engine: Stepper) -> Iterator[str]:
     for overlap in islice(overlaps_of(engine), 1):
         yield (
             f"{shown(overlap.a)} and {shown(overlap.b)} overlap by {1e3 * overlap.depth:.3g} mm at the start"
         )
 
 
-def _light_parts(engine: WorldEngine) -> Iterator[str]:
+def _light_parts(engine: Stepper) -> Iterator[str]:
     """Yield the pair of bodies in contact whose masses differ the most."""
     layout = engine.layout
     worst = (MIN_MASS_RATIO, "", "")

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dynx.world.engine import WorldEngine
+from dynx.steppers.layout import Collider
+from dynx.steppers.stepper import Stepper
 from dynx.world.geometry.boxes import shape_box
-from dynx.world.layout import Collider
 
 MIN_DEPTH = 1e-3
 """Depth [m] from which two parts count as overlapping: at rest, parts sink into one another by less."""
@@ -25,7 +25,7 @@ class Overlap(NamedTuple):
     depth: float
 
 
-def overlaps_of(engine: WorldEngine) -> tuple[Overlap, ...]:
+def overlaps_of(engine: Stepper) -> tuple[Overlap, ...]:
     """Return the parts that may touch and overlap at the present state, the deepest first."""
     deepest: dict[tuple[int, int], float] = {}
     for point in engine.contacts():

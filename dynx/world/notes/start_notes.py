@@ -9,13 +9,13 @@ import numpy as np
 
 from dynx.errors import shown
 from dynx.spatial.so3 import quat_from_rotation, quat_log
-from dynx.world.engine import WorldEngine
+from dynx.steppers.layout import ConstraintLayout, Layout
+from dynx.steppers.materials import inexact_materials
+from dynx.steppers.state import WorldState
+from dynx.steppers.stepper import Stepper
 from dynx.world.geometry.owner_poses import owner_pose
-from dynx.world.layout import ConstraintLayout, Layout
-from dynx.world.materials import inexact_materials
 from dynx.world.notes.overlaps import overlaps_of
 from dynx.world.notes.unbounded_motions import unbounded_motions
-from dynx.world.state import WorldState
 
 MAX_OVERLAPS = 5
 """Largest number of overlaps that are noted one by one."""
@@ -30,7 +30,7 @@ LONG_STEP = 0.1
 """Step of an engine [s] above which contacts are hardly noticed."""
 
 
-def notes_on_start(engine: WorldEngine, state: WorldState) -> tuple[str, ...]:
+def notes_on_start(engine: Stepper, state: WorldState) -> tuple[str, ...]:
     """Return one sentence for each overlap, violated constraint and joint beyond its limits of an engine at a
     state, and for each robot whose accelerations have no bound."""
     drawn = "so that they are pulled together in the first steps"
@@ -43,7 +43,7 @@ def notes_on_start(engine: WorldEngine, state: WorldState) -> tuple[str, ...]:
     )
 
 
-def notes_on_engine(engine: WorldEngine) -> Iterator[str]:
+def notes_on_engine(engine: Stepper) -> Iterator[str]:
     """Yield one sentence for each coefficient of contact that the engine does not have, for a long step, and
     for each robot without collision shapes: they hold at every state."""
     yield from map(str, inexact_materials(engine))
@@ -60,7 +60,7 @@ def _robots_without_shapes(layout: Layout) -> Iterator[str]:
             yield f"no link of {shown(robot.name)} has a collision shape: it passes through everything"
 
 
-def _overlaps(engine: WorldEngine) -> Iterator[str]:
+def _overlaps(engine: Stepper) -> Iterator[str]:
     found = overlaps_of(engine)
     for each in found[:MAX_OVERLAPS]:
         yield (

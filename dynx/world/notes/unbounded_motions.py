@@ -7,13 +7,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from dynx.errors import SingularMassMatrixError, shown
-from dynx.model import Model
+from dynx.errors import shown
 from dynx.model.mechanism import ROOT, Mechanism
-from dynx.spatial.scalar import Floats
-from dynx.world.layout import Layout, RobotLayout
-from dynx.world.notes.conditioning import singular_direction
-from dynx.world.state import WorldState
+from dynx.steppers.conditioning import main_joints, singular_direction
+from dynx.steppers.layout import Layout
+from dynx.steppers.state import WorldState
 
 
 def unbounded_motions(layout: Layout, state: WorldState) -> Iterator[str]:
@@ -37,32 +35,6 @@ def unbounded_motions(layout: Layout, state: WorldState) -> Iterator[str]:
                 f"the links between {first} and {last} have no mass, so that the motion has no bound where "
                 "the axes of these two joints align"
             )
-
-
-def refuse_singular_start(robot: RobotLayout, remedy: str) -> None:
-    """Raise SingularMassMatrixError, naming the joints and a remedy, if M is singular to rounding at the
-    start."""
-    if not robot.model.mechanism.bodies:
-        return
-    found = singular_direction(robot.model, robot.q)
-    if found is None:
-        return
-    condition, direction = found
-    if condition * len(direction) * 4.0 * np.finfo(float).eps > 1.0:
-        joints = " and ".join(map(shown, main_joints(robot.model, direction))) or "its base"
-        raise SingularMassMatrixError(
-            f"{robot.model.name} has no unique acceleration at its configuration at the start, because its "
-            f"links have almost no inertia about {joints} ({remedy}, start at another configuration, lock "
-            "one of the joints, or give the links an inertia)"
-        )
-
-
-def main_joints(model: Model, direction: Floats) -> list[str]:
-    """Return the names of the at most two joints that move the most along a `singular_direction`; none where
-    the base does."""
-    moving = [joint.name for joint in model.joints if joint.moves]
-    share = np.abs(direction[len(direction) - len(moving) :])
-    return [moving[k] for k in np.argsort(-share)[:2] if share[k] > 0.1]
 
 
 def _massless_gimbal(mechanism: Mechanism) -> tuple[int, int] | None:

@@ -29,7 +29,7 @@ from dynx.model.geometry import (
 from dynx.model.geometry.sizes import finite_numbers, finite_vector, positive_number
 from dynx.model.urdf.links import inertia_fault
 from dynx.spatial.scalar import Floats
-from dynx.world.scene.material import DEFAULT_MATERIAL, Material, checked_material
+from dynx.steppers.material import DEFAULT_MATERIAL, Material, checked_material
 from dynx.world.scene.names import checked_name
 
 if TYPE_CHECKING:

@@ -14,6 +14,7 @@ import numpy as np
 from dynx.errors import EngineLimitError, UnsupportedFeatureError, shown
 from dynx.model.elements import IDENTITY, Joint, Pose
 from dynx.model.geometry import HeightField, Plane
+from dynx.model.geometry.mjcf import ShapeWriter, placement, quat_text, text
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_quat
@@ -22,7 +23,6 @@ from dynx.world.scene.filters import merged_links
 from dynx.world.scene.link_frames import LinkFrames
 from dynx.world.scene.mjcf_contacts import ContactWriter
 from dynx.world.scene.mjcf_inertias import add_inertial, add_inertias
-from dynx.world.scene.mjcf_shapes import ShapeWriter, placement, quat_text, text
 from dynx.world.scene.names import WORLD, split_name
 from dynx.world.scene.robots import SceneRobot
 from dynx.world.scene.scene import Scene

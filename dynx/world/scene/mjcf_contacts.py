@@ -8,10 +8,10 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
-from dynx.world.scene.contact_priorities import contact_directions, contact_priorities
-from dynx.world.scene.contact_springs import damping_ratio
+from dynx.steppers.contact_springs import damping_ratio
+from dynx.steppers.material import geometric_means, material_numbers
+from dynx.steppers.mean_coefficients import contact_directions, contact_priorities
 from dynx.world.scene.filters import CollisionFilter
-from dynx.world.scene.material import geometric_means, material_numbers
 from dynx.world.scene.scene import Scene
 
 STEP = 0.002

@@ -13,12 +13,12 @@ import numpy as np
 
 from dynx.errors import UnsupportedFeatureError, shown
 from dynx.model.elements import Inertial
+from dynx.model.geometry.mjcf import quat_text, text
 from dynx.spatial.extended import FLOAT64_EPS, jacobi_eigen, longdouble
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.so3 import rotation_from_rpy, skew
 from dynx.world.scene.filters import merged_links
-from dynx.world.scene.mjcf_shapes import quat_text, text
 from dynx.world.scene.robots import SceneRobot
 
 LEAST_INERTIA = 1e-15

@@ -19,6 +19,7 @@ from dynx.model.loading import load, read_model
 from dynx.model.xacro_reading import split_arguments
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_quat
+from dynx.steppers.material import DEFAULT_MATERIAL, Material
 from dynx.world.motors import Motor, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
 from dynx.world.scene.bodies import SceneBody
 from dynx.world.scene.constraints import Constraint, PointToPoint, Weld
@@ -31,7 +32,6 @@ from dynx.world.scene.document_types import (
     SceneDocument,
     ShapeDocument,
 )
-from dynx.world.scene.material import DEFAULT_MATERIAL, Material
 from dynx.world.scene.paths import ScenePaths
 from dynx.world.scene.robots import SceneRobot
 from dynx.world.scene.scene import Scene

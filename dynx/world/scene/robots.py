@@ -14,8 +14,8 @@ from dynx.model import Model, Pose
 from dynx.model.configuration import checked_array, checked_pose, checked_q, neutral
 from dynx.model.model import refuse_other_than_model
 from dynx.spatial.so3 import quat_from_rotation
+from dynx.steppers.material import DEFAULT_MATERIAL, Material, checked_material
 from dynx.world.motors import Motor, combine
-from dynx.world.scene.material import DEFAULT_MATERIAL, Material, checked_material
 from dynx.world.scene.names import checked_name
 
 

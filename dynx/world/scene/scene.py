@@ -17,11 +17,11 @@ from dynx.model.configuration import checked_gravity
 from dynx.model.elements import Vector
 from dynx.model.model import STANDARD_GRAVITY
 from dynx.option_names import checks_option_names
+from dynx.steppers.material import Material
 from dynx.world.scene.avoidance import MARGIN, robot_avoidance, robot_like
 from dynx.world.scene.bodies import SceneBody
 from dynx.world.scene.constraints import Constraint, PointToPoint, Weld
 from dynx.world.scene.filters import CollisionFilter
-from dynx.world.scene.material import Material
 from dynx.world.scene.names import WORLD, checked_name, split_name
 from dynx.world.scene.robots import SceneRobot
 

@@ -11,10 +11,10 @@ from dynx.model import Model, Pose
 from dynx.model.documents import pose_numbers
 from dynx.model.elements import IDENTITY
 from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, Mesh, Plane, Sphere, Visual
+from dynx.steppers.material import DEFAULT_MATERIAL, Material
 from dynx.world.motors import Motor
 from dynx.world.scene.bodies import SceneBody
 from dynx.world.scene.constraints import Constraint, Weld
-from dynx.world.scene.material import DEFAULT_MATERIAL, Material
 from dynx.world.scene.paths import ScenePaths
 from dynx.world.scene.reading import MOTORS, SCHEMA
 from dynx.world.scene.robots import SceneRobot

@@ -13,8 +13,8 @@ from dynx.engines.drake.world.contacts import parts_of_force
 from dynx.engines.drake.world.engine import DrakeWorld
 from dynx.errors import SingularMassMatrixError, UnsupportedFeatureError
 from dynx.model.geometry import Box, Collision, HeightField
+from dynx.steppers.layout import Layout
 from dynx.world import Material, PointToPoint, Scene, SceneBody, SceneRobot, Weld, World, box, ground, sphere
-from dynx.world.layout import Layout
 from dynx.world.preparation import prepare
 
 G = 9.81

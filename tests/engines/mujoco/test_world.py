@@ -15,8 +15,8 @@ from dynx.engines.mujoco.world.engine import MujocoWorld
 from dynx.engines.mujoco.world.filters import collision_masks, pairs_to_exclude
 from dynx.errors import SingularMassMatrixError
 from dynx.model.geometry import Box, Collision, HeightField, Sphere
+from dynx.steppers.layout import Layout
 from dynx.world import Material, PointToPoint, Scene, SceneBody, SceneRobot, Weld, World, box, ground, sphere
-from dynx.world.layout import Layout
 from dynx.world.preparation import prepare
 
 G = 9.81

@@ -36,7 +36,7 @@ from dynx.errors import EngineLimitError, UnsupportedFeatureError, shown
 from dynx.model.mechanism import ROOT
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, Floats
-from dynx.world.layout import WORLD, BodyLayout, Layout, Owner, RobotLayout
+from dynx.steppers.layout import WORLD, BodyLayout, Layout, Owner, RobotLayout
 
 
 class Carrier(NamedTuple):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dynx.spatial.scalar import Floats
-from dynx.world.engine import TouchingPoint
+from dynx.steppers.stepper import TouchingPoint
 
 
 def read_contacts(results: Any, query: Any, collider_of: Mapping[int, int]) -> list[TouchingPoint]:

@@ -19,7 +19,7 @@ from dynx.model.mechanism import Mechanism
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import cross, quat_from_rotation, rotation_from_quat
-from dynx.world.state import BodyState, RobotState
+from dynx.steppers.state import BodyState, RobotState
 
 _POINT_THEN_XYZW = (4, 5, 6, 1, 2, 3, 0)
 _LINEAR_THEN_ANGULAR = (3, 4, 5, 0, 1, 2)

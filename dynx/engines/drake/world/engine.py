@@ -23,12 +23,12 @@ from dynx.model.geometry import HeightField, Plane
 from dynx.rbd.kinematics import body_poses
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
-from dynx.world.engine import Torque, TouchingPoint, WorldEngine
-from dynx.world.engine_failures import translate_failures
-from dynx.world.layout import WORLD, Collider, Layout
-from dynx.world.materials import EffectiveCoefficient
-from dynx.world.settings import Setting
-from dynx.world.state import BodyState, RobotState
+from dynx.steppers.failures import translate_failures
+from dynx.steppers.layout import WORLD, Collider, Layout
+from dynx.steppers.materials import EffectiveCoefficient
+from dynx.steppers.settings import Setting
+from dynx.steppers.state import BodyState, RobotState
+from dynx.steppers.stepper import Stepper, Torque, TouchingPoint
 
 LONGEST = 1.001
 """Squared length of a quaternion above which it is normalised."""
@@ -36,8 +36,8 @@ LONGEST = 1.001
 _engine_errors = translate_failures(DRAKE_FAILURES, error_message)
 
 
-class DrakeWorld(WorldEngine):
-    """A scene in Drake behind the interface of `WorldEngine`."""
+class DrakeWorld(Stepper):
+    """A scene in Drake behind the interface of `Stepper`."""
 
     name: ClassVar[str] = "drake"
     settings: ClassVar[Mapping[str, Setting]] = SETTINGS

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.spatial.scalar import Floats
-from dynx.world.layout import Layout
-from dynx.world.materials import EffectiveCoefficient
-from dynx.world.scene.material import geometric_means, material_numbers
-from dynx.world.scene.pair_terms import CLOSE, pair_terms
+from dynx.steppers.layout import Layout
+from dynx.steppers.material import geometric_means, material_numbers
+from dynx.steppers.materials import EffectiveCoefficient
+from dynx.steppers.mean_coefficients import CLOSE, pair_terms
 
 
 class Copies(NamedTuple):

@@ -23,8 +23,8 @@ from dynx.engines.drake.library import (
     geometry,
 )
 from dynx.model.geometry import Box, Cylinder, HeightField, Plane, Shape
-from dynx.world.materials import STRICT_MATERIALS
-from dynx.world.settings import Setting
+from dynx.steppers.materials import STRICT_MATERIALS
+from dynx.steppers.settings import Setting
 
 SETTINGS: Mapping[str, Setting] = {
     "contact_approximation": Setting(

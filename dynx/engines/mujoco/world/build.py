@@ -30,8 +30,8 @@ from dynx.errors import EngineLimitError
 from dynx.model.mechanism import ROOT
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
-from dynx.world.layout import WORLD, Layout, Owner, RobotLayout
-from dynx.world.notes.unbounded_motions import refuse_singular_start
+from dynx.steppers.conditioning import refuse_singular_start
+from dynx.steppers.layout import WORLD, Layout, Owner, RobotLayout
 
 WELD_TORQUE_WEIGHT = 10
 """Index, in the data of a weld, of the weight of its torque."""

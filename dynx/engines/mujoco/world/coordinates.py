@@ -19,8 +19,8 @@ from dynx.model.mechanism import Mechanism
 from dynx.spatial.plain import minus_cross, rotate, rotate_back, rotation_rows
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.so3 import cross, rotation_from_quat
-from dynx.world.layout import BodyLayout
-from dynx.world.state import BodyState, RobotState
+from dynx.steppers.layout import BodyLayout
+from dynx.steppers.state import BodyState, RobotState
 
 
 def root_center(mechanism: Mechanism) -> Array:

@@ -21,13 +21,13 @@ from dynx.engines.mujoco.world.shapes import FIELD_GROUP
 from dynx.engines.mujoco.world.touching import closest_of, read_contacts
 from dynx.errors import EngineError, nonblank_lines, shown
 from dynx.model.geometry import HeightField
+from dynx.model.geometry.ray_casting import cast_on_shape
 from dynx.spatial.scalar import Floats
-from dynx.world.engine import RayHit, Torque, TouchingPoint, WorldEngine
-from dynx.world.engine_failures import translate_failures
-from dynx.world.geometry.ray_casting import cast_on_shape
-from dynx.world.layout import Layout
-from dynx.world.materials import EffectiveCoefficient
-from dynx.world.state import BodyState, RobotState
+from dynx.steppers.failures import translate_failures
+from dynx.steppers.layout import Layout
+from dynx.steppers.materials import EffectiveCoefficient
+from dynx.steppers.state import BodyState, RobotState
+from dynx.steppers.stepper import RayHit, Stepper, Torque, TouchingPoint
 
 _MISS = RayHit(None, np.inf, np.full(3, np.nan))
 
@@ -41,8 +41,8 @@ CONSTRAINTS_LOST = int(mujoco.mjtWarning.mjWARN_CNSTRFULL)
 _engine_errors = translate_failures((Exception,), lambda error: (nonblank_lines(error) or ["no message"])[0])
 
 
-class MujocoWorld(WorldEngine):
-    """A scene in MuJoCo behind the interface of `WorldEngine`."""
+class MujocoWorld(Stepper):
+    """A scene in MuJoCo behind the interface of `Stepper`."""
 
     name: ClassVar[str] = "mujoco"
     settings: ClassVar[Mapping[str, Any]] = SETTINGS

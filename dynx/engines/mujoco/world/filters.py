@@ -11,7 +11,7 @@ from itertools import groupby
 
 import numpy as np
 
-from dynx.world.layout import Layout
+from dynx.steppers.layout import Layout
 
 BITS = 31
 """Bits of a mask; a signed integer of 32 has no more."""

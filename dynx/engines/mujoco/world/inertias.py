@@ -12,7 +12,7 @@ from dynx.spatial.extended import FLOAT64_EPS, jacobi_eigen, longdouble
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array
 from dynx.spatial.so3 import skew
-from dynx.world.layout import BodyLayout
+from dynx.steppers.layout import BodyLayout
 
 
 def write_rigid_inertia(model: Any, body: int, inertia: RigidInertia, robot: str, *, at_center: bool) -> None:

@@ -2,7 +2,7 @@
 
 Every pair of geoms that may touch is an explicit pair with coefficients of its own. It takes some nanoseconds
 in every step, so in scenes of very many geoms moving bodies touch one another by MuJoCo's own rule: it takes
-the coefficients of the geom with the higher priority (`dynx.world.scene.contact_priorities`).
+the coefficients of the geom with the higher priority (`dynx.steppers.mean_coefficients`).
 
 Only explicit pairs have a damping of slip apart from that of the normal direction. MuJoCo's friction pushes
 bodies apart in proportion to the damping times the sliding speed, so that bodies hop where it is as large as
@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from dynx.engines.mujoco.world.options import contact_reference, contact_restitution, slip_reference
 from dynx.spatial.scalar import Floats
-from dynx.world.layout import Layout
-from dynx.world.materials import EffectiveCoefficient, coefficients
-from dynx.world.scene.contact_priorities import contact_directions, contact_priorities
-from dynx.world.scene.material import geometric_means, material_numbers
+from dynx.steppers.layout import Layout
+from dynx.steppers.material import geometric_means, material_numbers
+from dynx.steppers.materials import EffectiveCoefficient, coefficients
+from dynx.steppers.mean_coefficients import contact_directions, contact_priorities
 
 MAX_PAIRS = 2000
 """Largest number of explicit pairs of geoms, beside those without which a contact had other coefficients."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from dynx.engines.mujoco.library import mujoco
 from dynx.spatial.scalar import Floats
-from dynx.world.layout import RobotLayout
+from dynx.steppers.layout import RobotLayout
 
 
 class CoupledRobot:

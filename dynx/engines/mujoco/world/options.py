@@ -12,9 +12,9 @@ from typing import Any
 
 from dynx.engines.mujoco.library import mujoco
 from dynx.spatial.scalar import Floats
-from dynx.world.materials import STRICT_MATERIALS
-from dynx.world.scene.contact_springs import damping_ratio, restitution_of
-from dynx.world.settings import Setting
+from dynx.steppers.contact_springs import damping_ratio, restitution_of
+from dynx.steppers.materials import STRICT_MATERIALS
+from dynx.steppers.settings import Setting
 
 SETTINGS: Mapping[str, Setting] = {
     "integrator": Setting(

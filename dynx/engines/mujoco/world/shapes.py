@@ -10,8 +10,8 @@ import numpy as np
 from dynx.engines.mujoco.library import mujoco
 from dynx.engines.mujoco.tree import quat_wxyz
 from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
+from dynx.model.geometry.mjcf import MIN_HEIGHT_RANGE
 from dynx.spatial.scalar import Floats
-from dynx.world.scene.mjcf_shapes import MIN_HEIGHT_RANGE
 
 FIELD_GROUP = 5
 """MuJoCo's geom group of height fields, which `mj_ray` can leave out; others are in group 0."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from dynx.engines.mujoco.library import mujoco
 from dynx.spatial.scalar import Floats
-from dynx.world.engine import TouchingPoint
+from dynx.steppers.stepper import TouchingPoint
 
 NEAR = 1e-9
 """Distance [m] below which the direction between two points is rounding."""

@@ -16,8 +16,8 @@ from dynx.spatial.extended import longdouble
 from dynx.spatial.inertia import inertia_about_origin
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross, quat_from_rotation
-from dynx.world.layout import BodyLayout, Collider
-from dynx.world.state import BodyState
+from dynx.steppers.layout import BodyLayout, Collider
+from dynx.steppers.state import BodyState
 
 
 class BulletBody:

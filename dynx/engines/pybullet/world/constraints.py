@@ -12,7 +12,7 @@ from dynx.engines.pybullet.world.robot import BulletRobot
 from dynx.model.mechanism import ROOT
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
-from dynx.world.layout import WORLD, Anchor, ConstraintLayout
+from dynx.steppers.layout import WORLD, Anchor, ConstraintLayout
 
 NO_BODY = -1
 """Bullet's number of the world as the second body of a constraint."""

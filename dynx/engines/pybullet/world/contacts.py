@@ -10,7 +10,7 @@ import numpy as np
 from dynx.engines.pybullet.world.client import WorldClient
 from dynx.engines.pybullet.world.filters import Place
 from dynx.spatial.scalar import Floats
-from dynx.world.engine import TouchingPoint
+from dynx.steppers.stepper import TouchingPoint
 
 
 class ContactReader:

@@ -31,14 +31,14 @@ from dynx.engines.pybullet.world.shapes import ShapeFiles, is_ground, load_groun
 from dynx.errors import EngineError
 from dynx.model.mechanism import ROOT
 from dynx.spatial.scalar import Floats
-from dynx.world.engine import Torque, TouchingPoint, WorldEngine
-from dynx.world.layout import Collider, Layout
-from dynx.world.materials import EffectiveCoefficient
-from dynx.world.settings import Setting
-from dynx.world.state import BodyState, RobotState
+from dynx.steppers.layout import Collider, Layout
+from dynx.steppers.materials import EffectiveCoefficient
+from dynx.steppers.settings import Setting
+from dynx.steppers.state import BodyState, RobotState
+from dynx.steppers.stepper import Stepper, Torque, TouchingPoint
 
 
-class BulletWorld(WorldEngine):
+class BulletWorld(Stepper):
     """A scene in a Bullet client of its own."""
 
     name = "pybullet"

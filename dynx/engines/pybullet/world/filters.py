@@ -8,7 +8,7 @@ from typing import Any
 from dynx.engines.pybullet.world.client import WorldClient
 from dynx.engines.pybullet.world.materials import BulletMaterials
 from dynx.model.geometry import Mesh
-from dynx.world.layout import Layout
+from dynx.steppers.layout import Layout
 
 Place = tuple[int, int]
 """Bullet's numbers of a body and of its link."""

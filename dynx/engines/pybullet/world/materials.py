@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.spatial.scalar import Floats
-from dynx.world.layout import Layout
-from dynx.world.materials import EffectiveCoefficient, coefficients
-from dynx.world.scene.material import COEFFICIENTS, geometric_means, material_numbers
-from dynx.world.scene.pair_terms import pair_terms
+from dynx.steppers.layout import Layout
+from dynx.steppers.material import COEFFICIENTS, geometric_means, material_numbers
+from dynx.steppers.materials import EffectiveCoefficient, coefficients
+from dynx.steppers.mean_coefficients import pair_terms
 
 MAX_FRICTION = 10.0
 """Largest coefficient of a contact in Bullet, of each kind of friction."""

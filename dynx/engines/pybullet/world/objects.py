@@ -25,7 +25,7 @@ from dynx.errors import EngineError, EngineLimitError
 from dynx.model.mechanism import ROOT, Mechanism
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
-from dynx.world.layout import Collider
+from dynx.steppers.layout import Collider
 
 MAX_LINKS = 121
 """Largest number of links of a robot besides its root: Bullet reports the states of no more."""

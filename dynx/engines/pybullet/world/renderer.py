@@ -21,8 +21,7 @@ from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import inverse
 from dynx.spatial.so3 import quat_from_rotation
-from dynx.world.camera.drawing import Drawing, DrawnShape
-from dynx.world.camera.view import Camera
+from dynx.steppers.camera import Camera, Drawing, DrawnShape
 
 GROUND_SIDE = 200.0
 """Length of the edges of the square that is drawn for a plane [m]."""

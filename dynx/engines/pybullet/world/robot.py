@@ -20,8 +20,8 @@ from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.branchless import quat_exp
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross, quat_product, rotation_from_quat
-from dynx.world.layout import Collider, RobotLayout
-from dynx.world.state import RobotState
+from dynx.steppers.layout import Collider, RobotLayout
+from dynx.steppers.state import RobotState
 
 STIFF = 0.25
 """Share of a joint's speed that damping may remove in a step by Bullet's own, explicit law."""

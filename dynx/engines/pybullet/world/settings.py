@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dynx.world.materials import STRICT_MATERIALS
-from dynx.world.settings import Setting
+from dynx.steppers.materials import STRICT_MATERIALS
+from dynx.steppers.settings import Setting
 
 SETTINGS = {
     "solver_iterations": Setting(

@@ -13,7 +13,7 @@ from dynx.errors import EngineLimitError
 from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Sphere
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
-from dynx.world.layout import PlacedShape
+from dynx.steppers.layout import PlacedShape
 
 MAX_VERTICES = 100_000
 """Largest number of points of a height field; Bullet takes 131,072 in one call."""

@@ -14,11 +14,13 @@ from functools import lru_cache
 
 import numpy as np
 
+from dynx.errors import SingularMassMatrixError, shown
 from dynx.model import Model
 from dynx.model.mechanism import Mechanism
 from dynx.rbd.kinematics import ancestry, body_poses
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross
+from dynx.steppers.layout import RobotLayout
 
 MIN_SINGULAR_CONDITION = 1e10
 """Condition number of a mass matrix, with its diagonal scaled to 1, from which it is conspicuous."""
@@ -66,6 +68,32 @@ def _singular_direction(key: _Key, q: bytes) -> tuple[float, Floats] | None:
     direction = directions[:, 0].copy()
     direction.flags.writeable = False
     return condition, direction
+
+
+def refuse_singular_start(robot: RobotLayout, remedy: str) -> None:
+    """Raise SingularMassMatrixError, naming the joints and a remedy, if M is singular to rounding at the
+    start."""
+    if not robot.model.mechanism.bodies:
+        return
+    found = singular_direction(robot.model, robot.q)
+    if found is None:
+        return
+    condition, direction = found
+    if condition * len(direction) * 4.0 * np.finfo(float).eps > 1.0:
+        joints = " and ".join(map(shown, main_joints(robot.model, direction))) or "its base"
+        raise SingularMassMatrixError(
+            f"{robot.model.name} has no unique acceleration at its configuration at the start, because its "
+            f"links have almost no inertia about {joints} ({remedy}, start at another configuration, lock "
+            "one of the joints, or give the links an inertia)"
+        )
+
+
+def main_joints(model: Model, direction: Floats) -> list[str]:
+    """Return the names of the at most two joints that move the most along a `singular_direction`; none where
+    the base does."""
+    moving = [joint.name for joint in model.joints if joint.moves]
+    share = np.abs(direction[len(direction) - len(moving) :])
+    return [moving[k] for k in np.argsort(-share)[:2] if share[k] > 0.1]
 
 
 def condition_bound(A: Floats) -> float:

@@ -2,7 +2,7 @@
 
 Two surfaces in contact have the geometric mean of their coefficients: of friction, sliding, torsional and
 rolling, and of restitution. An engine that combines coefficients by another rule is given such ones that its
-rule has this result; where it cannot, it says so by `WorldEngine.effective_materials`.
+rule has this result; where it cannot, it says so by `Stepper.effective_materials`.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from dynx.errors import UnsupportedFeatureError, shown
 from dynx.spatial.scalar import Floats
-from dynx.world.layout import Layout
-from dynx.world.settings import Setting
+from dynx.steppers.layout import Layout
+from dynx.steppers.settings import Setting
 
 STRICT_MATERIALS = Setting(
     False, "whether a scene with coefficients of contact that the engine cannot have is refused"
@@ -63,7 +63,7 @@ class EffectiveCoefficient:
 
 
 class EngineWithMaterials(Protocol):
-    """The part of `WorldEngine` that this module needs."""
+    """The part of `Stepper` that this module needs."""
 
     layout: Layout
 

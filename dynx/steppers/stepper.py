@@ -1,7 +1,7 @@
 """The interface that an engine implements to run a world.
 
-An implementation is given checked numbers only (`dynx.world.layout`): finite, in SI units and world axes, and
-robots in the coordinates of their models (`dynx.Model`), mimic joints and floating bases included. Names,
+An implementation is given checked numbers only (`dynx.steppers.layout`): finite, in SI units and world axes,
+and robots in the coordinates of their models (`dynx.Model`), mimic joints and floating bases included. Names,
 frames, motors, the time and the check of every argument are those of `dynx.world.World`.
 """
 
@@ -11,17 +11,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
-from dynx.control.engine_motors import MotorCommand
 from dynx.errors import EngineLimitError, UnsupportedFeatureError
 from dynx.spatial.scalar import Floats
-from dynx.world.camera.drawing import Drawing, DrawnShape
-from dynx.world.camera.view import Camera
-from dynx.world.geometry.first_hits import first_hits
-from dynx.world.geometry.owner_poses import OwnerPoses
-from dynx.world.layout import Layout
-from dynx.world.materials import EffectiveCoefficient
-from dynx.world.settings import Setting
-from dynx.world.state import BodyState, RobotState, WorldState
+from dynx.steppers.camera import Camera, Drawing, DrawnShape
+from dynx.steppers.layout import Layout
+from dynx.steppers.materials import EffectiveCoefficient
+from dynx.steppers.settings import Setting
+from dynx.steppers.state import BodyState, RobotState
 
 
 class TouchingPoint(NamedTuple):
@@ -51,7 +47,7 @@ class RayHit(NamedTuple):
     normal: Floats
 
 
-class WorldEngine(ABC):
+class Stepper(ABC):
     """A scene inside an engine, which advances in steps of `dt` [s].
 
     A subclass has this constructor. A package offers it by an entry point in the group ``dynx.worlds``.
@@ -82,7 +78,7 @@ class WorldEngine(ABC):
 
     def effective_materials(self) -> Mapping[str, EffectiveCoefficient]:
         """Return, by name, the coefficients of contact that the engine does not have for every pair of
-        materials as `dynx.world.materials.combined` gives them."""
+        materials as `dynx.steppers.materials.combined` gives them."""
         return {}
 
     # -- motion -------------------------------------------------------------------------------
@@ -92,7 +88,7 @@ class WorldEngine(ABC):
         """Apply a force and a moment about the centre of mass (n_bodies, 6), in world axes, to every body of
         the scene in all later steps, until the next call."""
 
-    def command_motors(self, robot: int, command: MotorCommand | None) -> None:
+    def command_motors(self, robot: int, command: Any) -> None:
         """Set the engine's own motors of a robot, one per joint of the model, in all later steps; None
         releases them."""
         if command is not None:
@@ -166,21 +162,13 @@ class WorldEngine(ABC):
         """
         raise EngineLimitError(f"{self.name} has no distances of its own; leave native out for those of dynx")
 
-    def cast_rays(self, origins: Floats, directions: Floats, length: float) -> Sequence[RayHit]:
+    def cast_rays(self, origins: Floats, directions: Floats, length: float) -> Sequence[RayHit] | None:
         """Return the first hit of every ray, from origins (n, 3) along unit directions (n, 3).
 
-        dynx intersects the shapes in closed form; an engine overrides this where its own rays are as exact.
+        None, which is the default, for those of dynx, which intersects the shapes in closed form; an engine
+        overrides this where its own rays are as exact.
         """
-        robots = {each.name: self.robot_state(k) for k, each in enumerate(self.layout.robots)}
-        bodies = {each.name: self.body_state(k) for k, each in enumerate(self.layout.bodies)}
-        poses = OwnerPoses(self.layout, WorldState(0.0, robots, bodies))
-        hits = first_hits(self.layout, poses, origins, directions, length)
-        return [
-            RayHit(None if number < 0 else number, distance, normal)
-            for number, distance, normal in zip(
-                hits.number.tolist(), hits.distance.tolist(), hits.normal, strict=True
-            )
-        ]
+        return None
 
     # -- pictures -----------------------------------------------------------------------------
 

@@ -11,8 +11,8 @@ from dynx.errors import (
     shown,
 )
 from dynx.registry import ClassRegistry
-from dynx.world.camera.drawing import Draw
-from dynx.world.engine import WorldEngine
+from dynx.steppers.camera import Draw
+from dynx.steppers.stepper import Stepper
 
 GROUP = "dynx.worlds"
 """The entry-point group: ``name = "package.module:EngineClass"``."""
@@ -25,7 +25,7 @@ BUILT_IN = {
 """Engines of dynx itself."""
 
 _engines = ClassRegistry(
-    "world engine", GROUP, BUILT_IN, lambda: WorldEngine, error=BackendError, unknown=UnknownBackendError
+    "world engine", GROUP, BUILT_IN, lambda: Stepper, error=BackendError, unknown=UnknownBackendError
 )
 world_names = _engines.names
 world_class = _engines.find

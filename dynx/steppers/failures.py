@@ -7,7 +7,7 @@ from functools import wraps
 from typing import ClassVar, Concatenate, ParamSpec, Protocol, TypeVar
 
 from dynx.errors import ClosedError, DynxError, EngineError, shown
-from dynx.world.layout import Layout
+from dynx.steppers.layout import Layout
 
 
 class ClosableWorld(Protocol):

@@ -8,7 +8,10 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
-from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
+from dynx.model.geometry.links import Collision
+from dynx.model.geometry.mesh import Mesh
+from dynx.model.geometry.shapes import Box, Capsule, Cylinder, HeightField, Plane, Sphere
+from dynx.model.geometry.solids import Shape
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
 

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from dynx.errors import ArgumentError, shown
 from dynx.model import Pose
 from dynx.model.configuration import checked_pose, checked_vector, is_real, whole_number
 from dynx.model.elements import IDENTITY
 from dynx.model.geometry.sizes import positive_number
+from dynx.model.geometry.solids import Shape
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 
@@ -95,3 +97,25 @@ class Camera:
         columns = (np.arange(width) + 0.5 - 0.5 * width) / self.focal_length
         rows = (np.arange(height) + 0.5 - 0.5 * height) / self.focal_length
         return np.asarray(columns, np.float64), np.asarray(rows, np.float64)
+
+
+class DrawnShape(NamedTuple):
+    """A shape, its colour, its pose in the world (4, 4), and the number of its part."""
+
+    part: int
+    shape: Shape
+    rgba: tuple[float, float, float, float]
+    T: Floats
+
+
+class Drawing(NamedTuple):
+    """The sight in each of the n pixels, by rows: colour (n, 3), depth (n,) [m], and the number (n,) of
+    the shape, -1 for none, whose depth is infinite."""
+
+    rgb: NDArray[np.uint8]
+    depth: Floats
+    number: NDArray[np.intp]
+
+
+Draw = Callable[[Sequence[DrawnShape], Floats, Camera], Drawing]
+"""A renderer: it draws shapes as a camera at a pose (4, 4) in the world sees them."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dynx.model import Model
 from dynx.model.geometry import Shape
 from dynx.spatial.scalar import Floats
-from dynx.world.scene import Material
+from dynx.steppers.material import Material
 
 WORLD = -1
 """Number of the body that is the world itself."""

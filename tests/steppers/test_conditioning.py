@@ -13,8 +13,8 @@ import dynx
 from dynx.model import Model
 from dynx.rbd.crba import mass_matrix
 from dynx.spatial.scalar import Floats
+from dynx.steppers.conditioning import condition_bound, mass_matrix_of_floats, singular_direction
 from dynx.testing.strategies import configurations, models
-from dynx.world.notes.conditioning import condition_bound, mass_matrix_of_floats, singular_direction
 
 
 def of_algorithm(model: Model, q: Floats) -> Floats:
