@@ -40,7 +40,7 @@ from dynx.errors import DescriptionError, DynxError
 from dynx.model import Model
 from dynx.model.library import robots
 from dynx.model.loading import load
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.sim import Noise, Push, simulate, simulate_batch
 
 MAX_SECONDS = 10.0

@@ -31,8 +31,8 @@ from dynx.backends import (
 from dynx.backends.solvability import singular_coordinates
 from dynx.errors import ArgumentError, DynxError
 from dynx.model import Model
-from dynx.model.configuration import whole_number
 from dynx.model.loading import load
+from dynx.model.numbers import whole_number
 from dynx.option_names import checks_option_names
 
 DEFAULT_SAMPLES = 16

@@ -10,7 +10,7 @@ from dynx.agreement.report import AgreementReport, refused_report
 from dynx.errors import DynxError
 from dynx.model import Pose
 from dynx.model.loading import load
-from dynx.model.model import Base
+from dynx.model.tree import Base
 
 
 @dataclass(frozen=True)

@@ -18,13 +18,8 @@ from dynx.errors import (
     shown,
 )
 from dynx.model import Model
-from dynx.model.configuration import (
-    MAX_MAGNITUDE,
-    UNIT_NORM_TOLERANCE,
-    checked_array,
-    checked_q,
-    checked_vector,
-)
+from dynx.model.configuration import checked_q
+from dynx.model.numbers import MAX_MAGNITUDE, UNIT_NORM_TOLERANCE, checked_array, checked_vector
 from dynx.rbd.jacobians import REFERENCES, Reference
 from dynx.spatial.scalar import Floats
 

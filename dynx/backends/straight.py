@@ -15,7 +15,7 @@ from numpy import ndarray
 
 from dynx.backends.arguments import MAX_LISTED
 from dynx.model import Model
-from dynx.model.configuration import MAX_MAGNITUDE, UNIT_NORM_TOLERANCE
+from dynx.model.numbers import MAX_MAGNITUDE, UNIT_NORM_TOLERANCE
 
 SampleHook = Callable[..., Any]
 """Function of a backend and the arrays of one sample that evaluates a hook."""

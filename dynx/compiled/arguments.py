@@ -14,7 +14,7 @@ import numpy as np
 
 from dynx.backends.arguments import Arguments
 from dynx.errors import ClosedError
-from dynx.model.configuration import MAX_MAGNITUDE, UNIT_NORM_TOLERANCE
+from dynx.model.numbers import MAX_MAGNITUDE, UNIT_NORM_TOLERANCE
 from dynx.spatial.scalar import Floats
 
 _MAX_LIST_SIZE = 64

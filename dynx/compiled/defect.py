@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from dynx.model import Mechanism
-from dynx.model.configuration import MAX_MAGNITUDE, UNIT_NORM_TOLERANCE
+from dynx.model.numbers import MAX_MAGNITUDE, UNIT_NORM_TOLERANCE
 from dynx.spatial.scalar import Array
 
 MAX_DEFECT = MAX_MAGNITUDE**2

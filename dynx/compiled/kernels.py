@@ -28,8 +28,8 @@ import dynx.backends.quantities
 import dynx.compiled.defect
 import dynx.compiled.model_coordinates
 import dynx.compiled.simplification
-import dynx.model.configuration
 import dynx.model.mechanism
+import dynx.model.numbers
 import dynx.rbd
 import dynx.spatial
 from dynx.backends.quantities import QUANTITIES, Quantity
@@ -240,7 +240,7 @@ def _algorithms() -> str:
     return source_version(
         dynx.rbd,
         dynx.spatial,
-        dynx.model.configuration,
+        dynx.model.numbers,
         dynx.model.mechanism,
         dynx.backends.quantities,
         dynx.compiled.defect,

@@ -21,8 +21,8 @@ from dynx.compiled.robot_kernel import RobotKernels
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.errors import ArgumentError, shown
 from dynx.model import Mechanism, Model
-from dynx.model.configuration import checked_array
 from dynx.model.model import refuse_other_than_model
+from dynx.model.numbers import checked_array
 from dynx.rbd import crba, rnea
 from dynx.rbd.elimination import factorize_mass_matrix, solve_with_factors
 from dynx.simd.program import Program

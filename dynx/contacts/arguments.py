@@ -9,7 +9,7 @@ from dynx.contacts.candidates import SUBSTEPS
 from dynx.contacts.case import Case
 from dynx.contacts.registry import BUILT_IN, find_case, find_cases
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
-from dynx.model.configuration import positive_seconds, whole_number
+from dynx.model.numbers import positive_seconds, whole_number
 from dynx.steppers.registry import installed_worlds, world_class
 from dynx.steppers.settings import checked_settings
 

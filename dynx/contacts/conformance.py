@@ -23,7 +23,7 @@ from dynx.contacts.runner import Runner
 from dynx.contacts.series import Series, TrialOfEngine, collect
 from dynx.contacts.trend import judge
 from dynx.contacts.verdict import VERDICTS, Verdict, VerdictKind
-from dynx.model.configuration import whole_number
+from dynx.model.numbers import whole_number
 
 STEPS = (4e-3, 2e-3, 1e-3)
 """Steps [s] where none are given."""

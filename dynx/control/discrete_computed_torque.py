@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from dynx.backends import Backend
 from dynx.control.base import Measurement, ModelBased, parameter
 from dynx.model import Model
-from dynx.model.configuration import positive_seconds
+from dynx.model.numbers import positive_seconds
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Array, Floats
 from dynx.trajectory.base import Setpoint

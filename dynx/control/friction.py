@@ -13,7 +13,7 @@ from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.control.gains import checked_gain
 from dynx.errors import ArgumentError, GainError, UnknownNameError, shown
 from dynx.model import Model
-from dynx.model.configuration import is_real, real_array
+from dynx.model.numbers import is_real, real_array
 from dynx.spatial.scalar import Array, Floats, sign, tanh
 
 SLIP = 1e-2

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from dynx.control.base import Controller, Measurement, parameter
 from dynx.errors import ShapeError
 from dynx.model import Model
-from dynx.model.configuration import checked_array, positive_seconds
+from dynx.model.numbers import checked_array, positive_seconds
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 

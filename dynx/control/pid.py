@@ -13,7 +13,7 @@ from dynx.control.joint_space import JointSpace
 from dynx.control.pd import pd_torque
 from dynx.control.saturation import checked_limit
 from dynx.model import Model
-from dynx.model.configuration import positive_seconds
+from dynx.model.numbers import positive_seconds
 from dynx.spatial.scalar import Floats, clamp
 from dynx.trajectory.base import Setpoint
 

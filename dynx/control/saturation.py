@@ -12,7 +12,7 @@ from dynx.control.base import Controller, ControllerState, Measurement, Wrapper,
 from dynx.control.friction import coefficients_by_joint, refuse_text
 from dynx.errors import GainError, LimitError, shown
 from dynx.model import Model
-from dynx.model.configuration import real_array
+from dynx.model.numbers import real_array
 from dynx.spatial.scalar import Floats, clamp
 from dynx.trajectory.base import Setpoint
 

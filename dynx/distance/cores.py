@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynx.errors import ArgumentError, ShapeError, shown
-from dynx.model.configuration import MAX_MAGNITUDE, checked_array
 from dynx.model.geometry import Box, Capsule, Cylinder, Mesh, Sphere
+from dynx.model.numbers import MAX_MAGNITUDE, checked_array
 from dynx.spatial.plain import Vector3
 from dynx.spatial.scalar import Floats
 

@@ -14,9 +14,9 @@ from dynx.distance.parallel_axes import penetration_of_parallel
 from dynx.distance.penetration import Penetration, penetration
 from dynx.errors import ArgumentError
 from dynx.model import Pose
-from dynx.model.configuration import MAX_MAGNITUDE, checked_pose, checked_vector
-from dynx.model.elements import rigid_matrix
+from dynx.model.elements import checked_pose, rigid_matrix
 from dynx.model.geometry import Plane
+from dynx.model.numbers import MAX_MAGNITUDE, checked_vector
 from dynx.spatial.plain import Vector3
 from dynx.spatial.scalar import Floats
 

@@ -46,9 +46,8 @@ from dynx.doctor.variants import diagnosed_variants, variants_as_loaded
 from dynx.errors import ArgumentError, DescriptionError, DynxError, UnknownNameError, nearest, shown
 from dynx.loaded import COMMON_VARIANTS, ENGINES, VARIANTS, engine_of, installed_engines
 from dynx.model import Model
-from dynx.model.configuration import checked_base
 from dynx.model.loading import read_description
-from dynx.model.model import Base
+from dynx.model.tree import Base, checked_base
 from dynx.model.xml.source import XmlSource
 from dynx.option_names import checks_option_names
 from dynx.rules import LEVELS, Case, Detection, Level, Rule, all_rules

@@ -10,7 +10,7 @@ from dynx.doctor.diagnosis import compare_as_loaded, diagnose, refused_report
 from dynx.doctor.report import DoctorReport
 from dynx.errors import BackendError, DynxError
 from dynx.loaded.registry import ENGINES, loader_class
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.rules.rule import Level
 
 

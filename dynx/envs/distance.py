@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from dynx.envs.library import Env
 from dynx.errors import ArgumentError
-from dynx.model.configuration import whole_number
+from dynx.model.numbers import whole_number
 
 Act = Callable[[NDArray[Any]], NDArray[Any]]
 """A policy: observations (1, ...) in, actions (1, ...) out."""

@@ -15,7 +15,7 @@ from dynx.envs.randomization.randomization import Randomization
 from dynx.envs.randomization.variation import Variation
 from dynx.envs.task import Episodes, Task, checked_engine
 from dynx.errors import ArgumentError, ClosedError, EpisodeError, nearest, shown
-from dynx.model.configuration import whole_number
+from dynx.model.numbers import whole_number
 
 RENDER_MODES = ("human", "rgb_array")
 

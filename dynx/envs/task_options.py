@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from dynx.errors import ArgumentError, nearest, shown
-from dynx.model.configuration import MAX_MAGNITUDE, is_real
+from dynx.model.numbers import MAX_MAGNITUDE, is_real
 
 
 def refuse_unknown_choice(name: str, value: object, known: Sequence[str]) -> None:

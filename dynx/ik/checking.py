@@ -18,7 +18,8 @@ from dynx.ik.problem import Problem, Requirement
 from dynx.ik.secondary import MAXIMA, Secondary
 from dynx.ik.targets import Targets, checked_targets
 from dynx.model import Model
-from dynx.model.configuration import checked_q, checked_vector, real_array
+from dynx.model.configuration import checked_q
+from dynx.model.numbers import checked_vector, real_array
 from dynx.spatial.scalar import Floats
 
 

@@ -14,7 +14,7 @@ from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.ik.avoidance import AvoidanceSource
 from dynx.ik.axes import checked_tolerance
 from dynx.ik.search import SearchLimits
-from dynx.model.configuration import whole_number
+from dynx.model.numbers import whole_number
 
 F = TypeVar("F", bound=Callable[..., Any])
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError, nearest, shown
-from dynx.model.configuration import MAX_MAGNITUDE, checked_entries, real_array
+from dynx.model.numbers import MAX_MAGNITUDE, checked_entries, real_array
 from dynx.spatial.scalar import Floats
 
 ORTHONORMALITY_TOLERANCE = 1e-6

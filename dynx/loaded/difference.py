@@ -16,7 +16,7 @@ import numpy as np
 from dynx.loaded.description import LoadedInertial, LoadedJoint, LoadedModel
 from dynx.loaded.merging import Placements, merged_inertial, rigid_placements
 from dynx.model import Joint, Model
-from dynx.model.model import STANDARD_GRAVITY
+from dynx.model.tree import STANDARD_GRAVITY
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import rpy_from_rotation
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from dynx.model.configuration import checked_array
 from dynx.model.elements import IDENTITY, Pose
 from dynx.model.loading import read_model
 from dynx.model.model import Model
+from dynx.model.numbers import checked_array
 
 
 def robot_document(model: Model) -> dict[str, Any]:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, shown
-from dynx.model.masks import refuse_mask
+from dynx.model.numbers import checked_vector, refuse_mask
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_rpy, rpy_from_rotation
@@ -208,3 +208,11 @@ class Note:
 
     def __str__(self) -> str:
         return self.message if self.line is None else f"line {self.line}: {self.message}"
+
+
+def checked_pose(name: str, pose: Pose | ArrayLike) -> Pose:
+    """Return a pose, given as a `Pose` or a matrix (4, 4), with finite floats below `MAX_MAGNITUDE`."""
+    if not isinstance(pose, Pose):
+        pose = Pose.from_matrix(pose, name)
+    xyz, rpy = (checked_vector(f"{part} of {name}", getattr(pose, part)).tolist() for part in ("xyz", "rpy"))
+    return Pose(tuple(xyz), tuple(rpy))

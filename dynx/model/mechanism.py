@@ -12,17 +12,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from dynx.model.elements import IDENTITY, Pose
+from dynx.model.tree import Tree
 from dynx.spatial.inertia import RigidInertia, inertia_about_origin
 from dynx.spatial.scalar import Array, Floats, sqrt
 from dynx.spatial.so3 import rotate, rotation_about, rotation_from_rpy
-
-if TYPE_CHECKING:
-    from dynx.model.model import Model
 
 ScalarConverter = Callable[[object], Array]
 """Function that converts nested floats to an array of the scalar type in use."""
@@ -157,14 +155,14 @@ def pose_arrays(pose: Pose, convert: ScalarConverter) -> tuple[Array, Array]:
     return rotation_from_rpy(convert(pose.rpy)), convert(pose.xyz)
 
 
-def build_mechanism(model: Model, convert: ScalarConverter = float64) -> Mechanism:
+def build_mechanism(tree: Tree, convert: ScalarConverter = float64) -> Mechanism:
     """Merge the links connected by fixed joints and their inertias, in the scalar type of `convert`."""
     # Placement of each link: its body and its pose (R, p) in the frame of that body.
     identity = convert(np.eye(3)), convert(np.zeros(3))
-    at_root = identity if model.base_pose == IDENTITY else pose_arrays(model.base_pose, convert)
-    placed: dict[str, tuple[int, Array, Array]] = {model.root: (ROOT, *at_root)}
+    at_root = identity if tree.base_pose == IDENTITY else pose_arrays(tree.base_pose, convert)
+    placed: dict[str, tuple[int, Array, Array]] = {tree.root: (ROOT, *at_root)}
     moving: list[tuple[str, int, bool, Array, Array, Array]] = []
-    for joint in model.joints:
+    for joint in tree.joints:
         body, R_parent, p_parent = placed[joint.parent]
         R_joint, p_joint = pose_arrays(joint.origin, convert)
         R, p = R_parent @ R_joint, p_parent + rotate(R_parent, p_joint)
@@ -180,7 +178,7 @@ def build_mechanism(model: Model, convert: ScalarConverter = float64) -> Mechani
 
     massless = RigidInertia(convert(0.0), convert(np.zeros(3)), convert(np.zeros((3, 3))))
     merged = dict.fromkeys(range(ROOT, len(moving)), massless)
-    for link in model.links:
+    for link in tree.links:
         if link.inertial is None:
             continue
         body, R, p = placed[link.name]
@@ -191,19 +189,19 @@ def build_mechanism(model: Model, convert: ScalarConverter = float64) -> Mechani
         merged[body] = merged[body] + own.transform(R, p)
 
     frames = []
-    for frame in model.frames:
+    for frame in tree.frames:
         body, R, p = placed[frame.link]
         R_frame, p_frame = pose_arrays(frame.placement, convert)
         frames.append(BodyFrame(frame.name, body, R @ R_frame, p + rotate(R, p_frame)))
 
     return Mechanism(
-        name=model.name,
-        floating=model.floating,
-        gravity=convert(model.gravity),
+        name=tree.name,
+        floating=tree.floating,
+        gravity=convert(tree.gravity),
         root=merged[ROOT],
         bodies=tuple(Body(*fields, inertia=merged[k]) for k, fields in enumerate(moving)),
         frames=tuple(frames),
-        coupling=_coupling(model),
+        coupling=_coupling(tree),
     )
 
 
@@ -215,15 +213,15 @@ def joint_motion(body: Body, value: Array) -> tuple[Array, Array]:
     return body.R, body.p + rotate(body.R, body.axis * value[..., None])
 
 
-def _coupling(model: Model) -> Coupling | None:
-    moving = [joint for joint in model.joints if joint.moves]
+def _coupling(tree: Tree) -> Coupling | None:
+    moving = [joint for joint in tree.joints if joint.moves]
     if all(joint.mimic is None for joint in moving):
         return None
-    position = {name: index for index, name in enumerate(model.joint_names)}
+    position = {name: index for index, name in enumerate(tree.joint_names)}
     index, scale, offset = [], [], []
     for joint in moving:
         driver = joint.mimic
         index.append(position[joint.name if driver is None else driver.joint])
         scale.append(1.0 if driver is None else driver.multiplier)
         offset.append(0.0 if driver is None else driver.offset)
-    return Coupling(tuple(index), tuple(scale), tuple(offset), len(position), model.floating)
+    return Coupling(tuple(index), tuple(scale), tuple(offset), len(position), tree.floating)

@@ -3,33 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal, TypeVar
+from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
+from dynx.errors import ArgumentError, shown
 from dynx.files.notebook import html_grid
 from dynx.model import configuration, locking, topology
-from dynx.model.elements import IDENTITY, Frame, Inertial, Joint, Link, Note, Pose, Vector
-from dynx.model.geometry import Geometry
+from dynx.model.elements import IDENTITY, Frame, Joint, Link, Note, Pose, checked_pose
+from dynx.model.geometry.links import Geometry
 from dynx.model.mechanism import Mechanism, build_mechanism
 from dynx.model.number_bounds import refuse_unbounded_numbers
+from dynx.model.numbers import checked_gravity
+from dynx.model.tree import NO_GEOMETRY, STANDARD_GRAVITY, Base, Tree, checked_base
 from dynx.model.urdf.writer import write_urdf
 from dynx.registry import view
 from dynx.spatial.extended import longdouble
-from dynx.spatial.scalar import Floats
-
-Base = Literal["fixed", "floating"]
-Part = TypeVar("Part")
-STANDARD_GRAVITY: Vector = (0.0, 0.0, -9.81)
-NO_GEOMETRY = Geometry({})
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class Model(Tree):
     """A robot: links and joints in depth-first order, its base, and gravity.
 
     Create one with `dynx.load` or `Model.build`. Coordinates (`q`, `v`) list the moving joints in the order
@@ -43,24 +38,6 @@ class Model:
 
     Models are immutable; they compare by content (`==`), hash and pickle.
     """
-
-    name: str
-    links: tuple[Link, ...]
-    joints: tuple[Joint, ...]
-    base: Base = "fixed"
-    gravity: Vector = STANDARD_GRAVITY
-    extra_frames: tuple[Frame, ...] = ()
-    base_pose: Pose = IDENTITY
-    notes: tuple[Note, ...] = field(default=(), compare=False)
-    source: str = field(default="<memory>", compare=False)
-    geometry: Geometry = field(default=NO_GEOMETRY, compare=False)
-
-    def __post_init__(self) -> None:
-        if self.floating and self.base_pose != IDENTITY:
-            raise ArgumentError(
-                "base_pose is the pose of a fixed base; a floating base has its pose in q: position q[:3], "
-                "quaternion (x, y, z, w) q[3:7]"
-            )
 
     @classmethod
     def build(
@@ -92,107 +69,13 @@ class Model:
             name=name,
             links=tuple(ordered_links),
             joints=tuple(ordered_joints),
-            base=configuration.checked_base(base),
-            gravity=configuration.checked_gravity(gravity),
-            base_pose=configuration.checked_pose("base_pose", base_pose),
+            base=checked_base(base),
+            gravity=checked_gravity(gravity),
+            base_pose=checked_pose("base_pose", base_pose),
             notes=tuple(notes),
             source=source,
             geometry=geometry.for_links(link.name for link in ordered_links),
         )
-
-    # -- names and sizes ---------------------------------------------------------------------
-
-    @cached_property
-    def coordinate_joints(self) -> tuple[Joint, ...]:
-        """Joints with a coordinate of their own: they move and follow no other joint."""
-        return tuple(joint for joint in self.joints if joint.moves and joint.mimic is None)
-
-    @cached_property
-    def joint_names(self) -> tuple[str, ...]:
-        """Names of the coordinates, in order; name k belongs to ``v[k]``, after the 6 of a floating base."""
-        return tuple(joint.name for joint in self.coordinate_joints)
-
-    @cached_property
-    def frames(self) -> tuple[Frame, ...]:
-        """One frame per link, in depth-first order, then the added frames."""
-        return tuple(Frame(link.name, link.name) for link in self.links) + self.extra_frames
-
-    @cached_property
-    def frame_names(self) -> tuple[str, ...]:
-        """Names of all frames, in the order in which `forward_kinematics` stacks them."""
-        return tuple(frame.name for frame in self.frames)
-
-    @cached_property
-    def root(self) -> str:
-        """Name of the root link, whose frame is the base frame."""
-        return self.links[0].name
-
-    @cached_property
-    def floating(self) -> bool:
-        """True if the base moves freely."""
-        return self.base == "floating"
-
-    @cached_property
-    def nq(self) -> int:
-        """Length of a configuration `q`."""
-        return len(self.coordinate_joints) + (7 if self.floating else 0)
-
-    @cached_property
-    def nv(self) -> int:
-        """Length of a velocity `v`, an acceleration `a` and a torque `tau`."""
-        return len(self.coordinate_joints) + (6 if self.floating else 0)
-
-    @cached_property
-    def total_mass(self) -> float:
-        """Sum of the masses of the links [kg]."""
-        return float(sum(link.inertial.mass for link in self.links if link.inertial is not None))
-
-    def joint(self, name: str) -> Joint:
-        """Return the joint of that name (of any type); UnknownNameError if there is none."""
-        return self._named("joint", name, self._joint_by_name)
-
-    def link(self, name: str) -> Link:
-        """Return the link of that name; UnknownNameError if there is none."""
-        return self._named("link", name, self._link_by_name)
-
-    def frame_index(self, name: str) -> int:
-        """Return the index of the frame in `frame_names`; UnknownNameError if there is none."""
-        return self._named("frame", name, self._frame_index)
-
-    def coordinate_index(self, joint: str) -> int:
-        """Return the index of the joint's coordinate in `v` (one higher in `q` with a floating base)."""
-        offset = 6 if self.floating else 0
-        if joint in self.joint_names:
-            return offset + self.joint_names.index(joint)
-        found = self.joint(joint)
-        why = "it is locked" if found.locked_at is not None else "it is fixed"
-        if found.mimic is not None:
-            why = f"it follows {shown(found.mimic.joint)}"
-        raise UnknownNameError(f"joint {shown(joint)} of {self.name} has no coordinate: {why}")
-
-    # -- limits ------------------------------------------------------------------------------
-
-    @cached_property
-    def lower(self) -> Floats:
-        """Lower position limits (nq,); -inf for a continuous joint and for a floating base."""
-        return configuration.position_limits(self)[0]
-
-    @cached_property
-    def upper(self) -> Floats:
-        """Upper position limits (nq,)."""
-        return configuration.position_limits(self)[1]
-
-    @cached_property
-    def velocity_limit(self) -> Floats:
-        """Largest speed of each coordinate (nv,) [rad/s or m/s], inf for no limit."""
-        base = [np.inf] * (6 if self.floating else 0)
-        return np.array(base + [joint.limits.velocity for joint in self.coordinate_joints])
-
-    @cached_property
-    def effort_limit(self) -> Floats:
-        """Largest effort of each coordinate (nv,) [N m or N], inf for no limit."""
-        base = [np.inf] * (6 if self.floating else 0)
-        return np.array(base + [joint.limits.effort for joint in self.coordinate_joints])
 
     # -- configuration arithmetic ------------------------------------------------------------
 
@@ -220,7 +103,7 @@ class Model:
         """Return the same robot with that kind of base; `base_pose` is kept for a fixed base only, because a
         floating one has its pose in q."""
         base_pose = IDENTITY if base == "floating" else self.base_pose
-        return replace(self, base=configuration.checked_base(base), base_pose=base_pose)
+        return replace(self, base=checked_base(base), base_pose=base_pose)
 
     def with_base_pose(self, base_pose: Pose | ArrayLike) -> Model:
         """Return the same robot with its fixed base at another pose in the world.
@@ -228,11 +111,11 @@ class Model:
         `base_pose` is the pose of the root link: a `Pose`, or a matrix T_world_base (4, 4). Raises
         ArgumentError for a floating base, whose pose is in q.
         """
-        return replace(self, base_pose=configuration.checked_pose("base_pose", base_pose))
+        return replace(self, base_pose=checked_pose("base_pose", base_pose))
 
     def with_gravity(self, gravity: ArrayLike) -> Model:
         """Return the same robot with another gravity (3,) [m/s^2]."""
-        return replace(self, gravity=configuration.checked_gravity(gravity))
+        return replace(self, gravity=checked_gravity(gravity))
 
     def with_frame(self, name: str, link: str, placement: Pose | ArrayLike = IDENTITY) -> Model:
         """Return the same robot with one more named frame, fixed to `link` (a tool tip, say).
@@ -242,14 +125,10 @@ class Model:
         self.link(link)
         if not isinstance(name, str) or not name:
             raise ArgumentError(f"a frame's name is {shown(name)}; wanted a str that is not empty")
-        placement = configuration.checked_pose("placement", placement)
+        placement = checked_pose("placement", placement)
         if name in self._frame_index:
             raise ArgumentError(f"frame {shown(name)} exists already in {self.name}")
         return replace(self, extra_frames=(*self.extra_frames, Frame(name, link, placement)))
-
-    def inertial(self, link: str) -> Inertial:
-        """Return the inertial of a link; a link without one has no mass."""
-        return self.link(link).inertial or Inertial()
 
     def view(self, **options: Any) -> Any:
         """Show the robot in the browser; return the `dynx.viewer.Viewer`, which takes the options.
@@ -301,37 +180,6 @@ class Model:
     @cached_property
     def _hash(self) -> int:
         return hash(self._content)
-
-    @cached_property
-    def _joint_by_name(self) -> dict[str, Joint]:
-        return {joint.name: joint for joint in self.joints}
-
-    @cached_property
-    def _link_by_name(self) -> dict[str, Link]:
-        return {link.name: link for link in self.links}
-
-    @cached_property
-    def _frame_index(self) -> dict[str, int]:
-        return {name: index for index, name in enumerate(self.frame_names)}
-
-    def _named(self, kind: str, name: str, known: Mapping[str, Part]) -> Part:
-        try:
-            return known[name]
-        except (KeyError, TypeError):
-            raise UnknownNameError(self._unknown_name_message(kind, name, known)) from None
-
-    def _unknown_name_message(self, kind: str, name: object, known: Mapping[str, object]) -> str:
-        message = f"no {kind} {shown(name)} in {self.name}"
-        if not isinstance(name, str):
-            return f"{message}: a name is a str, not {type(name).__name__}"
-        if kind != "joint" and name in self._joint_by_name:
-            child = self._joint_by_name[name].child
-            return f"{message}: that is a joint; the {kind} it moves is {shown(child)}"
-        if kind == "joint" and name in self._link_by_name:
-            above = [joint.name for joint in self.joints if joint.child == name]
-            moved = f"; the joint that moves it is {shown(above[0])}" if above else ", the root"
-            return f"{message}: that is a link{moved}"
-        return message + nearest(name, known)
 
 
 def refuse_other_than_model(model: object) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from dynx.errors import DescriptionError, shown
-from dynx.model.configuration import MAX_MAGNITUDE
 from dynx.model.elements import Inertial, Joint, Link, Pose
+from dynx.model.numbers import MAX_MAGNITUDE
 
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError
-from dynx.model.configuration import checked_array, checked_quaternion
 from dynx.model.elements import RIGIDITY_TOLERANCE
+from dynx.model.numbers import checked_array, checked_quaternion
 from dynx.spatial import so3
 from dynx.spatial.scalar import Floats
 

@@ -11,7 +11,7 @@ from dynx.errors import DynxError
 from dynx.model import Model
 from dynx.model.elements import Inertial, Vector
 from dynx.model.loading import read_model
-from dynx.model.model import STANDARD_GRAVITY, Base
+from dynx.model.tree import STANDARD_GRAVITY, Base
 from dynx.model.xml.source import SourceElement, XmlSource
 
 

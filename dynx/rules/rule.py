@@ -15,7 +15,7 @@ from packaging.specifiers import SpecifierSet
 
 from dynx.loaded import engine_of
 from dynx.loaded.calls import call_on_joint
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.rules.case import Case
 
 Kind = Literal["difference", "practice"]

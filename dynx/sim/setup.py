@@ -12,7 +12,8 @@ from dynx.control.engine_motors import EngineMotor
 from dynx.control.saturation import checked_limit
 from dynx.errors import ArgumentError
 from dynx.model import Model
-from dynx.model.configuration import checked_array, checked_q, whole_number
+from dynx.model.configuration import checked_q
+from dynx.model.numbers import checked_array, whole_number
 from dynx.sim.loop.controller_checks import check_controller
 from dynx.sim.loop.references import SetpointOf, checked_reference
 from dynx.sim.plants.disturbances import Disturbances

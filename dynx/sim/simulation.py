@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ClosedError, SimulationError, shown
-from dynx.model.configuration import checked_array
+from dynx.model.numbers import checked_array
 from dynx.sim.loop.controller_checks import ControllerWatch
 from dynx.sim.loop.plain import Loop, LoopState
 from dynx.sim.loop.record import Record

@@ -16,7 +16,7 @@ import numpy as np
 
 from dynx.control.base import Measurement
 from dynx.model import Model
-from dynx.model.configuration import DIVERGENCE_SPEED
+from dynx.model.numbers import DIVERGENCE_SPEED
 from dynx.spatial.branchless import integrate
 from dynx.spatial.scalar import Array, Floats, sign
 

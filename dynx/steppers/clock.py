@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dynx.errors import ArgumentError, shown
-from dynx.model.configuration import is_real, positive_seconds
+from dynx.model.numbers import is_real, positive_seconds
 from dynx.spatial.scalar import Floats
 
 TIME_ROUNDING = 1e-9

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
-from dynx.model.configuration import checked_array, is_real
+from dynx.model.numbers import checked_array, is_real
 
 
 @dataclass(frozen=True)

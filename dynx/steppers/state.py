@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from dynx.errors import UnknownNameError, nearest, shown
-from dynx.model.configuration import DIVERGENCE_SPEED
+from dynx.model.numbers import DIVERGENCE_SPEED
 from dynx.spatial.scalar import Floats
 
 Part = TypeVar("Part")

@@ -8,7 +8,7 @@ from typing import Literal
 import pytest
 
 from dynx.errors import ArgumentError, nearest, shown
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.testing.robot_checks import CHECKS, Disagreement, measured_agreement, require_agreement
 from dynx.testing.robot_plan import path_or_name
 

@@ -12,7 +12,7 @@ from dynx.doctor.formats import Baseline, wording
 from dynx.doctor.formats.baseline import Difference
 from dynx.doctor.report import Effect
 from dynx.errors import DynxError
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.testing.robot_checks import Disagreement
 from dynx.testing.robot_plan import RobotPlan
 

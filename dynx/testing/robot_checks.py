@@ -15,7 +15,7 @@ from dynx.agreement.compared_quantities import compared_quantities
 from dynx.agreement.identities import IDENTITIES
 from dynx.errors import DynxError
 from dynx.model.loading import load
-from dynx.model.model import Base
+from dynx.model.tree import Base
 
 CHECKS: tuple[str, ...] = (
     *(quantity.name for quantity in compared_quantities()),

@@ -12,7 +12,7 @@ import pytest
 
 from dynx.errors import DynxError
 from dynx.model.loading import load
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.testing.robot_checks import CHECKS, Disagreement, measured_agreement, require_agreement
 from dynx.testing.robot_plan import PlannedRobot, RobotPlan
 

@@ -15,7 +15,7 @@ from dynx.errors import DynxError, RobotNotFoundError, shown
 from dynx.loaded.registry import ENGINES
 from dynx.model.expansion import ALL, RobotInput, expand, is_library_name
 from dynx.model.loading import load
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.model.xacro_robots import left_out_note
 
 if TYPE_CHECKING:

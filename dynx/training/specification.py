@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from dynx.errors import ArgumentError, shown
 from dynx.files.documents import convert_document, to_json_values
-from dynx.model.configuration import whole_number
+from dynx.model.numbers import whole_number
 
 
 @dataclass(frozen=True)

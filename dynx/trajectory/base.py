@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError
-from dynx.model.configuration import checked_entries, positive_seconds, real_array
+from dynx.model.numbers import checked_entries, positive_seconds, real_array
 from dynx.spatial.scalar import Floats
 
 

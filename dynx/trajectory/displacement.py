@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError
 from dynx.model import Model
-from dynx.model.configuration import checked_array, checked_entries, checked_q, real_array
+from dynx.model.configuration import checked_q
+from dynx.model.numbers import checked_array, checked_entries, real_array
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint, Trajectory, read_only_setpoint
 from dynx.trajectory.curve import Curve

@@ -22,8 +22,8 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, TrajectoryError
 from dynx.model import Model
-from dynx.model.configuration import whole_number
 from dynx.model.model import refuse_other_than_model
+from dynx.model.numbers import whole_number
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory, checked_duration, read_only

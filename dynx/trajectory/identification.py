@@ -12,7 +12,7 @@ import numpy as np
 from dynx.backends import backend as make_backend
 from dynx.errors import ShapeError
 from dynx.model import Model
-from dynx.model.configuration import whole_number
+from dynx.model.numbers import whole_number
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory

@@ -18,8 +18,9 @@ from dynx.backends import Backend
 from dynx.errors import ArgumentError, ShapeError, TrajectoryError, shown
 from dynx.ik import checked_targets
 from dynx.model import Model
-from dynx.model.configuration import checked_q, real_array
+from dynx.model.configuration import checked_q
 from dynx.model.model import refuse_other_than_model
+from dynx.model.numbers import real_array
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, pose_error

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError, TrajectoryError
-from dynx.model.configuration import real_array
+from dynx.model.numbers import real_array
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.displacement import Ends
 

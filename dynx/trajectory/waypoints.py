@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError, shown
-from dynx.model.configuration import checked_entries, real_array
+from dynx.model.numbers import checked_entries, real_array
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory, read_only_setpoint
 from dynx.trajectory.curve import PiecewisePolynomial

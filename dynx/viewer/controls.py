@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, shown
-from dynx.model.configuration import checked_array, checked_vector, is_real
+from dynx.model.numbers import checked_array, checked_vector, is_real
 from dynx.spatial.scalar import Floats
 from dynx.viewer.colours import BLUE, RGB
 from dynx.viewer.library import HOTKEYS

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dynx.errors import ArgumentError, shown
-from dynx.model.configuration import whole_number
+from dynx.model.numbers import whole_number
 from dynx.spatial.scalar import Floats
 from dynx.viewer.browser.client import NO_SOFTWARE_MESSAGE, Client
 from dynx.viewer.framing import VIEW_DIRECTION, fitting_distance, round_length

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, shown
 from dynx.files.reading import checked_path
-from dynx.model.configuration import whole_number
+from dynx.model.numbers import whole_number
 from dynx.spatial.scalar import Floats
 from dynx.viewer.controls import Controls
 from dynx.viewer.drawn_robot import Look

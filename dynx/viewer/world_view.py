@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ClosedError, DynxError, nearest, shown
-from dynx.model.configuration import checked_array
+from dynx.model.numbers import checked_array
 from dynx.viewer.contact_arrows import ContactArrows
 from dynx.viewer.drawn_robot import AS_DESCRIBED, Look
 from dynx.viewer.drawn_scene import DrawnScene

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from dynx.control.engine_motors import MotorCommand
 from dynx.errors import ArgumentError, ShapeError, UnknownNameError, nearest, shown
 from dynx.model import Model
-from dynx.model.configuration import checked_array
+from dynx.model.numbers import checked_array
 from dynx.spatial.scalar import Floats
 from dynx.steppers.layout import Layout, RobotLayout
 from dynx.steppers.stepper import Stepper, Torque

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from dynx.errors import ArgumentError, DynxError
-from dynx.model.configuration import positive_seconds, whole_number
 from dynx.model.mechanism import ROOT
+from dynx.model.numbers import positive_seconds, whole_number
 from dynx.rbd.kinematics import body_poses
 from dynx.spatial.scalar import Floats
 from dynx.steppers.state import WorldState

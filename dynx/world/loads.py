@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from dynx.backends import Backend, backend
 from dynx.backends.hooks import cholesky_solver
 from dynx.errors import ArgumentError, ShapeError, UnknownNameError, nearest, shown
-from dynx.model.configuration import checked_array, checked_entries, real_array
+from dynx.model.numbers import checked_array, checked_entries, real_array
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross

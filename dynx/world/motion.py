@@ -8,7 +8,7 @@ from typing import NoReturn
 import numpy as np
 
 from dynx.errors import ClosedError, DivergedError, EngineError
-from dynx.model.configuration import DIVERGENCE_SPEED
+from dynx.model.numbers import DIVERGENCE_SPEED
 from dynx.steppers.layout import Layout
 from dynx.steppers.state import PartStates, WorldState, has_diverged
 from dynx.steppers.stepper import Stepper, Torque

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, GainError, ShapeError, UnknownNameError, nearest, shown
 from dynx.model import Model
-from dynx.model.configuration import checked_entries, real_array
+from dynx.model.numbers import checked_entries, real_array
 from dynx.spatial.scalar import Floats
 
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from dynx.distance import Distance
 from dynx.errors import ArgumentError, ShapeError, UnknownNameError, shown
-from dynx.model.configuration import MAX_MAGNITUDE, checked_array, checked_vector, is_real
+from dynx.model.numbers import MAX_MAGNITUDE, checked_array, checked_vector, is_real
 from dynx.spatial.scalar import Floats
 from dynx.steppers.layout import Layout
 from dynx.steppers.state import WorldState

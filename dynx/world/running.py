@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
-from dynx.model.configuration import positive_seconds
+from dynx.model.numbers import positive_seconds
 
 TIME_ROUNDING = 1e-9
 """Tolerance within which the ratio of two times counts as a whole number."""

@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError, UnknownNameError, nearest, shown
 from dynx.model import Pose
-from dynx.model.configuration import checked_array, checked_q, is_real
+from dynx.model.configuration import checked_q
+from dynx.model.numbers import checked_array, is_real
 from dynx.steppers.layout import BodyLayout, Layout, RobotLayout
 from dynx.steppers.state import BodyState, RobotState, WorldState
 from dynx.steppers.stepper import Stepper

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from dynx.errors import ArgumentError
 from dynx.ik.avoidance import Avoidance
 from dynx.model import Model
-from dynx.model.configuration import positive_seconds, whole_number
+from dynx.model.numbers import positive_seconds, whole_number
 from dynx.model.package_paths import StrPath
 from dynx.option_names import checks_option_names
 from dynx.registry import view

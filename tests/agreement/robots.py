@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from dynx.model import Inertial, Joint, Limits, Link, Mimic, Model, Pose
 from dynx.model.elements import JointDynamics
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.rbd.jacobians import Reference
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats

@@ -12,7 +12,7 @@ from dynx.agreement.tolerances import BAR
 from dynx.backends import installed_backends
 from dynx.errors import ArgumentError, ClosedError, UnknownBackendError
 from dynx.model import Model
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.reference.backend import ReferenceBackend
 from dynx.testing.strategies import models
 from tests.agreement.robots import DEFECTS, Broken, arm, massless_chain, massless_finger, pendulum, rock

@@ -10,7 +10,7 @@ from dynx.agreement.magnitudes import Magnitudes
 from dynx.agreement.sampling import draw_samples
 from dynx.backends import Backend
 from dynx.model import Inertial, Joint, Link, Model
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 from tests.agreement.robots import BODY, Broken, GravityUpsideDown, TransposedRotation, arm

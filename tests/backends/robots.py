@@ -11,7 +11,7 @@ from dynx.agreement.tolerances import BAR
 from dynx.backends import Backend
 from dynx.model import Joint, JointDynamics, Link, Mimic, Model
 from dynx.model.elements import Inertial, JointType, Pose, Vector
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.spatial.scalar import Floats
 
 BASES: tuple[Base, ...] = ("fixed", "floating")

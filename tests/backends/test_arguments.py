@@ -20,7 +20,7 @@ from dynx.errors import (
     SingularMassMatrixError,
     UnknownNameError,
 )
-from dynx.model.configuration import MAX_MAGNITUDE
+from dynx.model.numbers import MAX_MAGNITUDE
 from dynx.spatial.scalar import Floats
 from tests.backends.robots import chain, motion
 

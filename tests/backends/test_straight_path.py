@@ -26,7 +26,7 @@ from dynx.errors import (
     UnknownNameError,
 )
 from dynx.model import Model
-from dynx.model.configuration import MAX_MAGNITUDE
+from dynx.model.numbers import MAX_MAGNITUDE
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models

@@ -10,7 +10,7 @@ from dynx.bench.backend_implementations import backend_implementation
 from dynx.bench.cases import BENCHMARK_QUANTITIES, BenchmarkCase, draw_batch
 from dynx.bench.measurement import measure
 from dynx.errors import UnknownBackendError
-from dynx.model.model import Base
+from dynx.model.tree import Base
 
 
 @pytest.mark.parametrize("count", [1, 5])

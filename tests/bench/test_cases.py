@@ -14,7 +14,7 @@ from dynx.bench.cases import (
     require_memory,
 )
 from dynx.errors import ArgumentError, UnknownNameError
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.reference.backend import ReferenceBackend
 
 

@@ -11,7 +11,7 @@ from dynx.bench.cases import BENCHMARK_QUANTITIES, draw_batch
 from dynx.bench.checking import CHECKED_AT_ENDS, Judge, checked_rows
 from dynx.errors import SingularMassMatrixError
 from dynx.model import Joint, Link, Model
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 

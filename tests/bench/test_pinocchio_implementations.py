@@ -17,7 +17,7 @@ from dynx.bench.pinocchio_implementations import (
     pinocchio_implementations,
     without_mimics,
 )
-from dynx.model.model import Base
+from dynx.model.tree import Base
 
 ROBOTS: tuple[tuple[str, Base], ...] = (
     ("pendulum", "fixed"),

@@ -13,7 +13,7 @@ from dynx.compiled.backend import CompiledBackend
 from dynx.compiled.call import MAX_COPIED_SAMPLES
 from dynx.errors import ArgumentError, NotFiniteError, ShapeError, SingularMassMatrixError
 from dynx.model import Inertial, Joint, Link, Model, Pose
-from dynx.model.configuration import MAX_MAGNITUDE
+from dynx.model.numbers import MAX_MAGNITUDE
 from tests.backends.robots import chain
 from tests.compiled.robots import ROBOTS, made, state
 from tests.error_bounds import ErrorBounds, samples_at

@@ -11,7 +11,7 @@ from dynx.compiled.backend import CompiledBackend
 from dynx.compiled.call import MAX_COPIED_SAMPLES, KernelCall
 from dynx.errors import ArgumentError, DTypeError, DynxError, ShapeError
 from dynx.model import Model
-from dynx.model.configuration import MAX_MAGNITUDE
+from dynx.model.numbers import MAX_MAGNITUDE
 from dynx.simd.target import host
 from dynx.spatial.scalar import Floats
 from tests.backends.robots import chain

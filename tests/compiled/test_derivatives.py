@@ -34,7 +34,7 @@ from dynx.errors import (
     UnknownNameError,
 )
 from dynx.model import Link, Model
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.rbd import rnea
 from dynx.rbd.derivatives import inverse_dynamics_derivatives as closed_form
 from dynx.reference.backend import ReferenceBackend

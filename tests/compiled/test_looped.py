@@ -14,7 +14,7 @@ from dynx.backends.quantities import QUANTITIES
 from dynx.compiled.call import MAX_COPIED_SAMPLES
 from dynx.compiled.looped.kernels import LOOPED
 from dynx.model import Model
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.simd.target import host
 from dynx.spatial.scalar import Floats
 from tests.backends.robots import mixed_robot

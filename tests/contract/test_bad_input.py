@@ -23,8 +23,8 @@ from dynx.errors import (
     UnknownBackendError,
     UnknownNameError,
 )
-from dynx.model.configuration import MAX_MAGNITUDE
 from dynx.model.loading import load
+from dynx.model.numbers import MAX_MAGNITUDE
 from tests.contract.conftest import Make
 from tests.contract.engine_calls import ENGINE_CALLS, EngineCall, State, random_state
 from tests.contract.robots import branched

@@ -27,7 +27,7 @@ from dynx.engines.silence import silence
 from dynx.errors import DynxError
 from dynx.loaded import installed_engines
 from dynx.loaded.registry import loader_class
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
 from dynx.workers import Workers
 

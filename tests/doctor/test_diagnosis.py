@@ -17,7 +17,7 @@ from dynx.doctor import DoctorReport, compare_as_loaded, diagnose, results_docum
 from dynx.errors import ArgumentError, NotInstalledError, UnknownBackendError, UnknownNameError
 from dynx.loaded import ENGINES, installed_engines, loader_class, registry
 from dynx.model import Model
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.rules import Rule, all_rules
 from dynx.rules.traps import find_trap, trap_case
 from dynx.testing.strategies import models

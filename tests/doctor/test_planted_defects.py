@@ -8,7 +8,7 @@ from __future__ import annotations
 import pytest
 
 from dynx.loaded import ENGINES, installed_engines, loader_class
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.rules import all_rules
 from tests.doctor.planting.catalogue import EXEMPT, PLANTERS
 from tests.doctor.planting.judging import complaint_about_clean, judge

@@ -14,7 +14,7 @@ from dynx.agreement.tolerances import BAR
 from dynx.doctor import diagnose
 from dynx.loaded import installed_engines
 from dynx.model.library import find
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from tests.doctor.raw_agreement import beside, difference, run_script, task
 
 ROBOTS = [

@@ -7,7 +7,7 @@ import numpy as np
 from dynx.loaded import LoadedModel, LoadedRobot
 from dynx.loaded.difference import model_difference
 from dynx.model import Inertial, Joint, JointDynamics, Limits, Link, Model, Pose
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from tests.loaded.files import TILTED, loaded
 
 BASES: tuple[Base, ...] = ("fixed", "floating")

@@ -15,7 +15,7 @@ from dynx.loaded import LoadedInertial, LoadedJoint, LoadedModel
 from dynx.loaded.difference import ROUNDING, Deviation, model_difference
 from dynx.model import Inertial, Joint, JointDynamics, Limits, Link, Model, Pose
 from dynx.model.mechanism import build_mechanism
-from dynx.model.model import STANDARD_GRAVITY
+from dynx.model.tree import STANDARD_GRAVITY
 from dynx.spatial.so3 import rotation_from_rpy, skew
 from tests.loaded.files import TILTED, file_robots
 

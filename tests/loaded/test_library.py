@@ -15,7 +15,7 @@ from dynx.loaded.difference import model_difference
 from dynx.model import Model
 from dynx.model.library import EXAMPLE_ROBOT_DATA, robots
 from dynx.model.loading import load
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
 from dynx.reference.backend import ReferenceBackend
 from tests.backends.robots import motion

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import copy
 import dataclasses
 import pickle
+import zlib
 from typing import Any
 
 import numpy as np
@@ -12,10 +14,22 @@ import pytest
 from hypothesis import given
 
 from dynx.errors import ArgumentError, UnknownNameError
-from dynx.model import Link, Model, Pose
+from dynx.model import Inertial, Joint, Limits, Link, Model, Pose
 from dynx.model.loading import load
 from dynx.model.model import refuse_other_than_model
 from dynx.testing.strategies import models
+
+PICKLED_BEFORE_TREE = (
+    "eNp9U82O0zAQLuSnabcrVuLEiQMX9tInQHBBqkBLBU8QOcmkNuvEkeN0k0oIOCx7mVvDlefgBk/BS3DhERinaVq0aHNwPN/M"
+    "eL75PP7kfv3ljLoPz5Imr+eZSkDuVvTe2N/2/POHp+jmLIMWHaYz9KTIL0t8eJQAEjLITdmie0HObWuT+AjdiJWUFogctBFM"
+    "tkt0KRvaZRXx+32QY0TRcpffw+BVH9cXzVhZLl786Rn6SouVyFsKdN+qEnZV0KmbTbsY9d/tzQ3R1kXT8mkVoSPq+nAiWc0Q"
+    "Z63NsdU0x5HNP77NZvBxzzZjly/ov1eCZCCG3mu72/YteiAjdYWuaQrAQMNaycoA+gXTJBt30Iu5kAn3+ZgHXc6ET/lJR9ll"
+    "tTio8J/+0JciE11V/6Lb7eTzpLoCvfix78GrioLsoadgDVLFwjSLj4PEkKZKmwGg8gFdM8tEbI8/7Zp62QO7KuOEZYXIVwd1"
+    "glSL2AiVH0E0N8xUGgaITvYyIhsvcUIsLiEJmVl2Ml5bPVJRQ4LjlWZry/D29f588u37u9/Xj29wBrXRLEw1jWh5jhM7c2FB"
+    "A7KX8q7h4Cd3eS3LXBl7rF+qSsd0e88yyJRunmOwApWB0Q0+OnoKe3DevRKa/UUPWLnwLOzgUOlQA0tAEz+Hz3Bmn81RZGuV"
+    "XYuyYpJqT2MlpShJUjJmOzhMWSXNEh8Mvh6hYfT5aVVGVTT/C6BUKCE="
+)
+"""A pickle of a model as written before `Tree` was split off, compressed, in base 64."""
 
 
 @given(models())
@@ -107,3 +121,11 @@ def test_a_notebook_shows_the_joints() -> None:
     assert page.count("<tr>") == 1 + model.nv
     assert "<td>shoulder</td>" in page
     assert "fixed base, nq 2, nv 2" in page
+
+
+def test_a_model_pickled_before_tree_was_split_off_is_read() -> None:
+    read = pickle.loads(zlib.decompress(base64.b64decode(PICKLED_BEFORE_TREE)))
+    tip = Inertial(1.0, ixx=1.0, iyy=1.0, izz=1.0)
+    elbow = Joint("elbow", "revolute", "base", "tip", limits=Limits(-1.0, 1.0))
+    assert read == Model.build("arm", [Link("base"), Link("tip", tip)], [elbow])
+    assert read.upper.tolist() == [1.0]

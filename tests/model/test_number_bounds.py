@@ -15,8 +15,8 @@ from dynx.backends import backend
 from dynx.control import PD, OpenLoop, Saturated
 from dynx.errors import ArgumentError, DescriptionError, DTypeError, DynxError, SingularMassMatrixError
 from dynx.model import Inertial, Joint, JointDynamics, Limits, Link, Mimic, Model, Pose
-from dynx.model.configuration import MAX_MAGNITUDE
 from dynx.model.loading import load
+from dynx.model.numbers import MAX_MAGNITUDE
 from dynx.sim import Noise, Payload, Push, Scenario, simulate, simulate_batch
 
 LARGE = 0.9 * MAX_MAGNITUDE

@@ -7,7 +7,7 @@ import pytest
 
 import dynx
 from dynx.model import Model
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.rbd.elimination import (
     factorize_mass_matrix,
     filled_entries,

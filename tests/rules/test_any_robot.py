@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from dynx.agreement.tolerances import BAR
 from dynx.doctor.examine.reference_values import TILTED_GRAVITY
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, Rule, all_rules
 from dynx.testing.strategies import urdf_text

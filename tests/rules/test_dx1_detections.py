@@ -11,7 +11,7 @@ from dynx.agreement.tolerances import BAR
 from dynx.engines.pybullet.inertia_checks import diagonalisation_error
 from dynx.model.elements import Inertial, Pose
 from dynx.model.library import DYNX_MODELS, robots
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.model.xml.source import Edit, XmlSource
 from dynx.rules import Case, all_rules, find_rule
 from dynx.rules.inertia.edits import inertial_edits, with_inertials

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 import dynx
 from dynx.model import Inertial, Model
 from dynx.model.library import EXAMPLE_ROBOT_DATA, robots
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, Remedy, all_rules, find_rule
 from dynx.rules.inertia.central import CentralInertia

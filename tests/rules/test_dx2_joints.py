@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from dynx.doctor.prove.mending import mend
 from dynx.model import Model
 from dynx.model.loading import load
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
 from dynx.reference.backend import ReferenceBackend
 from dynx.rules import Case, find_rule

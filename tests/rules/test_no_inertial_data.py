@@ -9,7 +9,7 @@ import pytest
 from dynx.doctor import DoctorReport, diagnose
 from dynx.doctor.report_document import results_document
 from dynx.loaded import installed_engines
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from tests.rules.documents import case_of, joint, link
 
 DYNAMICS = {"mass_matrix", "inverse_dynamics", "forward_dynamics"}

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.model.configuration import DIVERGENCE_SPEED
+from dynx.model.numbers import DIVERGENCE_SPEED
 from dynx.sim.step import (
     MAX_SQUARED_SPEED,
     held_at_limits,

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import dynx
 from dynx.model import Model
+from dynx.model.tree import Base
 from dynx.rbd.crba import mass_matrix
 from dynx.spatial.scalar import Floats
 from dynx.steppers.conditioning import condition_bound, mass_matrix_of_floats, singular_direction
@@ -47,7 +48,7 @@ def test_the_condition_is_bounded_from_above(n: int, seed: int, spread: float) -
 
 
 @pytest.mark.parametrize("base", ["fixed", "floating"])
-def test_a_robot_with_a_massless_joint_is_found(base: dynx.model.model.Base) -> None:
+def test_a_robot_with_a_massless_joint_is_found(base: Base) -> None:
     model = dynx.load("romeo", base=base)
     found = singular_direction(model, model.neutral())
     assert found is not None

@@ -13,6 +13,7 @@ from dynx.errors import UnknownNameError
 from dynx.model import configuration
 from dynx.model.elements import IDENTITY
 from dynx.model.geometry import Box, Collision
+from dynx.model.tree import Base
 from dynx.world import Scene, SceneBody, SceneRobot, World, Wrench, box, read_scene
 from tests.world.engines import WORLDS
 
@@ -111,7 +112,7 @@ def test_the_state_that_is_set_is_the_one_that_is_read(engine: str) -> None:
 
 @pytest.mark.parametrize("base", ["fixed", "floating"])
 @pytest.mark.parametrize("name", ["six_axis_arm", "panda"])
-def test_a_wrench_on_a_link_acts_as_its_torque(engine: str, name: str, base: dynx.model.model.Base) -> None:
+def test_a_wrench_on_a_link_acts_as_its_torque(engine: str, name: str, base: Base) -> None:
     model = dynx.load(name, base=base)
     q = configuration.random(model, 1)
     force, moment, point = np.array([3.0, -2.0, 5.0]), np.array([0.3, 0.1, -0.2]), np.array([0.1, 0, 0.05])
@@ -132,7 +133,7 @@ FREE = {"collisions": False, "joint_limits": False, "joint_damping": False}
 
 @pytest.mark.parametrize("base", ["fixed", "floating"])
 @pytest.mark.parametrize("name", ["ur5", "panda"])
-def test_robots_step_as_simulate_does(engine: str, name: str, base: dynx.model.model.Base) -> None:
+def test_robots_step_as_simulate_does(engine: str, name: str, base: Base) -> None:
     if engine not in ("pybullet", "mujoco"):
         pytest.skip("the plant of this engine has another scheme")
     model = dynx.load(name, base=base)

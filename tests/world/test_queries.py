@@ -12,7 +12,7 @@ import dynx
 from dynx import Pose
 from dynx.errors import ShapeError, UnknownNameError
 from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, Shape, Sphere
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.spatial.so3 import rotation_from_rpy
 from dynx.world import Scene, SceneBody, SceneRobot, World, box, ground, sphere
 from dynx.world.geometry.boxes import shape_box

@@ -16,7 +16,7 @@ import dynx
 from dynx.backends import backend
 from dynx.errors import DynxError
 from dynx.model.library import robots
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.spatial.scalar import Floats
 from dynx.world import Scene, SceneRobot, World, ground
 from dynx.world.geometry.boxes import shape_box

@@ -19,7 +19,7 @@ from dynx.cli.shell.run import Run, carry_out
 from dynx.cli.shell.terminal import console, write_json
 from dynx.errors import DynxError
 from dynx.model.expansion import expand, refusals
-from dynx.model.model import Base
+from dynx.model.tree import Base
 
 AgreementRun = Run[AgreementTask, AgreementReport]
 

@@ -25,7 +25,7 @@ from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.output_file import check_json
 from dynx.cli.shell.progress import progress_bar
 from dynx.cli.shell.terminal import counted, present
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.simd.machine import core_count
 
 

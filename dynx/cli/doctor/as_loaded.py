@@ -23,7 +23,7 @@ from dynx.doctor.formats.vote import Vote, largest_error, largest_quantity_error
 from dynx.doctor.report import DoctorReport, EngineResult
 from dynx.doctor.task import DoctorTask, check_engines, missing_engines
 from dynx.model.expansion import expand, refusals
-from dynx.model.model import Base
+from dynx.model.tree import Base
 
 
 def compare(

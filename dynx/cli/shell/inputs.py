@@ -11,10 +11,11 @@ import numpy as np
 from dynx.cli.shell.exits import one_line
 from dynx.errors import ArgumentError, NotInstalledError, UnknownNameError, nearest, shown
 from dynx.model import Model, Pose
-from dynx.model.configuration import checked_array, checked_q
+from dynx.model.configuration import checked_q
 from dynx.model.loading import load
-from dynx.model.model import Base
+from dynx.model.numbers import checked_array
 from dynx.model.topology import longest_chain_end
+from dynx.model.tree import Base
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_quat, rotation_from_rpy

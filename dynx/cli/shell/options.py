@@ -132,7 +132,7 @@ def finite_number(word: str) -> float:
         ) from None
     if not math.isfinite(number):
         raise click.BadParameter(f"{shown(word)} is not finite")
-    bound = import_object("dynx.model.configuration:MAX_MAGNITUDE")
+    bound = import_object("dynx.model.numbers:MAX_MAGNITUDE")
     if not abs(number) < bound:
         raise click.BadParameter(f"{shown(word)} is not below {bound:g} in magnitude")
     return number

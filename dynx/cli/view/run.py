@@ -12,7 +12,7 @@ from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.output_file import check_writable
 from dynx.cli.shell.terminal import console
 from dynx.cli.view.targets import check_options, kind_of_targets, load_robot, single_engine
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.viewer import Viewer
 
 

@@ -9,7 +9,7 @@ from dynx.errors import ArgumentError, RobotNotFoundError, nearest, shown
 from dynx.model import Model
 from dynx.model.library import robots, scene_names
 from dynx.model.loading import load
-from dynx.model.model import Base
+from dynx.model.tree import Base
 
 _SCENES = (".toml", ".json")
 _ROLLOUTS = (".npz", ".mcap")

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import dynx.compiled.defect
 import dynx.compiled.looped
-import dynx.model.configuration
 import dynx.model.mechanism
+import dynx.model.numbers
 import dynx.rbd
 import dynx.spatial
 from dynx.backends.quantities import QUANTITIES
@@ -91,5 +91,5 @@ def _code(name: str) -> tuple[RoutineSet, RoutineCode]:
 @cache
 def _algorithms() -> str:
     """Return the hash of the source of everything that is traced."""
-    modules = (dynx.model.configuration, dynx.model.mechanism, dynx.compiled.defect)
+    modules = (dynx.model.numbers, dynx.model.mechanism, dynx.compiled.defect)
     return source_version(dynx.rbd, dynx.spatial, dynx.compiled.looped, *modules)

@@ -21,7 +21,7 @@ from dynx.doctor.examine.reference_values import (
 from dynx.engines.silence import silence
 from dynx.errors import DynxError, UnusableEngineError
 from dynx.loaded import LoadedModel, LoadedRobot, loader_class
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
 from dynx.rules.case import Case
 from dynx.rules.inertia.massless_links import has_inertial_data

@@ -18,7 +18,7 @@ from dynx.backends.solvability import singular_coordinates
 from dynx.model import Model
 from dynx.model.elements import Vector
 from dynx.model.loading import read_model
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats

@@ -21,7 +21,7 @@ from dynx.engines.pybullet.library import bullet, bullet_version
 from dynx.engines.pybullet.robot import BulletRobot
 from dynx.errors import ArgumentError, ClosedError, EngineError
 from dynx.model import Model
-from dynx.model.configuration import checked_array
+from dynx.model.numbers import checked_array
 from dynx.rbd.jacobians import Reference
 from dynx.spatial.scalar import Floats
 

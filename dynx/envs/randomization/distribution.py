@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
-from dynx.model.configuration import MAX_MAGNITUDE, is_real
+from dynx.model.numbers import MAX_MAGNITUDE, is_real
 from dynx.spatial.scalar import Floats
 
 Range = float | Sequence[float] | Mapping[str, Sequence[float]]

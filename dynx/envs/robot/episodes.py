@@ -21,7 +21,7 @@ from dynx.envs.robot.variation import RobotVariation
 from dynx.envs.robot.varied_robot import VariedRobot
 from dynx.envs.task import Episodes, Outcome
 from dynx.errors import DivergedError, ShapeError
-from dynx.model.configuration import DIVERGENCE_SPEED
+from dynx.model.numbers import DIVERGENCE_SPEED
 from dynx.spatial.scalar import Array, Floats
 
 

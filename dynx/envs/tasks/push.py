@@ -21,8 +21,8 @@ from dynx.envs.world.scene_task import Episode
 from dynx.envs.world.task import WorldTask
 from dynx.errors import ArgumentError, nearest, shown
 from dynx.model import Model, Pose
-from dynx.model.configuration import checked_array
 from dynx.model.loading import load
+from dynx.model.numbers import checked_array
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross

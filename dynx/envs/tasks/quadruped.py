@@ -21,8 +21,8 @@ from dynx.envs.world.scene_task import Episode
 from dynx.envs.world.task import WorldTask
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
-from dynx.model.configuration import is_real
 from dynx.model.loading import load
+from dynx.model.numbers import is_real
 from dynx.model.rotations import quat_from_rpy
 from dynx.spatial.plain import Vector3, rotation_rows
 from dynx.spatial.scalar import Floats

@@ -17,7 +17,7 @@ from dynx.envs.robot.varied_robot import VariedRobot
 from dynx.envs.vector.checks import checked_actions, checked_mode, checked_reset_mask, raise_defect
 from dynx.envs.vector.kernels import INVALID, VectorKernels
 from dynx.errors import ArgumentError, ClosedError, EpisodeError, ShapeError, nearest, shown
-from dynx.model.configuration import checked_array, whole_number
+from dynx.model.numbers import checked_array, whole_number
 from dynx.simd.target import host
 from dynx.spatial.scalar import Floats
 

@@ -21,7 +21,7 @@ from dynx.envs.robot.step import control_step
 from dynx.envs.robot.varied_robot import VariedRobot
 from dynx.envs.vector.layout import Layout
 from dynx.errors import ArgumentError, ShapeError, TraceError, UnsupportedFeatureError
-from dynx.model.configuration import DIVERGENCE_SPEED
+from dynx.model.numbers import DIVERGENCE_SPEED
 from dynx.sim.batch.traced_controller import ArrayDynamics
 from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.kernel import Kernel

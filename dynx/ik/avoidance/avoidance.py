@@ -13,7 +13,7 @@ from dynx.ik.avoidance.parts import Pair, Part, Separation, adapted_pairs, place
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.tasks import Kinematics
 from dynx.model import Model
-from dynx.model.configuration import is_real
+from dynx.model.numbers import is_real
 from dynx.spatial.scalar import Floats
 
 MAX_MARGIN = 10.0

@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 
 import dynx.ik.coordinates
 import dynx.ik.targets
-import dynx.model.configuration
+import dynx.model.numbers
 import dynx.rbd
 import dynx.spatial
 from dynx.ik.closed_form.branches import N_BRANCHES, SIGNS
 from dynx.ik.closed_form.candidates import ARBITRARY, POSITION, ROTATION, SEPARATION, VIOLATION, Candidates
 from dynx.ik.closed_form.review import AT_LIMIT, ROUNDING
 from dynx.ik.targets import ROUNDING_TOLERANCE
-from dynx.model.configuration import MAX_MAGNITUDE
+from dynx.model.numbers import MAX_MAGNITUDE
 from dynx.simd.cache import source_version
 from dynx.simd.trace import trace
 from dynx.simd.variants import BoundVariants, VariantKernel, Variants, load_variants
@@ -196,5 +196,5 @@ def _algorithms() -> str:
     """Return the hash of the source of the packages that the kernel is traced from."""
     own = sys.modules[__name__.rpartition(".")[0]]
     return source_version(
-        own, dynx.ik.coordinates, dynx.ik.targets, dynx.model.configuration, dynx.rbd, dynx.spatial
+        own, dynx.ik.coordinates, dynx.ik.targets, dynx.model.numbers, dynx.rbd, dynx.spatial
     )

@@ -15,8 +15,8 @@ import numpy as np
 
 from dynx.errors import ArgumentError, NoClosedFormError, UnknownNameError, nearest, shown
 from dynx.model import Model
-from dynx.model.configuration import MAX_MAGNITUDE, is_real
 from dynx.model.mechanism import joint_motion
+from dynx.model.numbers import MAX_MAGNITUDE, is_real
 from dynx.rbd.kinematics import ancestry
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous

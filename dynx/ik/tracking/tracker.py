@@ -24,14 +24,8 @@ from dynx.ik.tracking.path import PathTracker, TrackedPath, TrackLimits
 from dynx.ik.tracking.reason import FailureExplainer
 from dynx.ik.tracking.result import TrackResult
 from dynx.model import Model
-from dynx.model.configuration import (
-    checked_q,
-    checked_vector,
-    is_real,
-    positive_seconds,
-    real_array,
-    whole_number,
-)
+from dynx.model.configuration import checked_q
+from dynx.model.numbers import checked_vector, is_real, positive_seconds, real_array, whole_number
 from dynx.option_names import checks_option_names
 from dynx.spatial.scalar import Floats
 

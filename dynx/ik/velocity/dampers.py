@@ -16,7 +16,7 @@ from dynx.errors import ArgumentError, shown
 from dynx.ik.avoidance import AvoidanceSource
 from dynx.ik.checking import checked_avoidance
 from dynx.ik.tasks import Kinematics
-from dynx.model.configuration import is_real
+from dynx.model.numbers import is_real
 from dynx.spatial.scalar import Floats
 
 FREE_SPEED = 1.0

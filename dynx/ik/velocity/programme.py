@@ -17,7 +17,8 @@ from dynx.ik.velocity.library import solve_programme
 from dynx.ik.velocity.limits import joints_outside, velocity_bounds
 from dynx.ik.velocity.tasks import VelocityTask
 from dynx.model import Model
-from dynx.model.configuration import checked_array, checked_q, is_real, positive_seconds, real_array
+from dynx.model.configuration import checked_q
+from dynx.model.numbers import checked_array, is_real, positive_seconds, real_array
 from dynx.option_names import checks_option_names
 from dynx.spatial.scalar import Floats
 

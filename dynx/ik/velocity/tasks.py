@@ -11,7 +11,7 @@ from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.ik.residual import Residual
 from dynx.ik.targets import checked_targets
 from dynx.ik.tasks import Kinematics, frame_jacobian
-from dynx.model.configuration import checked_array, checked_vector, is_real, real_array
+from dynx.model.numbers import checked_array, checked_vector, is_real, real_array
 from dynx.option_names import checks_field_names
 from dynx.spatial.scalar import Floats
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from dynx.errors import ArgumentError, DescriptionError, UnknownNameError, nearest, shown
-from dynx.model.configuration import checked_pose
-from dynx.model.elements import IDENTITY, Pose
+from dynx.model.elements import IDENTITY, Pose, checked_pose
 from dynx.model.geometry.mesh import Mesh
 from dynx.model.geometry.shapes import Box, Capsule, Cylinder, HeightField, Plane, Sphere
 from dynx.model.geometry.sizes import colour

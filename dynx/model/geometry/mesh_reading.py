@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from dynx.errors import DescriptionError, DynxError, shown
 from dynx.files.reading import printable, read_file
-from dynx.model.configuration import MAX_MAGNITUDE
 from dynx.model.geometry.formats.collada import collada_triangles
 from dynx.model.geometry.formats.gltf import gltf_triangles
 from dynx.model.geometry.formats.obj import obj_triangles
 from dynx.model.geometry.formats.stl import stl_triangles
+from dynx.model.numbers import MAX_MAGNITUDE
 from dynx.spatial.scalar import Floats
 
 Triangles = tuple[Floats, NDArray[np.intp]]

@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from dynx.errors import ArgumentError, ShapeError
-from dynx.model.configuration import checked_entries, real_array
 from dynx.model.elements import Vector
 from dynx.model.geometry.sizes import positive_number, positive_numbers
+from dynx.model.numbers import checked_entries, real_array
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dynx.errors import ArgumentError, ShapeError, shown
-from dynx.model.configuration import MAX_MAGNITUDE, checked_array, is_real
 from dynx.model.elements import Vector
+from dynx.model.numbers import MAX_MAGNITUDE, checked_array, is_real
 
 
 def positive_number(name: str, value: object) -> float:

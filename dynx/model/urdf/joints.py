@@ -6,8 +6,8 @@ import math
 import sys
 
 from dynx.errors import nearest, shown
-from dynx.model.configuration import MAX_MAGNITUDE
 from dynx.model.elements import INFINITY, Joint, JointDynamics, JointType, Limits, Mimic, Vector
+from dynx.model.numbers import MAX_MAGNITUDE
 from dynx.model.urdf.origins import read_origin
 from dynx.model.urdf.values import Reading
 from dynx.model.xml.reading import Element

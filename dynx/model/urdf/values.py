@@ -9,8 +9,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from dynx.errors import DescriptionError, UnsupportedFeatureError, escaped, shown
-from dynx.model.configuration import MAX_MAGNITUDE
 from dynx.model.elements import Note, Vector
+from dynx.model.numbers import MAX_MAGNITUDE
 from dynx.model.xml.reading import Element
 
 MAX_NAME = 1000

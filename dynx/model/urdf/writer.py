@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from dynx.errors import DescriptionError
 from dynx.model.elements import Inertial, Joint, JointDynamics, Pose, Vector
+from dynx.model.tree import Tree
 from dynx.model.urdf.joints import FRAME_TAG, LOCKED_TAG
 from dynx.model.urdf.shapes import write_shapes
 from dynx.model.urdf.values import name_fault
 from dynx.model.xml.quoting import quoteattr
 
-if TYPE_CHECKING:
-    from dynx.model.model import Model
 
-
-def write_urdf(model: Model, *, geometry: bool = False) -> str:
-    """Return `model` as URDF text in canonical form; `dynx.load` of it returns an equal model.
+def write_urdf(tree: Tree, *, geometry: bool = False) -> str:
+    """Return the robot as URDF text in canonical form; `dynx.load` of it returns an equal model.
 
     URDF cannot express the base, its pose and gravity, so the same must be given to ``load`` again. A locked
     joint is written as fixed, with its position in the extension ``<dynx_locked>``; an added frame as a
@@ -27,19 +24,19 @@ def write_urdf(model: Model, *, geometry: bool = False) -> str:
     read back as infinite. With `geometry` the visual and collision shapes are written too. Raises
     DescriptionError for a name that URDF cannot express, and with `geometry` as `write_shapes` does.
     """
-    lines = ['<?xml version="1.0"?>', f"<robot name={_name(model.name)}>"]
-    for link in model.links:
+    lines = ['<?xml version="1.0"?>', f"<robot name={_name(tree.name)}>"]
+    for link in tree.links:
         content = [] if link.inertial is None else [*_inertial(link.inertial)]
         if geometry:
-            content += write_shapes(model.geometry, link.name, _origin)
+            content += write_shapes(tree.geometry, link.name, _origin)
         if content:
             lines += [f"  <link name={_name(link.name)}>", *content, "  </link>"]
         else:
             lines.append(f"  <link name={_name(link.name)}/>")
-    for joint in model.joints:
+    for joint in tree.joints:
         lines += _joint(joint)
-    taken = {joint.name for joint in model.joints}
-    for frame in model.extra_frames:
+    taken = {joint.name for joint in tree.joints}
+    for frame in tree.extra_frames:
         name = f"{frame.name}_frame"
         while name in taken:
             name += "_"

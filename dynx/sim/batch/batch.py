@@ -18,7 +18,8 @@ from dynx.control.base import Controller
 from dynx.control.friction import Coefficients
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
-from dynx.model.configuration import checked_q, whole_number
+from dynx.model.configuration import checked_q
+from dynx.model.numbers import whole_number
 from dynx.model.package_paths import StrPath
 from dynx.option_names import checks_option_names
 from dynx.sim.batch.disturbances import PLACEHOLDER, BatchDisturbances

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from dynx.control.friction import coefficients_by_joint, refuse_text
 from dynx.errors import ArgumentError, GainError
 from dynx.model import Model
-from dynx.model.configuration import checked_array, real_array, whole_number
+from dynx.model.numbers import checked_array, real_array, whole_number
 from dynx.model.package_paths import StrPath
 from dynx.sim.scenario.keywords import scenario_of
 from dynx.sim.scenario.scenario import Scenario

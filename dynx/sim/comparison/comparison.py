@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from dynx.errors import ArgumentError, DynxError, shown
 from dynx.files.notebook import html_grid
-from dynx.model.configuration import is_real
+from dynx.model.numbers import is_real
 from dynx.sim.comparison.factors import Factor, Mixture
 from dynx.sim.comparison.separation import Separation, separation
 from dynx.sim.one_rollout import simulate

@@ -14,7 +14,7 @@ from dynx.control.base import Controller, chain_of
 from dynx.control.content import attributes_of, entered
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
-from dynx.model.configuration import whole_number
+from dynx.model.numbers import whole_number
 from dynx.steppers.clock import TIME_ROUNDING, Clock
 
 MAX_DEPTH = 4

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from dynx.control.gains import checked_gain
 from dynx.model import Model
-from dynx.model.configuration import whole_number
+from dynx.model.numbers import whole_number
 from dynx.spatial.scalar import Floats
 
 BLOCK_STEPS = 64

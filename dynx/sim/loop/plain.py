@@ -18,8 +18,7 @@ import numpy as np
 from dynx.control.base import Controller, Measurement
 from dynx.control.engine_motors import EngineMotor
 from dynx.errors import ControlError, DivergedError, DynxError, SimulationError, shown
-from dynx.model.configuration import DIVERGENCE_SPEED
-from dynx.model.masks import refuse_mask
+from dynx.model.numbers import DIVERGENCE_SPEED, refuse_mask
 from dynx.sim.loop.controller_checks import ControllerWatch, defect_of_outcome, defect_of_torque
 from dynx.sim.loop.record import Record
 from dynx.sim.loop.sensors import Sensors

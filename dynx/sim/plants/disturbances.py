@@ -28,7 +28,7 @@ from dynx.control.friction import (
 from dynx.control.gains import checked_gain
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
-from dynx.model.configuration import checked_entries, is_real, real_array
+from dynx.model.numbers import checked_entries, is_real, real_array
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, REFERENCES
 from dynx.sim.plants.friction_law import FrictionLaw
 from dynx.sim.plants.friction_solver import FrictionSolver

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
-from dynx.model.configuration import MAX_MAGNITUDE, checked_array, checked_vector, is_real
 from dynx.model.elements import Inertial, Joint, Link, Pose
+from dynx.model.numbers import MAX_MAGNITUDE, checked_array, checked_vector, is_real
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from dynx.backends import backend, backend_class, backend_names
 from dynx.backends.registry import BUILT_IN as BACKENDS
 from dynx.errors import ArgumentError, BackendError, UnknownBackendError, nearest, shown
 from dynx.model import Model
-from dynx.model.configuration import whole_number
+from dynx.model.numbers import whole_number
 from dynx.registry import ClassRegistry
 from dynx.sim.plants.disturbances import Disturbances
 from dynx.sim.plants.integrated import SCHEMES, IntegratedPlant

@@ -15,8 +15,8 @@ from dynx.control.base import Controller, refuse_other_than_controller
 from dynx.control.friction import Coefficients, coefficients_by_joint
 from dynx.errors import ArgumentError, nearest, shown
 from dynx.model import Model
-from dynx.model.masks import refuse_mask
 from dynx.model.model import refuse_other_than_model
+from dynx.model.numbers import refuse_mask
 from dynx.registry import DEFAULT_ENGINE
 from dynx.sim.loop.noise import Noise
 from dynx.sim.plants.disturbances import Push

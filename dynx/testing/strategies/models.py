@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from dynx.errors import ArgumentError, DTypeError, UnknownNameError, nearest, shown
 from dynx.model import Inertial, Joint, JointDynamics, Limits, Link, Mimic, Model, Pose
 from dynx.model.elements import INFINITY, JointType, Vector
-from dynx.model.model import STANDARD_GRAVITY, Base
+from dynx.model.tree import STANDARD_GRAVITY, Base
 from dynx.testing.strategies.geometry import (
     Strategy,
     numbers,

@@ -30,7 +30,7 @@ from dynx.model.geometry import (
     Shape,
     Sphere,
 )
-from dynx.model.model import STANDARD_GRAVITY
+from dynx.model.tree import STANDARD_GRAVITY
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies.columns import ground_height, in_columns
 from dynx.testing.strategies.configurations import configurations, velocities

@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.model import Inertial, Pose
-from dynx.model.configuration import checked_array, checked_pose
-from dynx.model.elements import IDENTITY, Vector
+from dynx.model.elements import IDENTITY, Vector, checked_pose
 from dynx.model.geometry import (
     Box,
     Capsule,
@@ -27,6 +26,7 @@ from dynx.model.geometry import (
     solid_properties,
 )
 from dynx.model.geometry.sizes import finite_numbers, finite_vector, positive_number
+from dynx.model.numbers import checked_array
 from dynx.model.urdf.links import inertia_fault
 from dynx.spatial.scalar import Floats
 from dynx.steppers.material import DEFAULT_MATERIAL, Material, checked_material

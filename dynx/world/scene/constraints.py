@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 from dynx.errors import ArgumentError, shown
 from dynx.model import Pose
-from dynx.model.configuration import checked_pose
-from dynx.model.elements import ZERO, Vector
+from dynx.model.elements import ZERO, Vector, checked_pose
 from dynx.model.geometry.sizes import finite_vector
 
 

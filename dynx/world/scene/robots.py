@@ -11,8 +11,10 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.model import Model, Pose
-from dynx.model.configuration import checked_array, checked_pose, checked_q, neutral
+from dynx.model.configuration import checked_q, neutral
+from dynx.model.elements import checked_pose
 from dynx.model.model import refuse_other_than_model
+from dynx.model.numbers import checked_array
 from dynx.spatial.so3 import quat_from_rotation
 from dynx.steppers.material import DEFAULT_MATERIAL, Material, checked_material
 from dynx.world.motors import Motor, combine

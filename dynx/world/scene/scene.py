@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.ik.avoidance import Avoidance
 from dynx.model import Model
-from dynx.model.configuration import checked_gravity
 from dynx.model.elements import Vector
-from dynx.model.model import STANDARD_GRAVITY
+from dynx.model.numbers import checked_gravity
+from dynx.model.tree import STANDARD_GRAVITY
 from dynx.option_names import checks_option_names
 from dynx.steppers.material import Material
 from dynx.world.scene.avoidance import MARGIN, robot_avoidance, robot_like

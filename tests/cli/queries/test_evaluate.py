@@ -18,8 +18,8 @@ from dynx.cli.shell.main import COMMANDS, cli
 from dynx.cli.shell.options import number_list
 from dynx.cli.shell.terminal import counted
 from dynx.ik import IKSolutions
-from dynx.model.configuration import MAX_MAGNITUDE
 from dynx.model.loading import load
+from dynx.model.numbers import MAX_MAGNITUDE
 from dynx.spatial.so3 import quat_from_rotation, rpy_from_rotation
 from tests.conftest import EXAMPLES_INSTALLED
 

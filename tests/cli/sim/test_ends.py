@@ -87,7 +87,7 @@ def test_a_simulation_that_diverges_keeps_its_record(tmp_path: Path) -> None:
 
 def test_an_invalid_torque_is_not_reported_as_divergence(monkeypatch: pytest.MonkeyPatch) -> None:
     # No gain below the bound overflows.
-    monkeypatch.setattr("dynx.model.configuration.MAX_MAGNITUDE", np.inf)
+    monkeypatch.setattr("dynx.model.numbers.MAX_MAGNITUDE", np.inf)
     made = document("ur5", *SHORT, "--kp", "1e308", "--q0", "1,1,1,1,1,1", code=1)
     assert made["status"] == "control failed"
     assert made["error"]["type"] == "ControlError"

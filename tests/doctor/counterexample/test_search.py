@@ -22,7 +22,7 @@ from dynx.doctor.report import Counterexample
 from dynx.errors import DynxError
 from dynx.model import Model
 from dynx.model.library import find
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
 from dynx.reference.backend import ReferenceBackend
 from dynx.rules import Case

@@ -14,7 +14,7 @@ import time
 from collections import Counter
 from collections.abc import Sequence
 
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.workers import Workers
 from tests.doctor.planting.catalogue import EXEMPT, PLANTERS
 from tests.doctor.planting.judging import Verdict, run_task

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from dynx.doctor import DoctorReport, Finding, diagnose
 from dynx.doctor.report import VariantResult
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from tests.doctor.planting.plan import Trial, plant_defects
 from tests.doctor.planting.robots import clean_text
 from tests.doctor.planting.site import Place, PlantedDefect

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from random import Random
 
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
 from tests.doctor.planting.catalogue import PLANTERS
 from tests.doctor.planting.robots import ROBOTS, bases, clean_skeleton, clean_text

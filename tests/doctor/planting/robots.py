@@ -12,7 +12,7 @@ from functools import cache
 from dynx.doctor.prove.mending import mend
 from dynx.model.library import find
 from dynx.model.loading import read_model
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.rules import Case
 from tests.doctor.planting.skeleton import Skeleton

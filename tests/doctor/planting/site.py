@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from dynx.model import Model
 from dynx.model.elements import Joint
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from tests.doctor.planting.skeleton import Skeleton
 

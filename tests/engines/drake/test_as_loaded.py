@@ -19,7 +19,7 @@ from dynx.errors import EngineError
 from dynx.loaded import LoadedRobot
 from dynx.loaded.difference import Deviation, model_difference
 from dynx.model import Inertial, JointDynamics, Model
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from tests.backends.robots import chain, motion
 from tests.loaded.files import TILTED, assert_alike, clean_robots, loaded
 from tests.loaded.fork import BASES, BODY, check_loaded_as_written, forked

@@ -18,7 +18,7 @@ from dynx.loaded import load_as
 from dynx.loaded.difference import model_difference
 from dynx.model import Inertial, JointDynamics, Link, Mimic, Model
 from dynx.model.loading import load
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies.geometry import Strategy

@@ -15,7 +15,7 @@ from dynx.backends.quantities import QUANTITIES
 from dynx.errors import ClosedError, EngineError, EngineLimitError, SingularMassMatrixError
 from dynx.model import Inertial, Joint, Link, Model, Pose
 from dynx.model.loading import load
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 from tests.backends.independence import (

@@ -18,7 +18,7 @@ from dynx.engines.pinocchio.engine_model import MAX_NV
 from dynx.errors import EngineError
 from dynx.loaded.difference import model_difference
 from dynx.model import Joint, Link, Model
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 from tests.backends.robots import chain, motion

@@ -17,7 +17,7 @@ from dynx.engines.pybullet.as_loaded import LoadedPyBullet
 from dynx.errors import EngineError
 from dynx.loaded.difference import model_difference
 from dynx.model import Inertial, Joint, Limits, Link, Model, Pose
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from tests.backends.robots import chain, motion
 from tests.loaded.files import TILTED, assert_alike, clean, clean_robots, loaded
 

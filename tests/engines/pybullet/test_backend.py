@@ -14,7 +14,7 @@ from dynx.engines.pybullet.client import MAX_JOINTS
 from dynx.errors import EngineLimitError
 from dynx.model import JointDynamics, Limits, Link, Model, Pose
 from dynx.model.loading import load
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.so3 import quat_from_rotation, rotation_from_rpy
 from dynx.testing.strategies import models

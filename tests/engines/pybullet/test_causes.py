@@ -14,7 +14,7 @@ from dynx.engines.pybullet.as_loaded import LoadedPyBullet
 from dynx.errors import EngineError
 from dynx.loaded.difference import model_difference
 from dynx.model import Inertial, Joint, JointDynamics, Limits, Link, Model, Pose
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import rotation_from_rpy

@@ -10,7 +10,7 @@ import pytest
 from dynx.engines.pybullet.backend import PyBulletBackend
 from dynx.errors import EngineError
 from dynx.model import Inertial, Joint, Link, Model, Pose
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.reference.backend import ReferenceBackend
 from tests.backends.robots import BASES, BOX, assert_close, motion, pair
 from tests.engines.pybullet.robots import assert_agrees, assert_solves

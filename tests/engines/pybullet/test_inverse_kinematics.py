@@ -9,7 +9,7 @@ from dynx.agreement.tolerances import TARGET_TOLERANCE
 from dynx.engines.pybullet.backend import PyBulletBackend
 from dynx.errors import ArgumentError, NotFiniteError
 from dynx.model.loading import load
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.spatial.se3 import pose_error
 from tests.backends.robots import BASES, chain, mixed_robot, motion
 

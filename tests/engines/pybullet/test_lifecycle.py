@@ -14,7 +14,7 @@ import pytest
 from dynx.engines.pybullet.backend import PyBulletBackend
 from dynx.errors import ClosedError, EngineError, NotFiniteError
 from dynx.model import Inertial
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.reference.backend import ReferenceBackend
 from tests.backends.independence import (
     check_pickle_round_trip,

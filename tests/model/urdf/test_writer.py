@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from dynx.errors import DescriptionError
 from dynx.model import Inertial, Joint, JointDynamics, Limits, Link, Mimic, Model, Pose
-from dynx.model.configuration import MAX_MAGNITUDE
 from dynx.model.library import robots
 from dynx.model.loading import load
+from dynx.model.numbers import MAX_MAGNITUDE
 from dynx.testing.strategies import models
 
 LOADABLE = [entry.name for entry in robots() if entry.name != "ur_description_ur3"]

@@ -10,7 +10,7 @@ import pytest
 import dynx
 from dynx.control import PD
 from dynx.errors import ArgumentError
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.sim import Rollout, simulate
 
 ARM = dynx.load("dynx_double_pendulum")

@@ -14,7 +14,7 @@ from dynx.control import ComputedTorque, GravityCompensatedPD
 from dynx.errors import ArgumentError
 from dynx.model import Inertial, Link, Model
 from dynx.model.loading import load
-from dynx.model.model import Base
+from dynx.model.tree import Base
 from dynx.sim import Payload, Rollout, simulate
 from dynx.trajectory.base import Setpoint
 from tests.sim.bars import tutorial_motion, tutorial_robot

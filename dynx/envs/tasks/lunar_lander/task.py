@@ -47,7 +47,7 @@ from dynx.envs.tasks.lunar_lander.thrust import (
 from dynx.envs.world.scene_task import Episode
 from dynx.envs.world.task import WorldTask
 from dynx.errors import ArgumentError, shown
-from dynx.model.configuration import MAX_MAGNITUDE, is_real
+from dynx.model.numbers import MAX_MAGNITUDE, is_real
 from dynx.world import Camera, Scene
 
 FPS = 50

@@ -1,0 +1,151 @@
+"""Checks of numbers and arrays that a user gives, and the bounds on their magnitude."""
+
+from __future__ import annotations
+
+from typing import TypeGuard
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dynx.errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, shown
+from dynx.spatial.scalar import Floats
+
+_MAX_FLOAT = float(np.finfo(np.float64).max)
+
+MAX_MAGNITUDE = 1e60
+"""Bound on the magnitude of the entries of an array, and of the numbers of a description.
+
+A moment is a product of two lengths, two speeds and a mass. The bound prevents its overflow, with which an
+engine would silently return infinity or NaN.
+"""
+
+DIVERGENCE_SPEED = 1e8
+"""Norm of the velocity [rad/s or m/s] above which a simulation or a world counts as diverged."""
+
+UNIT_NORM_TOLERANCE = 4 * float(np.finfo(np.float64).eps)
+"""Largest deviation from 1 of the norm of a quaternion that counts as rounding."""
+
+
+def checked_array(name: str, value: ArrayLike, length: int) -> Floats:
+    """Return `value` as float64 (..., length) with entries below `MAX_MAGNITUDE`.
+
+    Raises DTypeError, ShapeError, NotFiniteError or ArgumentError, naming the argument `name`.
+    """
+    array = real_array(name, value)
+    if array.ndim == 0 or array.shape[-1] != length:
+        raise ShapeError(f"{name} has shape {array.shape}; wanted (..., {length})")
+    return checked_entries(name, array)
+
+
+def checked_vector(name: str, value: ArrayLike) -> Floats:
+    """Return one vector (3,), checked like `checked_array`."""
+    array = checked_array(name, value, 3)
+    if array.ndim != 1:
+        raise ShapeError(f"{name} has shape {array.shape}; wanted (3,)")
+    return array
+
+
+def whole_number(name: str, value: object, least: int, most: float = np.inf) -> int:
+    """Return a whole number from `least` to `most`; raise ArgumentError for anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
+        end = "" if most == np.inf else f" and at most {most}"
+        raise ArgumentError(f"{name} is {shown(value)}; wanted a whole number, at least {least}{end}")
+    return int(value)
+
+
+def is_real(value: object) -> TypeGuard[float]:
+    """Check whether a value is one real number, of Python or NumPy, that a float can hold; no truth value."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        return False
+    return not isinstance(value, int) or abs(value) <= _MAX_FLOAT
+
+
+def positive_seconds(name: str, seconds: object) -> float:
+    """Return a positive, finite number of seconds as a float, or raise ArgumentError."""
+    if is_real(seconds) and 0.0 < float(seconds) < np.inf:
+        return float(seconds)
+    raise ArgumentError(f"{name} is {shown(seconds)}; wanted a positive number of seconds")
+
+
+def real_array(name: str, value: ArrayLike) -> Floats:
+    """Return `value` as a float64 array of any shape.
+
+    Raises ShapeError if it is ragged, DTypeError if it is not real or has a mask, which would be lost.
+    """
+    if type(value) is not np.ndarray:
+        refuse_mask(name, value)
+    try:
+        array = np.asarray(value)
+    except ValueError as error:
+        raise ShapeError(f"{name} is ragged: {error}") from None
+    if array.dtype.kind not in "fiu":
+        raise DTypeError(f"{name} has dtype {array.dtype}; wanted real numbers (float64)")
+    return np.asarray(array, dtype=np.float64)
+
+
+def checked_entries(name: str, array: Floats) -> Floats:
+    """Return `array`; raise an error naming an entry that is not finite or not below `MAX_MAGNITUDE`."""
+    if not np.isfinite(array).all():
+        where = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        raise NotFiniteError(
+            f"{name}[{', '.join(map(str, where))}] is {array[where]}; wanted a finite number"
+        )
+    if np.max(np.abs(array), initial=0.0) >= MAX_MAGNITUDE:
+        where = tuple(int(i) for i in np.argwhere(np.abs(array) >= MAX_MAGNITUDE)[0])
+        raise ArgumentError(
+            f"{name}[{', '.join(map(str, where))}] is {array[where]}; wanted less than {MAX_MAGNITUDE:g} "
+            "in magnitude, since products of larger numbers overflow"
+        )
+    return array
+
+
+def checked_generator(rng: np.random.Generator | int | None) -> np.random.Generator:
+    """Return the generator, or that of a seed. Raises ArgumentError for anything else."""
+    try:
+        return np.random.default_rng(rng)
+    except (TypeError, ValueError):
+        raise ArgumentError(f"rng is {shown(rng)}; wanted a NumPy generator, or a seed: 0 or more") from None
+
+
+def checked_size(size: tuple[int, ...] | int) -> tuple[int, ...]:
+    """Return the shape of an array of samples. Raises ArgumentError for anything else."""
+    shape = tuple(size) if isinstance(size, tuple | list) else (size,)
+    if not all(isinstance(n, int | np.integer) and not isinstance(n, bool) and n >= 0 for n in shape):
+        raise ArgumentError(f"size is {shown(size)}; wanted a number of samples, or a tuple of them")
+    return tuple(int(n) for n in shape)
+
+
+def checked_quaternion(name: str, quat_xyzw: Floats, part: str = "") -> Floats:
+    """Return unit quaternions (..., 4), normalised in a copy if a norm deviates by more than rounding.
+
+    Raises ArgumentError for a norm that differs from 1 by more than 1e-6; `part` is the index of the
+    quaternion on the last axis of `name`.
+    """
+    norm = np.linalg.norm(quat_xyzw, axis=-1, keepdims=True)
+    off = np.abs(norm - 1.0)
+    if np.any(off > 1e-6):
+        at = np.unravel_index(np.argmax(off), off.shape)[:-1]
+        where = ", ".join([*map(str, map(int, at)), *([part] if part else [])])
+        raise ArgumentError(
+            f"{name}{f'[{where}]' if where else ''} is a quaternion (x, y, z, w) of length "
+            f"{float(norm[at][0]):.9g}; wanted length 1"
+        )
+    return quat_xyzw / norm if np.any(off > UNIT_NORM_TOLERANCE) else quat_xyzw
+
+
+def checked_gravity(gravity: ArrayLike) -> tuple[float, float, float]:
+    """Return gravity as three finite floats [m/s^2]."""
+    x, y, z = checked_vector("gravity", gravity).tolist()
+    return (x, y, z)
+
+
+def refuse_mask(name: str, value: object) -> None:
+    """Raise DTypeError for a masked array, or a list or tuple with one inside."""
+    if isinstance(value, list | tuple):
+        for each in value:
+            if not isinstance(each, float | int):
+                refuse_mask(name, each)
+    elif isinstance(value, np.ma.MaskedArray):
+        raise DTypeError(
+            f"{name} is a masked array; wanted an array without a mask, such as its method filled returns"
+        )

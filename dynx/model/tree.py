@@ -1,0 +1,213 @@
+"""Tree of links, joints and frames: what a description states, with names, sizes and limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal, TypeVar
+
+import numpy as np
+
+from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
+from dynx.model.elements import IDENTITY, Frame, Inertial, Joint, Link, Note, Pose, Vector
+from dynx.model.geometry.links import Geometry
+from dynx.spatial.scalar import Floats
+
+Base = Literal["fixed", "floating"]
+Part = TypeVar("Part")
+STANDARD_GRAVITY: Vector = (0.0, 0.0, -9.81)
+NO_GEOMETRY = Geometry({})
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Tree:
+    """Links and joints in depth-first order, the base and gravity; `Model` adds what is computed from them.
+
+    Coordinates (`q`, `v`) list the moving joints in the order of `joint_names`, after those of a floating
+    base.
+    """
+
+    name: str
+    links: tuple[Link, ...]
+    joints: tuple[Joint, ...]
+    base: Base = "fixed"
+    gravity: Vector = STANDARD_GRAVITY
+    extra_frames: tuple[Frame, ...] = ()
+    base_pose: Pose = IDENTITY
+    notes: tuple[Note, ...] = field(default=(), compare=False)
+    source: str = field(default="<memory>", compare=False)
+    geometry: Geometry = field(default=NO_GEOMETRY, compare=False)
+
+    def __post_init__(self) -> None:
+        if self.floating and self.base_pose != IDENTITY:
+            raise ArgumentError(
+                "base_pose is the pose of a fixed base; a floating base has its pose in q: position q[:3], "
+                "quaternion (x, y, z, w) q[3:7]"
+            )
+
+    # -- names and sizes ---------------------------------------------------------------------
+
+    @cached_property
+    def coordinate_joints(self) -> tuple[Joint, ...]:
+        """Joints with a coordinate of their own: they move and follow no other joint."""
+        return tuple(joint for joint in self.joints if joint.moves and joint.mimic is None)
+
+    @cached_property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the coordinates, in order; name k belongs to ``v[k]``, after the 6 of a floating base."""
+        return tuple(joint.name for joint in self.coordinate_joints)
+
+    @cached_property
+    def frames(self) -> tuple[Frame, ...]:
+        """One frame per link, in depth-first order, then the added frames."""
+        return tuple(Frame(link.name, link.name) for link in self.links) + self.extra_frames
+
+    @cached_property
+    def frame_names(self) -> tuple[str, ...]:
+        """Names of all frames, in the order in which `forward_kinematics` stacks them."""
+        return tuple(frame.name for frame in self.frames)
+
+    @cached_property
+    def root(self) -> str:
+        """Name of the root link, whose frame is the base frame."""
+        return self.links[0].name
+
+    @cached_property
+    def floating(self) -> bool:
+        """True if the base moves freely."""
+        return self.base == "floating"
+
+    @cached_property
+    def nq(self) -> int:
+        """Length of a configuration `q`."""
+        return len(self.coordinate_joints) + (7 if self.floating else 0)
+
+    @cached_property
+    def nv(self) -> int:
+        """Length of a velocity `v`, an acceleration `a` and a torque `tau`."""
+        return len(self.coordinate_joints) + (6 if self.floating else 0)
+
+    @cached_property
+    def total_mass(self) -> float:
+        """Sum of the masses of the links [kg]."""
+        return float(sum(link.inertial.mass for link in self.links if link.inertial is not None))
+
+    def joint(self, name: str) -> Joint:
+        """Return the joint of that name (of any type); UnknownNameError if there is none."""
+        return self._named("joint", name, self._joint_by_name)
+
+    def link(self, name: str) -> Link:
+        """Return the link of that name; UnknownNameError if there is none."""
+        return self._named("link", name, self._link_by_name)
+
+    def frame_index(self, name: str) -> int:
+        """Return the index of the frame in `frame_names`; UnknownNameError if there is none."""
+        return self._named("frame", name, self._frame_index)
+
+    def coordinate_index(self, joint: str) -> int:
+        """Return the index of the joint's coordinate in `v` (one higher in `q` with a floating base)."""
+        offset = 6 if self.floating else 0
+        if joint in self.joint_names:
+            return offset + self.joint_names.index(joint)
+        found = self.joint(joint)
+        why = "it is locked" if found.locked_at is not None else "it is fixed"
+        if found.mimic is not None:
+            why = f"it follows {shown(found.mimic.joint)}"
+        raise UnknownNameError(f"joint {shown(joint)} of {self.name} has no coordinate: {why}")
+
+    # -- limits ------------------------------------------------------------------------------
+
+    @cached_property
+    def lower(self) -> Floats:
+        """Lower position limits (nq,); -inf for a continuous joint and for a floating base."""
+        return self._position_limits[0]
+
+    @cached_property
+    def upper(self) -> Floats:
+        """Upper position limits (nq,)."""
+        return self._position_limits[1]
+
+    @cached_property
+    def velocity_limit(self) -> Floats:
+        """Largest speed of each coordinate (nv,) [rad/s or m/s], inf for no limit."""
+        base = [np.inf] * (6 if self.floating else 0)
+        return np.array(base + [joint.limits.velocity for joint in self.coordinate_joints])
+
+    @cached_property
+    def effort_limit(self) -> Floats:
+        """Largest effort of each coordinate (nv,) [N m or N], inf for no limit."""
+        base = [np.inf] * (6 if self.floating else 0)
+        return np.array(base + [joint.limits.effort for joint in self.coordinate_joints])
+
+    def inertial(self, link: str) -> Inertial:
+        """Return the inertial of a link; a link without one has no mass."""
+        return self.link(link).inertial or Inertial()
+
+    @cached_property
+    def _position_limits(self) -> tuple[Floats, Floats]:
+        """Lower and upper limits, each (nq,): each joint's own, narrowed by those of joints that mimic it.
+
+        If the lower limit in the file exceeds the upper one, the two are exchanged (the reader adds a note).
+        If the limits of a follower leave no range for its driver, the driver's own limits apply.
+        """
+        base = 7 if self.floating else 0
+        lower, upper = np.full(self.nq, -np.inf), np.full(self.nq, np.inf)
+        index = {name: base + k for k, name in enumerate(self.joint_names)}
+        for joint in self.coordinate_joints:
+            k = index[joint.name]
+            lower[k] = min(joint.limits.lower, joint.limits.upper)
+            upper[k] = max(joint.limits.lower, joint.limits.upper)
+        for joint in self.joints:
+            if joint.mimic is None or joint.mimic.multiplier == 0.0:
+                continue
+            k = index[joint.mimic.joint]
+            ends = sorted(
+                (limit - joint.mimic.offset) / joint.mimic.multiplier
+                for limit in (joint.limits.lower, joint.limits.upper)
+            )
+            low, high = max(lower[k], ends[0]), min(upper[k], ends[1])
+            if low <= high:
+                lower[k], upper[k] = low, high
+        # Adding 0.0 turns -0.0 into 0.0: NumPy's generator rejects the range from 0.0 to -0.0.
+        return lower + 0.0, upper + 0.0
+
+    @cached_property
+    def _joint_by_name(self) -> dict[str, Joint]:
+        return {joint.name: joint for joint in self.joints}
+
+    @cached_property
+    def _link_by_name(self) -> dict[str, Link]:
+        return {link.name: link for link in self.links}
+
+    @cached_property
+    def _frame_index(self) -> dict[str, int]:
+        return {name: index for index, name in enumerate(self.frame_names)}
+
+    def _named(self, kind: str, name: str, known: Mapping[str, Part]) -> Part:
+        try:
+            return known[name]
+        except (KeyError, TypeError):
+            raise UnknownNameError(self._unknown_name_message(kind, name, known)) from None
+
+    def _unknown_name_message(self, kind: str, name: object, known: Mapping[str, object]) -> str:
+        message = f"no {kind} {shown(name)} in {self.name}"
+        if not isinstance(name, str):
+            return f"{message}: a name is a str, not {type(name).__name__}"
+        if kind != "joint" and name in self._joint_by_name:
+            child = self._joint_by_name[name].child
+            return f"{message}: that is a joint; the {kind} it moves is {shown(child)}"
+        if kind == "joint" and name in self._link_by_name:
+            above = [joint.name for joint in self.joints if joint.child == name]
+            moved = f"; the joint that moves it is {shown(above[0])}" if above else ", the root"
+            return f"{message}: that is a link{moved}"
+        return message + nearest(name, known)
+
+
+def checked_base(base: str) -> Literal["fixed", "floating"]:
+    """Return `base`; raise ArgumentError unless it is ``"fixed"`` or ``"floating"``."""
+    if base == "fixed":
+        return "fixed"
+    if base == "floating":
+        return "floating"
+    raise ArgumentError(f"base is {shown(base)}; wanted 'fixed' or 'floating'")
