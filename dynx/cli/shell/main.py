@@ -14,6 +14,7 @@ from dynx._version import __version__
 from dynx.cli.shell.exits import DONE, closed_pipe_raised, report_failure
 from dynx.cli.shell.lazy import LazyCommand, LazyGroup
 from dynx.errors import TRACEBACK_VARIABLE
+from dynx.safe_path import isolate_children
 
 COMMANDS = {
     "agree": LazyCommand("dynx.cli.agree.command:agree", "Compare the results of all engines on robots."),
@@ -149,7 +150,8 @@ def cli(ctx: click.Context) -> None:
 
 
 def main() -> None:
-    """Run the command line on ``sys.argv``."""
+    """Run the command line on ``sys.argv``; no process that it starts imports from the current folder."""
+    isolate_children()
     cli.main(prog_name="dynx")
 
 

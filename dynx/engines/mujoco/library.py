@@ -8,9 +8,11 @@ import warnings
 from typing import Any
 
 from dynx.errors import NotInstalledError
+from dynx.safe_path import isolated_children
 
 try:
-    import mujoco
+    with isolated_children():
+        import mujoco
 except (ImportError, AttributeError, OSError, RuntimeError) as error:
     # The last three are raised while its renderer is set up, because of a wrong MUJOCO_GL or missing
     # libraries.
