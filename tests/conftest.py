@@ -1,9 +1,8 @@
 """Hypothesis profiles, and one cache of compiled kernels for the whole run.
 
 The profiles are ``ci`` (50 examples of each property, the default), ``dev`` (20, for a quick look),
-``faults`` (25, not shrunk: `tests.faults` and `tests.mutation` need only whether a test fails, so that every
-planted fault is found within half the examples of ``ci``), ``coverage`` (5: `tests.mutation` records which
-lines a test executes) and ``long`` (1000, for a night).
+``mutation`` (25, not shrunk: `tests.mutation` needs only whether a test fails), ``coverage`` (5:
+`tests.mutation` records which lines a test executes) and ``long`` (1000, for a night).
 ``pytest --hypothesis-profile dev`` or ``HYPOTHESIS_PROFILE=dev`` chooses.
 
 Examples are drawn from a fixed seed, so a failure in CI is a failure everywhere; no deadline, since
@@ -39,12 +38,12 @@ settings.register_profile(
 settings.register_profile("dev", parent=settings.get_profile("ci"), max_examples=20)
 settings.register_profile("long", parent=settings.get_profile("ci"), max_examples=1000)
 settings.register_profile(
-    "faults",
+    "mutation",
     parent=settings.get_profile("ci"),
     max_examples=25,
     phases=[Phase.explicit, Phase.generate],
 )
-settings.register_profile("coverage", parent=settings.get_profile("faults"), max_examples=5)
+settings.register_profile("coverage", parent=settings.get_profile("mutation"), max_examples=5)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 
 LONGEST = (

@@ -1,11 +1,12 @@
 """Mutation testing of dynx by the operators of mutmut::
 
-    python -m tests.mutation --record            which tests execute which lines (once, some ten minutes)
+    python -m tests.mutation --record            which tests execute which lines (once)
     python -m tests.mutation --seed 0 --count 300
 
-Makes a random sample of mutants, runs for each the tests that execute the changed line (fastest first, up
-to the first failure), and prints the score and the survivors. What is done is kept in the folder of
-``--results``: the same command goes on where Ctrl-C ended it, ``--retry`` tries survivors again.
+Makes a random sample of mutants with at least 12 of each room, runs for each the tests that execute the
+changed line (fastest first, up to the first failure), and prints the score by room and the survivors. What
+is done is kept in the folder of ``--results``: the same command goes on where Ctrl-C ended it, ``--retry``
+tries survivors again.
 """
 
 from __future__ import annotations
@@ -21,34 +22,40 @@ from hashlib import sha256
 from pathlib import Path
 from queue import SimpleQueue
 
-from tests.faults.warm import ROOT, Runner
 from tests.mutation.coverage_map import CoverageMap, record
 from tests.mutation.population import Mutant, sample
 from tests.mutation.report import EQUIVALENT, reason, summary
 from tests.mutation.trial import CAUGHT, Outcome, attempt
+from tests.mutation.warm import ROOT, Runner
 
-ROOMS = ("rbd", "spatial", "model", "backends", "ik", "control", "sim", "agreement")
-TESTS = tuple(f"tests/{room}" for room in (*ROOMS, "contract", "oracles"))
+SOURCES = {
+    path.stem: path.relative_to(ROOT).as_posix()
+    for path in sorted((ROOT / "dynx").iterdir())
+    if (path / "__init__.py").exists() or (path.suffix == ".py" and not path.name.startswith("_"))
+}
+"""Room of dynx -> its folder, or its file where it is a single module."""
+TESTS = tuple(
+    sorted(f"tests/{path.name}" for path in (ROOT / "tests").iterdir() if (path / "__init__.py").exists())
+)
+MIN_PER_ROOM = 12
+"""Least number of mutants of a room in the sample, if the room has as many places."""
 
 
 def main() -> None:
     arguments = parser().parse_args()
     arguments.results.mkdir(parents=True, exist_ok=True)
-    folders = [f"dynx/{room}" for room in ROOMS]
     map_file = arguments.results / "coverage.json"
     coverage = CoverageMap.load(map_file)
     if arguments.record is not None:
         os.environ.setdefault("HYPOTHESIS_PROFILE", "coverage")
         tests = arguments.record or list(TESTS)
-        coverage.replace(record(ROOT, folders, tests, arguments.results))
+        coverage.replace(record(ROOT, tests, arguments.results))
         coverage.save(map_file)
         return
     if not coverage.durations:
         raise SystemExit("no coverage is recorded yet: python -m tests.mutation --record")
-    mutants, total = cached_sample(
-        folders, arguments.seed, arguments.count, arguments.results / "sample.json"
-    )
-    mutants = [mutant for mutant in mutants if mutant.path.split("/")[1] in arguments.rooms]
+    mutants, total = cached_sample(arguments.seed, arguments.count, arguments.results / "sample.json")
+    mutants = [mutant for mutant in mutants if mutant.room in arguments.rooms]
     kept = arguments.results / "outcomes.json"
     outcomes = load(kept)
     equivalent = json.loads(EQUIVALENT.read_text(encoding="utf-8"))
@@ -83,9 +90,10 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument(
         "--rooms",
         nargs="+",
-        default=ROOMS,
+        choices=SOURCES,
+        default=tuple(SOURCES),
         metavar="ROOM",
-        help="try the mutants of the sample in these packages only",
+        help="try the mutants of the sample in these rooms only",
     )
     made.add_argument("--jobs", type=int, default=2, help="mutants to try at a time")
     made.add_argument("--retry", action="store_true", help="try survivors again that are not equivalent")
@@ -94,22 +102,21 @@ def parser() -> argparse.ArgumentParser:
         "--record",
         nargs=argparse.REMAINDER,
         metavar="PYTEST-ARGUMENT",
-        help="record what tests execute (all of the packages, or those of these arguments), and end",
+        help="record what tests execute (all of them, or those of these arguments), and end",
     )
     return made
 
 
-def cached_sample(folders: list[str], seed: int, count: int, kept: Path) -> tuple[list[Mutant], int]:
+def cached_sample(seed: int, count: int, kept: Path) -> tuple[list[Mutant], int]:
     """Return the sample: from the file `kept`, if that was made of the same sources, or made anew."""
-    digest = sha256(f"{seed} {count}".encode())
-    for folder in folders:
-        for file in sorted((ROOT / folder).rglob("*.py")):
-            digest.update(file.read_bytes())
+    digest = sha256(f"{seed} {count} {MIN_PER_ROOM}".encode())
+    for file in sorted((ROOT / "dynx").rglob("*.py")):
+        digest.update(file.read_bytes())
     if kept.exists():
         document = json.loads(kept.read_text(encoding="utf-8"))
         if document["of"] == digest.hexdigest():
             return [Mutant(**each) for each in document["mutants"]], document["places"]
-    mutants, places = sample(ROOT, folders, seed, count)
+    mutants, places = sample(ROOT, SOURCES.values(), seed, count, MIN_PER_ROOM)
     document = {"of": digest.hexdigest(), "places": places, "mutants": [asdict(each) for each in mutants]}
     kept.write_text(json.dumps(document), encoding="utf-8")
     return mutants, places

@@ -85,11 +85,9 @@ class ContextSwitcher:
             self.not_passed.add(report.nodeid)
 
 
-def record(root: Path, folders: list[str], tests: list[str], scratch: Path) -> CoverageMap:
+def record(root: Path, tests: list[str], scratch: Path) -> CoverageMap:
     """Run tests in this process, which must not have imported dynx, and return what they execute."""
-    recorder = coverage.Coverage(
-        data_file=str(scratch / "coverage"), include=[f"{root / folder}/*" for folder in folders]
-    )
+    recorder = coverage.Coverage(data_file=str(scratch / "coverage"), include=[f"{root / 'dynx'}/*"])
     switcher = ContextSwitcher(recorder)
     recorder.erase()
     recorder.start()

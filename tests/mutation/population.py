@@ -49,6 +49,11 @@ class Place:
         return int.from_bytes(hashlib.sha256(identity.encode()).digest()[:8], "big")
 
 
+def room_of(path: str) -> str:
+    """Return the folder of dynx, or the module directly in it, of which a file is part."""
+    return path.split("/")[1].removesuffix(".py")
+
+
 @dataclass(frozen=True)
 class Mutant:
     """One changed source file."""
@@ -61,6 +66,10 @@ class Mutant:
     before: str
     after: str
     source: str
+
+    @property
+    def room(self) -> str:
+        return room_of(self.path)
 
     @property
     def module(self) -> str:
@@ -101,22 +110,35 @@ def places(root: Path, path: str) -> Iterator[Place]:
                 seen[same] += 1
 
 
-def sample(root: Path, folders: Iterable[str], seed: int, count: int) -> tuple[list[Mutant], int]:
-    """Return `count` random mutants of the Python files in the folders, and the number of places.
+def sample(
+    root: Path, sources: Iterable[str], seed: int, count: int, least: int = 0
+) -> tuple[list[Mutant], int]:
+    """Return random mutants of the sources, files or folders, and the number of places.
 
-    Each place has the same chance, whatever the number of its mutants. The sample is that of the lowest
-    ranks (`Place.rank`), so that an edit of one function leaves the mutants of the others in it.
+    They are `least` of each source, or all where it has fewer, and of the rest as many as make `count`.
+    Each place of a source has the same chance, whatever the number of its mutants. The sample is that of the
+    lowest ranks (`Place.rank`), so that an edit of one function leaves the mutants of the others in it.
     """
-    files = [path for folder in folders for path in sorted((root / folder).rglob("*.py"))]
-    ranked: list[tuple[int, Place]] = []
+    chosen: list[tuple[int, Place]] = []
+    rest: list[tuple[int, Place]] = []
     total = 0
-    for file in files:
-        for place in places(root, file.relative_to(root).as_posix()):
-            total += 1
-            ranked.append((place.rank(seed), place))
-        # Trees of places that cannot be in the sample any more are not kept.
-        ranked = sorted(ranked, key=lambda each: each[0])[:count]
-    return [mutant(place, rank) for rank, place in ranked], total
+    for source in sources:
+        ranked: list[tuple[int, Place]] = []
+        path = root / source
+        for file in [path] if path.is_file() else sorted(path.rglob("*.py")):
+            for place in places(root, file.relative_to(root).as_posix()):
+                total += 1
+                ranked.append((place.rank(seed), place))
+            # Trees of places that cannot be in the sample any more are not kept.
+            ranked = sorted(ranked, key=_rank)[: max(count, least)]
+        chosen += ranked[:least]
+        rest = sorted(rest + ranked[least:], key=_rank)[:count]
+    chosen += rest[: max(count - len(chosen), 0)]
+    return [mutant(place, rank) for rank, place in sorted(chosen, key=_rank)], total
+
+
+def _rank(ranked: tuple[int, Place]) -> int:
+    return ranked[0]
 
 
 def mutant(place: Place, rank: int) -> Mutant:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 
+from tests.mutation.population import room_of
 from tests.mutation.trial import BROKEN, CAUGHT, Outcome
 
 EQUIVALENT = Path(__file__).with_name("equivalent.json")
@@ -31,15 +32,15 @@ def percentage(part: int, whole: int) -> str:
 
 
 def summary(outcomes: list[Outcome], places: int, equivalent: Known) -> str:
-    """Return the score by package and the survivors."""
+    """Return the score by room and the survivors."""
     lines = [f"\n{len(outcomes)} mutants of {places} places"]
     for title, groups in (
-        ("package", Counter(each.path.split("/")[1] for each in outcomes)),
+        ("room", Counter(room_of(each.path) for each in outcomes)),
         ("operator", Counter(each.operator for each in outcomes)),
     ):
         lines.append(f"\n{title:30} mutants  equivalent  caught  at first")
         for name, count in groups.most_common():
-            group = [each for each in outcomes if name in (each.path.split("/")[1], each.operator)]
+            group = [each for each in outcomes if name in (room_of(each.path), each.operator)]
             none = sum(each.status != CAUGHT and reason(each, equivalent) is not None for each in group)
             caught = sum(each.status == CAUGHT for each in group)
             first = sum(each.first_status == CAUGHT for each in group)

@@ -53,6 +53,19 @@ def test_a_sample_is_one_mutant_of_each_of_its_places(root: Path) -> None:
         compile(mutant.source, mutant.path, "exec")
 
 
+def test_a_sample_has_mutants_of_every_source(root: Path) -> None:
+    small = root / "dynx" / "small"
+    small.mkdir()
+    (small / "h.py").write_text("def h(x):\n    return x + 5\n", encoding="utf-8")
+    sources = ["dynx/f.py", "dynx/small"]
+    for seed in range(5):
+        mutants, total = sample(root, sources, seed, 5, 2)
+        assert total == 4 + 2
+        assert sum(mutant.path.startswith("dynx/small") for mutant in mutants) == 2
+        assert len(mutants) == 5
+    assert len(sample(root, sources, 0, 1, 2)[0]) == 4
+
+
 def test_an_edit_of_one_file_leaves_the_sample_of_the_others(root: Path) -> None:
     before = {mutant.key for mutant in sample(root, ["dynx"], 1, 100)[0] if mutant.path == "dynx/g.py"}
     (root / "dynx" / "f.py").write_text("y = 1 + 2\n" + SOURCE, encoding="utf-8")

@@ -6,9 +6,9 @@ import re
 from collections import defaultdict
 from dataclasses import dataclass
 
-from tests.faults.warm import TIMED_OUT, Change, Runner
 from tests.mutation.coverage_map import CoverageMap
 from tests.mutation.population import Mutant
+from tests.mutation.warm import TIMED_OUT, Change, Runner
 
 STAGES = ((30, 8.0), (80, 15.0))
 """Tests to run, at most, and the time that they take without a mutant [s]; the next stage if none fails."""
@@ -69,7 +69,7 @@ def attempt(mutant: Mutant, coverage: CoverageMap, runner: Runner) -> Outcome:
     covering = coverage.tests(mutant.path, mutant.line, mutant.last_line)
     own = own_tests(mutant.path)
     covering |= {test for test in coverage.durations if test.startswith(f"{own}::")}
-    waiting = ordered(covering, coverage.durations, mutant.path.split("/")[1])
+    waiting = ordered(covering, coverage.durations, mutant.room)
     outcome = Outcome(
         mutant.key,
         mutant.path,

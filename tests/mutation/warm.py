@@ -1,8 +1,8 @@
 """Runs of pytest with one module of dynx changed, each forked from a process with loaded imports.
 
-``python -m tests.faults.warm`` imports what dynx and its tests need from elsewhere, but nothing of dynx, and
-then serves requests: a line of JSON on stdin (see `Runner.run`), a line of JSON ``[exit code, output]`` on
-stdout. The imports take most of the time of a short test, so this is several times as fast as a new
+``python -m tests.mutation.warm`` imports what dynx and its tests need from elsewhere, but nothing of dynx,
+and then serves requests: a line of JSON on stdin (see `Runner.run`), a line of JSON ``[exit code, output]``
+on stdout. The imports take most of the time of a short test, so this is several times as fast as a new
 interpreter for each change. Where there is no fork, `Runner` starts one.
 """
 
@@ -37,7 +37,7 @@ PRELOADED = (
     *("pinocchio", "mujoco", "pydrake.multibody.parsing"),
 )
 OPTIONS = (
-    *("-x", "-q", "-p", "tests.faults.plant", "-p", "no:xdist", "-p", "no:benchmark"),
+    *("-x", "-q", "-p", "tests.mutation.plant", "-p", "no:xdist", "-p", "no:benchmark"),
     # Modules imported before cannot have their assertions rewritten; none of them has any.
     *("-W", "ignore::pytest.PytestAssertRewriteWarning"),
 )
@@ -98,7 +98,7 @@ class Runner:
     @staticmethod
     def _start() -> subprocess.Popen[str]:
         return subprocess.Popen(
-            [sys.executable, "-m", "tests.faults.warm"],
+            [sys.executable, "-m", "tests.mutation.warm"],
             cwd=ROOT,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
@@ -118,7 +118,7 @@ def serve() -> None:
     with tempfile.TemporaryDirectory() as folder:
         if sys.dont_write_bytecode:
             # Later runs read the bytecode that one run writes, which halves the time of most. A changed
-            # module never writes any (`tests.faults.plant`).
+            # module never writes any (`tests.mutation.plant`).
             sys.pycache_prefix, sys.dont_write_bytecode = folder, False
         for line in sys.stdin:
             request = json.loads(line)
@@ -165,7 +165,7 @@ def run_here(request: dict[str, Any], output: int) -> int:
     os.dup2(nothing, 0)
     os.dup2(output, 1)
     os.dup2(output, 2)
-    os.environ["HYPOTHESIS_PROFILE"] = "faults"
+    os.environ["HYPOTHESIS_PROFILE"] = "mutation"
     if request["change"] is not None:
         os.environ["DYNX_PLANT"] = request["change"]
         # Kernels are compiled anew: those in the cache are from the source on the disk.

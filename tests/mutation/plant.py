@@ -1,6 +1,6 @@
 """A pytest plugin that imports one module of dynx from other source than that on the disk.
 
-``pytest -p tests.faults.plant`` with DYNX_PLANT naming a JSON file ``{"module": ..., "source": ...}``.
+``pytest -p tests.mutation.plant`` with DYNX_PLANT naming a JSON file ``{"module": ..., "source": ...}``.
 It is a plugin, because pytest puts its own finder first as it starts, and that one reads the disk.
 """
 

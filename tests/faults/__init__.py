@@ -1,1 +1,0 @@
-"""Planted defects: each is put into dynx alone, and a named test must fail because of it."""
