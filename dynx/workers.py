@@ -24,6 +24,11 @@ from dynx.errors import DynxError, EngineError, traceback_wanted
 WINDOWS_EXCEPTION = 0xC0000000
 """Smallest exit code of a process that an exception of Windows ended, such as an access violation."""
 
+MAX_START_TIME = 120.0
+"""Time limit of the start of a process and of the imports of its target [s], unless that of a task is longer.
+
+It is not part of the first task's time: imports of engines take seconds on a busy machine."""
+
 FailureKind = Literal["crash", "timeout", "defect"]
 
 _START = "import sys; sys.path[:] = sys.argv[1:]; from dynx.workers import serve; serve()"
@@ -199,6 +204,15 @@ class _Worker:
 
     def compute(self, task: Any, timeout: float | None) -> tuple[Any] | Failure:
         """Return the value of one task in a tuple of one, or the failure."""
+        if not self._has_target:
+            started = self._exchange(self._target, None if timeout is None else max(timeout, MAX_START_TIME))
+            if isinstance(started, Failure):
+                return started
+            self._has_target = True
+        return self._exchange(task, timeout)
+
+    def _exchange(self, request: Any, timeout: float | None) -> tuple[Any] | Failure:
+        """Send a request and return the reply, which is a failure if it takes more than `timeout` [s]."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         timer = None if timeout is None else threading.Timer(timeout, self._expire)
@@ -206,10 +220,7 @@ class _Worker:
             timer.daemon = True
             timer.start()
         try:
-            if not self._has_target:
-                pickle.dump(self._target, self._process.stdin)
-                self._has_target = True
-            pickle.dump(task, self._process.stdin)
+            pickle.dump(request, self._process.stdin)
             self._process.stdin.flush()
             reply: tuple[Any] | Failure = pickle.load(self._process.stdout)
         except (EOFError, OSError, pickle.UnpicklingError):
@@ -247,18 +258,24 @@ class _Worker:
 
 
 def serve() -> None:
-    """Run in the child: compute tasks from standard input until it is closed."""
+    """Run in the child: read the target, confirm it, and compute tasks from standard input until it is
+    closed."""
     replies = os.fdopen(os.dup(1), "wb")
     _silence()
     requests = sys.stdin.buffer
+
+    def send(reply: tuple[Any] | Failure) -> None:
+        pickle.dump(reply, replies)
+        replies.flush()
+
     target = pickle.load(requests)
+    send((None,))
     while True:
         try:
             task = pickle.load(requests)
         except EOFError:
             return
-        pickle.dump(_reply(target, task), replies)
-        replies.flush()
+        send(_reply(target, task))
 
 
 def _reply(target: Callable[[Any], Any], task: Any) -> tuple[Any] | Failure:

@@ -41,6 +41,13 @@ def test_a_hang_is_ended_and_the_rest_is_done() -> None:
     assert found[1].kind == "timeout"
 
 
+def test_the_import_of_the_target_is_not_part_of_the_first_task() -> None:
+    from tests.workers.slow_import import name_of
+
+    with Workers(name_of, 1, timeout=2.0) as workers:
+        assert [outcome.value for outcome in workers.run(["a", "b"])] == ["a", "b"]
+
+
 def test_an_exception_and_printing_are_survived_by_the_process() -> None:
     with Workers(act, 1) as workers:
         values = list(workers.run(["a", "raise", "print", "b"]))
