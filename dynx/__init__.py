@@ -48,7 +48,7 @@ if TYPE_CHECKING:
         Scenario,
         ScenePlant,
         Simulation,
-        compare_rollouts,
+        compare,
         simulate,
         simulate_batch,
     )
@@ -73,8 +73,8 @@ __all__ = [
     "__version__",
     "agree",
     "backend",
+    "compare",
     "compare_as_loaded",
-    "compare_rollouts",
     "control",
     "diagnose",
     "errors",
@@ -117,8 +117,8 @@ _HOME = {
     "Simulation": "dynx.sim",
     "agree": "dynx.agreement",
     "backend": "dynx.backends",
+    "compare": "dynx.sim",
     "compare_as_loaded": "dynx.doctor",
-    "compare_rollouts": "dynx.sim",
     "diagnose": "dynx.doctor",
     "inertial_parameters": "dynx.rbd.regressor",
     "installed_backends": "dynx.backends",
@@ -135,6 +135,7 @@ _HOME = {
     "simulate": "dynx.sim",
     "simulate_batch": "dynx.sim",
 }
+_MOVED = {"compare_rollouts": "dynx.compare"}
 _SUBPACKAGES = ("control", "errors", "ik", "sim", "trajectory", "world")
 _OF_EXTRAS = ("envs", "testing", "training", "viewer")
 
@@ -147,6 +148,8 @@ if not TYPE_CHECKING:
             return import_module(f"dynx.{name}")
         if name in _OF_EXTRAS:
             raise AttributeError(f"dynx.{name} is not imported by itself; write: import dynx.{name}")
+        if name in _MOVED:
+            raise ImportError(f"dynx.{name} is now {_MOVED[name]}", name="dynx")
         if name not in _HOME:
             raise AttributeError(f"module 'dynx' has no attribute {name!r}{nearest_name(name)}")
         return getattr(import_module(_HOME[name]), name)

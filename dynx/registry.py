@@ -34,6 +34,21 @@ def view(shown: object, **options: Any) -> Any:
     return getattr(import_module(module), name)(shown, **options)
 
 
+def moved_names(package: str, moved: Mapping[str, str]) -> Callable[[str], Any]:
+    """Return the ``__getattr__`` of a package whose public names have moved.
+
+    It raises ImportError, whose text also reaches the user of ``from package import name``, for a name of
+    `moved`, and AttributeError for any other name.
+    """
+
+    def getattr_of_package(name: str) -> Any:
+        if name in moved:
+            raise ImportError(f"{package}.{name} is now {moved[name]}", name=package)
+        raise AttributeError(f"module {package!r} has no attribute {name!r}")
+
+    return getattr_of_package
+
+
 class ClassRegistry(Generic[Kind]):
     """The subclasses of one base class, by name."""
 

@@ -22,7 +22,7 @@ from dynx.doctor import results_document as doctor_document
 from dynx.doctor.formats.baseline import baseline_document
 from dynx.errors import DescriptionError
 from dynx.files.documents import json_text
-from dynx.sim import Noise, Payload, Push, compare_rollouts, simulate
+from dynx.sim import Noise, Payload, Push, compare, simulate
 from dynx.sim.scenario.scenario import Scenario
 from dynx.trajectory import cycloidal
 from dynx.world import read_scene
@@ -113,7 +113,7 @@ def test_comparisons_of_rollouts_keep_their_schema() -> None:
         for damping in (0.0, 0.5)
     ]
     for rerun in (True, False):
-        comparison = compare_rollouts(*runs, rerun=rerun)
+        comparison = compare(*runs, rerun=rerun)
         assert errors("compare", compare_document(comparison, "a.npz", "b.npz")) == []
 
 

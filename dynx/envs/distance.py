@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from dynx.envs.library import Env
 from dynx.errors import ArgumentError
 from dynx.model.numbers import whole_number
+from dynx.world.record import Channel, Record
+from dynx.world.separation import separation
 
 Act = Callable[[NDArray[Any]], NDArray[Any]]
 """A policy: observations (1, ...) in, actions (1, ...) out."""
@@ -29,6 +31,13 @@ class EpisodeRecord:
     rewards: NDArray[np.float64]
     """Rewards (steps,)."""
     terminated: bool
+
+    @property
+    def record(self) -> Record:
+        """Entries of the observation over the number of the step."""
+        entries = tuple(map(str, range(self.observations.shape[1])))
+        channel = Channel(self.observations, entries, ("",) * len(entries))
+        return Record(self.engine, np.arange(float(len(self.observations))), {"observation": channel})
 
     @property
     def steps(self) -> int:
@@ -171,10 +180,10 @@ def _numbers(observation: Any) -> NDArray[np.float64]:
 def _difference(a: EpisodeRecord, b: EpisodeRecord, tolerance: float) -> EpisodeDifference:
     """Compare two episodes over the steps that both have; one that ends earlier differs where it ends."""
     common = min(a.steps, b.steps)
-    difference = np.abs(a.observations[: common + 1] - b.observations[: common + 1])
-    beyond = np.flatnonzero(difference.max(axis=1) > tolerance)
+    apart = separation(a.record, b.record)
+    beyond = np.flatnonzero(apart.distance > tolerance)
     step: int | None = int(beyond[0]) if beyond.size else None
-    entry = int(np.argmax(difference[step])) if step is not None else None
+    entry = int(np.argmax(apart.distances[step])) if step is not None else None
     # Only an end by the task is a difference: the first engine's episode has as many steps as actions.
     if step is None and (a.steps != b.steps or a.terminated != b.terminated):
         step = common
@@ -183,7 +192,7 @@ def _difference(a: EpisodeRecord, b: EpisodeRecord, tolerance: float) -> Episode
         a.seed,
         step,
         entry,
-        float(difference.max()),
+        apart.largest,
         (a.episode_return, b.episode_return),
         (a.steps, b.steps),
     )

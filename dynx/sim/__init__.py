@@ -1,8 +1,11 @@
 """Simulation: plants, integrators, the closed loop, and its record; many rollouts at once."""
 
+from typing import TYPE_CHECKING
+
+from dynx.registry import moved_names
 from dynx.sim.batch.batch import BatchInterrupted, simulate_batch
 from dynx.sim.batch.rollouts import BatchRollouts
-from dynx.sim.comparison.comparison import RolloutComparison, compare_rollouts
+from dynx.sim.comparison.comparison import RolloutComparison, compare
 from dynx.sim.loop.noise import Noise
 from dynx.sim.one_rollout import RolloutInterrupted, simulate
 from dynx.sim.plants.disturbances import Push
@@ -33,9 +36,13 @@ __all__ = [
     "State",
     "StepResult",
     "Summary",
-    "compare_rollouts",
+    "compare",
     "plant_model",
     "register_plant",
     "simulate",
     "simulate_batch",
 ]
+
+# Hidden from type checkers, which would take any name for an attribute.
+if not TYPE_CHECKING:
+    __getattr__ = moved_names(__name__, {"compare_rollouts": "dynx.compare"})

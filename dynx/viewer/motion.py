@@ -17,7 +17,9 @@ from dynx.spatial.scalar import Floats
 from dynx.steppers.state import WorldState
 from dynx.world.camera.drawing import part_poses
 from dynx.world.comparison import EngineRun
+from dynx.world.record import Record, position_channel
 from dynx.world.scene import Scene, SceneBody
+from dynx.world.separation import Separation, separation
 
 FRAME_RATE = 60.0
 """Largest number of frames a second of the motion."""
@@ -55,6 +57,12 @@ class Motion:
     bodies: tuple[SceneBody, ...] = ()
     contacts: tuple[Arrows, ...] = ()
     """Contact forces at each time; empty where none were recorded."""
+
+    @property
+    def record(self) -> Record:
+        """Positions of the parts."""
+        paths = {part: position_channel(part, T[:, :3, 3]) for part, T in self.poses.items()}
+        return Record(self.name, self.t, paths)
 
     def frame_at(self, time: float) -> int:
         """Return the number of the last frame whose time is not after `time`."""
@@ -139,37 +147,15 @@ def motion_of_run(scene: Scene, run: EngineRun) -> Motion:
     return Motion(run.engine, run.times[: len(frames)], poses, robots, scene.bodies)
 
 
-def separation(a: Motion, b: Motion) -> tuple[Floats, tuple[str, ...]]:
-    """Return the largest distance (n,) [m] between a part in two motions at the times of `a`, and its name.
+def motion_separation(a: Motion, b: Motion) -> Separation:
+    """Measure how far apart the parts of two motions are, at the times of `a` at which `b` lasts.
 
-    Positions of `b` are interpolated linearly between its frames; where `b` has not begun or has ended the
-    distance is NaN. Raises ArgumentError for motions without a common part or without a common time.
+    Positions of `b` are interpolated linearly between its frames. Raises ArgumentError for motions without a
+    common part or without a common time.
     """
-    common = [name for name in a.poses if name in b.poses]
     if not a.poses and not b.poses:
         raise ArgumentError(f"{a.name} and {b.name} cannot be compared: nothing moves in them")
-    if not common:
-        raise ArgumentError(
-            f"{a.name} and {b.name} have no part in common: {_some(a.poses)}; {_some(b.poses)}"
-        )
-    outside = (a.t < b.t[0] - _SAME_TIME) | (a.t > b.t[-1] + _SAME_TIME)
-    if outside.all():
-        raise ArgumentError(
-            f"{a.name} and {b.name} have no time in common: {a.t[0]:g} to {a.t[-1]:g} s; "
-            f"{b.t[0]:g} to {b.t[-1]:g} s"
-        )
-    after = np.clip(np.searchsorted(b.t, a.t), min(1, len(b.t) - 1), len(b.t) - 1)
-    before = np.maximum(after - 1, 0)
-    step = b.t[after] - b.t[before]
-    weight = np.clip(np.divide(a.t - b.t[before], step, out=np.ones(len(a.t)), where=step > 0.0), 0.0, 1.0)
-    apart = np.empty((len(common), len(a.t)))
-    for k, name in enumerate(common):
-        p = b.poses[name][:, :3, 3]
-        there = (1.0 - weight[:, None]) * p[before] + weight[:, None] * p[after]
-        apart[k] = np.linalg.norm(a.poses[name][:, :3, 3] - there, axis=1)
-    largest = apart.argmax(axis=0)
-    distance = np.where(outside, np.nan, apart[largest, np.arange(len(a.t))])
-    return distance, tuple(common[k] for k in largest.tolist())
+    return separation(a.record, b.record, a.t)
 
 
 def _frames(t: Floats) -> NDArray[np.intp]:
@@ -203,8 +189,3 @@ def _require_motion(name: str, t: Floats, q: Floats, what: str) -> None:
             f"{name} cannot be shown: entry {entry} of {what} is {q[k, entry]} at {t[k]:g} s "
             f"(state {k} of {len(t)})"
         )
-
-
-def _some(names: Mapping[str, Floats]) -> str:
-    listed = list(names)[:3]
-    return ", ".join(listed) + (", ..." if len(names) > 3 else "")

@@ -17,7 +17,7 @@ from dynx.viewer.drawn_scene import DrawnScene
 from dynx.viewer.following_camera import FollowingCamera
 from dynx.viewer.framing import box_around, has_ground
 from dynx.viewer.marks import NamedParts
-from dynx.viewer.motion import PARTED, Motion, separation
+from dynx.viewer.motion import PARTED, Motion, motion_separation
 from dynx.viewer.page import Page
 from dynx.viewer.timeline import Timeline
 
@@ -191,16 +191,15 @@ class MotionView:
     def _add_curves(self, curves: Sequence[Series], step: float, *, compare: bool) -> None:
         gui = self._page.gui
         if compare and self.ghost is not None:
-            distance, farthest = separation(self.motion, self.ghost)
-            beyond = np.flatnonzero(distance > PARTED)
+            apart = motion_separation(self.motion, self.ghost)
+            parted = apart.first_beyond(PARTED)
             with gui.add_folder("difference"):
                 text = "never more than"
-                if beyond.size:
-                    first = int(beyond[0])
-                    text = f"from {self.motion.t[first]:.4g} s, {farthest[first]} by more than"
+                if parted is not None:
+                    time, part = parted
+                    text = f"from {time:.4g} s, {part} by more than"
                     jump = gui.add_button("jump to where they part")
-                    at = float(self.motion.t[first]) - self._start
-                    jump.on_click(lambda _: self._jump_to(at))
+                    jump.on_click(lambda _: self._jump_to(time - self._start))
                 gui.add_text("they part", f"{text} {1e3 * PARTED:g} mm", multiline=True, disabled=True)
                 ends = {each.name: float(each.t[-1]) for each in (self.motion, self.ghost)}
                 shorter = min(ends, key=lambda name: ends[name])
@@ -209,7 +208,14 @@ class MotionView:
                         "compared", f"until {ends[shorter]:.4g} s, where {shorter} ends", disabled=True
                     )
                 self._curves.append(
-                    Curves(self._page, "distance [m]", self.motion.t, distance[:, None], ["largest distance"])
+                    Curves(
+                        self._page,
+                        "distance [m]",
+                        apart.times,
+                        apart.distance[:, None],
+                        ["largest distance"],
+                        (float(self.motion.t[0]), float(self.motion.t[-1])),
+                    )
                 )
         # There is one torque fewer than there are states; the axes of all curves are alike.
         span = (self._start, self._start + self.duration)

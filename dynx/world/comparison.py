@@ -17,7 +17,9 @@ from dynx.rbd.kinematics import body_poses
 from dynx.spatial.scalar import Floats
 from dynx.steppers.state import WorldState
 from dynx.world.contacts import Contact
-from dynx.world.scene import Scene
+from dynx.world.record import Record, position_channel
+from dynx.world.scene.scene import Scene
+from dynx.world.separation import Separation, separation
 from dynx.world.world import World
 
 SEPARATIONS = (1e-3, 1e-2, 1e-1)
@@ -48,24 +50,6 @@ class EngineRun:
 
 
 @dataclass(frozen=True, eq=False)
-class Separation:
-    """Distance between the motions of one scene in two engines."""
-
-    engines: tuple[str, str]
-    times: Floats
-    """Times (k,) [s]."""
-    distance: Floats
-    """Largest distance (k,) between the positions of a body, or of a moving link, in the two engines [m]."""
-    farthest: tuple[str, ...]
-    """Name of that body or ``robot/link`` at each time."""
-
-    def first_beyond(self, distance: float) -> float | None:
-        """Return the first of the times at which the distance is larger; None if it never is."""
-        beyond = np.flatnonzero(self.distance > distance)
-        return float(self.times[beyond[0]]) if beyond.size else None
-
-
-@dataclass(frozen=True, eq=False)
 class WorldComparison:
     """Runs of one scene by several engines."""
 
@@ -75,6 +59,8 @@ class WorldComparison:
     duration: float
     runs: tuple[EngineRun, ...]
     separations: tuple[Separation, ...] = field(default=())
+    """Distances between the positions of each body that moves, and of each moving link as ``robot/link``, for
+    each two engines, whose names are the `records`."""
 
     def __repr__(self) -> str:
         engines = ", ".join(run.engine for run in self.runs)
@@ -82,7 +68,7 @@ class WorldComparison:
 
 
 class ComparisonInterrupted(KeyboardInterrupt):
-    """Interruption of `compare_worlds` by Ctrl-C; `comparison` has the engines that ran until then."""
+    """Interruption of `compare` by Ctrl-C; `comparison` has the engines that ran until then."""
 
     def __init__(self, comparison: WorldComparison) -> None:
         last, count = comparison.runs[-1], len(comparison.runs)
@@ -90,7 +76,7 @@ class ComparisonInterrupted(KeyboardInterrupt):
         self.comparison = comparison
 
 
-def compare_worlds(
+def compare_engines(
     scene: Scene,
     engines: Sequence[str],
     duration: float,
@@ -127,7 +113,8 @@ def compare_worlds(
             runs.append(_run(world, ends.tolist(), finish, progress))
             if runs[-1].interrupted:
                 break
-    separations = tuple(_separation(scene, a, b) for a, b in combinations(runs, 2))
+    records = [_record(scene, run) for run in runs]
+    separations = tuple(separation(a, b) for a, b in combinations(records, 2))
     comparison = WorldComparison(scene, dt, substeps, n_steps * dt, tuple(runs), separations)
     if runs and runs[-1].interrupted:
         raise ComparisonInterrupted(comparison)
@@ -161,31 +148,22 @@ def _run(
     )
 
 
-def _separation(scene: Scene, one: EngineRun, other: EngineRun) -> Separation:
-    k = min(len(one.states), len(other.states))
-    names, paths = zip(*(_positions(scene, run.states[:k]) for run in (one, other)), strict=True)
-    apart = np.linalg.norm(paths[0] - paths[1], axis=2)
-    worst = np.argmax(apart, axis=1)
-    farthest = tuple(names[0][index] if names[0] else "" for index in worst.tolist())
-    return Separation((one.engine, other.engine), one.times[:k], apart[np.arange(k), worst], farthest)
-
-
-def _positions(scene: Scene, states: Sequence[WorldState]) -> tuple[list[str], Floats]:
-    """Return the names of what moves, and its positions (states, names, 3)."""
+def _record(scene: Scene, run: EngineRun) -> Record:
+    """Return the positions of what moves."""
     paths: dict[str, Floats] = {}
     for body in scene.bodies:
         if not body.fixed:
-            paths[body.name] = np.array([state.bodies[body.name].T_world_body[:3, 3] for state in states])
+            paths[body.name] = np.array([state.bodies[body.name].T_world_body[:3, 3] for state in run.states])
     for robot in scene.robots:
         mechanism = robot.model.mechanism
-        q = np.array([state.robots[robot.name].q for state in states])
+        q = np.array([state.robots[robot.name].q for state in run.states])
         poses = body_poses(mechanism, mechanism.tree_q(q))
         if robot.model.floating:
             paths[f"{robot.name}/{robot.model.root}"] = poses[ROOT][1]
         moving = (joint.child for joint in robot.model.joints if joint.moves)
         # A position that no joint before it changes is the same at all times.
         paths |= {
-            f"{robot.name}/{link}": np.broadcast_to(poses[k][1], (len(states), 3))
+            f"{robot.name}/{link}": np.broadcast_to(poses[k][1], (len(run.states), 3))
             for k, link in enumerate(moving)
         }
-    return [*paths], np.stack([*paths.values(), np.zeros((len(states), 3))][: len(paths) or 1], axis=1)
+    return Record(run.engine, run.times, {name: position_channel(name, rows) for name, rows in paths.items()})

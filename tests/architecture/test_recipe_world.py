@@ -12,10 +12,11 @@ import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
 
+import dynx
 from dynx import Pose
 from dynx.cli.shell.main import cli
 from dynx.errors import ArgumentError, UnknownBackendError, UnknownNameError, UnsupportedFeatureError
-from dynx.world import Scene, World, Wrench, box, compare_worlds, sphere, world_names, write_scene
+from dynx.world import Scene, World, Wrench, box, sphere, world_names, write_scene
 from tests.architecture.packages import installed_package
 
 MODULE = '''"""Balls that fly through each other, on the exact solution of their equations of motion."""
@@ -155,7 +156,7 @@ def test_wrenches_settings_and_saved_states_are_those_of_any_world(tmp_path: Pat
 
 @pytest.mark.usefixtures("package")
 def test_it_is_compared_with_the_engines_of_dynx(tmp_path: Path) -> None:
-    comparison = compare_worlds(balls(), [NAME, "pybullet"], duration=0.5, dt=1e-3)
+    comparison = dynx.compare(balls(), [NAME, "pybullet"], duration=0.5, dt=1e-3)
     # Semi-implicit Euler is g t h / 2 below the parabola.
     (apart,) = comparison.separations
     assert apart.distance[-1] == pytest.approx(0.5 * 9.81 * 0.5 * 1e-3, rel=1e-3)

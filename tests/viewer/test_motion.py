@@ -19,12 +19,12 @@ from dynx.viewer.motion import (
     motion_of_reference,
     motion_of_rollout,
     motion_of_run,
-    separation,
+    motion_separation,
 )
 from dynx.viewer.motion_view import MotionView
 from dynx.viewer.page import Page
 from dynx.world import Scene, SceneRobot, box, ground
-from dynx.world.comparison import compare_worlds
+from dynx.world.comparison import compare_engines
 from dynx.world.scene import read_scene
 
 GOAL = [0.5, -0.4, 0.3, 0.2, -0.3, 0.4]
@@ -64,16 +64,16 @@ def test_the_reference_is_another_motion_of_the_same_parts(rollout: dynx.Rollout
     motion, reference = motion_of_rollout(rollout), motion_of_reference(rollout)
     assert reference is not None
     assert set(reference.poses) == set(motion.poses)
-    distance, farthest = separation(motion, reference)
-    assert distance[0] > 1e-3
-    assert distance[-1] < distance[0]
-    assert set(farthest) <= set(motion.poses)
+    apart = motion_separation(motion, reference)
+    assert apart.distance[0] > 1e-3
+    assert apart.distance[-1] < apart.distance[0]
+    assert set(apart.parts) <= set(motion.poses)
     assert motion_of_reference(replace(rollout, reference=None)) is None
 
 
 def test_a_motion_is_not_apart_from_itself(rollout: dynx.Rollout) -> None:
     motion = motion_of_rollout(rollout)
-    assert not separation(motion, motion)[0].any()
+    assert not motion_separation(motion, motion).distances.any()
 
 
 def accelerated(name: str, t: Floats) -> Motion:
@@ -86,13 +86,13 @@ def accelerated(name: str, t: Floats) -> Motion:
 def test_frames_at_other_times_and_a_shorter_motion_do_not_part() -> None:
     a, b = accelerated("a", np.linspace(0.0, 2.0, 121)), accelerated("b", np.linspace(0.0, 1.0, 37))
     for first, second in ((a, b), (b, a)):
-        distance, _ = separation(first, second)
+        apart = motion_separation(first, second)
         # Between frames h apart a line is at most h^2 / 8 of the acceleration from the motion.
         step = float(np.diff(second.t).max())
-        assert np.nanmax(distance) <= 2.0 * step**2 / 8.0 + 1e-12
-        assert np.array_equal(np.isnan(distance), first.t > 1.0 + 1e-9)
-    with pytest.raises(ArgumentError, match="no time in common: 0 to 1 s; 5 to 6 s"):
-        separation(b, accelerated("later", np.linspace(5.0, 6.0, 10)))
+        assert apart.largest <= 2.0 * step**2 / 8.0 + 1e-12
+        assert np.array_equal(apart.times, first.t[first.t <= 1.0 + 1e-9])
+    with pytest.raises(ArgumentError, match="no common time: one is from 0 to 1 s, the other from 5 to 6 s"):
+        motion_separation(b, accelerated("later", np.linspace(5.0, 6.0, 10)))
 
 
 def test_the_longer_of_two_motions_is_shown_to_its_end(rollout: dynx.Rollout) -> None:
@@ -140,10 +140,10 @@ def test_motions_without_a_common_part_are_refused(rollout: dynx.Rollout) -> Non
     motion = motion_of_rollout(rollout)
     renamed = replace(motion, poses={f"other/{name}": T for name, T in motion.poses.items()})
     with pytest.raises(ArgumentError, match="no part in common"):
-        separation(motion, renamed)
+        motion_separation(motion, renamed)
     still = replace(motion, poses={})
     with pytest.raises(ArgumentError, match="nothing moves in them"):
-        separation(still, still)
+        motion_separation(still, still)
 
 
 def test_a_picture_of_two_motions_that_coincide_shows_the_solid_one() -> None:
@@ -198,9 +198,9 @@ def test_runs_of_a_scene_are_as_far_apart_as_their_comparison_says() -> None:
     pytest.importorskip("mujoco")
     pytest.importorskip("pybullet")
     scene = read_scene("slope")
-    compared = compare_worlds(scene, ["pybullet", "mujoco"], 0.2, samples=10)
+    compared = compare_engines(scene, ["pybullet", "mujoco"], 0.2, samples=10)
     a, b = (motion_of_run(scene, run) for run in compared.runs)
-    assert np.allclose(separation(a, b)[0], compared.separations[0].distance, atol=1e-12)
+    assert np.allclose(motion_separation(a, b).distance, compared.separations[0].distance, atol=1e-12)
 
 
 def test_one_of_many_curves_is_chosen_and_keeps_its_colour_while_the_time_moves() -> None:

@@ -17,7 +17,7 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
 from dynx.steppers.state import RobotState, WorldState
 from dynx.viewer import Viewer, view
-from dynx.viewer.motion import PARTED, separation
+from dynx.viewer.motion import PARTED, motion_separation
 from dynx.world import Scene, World
 from dynx.world.camera import Camera, draw_picture
 from dynx.world.scene import SceneRobot, read_scene
@@ -247,7 +247,7 @@ def test_the_page_pushes_a_part_and_jumps_to_where_motions_part(open_page: OpenP
         page = open_page(viewer.url)
         viewer.view.go_to(0.2)
         page.page.get_by_role("button", name="jump to where they part").click()
-        distance, _ = separation(viewer.view.motion, viewer.view.ghost)
+        distance = motion_separation(viewer.view.motion, viewer.view.ghost).distance
         first = int(np.argmax(distance > PARTED))
         until(lambda: viewer.view.time == viewer.view.motion.t[first], "the time at which they part")
         assert not page.errors

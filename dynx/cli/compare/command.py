@@ -28,7 +28,7 @@ from dynx.cli.shell.options import FiniteRange, GroupedCommand, group, json_opti
     ),
 )
 @group("Output", json_option, quiet_option)
-@runs("dynx.cli.compare.run:compare")
+@runs("dynx.cli.compare.run:compare_files")
 def compare() -> None:
     """Find out how far apart two rollouts of a robot are, and why.
 

@@ -6,7 +6,7 @@ import math
 from typing import Literal, TypedDict
 
 from dynx.sim.comparison.comparison import Cause, RolloutComparison
-from dynx.sim.comparison.separation import Separation
+from dynx.world.separation import Separation
 
 SCHEMA: Literal["dynx.compare/1"] = "dynx.compare/1"
 

@@ -12,11 +12,11 @@ from dynx.cli.shell.progress import progress_bar
 from dynx.cli.shell.terminal import present
 from dynx.errors import ArgumentError
 from dynx.model.loading import load
-from dynx.sim.comparison.comparison import TOLERANCE, compare_rollouts
+from dynx.sim.comparison.comparison import TOLERANCE, compare
 from dynx.sim.record.rollout import Rollout
 
 
-def compare(
+def compare_files(
     first: str,
     second: str,
     tolerance: float | None,
@@ -33,7 +33,7 @@ def compare(
         def progress(done: int, total: int) -> None:
             advance(done, "reruns", total)
 
-        comparison = compare_rollouts(
+        comparison = compare(
             ours,
             theirs,
             tolerance=TOLERANCE if tolerance is None else tolerance,

@@ -8,7 +8,7 @@ from dynx.errors import ArgumentError
 from dynx.steppers.registry import installed_worlds
 from dynx.viewer.motion import FRAME_RATE, MAX_FRAMES
 from dynx.world import World
-from dynx.world.comparison import WorldComparison, compare_worlds
+from dynx.world.comparison import WorldComparison, compare_engines
 from dynx.world.scene import read_scene
 
 DEFAULT_STEP = 1e-3
@@ -45,4 +45,4 @@ def open_scene(
             before[engine] = now
             advance(round(1e3 * sum(before.values())), f"{engine}, simulated time [ms]")
 
-        return compare_worlds(scene, chosen, time, step, samples=samples, progress=progress)
+        return compare_engines(scene, chosen, time, step, samples=samples, progress=progress)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any, Literal, TypedDict
 
 from dynx.spatial.so3 import quat_from_rotation
-from dynx.world.comparison import SEPARATIONS, EngineRun, Separation, WorldComparison
+from dynx.world.comparison import SEPARATIONS, EngineRun, WorldComparison
 from dynx.world.contacts import Contact
+from dynx.world.separation import Separation
 
 SCHEMA: Literal["dynx.world/1"] = "dynx.world/1"
 
@@ -145,9 +146,14 @@ def _contact(contact: Contact) -> ContactEntry:
 
 def _separation(separation: Separation) -> SeparationEntry:
     return {
-        "engines": list(separation.engines),
+        "engines": list(separation.records),
         "times": separation.times.tolist(),
         "distance": separation.distance.tolist(),
-        "farthest": list(separation.farthest),
-        "parted": [{"distance": each, "time": separation.first_beyond(each)} for each in SEPARATIONS],
+        "farthest": list(separation.parts),
+        "parted": [_parted(separation, each) for each in SEPARATIONS],
     }
+
+
+def _parted(separation: Separation, distance: float) -> PartedEntry:
+    time, _ = separation.first_beyond(distance) or (None, "")
+    return {"distance": distance, "time": time}

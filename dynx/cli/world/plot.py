@@ -25,7 +25,7 @@ def plot(comparison: WorldComparison, path: str) -> None:
         bottom = _lowest(max(float(each.distance.max()) for each in comparison.separations))
         for each in comparison.separations:
             distance = np.maximum(each.distance, bottom)
-            axes.semilogy(each.times, distance, lw=1.3, label=" - ".join(each.engines))
+            axes.semilogy(each.times, distance, lw=1.3, label=" - ".join(each.records))
         axes.set_ylim(bottom=bottom)
         axes.set_ylabel("largest distance [m]")
     else:

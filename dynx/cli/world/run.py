@@ -18,7 +18,7 @@ from dynx.errors import ArgumentError, DynxError
 from dynx.files.figures import picture_format
 from dynx.steppers.registry import installed_worlds
 from dynx.world import World
-from dynx.world.comparison import ComparisonInterrupted, WorldComparison, compare_worlds
+from dynx.world.comparison import ComparisonInterrupted, WorldComparison, compare_engines
 from dynx.world.scene import read_scene
 from dynx.world.snapshot import check_world_suffix
 
@@ -72,7 +72,7 @@ def world(
 
             ended: ComparisonInterrupted | None = None
             try:
-                comparison = compare_worlds(
+                comparison = compare_engines(
                     described,
                     chosen,
                     duration,

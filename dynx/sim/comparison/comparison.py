@@ -1,19 +1,22 @@
-"""`compare_rollouts`: how far apart two rollouts are, and which differences of their scenarios cause it."""
+"""`compare`: how far apart two motions of a kind are, and which differences of two scenarios cause it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from typing import Any, overload
 
 from dynx.errors import ArgumentError, DynxError, shown
 from dynx.files.notebook import html_grid
 from dynx.model.numbers import is_real
 from dynx.sim.comparison.factors import Factor, Mixture
-from dynx.sim.comparison.separation import Separation, separation
 from dynx.sim.one_rollout import simulate
 from dynx.sim.record.rollout import Rollout
 from dynx.sim.scenario.documents import Unknown
+from dynx.world.comparison import WorldComparison, compare_engines
+from dynx.world.scene.scene import Scene
+from dynx.world.separation import Separation, separation
 
 TOLERANCE = 1e-9
 """Default distance [rad or m] up to which two rollouts are alike: that of engines which add in another order
@@ -94,7 +97,64 @@ class RolloutComparison:
         return html_grid(repr(self)[1:-1], ("difference", "ours", "theirs", "alone", "without it"), rows)
 
 
-def compare_rollouts(
+@overload
+def compare(
+    ours: Rollout,
+    theirs: Rollout,
+    *,
+    tolerance: float = TOLERANCE,
+    rerun: bool = True,
+    progress: Progress | None = None,
+) -> RolloutComparison: ...
+@overload
+def compare(
+    ours: Scene, theirs: Sequence[str], duration: float, dt: float = 1e-3, **options: Any
+) -> WorldComparison: ...
+def compare(ours: Any, theirs: Any, *given: Any, **options: Any) -> Any:
+    """Find out how far apart two motions are.
+
+    - ``compare(rollout, rollout, tolerance=, rerun=, progress=)``: two rollouts of a robot, or logs that
+      `Rollout.load` reads, and why they part: the differences of their scenarios (`RolloutComparison`).
+    - ``compare(scene, engines, duration, dt=1e-3, substeps=, settings=, samples=, finish=, progress=)``: the
+      motions of one scene in the worlds of several engines (`dynx.world.WorldComparison`).
+
+    Each difference of two scenarios (an argument of `simulate`, a gain, a link, a joint) is taken over from
+    `theirs` into `ours` alone, and simulated again; and so are all differences but this one. With all of
+    them the rerun must be `theirs` again, which is the proof that nothing else is a cause. `tolerance` is the
+    distance [rad or m] up to which rollouts are alike. Without `rerun` the differences are listed only.
+    `progress` is called with the number of reruns done and their total number.
+
+    The engines run the scene for `duration` [s] in steps of `dt` / `substeps` [s], with the `settings` of
+    `World` by engine; states are compared at `samples` times. `finish` is called with each world at its end,
+    and `progress` with the name of the engine and the time reached. An engine that fails in a step ends its
+    run there.
+
+    Raises ArgumentError for rollouts of robots with other coordinates or without a common time, for anything
+    but two rollouts or a scene with its engines, and for an invalid tolerance; the errors of `World` for a
+    scene that cannot be opened.
+    """
+    if isinstance(ours, Scene):
+        return compare_engines(ours, theirs, *given, **options)
+    return _compare_rollouts(ours, theirs, *given, **options)
+
+
+def rollout_separation(ours: Rollout, theirs: Rollout) -> Separation:
+    """Measure how far apart two rollouts are over time, in the coordinates of their robot and the positions
+    of the bodies that both have.
+
+    Raises ArgumentError for rollouts of robots with other coordinates, or without a common time.
+    """
+    one, other = ours.model, theirs.model
+    if (one.base, one.joint_names) != (other.base, other.joint_names):
+        raise ArgumentError(
+            "the rollouts have other coordinates: "
+            f"{one.base} base and joints {', '.join(one.joint_names) or 'none'}; "
+            f"{other.base} base and joints {', '.join(other.joint_names) or 'none'}"
+        )
+    return separation(ours.record("the first rollout"), theirs.record("the second rollout"))
+
+
+def _compare_rollouts(
     ours: Rollout,
     theirs: Rollout,
     *,
@@ -102,26 +162,15 @@ def compare_rollouts(
     rerun: bool = True,
     progress: Progress | None = None,
 ) -> RolloutComparison:
-    """Find out how far apart two rollouts of a robot are, and why.
-
-    Each difference of their scenarios (an argument of `simulate`, a gain, a link, a joint) is taken over from
-    `theirs` into `ours` alone, and simulated again; and so are all differences but this one. With all of
-    them the rerun must be `theirs` again, which is the proof that nothing else is a cause. `tolerance` is the
-    distance [rad or m] up to which rollouts are alike. Without `rerun` the differences are listed only.
-    `progress` is called with the number of reruns done and their total number.
-
-    Raises ArgumentError for rollouts of robots with other coordinates, or without a common time, for anything
-    but a Rollout, and for an invalid tolerance.
-    """
     for name, each in (("first", ours), ("second", theirs)):
         if not isinstance(each, Rollout):
             raise ArgumentError(
                 f"the {name} rollout is of type {type(each).__name__}; wanted a dynx.Rollout, which "
-                "simulate returns and Rollout.load reads"
+                "simulate returns and Rollout.load reads, or first a Scene and second its engines"
             )
     if not is_real(tolerance) or not 0.0 <= tolerance < math.inf:
         raise ArgumentError(f"tolerance is {shown(tolerance)}; wanted a number of rad or m, 0 or more")
-    apart = separation(ours, theirs)
+    apart = rollout_separation(ours, theirs)
     notes = [*_departures("the first", ours), *_departures("the second", theirs)]
     if ours.scenario is None or theirs.scenario is None:
         which = " and ".join(
@@ -169,7 +218,7 @@ class _Trials:
         found, why = self._rollout(taken)
         if found is None:
             return None, why
-        return (float("inf") if why is not None else separation(found, record).largest), why
+        return (float("inf") if why is not None else rollout_separation(found, record).largest), why
 
     def _rollout(self, taken: Collection[str]) -> tuple[Rollout | None, str | None]:
         key = frozenset(taken)

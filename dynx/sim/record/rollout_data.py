@@ -18,12 +18,17 @@ from dynx.sim.scenario.scenario import Scenario
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 from dynx.trajectory.limit_check import UNITS
+from dynx.world.record import (
+    Channel,
+    Record,
+    configuration_channel,
+    coordinate_names,
+    coordinate_units,
+    position_channel,
+)
 from dynx.world.surroundings import Surroundings
 
 Self = TypeVar("Self", bound="RolloutData")
-
-BASE_COORDINATES = ("base x", "base y", "base z", "base rx", "base ry", "base rz")
-"""Names of the coordinates of a floating base."""
 
 
 class Summary(NamedTuple):
@@ -160,14 +165,17 @@ class RolloutData:
             max_torque=np.max(np.abs(self.tau), axis=0, initial=0.0),
             energy_drift=drift / peak if peak else drift,
             saturated=float(np.mean(self.saturated.any(axis=1))) if len(self) else 0.0,
-            coordinates=(*(BASE_COORDINATES if self.model.floating else ()), *self.model.joint_names),
-            units=self._units,
+            coordinates=coordinate_names(self.model),
+            units=coordinate_units(self.model),
         )
 
-    @property
-    def _units(self) -> tuple[str, ...]:
-        joints = (joint.unit for joint in self.model.coordinate_joints)
-        return (*(("m",) * 3 + ("rad",) * 3 if self.model.floating else ()), *joints)
+    def record(self, name: str = "") -> Record:
+        """Return the motion as a record: the configurations of the robot, and the positions of the bodies of
+        its scene."""
+        bodies = {} if self.surroundings is None else self.surroundings.bodies
+        channels: dict[str, Channel] = {"q": configuration_channel(self.model, self.q)}
+        channels |= {f"{body}/pose": position_channel(body, T[:, :3, 3]) for body, T in bodies.items()}
+        return Record(name or self.model.name, self.t, channels)
 
     @cached_property
     def settings(self) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from dynx import control
 from dynx.cli.compare.document import document
 from dynx.cli.compare.tables import show, verdict
 from dynx.cli.shell.main import cli
-from dynx.sim import Payload, compare_rollouts, simulate
+from dynx.sim import Payload, compare, simulate
 
 ARM = dynx.load("so101")
 GOAL = np.full(6, 0.1)
@@ -86,17 +86,15 @@ def test_unusable_input(folder: Path) -> None:
 
 def test_verdicts_without_a_proof(folder: Path) -> None:
     ours, theirs = (dynx.Rollout.load(folder / name) for name in ("a.npz", "b.npz"))
-    listed = document(compare_rollouts(ours, theirs, rerun=False), "a", "b")
+    listed = document(compare(ours, theirs, rerun=False), "a", "b")
     assert verdict(listed) == "a and b part; their differences were not simulated"
     log = dynx.Rollout.load(folder / "log.csv", ARM)
-    assert (
-        verdict(document(compare_rollouts(ours, log), "a", "b")) == "a and b part, for no cause that is known"
-    )
+    assert verdict(document(compare(ours, log), "a", "b")) == "a and b part, for no cause that is known"
 
 
 def test_a_verdict_says_which_effects_are_not_known(folder: Path) -> None:
     ours, theirs = (dynx.Rollout.load(folder / name) for name in ("a.npz", "b.npz"))
-    report: dict[str, Any] = {**document(compare_rollouts(ours, theirs), "a", "b")}
+    report: dict[str, Any] = {**document(compare(ours, theirs), "a", "b")}
     (payload,) = report["causes"]
     small = {**payload, "alone": 1e-12, "without": 1e-12, "acts": False}
     unknown = {**small, "without": None}
@@ -118,4 +116,4 @@ def test_a_verdict_says_which_effects_are_not_known(folder: Path) -> None:
 def test_the_duration_is_that_of_the_common_time(folder: Path) -> None:
     ours, theirs = (dynx.Rollout.load(folder / name) for name in ("a.npz", "b.npz"))
     later = [replace(each, t=each.t + 5.0, scenario=None) for each in (ours, theirs)]
-    assert document(compare_rollouts(*later), "a", "b")["duration"] == pytest.approx(0.1, abs=1e-12)
+    assert document(compare(*later), "a", "b")["duration"] == pytest.approx(0.1, abs=1e-12)

@@ -13,8 +13,8 @@ import dynx
 from dynx import control, trajectory
 from dynx.errors import ArgumentError
 from dynx.model import Model
-from dynx.sim import Noise, Payload, Rollout, Scenario, ScenePlant, compare_rollouts, simulate
-from dynx.sim.comparison.separation import separation
+from dynx.sim import Noise, Payload, Rollout, Scenario, ScenePlant, compare, simulate
+from dynx.sim.comparison.comparison import rollout_separation
 from dynx.world import Material, Scene, SceneRobot, box, ground
 
 ARM = dynx.load("so101")
@@ -45,7 +45,7 @@ def other_robot() -> Model:
 def test_one_cause_is_proved_and_another_difference_has_no_effect() -> None:
     ours = simulate(scenario())
     theirs = simulate(scenario(payload=Payload("gripper_link", 0.1), plant="reference"))
-    found = compare_rollouts(ours, theirs)
+    found = compare(ours, theirs)
     assert not found.alike
     assert found.proved
     assert (found.remaining, found.repeated) == (0.0, 0.0)
@@ -63,7 +63,7 @@ def test_one_cause_is_proved_and_another_difference_has_no_effect() -> None:
 def test_links_joints_gains_and_noise_are_differences_of_their_own() -> None:
     ours = simulate(scenario(damping=True))
     theirs = simulate(scenario(other_robot(), kp=50.0, noise=Noise(q=1e-4), damping=True))
-    found = compare_rollouts(ours, theirs)
+    found = compare(ours, theirs)
     assert found.proved
     effects = {cause.factor.name: cause for cause in found.causes}
     assert set(effects) == {
@@ -88,7 +88,7 @@ def test_a_cause_that_is_mended_leaves_the_rollouts_alike() -> None:
     ours = scenario(damping=True)
     theirs = scenario(other_robot(), damping=True)
     mended = replace(theirs, model=ARM, controller=control.ComputedTorque(ARM, kp=100.0, kd=20.0))
-    found = compare_rollouts(simulate(ours), simulate(mended))
+    found = compare(simulate(ours), simulate(mended))
     assert found.alike
     assert not found.causes
     assert not found.proved
@@ -96,15 +96,15 @@ def test_a_cause_that_is_mended_leaves_the_rollouts_alike() -> None:
 
 def test_times_of_other_steps_are_interpolated() -> None:
     ours, theirs = simulate(scenario(dt=2e-3)), simulate(scenario(dt=1e-3))
-    apart = separation(ours, theirs)
+    apart = rollout_separation(ours, theirs)
     np.testing.assert_array_equal(apart.times, ours.t)
     np.testing.assert_array_equal(apart.distances, np.abs(ARM.difference(ours.q, theirs.q[::2])))
     late = replace(theirs, t=theirs.t + 0.5e-3)
-    middle = separation(late, theirs)
+    middle = rollout_separation(late, theirs)
     assert len(middle.times) == len(theirs.t) - 1
     expected = np.abs(0.5 * (theirs.q[1:] - theirs.q[:-1]))
     np.testing.assert_allclose(middle.distances, expected, atol=1e-15)
-    found = compare_rollouts(ours, theirs)
+    found = compare(ours, theirs)
     assert found.proved
     assert [cause.factor.name for cause in found.causes] == ["dt", "control_dt"]
 
@@ -113,9 +113,9 @@ def test_rollouts_that_cannot_be_compared() -> None:
     ours, other = simulate(scenario(duration=0.01)), dynx.load("ur5")
     theirs = simulate(other, None, plant="compiled", duration=0.01)
     with pytest.raises(ArgumentError, match="other coordinates: fixed base and joints shoulder_pan, "):
-        compare_rollouts(ours, theirs)
+        compare(ours, theirs)
     with pytest.raises(ArgumentError, match=r"no common time: one is from 0 to 0\.01 s, the other from 5 to"):
-        compare_rollouts(ours, replace(ours, t=ours.t + 5.0))
+        compare(ours, replace(ours, t=ours.t + 5.0))
 
 
 class Own(control.Controller[None], pure=True):
@@ -132,14 +132,14 @@ def test_what_cannot_be_simulated_again_is_said(tmp_path: Path) -> None:
     start: dict[str, Any] = {"q0": np.full(6, 0.1), "duration": 0.02, "plant": "compiled"}
     ours = simulate(ARM, Own(ARM), np.zeros(6), **start)
     theirs = simulate(ARM, Own(ARM), np.zeros(6), damping=1.0, **start)
-    assert compare_rollouts(ours, theirs).proved  # as the objects are here
+    assert compare(ours, theirs).proved  # as the objects are here
     ours.save(tmp_path / "own.npz")
-    found = compare_rollouts(Rollout.load(tmp_path / "own.npz"), theirs)
+    found = compare(Rollout.load(tmp_path / "own.npz"), theirs)
     assert not found.proved
     assert found.repeated is None
     assert any("controller cannot be rebuilt" in note for note in found.notes)
     bare = replace(theirs, scenario=None)
-    found = compare_rollouts(ours, bare)
+    found = compare(ours, bare)
     assert found.causes == ()
     assert found.notes == (
         "the second rollout has no scenario, so that differences cannot be listed or proved",
@@ -152,9 +152,9 @@ def test_a_difference_that_diverges_has_an_infinite_effect() -> None:
     theirs = simulate(replace(scenario(duration=0.05), controller=law))
     assert theirs.scenario is not None
     again = replace(theirs.scenario, controller=control.PD(ARM, kp=1.0, kd=1e3), q0=np.full(6, 1e-3))
-    found = compare_rollouts(ours, theirs)
+    found = compare(ours, theirs)
     assert found.proved
-    mixed = compare_rollouts(theirs, replace(ours, scenario=again), tolerance=0.0)
+    mixed = compare(theirs, replace(ours, scenario=again), tolerance=0.0)
     assert any(cause.alone == float("inf") and "diverged" in (cause.obstacle or "") for cause in mixed.causes)
     assert not mixed.proved
 
@@ -178,7 +178,7 @@ def test_bodies_materials_and_the_engine_of_a_scene() -> None:
     def run(*given: Any) -> Rollout:
         return simulate(ARM, law, np.zeros(6), plant=plant(*given), duration=0.1)
 
-    found = compare_rollouts(run(0.1, 0.5, "pybullet"), run(0.3, 0.8, "pybullet"), tolerance=1e-4)
+    found = compare(run(0.1, 0.5, "pybullet"), run(0.3, 0.8, "pybullet"), tolerance=1e-4)
     assert found.proved
     effects = {cause.factor.name: cause for cause in found.causes}
     assert set(effects) == {"body cube, material", "body cube, mass"}

@@ -13,7 +13,7 @@ from dynx import control
 from dynx.model import Model
 from dynx.model.geometry import Collision, Geometry, LinkGeometry
 from dynx.model.geometry.shapes import Sphere
-from dynx.sim import Payload, Rollout, Scenario, ScenePlant, compare_rollouts, simulate
+from dynx.sim import Payload, Rollout, Scenario, ScenePlant, compare, simulate
 from dynx.sim.comparison.comparison import RolloutComparison
 from dynx.world import Scene, SceneRobot, box, ground
 
@@ -42,7 +42,7 @@ def heavier(model: Model, *links: str) -> Model:
 
 
 def compared(ours: Scenario, theirs: Scenario) -> RolloutComparison:
-    return compare_rollouts(simulate(ours), simulate(theirs))
+    return compare(simulate(ours), simulate(theirs))
 
 
 def names(found: RolloutComparison) -> set[str]:
@@ -151,7 +151,7 @@ def test_shapes_that_collide_are_a_difference_in_a_scene() -> None:
         plant = ScenePlant(scene, engine="mujoco")
         return simulate(shaped, None, q0=[0.3, 0.5], plant=plant, duration=0.3, **options)
 
-    found = compare_rollouts(run(0.02), run(0.08, heavier(small, "link1")))
+    found = compare(run(0.02), run(0.08, heavier(small, "link1")))
     assert found.proved
     assert names(found) == {"robot arm, shapes", "link link1, inertial"}
     shapes = next(cause for cause in found.causes if cause.factor.name == "robot arm, shapes")

@@ -12,8 +12,8 @@ import pytest
 import dynx
 from dynx import control
 from dynx.errors import ArgumentError
-from dynx.sim import Rollout, compare_rollouts, simulate, simulate_batch
-from dynx.sim.comparison.separation import separation
+from dynx.sim import Rollout, compare, simulate, simulate_batch
+from dynx.sim.comparison.comparison import rollout_separation
 
 ARM = dynx.load("double_pendulum_continuous")
 OURS = simulate(ARM, None, q0=[0.5, 0.2], plant="compiled", duration=0.2)
@@ -38,13 +38,13 @@ def test_a_log_at_other_times_is_interpolated_as_numpy_does(tmp_path: Path) -> N
     t = np.sort(rng.uniform(0.01, 0.3, 40))
     q = np.column_stack([np.sin(9.0 * t), np.cos(7.0 * t)])
     read = log(tmp_path / "log.csv", t, q)
-    apart = separation(OURS, read)
+    apart = rollout_separation(OURS, read)
     inside = t <= OURS.t[-1]
     np.testing.assert_array_equal(apart.times, t[inside])
     ours = np.column_stack([np.interp(t[inside], OURS.t, OURS.q[:, k]) for k in range(2)])
     expected = np.abs(ours - q[inside])
     np.testing.assert_allclose(apart.distances, expected, atol=1e-13)
-    np.testing.assert_array_equal(apart.distances, separation(read, OURS).distances)
+    np.testing.assert_array_equal(apart.distances, rollout_separation(read, OURS).distances)
     k = int(np.argmax((expected > 0.3).any(axis=1)))
     assert apart.first_beyond(0.3) == (t[inside][k], ARM.joint_names[int(np.argmax(expected[k]))])
     row, column = np.unravel_index(int(np.argmax(expected)), expected.shape)
@@ -53,7 +53,7 @@ def test_a_log_at_other_times_is_interpolated_as_numpy_does(tmp_path: Path) -> N
 
 def test_a_log_in_milliseconds_is_not_like_the_simulation(tmp_path: Path) -> None:
     read = log(tmp_path / "log.csv", 1e3 * OURS.t[::10], OURS.q[::10])
-    for apart in (separation(OURS, read), separation(read, OURS)):
+    for apart in (rollout_separation(OURS, read), rollout_separation(read, OURS)):
         np.testing.assert_array_equal(apart.times, OURS.t)
         expected = [np.interp(OURS.t, read.t, read.q[:, k]) for k in range(2)]
         np.testing.assert_allclose(apart.distances, np.abs(OURS.q - np.column_stack(expected)), atol=1e-15)
@@ -63,13 +63,13 @@ def test_a_log_in_milliseconds_is_not_like_the_simulation(tmp_path: Path) -> Non
 def test_times_of_a_clock_are_shown_to_the_last_digit() -> None:
     late = replace(OURS, t=OURS.t + 1764251202.25)
     with pytest.raises(ArgumentError, match=r"from 1764251202\.25 to 1764251202\.45 s, the other from 0"):
-        separation(late, OURS)
+        rollout_separation(late, OURS)
 
 
 @pytest.mark.parametrize("tolerance", [np.nan, np.inf, -1.0, "1e-3", None, True])
 def test_an_invalid_tolerance_is_refused(tolerance: float) -> None:
     with pytest.raises(ArgumentError, match=r"tolerance is .*; wanted a number of rad or m, 0 or more"):
-        compare_rollouts(OURS, THEIRS, tolerance=tolerance)
+        compare(OURS, THEIRS, tolerance=tolerance)
 
 
 def test_anything_but_a_rollout_is_refused() -> None:
@@ -77,7 +77,7 @@ def test_anything_but_a_rollout_is_refused() -> None:
     many = simulate_batch(ARM, law, np.zeros(2), q0=ARM.random(1, 3), duration=0.01, plant="compiled")
     for other in (many, "b.npz", None):
         with pytest.raises(ArgumentError, match=r"the second rollout is of type .*; wanted a dynx\.Rollout"):
-            compare_rollouts(OURS, other)  # type: ignore[arg-type]
+            compare(OURS, other)  # type: ignore[call-overload]
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
@@ -89,7 +89,7 @@ def test_progress_ends_with_the_last_rerun(count: int) -> None:
     plain: dict[str, Any] = {"damping": False}
     theirs = simulate(replace(THEIRS.scenario, **(plain | options)))
     calls: list[tuple[int, int]] = []
-    found = compare_rollouts(OURS, theirs, progress=lambda *each: calls.append(each))
+    found = compare(OURS, theirs, progress=lambda *each: calls.append(each))
     assert found.proved
     assert len(found.causes) == count
     total = 2 + 2 * count if count > 2 else 2**count
