@@ -1,16 +1,21 @@
-"""Names of keyword arguments: a misspelt one raises an error with the nearest name."""
+"""Options of functions: a misspelt name raises an error with the nearest one, and a dataclass can declare the
+arguments of a function."""
 
 from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
+from dataclasses import fields
 from functools import wraps
-from typing import Any, TypeVar, cast
+from typing import Any, ParamSpec, TypeVar, cast
 
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 
 F = TypeVar("F", bound=Callable[..., Any])
 C = TypeVar("C", bound=type)
+P = ParamSpec("P")
+A = TypeVar("A")
+R = TypeVar("R")
 
 
 def checks_option_names(function: F) -> F:
@@ -23,6 +28,44 @@ def checks_field_names(cls: C) -> C:
     """Decorate a dataclass so that a field that it does not have raises UnknownNameError, not TypeError."""
     cls.__init__ = _checked(cls.__init__, cls.__name__)  # type: ignore[misc]  # of the class, not an instance
     return cls
+
+
+def takes(arguments: Callable[P, A]) -> Callable[[Callable[[A], R]], Callable[P, R]]:
+    """Decorate a function of one object, so that it has the signature of the dataclass `arguments`.
+
+    Type checkers and `help` see the fields as arguments. A keyword that is no field raises UnknownNameError,
+    other arguments that do not fit TypeError. The docstring gets a line for each field that `option`
+    declares (`dynx.sim.scenario.options`).
+    """
+
+    def decorate(function: Callable[[A], R]) -> Callable[P, R]:
+        name = function.__name__
+        signature = inspect.signature(arguments)
+        known = list(signature.parameters)
+
+        @wraps(function)
+        def called(*given: P.args, **options: P.kwargs) -> R:
+            wrong = next((each for each in options if each not in signature.parameters), None)
+            if wrong is not None:
+                raise UnknownNameError(f"{name} has no option {shown(wrong)}{nearest(wrong, known)}")
+            try:
+                signature.bind(*given, **options)
+            except TypeError as error:
+                raise TypeError(f"{name}: {error}") from None
+            return function(arguments(*given, **options))
+
+        lines = [
+            f"        {each.name}: {each.metadata['option'].line}"
+            for each in fields(cast(Any, arguments))
+            if "option" in each.metadata
+        ]
+        if function.__doc__ and lines:
+            called.__doc__ = "\n".join([function.__doc__.rstrip(), "", "    Options:", *lines, "    "])
+        returned = inspect.signature(function).return_annotation
+        called.__signature__ = signature.replace(return_annotation=returned)  # type: ignore[attr-defined]
+        return called
+
+    return decorate
 
 
 def _checked(function: F, name: str) -> F:

@@ -2,28 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from dataclasses import KW_ONLY, dataclass, replace
 
-from numpy.typing import ArrayLike
-
+from dynx.backends.registry import backend_class
 from dynx.control.base import Controller
-from dynx.control.friction import Coefficients
 from dynx.errors import ArgumentError
-from dynx.model import Model
-from dynx.model.package_paths import StrPath
-from dynx.option_names import checks_option_names
-from dynx.registry import DEFAULT_ENGINE
-from dynx.sim.loop.noise import Noise
-from dynx.sim.plants.disturbances import Push
-from dynx.sim.plants.model_error import MassScale, Payload
-from dynx.sim.plants.scene_plant import ScenePlant
+from dynx.option_names import takes
 from dynx.sim.record.rollout import Rollout
-from dynx.sim.scenario.keywords import scenario_of
-from dynx.sim.scenario.scenario import Scenario
+from dynx.sim.scenario.scenario import Scenario, ScenarioArguments
 from dynx.sim.setup import require_duration
 from dynx.sim.simulation import Progress, Simulation
-from dynx.trajectory.base import Trajectory
 
 
 class RolloutInterrupted(KeyboardInterrupt):
@@ -34,40 +22,27 @@ class RolloutInterrupted(KeyboardInterrupt):
         self.rollout = rollout
 
 
-@checks_option_names
-def simulate(
-    model: Model | Scenario | StrPath,
-    controller: Controller[Any] | None = None,
-    reference: Trajectory | ArrayLike | None = None,
-    *,
-    plant: str | ScenePlant = DEFAULT_ENGINE,
-    integrator: str | None = None,
-    controller_backend: str | None = None,
-    dt: float = 1e-3,
-    duration: float | None = None,
-    q0: ArrayLike | None = None,
-    v0: ArrayLike | None = None,
-    substeps: int = 1,
-    control_dt: float | None = None,
-    delay: float = 0.0,
-    noise: Noise | None = None,
-    damping: Coefficients = False,
-    friction: Coefficients = False,
-    friction_slip: float = 0.0,
-    armature: Coefficients = False,
-    effort_limits: Coefficients = False,
-    position_limits: bool = False,
-    payload: Payload | Sequence[Payload] | None = None,
-    mass_scale: MassScale = 1.0,
-    pushes: Push | Sequence[Push] = (),
-    check_reference: bool = True,
-    method: str = "DOP853",
-    rtol: float = 1e-10,
-    atol: float = 1e-12,
-    resume: Rollout | None = None,
-    step: int | None = None,
-    progress: Progress | None = None,
-) -> Rollout:
+@dataclass(frozen=True, eq=False, repr=False)
+class SimulateArguments(ScenarioArguments):
+    """Arguments of `simulate`."""
+
+    _: KW_ONLY
+    controller_backend: str | None = None
+    resume: Rollout | None = None
+    step: int | None = None
+    progress: Progress | None = None
+
+    def scenario_on_backend(self) -> Scenario:
+        """Return the scenario, whose controller computes on `controller_backend` if that is given."""
+        if self.controller_backend is None or not isinstance(self.controller, Controller):
+            return self.scenario()
+        if isinstance(self.controller_backend, str):
+            backend_class(self.controller_backend)
+        return replace(self, controller=self.controller.on(self.controller_backend)).scenario()
+
+
+@takes(SimulateArguments)
+def simulate(given: SimulateArguments) -> Rollout:
     """Simulate `model` under `controller` along `reference`, and return the record.
 
     The first argument may also be a robot's name or file, which `dynx.load` reads, or a `Scenario`, whose
@@ -113,18 +88,18 @@ def simulate(
     `check_reference` is False) or an effort limit of 0; DivergedError and ControlError in a step, with the
     record until then in ``error.rollout``.
     """
-    given: dict[str, Any] = {
-        name: value
-        for name, value in locals().items()
-        if name not in ("model", "controller_backend", "resume", "step", "progress")
-    }
-    scenario = scenario_of(model, controller_backend, given)
+    if isinstance(given.model, Scenario) and given.controller_backend is not None:
+        raise ArgumentError(
+            "controller_backend is given in addition to a scenario, whose controller has a backend: change "
+            "it by dataclasses.replace"
+        )
+    scenario = given.scenario_on_backend()
     require_duration(scenario)
-    if step is not None and resume is None:
+    if given.step is not None and given.resume is None:
         raise ArgumentError("step is that of a rollout to resume, which is not given")
-    with Simulation(scenario, progress=progress) as simulation:
-        if resume is not None:
-            simulation.take_over(resume, step)
+    with Simulation(scenario, progress=given.progress) as simulation:
+        if given.resume is not None:
+            simulation.take_over(given.resume, given.step)
         try:
             return simulation.run()
         except KeyboardInterrupt:

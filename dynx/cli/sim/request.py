@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,33 +10,23 @@ import numpy as np
 
 from dynx.backends.registry import backend_class
 from dynx.cli.shell.inputs import configuration, load_robot, velocity
+from dynx.cli.shell.kinds import Coefficients, command_flag, is_command_option
 from dynx.cli.sim.motion import Motion, MotionInput, plan_motion
-from dynx.cli.sim.values import Coefficients
 from dynx.control import EngineMotor, FrictionCompensation, ModelBased
 from dynx.control.base import Controller
 from dynx.control.saturation import checked_limit
 from dynx.errors import ArgumentError, UnsupportedFeatureError
 from dynx.model import Model
-from dynx.sim import Noise, Payload, Push, Rollout, Scenario
+from dynx.sim import Noise, Rollout, Scenario
 from dynx.sim.named_controllers import ControllerRequest, Gains, named_controller
 from dynx.sim.plants.registry import require_plant
+from dynx.sim.scenario import options as declared
+from dynx.sim.scenario.options import OPTIONS, Kind, Option, SimulationOptions
 from dynx.sim.setup import step_bytes
 from dynx.simd.machine import require_memory
 from dynx.steppers.clock import Clock
 
 GAINS = ("kp", "kd", "ki", "natural_frequency", "damping_ratio", "posture_kp", "posture_kd")
-SCENARIO_FIELDS = ("plant", "integrator", "dt", "substeps", "control_dt", "delay", "position_limits")
-"""Options that are fields of a `Scenario` under the same name."""
-
-REQUIRED_OPTION = {
-    "method": "--integrator adaptive",
-    "rtol": "--integrator adaptive",
-    "atol": "--integrator adaptive",
-    "friction_slip": "--friction",
-    "seed": "--noise-q or --noise-v",
-    "resume_step": "--resume",
-}
-"""Options that have an effect only together with another option."""
 
 STEP_BYTES = 2000
 """Approximate memory [bytes] of a step besides its record: setpoints, temporary arrays of the summary."""
@@ -58,31 +49,23 @@ class SimulationRequest:
 def prepare(given: dict[str, Any]) -> SimulationRequest:
     """Make a scenario from the options `given` by parameter name. Raises ArgumentError for invalid ones."""
     model = load_robot(*(given[name] for name in ("robot", "base", "lock", "base_pose", "gravity")))
-    require_plant(given["plant"])
+    settings = _settings(model, given)
+    # Prepared with defaults: not every field is known yet.
+    chosen = SimulationOptions(**settings)
+    if isinstance(chosen.plant, str):
+        require_plant(chosen.plant)
     backend_class(given["backend"]).require_engine()
-    dynamics = _joint_dynamics(given)
-    _refuse_ineffective_options(given, dynamics)
+    _refuse_ineffective_options(given, settings)
     motion = plan_motion(model, MotionInput.of(given))
-    clock = Clock.of(given["dt"], motion.duration, given["control_dt"], given["delay"])
+    clock = Clock.of(chosen.dt, motion.duration, chosen.control_dt, chosen.delay)
     require_memory(f"{clock.n_steps} steps", clock.n_steps * (STEP_BYTES + step_bytes(model)))
-    controller = _controller(model, given, motion, clock, dynamics)
-    limits: Coefficients | None = given["effort_limits"]
-    q0 = motion.start if given["q0"] is None else configuration(model, given["q0"], "--q0", motion.start)
-    fields: dict[str, Any] = {
-        **{name: given[name] for name in SCENARIO_FIELDS},
-        **dynamics,
-        **{name: given[name] for name in ("method", "rtol", "atol") if given[name] is not None},
-        "duration": motion.duration,
-        "q0": q0,
-        "v0": velocity(model, given["v0"], "--v0") if given["v0"] is not None else None,
+    controller = _controller(model, given, motion, clock, chosen)
+    if isinstance(controller, EngineMotor):
         # Motors of the engine have their own limits (`_controller`).
-        "effort_limits": False if limits is None or isinstance(controller, EngineMotor) else limits,
-        "noise": _noise(given),
-        "payload": [Payload(*each) for each in given["payload"]],
-        "mass_scale": _mass_scale(model, given["mass_scale"]),
-        "pushes": [Push(*each) for each in given["pushes"]],
-        "check_reference": not given["ignore_limits"],
-    }
+        settings.pop("effort_limits", None)
+    settings["duration"] = motion.duration
+    settings["q0"] = configuration(model, given["q0"], "--q0", motion.start)
+    settings["check_reference"] = not given["ignore_limits"]
     options = {
         "resume": None if given["resume"] is None else Rollout.load(given["resume"]),
         "step": given["resume_step"],
@@ -96,12 +79,12 @@ def prepare(given: dict[str, Any]) -> SimulationRequest:
         "gains": _gains_of(controller),
         "motor_limits": _limits_of_motors(model, given["effort_limits"], controller),
     }
-    scenario = Scenario(model, controller, motion.reference, **fields)
+    scenario = Scenario(model, controller, motion.reference, **settings)
     return SimulationRequest(scenario, controller, motion, clock, options, header)
 
 
 def _controller(
-    model: Model, given: dict[str, Any], motion: Motion, clock: Clock, dynamics: dict[str, Any]
+    model: Model, given: dict[str, Any], motion: Motion, clock: Clock, chosen: SimulationOptions
 ) -> Controller[Any] | None:
     gains = Gains(**{name: given[name] for name in GAINS})
     if given["controller"] == "none":
@@ -126,15 +109,15 @@ def _controller(
         raise UnsupportedFeatureError(
             f"{given['controller']} is a motor inside PyBullet; no torque can be added"
         )
-    if dynamics["damping"] is False and dynamics["friction"] is False:
+    if chosen.damping is False and chosen.friction is False:
         raise ArgumentError(
             "--friction-compensation needs joint dynamics: --damping, --friction or --joint-dynamics"
         )
-    slip = dynamics["friction_slip"]
+    slip = chosen.friction_slip
     return FrictionCompensation(
         controller,
-        damping=dynamics["damping"],
-        friction=dynamics["friction"],
+        damping=chosen.damping,
+        friction=chosen.friction,
         slip=slip,
         # A joint that sticks has no measured speed.
         speed="measured" if slip else "setpoint",
@@ -157,35 +140,55 @@ def _limits_of_motors(
     return motor_limits
 
 
-def _joint_dynamics(given: dict[str, Any]) -> dict[str, Any]:
-    """Return damping, friction and armature of the joints; single options override ``--joint-dynamics``."""
-    all_of_urdf: bool = given["joint_dynamics"]
-    names = ("damping", "friction", "armature")
-    dynamics = {name: all_of_urdf if given[name] is None else given[name] for name in names}
-    return {
-        **dynamics,
-        "friction_slip": given["friction_slip"] or 0.0,
-    }
+def _settings(model: Model, given: dict[str, Any]) -> dict[str, Any]:
+    """Return the options of the scenario that were given, in the form of its fields.
+
+    Damping, friction and armature override ``--joint-dynamics``.
+    """
+    settings: dict[str, Any] = {}
+    if given["joint_dynamics"]:
+        settings |= dict.fromkeys(("damping", "friction", "armature"), True)
+    for name, each in OPTIONS.items():
+        value = given.get(name)
+        if is_command_option(each) and value not in (None, ()):
+            settings[name] = _VALUES.get(each.kind, _unchanged)(model, each, value)
+    if given["noise_q"] is not None or given["noise_v"] is not None:
+        settings["noise"] = Noise(given["noise_q"] or 0.0, given["noise_v"] or 0.0, given["seed"] or 0)
+    return settings
 
 
-def _refuse_ineffective_options(given: dict[str, Any], dynamics: dict[str, Any]) -> None:
+def _refuse_ineffective_options(given: dict[str, Any], settings: dict[str, Any]) -> None:
     """Raise ArgumentError for an option that has no effect without another that is missing."""
-    noisy = given["noise_q"] is not None or given["noise_v"] is not None
-    has_use = {
-        "--integrator adaptive": given["integrator"] == "adaptive",
-        "--friction": dynamics["friction"] is not False,
-        "--noise-q or --noise-v": noisy,
-        "--resume": given["resume"] is not None,
+    needed = {
+        command_flag(each): f"{command_flag(OPTIONS[other])} {wanted}".rstrip()
+        for name, each in OPTIONS.items()
+        for other, wanted in [each.needs]
+        if name in settings and other and not _in_effect(settings.get(other, False), wanted)
     }
-    for name, other in REQUIRED_OPTION.items():
-        if given[name] is not None and not has_use[other]:
-            raise ArgumentError(f"--{name.replace('_', '-')} needs {other}")
+    if given["seed"] is not None and "noise" not in settings:
+        needed["--seed"] = "--noise-q or --noise-v"
+    if given["resume_step"] is not None and given["resume"] is None:
+        needed["--resume-step"] = "--resume"
+    for flag, other in needed.items():
+        raise ArgumentError(f"{flag} needs {other}")
 
 
-def _noise(given: dict[str, Any]) -> Noise | None:
-    if given["noise_q"] is None and given["noise_v"] is None:
-        return None
-    return Noise(given["noise_q"] or 0.0, given["noise_v"] or 0.0, given["seed"] or 0)
+def _in_effect(value: Any, wanted: str) -> bool:
+    return bool(value == wanted) if wanted else value is not False
+
+
+def _unchanged(model: Model, option: Option, value: Any) -> Any:
+    return value
+
+
+def _coordinates(model: Model, option: Option, value: Any) -> Any:
+    read = configuration if option.kind is declared.CONFIGURATION else velocity
+    return read(model, value, command_flag(option))
+
+
+def _parts(model: Model, option: Option, value: Any) -> Any:
+    assert isinstance(option.kind, declared.Parts)
+    return [option.kind.part_class(*each) for each in value]
 
 
 def _gains_of(controller: Controller[Any] | None) -> dict[str, list[float]]:
@@ -199,14 +202,21 @@ def _innermost(controller: Controller[Any] | None) -> Controller[Any] | None:
     return controller.inner if isinstance(controller, FrictionCompensation) else controller
 
 
-def _mass_scale(model: Model, given: tuple[tuple[str | None, float], ...]) -> float | dict[str, float]:
+def _factors(model: Model, option: Option, given: Any) -> float | dict[str, float]:
     """Return the factor of all links, or of each link where some have their own."""
     whole = [factor for link, factor in given if link is None]
-    named = [link for link, _ in given if link is not None]
-    if len(whole) > 1 or len(named) > len(set(named)):
-        raise ArgumentError("--mass-scale is given twice for the same links")
-    of_all = whole[0] if whole else 1.0
-    if not named:
-        return of_all
-    factors = dict.fromkeys((link.name for link in model.links), of_all)
-    return {**factors, **{link: factor for link, factor in given if link is not None}}
+    named = {link: factor for link, factor in given if link is not None}
+    if len(whole) > 1 or len(whole) + len(named) < len(given):
+        raise ArgumentError(f"{command_flag(option)} is given twice for the same links")
+    of_all: float = whole[0] if whole else 1.0
+    return {**dict.fromkeys((link.name for link in model.links), of_all), **named} if named else of_all
+
+
+_VALUES: dict[Kind, Callable[[Model, Option, Any], Any]] = {
+    declared.CONFIGURATION: _coordinates,
+    declared.VELOCITY: _coordinates,
+    declared.PAYLOADS: _parts,
+    declared.PUSHES: _parts,
+    declared.FACTORS: _factors,
+}
+"""Conversions of what the command line reads to what a scenario takes, by the kind of option."""

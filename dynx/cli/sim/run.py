@@ -14,13 +14,18 @@ from dynx.cli.shell.progress import progress_bar
 from dynx.cli.shell.terminal import present
 from dynx.cli.sim.document import EarlyEnd, document
 from dynx.cli.sim.motion import limit_message
-from dynx.cli.sim.options import TUTORIAL_OPTIONS
 from dynx.cli.sim.outputs import Outputs
 from dynx.cli.sim.request import SimulationRequest, prepare
 from dynx.cli.sim.tables import show
 from dynx.cli.sim.tutorial_run import run_tutorial
 from dynx.errors import ArgumentError, LimitError, SimulationError
 from dynx.sim import Rollout, RolloutInterrupted, simulate
+
+TUTORIAL_OPTIONS = {
+    *("tutorial", "robot", "lock", "gravity", "to", "start", "duration", "dt", "backend"),
+    *("plot", "json_path"),
+}
+"""Parameters that have an effect with ``--tutorial``."""
 
 
 def sim(robot: str | None, tutorial: bool, json_path: str | None, **given: Any) -> int:

@@ -18,6 +18,7 @@ from dynx.cli.sim.tutorial_tables import show
 from dynx.errors import ArgumentError, LimitError
 from dynx.model.loading import load
 from dynx.sim.named_controllers import NATURAL_FREQUENCY
+from dynx.sim.scenario.options import OPTIONS
 from dynx.sim.tutorial import DURATION, GRAVITY, MODES, ROBOT, Outcome, Row, Tutorial, tutorial
 from dynx.sim.tutorial_plot import plot_rows
 from dynx.steppers.clock import Clock
@@ -111,10 +112,9 @@ def _experiments(robot: str | None, given: dict[str, Any]) -> Tutorial:
     start = configuration(model, given["start"], "--from", model.clip(model.neutral()))
     to = None if given["to"] is None else configuration(model, given["to"], "--to", start)
     duration = DURATION if given["duration"] is None else given["duration"]
-    Clock.of(given["dt"], duration, None, 0.0)
+    dt = OPTIONS["dt"].default if given["dt"] is None else given["dt"]
+    Clock.of(dt, duration, None, 0.0)
     try:
-        return tutorial(
-            model, start=start, to=to, duration=duration, dt=given["dt"], backend=given["backend"]
-        )
+        return tutorial(model, start=start, to=to, duration=duration, dt=dt, backend=given["backend"])
     except LimitError as error:
         raise ArgumentError(limit_message(error, model.name, ignorable=False)) from error

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
-from dataclasses import replace
+from dataclasses import KW_ONLY, dataclass, replace
 from math import prod
 from typing import Any
 
@@ -14,21 +14,16 @@ from numpy.typing import ArrayLike
 
 from dynx.backends.solvability import Solvability
 from dynx.compiled.parametric import ParametricDynamics
-from dynx.control.base import Controller
-from dynx.control.friction import Coefficients
 from dynx.errors import ArgumentError, shown
-from dynx.model import Model
 from dynx.model.configuration import checked_q
 from dynx.model.numbers import whole_number
-from dynx.model.package_paths import StrPath
-from dynx.option_names import checks_option_names
+from dynx.option_names import takes
 from dynx.sim.batch.disturbances import PLACEHOLDER, BatchDisturbances
 from dynx.sim.batch.kernel import FusedStep
 from dynx.sim.batch.part import Part, PartNoise, PartOutcome, StepKernels, pushing
 from dynx.sim.batch.rollouts import BatchRollouts
 from dynx.sim.batch.rows import (
     COEFFICIENTS,
-    PLANT,
     RolloutRows,
     coefficient_rows,
     columns_of,
@@ -41,15 +36,18 @@ from dynx.sim.batch.stopping import BatchStops
 from dynx.sim.batch.store import Store
 from dynx.sim.batch.traced_controller import gain_shapes, innermost
 from dynx.sim.loop.noise import Noise
-from dynx.sim.plants.disturbances import Push
-from dynx.sim.plants.model_error import MassScale, Payload
-from dynx.sim.scenario.scenario import Scenario, field_names
+from dynx.sim.plants.scene_plant import ScenePlant
+from dynx.sim.scenario.options import OPTIONS, option
+from dynx.sim.scenario.scenario import Scenario, ScenarioArguments
 from dynx.sim.setup import Setup, require_duration
 from dynx.simd.machine import require_memory
 from dynx.simd.threads import checked_threads
 from dynx.spatial.scalar import Floats
 from dynx.steppers.clock import Clock
-from dynx.trajectory.base import Setpoint, Trajectory
+from dynx.trajectory.base import Setpoint
+
+PLANT = "compiled"
+"""Name of the plant of `dynx.simulate` whose results a batch gives."""
 
 PART = 1024
 """Number of rollouts in one part: small enough that their state stays in the processor's caches, and large
@@ -71,40 +69,30 @@ class BatchInterrupted(KeyboardInterrupt):
         self.rollouts = rollouts
 
 
-@checks_option_names
-def simulate_batch(
-    model: Model | Scenario | StrPath,
-    controller: Controller[Any] | None = None,
-    reference: Trajectory | ArrayLike | None = None,
-    *,
-    rollouts: int | None = None,
-    plant: str = PLANT,
-    parametric: ParametricDynamics | None = None,
-    parameters: ArrayLike | None = None,
-    gains: Mapping[str, ArrayLike] | None = None,
-    q0: ArrayLike | None = None,
-    v0: ArrayLike | None = None,
-    dt: float = 1e-3,
-    duration: float | None = None,
-    control_dt: float | None = None,
-    delay: float = 0.0,
-    noise: Noise | None = None,
-    damping: Coefficients = False,
-    friction: Coefficients = False,
-    friction_slip: float = 0.0,
-    armature: Coefficients = False,
-    effort_limits: Coefficients = False,
-    position_limits: bool = False,
-    payload: Payload | Sequence[Payload] | None = None,
-    mass_scale: MassScale = 1.0,
-    pushes: Push | Sequence[Push] = (),
-    record_every: int = 0,
-    check_reference: bool = True,
-    threads: int | None = None,
-    executor: Executor | None = None,
-    keep: str | os.PathLike[str] | None = None,
-    progress: Progress | None = None,
-) -> BatchRollouts:
+@dataclass(frozen=True, eq=False, repr=False)
+class BatchArguments(ScenarioArguments):
+    """Arguments of `simulate_batch`."""
+
+    _: KW_ONLY
+    plant: str | ScenePlant = option(
+        PLANT,
+        "Plant that moves the robots; another one is refused",
+        kind=OPTIONS["plant"].kind,
+        group=OPTIONS["plant"].group,
+    )
+    rollouts: int | None = None
+    parametric: ParametricDynamics | None = None
+    parameters: ArrayLike | None = None
+    gains: Mapping[str, ArrayLike] | None = None
+    record_every: int = 0
+    threads: int | None = None
+    executor: Executor | None = None
+    keep: str | os.PathLike[str] | None = None
+    progress: Progress | None = None
+
+
+@takes(BatchArguments)
+def simulate_batch(given: BatchArguments) -> BatchRollouts:
     """Simulate many rollouts of `model` under `controller` along `reference`, by semi-implicit Euler.
 
     Controller, dynamics and integrator are compiled into one kernel, with one rollout in each vector lane.
@@ -120,10 +108,10 @@ def simulate_batch(
       and rest if `q0` is given
     - `noise` of the measurements: rollout k has the noise of ``simulate`` with ``Noise(..., rollout=k)``
 
-    `rollouts` is the number n of rollouts; it is needed if no argument has n rows. Times [s], `delay`,
-    `noise`, `friction_slip`, `effort_limits`, `position_limits`, `payload`, `mass_scale` and `pushes` are
-    those of `simulate`. With a payload or scaled masses, `parametric` has to be made from
-    ``plant_model(model, payload, mass_scale)``. With `record_every` = k every k-th state is recorded.
+    `rollouts` is the number n of rollouts; it is needed if no argument has n rows. All other options are
+    those of `simulate`; an `integrator` other than semi-implicit Euler and `substeps` are refused. With a
+    payload or scaled masses, `parametric` has to be made from ``plant_model(model, payload, mass_scale)``.
+    With `record_every` = k every k-th state is recorded.
 
     The first argument may also be a robot's name or file, or a `Scenario` on the plant ``compiled``; beside
     a scenario only arguments that may differ between rollouts can be given. `BatchRollouts.scenario` is the
@@ -140,8 +128,9 @@ def simulate_batch(
     UnsupportedFeatureError for controllers that branch on their measurement. A rollout that diverges does not
     stop the others: `BatchRollouts.diverged` has the time of the step that led to it.
     """
-    given = {name: value for name, value in locals().items() if name in field_names() and name != "model"}
-    scenario, own = split_rows(model, given)
+    rollouts, parametric, parameters, gains = given.rollouts, given.parametric, given.parameters, given.gains
+    record_every, executor, keep, progress = given.record_every, given.executor, given.keep, given.progress
+    scenario, own = split_rows(given)
     refuse_uncompiled(scenario)
     joints = joints_of(scenario.model)
     varied = {name: coefficient_rows(name, own[name], joints) for name in COEFFICIENTS if name in own}
@@ -244,7 +233,7 @@ def simulate_batch(
         return _batch_rollouts(scenario, clock, parts, done, record_every)
 
     try:
-        _run_parts(parts, done, checked_threads(threads), executor, store, progress, n)
+        _run_parts(parts, done, checked_threads(given.threads), executor, store, progress, n)
     except KeyboardInterrupt:
         raise BatchInterrupted(outcome()) from None
     finally:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -13,33 +12,26 @@ from dynx.control.friction import coefficients_by_joint, refuse_text
 from dynx.errors import ArgumentError, GainError
 from dynx.model import Model
 from dynx.model.numbers import checked_array, real_array, whole_number
-from dynx.model.package_paths import StrPath
-from dynx.sim.scenario.keywords import scenario_of
-from dynx.sim.scenario.scenario import Scenario
+from dynx.sim.scenario.options import COEFFICIENTS as COEFFICIENTS_KIND
+from dynx.sim.scenario.options import OPTIONS
+from dynx.sim.scenario.scenario import Scenario, ScenarioArguments
 from dynx.spatial.scalar import Floats
 
-PLANT = "compiled"
-"""Name of the plant of `dynx.simulate` whose results a batch gives."""
+COEFFICIENTS = tuple(name for name, each in OPTIONS.items() if each.rows and each.kind is COEFFICIENTS_KIND)
+"""Coefficients of joints that may have one row for each rollout."""
 
-COEFFICIENTS = ("damping", "friction", "armature")
-
-PER_ROLLOUT = ("q0", "v0", *COEFFICIENTS)
+PER_ROLLOUT = tuple(name for name, each in OPTIONS.items() if each.rows)
 """Fields of a scenario that may have one row for each rollout of a batch."""
 
 
-def split_rows(
-    model: Model | Scenario | StrPath, given: Mapping[str, Any]
-) -> tuple[Scenario, dict[str, Any]]:
+def split_rows(given: ScenarioArguments) -> tuple[Scenario, dict[str, Any]]:
     """Return the scenario that all rollouts share, and the arguments with a row for each rollout, by name.
 
-    `given` are fields of a scenario. If `model` is a scenario, they replace its fields, and only those of
-    `PER_ROLLOUT` may be given.
+    If a scenario is given instead of a model, arguments of `PER_ROLLOUT` replace its fields.
     """
-    own = {name: given[name] for name in PER_ROLLOUT if given[name] is not None and given[name] is not False}
-    fixed = {name: value for name, value in given.items() if name not in PER_ROLLOUT}
-    if isinstance(model, Scenario) and fixed["plant"] == PLANT:
-        del fixed["plant"]
-    scenario = scenario_of(model, None, fixed)
+    own = {name: getattr(given, name) for name in PER_ROLLOUT}
+    own = {name: value for name, value in own.items() if value is not None and value is not False}
+    scenario = given.scenario(PER_ROLLOUT)
     own |= {
         name: coefficients_by_joint(scenario.model, name, own[name]) for name in COEFFICIENTS if name in own
     }
@@ -78,10 +70,10 @@ def coefficient_rows(name: str, values: ArrayLike, joints: int) -> Floats:
     return np.ascontiguousarray(np.broadcast_to(rows, (len(rows), joints)))
 
 
-def refuse_ambiguous(given: Mapping[str, Any], joints: int, n: int) -> None:
+def refuse_ambiguous(given: ScenarioArguments, joints: int, n: int) -> None:
     """Raise ArgumentError for coefficients in `given` that fit n joints as well as n rollouts."""
     for name in COEFFICIENTS:
-        if n == joints > 1 and np.shape(given[name]) == (n,):
+        if n == joints > 1 and np.shape(getattr(given, name)) == (n,):
             raise ArgumentError(
                 f"{name} has {n} numbers, and there are {n} joints and {n} rollouts: write it as (1, {n}) "
                 f"for the joints or as ({n}, 1) for the rollouts"

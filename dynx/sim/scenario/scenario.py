@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, fields, replace
-from typing import Any, NamedTuple
+import os
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, fields, make_dataclass, replace
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.control.base import Controller, refuse_other_than_controller
-from dynx.control.friction import Coefficients, coefficients_by_joint
-from dynx.errors import ArgumentError, nearest, shown
+from dynx.errors import ArgumentError, shown
+from dynx.files.document_checks import check_document
 from dynx.model import Model
+from dynx.model.loading import load
 from dynx.model.model import refuse_other_than_model
-from dynx.model.numbers import refuse_mask
-from dynx.registry import DEFAULT_ENGINE
-from dynx.sim.loop.noise import Noise
+from dynx.model.package_paths import StrPath
 from dynx.sim.plants.disturbances import Push
-from dynx.sim.plants.model_error import MassScale, Payload
+from dynx.sim.plants.model_error import Payload
 from dynx.sim.plants.registry import default_integrator
 from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.scenario.documents import (
@@ -37,18 +36,28 @@ from dynx.sim.scenario.documents import (
     encode,
 )
 from dynx.sim.scenario.documents import NUMBERS as CONTROLLER_NUMBERS
+from dynx.sim.scenario.options import OPTIONS, SimulationOptions, as_array
 from dynx.steppers.clock import TIME_ROUNDING, Clock
 from dynx.trajectory.base import Trajectory
 
 SCHEMA = "dynx.scenario/1"
 """Name and version of the layout of a scenario's document."""
 
-NUMBERS = ("reference", "q0", "v0", "damping", "friction", "armature", "effort_limits")
-"""Fields that may be given as lists of numbers, and are kept as arrays."""
+ScenarioDocument = make_dataclass(
+    "ScenarioDocument",
+    [
+        ("schema", Literal["dynx.scenario/1"]),
+        ("model", dict[str, Any]),
+        ("controller", dict[str, Any] | None, None),
+        ("reference", list[Any] | dict[str, Any] | None, None),
+        *((each.name, each.json_type, None) for each in OPTIONS.values()),
+    ],
+    namespace={"__doc__": "One simulation; the keys are the arguments of `dynx.simulate`."},
+)
+"""Keys of a scenario's document and the types of their values, from which its JSON Schema is generated.
 
-
-BY_JOINT = {"damping": 0.0, "friction": 0.0, "armature": 0.0, "effort_limits": math.inf}
-"""Fields that may be given as numbers by joint, and the value of the joints that are not named."""
+Objects inside have one of the forms that `dynx.sim.scenario.documents` describes.
+"""
 
 
 class Difference(NamedTuple):
@@ -61,13 +70,13 @@ class Difference(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Scenario:
+class Scenario(SimulationOptions):
     """Complete description of one simulation, which `dynx.simulate` and `dynx.simulate_batch` run and a
     record contains.
 
     The fields are the arguments of `dynx.simulate`, which documents them. Two scenarios are equal if all
     fields are, element by element, with the defaults filled in. ``dataclasses.replace`` changes one field;
-    `to_json` and `from_json` keep every bit. A field is checked when a simulation is made of it.
+    `to_json` and `from_json` keep every bit. Types are checked here, values when a simulation is made of it.
     """
 
     model: Model
@@ -75,35 +84,6 @@ class Scenario:
     controller: Controller[Any] | Unknown | None = None
     """None for a robot without motors; `Unknown` only in a scenario that was read from a file."""
     reference: Trajectory | ArrayLike | Unknown | None = None
-    _: KW_ONLY
-    plant: str | ScenePlant = DEFAULT_ENGINE
-    integrator: str | None = None
-    substeps: int = 1
-    method: str = "DOP853"
-    rtol: float = 1e-10
-    atol: float = 1e-12
-    dt: float = 1e-3
-    """Step of the record [s]."""
-    duration: float | None = None
-    """Time to simulate [s], rounded up to a multiple of `dt`; by default the duration of the reference. A
-    `Simulation` does not need it."""
-    control_dt: float | None = None
-    """Step of the controller [s]; by default `dt`."""
-    delay: float = 0.0
-    """Age of a measurement [s]."""
-    q0: ArrayLike | None = None
-    v0: ArrayLike | None = None
-    noise: Noise | None = None
-    damping: Coefficients = False
-    friction: Coefficients = False
-    friction_slip: float = 0.0
-    armature: Coefficients = False
-    effort_limits: Coefficients = False
-    position_limits: bool = False
-    payload: Payload | Sequence[Payload] | None = None
-    mass_scale: MassScale = 1.0
-    pushes: Push | Sequence[Push] = ()
-    check_reference: bool = True
 
     def __post_init__(self) -> None:
         refuse_other_than_model(self.model)
@@ -116,42 +96,14 @@ class Scenario:
                 f"reference is {shown(self.reference)}; wanted a trajectory of dynx.trajectory, one "
                 "configuration to hold, or None"
             )
-        for name in ("position_limits", "check_reference"):
-            if not isinstance(getattr(self, name), bool | np.bool_):
-                raise ArgumentError(f"{name} is {shown(getattr(self, name))}; wanted True or False")
-        if not isinstance(self.integrator, str | None):
-            raise ArgumentError(f"integrator is {shown(self.integrator)}; wanted the name of one, or None")
-        if self.effort_limits is None:
-            raise ArgumentError("effort_limits is None; wanted True (those of the model), False or numbers")
-        if isinstance(self.plant, ScenePlant):
-            self.plant.require_model(self.model)
-            if self.position_limits:
-                raise ArgumentError(
-                    "position_limits are the stops of dynx; a plant in a scene has those of its engine, by "
-                    "ScenePlant(joint_limits=True)"
-                )
-        elif not isinstance(self.plant, str):
+        object.__setattr__(self, "reference", as_array("reference", self.reference))
+        for name, each in OPTIONS.items():
+            object.__setattr__(self, name, each.kind.checked(name, getattr(self, name), self.model))
+        if self.position_limits and isinstance(self.plant, ScenePlant):
             raise ArgumentError(
-                f"plant is of type {type(self.plant).__name__}; wanted the name of a plant or a ScenePlant"
+                "position_limits are the stops of dynx; a plant in a scene has those of its engine, by "
+                "ScenePlant(joint_limits=True)"
             )
-        if not isinstance(self.noise, Noise | Unknown | None):
-            raise ArgumentError(f"noise is {shown(self.noise)}; wanted a dynx.Noise, as in Noise(v=1e-3)")
-        for name in NUMBERS:
-            value = getattr(self, name)
-            if name in BY_JOINT:
-                value = coefficients_by_joint(self.model, name, value, BY_JOINT[name])
-            refuse_mask(name, value)
-            object.__setattr__(self, name, _as_array(value))
-        payload = () if self.payload is None else self.payload
-        kinds: dict[str, tuple[Any, type]] = {"payload": (payload, Payload), "pushes": (self.pushes, Push)}
-        for name, (given, kind) in kinds.items():
-            parts = tuple(given) if isinstance(given, Iterable) else (given,)
-            if not all(isinstance(each, kind | Unknown) for each in parts):
-                raise ArgumentError(f"{name} is {shown(given)}; wanted a {kind.__name__}, or a list of them")
-            object.__setattr__(self, name, parts)
-        if isinstance(self.mass_scale, Mapping):
-            by_name = sorted(self.mass_scale.items(), key=lambda entry: str(entry[0]))
-            object.__setattr__(self, "mass_scale", dict(by_name))
 
     @property
     def payloads(self) -> tuple[Payload, ...]:
@@ -201,11 +153,11 @@ class Scenario:
     def __repr__(self) -> str:
         """Show the fields that differ from their defaults."""
         shown_fields = [f"Scenario({self.model.name}"]
-        for each in fields(self):
-            value = getattr(self, each.name)
-            default = () if each.name == "payload" else each.default
-            if each.name != "model" and not _same(encode(value, self.model), encode(default, self.model)):
-                shown_fields.append(f"{each.name}={value}")
+        defaults = {each.name: each.default for each in fields(self)}
+        for name in field_names()[1:]:
+            value = getattr(self, name)
+            if not _same(encode(value, self.model), encode(defaults[name], self.model)):
+                shown_fields.append(f"{name}={value}")
         return ",\n    ".join(shown_fields) + ")"
 
     def to_dict(self) -> dict[str, Document]:
@@ -225,13 +177,9 @@ class Scenario:
         """Return the scenario of a document. Raises ArgumentError for a document of another layout."""
         if not isinstance(document, Mapping) or document.get("schema") != SCHEMA:
             raise ArgumentError(f"a scenario's document has schema {SCHEMA!r}; this one does not")
-        given = {name: value for name, value in document.items() if name != "schema"}
-        names = field_names()
-        for name in given:
-            if name not in names:
-                raise ArgumentError(f"a scenario has no field {shown(name)}{nearest(name, names)}")
-        if "model" not in given:
-            raise ArgumentError("the scenario's document has no model")
+        given = {name: decode(each) if _is_number(each) else each for name, each in document.items()}
+        check_document(given, ScenarioDocument)
+        del given["schema"]
         model = decode(given.pop("model"))
         parts = {name: decode(value, model) for name, value in given.items()}
         try:
@@ -262,9 +210,51 @@ class Scenario:
         return cls.from_dict(document)
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class ScenarioArguments(SimulationOptions):
+    """Arguments of a function that simulates a robot or a `Scenario`."""
+
+    model: Model | Scenario | StrPath
+    controller: Controller[Any] | None = None
+    reference: Trajectory | ArrayLike | None = None
+
+    def scenario(self, rows: Collection[str] = ()) -> Scenario:
+        """Return the scenario of these arguments, or the one that is given instead of a model.
+
+        The arguments `rows` do not go into it. Raises ArgumentError if another argument is given beside a
+        scenario, of which it is a field.
+        """
+        given = {name: getattr(self, name) for name in field_names()[1:] if name not in rows}
+        if isinstance(self.model, Scenario):
+            defaults = {each.name: each.default for each in fields(self)}
+            for name, value in given.items():
+                if not _is_default(value, defaults[name]):
+                    raise ArgumentError(
+                        f"{name} is given in addition to a scenario, which has a field of that name: change "
+                        "it by dataclasses.replace"
+                    )
+            return self.model
+        if not isinstance(self.model, Model | str | os.PathLike):
+            kind = type(self.model).__name__
+            raise ArgumentError(
+                f"model is of type {kind}; wanted a Model, a Scenario, or a robot's name or file"
+            )
+        return Scenario(load(self.model), **given)
+
+
+def _is_default(value: object, default: object) -> bool:
+    plain = type(value) is type(default) and isinstance(value, str | float | int | tuple)
+    return value is default or (plain and value == default)
+
+
 def field_names() -> tuple[str, ...]:
-    """Return the names of all fields of a scenario."""
-    return tuple(each.name for each in fields(Scenario))
+    """Return the names of all fields of a scenario, those that can be given by position first."""
+    return ("model", "controller", "reference", *OPTIONS)
+
+
+def _is_number(document: Document) -> bool:
+    """Check whether a document is that of a number that JSON does not have."""
+    return isinstance(document, Mapping) and document.keys() == {"float"}
 
 
 def _simulated(duration: float | None, dt: float) -> float | None:
@@ -276,20 +266,6 @@ def _simulated(duration: float | None, dt: float) -> float | None:
     except (ArgumentError, OverflowError):
         return duration
     return duration if abs(simulated - duration) <= TIME_ROUNDING * simulated else simulated
-
-
-def _as_array(value: Any) -> Any:
-    """Convert lists of numbers to a read-only array; return anything else unchanged."""
-    if not isinstance(value, list | tuple | np.ndarray):
-        return value
-    try:
-        array = np.array(value)
-    except ValueError:
-        return value
-    if array.dtype.kind in "iuf":
-        array = array.astype(np.float64)
-    array.setflags(write=False)
-    return array
 
 
 def _differences(name: str, ours: Document, theirs: Document) -> list[Difference]:

@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 
 from dynx.backends import installed_backends
 from dynx.cli.shell.main import cli
-from dynx.cli.sim import options as sim_options
+from dynx.cli.sim import run as sim_run
 from dynx.cli.sim.command import sim as command
 from dynx.engines.pybullet.backend import PyBulletBackend
 from dynx.errors import ArgumentError, NotInstalledError
@@ -38,10 +38,10 @@ def document(*arguments: str, code: int = 0) -> dict[str, Any]:
 
 
 def test_the_help_of_tutorial_lists_its_options() -> None:
-    assert {str(param.name) for param in command.params} >= sim_options.TUTORIAL_OPTIONS
+    assert {str(param.name) for param in command.params} >= sim_run.TUTORIAL_OPTIONS
     help_text = {param.name: param for param in command.params}["tutorial"].to_info_dict()["help"]
     for param in command.params:
-        if param.name in sim_options.TUTORIAL_OPTIONS - {"tutorial", "robot"}:
+        if param.name in sim_run.TUTORIAL_OPTIONS - {"tutorial", "robot"}:
             assert param.opts[0] in help_text
 
 

@@ -15,6 +15,7 @@ from dynx.control import PD, PID, ComputedTorque, Saturated
 from dynx.errors import ArgumentError
 from dynx.model.loading import load
 from dynx.sim import Noise, Payload, Push, Rollout, Scenario, simulate
+from dynx.sim.scenario.options import OPTIONS
 from dynx.trajectory import cycloidal
 
 ARM = load("ur5")
@@ -177,7 +178,7 @@ def test_equal_scenarios_written_otherwise_resume(tmp_path: Path) -> None:
         ARM,
         ComputedTorque(ARM, kp=np.full(6, 400.0), kd=[40.0] * 6),
         cycloidal([0.0] * 6, [0.02] * 6, duration=0.02),
-        **{each.name: getattr(SCENARIO, each.name) for each in fields(Scenario)[3:]},
+        **{name: getattr(SCENARIO, name) for name in OPTIONS},
         resume=part,
     )
     assert np.array_equal(same.q, WHOLE.q)

@@ -1,0 +1,94 @@
+"""Options of a simulation: one declaration, from which signatures, checks and defaults follow."""
+
+from __future__ import annotations
+
+import inspect
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+import pytest
+
+import dynx
+from dynx.errors import ArgumentError, UnknownNameError
+from dynx.option_names import takes
+from dynx.sim import Scenario, simulate, simulate_batch
+from dynx.sim.scenario.options import OPTIONS, SimulationOptions, option, options_of
+
+ARM = dynx.load("pendulum")
+
+
+@pytest.mark.parametrize("function", [simulate, simulate_batch, Scenario])
+def test_signatures_have_every_option_with_its_default(function: Any) -> None:
+    parameters = inspect.signature(function).parameters
+    assert list(parameters)[:3] == ["model", "controller", "reference"]
+    for name, declared in OPTIONS.items():
+        assert parameters[name].kind is inspect.Parameter.KEYWORD_ONLY
+        if (function, name) != (simulate_batch, "plant"):
+            assert parameters[name].default == declared.default
+    assert {each.name for each in fields(Scenario)} == {"model", "controller", "reference", *OPTIONS}
+
+
+def test_docstrings_list_every_option() -> None:
+    for function in (simulate, simulate_batch):
+        text = inspect.getdoc(function) or ""
+        for each in options_of(SimulationOptions):
+            assert f"    {each.name}: " in text
+            assert each.unit in text
+
+
+def test_type_checkers_refuse_what_the_functions_refuse() -> None:
+    """Each comment below is an error of mypy if the call has none."""
+    with pytest.raises(TypeError, match="simulate: missing a required argument: 'model'"):
+        simulate()  # type: ignore[call-arg]
+    with pytest.raises(UnknownNameError, match="simulate has no option 'damqing'; did you mean 'damping'"):
+        simulate(ARM, damqing=1.0)  # type: ignore[call-arg]
+    with pytest.raises(ArgumentError, match=r"dt is '0\.001'"):
+        simulate(ARM, duration=0.01, dt="0.001")  # type: ignore[arg-type]
+    with pytest.raises(UnknownNameError, match="simulate_batch has no option 'rolouts'"):
+        simulate_batch(ARM, rolouts=2)  # type: ignore[call-arg]
+    with pytest.raises(ArgumentError, match=r"noise is '0\.1'"):
+        Scenario(ARM, noise=0.1)  # type: ignore[arg-type]
+    with pytest.raises(TypeError):
+        simulate(ARM, None, None, "pinocchio")  # type: ignore[call-arg]
+
+
+def test_an_option_beside_a_scenario_is_refused_by_name() -> None:
+    scenario = Scenario(ARM, duration=0.01)
+    with pytest.raises(ArgumentError, match="substeps is given in addition to a scenario"):
+        simulate(scenario, substeps=2)
+    with pytest.raises(ArgumentError, match="controller_backend is given in addition to a scenario"):
+        simulate(scenario, controller_backend="reference")
+    assert len(simulate(scenario, dt=1e-3, pushes=())) == 10
+
+
+def test_a_scenario_keeps_values_in_one_form() -> None:
+    scenario = Scenario(
+        ARM, dt=np.float64(2e-3), atol=1, damping=[1], payload=None, mass_scale={"b": 2.0, "a": 1.0}
+    )
+    assert (type(scenario.dt), type(scenario.atol)) == (float, float)
+    assert isinstance(scenario.damping, np.ndarray)
+    assert not scenario.damping.flags.writeable
+    assert scenario.payload == ()
+    assert list(scenario.mass_scale) == ["a", "b"]  # type: ignore[arg-type]
+    with pytest.raises(ArgumentError, match="position_limits is '1'; wanted True or False"):
+        Scenario(ARM, position_limits=1)  # type: ignore[arg-type]
+    with pytest.raises(ArgumentError, match="friction is None"):
+        Scenario(ARM, friction=None)  # type: ignore[arg-type]
+
+
+def test_takes_gives_a_function_the_signature_of_a_dataclass() -> None:
+    @dataclass(frozen=True)
+    class Arguments:
+        size: int
+        rate: float = option(2.0, "Rate, as measured", unit="1/s", group="")
+
+    @takes(Arguments)
+    def product(given: Arguments) -> float:
+        """Multiply."""
+        return given.size * given.rate
+
+    assert product(3) == 6.0
+    assert product(size=3, rate=1.0) == 3.0
+    assert str(inspect.signature(product)) == "(size: 'int', rate: 'float' = 2.0) -> 'float'"
+    assert inspect.getdoc(product) == "Multiply.\n\nOptions:\n    rate: Rate [1/s], as measured (default: 2)"

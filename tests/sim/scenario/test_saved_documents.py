@@ -1,0 +1,39 @@
+"""Documents of scenarios that an earlier dynx wrote are read, and simulate to the same numbers.
+
+`scenarios_before_options.json.gz` was written when each function repeated the list of options: one
+document for every controller, kind of reference and field, and the last q, v and torque of its rollout.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dynx.backends import installed_backends
+from dynx.sim import Scenario, ScenePlant, simulate
+
+FILE = Path(__file__).with_name("scenarios_before_options.json.gz")
+SAVED: dict[str, Any] = json.loads(gzip.decompress(FILE.read_bytes()))
+
+
+@pytest.mark.parametrize("name", SAVED["documents"])
+def test_a_saved_document_is_read_and_written_alike(name: str) -> None:
+    document = SAVED["documents"][name]
+    assert json.loads(Scenario.from_dict(document).to_json()) == document
+
+
+@pytest.mark.parametrize("name", SAVED["ends"])
+def test_a_saved_scenario_ends_where_it_did(name: str) -> None:
+    scenario = Scenario.from_dict(SAVED["documents"][name])
+    engine = scenario.plant.engine if isinstance(scenario.plant, ScenePlant) else scenario.plant
+    if engine not in installed_backends():
+        pytest.skip(f"{engine} is not installed")
+    rollout = simulate(scenario)
+    for ours, saved in zip((rollout.q, rollout.v, rollout.tau), SAVED["ends"][name], strict=True):
+        size = max(1.0, float(np.max(np.abs(saved), initial=0.0)))
+        np.testing.assert_allclose(ours[-1], saved, rtol=0.0, atol=1e-12 * size)
