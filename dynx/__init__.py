@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from dynx.compiled.derivatives import Derivatives
     from dynx.compiled.parametric import ParametricDynamics, parametric
     from dynx.doctor import DoctorReport, compare_as_loaded, diagnose
-    from dynx.ik import IKResult
+    from dynx.ik import IKResult, inverse_kinematics
     from dynx.model import Model, Pose
     from dynx.model.library import robots
     from dynx.model.loading import load
@@ -81,6 +81,7 @@ __all__ = [
     "ik",
     "inertial_parameters",
     "installed_backends",
+    "inverse_kinematics",
     "load",
     "parametric",
     "quat_from_rotation",
@@ -122,6 +123,7 @@ _HOME = {
     "diagnose": "dynx.doctor",
     "inertial_parameters": "dynx.rbd.regressor",
     "installed_backends": "dynx.backends",
+    "inverse_kinematics": "dynx.ik",
     "load": "dynx.model.loading",
     "parametric": "dynx.compiled.parametric",
     "quat_from_rotation": "dynx.model.rotations",

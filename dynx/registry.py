@@ -5,7 +5,8 @@ package), the classes that a program registered, and the entry points of one gro
 meaning: `ClassRegistry.register` refuses a name that is taken, and an entry point with the name of one of
 dynx's own classes is ignored.
 
-A class is imported when it is first looked up; listing names imports none.
+A class is imported when it is first looked up; listing names imports none. So is the body of a method that
+lies in a room above its class (`door`).
 """
 
 from __future__ import annotations
@@ -15,23 +16,45 @@ from collections.abc import Callable, Mapping
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar, cast
 
 from dynx.errors import ArgumentError, DynxError, nearest, shown
 
 Kind = TypeVar("Kind")
+Method = TypeVar("Method", bound=Callable[..., Any])
 
 DEFAULT_ENGINE = "compiled" if find_spec("pinocchio") is None else "pinocchio"
 """Backend and plant where none is named: Pinocchio, or dynx's own where it has no wheels (Windows)."""
 
-_VIEW = "dynx.viewer.viewer", "view"
+
+def door(target: str) -> Callable[[Method], Method]:
+    """Decorate the stub of a method whose body is a function of a room above: ``"package.module:function"``.
+
+    The first look-up of the method imports that function and puts it in the stub's place, so that later calls
+    reach the function itself. The stub has its signature, for type checkers; its own body never runs.
+    """
+
+    def replaced(stub: Method) -> Method:
+        return cast(Method, _Door(target, stub))
+
+    return replaced
 
 
-def view(shown: object, **options: Any) -> Any:
-    """Open the viewer of `dynx.viewer` on a model, a rollout or a world; it is imported by its name, because
-    the rooms of these lie below it."""
-    module, name = _VIEW
-    return getattr(import_module(module), name)(shown, **options)
+class _Door:
+    """Descriptor that stands for a method until it is first looked up."""
+
+    def __init__(self, target: str, stub: Callable[..., Any]) -> None:
+        self.target, self.stub = target, stub
+        self.__doc__ = stub.__doc__
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._owner, self._name = owner, name
+
+    def __get__(self, instance: object, owner: type) -> Any:
+        module, _, name = self.target.partition(":")
+        body = getattr(import_module(module), name)
+        setattr(self._owner, self._name, body)
+        return body.__get__(instance, owner)
 
 
 def moved_names(package: str, moved: Mapping[str, str]) -> Callable[[str], Any]:

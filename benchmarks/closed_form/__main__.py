@@ -17,7 +17,7 @@ import numpy as np
 
 from benchmarks.closed_form.peers import Solver, installed_solvers
 from dynx.backends import Backend, backend
-from dynx.ik.closed_form.chain import chain_to
+from dynx.ik.closed_forms.chain import chain_to
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.spatial.scalar import Floats

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from dynx.backends import backend
-from dynx.ik.closed_form.chain import chain_to
+from dynx.ik.closed_forms.chain import chain_to
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from benchmarks.inverse_kinematics import ARMS, model_of
 from dynx.backends import backend
-from dynx.ik.avoidance import Avoidance
+from dynx.distance.avoidance import Avoidance
 from dynx.model import Pose
 from dynx.spatial.scalar import Floats
 from dynx.world import Scene, SceneBody, SceneRobot, World, box

@@ -41,6 +41,11 @@ class Arguments:
         self._v_shape = (model.nv,)
         self._listed = model.nq <= MAX_LISTED
 
+    def refuse_closed(self) -> None:
+        """Raise ClosedError if the backend was closed."""
+        if self.closed:
+            raise ClosedError(f"this backend of {self._model.name} was closed; make a new one")
+
     # The norm of a vector is below a bound only if every entry is, and no entry is NaN. One C loop over a
     # list computes it several times faster than NumPy at this size. If the norm is too large, every entry is
     # checked.

@@ -13,17 +13,27 @@ from numpy.typing import ArrayLike
 
 from dynx.backends.evaluation import common_batch
 from dynx.backends.hooks import apply_matrix, solve_mass_matrix
-from dynx.backends.quantity_calls import ALL_FRAMES, ONE_FRAME, Forces
-from dynx.backends.tracking import PathCalls
-from dynx.ik import FrameTarget, IKOptions, IKResult, IKSolutions, inverse_kinematics, spells_options
+from dynx.backends.quantity_calls import ALL_FRAMES, ONE_FRAME, Forces, QuantityCalls
+from dynx.errors import ArgumentError
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, shift_jacobian
+from dynx.registry import door
 from dynx.spatial.scalar import Floats
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
+    from dynx.distance.avoidance import AvoidanceSource
+    from dynx.ik.closed_forms.solutions import IKSolutions
+    from dynx.ik.frame_target import FrameTarget
+    from dynx.ik.options import IKOptions
+    from dynx.ik.result import IKResult
+    from dynx.ik.tracking.result import TrackResult
+    from dynx.ik.tracking.tracker import Motion
+    from dynx.ik.velocity.programme import VelocityResult
+    from dynx.ik.velocity.tasks import VelocityTask
 
-class Backend(PathCalls):
+
+class Backend(QuantityCalls):
     """A robot in one engine, with the same methods, conventions and results for every engine.
 
     Arrays are float64 and take leading batch axes, which broadcast: q (..., nq), v, a, tau
@@ -154,6 +164,8 @@ class Backend(PathCalls):
         dJ = self.jacobian_derivative(q, v, frame, reference=reference, point=point)
         return apply_matrix(J, a) + apply_matrix(dJ, v)
 
+    # -- inverse kinematics, whose bodies lie above (`dynx.ik`) ---------------------------------
+
     @overload
     def inverse_kinematics(
         self,
@@ -176,7 +188,7 @@ class Backend(PathCalls):
         **options: Unpack[IKOptions],
     ) -> IKResult: ...
 
-    @spells_options
+    @door("dynx.ik.solver:inverse_kinematics")
     def inverse_kinematics(
         self,
         target: ArrayLike | Mapping[str, ArrayLike] | Sequence[FrameTarget],
@@ -189,7 +201,69 @@ class Backend(PathCalls):
         Several frames have targets ``{name: target}`` or a list of `dynx.ik.FrameTarget`.
         `dynx.ik.inverse_kinematics` describes the targets, and `dynx.ik.Options` the options.
         """
-        return inverse_kinematics(self, target, frame, q0, **options)
+        raise NotImplementedError
+
+    @door("dynx.ik.tracking.tracker:track")
+    def track(
+        self,
+        targets: ArrayLike | Motion,
+        frame: str,
+        q0: ArrayLike | None = None,
+        *,
+        dt: float | None = None,
+        velocity_limit: ArrayLike | None = None,
+        free: str | Sequence[str] | None = None,
+        point: ArrayLike | None = None,
+        position_tolerance: float = 1e-6,
+        rotation_tolerance: float = 1e-6,
+        limit_margin: ArrayLike = 0.0,
+        max_step: float = 0.2,
+        jumps: bool | None = None,
+        max_starts: int = 32,
+        rng: np.random.Generator | int = 0,
+        avoid: AvoidanceSource | None = None,
+    ) -> TrackResult:
+        """Return configurations (..., n, nq) that follow `targets`, poses (..., n, 4, 4), continuously.
+
+        `dynx.ik.tracking.track` describes the options. Elsewhere: MoveIt `computeCartesianPath`, TRAC-IK
+        called with the previous solution.
+        """
+        raise NotImplementedError
+
+    @door("dynx.ik.velocity.programme:velocity_ik")
+    def velocity_ik(
+        self,
+        q: ArrayLike,
+        tasks: VelocityTask | Sequence[VelocityTask],
+        *,
+        dt: float,
+        damping: float = 1e-6,
+        posture: ArrayLike | None = None,
+        posture_weight: float = 1e-2,
+        posture_gain: float = 1.0,
+        velocity_limit: ArrayLike | None = None,
+        acceleration_limit: ArrayLike | None = None,
+        v0: ArrayLike | None = None,
+        avoid: AvoidanceSource | None = None,
+        avoid_gain: float = 5.0,
+    ) -> VelocityResult:
+        """Return the velocity v (nv,) that meets `tasks` best at q (nq,) and keeps the limits for `dt` [s].
+
+        `dynx.ik.velocity.velocity_ik` describes the options; needs the extra ``qp``. Elsewhere: Pink and mink
+        `solve_ik`, Drake `DoDifferentialInverseKinematics`.
+        """
+        raise NotImplementedError
+
+    def engine_inverse_kinematics(self, T_world_target: ArrayLike, frame: str, q0: ArrayLike) -> Floats:
+        """Return the configuration (nq,) at which the engine's own solver stops, for a pose (4, 4) of a frame
+        and the start q0 (nq,); the result may miss the target.
+
+        Raises ArgumentError if the engine has no solver of its own.
+        """
+        raise ArgumentError(
+            f"method 'engine': {self!r} has no solver of its own; use method 'dynx', "
+            "or the backend 'pybullet'"
+        )
 
     # -- dynamics -----------------------------------------------------------------------------
 

@@ -36,8 +36,16 @@ class EngineHooks(ABC):
     vectorized: ClassVar[bool] = False
     """True if the hooks take leading batch axes."""
 
+    compiles: ClassVar[bool] = False
+    """True if every quantity is a kernel of dynx's own."""
+
     model: Model
     _mechanism: Mechanism
+
+    @property
+    def threads(self) -> int:
+        """Most threads for a batch."""
+        return 1
 
     def _unchecked_callable(self, quantity: str) -> Callable[..., Floats] | None:
         """Return the unchecked callable for `quantity` bound to the calling thread, or None if the engine has

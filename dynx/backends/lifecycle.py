@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any, ClassVar, TypeVar
 
@@ -9,6 +10,7 @@ from dynx.backends.arguments import Arguments
 from dynx.model import Model
 
 Self = TypeVar("Self", bound="Lifecycle")
+Made = TypeVar("Made")
 
 
 class Lifecycle:
@@ -34,6 +36,7 @@ class Lifecycle:
         self._options: dict[str, Any] = {"validate": validate}
         # `close` sets this to True, so that the checks run and raise ClosedError.
         self._validate = validate
+        self._kept: dict[object, Any] = {}
 
     @property
     def engine_version(self) -> str:
@@ -49,7 +52,24 @@ class Lifecycle:
         if not self._arguments.closed:
             self._validate = True
             self._arguments.closed = True
+            self._kept.clear()
             self._release()
+
+    def kept(self, key: object, make: Callable[[], Made]) -> Made:
+        """Return what `make` returned for `key` when it was first needed; `close` releases it.
+
+        Rooms above keep here what belongs to one backend, such as solvers. Two threads that need it at once
+        may both make it; both get the same. Raises ClosedError.
+        """
+        try:
+            found: Made = self._kept[key]
+        except KeyError:
+            self._arguments.refuse_closed()
+            found = self._kept.setdefault(key, make())
+            if self._arguments.closed:
+                # Another thread closed this backend meanwhile.
+                self._kept.clear()
+        return found
 
     def _release(self) -> None:
         """Release the resources of the engine."""

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from dynx.backends.arguments import Arguments
-from dynx.errors import ClosedError
 from dynx.model.numbers import MAX_MAGNITUDE, UNIT_NORM_TOLERANCE
 from dynx.spatial.scalar import Floats
 
@@ -26,11 +25,6 @@ _MAX_ACCELERATION = 1e300
 
 class BatchArguments(Arguments):
     """`Arguments` with fast checks of batches."""
-
-    def refuse_closed(self) -> None:
-        """Raise ClosedError if the backend was closed."""
-        if self.closed:
-            raise ClosedError(f"this backend of {self._model.name} was closed; make a new one")
 
     def q(self, q: Any) -> Floats:
         if not self.closed and _is_batch(q, self._q_shape) and _below(q, MAX_MAGNITUDE):

@@ -9,23 +9,21 @@ Several threads may share one backend and its kernels.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, overload
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx._version import __version__
+from dynx.backends.base import Backend
 from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.backends.quantity_calls import Forces, Key
 from dynx.compiled.arguments import BatchArguments
 from dynx.compiled.call import KernelCall, NumericCall, write_into
 from dynx.compiled.coupled_call import CoupledCall
 from dynx.compiled.frames import chain_of, place_of
-from dynx.compiled.ik.kernels import SolverKey, applies, frame_key, frame_solver, solver_key
-from dynx.compiled.ik.pose_calls import PoseCalls
-from dynx.compiled.ik.solver import FrameSolver
 from dynx.compiled.kernels import (
     ON_CHAINS,
     chain_kernel,
@@ -35,10 +33,7 @@ from dynx.compiled.kernels import (
     routines_evaluate,
 )
 from dynx.compiled.looped.kernels import looped_kernel
-from dynx.compiled.paths import PathKernels
 from dynx.compiled.simplification import has_physical_inertias, simplify_mechanism
-from dynx.ik import FrameTarget, IKOptions, IKResult, IKSolutions, Problem, spells_options
-from dynx.ik.secondary import Posture
 from dynx.model import Model
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
 from dynx.simd.image import COMPILE_LOCK
@@ -47,13 +42,10 @@ from dynx.simd.target import compiler_version, host
 from dynx.simd.threads import checked_threads
 from dynx.spatial.scalar import Floats
 
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
-
 Call = Callable[..., Floats]
 
 
-class CompiledBackend(PathKernels):
+class CompiledBackend(Backend):
     """Kernels of `dynx.rbd` behind the interface of `Backend`.
 
     A batch is split over at most `threads` threads; None stands for one per processor. Results are the same
@@ -84,8 +76,6 @@ class CompiledBackend(PathKernels):
         )
         self._calls: dict[object, KernelCall | NumericCall | CoupledCall] = {}
         self._chain_kernels: dict[object, Kernel] = {}
-        self._ik_solvers: dict[SolverKey, FrameSolver] = {}
-        self._pose_calls = PoseCalls()
         # The same calls under the arguments of the public methods, which saves looking up names.
         self._public_calls: dict[object, Call] = {}
 
@@ -104,7 +94,6 @@ class CompiledBackend(PathKernels):
         # Calls in progress on other threads keep a reference to their kernels until they return.
         with COMPILE_LOCK:
             self._public_calls, self._calls, self._chain_kernels = {}, {}, {}
-            self._ik_solvers, self._pose_calls = {}, PoseCalls()
 
     # -- with `out` ---------------------------------------------------------------------------
 
@@ -208,78 +197,6 @@ class CompiledBackend(PathKernels):
         if joint_dynamics:
             M += self._joint_terms.armature
         return M
-
-    @overload
-    def inverse_kinematics(
-        self,
-        target: ArrayLike,
-        frame: str,
-        q0: ArrayLike | None = None,
-        *,
-        all_solutions: Literal[True],
-        given: Mapping[str, float] | None = None,
-        position_tolerance: ArrayLike = ...,
-        rotation_tolerance: ArrayLike = ...,
-    ) -> IKSolutions: ...
-
-    @overload
-    def inverse_kinematics(
-        self,
-        target: ArrayLike | Mapping[str, ArrayLike] | Sequence[FrameTarget],
-        frame: str | None = None,
-        q0: ArrayLike | None = None,
-        **options: Unpack[IKOptions],
-    ) -> IKResult: ...
-
-    @spells_options
-    def inverse_kinematics(
-        self,
-        target: ArrayLike | Mapping[str, ArrayLike] | Sequence[FrameTarget],
-        frame: str | None = None,
-        q0: ArrayLike | None = None,
-        **options: Unpack[IKOptions],
-    ) -> IKResult:
-        """Return the configuration that brings `frame` to `target`: a pose (..., 4, 4) or position (..., 3).
-
-        `dynx.ik.inverse_kinematics` describes the targets, and `dynx.ik.Options` the options. A kernel solves
-        for one frame that 1 to 24 joints move, on a fixed base, with at most 10,000 restarts; otherwise the
-        solver of the other backends does.
-        """
-        call = self._pose_calls.find(frame, options)
-        if call is not None:
-            found = call(target, q0)
-            if found is not None:
-                return found
-        self._arguments.refuse_closed()
-        found = super().inverse_kinematics(target, frame, q0, **options)
-        if call is None and isinstance(frame, str):
-            self._pose_calls.store(frame, options, self._ik_solvers.get(frame_key(frame)), self.model)
-        return found
-
-    def solve_inverse_kinematics(self, problem: Problem) -> IKResult | None:
-        """Solve a checked problem by a kernel; return None if none applies (`dynx.compiled.ik.kernels`)."""
-        solver = self._frame_solver(problem)
-        return None if solver is None else solver.solve(problem, self)
-
-    def nearest_solutions(self, problem: Problem, posture: Posture) -> tuple[Floats, IKResult] | None:
-        """Return the objective (count,) and the solutions nearest to a posture, each from its own q0, or None
-        if no kernel applies."""
-        solver = self._frame_solver(problem)
-        return None if solver is None else solver.nearest(problem, posture)
-
-    def _frame_solver(self, problem: Problem) -> FrameSolver | None:
-        """Return the solver for problems of this kind, or None if no kernel applies."""
-        self._arguments.refuse_closed()
-        if not applies(problem):
-            return None
-        key = solver_key(problem)
-        solver = self._ik_solvers.get(key)
-        if solver is None:
-            with COMPILE_LOCK:
-                solver = self._ik_solvers.get(key)
-                if solver is None:
-                    solver = self._ik_solvers[key] = frame_solver(self, problem, self._threads)
-        return solver
 
     # -- kernels ------------------------------------------------------------------------------
 

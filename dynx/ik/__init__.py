@@ -1,19 +1,24 @@
-"""Inverse kinematics: targets, a bounded Levenberg-Marquardt solver with restarts, checked results.
+"""Inverse kinematics on any backend: targets, a bounded search with restarts, checked results.
 
-This package lies below `dynx.backends`: the solver depends only on a small protocol of poses and Jacobians,
-so that every backend can offer `inverse_kinematics` as one of its quantities.
+This package lies above `dynx.backends`, whose methods `inverse_kinematics`, `track` and `velocity_ik` are
+doors to it (`dynx.registry.door`). What it keeps with a backend sits in `Backend.kept`. Closed forms are
+imported when they are first used.
 """
 
-from dynx.ik.closed_form import ClosedForm, IKSolutions, closed_form
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from dynx.errors import nearest
 from dynx.ik.frame_target import FrameTarget
-from dynx.ik.options import IKOptions, Options, spells_options
-from dynx.ik.problem import Problem, Requirement
-from dynx.ik.reach import proofs
+from dynx.ik.options import IKOptions, Options
 from dynx.ik.result import IKResult
-from dynx.ik.search import SearchLimits
 from dynx.ik.solver import inverse_kinematics
-from dynx.ik.targets import Targets, checked_targets, is_rigid
-from dynx.ik.tasks import Kinematics
+
+if TYPE_CHECKING:
+    from dynx.ik.closed_forms.solutions import IKSolutions
+    from dynx.ik.closed_forms.solver import ClosedForm, closed_form
 
 __all__ = [
     "ClosedForm",
@@ -21,16 +26,34 @@ __all__ = [
     "IKOptions",
     "IKResult",
     "IKSolutions",
-    "Kinematics",
     "Options",
-    "Problem",
-    "Requirement",
-    "SearchLimits",
-    "Targets",
-    "checked_targets",
     "closed_form",
     "inverse_kinematics",
-    "is_rigid",
-    "proofs",
-    "spells_options",
 ]
+
+_CLOSED_FORMS = {"ClosedForm": "solver", "IKSolutions": "solutions", "closed_form": "solver"}
+
+# Hidden from type checkers, which would take any name for an attribute: they know the imports above.
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> Any:
+        if name not in _CLOSED_FORMS:
+            raise AttributeError(f"module 'dynx.ik' has no attribute {name!r}{_advice(name)}")
+        return getattr(import_module(f"dynx.ik.closed_forms.{_CLOSED_FORMS[name]}"), name)
+
+
+_MOVED = {
+    "Kinematics": "dynx.Backend",
+    "Problem": "dynx.ik.problem.Problem",
+    "Requirement": "dynx.ik.problem.Requirement",
+    "SearchLimits": "dynx.ik.search.SearchLimits",
+    "Targets": "dynx.model.targets.Targets",
+    "checked_targets": "dynx.model.targets.checked_targets",
+    "is_rigid": "dynx.model.targets.is_rigid",
+    "spells_options": "dynx.ik.options.spells_options",
+}
+
+
+def _advice(name: str) -> str:
+    """Return the clause of an error that says where a name is now, or which is nearest."""
+    return f"; it is {_MOVED[name]}" if name in _MOVED else nearest(name, __all__)

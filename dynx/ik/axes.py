@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError, nearest, shown
-from dynx.ik.targets import FREE, Targets
 from dynx.model.numbers import real_array
+from dynx.model.targets import FREE, Targets
 
 AXIS_NAMES = ("position_x", "position_y", "position_z", "rotation_x", "rotation_y", "rotation_z")
 """Names of single axes, which `free` takes, in the order of `weights`."""

@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError, nearest, shown
-from dynx.ik.avoidance import Avoidance, AvoidanceSource
 from dynx.ik.axes import checked_axes
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.frame_target import frame_targets
 from dynx.ik.options import Options
 from dynx.ik.problem import Problem, Requirement
 from dynx.ik.secondary import MAXIMA, Secondary
-from dynx.ik.targets import Targets, checked_targets
 from dynx.model import Model
 from dynx.model.configuration import checked_q
 from dynx.model.numbers import checked_vector, real_array
+from dynx.model.targets import Targets, checked_targets
 from dynx.spatial.scalar import Floats
+
+if TYPE_CHECKING:
+    from dynx.distance.avoidance import Avoidance, AvoidanceSource
 
 
 def checked_problem(
@@ -66,6 +68,8 @@ def checked_avoidance(model: Model, avoid: AvoidanceSource | None) -> Avoidance 
     """Return what the robot is to avoid, or None. Raises ArgumentError."""
     if avoid is None:
         return None
+    from dynx.distance.avoidance import AvoidanceSource
+
     if not isinstance(avoid, AvoidanceSource):
         raise ArgumentError(
             f"avoid is {shown(avoid)}; wanted a dynx.world.Scene or World, or its avoidance(...)"

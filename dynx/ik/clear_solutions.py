@@ -15,14 +15,22 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from dynx.ik.avoidance import Avoidance, NearPair, Pair
-from dynx.ik.avoidance.descent import AvoidingDescent
-from dynx.ik.avoidance.wording import FIXED, OF_TARGET, collision_sentence, inevitable_sentence
-from dynx.ik.other_solutions import ProblemSolver, Target, from_closed_form, from_kernel
+from dynx.backends.base import Backend
+from dynx.distance.avoidance import (
+    FIXED,
+    OF_TARGET,
+    Avoidance,
+    NearPair,
+    Pair,
+    collision_sentence,
+    inevitable_sentence,
+)
+from dynx.ik.avoiding_descent import AvoidingDescent, fixed_pairs, pairs_of_target
+from dynx.ik.other_solutions import Target, from_closed_form, from_kernel
 from dynx.ik.problem import Problem
 from dynx.ik.result import IKResult
 from dynx.ik.search import Candidate, Search
-from dynx.ik.tasks import Kinematics, Task
+from dynx.ik.tasks import Task
 from dynx.spatial.scalar import Floats
 
 ROUND = 24
@@ -71,26 +79,25 @@ class _Tally:
 
 
 def clear_solutions(
-    kinematics: Kinematics,
+    backend: Backend,
     problem: Problem,
     avoidance: Avoidance,
     first: IKResult,
-    solve_all: ProblemSolver | None,
 ) -> IKResult:
     """Return `first` with solutions that keep all margins, where one is found.
 
     Samples that `first` does not reach stay. Where each solution found is too close to something, `success`
     is False, q is the one that lacks least, and `collision` says which pairs prevent it.
     """
-    nq = kinematics.model.nq
+    nq = backend.model.nq
     q = first.q.reshape(-1, nq).copy()
     columns = (first.position_error, first.rotation_error, first.iterations, first.restarts)
     distances, angles, iterations, restarts = (column.reshape(-1).copy() for column in columns)
     success = first.success.reshape(-1).copy()
     sentences = np.full(len(q), "", dtype=object)
-    search = Search(kinematics.model, problem.coordinates, problem.limits)
-    finder = _Finder(kinematics, problem, avoidance, search, solve_all)
-    samples = zip(problem.tasks(kinematics), problem.targets.rows(problem.batch), strict=True)
+    search = Search(backend.model, problem.coordinates, problem.limits)
+    finder = _Finder(backend, problem, avoidance, search)
+    samples = zip(problem.tasks(backend), problem.targets.rows(problem.batch), strict=True)
     starts = problem.starts()
     for (k, task), target in samples:
         if not success[k]:
@@ -127,19 +134,18 @@ class _Finder:
 
     def __init__(
         self,
-        kinematics: Kinematics,
+        backend: Backend,
         problem: Problem,
         avoidance: Avoidance,
         search: Search,
-        solve_all: ProblemSolver | None,
     ) -> None:
-        self._kinematics, self._problem, self._avoidance = kinematics, problem, avoidance
-        self._search, self._solve_all = search, solve_all
-        self._fixed = avoidance.fixed_pairs(problem.coordinates)
+        self._backend, self._problem, self._avoidance = backend, problem, avoidance
+        self._search = search
+        self._fixed = fixed_pairs(avoidance, problem.coordinates)
         self._of_target: frozenset[Pair] = frozenset()
         targets, limits = problem.targets, problem.limits
         if problem.is_plain and targets.positions is not None and targets.rotations is not None:
-            self._of_target = avoidance.pairs_of_target(problem.coordinates, problem.frame)
+            self._of_target = pairs_of_target(avoidance, problem.coordinates, problem.frame)
         # Two solutions differ by twice the tolerances.
         self._slack = 2.0 * (limits.position_tolerance + FRAME_REACH * limits.rotation_tolerance)
 
@@ -148,7 +154,7 @@ class _Finder:
     ) -> tuple[Candidate | None, _Tally]:
         """Return a configuration that reaches the target and keeps the margins, or None; and what failed."""
         tally = _Tally()
-        descent = AvoidingDescent(task, self._avoidance, self._kinematics, self._problem.coordinates)
+        descent = AvoidingDescent(task, self._avoidance, self._backend, self._problem.coordinates)
         restarts, improvements = -1, 0
         for solutions, drawn, complete in self._rounds(task, target, start, solution):
             restarts += drawn
@@ -158,7 +164,7 @@ class _Finder:
                 candidate = self._search.evaluate(q, task)
                 if not candidate.success:
                     continue
-                violated = self._avoidance.violated(self._kinematics, candidate.q)
+                violated = self._avoidance.violated(self._backend, candidate.q)
                 if not violated:
                     candidate.restarts = max(restarts, 0)
                     return candidate, tally
@@ -186,7 +192,7 @@ class _Finder:
     ) -> Iterator[tuple[list[Floats], int, bool]]:
         """Yield solutions with the number of starts that they took, and whether there are no others."""
         problem, coordinates = self._problem, self._problem.coordinates
-        known = from_closed_form(self._kinematics, problem, target, start) if coordinates.count else []
+        known = from_closed_form(self._backend, problem, target, start) if coordinates.count else []
         if known is not None:
             distinct = [solution]
             for q in map(coordinates.clipped, known):
@@ -201,9 +207,7 @@ class _Finder:
         while left > 0:
             count = min(ROUND, left)
             left -= count
-            found = None
-            if self._solve_all is not None:
-                found = from_kernel(problem, target, start, rng, count, self._solve_all)
+            found = from_kernel(self._backend, problem, target, start, rng, count)
             if found is None:
                 found = []
                 for _ in range(count):
@@ -225,7 +229,7 @@ class _Finder:
         found.iterations = steps
         if not found.success:
             return None
-        violated = self._avoidance.violated(self._kinematics, found.q)
+        violated = self._avoidance.violated(self._backend, found.q)
         if not violated:
             return found
         tally.compare(found, violated)

@@ -5,16 +5,18 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Any, TypedDict, TypeVar
+from typing import TYPE_CHECKING, Any, TypedDict, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
-from dynx.ik.avoidance import AvoidanceSource
 from dynx.ik.axes import checked_tolerance
 from dynx.ik.search import SearchLimits
 from dynx.model.numbers import whole_number
+
+if TYPE_CHECKING:
+    from dynx.distance.avoidance import AvoidanceSource
 
 F = TypeVar("F", bound=Callable[..., Any])
 

@@ -2,50 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from dynx.ik.other_solutions import ProblemSolver, Target, from_closed_form, from_kernel, one_target
+from dynx.backends.base import Backend
+from dynx.ik.kernels.kernels import nearest_solutions
+from dynx.ik.other_solutions import Target, from_closed_form, from_kernel, one_target
 from dynx.ik.problem import Problem
 from dynx.ik.result import IKResult
 from dynx.ik.search import Candidate, Search
-from dynx.ik.secondary import Admissible, Posture, Secondary, best_solution
-from dynx.ik.tasks import Kinematics
+from dynx.ik.secondary import Admissible, Secondary, best_solution
 from dynx.spatial.scalar import Floats
 
 STARTS = 24
 """Most random starts from which solutions are sought."""
 
-NearestSolver = Callable[[Problem, Posture], "tuple[Floats, IKResult] | None"]
-"""Method ``nearest_solutions`` of kinematics that bring many solutions near to a posture; it returns None for
-a problem that it does not apply to."""
-
 _COLUMNS = ("q", "position_error", "rotation_error", "iterations", "restarts")
 
 
 def preferred_solutions(
-    kinematics: Kinematics,
+    backend: Backend,
     problem: Problem,
     secondary: Secondary,
     first: IKResult,
-    solve_all: ProblemSolver | None,
     is_admissible: Admissible | None = None,
 ) -> IKResult:
     """Return the best solutions of the samples that the result `first` reaches; the others stay.
 
     With `is_admissible` only configurations count for which it is True, as it is for those of `first`.
 
-    Other solutions come from the closed form, if there is one, or from random starts: in a kernel by
-    `solve_all`, otherwise one after the other.
+    Other solutions come from the closed form, if there is one, or from random starts: in a kernel, if one
+    applies, otherwise one after the other.
     """
-    coordinates, nq = problem.coordinates, kinematics.model.nq
-    search, starts = Search(kinematics.model, coordinates, problem.limits), problem.starts()
-    # A kernel knows nothing of what is admissible.
-    nearest_solutions: NearestSolver | None = (
-        getattr(kinematics, "nearest_solutions", None) if is_admissible is None else None
-    )
+    coordinates, nq = problem.coordinates, backend.model.nq
+    search, starts = Search(backend.model, coordinates, problem.limits), problem.starts()
     goals = None
     if secondary.nearest is not None:
         goals = np.broadcast_to(secondary.nearest, (*problem.batch, nq)).reshape(-1, nq)
@@ -53,23 +44,24 @@ def preferred_solutions(
     columns = (first.position_error, first.rotation_error, first.iterations, first.restarts)
     distances, angles, iterations, restarts = (column.reshape(-1).copy() for column in columns)
     reached, count = first.success.reshape(-1), min(problem.limits.max_restarts, STARTS)
-    samples = zip(problem.tasks(kinematics), problem.targets.rows(problem.batch), strict=True)
+    samples = zip(problem.tasks(backend), problem.targets.rows(problem.batch), strict=True)
     for (k, task), target in samples:
         if not reached[k] or not coordinates.count:
             continue
         goal, rng = None if goals is None else goals[k], np.random.default_rng(problem.rng)
         begins = [q[k]] if goal is None else [coordinates.with_joints_of(starts[k], goal), q[k]]
-        known = from_closed_form(kinematics, problem, target, starts[k])
+        known = from_closed_form(backend, problem, target, starts[k])
         is_complete = known is not None
-        if known is None and solve_all is not None:
-            known = from_kernel(problem, target, starts[k], rng, count, solve_all, begins[:-1])
+        if known is None:
+            known = from_kernel(backend, problem, target, starts[k], rng, count, begins[:-1])
         if known is None:
             known = [coordinates.random(starts[k], rng) for _ in range(count)]
         begins += [coordinates.clipped(each) for each in known]
         of_sample = replace(secondary, nearest=goal)
         best = None
-        if nearest_solutions is not None and not is_complete:
-            best = _nearest(problem, target, begins, starts[k], of_sample, nearest_solutions)
+        # A kernel knows nothing of what is admissible.
+        if is_admissible is None and not is_complete:
+            best = _nearest(backend, problem, target, begins, starts[k], of_sample)
         if best is None:
             best = best_solution(search, coordinates, task, begins, of_sample, is_admissible)
         if best is None:
@@ -83,12 +75,12 @@ def preferred_solutions(
 
 
 def _nearest(
+    backend: Backend,
     problem: Problem,
     target: Target,
     begins: list[Floats],
     start: Floats,
     secondary: Secondary,
-    solve: NearestSolver,
 ) -> Candidate | None:
     """Return the best solution from some that a kernel improves, or None if no kernel applies, or if the
     objective is no posture."""
@@ -96,7 +88,7 @@ def _nearest(
     posture = None if coordinates.floating else secondary.posture(coordinates)
     if posture is None:
         return None
-    found = solve(one_target(problem, target, np.array(begins)), posture)
+    found = nearest_solutions(backend, one_target(problem, target, np.array(begins)), posture)
     if found is None:
         return None
     objective, solutions = found

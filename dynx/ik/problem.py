@@ -5,17 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dynx.ik.avoidance import Avoidance
+from dynx.backends.base import Backend
 from dynx.ik.axes import AxisRequirement
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.search import SearchLimits
 from dynx.ik.secondary import Secondary
-from dynx.ik.targets import Targets
-from dynx.ik.tasks import AxisTask, FrameTask, Kinematics, SeveralTasks, Task
+from dynx.ik.tasks import AxisTask, FrameTask, SeveralTasks, Task
+from dynx.model.targets import Targets
 from dynx.spatial.scalar import Floats
+
+if TYPE_CHECKING:
+    from dynx.distance.avoidance import Avoidance
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,14 +37,14 @@ class Requirement:
 
     def task(
         self,
-        kinematics: Kinematics,
+        backend: Backend,
         coordinates: FrameCoordinates,
         position: Floats | None,
         rotation: Floats | None,
     ) -> Task:
         """Return the task of one target: a position (3,) [m] and a rotation (3, 3)."""
         arguments = (
-            kinematics, self.frame, self.point, coordinates, self.tolerances, position, rotation
+            backend, self.frame, self.point, coordinates, self.tolerances, position, rotation
         )  # fmt: skip
         return FrameTask(*arguments) if self.axes is None else AxisTask(*arguments, self.axes)
 
@@ -99,7 +103,7 @@ class Problem:
             return q0[None]
         return np.broadcast_to(q0, (*self.batch, q0.shape[-1])).reshape(self.count, q0.shape[-1])
 
-    def tasks(self, kinematics: Kinematics) -> Iterator[tuple[int, Task]]:
+    def tasks(self, backend: Backend) -> Iterator[tuple[int, Task]]:
         """Yield the index of each sample, and what it has to reach."""
         rows: list[Iterable[tuple[Floats | None, Floats | None]]]
         if self.batch:
@@ -109,7 +113,7 @@ class Problem:
             rows = [((each.positions, each.rotations),) for each in targets]
         for k, sample in enumerate(zip(*rows, strict=True)):
             tasks = [
-                requirement.task(kinematics, self.coordinates, position, rotation)
+                requirement.task(backend, self.coordinates, position, rotation)
                 for requirement, (position, rotation) in zip(self.requirements, sample, strict=True)
             ]
             yield k, tasks[0] if len(tasks) == 1 else SeveralTasks(tasks)

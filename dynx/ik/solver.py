@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, overload
@@ -10,28 +10,23 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.backends.base import Backend
 from dynx.errors import ArgumentError, nearest, shown
 from dynx.ik.checking import argument_note, checked_problem
-from dynx.ik.clear_solutions import clear_solutions
-from dynx.ik.closed_form.checking import all_solutions as solve_closed_form
-from dynx.ik.closed_form.solutions import IKSolutions
+from dynx.ik.kernels.kernels import KernelSolvers, kernel_solution
 from dynx.ik.options import IKOptions, Options, spells_options
-from dynx.ik.other_solutions import ProblemSolver
 from dynx.ik.preference import preferred_solutions
 from dynx.ik.problem import Problem
 from dynx.ik.reach import proofs
 from dynx.ik.result import IKResult
 from dynx.ik.search import Candidate, Search
-from dynx.ik.tasks import Kinematics
 from dynx.spatial.scalar import Floats
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
+    from dynx.ik.closed_forms.solutions import IKSolutions
     from dynx.ik.frame_target import FrameTarget
-
-EngineSolver = Callable[[Floats, str, Floats], Floats]
-"""Function from a pose T_world_target (4, 4), a frame and q0 (nq,) to the engine's solution q (nq,)."""
 
 METHODS = ("dynx", "engine")
 """Values of the option `method`."""
@@ -39,7 +34,7 @@ METHODS = ("dynx", "engine")
 
 @overload
 def inverse_kinematics(
-    kinematics: Kinematics,
+    backend: Backend,
     target: ArrayLike,
     frame: str,
     q0: ArrayLike | None = None,
@@ -53,7 +48,7 @@ def inverse_kinematics(
 
 @overload
 def inverse_kinematics(
-    kinematics: Kinematics,
+    backend: Backend,
     target: ArrayLike | Mapping[str, ArrayLike] | Sequence[FrameTarget],
     frame: str | None = None,
     q0: ArrayLike | None = None,
@@ -63,7 +58,7 @@ def inverse_kinematics(
 
 @spells_options
 def inverse_kinematics(
-    kinematics: Kinematics,
+    backend: Backend,
     target: ArrayLike | Mapping[str, ArrayLike] | Sequence[FrameTarget],
     frame: str | None = None,
     q0: ArrayLike | None = None,
@@ -110,94 +105,113 @@ def inverse_kinematics(
     NotFiniteError) for an invalid argument, and for method ``"engine"`` if the backend has no solver of its
     own; NoClosedFormError if all solutions of an arm without a closed form are wanted, with what is missing.
     """
+    if not backend.compiles:
+        return _inverse_kinematics(backend, target, frame, q0, options)
+    # A few microseconds for a single pose with options that were checked before.
+    solvers = backend.kept(KernelSolvers, KernelSolvers)
+    call = solvers.call(frame, options)
+    if call is not None:
+        found = call(target, q0)
+        if found is not None:
+            return found
+    found = _inverse_kinematics(backend, target, frame, q0, options)
+    if call is None and isinstance(frame, str):
+        solvers.store_call(frame, options, backend)
+    return found
+
+
+def _inverse_kinematics(
+    backend: Backend, target: Any, frame: str | None, q0: ArrayLike | None, options: Mapping[str, Any]
+) -> IKResult:
+    """Check the arguments and return the result."""
     chosen = Options.of(options)
     if chosen.all_solutions:
-        return _all_solutions(kinematics, target, frame, q0, chosen)
+        return _all_solutions(backend, target, frame, q0, chosen)
     if chosen.given is not None:
         raise ArgumentError(
             "given has no effect without all_solutions=True; lock joints when loading instead"
         )
-    problem = checked_problem(kinematics.model, target, frame, q0, chosen)
-    found = _solved(kinematics, problem, chosen.method)
-    note = argument_note(kinematics.model, q0, problem.avoidance)
+    problem = checked_problem(backend.model, target, frame, q0, chosen)
+    found = _solved(backend, problem, chosen.method)
+    note = argument_note(backend.model, q0, problem.avoidance)
     return replace(found, note=note) if note else found
 
 
-def _solved(kinematics: Kinematics, problem: Problem, method: str) -> IKResult:
+def _solved(backend: Backend, problem: Problem, method: str) -> IKResult:
     """Return the result of a checked problem. Raises ArgumentError for an unknown method."""
     if method == "dynx":
-        solve_all: ProblemSolver | None = getattr(kinematics, "solve_inverse_kinematics", None)
-        found = None if solve_all is None else solve_all(problem)
+        found = kernel_solution(backend, problem)
         if found is None:
-            found = _searched(kinematics, problem)
+            found = _searched(backend, problem)
         if problem.secondary is None and problem.avoidance is None:
             return found
         avoidance, is_clear = problem.avoidance, None
         if avoidance is not None:
-            found = clear_solutions(kinematics, problem, avoidance, found, solve_all)
-            is_clear = partial(avoidance.is_clear, kinematics)
+            from dynx.ik.clear_solutions import clear_solutions
+
+            found = clear_solutions(backend, problem, avoidance, found)
+            is_clear = partial(avoidance.is_clear, backend)
         if problem.secondary is not None:
-            found = preferred_solutions(kinematics, problem, problem.secondary, found, solve_all, is_clear)
-        errors = _errors_by_frame(list(found.q.reshape(problem.count, -1)), problem, kinematics)
+            found = preferred_solutions(backend, problem, problem.secondary, found, is_clear)
+        errors = _errors_by_frame(list(found.q.reshape(problem.count, -1)), problem, backend)
         return replace(found, by_frame=errors)
     if method == "engine":
-        return _solved_by_engine(kinematics, problem)
+        return _solved_by_engine(backend, problem)
     raise ArgumentError(f"method is {shown(method)}{nearest(str(method), METHODS)}")
 
 
-def _searched(kinematics: Kinematics, problem: Problem) -> IKResult:
+def _searched(backend: Backend, problem: Problem) -> IKResult:
     """Search for each sample, one after the other."""
-    search, starts = Search(kinematics.model, problem.coordinates, problem.limits), problem.starts()
+    search, starts = Search(backend.model, problem.coordinates, problem.limits), problem.starts()
     candidates = [
         search.run(task, starts[k], problem.rng, begin_at_q0=problem.begins_at_q0)
-        for k, task in problem.tasks(kinematics)
+        for k, task in problem.tasks(backend)
     ]
-    return _result(candidates, problem, kinematics)
+    return _result(candidates, problem, backend)
 
 
-def _solved_by_engine(kinematics: Kinematics, problem: Problem) -> IKResult:
+def _solved_by_engine(backend: Backend, problem: Problem) -> IKResult:
     """Return the solutions of the engine's own solver, measured by forward kinematics."""
     targets = problem.targets
     is_pose = problem.is_plain and targets.positions is not None and targets.rotations is not None
-    solve = _engine_solver(kinematics, not is_pose or problem.point is not None)
-    search, starts = Search(kinematics.model, problem.coordinates, problem.limits), problem.starts()
+    if not is_pose or problem.point is not None:
+        raise ArgumentError("method 'engine' takes poses (..., 4, 4) of a frame only; use method 'dynx'")
+    search, starts = Search(backend.model, problem.coordinates, problem.limits), problem.starts()
     candidates = []
     for (k, task), (position, rotation) in zip(
-        problem.tasks(kinematics), targets.rows(problem.batch), strict=True
+        problem.tasks(backend), targets.rows(problem.batch), strict=True
     ):
         T, q = np.eye(4), starts[k]
         T[:3, :3], T[:3, 3] = rotation, position
-        q_engine = solve(T, problem.frame, q)
+        q_engine = backend.engine_inverse_kinematics(T, problem.frame, q)
         # If the engine diverged, its start is the best configuration known.
         within = search.within_limits(q_engine, q) if np.isfinite(q_engine).all() else q
         candidates.append(search.evaluate(within, task))
-    return _result(candidates, problem, kinematics)
+    return _result(candidates, problem, backend)
 
 
-def _result(found: list[Candidate], problem: Problem, kinematics: Kinematics) -> IKResult:
+def _result(found: list[Candidate], problem: Problem, backend: Backend) -> IKResult:
     batch = problem.batch
     success = np.array([one.success for one in found], dtype=np.bool_).reshape(batch)
     unreached = ~success.reshape(-1)
-    proof = proofs(problem, kinematics.model, unreached).reshape(batch) if unreached.any() else None
+    proof = proofs(problem, backend.model, unreached).reshape(batch) if unreached.any() else None
     return IKResult(
-        q=np.array([one.q for one in found], dtype=np.float64).reshape(*batch, kinematics.model.nq),
+        q=np.array([one.q for one in found], dtype=np.float64).reshape(*batch, backend.model.nq),
         success=success,
         position_error=np.array([one.position_error for one in found]).reshape(batch),
         rotation_error=np.array([one.rotation_error for one in found]).reshape(batch),
         iterations=np.array([one.iterations for one in found], dtype=np.int64).reshape(batch),
         restarts=np.array([one.restarts for one in found], dtype=np.int64).reshape(batch),
         proof=proof,
-        by_frame=_errors_by_frame([one.q for one in found], problem, kinematics),
+        by_frame=_errors_by_frame([one.q for one in found], problem, backend),
     )
 
 
-def _errors_by_frame(
-    q: list[Floats], problem: Problem, kinematics: Kinematics
-) -> dict[str, tuple[Floats, Floats]]:
+def _errors_by_frame(q: list[Floats], problem: Problem, backend: Backend) -> dict[str, tuple[Floats, Floats]]:
     """Return the errors of each frame, if there are several."""
     if len(problem.requirements) == 1:
         return {}
-    parts = [task.error(q[k]).rows for k, task in problem.tasks(kinematics)]
+    parts = [task.error(q[k]).rows for k, task in problem.tasks(backend)]
     return {
         requirement.frame: (
             np.array([part[index].position for part in parts]).reshape(problem.batch),
@@ -208,7 +222,7 @@ def _errors_by_frame(
 
 
 def _all_solutions(
-    kinematics: Kinematics, target: Any, frame: str | None, q0: ArrayLike | None, options: Options
+    backend: Backend, target: Any, frame: str | None, q0: ArrayLike | None, options: Options
 ) -> IKResult:
     """Return every solution of poses of one frame, from the closed form."""
     plain = Options(
@@ -220,20 +234,9 @@ def _all_solutions(
             f"all_solutions takes poses (..., 4, 4) of a frame, without {', '.join(names[:-1])} or "
             f"{names[-1]}"
         )
-    kinematics.model.frame_index(frame)
+    backend.model.frame_index(frame)
     limits = options.search_limits()
     tolerances = (limits.position_tolerance, limits.rotation_tolerance)
-    return solve_closed_form(kinematics, target, frame, q0, options.given, *tolerances)
+    from dynx.ik.closed_forms.checking import all_solutions
 
-
-def _engine_solver(kinematics: Kinematics, restricted: bool) -> EngineSolver:
-    solver = getattr(kinematics, "engine_inverse_kinematics", None)
-    if solver is None:
-        raise ArgumentError(
-            f"method 'engine': {kinematics!r} has no solver of its own; use method 'dynx', "
-            "or the backend 'pybullet'"
-        )
-    if restricted:
-        raise ArgumentError("method 'engine' takes poses (..., 4, 4) of a frame only; use method 'dynx'")
-    engine_solve: EngineSolver = solver
-    return engine_solve
+    return all_solutions(backend, target, frame, q0, options.given, *tolerances)

@@ -14,7 +14,7 @@ from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
 
-class Kinematics(Protocol):
+class Backend(Protocol):
     """Methods of a backend that the solver uses, for one sample and a frame by name."""
 
     @property
@@ -76,7 +76,7 @@ class FrameTask:
 
     def __init__(
         self,
-        kinematics: Kinematics,
+        backend: Backend,
         frame: str,
         point: Floats | None,
         coordinates: FrameCoordinates,
@@ -84,7 +84,7 @@ class FrameTask:
         position: Floats | None,
         rotation: Floats | None,
     ) -> None:
-        self._forward_kinematics, self._jacobian = kinematics.forward_kinematics, kinematics.jacobian
+        self._forward_kinematics, self._jacobian = backend.forward_kinematics, backend.jacobian
         self._frame, self._point = frame, point
         self._tolerances = (tolerances.position_tolerance, tolerances.rotation_tolerance)
         self._residual = Residual(position, rotation, point)
@@ -111,7 +111,7 @@ class AxisTask:
 
     def __init__(
         self,
-        kinematics: Kinematics,
+        backend: Backend,
         frame: str,
         point: Floats | None,
         coordinates: FrameCoordinates,
@@ -120,7 +120,7 @@ class AxisTask:
         rotation: Floats | None,
         axes: AxisRequirement,
     ) -> None:
-        self._kinematics, self._frame, self._point = kinematics, frame, point
+        self._backend, self._frame, self._point = backend, frame, point
         self._columns = coordinates.columns
         self._residual = AxisResidual(position, rotation, point, axes)
         # A tolerance for each axis replaces that of the norm.
@@ -129,14 +129,14 @@ class AxisTask:
 
     def error(self, q: Floats) -> TaskError:
         """Return the error at q (nq,)."""
-        T = self._kinematics.forward_kinematics(q, self._frame)
+        T = self._backend.forward_kinematics(q, self._frame)
         vector, distance, angle, within, rows = self._residual(T)
         reached = within and distance <= self._position and angle <= self._rotation
         return TaskError(tuple(vector.tolist()), distance, angle, reached, rows)
 
     def jacobian(self, q: Floats, error: TaskError) -> Floats:
         """Return the weighted Jacobian at q along the axes."""
-        J = frame_jacobian(self._kinematics, q, self._frame, self._point)[:, self._columns]
+        J = frame_jacobian(self._backend, q, self._frame, self._point)[:, self._columns]
         return np.asarray(error.rows @ J)
 
 
@@ -163,6 +163,6 @@ class SeveralTasks:
         return np.concatenate(parts)
 
 
-def frame_jacobian(kinematics: Kinematics, q: Floats, frame: str, point: Floats | None) -> Floats:
+def frame_jacobian(backend: Backend, q: Floats, frame: str, point: Floats | None) -> Floats:
     """Return J (6, nv) of a frame, or of a point of it, in world axes."""
-    return kinematics.jacobian(q, frame) if point is None else kinematics.jacobian(q, frame, point=point)
+    return backend.jacobian(q, frame) if point is None else backend.jacobian(q, frame, point=point)

@@ -16,11 +16,11 @@ from numpy.typing import ArrayLike
 
 from dynx.backends import Backend
 from dynx.errors import ArgumentError, ShapeError, TrajectoryError, shown
-from dynx.ik import checked_targets
 from dynx.model import Model
 from dynx.model.configuration import checked_q
 from dynx.model.model import refuse_other_than_model
 from dynx.model.numbers import real_array
+from dynx.model.targets import checked_targets
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, pose_error

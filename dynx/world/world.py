@@ -8,13 +8,13 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from dynx.distance.avoidance import Avoidance
 from dynx.errors import ArgumentError
-from dynx.ik.avoidance import Avoidance
 from dynx.model import Model
 from dynx.model.numbers import positive_seconds, whole_number
 from dynx.model.package_paths import StrPath
 from dynx.option_names import checks_option_names
-from dynx.registry import view
+from dynx.registry import door
 from dynx.spatial.scalar import Floats
 from dynx.steppers.materials import InexactMaterial, inexact_materials, open_engine
 from dynx.steppers.registry import renderer_of, world_class
@@ -344,13 +344,14 @@ class World:
         draw = cast_rays if renderer is None else renderer_of(renderer)
         return draw_picture(self.scene, self.state, camera, draw)
 
+    @door("dynx.viewer.viewer:view")
     def view(self, **options: Any) -> Any:
         """Show the world in the browser, which steps it; return the `dynx.viewer.Viewer`, which takes the
         options.
 
         Raises NotInstalledError without the extra ``viewer``.
         """
-        return view(self, **options)
+        raise NotImplementedError
 
     # -- end ----------------------------------------------------------------------------------
 

@@ -11,10 +11,9 @@ from dynx.cli.shell.exits import DONE, NEGATIVE_RESULT, one_line
 from dynx.cli.shell.inputs import Numbers, default_frame_note
 from dynx.cli.shell.tables import Table
 from dynx.cli.shell.terminal import console, number, write_json
+from dynx.distance.avoidance import Avoidance, closest_sentence
 from dynx.errors import ArgumentError, NoClosedFormError
 from dynx.ik import IKSolutions
-from dynx.ik.avoidance import Avoidance
-from dynx.ik.avoidance.wording import closest_sentence
 from dynx.spatial.scalar import Floats
 
 

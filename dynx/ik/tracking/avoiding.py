@@ -2,22 +2,26 @@
 
 The samples of another follower are kept as long as they are clear. Where one is too close to something, the
 descent to its target is repeated with the distances that are too small as further errors
-(`dynx.ik.avoidance.descent`): redundant joints then move around what is in the way. Where that fails, the
+(`dynx.ik.avoiding_descent`): redundant joints then move around what is in the way. Where that fails, the
 sample is not reached and stays at the last configuration that is clear.
 """
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from dynx.ik.avoidance import Avoidance
-from dynx.ik.avoidance.descent import AvoidingDescent
+from dynx.backends.base import Backend
+from dynx.ik.avoiding_descent import AvoidingDescent
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.problem import Requirement
-from dynx.ik.targets import Targets
-from dynx.ik.tasks import Kinematics
 from dynx.ik.tracking.descent import Followed, Follower, StepBounds, part_of
+from dynx.model.targets import Targets
 from dynx.spatial.scalar import Floats
+
+if TYPE_CHECKING:
+    from dynx.distance.avoidance import Avoidance
 
 CHUNK = 64
 """Samples that the other follower solves before they are checked."""
@@ -29,12 +33,12 @@ class AvoidingFollower:
     def __init__(
         self,
         base: Follower,
-        kinematics: Kinematics,
+        backend: Backend,
         requirement: Requirement,
         coordinates: FrameCoordinates,
         avoidance: Avoidance,
     ) -> None:
-        self._base, self._kinematics, self._avoidance = base, kinematics, avoidance
+        self._base, self._backend, self._avoidance = base, backend, avoidance
         self._requirement, self._coordinates = requirement, coordinates
 
     def follow(self, q: Floats, targets: Targets, bounds: StepBounds, *, stop: bool) -> Followed:
@@ -69,15 +73,15 @@ class AvoidingFollower:
         return found
 
     def _is_clear(self, q: Floats) -> bool:
-        return self._avoidance.is_clear(self._kinematics, q)
+        return self._avoidance.is_clear(self._backend, q)
 
     def _avoid(self, q: Floats, target: Targets, bounds: StepBounds) -> Followed:
         """Return the sample of a target (1,) that keeps the margins, or else stays clear, near q."""
         coordinates = self._coordinates
         ((position, rotation),) = target.rows((1,))
-        task = self._requirement.task(self._kinematics, coordinates, position, rotation)
+        task = self._requirement.task(self._backend, coordinates, position, rotation)
         around = bounds.around(np.array(coordinates.values(q)))
-        descent = AvoidingDescent(task, self._avoidance, self._kinematics, coordinates, around)
+        descent = AvoidingDescent(task, self._avoidance, self._backend, coordinates, around)
         moved, steps, reached = descent.run(q)
         stays = not reached and not self._is_clear(moved)
         error = task.error(q if stays else moved)

@@ -16,12 +16,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.backends.base import Backend
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.levenberg_marquardt import BoundedStep
 from dynx.ik.problem import Requirement
 from dynx.ik.search import DAMPING, MIN_DAMPING, REQUIRED_REDUCTION, WINDOW
-from dynx.ik.targets import Targets
-from dynx.ik.tasks import Kinematics, Task, TaskError
+from dynx.ik.tasks import Task, TaskError
+from dynx.model.targets import Targets
 from dynx.spatial.scalar import Floats
 
 ACCEPTED_FACTOR, REJECTED_FACTOR = 0.3, 4.0
@@ -102,9 +103,9 @@ class Follower(Protocol):
 class SampleFollower:
     """Follower on any backend, which evaluates a pose and a Jacobian for every step."""
 
-    def __init__(self, kinematics: Kinematics, requirement: Requirement) -> None:
-        self._kinematics, self._requirement = kinematics, requirement
-        self._coordinates = FrameCoordinates(kinematics.model, requirement.frame)
+    def __init__(self, backend: Backend, requirement: Requirement) -> None:
+        self._backend, self._requirement = backend, requirement
+        self._coordinates = FrameCoordinates(backend.model, requirement.frame)
 
     def follow(self, q: Floats, targets: Targets, bounds: StepBounds, *, stop: bool) -> Followed:
         found: list[_Sample] = []
@@ -122,7 +123,7 @@ class SampleFollower:
         return _followed(found, starts.shape[-1])
 
     def _task(self, position: Floats | None, rotation: Floats | None) -> Task:
-        return self._requirement.task(self._kinematics, self._coordinates, position, rotation)
+        return self._requirement.task(self._backend, self._coordinates, position, rotation)
 
     def _solve(self, q: Floats, task: Task, bounds: StepBounds, *, abandons: bool) -> _Sample:
         coordinates = self._coordinates

@@ -18,13 +18,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.backends.base import Backend
 from dynx.ik.axis_residual import rotation_between
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.problem import Requirement
-from dynx.ik.targets import Targets
-from dynx.ik.tasks import Kinematics
 from dynx.ik.tracking.descent import Followed, Follower, StepBounds, part_of
 from dynx.ik.tracking.result import TrackStatus
+from dynx.model.targets import Targets
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_exp, quat_from_rotation, quat_log, rotation_from_quat
 
@@ -106,7 +106,7 @@ class PathTracker:
 
     def __init__(
         self,
-        kinematics: Kinematics,
+        backend: Backend,
         follower: Follower,
         requirement: Requirement,
         coordinates: FrameCoordinates,
@@ -114,7 +114,7 @@ class PathTracker:
         starts: Floats,
     ) -> None:
         """`starts` (k, n) are values of the joints, at which searches for another solution begin."""
-        self._kinematics, self._requirement = kinematics, requirement
+        self._backend, self._requirement = backend, requirement
         self._follower, self._limits, self._starts = follower, limits, starts
         self.coordinates = coordinates
 
@@ -183,7 +183,7 @@ class PathTracker:
         x = np.array(coordinates.values(q))
         bounds = StepBounds(limits.lower, limits.upper, limits.per_sample).within_reach_of(x, limits.max_step)
         between = _Between(
-            self._kinematics.forward_kinematics(q, self._requirement.frame), self._requirement, target
+            self._backend.forward_kinematics(q, self._requirement.frame), self._requirement, target
         )
         parts, steps = 2, 0
         while parts <= MAX_DIVISIONS:
@@ -200,7 +200,7 @@ class PathTracker:
         """Return the coordinates (n,) that the error at q presses against a limit."""
         coordinates, limits = self.coordinates, self._limits
         (position, rotation), *_ = part_of(targets, slice(k, k + 1)).rows((1,))
-        task = self._requirement.task(self._kinematics, coordinates, position, rotation)
+        task = self._requirement.task(self._backend, coordinates, position, rotation)
         at_q = task.error(q)
         error, J = np.array(at_q.vector), task.jacobian(q, at_q)
         pressure = error @ J / (np.linalg.norm(J, axis=0) * np.linalg.norm(error) + 1e-300)

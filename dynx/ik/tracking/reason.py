@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dynx.ik.avoidance import Avoidance
-from dynx.ik.avoidance.wording import pair_sentence
+from dynx.backends.base import Backend
+from dynx.distance.avoidance import pair_sentence
 from dynx.ik.problem import Requirement
 from dynx.ik.reach import proof_of
-from dynx.ik.tasks import Kinematics
 from dynx.ik.tracking.descent import Follower, part_of
 from dynx.ik.tracking.path import AT_BOUND, PathTracker, TrackedPath, TrackLimits
 from dynx.ik.tracking.result import TrackStatus
 from dynx.spatial.scalar import Floats
+
+if TYPE_CHECKING:
+    from dynx.distance.avoidance import Avoidance
 
 MAX_NAMES = 4
 """Most joints that are named."""
@@ -27,7 +30,7 @@ SINGULAR = 1e-3
 class FailureExplainer:
     """What is needed to say why a sample of one path is not OK."""
 
-    kinematics: Kinematics
+    backend: Backend
     tracker: PathTracker
     follower: Follower
     """Follower that avoids nothing."""
@@ -42,7 +45,7 @@ class FailureExplainer:
         if path.before_failure is None or k == len(path.status):
             return ""
         before, q = path.before_failure, path.q[k]
-        proof = proof_of(self.kinematics.model, self.requirement, k)
+        proof = proof_of(self.backend.model, self.requirement, k)
         out_of_reach = f"out of reach: {proof}" if proof else ""
         if path.status[k] == TrackStatus.JUMPED:
             return f"no continuous configuration was found; a joint changes by {path.jump[k]:.3g}"
@@ -55,12 +58,12 @@ class FailureExplainer:
         """Return the proof for the sample that is off the most, if there is one: bounds on the reach are not
         exact, and the first sample that is out of reach may lie within them."""
         farthest = int(np.argmax(path.position_error + path.rotation_error))
-        proof = proof_of(self.kinematics.model, self.requirement, farthest) if farthest > k else ""
+        proof = proof_of(self.backend.model, self.requirement, farthest) if farthest > k else ""
         return f"; number {farthest} is out of reach: {proof}" if proof else ""
 
     def _limiting_joints(self, q: Floats, before: Floats, k: int) -> str:
         """Name the joints that the error presses against a limit."""
-        coordinates, limits, model = self.tracker.coordinates, self.limits, self.kinematics.model
+        coordinates, limits, model = self.tracker.coordinates, self.limits, self.backend.model
         pressed = self.tracker.limiting(q, before, self.requirement.targets, k)
         x = np.array(coordinates.values(q))
         at_position = (x <= limits.lower + AT_BOUND) | (x >= limits.upper - AT_BOUND)
@@ -88,7 +91,7 @@ class FailureExplainer:
         found = self.follower.follow(before, target, self.limits.direct, stop=True)
         if not found.reached[0]:
             found = self.follower.descend(before[None], target, self.limits.unbounded_steps)
-        violated = self.avoidance.violated(self.kinematics, found.q[0]) if found.reached[0] else []
+        violated = self.avoidance.violated(self.backend, found.q[0]) if found.reached[0] else []
         if not violated:
             return ""
         worst = max(violated, key=lambda each: each.pair.margin - each.separation.lower)
@@ -98,7 +101,7 @@ class FailureExplainer:
         """Say how close q is to a singular configuration, where no motion of the joints reduces the error."""
         coordinates, targets = self.tracker.coordinates, self.requirement.targets
         (position, rotation), *_ = part_of(targets, slice(1)).rows((1,))
-        task = self.requirement.task(self.kinematics, coordinates, position, rotation)
+        task = self.requirement.task(self.backend, coordinates, position, rotation)
         J = task.jacobian(q, task.error(q))
         if J.shape[1] < J.shape[0]:
             return f"the frame has {J.shape[0]} coordinates, and {J.shape[1]} joints move it"

@@ -4,30 +4,33 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.backends.base import Backend
 from dynx.errors import ArgumentError, ShapeError, shown
-from dynx.ik.avoidance import AvoidanceSource
 from dynx.ik.axes import checked_axes
 from dynx.ik.checking import argument_note, checked_avoidance, checked_margin
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.problem import Requirement
 from dynx.ik.search import SearchLimits
-from dynx.ik.targets import Targets, checked_targets
-from dynx.ik.tasks import Kinematics
 from dynx.ik.tracking.avoiding import AvoidingFollower
 from dynx.ik.tracking.descent import Follower, SampleFollower, part_of
+from dynx.ik.tracking.kernel import path_follower
 from dynx.ik.tracking.path import PathTracker, TrackedPath, TrackLimits
 from dynx.ik.tracking.reason import FailureExplainer
 from dynx.ik.tracking.result import TrackResult
 from dynx.model import Model
 from dynx.model.configuration import checked_q
 from dynx.model.numbers import checked_vector, is_real, positive_seconds, real_array, whole_number
+from dynx.model.targets import Targets, checked_targets
 from dynx.option_names import checks_option_names
 from dynx.spatial.scalar import Floats
+
+if TYPE_CHECKING:
+    from dynx.distance.avoidance import AvoidanceSource
 
 MAX_STEPS = 60
 """Most steps of the solver to one target."""
@@ -47,7 +50,7 @@ class Motion(Protocol):
 
 @checks_option_names
 def track(
-    kinematics: Kinematics,
+    backend: Backend,
     targets: ArrayLike | Motion,
     frame: str,
     q0: ArrayLike | None = None,
@@ -98,7 +101,7 @@ def track(
     Raises UnknownNameError for the frame; ArgumentError (ShapeError, DTypeError, NotFiniteError) for an
     invalid argument.
     """
-    model = kinematics.model
+    model = backend.model
     model.frame_index(frame)
     seconds = None if dt is None else positive_seconds("dt", dt)
     for name, number in (
@@ -112,7 +115,7 @@ def track(
     whole_number("max_starts", max_starts, 1)
     at = None if point is None else checked_vector("point", point)
     part, axes = checked_axes(free, None, position_tolerance, rotation_tolerance, "target")
-    path = _checked_path(kinematics, targets, frame, part, seconds)
+    path = _checked_path(backend, targets, frame, part, seconds)
     if axes is not None and path.rotations is None:
         raise ArgumentError(f"free is {shown(free)}, an axis of poses (..., n, 4, 4); targets are positions")
     if at is not None and path.positions is None:
@@ -126,18 +129,19 @@ def track(
     limits = _limits(model, coordinates, max_step, seconds, velocity_limit)
     settings = SearchLimits(float(position_tolerance), float(rotation_tolerance), MAX_STEPS, 0)
     requirement = Requirement(frame, path, at, axes, settings)
-    make = getattr(kinematics, "path_follower", None) if axes is None else None
-    follower: Follower | None = None if make is None else make(frame, path, at, settings)
+    follower: Follower | None = None
+    if axes is None:
+        follower = path_follower(backend, coordinates, frame, path, at, settings)
     if follower is None:
-        follower = SampleFollower(kinematics, requirement)
+        follower = SampleFollower(backend, requirement)
     plain, avoidance = follower, checked_avoidance(model, avoid)
     if avoidance is not None:
-        follower = AvoidingFollower(follower, kinematics, requirement, coordinates, avoidance)
+        follower = AvoidingFollower(follower, backend, requirement, coordinates, avoidance)
     draws = coordinates.starts(_generator(rng), max_starts)
     offset = coordinates.count - len(coordinates.indices)
     starts = np.clip(draws, limits.lower[offset:], limits.upper[offset:])
-    tracker = PathTracker(kinematics, follower, requirement, coordinates, limits, starts)
-    explainer = FailureExplainer(kinematics, tracker, plain, requirement, limits, avoidance)
+    tracker = PathTracker(backend, follower, requirement, coordinates, limits, starts)
+    explainer = FailureExplainer(backend, tracker, plain, requirement, limits, avoidance)
 
     n = path.batch[-1]
     start = _start(model, q0, coordinates)
@@ -215,7 +219,7 @@ def _from_best_start(
 
 
 def _checked_path(
-    kinematics: Kinematics, targets: ArrayLike | Motion, frame: str, free: str | None, dt: float | None
+    backend: Backend, targets: ArrayLike | Motion, frame: str, free: str | None, dt: float | None
 ) -> Targets:
     """Return targets (..., n), n at least 1."""
     if isinstance(targets, Motion):
@@ -223,11 +227,11 @@ def _checked_path(
             raise ArgumentError("targets are a motion over time; give dt, the time between two samples [s]")
         count = math.floor(targets.duration / dt * (1.0 + 1e-12)) + 1
         q = np.asarray(targets(np.minimum(np.arange(count) * dt, targets.duration))[0])
-        if q.shape[-1] != kinematics.model.nq:
+        if q.shape[-1] != backend.model.nq:
             raise ShapeError(
-                f"the motion has {q.shape[-1]} coordinates; wanted {kinematics.model.nq}, those of the robot"
+                f"the motion has {q.shape[-1]} coordinates; wanted {backend.model.nq}, those of the robot"
             )
-        poses: ArrayLike = kinematics.forward_kinematics(q, frame)
+        poses: ArrayLike = backend.forward_kinematics(q, frame)
     else:
         poses = targets
     path = checked_targets(poses, free)

@@ -9,15 +9,18 @@ programme: Kanoun, Lamiraux and Wieber, IEEE Trans. Robotics 27(4), 2011).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dynx.backends.base import Backend
 from dynx.errors import ArgumentError, shown
-from dynx.ik.avoidance import AvoidanceSource
 from dynx.ik.checking import checked_avoidance
-from dynx.ik.tasks import Kinematics
 from dynx.model.numbers import is_real
 from dynx.spatial.scalar import Floats
+
+if TYPE_CHECKING:
+    from dynx.distance.avoidance import AvoidanceSource
 
 FREE_SPEED = 1.0
 """Speed of approach [m/s] that the damper of a pair allows where it begins to count."""
@@ -47,14 +50,12 @@ class Dampers:
         return tuple(name for name, x in zip(self.names, room.tolist(), strict=True) if x <= tolerance)
 
 
-def dampers(
-    kinematics: Kinematics, q: Floats, avoid: AvoidanceSource | None, gain: float, dt: float
-) -> Dampers:
+def dampers(backend: Backend, q: Floats, avoid: AvoidanceSource | None, gain: float, dt: float) -> Dampers:
     """Return the dampers at q (nq,); `gain` [1/s] is at most 1 / dt, so that a step does not pass the margin.
 
     Raises ArgumentError for `avoid` or `gain`.
     """
-    model = kinematics.model
+    model = backend.model
     avoidance = checked_avoidance(model, avoid)
     if avoidance is None:
         return Dampers(np.zeros((0, model.nv)), np.zeros(0), ())
@@ -62,7 +63,7 @@ def dampers(
         raise ArgumentError(
             f"avoid_gain is {shown(gain)}; wanted a number above 0, at most 1 / dt = {1.0 / dt:.6g} [1/s]"
         )
-    near = avoidance.near(kinematics, q, FREE_SPEED / gain)
+    near = avoidance.near(backend, q, FREE_SPEED / gain)
     room = np.array([each.separation.lower - each.pair.margin for each in near])
     names = tuple(avoidance.names(each.pair) for each in near)
-    return Dampers(avoidance.gradients(kinematics, q, near), -gain * room, names, avoidance.note)
+    return Dampers(avoidance.gradients(backend, q, near), -gain * room, names, avoidance.note)

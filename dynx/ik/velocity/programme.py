@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dynx.backends.base import Backend
 from dynx.errors import ArgumentError, ShapeError, shown
-from dynx.ik.avoidance import AvoidanceSource
-from dynx.ik.tasks import Kinematics
 from dynx.ik.velocity.dampers import dampers
 from dynx.ik.velocity.library import solve_programme
 from dynx.ik.velocity.limits import joints_outside, velocity_bounds
@@ -21,6 +21,9 @@ from dynx.model.configuration import checked_q
 from dynx.model.numbers import checked_array, is_real, positive_seconds, real_array
 from dynx.option_names import checks_option_names
 from dynx.spatial.scalar import Floats
+
+if TYPE_CHECKING:
+    from dynx.distance.avoidance import AvoidanceSource
 
 RELAXED_WEIGHT = 1e4
 """Weight of hard tasks that cannot all be met within the bounds."""
@@ -60,7 +63,7 @@ class VelocityResult:
 
 @checks_option_names
 def velocity_ik(
-    kinematics: Kinematics,
+    backend: Backend,
     q: ArrayLike,
     tasks: VelocityTask | Sequence[VelocityTask],
     *,
@@ -98,7 +101,7 @@ def velocity_ik(
     Raises NotInstalledError without the extra; UnknownNameError for a frame; ArgumentError (ShapeError,
     DTypeError, NotFiniteError) for an invalid argument.
     """
-    model = kinematics.model
+    model = backend.model
     seconds = positive_seconds("dt", dt)
     position = checked_q(model, q, "q")
     if position.ndim != 1:
@@ -123,7 +126,7 @@ def velocity_ik(
         raise ShapeError(f"v0 has shape {before.shape}; wanted ({model.nv},)")
     lower, upper = velocity_bounds(model, position, seconds, speed, acceleration, before)
 
-    rows = [task.rows(kinematics, position) for task in wanted]
+    rows = [task.rows(backend, position) for task in wanted]
     soft = [pair for task, pair in zip(wanted, rows, strict=True) if not task.hard]
     hard = [pair for task, pair in zip(wanted, rows, strict=True) if task.hard]
     if posture is not None:
@@ -135,7 +138,7 @@ def velocity_ik(
         error = (goal - position)[7 if model.floating else 0 :]
         soft.append((posture_weight * select, posture_weight * posture_gain * error))
     A, b = _stacked(hard, model.nv)
-    near = dampers(kinematics, position, avoid, avoid_gain, seconds)
+    near = dampers(backend, position, avoid, avoid_gain, seconds)
     G, rates = near.J, near.bound
     v = solve_programme(*_quadratic(soft, damping, model.nv), lower, upper, A, b, G, rates)
     success = v is not None

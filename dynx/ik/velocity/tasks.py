@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.backends.base import Backend
 from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.ik.residual import Residual
-from dynx.ik.targets import checked_targets
-from dynx.ik.tasks import Kinematics, frame_jacobian
+from dynx.ik.tasks import frame_jacobian
 from dynx.model.numbers import checked_array, checked_vector, is_real, real_array
+from dynx.model.targets import checked_targets
 from dynx.option_names import checks_field_names
 from dynx.spatial.scalar import Floats
 
@@ -39,13 +40,13 @@ class VelocityTask:
     point: ArrayLike | None = None
     """Point (3,) [m] of the frame, in its axes, that has the velocity instead of the origin."""
 
-    def rows(self, kinematics: Kinematics, q: Floats) -> tuple[Floats, Floats]:
+    def rows(self, backend: Backend, q: Floats) -> tuple[Floats, Floats]:
         """Return the weighted Jacobian (m, nv) and the weighted velocity (m,) at q.
 
         A component of weight 0 has no row; the weights of a hard task only select components. Raises
         UnknownNameError, ArgumentError, ShapeError, DTypeError or NotFiniteError.
         """
-        kinematics.model.frame_index(self.frame)
+        backend.model.frame_index(self.frame)
         point = None if self.point is None else checked_vector("point", self.point)
         velocity = (
             np.zeros(6) if self.velocity is None else checked_array("velocity", self.velocity, 6).copy()
@@ -65,11 +66,11 @@ class VelocityTask:
             if targets.batch:
                 raise ShapeError(f"target has shape {np.shape(self.target)}; wanted (4, 4) or (3,)")
             residual = Residual(targets.positions, targets.rotations, point)
-            error, _, _ = residual(kinematics.forward_kinematics(q, self.frame))
+            error, _, _ = residual(backend.forward_kinematics(q, self.frame))
             velocity[residual.rows] += self.gain * np.array(error)
             if targets.rotations is None and self.velocity is None:
                 weights[3:] = 0.0
         chosen = weights > 0.0
-        J = frame_jacobian(kinematics, q, self.frame, point)[chosen]
+        J = frame_jacobian(backend, q, self.frame, point)[chosen]
         scale = np.ones(int(chosen.sum())) if self.hard else weights[chosen]
         return scale[:, None] * J, scale * velocity[chosen]

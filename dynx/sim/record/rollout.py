@@ -6,7 +6,7 @@ import os
 from typing import Any
 
 from dynx.model import Model
-from dynx.registry import view
+from dynx.registry import door
 from dynx.sim.record.csv_file import columns
 from dynx.sim.record.formats import load, save
 from dynx.sim.record.plot import plot
@@ -20,12 +20,13 @@ class Rollout(RolloutData):
     plot = plot
     columns = columns
 
+    @door("dynx.viewer.viewer:view")
     def view(self, **options: Any) -> Any:
         """Play the rollout in the browser; return the `dynx.viewer.Viewer`, which takes the options.
 
         Raises NotInstalledError without the extra ``viewer``.
         """
-        return view(self, **options)
+        raise NotImplementedError
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], model: Model | None = None) -> Rollout:

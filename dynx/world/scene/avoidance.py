@@ -8,9 +8,8 @@ from itertools import combinations
 
 import numpy as np
 
+from dynx.distance.avoidance import Avoidance, Part, same_kinematics
 from dynx.errors import ArgumentError, DescriptionError, shown
-from dynx.ik.avoidance import Avoidance, Part
-from dynx.ik.avoidance.avoidance import same_kinematics
 from dynx.model import Link, Model
 from dynx.model.geometry import Collision
 from dynx.spatial.scalar import Floats

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
+from dynx.distance.avoidance import Avoidance
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
-from dynx.ik.avoidance import Avoidance
 from dynx.model import Model
 from dynx.model.elements import Vector
 from dynx.model.numbers import checked_gravity

@@ -1,1 +1,1 @@
-"""Tests of `dynx.ik.avoidance` and of what uses it."""
+"""Tests of `dynx.distance.avoidance` and of what uses it."""

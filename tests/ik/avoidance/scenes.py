@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 import dynx
-from dynx.ik.avoidance import Avoidance
+from dynx.distance.avoidance import Avoidance
 from dynx.model import Model, Pose
 from dynx.spatial.scalar import Floats
 from dynx.world import Scene, SceneBody, SceneRobot, World, box

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import dynx
+from dynx.distance.avoidance import Avoidance
 from dynx.errors import ArgumentError
-from dynx.ik.avoidance import Avoidance
 from dynx.model import Pose
 from dynx.spatial.scalar import Floats
 from dynx.world import Scene, SceneBody, SceneRobot, Weld, World, box

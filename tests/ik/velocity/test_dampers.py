@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dynx.distance.avoidance import Avoidance
 from dynx.errors import ArgumentError
-from dynx.ik.avoidance import Avoidance
 from dynx.ik.velocity import VelocityResult, VelocityTask
 from dynx.model import Pose
 from dynx.spatial.scalar import Floats

@@ -1,0 +1,235 @@
+"""Recognition of chains that have a closed form, from the lines of their axes.
+
+Families are looked for along the chain and along its inverse (from the frame to the world): a spherical
+wrist, three parallel axes, and those of `sliding_recognition`. Axes count as parallel, or as meeting, within
+a tolerance; the recognised geometry is that of the idealised chain, in which they do exactly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynx.errors import NoClosedFormError
+from dynx.ik.closed_forms.chain import MAX_JOINTS, Chain
+from dynx.ik.closed_forms.lines import Lines, along, angle_between, common_point, normal_feet
+from dynx.ik.closed_forms.outer_parallel_axes import OuterParallelAxes, OuterWristCase
+from dynx.ik.closed_forms.parallel_arm import ParallelArm
+from dynx.ik.closed_forms.parallel_axes import ParallelAxes, WristCase
+from dynx.ik.closed_forms.sliding_arm import SlidingArm
+from dynx.ik.closed_forms.sliding_recognition import Kinds, parallel_arm, sliding_arm, three_slides
+from dynx.ik.closed_forms.spherical_wrist import ArmCase, SphericalWrist, unit_normal
+from dynx.ik.closed_forms.subproblems import component_terms
+from dynx.ik.closed_forms.three_slides import ThreeSlides
+from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import cross
+
+TOLERANCES = (1e-9, 1e-6, 5e-4)
+"""Relative lengths, and angles [rad], within which axes count as meeting or parallel. A chain is recognised
+at the first tolerance at which it has a family: rounding, files with about six digits, files with three."""
+
+NEGLIGIBLE = 1e-6
+"""Relative length, or angle [rad], below which an offset within a recognised family is idealised."""
+
+Geometry = SphericalWrist | ParallelAxes | OuterParallelAxes | ThreeSlides | ParallelArm | SlidingArm
+
+
+@dataclass(frozen=True, eq=False)
+class Recognised:
+    """Geometry of a chain with a closed form."""
+
+    geometry: Geometry
+    inverted: bool
+    """True if the geometry is that of the inverse chain, whose joint 1 is joint 6 of the chain."""
+    tolerance: float
+    """Deviation of the chain from the geometry, relative to its length or [rad], at most."""
+    deviation: float
+    """Largest deviation of its lines from those of the geometry."""
+    description: str
+
+
+def recognise(chain: Chain, preferred: Floats) -> Recognised:
+    """Return the geometry of a chain of at most six joints; `preferred` (n,) stand for arbitrary angles.
+
+    Raises NoClosedFormError, which says how far the chain is from each family.
+    """
+    lines = Lines(chain.axes, chain.points)
+    for tolerance in TOLERANCES:
+        for inverted in (False, True):
+            here, angles, kinds = lines, preferred, chain.revolute
+            if inverted:
+                here, angles, kinds = lines.reversed(), preferred[::-1], kinds[::-1]
+            find = _revolute_family if kinds == (True,) * MAX_JOINTS else _sliding_family
+            found = find(here, kinds, angles, tolerance, inverted)
+            if found is not None:
+                geometry, text = found
+                return Recognised(geometry, inverted, tolerance, _deviation(here, geometry), text)
+    raise NoClosedFormError(_why_none(chain))
+
+
+def _revolute_family(
+    lines: Lines, kinds: Kinds, preferred: Floats, tolerance: float, inverted: bool
+) -> tuple[Geometry, str] | None:
+    """Return the geometry of six revolute joints, and the property of their axes, or None."""
+    wrist = _spherical_wrist(lines, preferred, tolerance)
+    if wrist is not None:
+        return wrist, f"axes of the {'first' if inverted else 'last'} three joints meet in a point"
+    parallel = _parallel_axes(lines, preferred, tolerance)
+    if parallel is not None:
+        return parallel, f"axes {'3, 4 and 5' if inverted else '2, 3 and 4'} are parallel"
+    outer = _outer_parallel_axes(lines, preferred, tolerance)
+    if outer is not None:
+        return outer, f"axes {'4, 5 and 6' if inverted else '1, 2 and 3'} are parallel"
+    return None
+
+
+def _sliding_family(
+    lines: Lines, kinds: Kinds, preferred: Floats, tolerance: float, inverted: bool
+) -> tuple[Geometry, str] | None:
+    """Return the geometry of joints of which some are prismatic, and what it is, or None."""
+    near = max(tolerance, NEGLIGIBLE)
+    slides = three_slides(lines, kinds, preferred, near)
+    if slides is not None:
+        return slides, "three prismatic joints, and revolute ones that determine the rotation alone"
+    plane = parallel_arm(lines, kinds, preferred, near, tolerance)
+    if plane is not None:
+        return plane, "all axes are parallel" if all(
+            kinds
+        ) else "all axes are parallel, one of a prismatic joint"
+    arm = sliding_arm(lines, kinds, preferred, near, tolerance)
+    if arm is not None:
+        end = "first" if inverted else "last"
+        return arm, f"axes of the {end} three joints meet in a point, and others are prismatic"
+    return None
+
+
+def _deviation(lines: Lines, geometry: Geometry) -> float:
+    """Return the largest distance, at its point, or angle of a line from that of the geometry."""
+    angles = [angle_between(a, b) for a, b in zip(lines.axes, geometry.axes, strict=True)]
+    return float(
+        max(*angles, np.linalg.norm(cross(lines.axes, geometry.points - lines.points), axis=-1).max())
+    )
+
+
+def _spherical_wrist(lines: Lines, preferred: Floats, tolerance: float) -> SphericalWrist | None:
+    h = lines.axes
+    centre, distance = common_point(Lines(h[3:], lines.points[3:]))
+    near = max(tolerance, NEGLIGIBLE)
+    if distance > tolerance or angle_between(h[3], h[4]) < near or angle_between(h[4], h[5]) < near:
+        return None
+    h = h.copy()
+    h1_h2, h2_h3 = angle_between(h[0], h[1]), angle_between(h[1], h[2])
+    case: ArmCase = "general"
+    if h2_h3 < near:
+        case, h[2] = "parallel_2_3", along(h[1], h[2])
+    if h1_h2 < near:
+        if case == "parallel_2_3":
+            return None
+        case, h[0] = "parallel_1_2", along(h[1], h[0])
+    p1, p2 = normal_feet(h[0], lines.points[0], h[1], lines.points[1])
+    p3 = normal_feet(h[1], p2, h[2], lines.points[2])[1]
+    if case == "parallel_1_2":
+        distance = float(np.linalg.norm(p2 - p1))
+        if distance < near:
+            return None
+        v = (p2 - p1) / distance
+        u, cos, sin = cross(v, h[1]), float(np.sign(h[0] @ h[1])), 0.0
+    else:
+        n = cross(h[0], h[1])
+        v = n / np.linalg.norm(n)
+        distance = float((p2 - p1) @ v)
+        cos, sin = float(h[0] @ h[1]), float(np.linalg.norm(n))
+        u = (h[0] - cos * h[1]) / sin
+        if case == "general" and abs(distance) < near:
+            case, distance = "intersecting_1_2", 0.0
+            p1 = p2 = 0.5 * (p1 + p2)
+    found = SphericalWrist(case, h, p1, p2, p3, centre, u, v, cos, sin, distance, preferred)
+    return found if found.reaches(near) else None
+
+
+def _parallel_axes(lines: Lines, preferred: Floats, tolerance: float) -> ParallelAxes | None:
+    h, points = lines.axes.copy(), lines.points.copy()
+    near = max(tolerance, NEGLIGIBLE)
+    if max(angle_between(h[1], h[2]), angle_between(h[1], h[3])) > tolerance:
+        return None
+    if min(angle_between(h[0], h[1]), angle_between(h[3], h[4])) < near:
+        return None
+    h[2], h[3] = along(h[1], h[2]), along(h[1], h[3])
+    case: WristCase = "general"
+    if angle_between(h[4], h[5]) < near:
+        case, h[5] = "parallel_5_6", along(h[4], h[5])
+    points[4], points[5] = normal_feet(h[4], points[4], h[5], points[5])
+    if case == "parallel_5_6":
+        if np.linalg.norm(points[5] - points[4]) < near:
+            return None
+    else:
+        # Terms in the cosine and sine of q_5 of both equations; a point elsewhere on axis 6 mixes them.
+        by_axis, by_point = (
+            np.array([h[1] @ across - (h[1] @ h[4]) * (h[4] @ across), h[1] @ cross(h[4], across)])
+            for across in (h[5], points[5] - points[4])
+        )
+        shift = float(by_axis @ by_point / (by_axis @ by_axis))
+        if np.linalg.norm(by_point - shift * by_axis) < near:
+            case = "intersecting_5_6"
+            points[5] = points[5] - shift * h[5]
+            if np.linalg.norm(points[5] - points[4]) < near:
+                points[4] = points[5] = 0.5 * (points[4] + points[5])
+    found = ParallelAxes(case, h, points, preferred, unit_normal(h[1]))
+    return found if found.reaches(near) else None
+
+
+def _outer_parallel_axes(lines: Lines, preferred: Floats, tolerance: float) -> OuterParallelAxes | None:
+    h, points = lines.axes.copy(), lines.points.copy()
+    near = max(tolerance, NEGLIGIBLE)
+    if max(angle_between(h[0], h[1]), angle_between(h[0], h[2])) > tolerance:
+        return None
+    if angle_between(h[0], h[3]) < near:
+        return None
+    h[1], h[2] = along(h[0], h[1]), along(h[0], h[2])
+    case: OuterWristCase = "general"
+    points[4], points[5] = normal_feet(h[4], points[4], h[5], points[5])
+    if angle_between(h[3], h[4]) < near:
+        case, h[4] = "parallel_4_5", along(h[3], h[4])
+        link = points[4] - points[3]
+        if angle_between(h[4], h[5]) < near or np.linalg.norm(cross(h[3], link)) < near:
+            return None
+    else:
+        # Terms in the cosine and sine of q_4 of both equations; a point elsewhere on axis 5 mixes them.
+        by_axis, by_point = (
+            np.array(component_terms(h[0], h[3], across)[1:]) for across in (h[4], points[4] - points[3])
+        )
+        shift = float(by_axis @ by_point / (by_axis @ by_axis))
+        if np.linalg.norm(by_point - shift * by_axis) < near:
+            case = "intersecting_4_5"
+            points[4] = points[4] - shift * h[4]
+            points[3] = points[3] + h[3] * float(h[3] @ (points[4] - points[3]))
+            if np.linalg.norm(points[4] - points[3]) < near:
+                points[3] = points[4] = 0.5 * (points[3] + points[4])
+            if np.linalg.norm(cross(h[5], points[5] - points[4])) < near:
+                return None
+    found = OuterParallelAxes(case, h, points, preferred, unit_normal(h[0]))
+    return found if found.reaches(near) else None
+
+
+def _why_none(chain: Chain) -> str:
+    """Return how far a chain is from each family."""
+    if not all(chain.revolute) or len(chain.revolute) != MAX_JOINTS:
+        kinds = ", ".join("revolute" if turns else "prismatic" for turns in chain.revolute)
+        return (
+            f"no closed form: the joints are {kinds}; with prismatic joints it needs three of them and at "
+            "most three revolute joints, or one or two and a spherical wrist, or three parallel revolute "
+            "joints and one along them"
+        )
+    lines = Lines(chain.axes, chain.points)
+    parts = []
+    for end, three in (("first", slice(0, 3)), ("last", slice(3, 6))):
+        _, distance = common_point(Lines(lines.axes[three], lines.points[three]))
+        parts.append(
+            f"the axes of the {end} three joints miss a common point by {distance * chain.length:.2g} m"
+        )
+    for numbers, first in (("1, 2 and 3", 0), ("2, 3 and 4", 1), ("3, 4 and 5", 2), ("4, 5 and 6", 3)):
+        h = lines.axes[first : first + 3]
+        angle = max(angle_between(h[0], h[1]), angle_between(h[1], h[2]))
+        parts.append(f"axes {numbers} are off parallel by {np.rad2deg(angle):.2g} deg")
+    return f"no closed form: {'; '.join(parts)}, or its other joints move it in fewer than six directions"
