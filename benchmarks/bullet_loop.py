@@ -21,7 +21,7 @@ from dynx.spatial.scalar import Floats
 Rows = list[list[float]]
 
 
-class BulletWorld:
+class BulletStepper:
     """UR5 in a Bullet world of its own, with nothing on its joints but what is commanded.
 
     Raises NotInstalledError without PyBullet.

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.bullet_loop import BulletWorld, Rows
+from benchmarks.bullet_loop import BulletStepper, Rows
 from benchmarks.simulator import Check, Simulator
 from benchmarks.tutorial_motion import AGREEMENT, DT, GRAVITY, KD, KP, TRACKING, Task
 from dynx.backends.registry import backend_class
@@ -94,7 +94,7 @@ class TutorialLoop(ClosedLoop):
         super().__init__(name, task)
         # With 1 there is one step of 1 ms as well as with 0, and it was never slower.
         self.same_scheme = substeps == 1
-        self._world = BulletWorld(task, substeps)
+        self._world = BulletStepper(task, substeps)
         self._run: Callable[[], Floats | Rows] = self._world.run_with_numpy if numpy else self._world.run
 
     def call(self) -> Floats | Rows:

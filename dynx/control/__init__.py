@@ -1,9 +1,17 @@
 """Controllers, one per file: frozen dataclasses that compute torques from measurement, setpoint, state."""
 
+from typing import TYPE_CHECKING, Any
+
 from dynx.control.base import Controller, Measurement, ModelBased, model_dynamics
+from dynx.control.bullet import (
+    BulletMotor,
+    BulletPDMotor,
+    BulletPositionMotor,
+    BulletTorqueMotor,
+    BulletVelocityMotor,
+)
 from dynx.control.computed_torque import ComputedTorque
 from dynx.control.discrete_computed_torque import DiscreteComputedTorque
-from dynx.control.engine_motors import EngineMotor, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
 from dynx.control.feed_forward import FeedForward
 from dynx.control.friction import JointFriction
 from dynx.control.friction_compensation import FrictionCompensation
@@ -24,11 +32,15 @@ from dynx.control.velocity import Velocity
 __all__ = [
     "PD",
     "PID",
+    "BulletMotor",
+    "BulletPDMotor",
+    "BulletPositionMotor",
+    "BulletTorqueMotor",
+    "BulletVelocityMotor",
     "ComputedTorque",
     "Controller",
     "DiscreteComputedTorque",
     "Encoders",
-    "EngineMotor",
     "FeedForward",
     "FrictionCompensation",
     "GravityCompensatedPD",
@@ -39,15 +51,27 @@ __all__ = [
     "MotorLag",
     "OpenLoop",
     "OperationalSpace",
-    "PDMotor",
-    "PositionMotor",
     "Saturated",
-    "TorqueMotor",
     "Velocity",
-    "VelocityMotor",
     "controller_from_document",
     "controller_to_document",
     "model_dynamics",
     "register_controller",
     "unregister_controller",
 ]
+
+_FORMER_NAMES = {
+    "EngineMotor": "BulletMotor",
+    "PDMotor": "BulletPDMotor",
+    "PositionMotor": "BulletPositionMotor",
+    "TorqueMotor": "BulletTorqueMotor",
+    "VelocityMotor": "BulletVelocityMotor",
+}
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> Any:
+        if name in _FORMER_NAMES:
+            also = "" if name == "EngineMotor" else f" (the motor of any engine is dynx.world.{name})"
+            raise AttributeError(f"dynx.control.{name} is now dynx.control.{_FORMER_NAMES[name]}{also}")
+        raise AttributeError(f"module 'dynx.control' has no attribute {name!r}")

@@ -36,6 +36,14 @@ def _own_controllers() -> dict[str, str]:
     return {kind.__name__: f"{kind.__module__}:{kind.__name__}" for kind in kinds if not isabstract(kind)}
 
 
+FORMER_NAMES = {
+    "PDMotor": "BulletPDMotor",
+    "PositionMotor": "BulletPositionMotor",
+    "TorqueMotor": "BulletTorqueMotor",
+    "VelocityMotor": "BulletVelocityMotor",
+}
+"""Names in documents of dynx's first versions."""
+
 BUILT_IN = _own_controllers()
 """Controllers of dynx itself."""
 
@@ -72,7 +80,8 @@ def to_document(controller: Controller[Any]) -> dict[str, Any]:
 def from_document(model: Model, document: Mapping[str, Any]) -> Controller[Any]:
     """Return the controller of `model` that `to_document` wrote. Raises ArgumentError for other documents."""
     arguments = {name: _read(model, value) for name, value in document.items() if name != "controller"}
-    kind = controller_class(document.get("controller", ""))
+    name = document.get("controller", "")
+    kind = controller_class(FORMER_NAMES.get(name, name) if isinstance(name, str) else name)
     known = getattr(kind, "__dataclass_fields__", {})
     if "model" in known and known["model"].init:
         arguments["model"] = model

@@ -211,7 +211,7 @@ def _velocity(request: ControllerRequest) -> Controller[Any]:
 def _position_motor(request: ControllerRequest) -> Controller[Any]:
     names = {"kp": "position_gain", "kd": "velocity_gain"}
     fractions: Any = {names[gain]: given for gain, given in request.gains.given().items()}
-    return control.PositionMotor(request.model, **fractions, force=request.limit)
+    return control.BulletPositionMotor(request.model, **fractions, force=request.limit)
 
 
 def _operational_space(request: ControllerRequest) -> Controller[Any]:
@@ -241,12 +241,12 @@ BUILT_IN: dict[str, NamedController] = {
         "PyBullet's POSITION_CONTROL, default gains", ("kp", "kd"), _position_motor
     ),
     "velocity-motor": NamedController(
-        "PyBullet's VELOCITY_CONTROL", (), lambda r: control.VelocityMotor(r.model, force=r.limit)
+        "PyBullet's VELOCITY_CONTROL", (), lambda r: control.BulletVelocityMotor(r.model, force=r.limit)
     ),
     "pd-motor": NamedController(
         "PyBullet's PD_CONTROL: pd inside the engine",
         _FEEDBACK,
-        lambda r: control.PDMotor(r.model, **r.torques(), force=r.limit),
+        lambda r: control.BulletPDMotor(r.model, **r.torques(), force=r.limit),
     ),
     "velocity": NamedController("kd (v* - v): positions drift", _FEEDBACK[1:], _velocity),
     "pd": NamedController(

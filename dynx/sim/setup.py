@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dynx.control.base import Controller
-from dynx.control.engine_motors import EngineMotor
+from dynx.control.bullet import BulletMotor
 from dynx.control.saturation import checked_limit
 from dynx.errors import ArgumentError
 from dynx.model import Model
@@ -131,7 +131,7 @@ def effort_limits_of(scenario: Scenario) -> Floats | None:
     """Return the effort limits (nv,) of a scenario; ArgumentError for limits its motors cannot have."""
     if scenario.effort_limits is False:
         return None
-    if isinstance(scenario.controller, EngineMotor):
+    if isinstance(scenario.controller, BulletMotor):
         raise ArgumentError(f"effort_limits do not reach {scenario.controller.name}: give it `force`")
     own = scenario.effort_limits is True
     return checked_limit(scenario.model, None if own else scenario.effort_limits, "effort_limits")

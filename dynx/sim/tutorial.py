@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from dynx.backends.registry import backend_class
 from dynx.control.base import Controller
-from dynx.control.engine_motors import EngineMotor
+from dynx.control.bullet import BulletMotor
 from dynx.errors import (
     ArgumentError,
     BackendError,
@@ -102,7 +102,7 @@ class Tutorial:
     def _outcome(self, mode: str, plant: str) -> Outcome:
         try:
             law = self._law(mode)
-            if isinstance(law, EngineMotor) and plant != BULLET:
+            if isinstance(law, BulletMotor) and plant != BULLET:
                 return Outcome(problem="a motor inside PyBullet")
             return Outcome(simulate(self.model, law, self.motion, plant=plant, dt=self.dt))
         except SimulationError as error:

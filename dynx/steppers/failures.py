@@ -10,15 +10,18 @@ from dynx.errors import ClosedError, DynxError, EngineError, shown
 from dynx.steppers.layout import Layout
 
 
-class ClosableWorld(Protocol):
-    """A scene inside an engine, which knows whether it was closed."""
+class Closable(Protocol):
+    """A scene inside an engine, which knows whether it was closed, or its queries."""
 
     name: ClassVar[str]
     layout: Layout
-    closed: bool
+
+    @property
+    def closed(self) -> bool:
+        """True after `close`."""
 
 
-World = TypeVar("World", bound=ClosableWorld)
+Scene = TypeVar("Scene", bound=Closable)
 Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")
 
@@ -26,16 +29,16 @@ Result = TypeVar("Result")
 def translate_failures(
     failures: tuple[type[BaseException], ...], message: Callable[[BaseException], str]
 ) -> Callable[
-    [Callable[Concatenate[World, Parameters], Result]], Callable[Concatenate[World, Parameters], Result]
+    [Callable[Concatenate[Scene, Parameters], Result]], Callable[Concatenate[Scene, Parameters], Result]
 ]:
     """Return a decorator under which a method raises EngineError in place of an engine's exceptions
     `failures`, described by `message`, and ClosedError after `close`."""
 
     def decorate(
-        method: Callable[Concatenate[World, Parameters], Result],
-    ) -> Callable[Concatenate[World, Parameters], Result]:
+        method: Callable[Concatenate[Scene, Parameters], Result],
+    ) -> Callable[Concatenate[Scene, Parameters], Result]:
         @wraps(method)
-        def call(self: World, /, *args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
+        def call(self: Scene, /, *args: Parameters.args, **kwargs: Parameters.kwargs) -> Result:
             try:
                 return method(self, *args, **kwargs)
             except DynxError:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib.metadata import entry_points
+
 from dynx.errors import (
     ArgumentError,
     BackendError,
@@ -12,25 +14,42 @@ from dynx.errors import (
 )
 from dynx.registry import ClassRegistry
 from dynx.steppers.camera import Draw
+from dynx.steppers.native_queries import native_queries_of
 from dynx.steppers.stepper import Stepper
 
-GROUP = "dynx.worlds"
+GROUP = "dynx.steppers"
 """The entry-point group: ``name = "package.module:EngineClass"``."""
 
+FORMER_GROUP = "dynx.worlds"
+
 BUILT_IN = {
-    "pybullet": "dynx.engines.pybullet.world.engine:BulletWorld",
-    "mujoco": "dynx.engines.mujoco.world.engine:MujocoWorld",
-    "drake": "dynx.engines.drake.world.engine:DrakeWorld",
+    "pybullet": "dynx.engines.pybullet.stepper:BulletStepper",
+    "mujoco": "dynx.engines.mujoco.stepper:MujocoStepper",
+    "drake": "dynx.engines.drake.stepper:DrakeStepper",
 }
 """Engines of dynx itself."""
 
 _engines = ClassRegistry(
-    "world engine", GROUP, BUILT_IN, lambda: Stepper, error=BackendError, unknown=UnknownBackendError
+    "stepper", GROUP, BUILT_IN, lambda: Stepper, error=BackendError, unknown=UnknownBackendError
 )
 world_names = _engines.names
-world_class = _engines.find
 register = _engines.register
 unregister = _engines.unregister
+
+
+def world_class(name: str) -> type[Stepper]:
+    """Import and return the class of that name.
+
+    Raises BackendError for one that a package offers in the entry-point group of dynx's first versions, whose
+    interface was another one; UnknownBackendError for a name that nobody provides.
+    """
+    if isinstance(name, str) and name not in world_names():
+        for point in entry_points(group=FORMER_GROUP, name=name):
+            raise BackendError(
+                f"{point.value} is offered in the group {FORMER_GROUP!r}, which dynx no longer reads: derive "
+                f"it from dynx.steppers.stepper.Stepper and offer it in the group {GROUP!r}"
+            )
+    return _engines.find(name)
 
 
 def installed_worlds() -> tuple[str, ...]:
@@ -58,4 +77,4 @@ def renderer_of(name: str) -> Draw:
             f"no renderer {shown(name)}; wanted None, for that of dynx, or 'pybullet', for PyBullet's in "
             f"software{nearest(name, ['pybullet'])}"
         )
-    return world_class(name).draw
+    return native_queries_of(world_class(name)).draw

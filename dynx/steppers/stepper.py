@@ -1,4 +1,4 @@
-"""The interface that an engine implements to run a world.
+"""The interface that an engine implements to move a scene.
 
 An implementation is given checked numbers only (`dynx.steppers.layout`): finite, in SI units and world axes,
 and robots in the coordinates of their models (`dynx.Model`), mimic joints and floating bases included. Names,
@@ -11,9 +11,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
-from dynx.errors import EngineLimitError, UnsupportedFeatureError
 from dynx.spatial.scalar import Floats
-from dynx.steppers.camera import Camera, Drawing, DrawnShape
+from dynx.steppers.forces import NO_FORCES, EngineCommand, Forces
 from dynx.steppers.layout import Layout
 from dynx.steppers.materials import EffectiveCoefficient
 from dynx.steppers.settings import Setting
@@ -35,22 +34,10 @@ class TouchingPoint(NamedTuple):
     """Force (3,) on a [N]; None in a query of distances."""
 
 
-Torque = tuple[int, Floats, list[float]]
-"""The number of a robot, a generalised force (nv,) on it, and a new list of its entries."""
-
-
-class RayHit(NamedTuple):
-    """First hit of a ray: the collider (None for no hit), the distance [m], the outward normal (3,)."""
-
-    collider: int | None
-    distance: float
-    normal: Floats
-
-
 class Stepper(ABC):
     """A scene inside an engine, which advances in steps of `dt` [s].
 
-    A subclass has this constructor. A package offers it by an entry point in the group ``dynx.worlds``.
+    A subclass has this constructor. A package offers it by an entry point in the group ``dynx.steppers``.
     Where a method fails it raises `EngineError`; the engine's own exceptions do not reach the caller.
     """
 
@@ -59,6 +46,13 @@ class Stepper(ABC):
 
     settings: ClassVar[Mapping[str, Setting]] = {}
     """Settings of the engine's solver and contacts that users may change, with their defaults."""
+
+    commands: ClassVar[tuple[type[EngineCommand], ...]] = ()
+    """Classes of the commands that the engine's own motors take (`Forces.commands`)."""
+
+    native_queries: ClassVar[str] = ""
+    """Class of the engine's own queries (`dynx.steppers.native_queries`), as "package.module:Class"; imported
+    when it is used."""
 
     def __init__(self, layout: Layout, dt: float, settings: Mapping[str, Any]) -> None:
         """Build the world at the start that `layout` describes; `settings` has a value for every name in
@@ -84,26 +78,8 @@ class Stepper(ABC):
     # -- motion -------------------------------------------------------------------------------
 
     @abstractmethod
-    def set_wrenches(self, wrenches: Floats) -> None:
-        """Apply a force and a moment about the centre of mass (n_bodies, 6), in world axes, to every body of
-        the scene in all later steps, until the next call."""
-
-    def command_motors(self, robot: int, command: Any) -> None:
-        """Set the engine's own motors of a robot, one per joint of the model, in all later steps; None
-        releases them."""
-        if command is not None:
-            raise UnsupportedFeatureError(
-                f"the engine {self.name!r} has no motors of its own; use those of dynx.world"
-            )
-
-    @abstractmethod
-    def step(self, n: int, torques: Sequence[Torque] = ()) -> None:
-        """Take `n` steps of `dt`, in which `torques` act on the robots named there, and none on the others.
-
-        The arrays may change after the call. The first six entries of a floating base are force and moment at
-        the base frame, in its axes. The caller takes one step at a time where they are not zero, so that they
-        may be converted to axes of the world once.
-        """
+    def step(self, n: int, forces: Forces = NO_FORCES) -> None:
+        """Take `n` steps of `dt`, in which these forces act, and no others."""
 
     # -- state --------------------------------------------------------------------------------
 
@@ -132,7 +108,7 @@ class Stepper(ABC):
 
     @abstractmethod
     def dump(self) -> bytes:
-        """Return everything that determines the later steps, torques and wrenches excepted.
+        """Return everything that determines the later steps, forces excepted.
 
         A world that continues and one that was restored take the same steps, bit for bit, also in another
         process.
@@ -153,32 +129,6 @@ class Stepper(ABC):
     def touching_pairs(self) -> Iterable[tuple[int, int]]:
         """Return the pairs of colliders that have a contact in `contacts`, in any order, also repeated."""
         return [(point.a, point.b) for point in self.contacts()]
-
-    def closest(self, a: int, b: int, within: float) -> TouchingPoint | None:
-        """Return the engine's own nearest points of two colliders, whether or not they may touch; None if
-        they are farther apart than `within` [m].
-
-        Raises EngineLimitError where the engine computes none.
-        """
-        raise EngineLimitError(f"{self.name} has no distances of its own; leave native out for those of dynx")
-
-    def cast_rays(self, origins: Floats, directions: Floats, length: float) -> Sequence[RayHit] | None:
-        """Return the first hit of every ray, from origins (n, 3) along unit directions (n, 3).
-
-        None, which is the default, for those of dynx, which intersects the shapes in closed form; an engine
-        overrides this where its own rays are as exact.
-        """
-        return None
-
-    # -- pictures -----------------------------------------------------------------------------
-
-    @classmethod
-    def draw(cls, shapes: Sequence[DrawnShape], T_world_camera: Floats, camera: Camera) -> Drawing:
-        """Draw shapes as a camera at the pose T (4, 4) sees them, by the engine's own renderer.
-
-        Raises EngineLimitError where the engine has none.
-        """
-        raise EngineLimitError(f"{cls.name} has no renderer in dynx; leave renderer out to draw without it")
 
     # -- end ----------------------------------------------------------------------------------
 

@@ -21,7 +21,6 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross
 from dynx.steppers.layout import BodyLayout, RobotLayout
 from dynx.steppers.state import BodyState
-from dynx.steppers.stepper import Torque
 from dynx.world.motors import JointLaw, Motor, combine
 
 _FLOAT64 = np.dtype(np.float64)
@@ -187,14 +186,14 @@ def _acceleration(M: Floats, tau: Floats) -> Floats:
 
 def checked_torques(
     torques: Mapping[str, ArrayLike], robots: Mapping[str, tuple[int, tuple[int]]]
-) -> list[Torque]:
+) -> list[tuple[int, Floats]]:
     """Return the torque of each robot named; `robots` has the number of each and the shape of its torque.
 
     Raises UnknownNameError, ShapeError, DTypeError or NotFiniteError, naming the robot.
     """
     if type(torques) is not dict and not isinstance(torques, Mapping):
         raise ArgumentError(f"torques is of type {type(torques).__name__}; wanted a dict by robot")
-    checked: list[Torque] = []
+    checked: list[tuple[int, Floats]] = []
     for name, tau in torques.items():
         try:
             number, shape = robots[name]
@@ -204,11 +203,10 @@ def checked_torques(
             tau = real_array(f"torque of {name}", tau)
             if tau.shape != shape:
                 raise ShapeError(f"torque of {name} has shape {tau.shape}; wanted {shape}")
-        entries: list[float] = tau.tolist()
         # Entries are below the bound where their norm is, which of few numbers Python computes fastest.
-        if not hypot(*entries) < 1e50:
+        if not hypot(*tau.tolist()) < 1e50:
             checked_entries(f"torque of {name}", tau)
-        checked.append((number, tau, entries))
+        checked.append((number, tau))
     return checked
 
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import NoReturn
 
 import numpy as np
 
 from dynx.errors import ClosedError, DivergedError, EngineError
 from dynx.model.numbers import DIVERGENCE_SPEED
+from dynx.steppers.forces import NO_FORCES, Forces
 from dynx.steppers.layout import Layout
 from dynx.steppers.state import PartStates, WorldState, has_diverged
-from dynx.steppers.stepper import Stepper, Torque
+from dynx.steppers.stepper import Stepper
 from dynx.world.commands import Act, Commands
 from dynx.world.notes.divergence import likely_causes
 from dynx.world.state_checks import apply_state
@@ -80,9 +81,9 @@ class Motion:
         assert self._state is not None
         return self._state
 
-    def advance(self, engine: Stepper, n: int, torques: Sequence[Torque], act: Act | None = None) -> None:
-        """Take `n` steps of `dt` in `engine`, the present one, in which `torques` act; or the loads that
-        `act` applies before each step of the engine.
+    def advance(self, engine: Stepper, n: int, forces: Forces = NO_FORCES, act: Act | None = None) -> None:
+        """Take `n` steps of `dt` in `engine`, the present one, in which `forces` act; or those that `act`
+        returns before each step of the engine.
 
         Raises DivergedError and the errors of the engine.
         """
@@ -91,7 +92,7 @@ class Motion:
                 part = n if n < self._most else self._most
                 count = part * self._substeps
                 if act is None:
-                    engine.step(count, torques)
+                    engine.step(count, forces)
                 else:
                     self._step_one_by_one(engine, count, act)
                 self._steps += part
@@ -108,10 +109,10 @@ class Motion:
         # Where motors diverge, the error says so, not warnings of NumPy.
         with np.errstate(over="ignore", invalid="ignore"):
             for taken in range(count):
-                torques = act(engine)
-                if torques is None:
+                forces = act(engine)
+                if forces is None:
                     self._diverge(f"a load is not finite after {taken} of {count} steps of the engine")
-                engine.step(1, torques)
+                engine.step(1, forces)
 
     def change(self, change: Callable[[Stepper], object], clock: tuple[float, int] | None = None) -> None:
         """Set the state of the engine by a function, and `clock` where it is given."""

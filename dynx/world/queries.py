@@ -12,6 +12,7 @@ from dynx.errors import ArgumentError, ShapeError, UnknownNameError, shown
 from dynx.model.numbers import MAX_MAGNITUDE, checked_array, checked_vector, is_real
 from dynx.spatial.scalar import Floats
 from dynx.steppers.layout import Layout
+from dynx.steppers.native_queries import NativeQueries, native_queries_of
 from dynx.steppers.state import WorldState
 from dynx.steppers.stepper import Stepper, TouchingPoint
 from dynx.world.contacts import ClosestPoints, Contact, RayHits
@@ -36,6 +37,7 @@ class Queries:
         self._names = tuple(collider.name for collider in layout.colliders)
         self._distances = Distances(layout)
         self._number = {name: k for k, name in enumerate(self._names)}
+        self._natives: NativeQueries | None = None
 
     def contacts(self, engine: Stepper, part: str | None = None) -> tuple[Contact, ...]:
         """Return the contacts of the last step, of a part or all, ordered by the parts of the scene."""
@@ -77,13 +79,19 @@ class Queries:
         points: list[ClosestPoints] = []
         if native:
             for i, j in product(first, second):
-                found = engine.closest(i, j, float(within)) if i != j else None
+                found = self._native(engine).closest(i, j, float(within)) if i != j else None
                 if found is not None:
                     points.append(self._nearest(i, j, found))
         else:
             distances = self._distances.closest(state, first, second, float(within))
             points += [self._nearest(i, j, found) for i, j, found in distances]
         return tuple(sorted(points, key=lambda each: each.distance))
+
+    def _native(self, engine: Stepper) -> NativeQueries:
+        """Return the engine's own queries of its present state."""
+        if self._natives is None or self._natives.stepper is not engine:
+            self._natives = native_queries_of(type(engine))(engine)
+        return self._natives
 
     def _nearest(self, i: int, j: int, found: TouchingPoint | Distance) -> ClosestPoints:
         names = self._names[i], self._names[j]
@@ -137,7 +145,7 @@ class Queries:
         if (norms == 0.0).any():
             raise ArgumentError(f"directions[{int(np.argmin(norms))}] is zero; wanted a direction")
         starts, unit = np.array(starts), along / norms
-        hits = engine.cast_rays(starts, unit, float(length))
+        hits = self._native(engine).cast_rays(starts, unit, float(length))
         if hits is None:
             hits = first_hits(self._layout, OwnerPoses(self._layout, state), starts, unit, float(length))
         distances = np.array([np.inf if hit.collider is None else hit.distance for hit in hits])

@@ -101,7 +101,7 @@ class World:
         self._scene_motors = {robot.name: robot.motors for robot in scene.robots if robot.motors}
         robots = {robot.name: k for k, robot in enumerate(self._layout.robots)}
         bodies = {body.name: k for k, body in enumerate(self._layout.bodies)}
-        self._commands = Commands(self._layout, robots, bodies, self.dt / self.substeps)
+        self._commands = Commands(self._layout, robots, bodies, self.dt / self.substeps, self._kind)
         self._queries = Queries(scene, self._layout)
         self._identity: str | None = None
         self._motion = Motion(self._layout, self._commands, self._build, self.dt, self.substeps)
@@ -148,11 +148,11 @@ class World:
         if self._scene_motors:
             motors = with_scene_motors(self._scene_motors, torques, motors)
         if not motors and not wrenches:
-            held = self._commands.hold(engine, torques, n * self.substeps)
+            held = self._commands.hold(torques, n * self.substeps)
             if held is not None:
                 self._motion.advance(engine, n, held)
                 return
-        self._motion.advance(engine, n, (), self._commands.plan(torques, motors, wrenches))
+        self._motion.advance(engine, n, act=self._commands.plan(torques, motors, wrenches))
 
     def run(
         self,

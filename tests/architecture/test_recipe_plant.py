@@ -76,7 +76,7 @@ def test_substeps_are_those_of_the_plant() -> None:
 @pytest.mark.usefixtures("package")
 def test_a_motor_of_another_engine_is_refused() -> None:
     arm = dynx.load("double_pendulum")
-    motor = dynx.control.VelocityMotor(arm)
+    motor = dynx.control.BulletVelocityMotor(arm)
     with pytest.raises(UnsupportedFeatureError, match="PyBullet"):
         dynx.simulate(arm, motor, arm.neutral(), plant=NAME, duration=0.01)
 

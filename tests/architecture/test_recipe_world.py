@@ -15,7 +15,13 @@ from numpy.testing import assert_allclose
 import dynx
 from dynx import Pose
 from dynx.cli.shell.main import cli
-from dynx.errors import ArgumentError, UnknownBackendError, UnknownNameError, UnsupportedFeatureError
+from dynx.errors import (
+    ArgumentError,
+    BackendError,
+    UnknownBackendError,
+    UnknownNameError,
+    UnsupportedFeatureError,
+)
 from dynx.world import Scene, World, Wrench, box, sphere, world_names, write_scene
 from tests.architecture.packages import installed_package
 
@@ -26,7 +32,7 @@ import numpy as np
 from dynx.errors import UnsupportedFeatureError
 from dynx.spatial.branchless import quat_exp
 from dynx.spatial.so3 import rotation_from_quat
-from dynx.steppers.stepper import RayHit, Stepper
+from dynx.steppers.stepper import Stepper
 from dynx.steppers.settings import Setting
 from dynx.steppers.state import BodyState
 
@@ -45,12 +51,12 @@ class ExactFlight(Stepper):
         self._drag = settings["drag"]
         self._T = np.array([body.T for body in layout.bodies])
         self._twist = np.array([body.twist for body in layout.bodies])
-        self._wrenches = np.zeros((len(layout.bodies), 6))
         self._mass = np.array([[body.mass] * 3 + [body.inertia[0, 0]] * 3 for body in layout.bodies])
 
-    def step(self, n, torques=()):
+    def step(self, n, forces):
+        wrenches = np.zeros_like(self._mass) if forces.wrenches is None else forces.wrenches
         for _ in range(n):
-            a = self._wrenches / self._mass + np.concatenate([self.layout.gravity, np.zeros(3)])
+            a = wrenches / self._mass + np.concatenate([self.layout.gravity, np.zeros(3)])
             h, c = self.dt, self._drag
             if c:
                 # v' = a - c v
@@ -70,9 +76,6 @@ class ExactFlight(Stepper):
 
     set_robot_state = robot_state
 
-    def set_wrenches(self, wrenches):
-        self._wrenches = wrenches.copy()
-
     def body_state(self, body):
         return BodyState(self._T[body].copy(), self._twist[body].copy())
 
@@ -89,9 +92,6 @@ class ExactFlight(Stepper):
     def contacts(self):
         return []
 
-    def closest(self, a, b, within):
-        raise UnsupportedFeatureError("'exact_flight' computes no distances")
-
     @property
     def version(self):
         return "exact_flight 1.0"
@@ -100,7 +100,7 @@ class ExactFlight(Stepper):
         pass
 '''
 NAME = "exact_flight"
-ENTRY_POINTS = f"[dynx.worlds]\n{NAME} = acme_flight:ExactFlight\n"
+ENTRY_POINTS = f"[dynx.steppers]\n{NAME} = acme_flight:ExactFlight\n"
 DT = 1e-2
 
 
@@ -180,6 +180,14 @@ def test_a_name_that_nobody_provides_is_refused() -> None:
         World(balls(), NAME)
 
 
+def test_one_of_the_former_group_is_refused_with_the_name_of_the_new_one(tmp_path: Path) -> None:
+    former = ENTRY_POINTS.replace("dynx.steppers", "dynx.worlds")
+    with installed_package(tmp_path, "acme_flight", MODULE, former):
+        assert NAME not in world_names()
+        with pytest.raises(BackendError, match=r"dynx\.steppers"):
+            World(balls(), NAME)
+
+
 def test_it_takes_one_module(package: Path) -> None:
     assert [path.name for path in package.glob("*.py")] == ["acme_flight.py"]
-    assert NAME in {found.name for found in entry_points(group="dynx.worlds")}
+    assert NAME in {found.name for found in entry_points(group="dynx.steppers")}

@@ -17,10 +17,11 @@ import numpy as np
 from dynx.model.geometry import Box, Cylinder, Plane, Sphere
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_exp, rotation_from_quat
+from dynx.steppers.forces import NO_FORCES, Forces
 from dynx.steppers.layout import Collider, Layout
 from dynx.steppers.settings import Setting
 from dynx.steppers.state import BodyState, RobotState
-from dynx.steppers.stepper import RayHit, Stepper, Torque, TouchingPoint
+from dynx.steppers.stepper import Stepper, TouchingPoint
 
 TINY = 1e-9
 """Distance [m], speed [m/s] and time [s] that count as zero."""
@@ -118,7 +119,8 @@ class ExactWorld(Stepper):
 
     # -- motion -------------------------------------------------------------------------------
 
-    def step(self, n: int, torques: Sequence[Torque] = ()) -> None:
+    def step(self, n: int, forces: Forces = NO_FORCES) -> None:
+        assert forces.wrenches is None
         for _ in range(n):
             left = self.dt
             while left > TINY:
@@ -276,19 +278,10 @@ class ExactWorld(Stepper):
         solid = self._solids[body]
         solid.R, solid.p, solid.v, solid.w = T[:3, :3], T[:3, 3], twist[:3], twist[3:]
 
-    def set_wrenches(self, wrenches: Floats) -> None:
-        assert not wrenches.any()
-
     def robot_state(self, robot: int) -> RobotState:
         raise NotImplementedError
 
     def set_robot_state(self, robot: int, q: Floats, v: Floats) -> None:
-        raise NotImplementedError
-
-    def closest(self, a: int, b: int, within: float) -> TouchingPoint | None:
-        raise NotImplementedError
-
-    def cast_rays(self, origins: Floats, directions: Floats, length: float) -> Sequence[RayHit]:
         raise NotImplementedError
 
     @property

@@ -11,15 +11,15 @@ import pytest
 
 from dynx.control import (
     PD,
+    BulletPositionMotor,
+    BulletTorqueMotor,
     ComputedTorque,
     Controller,
     DiscreteComputedTorque,
     Impedance,
     Measurement,
     OperationalSpace,
-    PositionMotor,
     Saturated,
-    TorqueMotor,
 )
 from dynx.control.base import gain, gains_of
 from dynx.control.open_loop import OpenLoop
@@ -108,8 +108,8 @@ def test_a_controller_prints_its_gains_with_units() -> None:
     said = "<ComputedTorque of ur5, backend pinocchio, kp 400 1/s^2, kd [1, 2, 3, 4, 5, 6] 1/s>"
     assert repr(law) == said
     assert repr(Saturated(law, limit=4.0)) == f"<Saturated of ur5, inner {said}, limit 4 N m or N>"
-    assert repr(TorqueMotor(law)) == f"<TorqueMotor of ur5, inner {said}>"
-    assert "position_gain 0.1" in repr(PositionMotor(ARM))
+    assert repr(BulletTorqueMotor(law)) == f"<BulletTorqueMotor of ur5, inner {said}>"
+    assert "position_gain 0.1" in repr(BulletPositionMotor(ARM))
     assert "control_dt 0.002 s" in repr(DiscreteComputedTorque(ARM, control_dt=0.002))
     assert repr(Plain(2.0)) == "<Plain of ur5>"
 

@@ -14,6 +14,10 @@ import dynx
 from dynx.control import (
     PD,
     PID,
+    BulletPDMotor,
+    BulletPositionMotor,
+    BulletTorqueMotor,
+    BulletVelocityMotor,
     ComputedTorque,
     Controller,
     Encoders,
@@ -21,11 +25,7 @@ from dynx.control import (
     Measurement,
     MotorLag,
     OpenLoop,
-    PDMotor,
-    PositionMotor,
     Saturated,
-    TorqueMotor,
-    VelocityMotor,
     controller_from_document,
     controller_to_document,
     register_controller,
@@ -45,10 +45,10 @@ from tests.control.test_controllers import LAWS
 ARM = load("ur5")
 FLOATING = ARM.with_base("floating")
 OTHERS: dict[str, Controller[Any]] = {
-    "position motor": PositionMotor(ARM, force=5.0),
-    "velocity motor": VelocityMotor(ARM),
-    "pd motor": PDMotor(ARM, kp=3.0, kd=1.0),
-    "torque motor": TorqueMotor(ComputedTorque(ARM, kp=4.0, kd=1.0, backend="reference")),
+    "position motor": BulletPositionMotor(ARM, force=5.0),
+    "velocity motor": BulletVelocityMotor(ARM),
+    "pd motor": BulletPDMotor(ARM, kp=3.0, kd=1.0),
+    "torque motor": BulletTorqueMotor(ComputedTorque(ARM, kp=4.0, kd=1.0, backend="reference")),
     "of the description": FrictionCompensation(PD(ARM, kp=1.0, kd=1.0), speed="setpoint"),
     "motor lag": MotorLag(
         PID(ARM, kp=1.0, ki=1.0, kd=1.0, control_dt=1e-3),

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from dynx.control import (
+    BulletPositionMotor,
     ComputedTorque,
     DiscreteComputedTorque,
     GravityCompensatedPD,
     Measurement,
-    PositionMotor,
 )
 from dynx.control.base import Controller
 from dynx.errors import (
@@ -122,9 +122,9 @@ def test_what_is_missing_or_of_another_robot() -> None:
 
 def test_a_motor_of_the_engine_needs_the_engine() -> None:
     with pytest.raises(UnsupportedFeatureError, match="plant='pybullet'"):
-        simulate(ARM, PositionMotor(ARM), REST, duration=0.01)
+        simulate(ARM, BulletPositionMotor(ARM), REST, duration=0.01)
     with pytest.raises(ArgumentError, match="force"):
-        simulate(ARM, PositionMotor(ARM), REST, duration=0.01, effort_limits=True)
+        simulate(ARM, BulletPositionMotor(ARM), REST, duration=0.01, effort_limits=True)
 
 
 def test_a_floating_base_has_no_motor() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dynx.backends import backend
-from dynx.control import PD, PID, ComputedTorque, Impedance, OperationalSpace, PositionMotor, Velocity
+from dynx.control import PD, PID, BulletPositionMotor, ComputedTorque, Impedance, OperationalSpace, Velocity
 from dynx.errors import GainError, LimitError, UnknownNameError
 from dynx.model import Model
 from dynx.model.loading import load
@@ -67,12 +67,12 @@ def test_what_is_given_is_taken() -> None:
     assert (task.kp.shape, task.posture_kp[0]) == ((6,), 7.0)
     spring: Impedance = law("impedance", frame="tool0", kp=500.0, kd=[50.0] * 3 + [5.0] * 3, posture_kd=1.0)
     assert (spring.stiffness[0], spring.damping[5], spring.joint_damping[0]) == (500.0, 5.0, 1.0)
-    motor: PositionMotor = law("position-motor", kp=0.2)
+    motor: BulletPositionMotor = law("position-motor", kp=0.2)
     command = motor.command(*[_still(motor)] * 2)
     assert command.position_gains == [0.2] * 6
 
 
-def _still(motor: PositionMotor) -> Any:
+def _still(motor: BulletPositionMotor) -> Any:
     return Setpoint(START, np.zeros(6), np.zeros(6))
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import dynx
 from dynx.backends import installed_backends
-from dynx.control import PD, PID, ComputedTorque, OpenLoop, PositionMotor
+from dynx.control import PD, PID, BulletPositionMotor, ComputedTorque, OpenLoop
 from dynx.control.base import Controller, Measurement
 from dynx.errors import ArgumentError, ClosedError, ControlError, DivergedError
 from dynx.model.loading import load
@@ -60,7 +60,7 @@ if "pybullet" in installed_backends():
         "pybullet": replace(SCENARIOS["sensors"], plant="pybullet"),
         "pybullet floating": replace(SCENARIOS["floating"], plant="pybullet"),
         "motor": Scenario(
-            ARM, PositionMotor(ARM), tutorial_motion(), plant="pybullet", control_dt=3e-3, duration=0.04
+            ARM, BulletPositionMotor(ARM), tutorial_motion(), plant="pybullet", control_dt=3e-3, duration=0.04
         ),
     }
 STEPS = 40

@@ -14,7 +14,7 @@ import pytest
 import dynx
 from dynx import Pose
 from dynx.errors import DivergedError, EngineError, SingularMassMatrixError
-from dynx.steppers.stepper import Torque
+from dynx.steppers.forces import Forces
 from dynx.world import PDMotor, PositionMotor, Scene, SceneRobot, Weld, World, Wrench, box, ground
 from tests.world.engines import FAST_WORLDS, WORLDS
 
@@ -65,12 +65,12 @@ def test_a_cause_that_is_not_known_is_not_made_up() -> None:
     assert "overlap" not in message
 
 
-def interrupting(world: World, after: int) -> Callable[[int, Sequence[Torque]], None]:
+def interrupting(world: World, after: int) -> Callable[[int, Forces], None]:
     """Return the engine's step, interrupted after some steps of a call."""
     step = world._motion.engine.step
 
-    def interrupted(n: int, torques: Sequence[Torque]) -> None:
-        step(min(n, after), torques)
+    def interrupted(n: int, forces: Forces) -> None:
+        step(min(n, after), forces)
         raise KeyboardInterrupt
 
     return interrupted

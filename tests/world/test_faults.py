@@ -13,7 +13,7 @@ import pytest
 
 import dynx
 from dynx import Pose
-from dynx.control.engine_motors import MotorCommand
+from dynx.control.bullet import BulletMotorCommand
 from dynx.errors import (
     ArgumentError,
     ClosedError,
@@ -105,12 +105,12 @@ CALLS: dict[str, tuple[Callable[[World], object], type[DynxError], str]] = {
         "two motors",
     ),
     "engine motor of no mode": (
-        lambda w: w.step(motors={"arm": MotorCommand("WISH")}),
+        lambda w: w.step(motors={"arm": BulletMotorCommand("WISH")}),
         DynxError,
         "mo(de|tors)",
     ),
     "engine motor with NaN": (
-        lambda w: w.step(motors={"arm": MotorCommand("VELOCITY_CONTROL", velocities=[NAN, 0.0])}),
+        lambda w: w.step(motors={"arm": BulletMotorCommand("VELOCITY_CONTROL", velocities=[NAN, 0.0])}),
         ArgumentError,
         "velocities",
     ),

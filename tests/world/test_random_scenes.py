@@ -7,17 +7,18 @@ settings that cause violations.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 
 import dynx
-from dynx.engines.mujoco.world.engine import MujocoWorld
+from dynx.engines.mujoco.stepper import MujocoStepper
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import rotation_from_rpy
-from dynx.steppers.stepper import Torque, TouchingPoint
+from dynx.steppers.forces import NO_FORCES, Forces
+from dynx.steppers.stepper import TouchingPoint
 from dynx.testing.strategies import scenes
 from dynx.world import Material, Scene, SceneRobot, World, box, capsule, ground
 from tests.world.engines import WORLDS
@@ -144,7 +145,7 @@ def _at(height: float, x: float = 0.0) -> Floats:
     return T
 
 
-def _faster(world: MujocoWorld) -> None:
+def _faster(world: MujocoStepper) -> None:
     for number, body in enumerate(world.layout.bodies):
         if not body.fixed:
             state = world.body_state(number)
@@ -189,20 +190,20 @@ def test_wrong_contacts_violate_a_law(
 ) -> None:
     examination = rest_excess if law.startswith("resting") else examine
     assert examination(thrown(), "mujoco")[law] <= 1.0
-    right = MujocoWorld.contacts
-    monkeypatch.setattr(MujocoWorld, "contacts", lambda self: [fault(each) for each in right(self)])
+    right = MujocoStepper.contacts
+    monkeypatch.setattr(MujocoStepper, "contacts", lambda self: [fault(each) for each in right(self)])
     assert examination(thrown(), "mujoco")[law] > 1.0
 
 
 def test_an_engine_that_adds_energy_violates_a_law(monkeypatch: pytest.MonkeyPatch) -> None:
     assert examine(thrown(), "mujoco")["energy"] <= 1.0
-    right = MujocoWorld.step
+    right = MujocoStepper.step
 
-    def step(self: MujocoWorld, n: int, torques: Sequence[Torque] = ()) -> None:
-        right(self, n, torques)
+    def step(self: MujocoStepper, n: int, forces: Forces = NO_FORCES) -> None:
+        right(self, n, forces)
         _faster(self)
 
-    monkeypatch.setattr(MujocoWorld, "step", step)
+    monkeypatch.setattr(MujocoStepper, "step", step)
     assert examine(thrown(), "mujoco")["energy"] > 1.0
 
 

@@ -12,7 +12,7 @@ from dynx.backends.registry import backend_class
 from dynx.cli.shell.inputs import configuration, load_robot, velocity
 from dynx.cli.shell.kinds import Coefficients, command_flag, is_command_option
 from dynx.cli.sim.motion import Motion, MotionInput, plan_motion
-from dynx.control import EngineMotor, FrictionCompensation, ModelBased
+from dynx.control import BulletMotor, FrictionCompensation, ModelBased
 from dynx.control.base import Controller
 from dynx.control.saturation import checked_limit
 from dynx.errors import ArgumentError, UnsupportedFeatureError
@@ -60,7 +60,7 @@ def prepare(given: dict[str, Any]) -> SimulationRequest:
     clock = Clock.of(chosen.dt, motion.duration, chosen.control_dt, chosen.delay)
     require_memory(f"{clock.n_steps} steps", clock.n_steps * (STEP_BYTES + step_bytes(model)))
     controller = _controller(model, given, motion, clock, chosen)
-    if isinstance(controller, EngineMotor):
+    if isinstance(controller, BulletMotor):
         # Motors of the engine have their own limits (`_controller`).
         settings.pop("effort_limits", None)
     settings["duration"] = motion.duration
@@ -105,7 +105,7 @@ def _controller(
     )
     if not given["friction_compensation"]:
         return controller
-    if isinstance(controller, EngineMotor):
+    if isinstance(controller, BulletMotor):
         raise UnsupportedFeatureError(
             f"{given['controller']} is a motor inside PyBullet; no torque can be added"
         )
@@ -133,7 +133,7 @@ def _limits_of_motors(
     model: Model, limits: Coefficients | None, controller: Controller[Any] | None
 ) -> list[float] | None:
     """Return the effort limits of PyBullet's motors; None for other controllers and engine defaults."""
-    if limits is None or not isinstance(controller, EngineMotor):
+    if limits is None or not isinstance(controller, BulletMotor):
         return None
     base = 6 if model.floating else 0
     motor_limits: list[float] = checked_limit(model, _motor_limit(model, limits))[base:].tolist()

@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.backends import backend
+from dynx.control.bullet import BulletMotor
 from dynx.control.dynamics import EngineDynamics
-from dynx.control.engine_motors import EngineMotor, MotorCommand
 from dynx.engines.pybullet.backend import PyBulletBackend
 from dynx.engines.pybullet.canonical_urdf import bullet_tree
 from dynx.engines.pybullet.inertia import ballast_for
 from dynx.engines.pybullet.library import bullet
+from dynx.engines.pybullet.motors import BulletMotorCommand
 from dynx.engines.pybullet.root_frame import BaseState, RootFrame
 from dynx.engines.pybullet.stepping import SteppingClient
 from dynx.errors import EngineLimitError, UnsupportedFeatureError
@@ -41,7 +42,7 @@ class BulletPlant(Plant):
     it: a torque of friction from dynx's own matrices, all else from Bullet's.
     """
 
-    motor_commands: ClassVar[tuple[type, ...]] = (MotorCommand,)
+    motor_commands: ClassVar[tuple[type, ...]] = (BulletMotorCommand,)
 
     def __init__(self, model: Model, disturbances: Disturbances, dt: float, *, substeps: int = 1) -> None:
         """Raises EngineLimitError for a robot with an inertia that Bullet's stepper does not accept."""
@@ -99,13 +100,13 @@ class BulletPlant(Plant):
             self._substep(t + k * self._h, tau)
         return StepResult(self._q, self._v, first, tau)
 
-    def step_motors(self, t: float, command: MotorCommand) -> StepResult:
+    def step_motors(self, t: float, command: BulletMotorCommand) -> StepResult:
         """Take one step with Bullet's motors.
 
         The torque (nv,) of the motors in the first sub-step is computed by inverse dynamics minus the
         disturbances, because Bullet's own report does not include PD_CONTROL.
         """
-        command = self._in_units(command)
+        command = command.in_units(self._unit)
         q, v = self._q, self._v
         first, disturbance = self._motor_substep(t, command)
         tau = self._engine.inverse_dynamics(q, v, first) - disturbance
@@ -115,11 +116,11 @@ class BulletPlant(Plant):
 
     def refuse(self, controller: object) -> None:
         """Raise UnsupportedFeatureError for an engine motor with armature or dry friction that sticks."""
-        if isinstance(controller, EngineMotor) and self.disturbances.has_armature:
+        if isinstance(controller, BulletMotor) and self.disturbances.has_armature:
             raise UnsupportedFeatureError(
                 f"{controller.name} is a motor inside PyBullet, without armature; use a torque controller"
             )
-        if isinstance(controller, EngineMotor) and self._sticks and self.disturbances.friction.dry.any():
+        if isinstance(controller, BulletMotor) and self._sticks and self.disturbances.friction.dry.any():
             raise UnsupportedFeatureError(
                 f"{controller.name} is a motor inside PyBullet, whose torque is unknown before the step, so "
                 "that joints cannot stick: give friction_slip above 0, or use a torque controller"
@@ -152,7 +153,7 @@ class BulletPlant(Plant):
         self._client.apply((torques / self._unit if self._unit != 1.0 else torques).tolist())
         return self._advance(tau, moves)
 
-    def _motor_substep(self, t: float, command: MotorCommand) -> tuple[Floats, Floats]:
+    def _motor_substep(self, t: float, command: BulletMotorCommand) -> tuple[Floats, Floats]:
         """Return the acceleration, and the torque of the disturbances (nv,)."""
         self._client.command(command)
         disturbance: Floats = np.zeros(self.model.nv)
@@ -236,16 +237,3 @@ class BulletPlant(Plant):
         if self._floating:
             base = self._base = self._root.base_state(q, v)
         self._client.place(q[self._base_nq :].tolist(), v[self._base_nv :].tolist(), base)
-
-    def _in_units(self, command: MotorCommand) -> MotorCommand:
-        """Return the forces, and the gains that are forces, in Bullet's unit of mass."""
-        command = command._replace(forces=self._in_unit(command.forces))
-        if command.mode != "PD_CONTROL":
-            return command
-        return command._replace(
-            position_gains=self._in_unit(command.position_gains),
-            velocity_gains=self._in_unit(command.velocity_gains),
-        )
-
-    def _in_unit(self, numbers: list[float] | None) -> list[float] | None:
-        return None if numbers is None else [x / self._unit for x in numbers]

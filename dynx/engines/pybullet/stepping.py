@@ -16,15 +16,11 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from dynx.control.engine_motors import MotorCommand
 from dynx.engines.pybullet.canonical_urdf import BulletTree
 from dynx.engines.pybullet.client import BulletClient
 from dynx.engines.pybullet.connection import Reals
+from dynx.engines.pybullet.motors import BulletMotorCommand
 from dynx.engines.pybullet.root_frame import BaseState
-from dynx.errors import ArgumentError, shown
-
-MODES = ("POSITION_CONTROL", "VELOCITY_CONTROL", "TORQUE_CONTROL", "PD_CONTROL")
-"""Control modes of the engine for a joint's motor."""
 
 
 class SteppingClient(BulletClient):
@@ -64,18 +60,9 @@ class SteppingClient(BulletClient):
             self._motors_hold = False
         self.add_torques(torques)
 
-    def command(self, command: MotorCommand) -> None:
+    def command(self, command: BulletMotorCommand) -> None:
         """Set the motors of all joints, which stay active until the next command or `apply`."""
-        if command.mode not in MODES:
-            raise ArgumentError(f"mode is {shown(command.mode)}; wanted one of {', '.join(MODES)}")
-        given = {
-            "targetPositions": command.positions,
-            "targetVelocities": command.velocities,
-            "forces": command.forces,
-            "positionGains": command.position_gains,
-            "velocityGains": command.velocity_gains,
-        }
-        options = {name: numbers for name, numbers in given.items() if numbers is not None}
+        options = command.options()
         self.check(*options.values())
         if command.mode == "TORQUE_CONTROL":
             self.apply(command.forces or [])

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from dynx.control.base import Controller, Measurement
-from dynx.control.engine_motors import EngineMotor
+from dynx.control.bullet import BulletMotor
 from dynx.errors import ControlError, DivergedError, DynxError, SimulationError, shown
 from dynx.model.numbers import DIVERGENCE_SPEED, refuse_mask
 from dynx.sim.loop.controller_checks import ControllerWatch, defect_of_outcome, defect_of_torque
@@ -71,7 +71,7 @@ class Loop:
     @cached_property
     def _constants(self) -> tuple[Any, ...]:
         """Values that `advance` needs as local variables, because a step takes only some microseconds."""
-        motors = self.controller if isinstance(self.controller, EngineMotor) else None
+        motors = self.controller if isinstance(self.controller, BulletMotor) else None
         sensors = None if self.sensors.plain else self.sensors
         setpoints = list(map(Setpoint, *self.setpoints))
         nv = self.plant.model.nv
@@ -195,7 +195,7 @@ class Loop:
         It is evaluated at the start and at a displaced state, where the tracking error is not zero.
         """
         controller = self.controller
-        if controller is None or isinstance(controller, EngineMotor):
+        if controller is None or isinstance(controller, BulletMotor):
             return
         watch = ControllerWatch(controller)
         # An error here will be raised again when the step is taken.
@@ -216,7 +216,7 @@ class Loop:
         if self.controller is None:
             return None
         state = self.controller.initial_state()
-        if state is None or isinstance(self.controller, EngineMotor):
+        if state is None or isinstance(self.controller, BulletMotor):
             return state
         for number, step in enumerate(range(0, record.steps, self.clock.steps_per_control)):
             measurement = self.sensors(step, record.q, record.v)
@@ -236,7 +236,7 @@ class Loop:
         none = np.zeros(self.plant.model.nv)
         if self.clock.is_control_step(begin):
             return none, None
-        if isinstance(self.controller, EngineMotor):
+        if isinstance(self.controller, BulletMotor):
             number = self.clock.control_number(begin)
             measurement = self.sensors(number * self.clock.steps_per_control, record.q, record.v)
             return none, self.controller.command(measurement, self._setpoint(number))

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.control.engine_motors import EngineMotor
+from dynx.control.bullet import BulletMotor
 from dynx.errors import CompileError, TraceError
 from dynx.sim.loop.controller_checks import (
     defect_of_next_state,
@@ -61,7 +61,7 @@ def staged_loop(loop: Loop, left: int) -> StagedLoop | str:
     plant = loop.plant
     if left < MIN_STEPS_TO_COMPILE:
         return f"fewer than {MIN_STEPS_TO_COMPILE} steps"
-    if isinstance(loop.controller, EngineMotor):
+    if isinstance(loop.controller, BulletMotor):
         return f"{loop.controller.name} is a motor inside the engine"
     if not isinstance(plant, IntegratedPlant):
         return f"{type(plant).__name__} has a stepper of its own"

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, ClassVar, NamedTuple
 
-from dynx.control.engine_motors import EngineMotor, MotorCommand
+from dynx.control.bullet import BulletMotor, BulletMotorCommand
 from dynx.errors import DynxError, EngineError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.sim.plants.disturbances import Disturbances
@@ -39,7 +39,7 @@ class Plant(ABC):
     """
 
     motor_commands: ClassVar[tuple[type, ...]] = ()
-    """Types of the motor commands that `step_motors` takes (see `dynx.control.engine_motors`)."""
+    """Types of the motor commands that `step_motors` takes (see `dynx.control.bullet`)."""
 
     def __init__(self, model: Model, disturbances: Disturbances, dt: float, *, substeps: int = 1) -> None:
         """A record step of `dt` [s] consists of `substeps` steps of the plant."""
@@ -58,13 +58,13 @@ class Plant(ABC):
     def step(self, t: float, tau: Floats) -> StepResult:
         """Advance by `dt` from time `t` [s] under the torque `tau` (nv,) of the motors."""
 
-    def step_motors(self, t: float, command: MotorCommand) -> StepResult:
+    def step_motors(self, t: float, command: BulletMotorCommand) -> StepResult:
         """Advance by `dt` under the engine's own motors; the result has their torque."""
         raise UnsupportedFeatureError(f"{type(self).__name__} has no motors of its own")
 
     def refuse(self, controller: object) -> None:
         """Raise UnsupportedFeatureError for a controller that this plant cannot run with."""
-        if isinstance(controller, EngineMotor) and MotorCommand not in self.motor_commands:
+        if isinstance(controller, BulletMotor) and BulletMotorCommand not in self.motor_commands:
             raise UnsupportedFeatureError(
                 f"{controller.name} is a motor inside PyBullet, so it runs with plant='pybullet' and "
                 "its own stepper only"

@@ -30,6 +30,7 @@ from dynx.errors import ArgumentError, UnknownNameError, shown
 from dynx.model import Model
 from dynx.model.documents import robot_document, robot_from_document
 from dynx.sim.loop.controller_checks import controller_numbers
+from dynx.sim.scenario.moved import present_name
 from dynx.trajectory.base import Trajectory
 from dynx.world.scene import Scene
 from dynx.world.scene.reading import scene_from_document
@@ -327,7 +328,7 @@ def _name_of(kind: type) -> str:
 
 def _class_of(name: str) -> Any:
     """Return the class of that name in dynx or a module that is already imported; None without one."""
-    module, _, path = name.partition(":")
+    module, _, path = present_name(name).partition(":")
     if module.partition(".")[0] == "dynx":
         importlib.import_module(module)
     found: Any = sys.modules.get(module)

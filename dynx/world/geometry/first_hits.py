@@ -12,7 +12,7 @@ from dynx.model.geometry import HeightField, Plane, Shape
 from dynx.model.geometry.ray_casting import cast_on_shape
 from dynx.spatial.scalar import Floats
 from dynx.steppers.layout import Layout
-from dynx.steppers.stepper import RayHit
+from dynx.steppers.native_queries import RayHit
 from dynx.world.geometry.boxes import shape_box
 from dynx.world.geometry.owner_poses import OwnerPoses
 

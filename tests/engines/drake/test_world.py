@@ -8,9 +8,9 @@ from numpy.testing import assert_allclose
 
 import dynx
 from dynx import Pose
+from dynx.engines.drake.stepper import DrakeStepper
 from dynx.engines.drake.world.build import build_scene
 from dynx.engines.drake.world.contacts import parts_of_force
-from dynx.engines.drake.world.engine import DrakeWorld
 from dynx.errors import SingularMassMatrixError, UnsupportedFeatureError
 from dynx.model.geometry import Box, Collision, HeightField
 from dynx.steppers.layout import Layout
@@ -19,7 +19,7 @@ from dynx.world.preparation import prepare
 
 G = 9.81
 SWITCHES = {"collisions": True, "joint_limits": True, "joint_damping": True, "joint_friction": False}
-DEFAULTS = {name: setting.default for name, setting in DrakeWorld.settings.items()}
+DEFAULTS = {name: setting.default for name, setting in DrakeStepper.settings.items()}
 
 
 def layout_of(scene: Scene) -> Layout:
@@ -110,7 +110,7 @@ def test_constraints_hold_a_hanging_body(kind: str) -> None:
 
 def test_mimic_joints_stay_coupled() -> None:
     model = dynx.load("panda")
-    engine = DrakeWorld(layout_of(Scene("s", robots=(SceneRobot("r", model),))), 1e-3, DEFAULTS)
+    engine = DrakeStepper(layout_of(Scene("s", robots=(SceneRobot("r", model),))), 1e-3, DEFAULTS)
     tau = np.zeros(model.nv)
     tau[-1] = 1.0
     engine.step(200, [(0, tau, tau.tolist())])
@@ -165,7 +165,7 @@ def test_what_drake_lacks_is_refused_where_asked() -> None:
 
 def test_a_long_spin_keeps_quaternions_near_unit_length() -> None:
     brick = box("brick", (0.3, 0.2, 0.1), mass=1.0, twist=(0, 0, 0, 0, 0, 40.0))
-    engine = DrakeWorld(layout_of(Scene("s", bodies=(brick,), gravity=(0, 0, 0))), 1e-3, DEFAULTS)
+    engine = DrakeStepper(layout_of(Scene("s", bodies=(brick,), gravity=(0, 0, 0))), 1e-3, DEFAULTS)
     engine.step(2000)
     q, _ = engine._state()
     assert abs(float(q[:4] @ q[:4]) - 1.0) < 1e-2

@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose
 
 import dynx
 from dynx import Pose
+from dynx.engines.mujoco.stepper import MujocoStepper
 from dynx.engines.mujoco.world.build import build_scene
-from dynx.engines.mujoco.world.engine import MujocoWorld
 from dynx.engines.mujoco.world.filters import collision_masks, pairs_to_exclude
 from dynx.errors import SingularMassMatrixError
 from dynx.model.geometry import Box, Collision, HeightField, Sphere
@@ -21,7 +21,7 @@ from dynx.world.preparation import prepare
 
 G = 9.81
 SWITCHES = {"collisions": True, "joint_limits": True, "joint_damping": True, "joint_friction": False}
-DEFAULTS = {name: setting.default for name, setting in MujocoWorld.settings.items()}
+DEFAULTS = {name: setting.default for name, setting in MujocoStepper.settings.items()}
 
 
 def two_arms() -> Scene:
@@ -88,7 +88,7 @@ def test_mimic_joints_stay_coupled_under_contact() -> None:
     q[-1] = 0.03
     scene = Scene("s", robots=(SceneRobot("r", model, q=tuple(q)),), bodies=(ground(),))
     layout = layout_of(scene)
-    engine = MujocoWorld(layout, 1e-3, DEFAULTS)
+    engine = MujocoStepper(layout, 1e-3, DEFAULTS)
     tau = np.zeros(model.nv)
     tau[-1] = -5.0  # closes the gripper, against the lower limit of both fingers
     engine.step(500, [(0, tau, tau.tolist())])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import dynx
-from dynx.control import ComputedTorque, FrictionCompensation, GravityCompensatedPD, PositionMotor
+from dynx.control import BulletPositionMotor, ComputedTorque, FrictionCompensation, GravityCompensatedPD
 from dynx.errors import (
     ArgumentError,
     GainError,
@@ -256,7 +256,7 @@ def test_what_no_option_can_be_is_refused(arm: Model) -> None:
     simulate_batch(arm, law, POSTURE, duration=0.002, damping=six[:, None])
     simulate_batch(arm, law, POSTURE, duration=0.002, damping=six[None], rollouts=1)
     with pytest.raises(UnsupportedFeatureError):
-        simulate_batch(arm, PositionMotor(arm), POSTURE, duration=0.01)
+        simulate_batch(arm, BulletPositionMotor(arm), POSTURE, duration=0.01)
 
 
 def test_a_robot_without_an_acceleration_is_refused() -> None:

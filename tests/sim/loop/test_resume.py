@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dynx.backends import installed_backends
-from dynx.control import PD, PID, ComputedTorque, PDMotor, PositionMotor, VelocityMotor
+from dynx.control import PD, PID, BulletPDMotor, BulletPositionMotor, BulletVelocityMotor, ComputedTorque
 from dynx.control.base import Controller
 from dynx.errors import ArgumentError
 from dynx.model import Model
@@ -25,9 +25,9 @@ STEPS = 40
 LAWS: dict[str, Controller[Any]] = {
     "pid": PID(ARM, kp=300, ki=2000, kd=30, control_dt=3e-3),
     "computed torque": ComputedTorque(ARM, kp=400, kd=40),
-    "position motor": PositionMotor(ARM),
-    "velocity motor": VelocityMotor(ARM),
-    "pd motor": PDMotor(ARM, kp=300.0, kd=30.0),
+    "position motor": BulletPositionMotor(ARM),
+    "velocity motor": BulletVelocityMotor(ARM),
+    "pd motor": BulletPDMotor(ARM, kp=300.0, kd=30.0),
 }
 OPTIONS: dict[str, Any] = {
     "duration": STEPS * 1e-3,

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.backends import backend, installed_backends
-from dynx.control import PD, OpenLoop, PositionMotor
+from dynx.control import PD, BulletPositionMotor, OpenLoop
 from dynx.errors import ArgumentError, UnsupportedFeatureError
 from dynx.model import Joint, Link, Model
 from dynx.model.elements import Inertial
@@ -255,5 +255,5 @@ def test_a_motor_of_the_engine_has_no_joints_that_stick() -> None:
     robot = load(MODELS / "six_axis_arm.urdf")
     options: dict[str, Any] = {"plant": "pybullet", "friction": 0.1, "duration": 0.01}
     with pytest.raises(UnsupportedFeatureError, match="friction_slip above 0"):
-        simulate(robot, PositionMotor(robot), robot.neutral(), **options)
-    simulate(robot, PositionMotor(robot), robot.neutral(), friction_slip=50.0, **options)
+        simulate(robot, BulletPositionMotor(robot), robot.neutral(), **options)
+    simulate(robot, BulletPositionMotor(robot), robot.neutral(), friction_slip=50.0, **options)

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 import dynx.registry as shared_registry
 from dynx.cli.shell.main import cli
-from dynx.control import PositionMotor
+from dynx.control import BulletPositionMotor
 from dynx.errors import (
     ArgumentError,
     BackendError,
@@ -90,7 +90,7 @@ def test_a_plant_is_never_replaced(drifting: str, taken: str) -> None:
 
 def test_only_a_plant_that_takes_a_motor_command_gets_it(drifting: str) -> None:
     with pytest.raises(UnsupportedFeatureError, match="own stepper"):
-        simulate(PENDULUM, PositionMotor(PENDULUM), [0.1], plant=drifting, duration=0.1)
+        simulate(PENDULUM, BulletPositionMotor(PENDULUM), [0.1], plant=drifting, duration=0.1)
 
 
 def test_a_class_that_is_no_plant_is_refused() -> None:

@@ -34,7 +34,7 @@ CONTROLLERS: list[Controller[Any] | None] = [
     control.Saturated(control.GravityCompensatedPD(ARM, kp=1, kd=0.1), limit=20.0),
     control.FrictionCompensation(control.PD(ARM, kp=1, kd=0.1), damping=0.1, friction=0.2),
     control.OperationalSpace(ARM, "tool0", kp=100, kd=20),
-    control.PositionMotor(ARM),
+    control.BulletPositionMotor(ARM),
     control.PD(load("ur5").with_gravity([0, 0, -1.62]), kp=1.0, kd=0.1),
 ]
 REFERENCES: list[Any] = [

@@ -88,10 +88,10 @@ class RobotCoordinates:
             self._q[3], self._q[4:7] = q[6], q[3:6]
             self._v[:3] = R @ (v[:3] + cross(v[3:6], self._center))
 
-    def forces(self, tau: Floats, entries: list[float]) -> Floats:
+    def forces(self, tau: Floats) -> Floats:
         """Return a torque with the wrench on a floating base, `tau[:6]` at its origin in its axes, converted
-        to MuJoCo's; `entries` are those of `tau`."""
-        if not self._floating or not any(entries[:6]):
+        to MuJoCo's."""
+        if not self._floating or not any(tau[:6].tolist()):
             return tau
         R, force = self._rotation(), tau[:3]
         return np.concatenate([R @ force, tau[3:6] - cross(self._center, force), tau[6:]])

@@ -40,8 +40,6 @@ class BulletBody:
         mechanism = Mechanism(layout.name, not layout.fixed, longdouble(np.zeros(3)), inertia, (), (), None)
         self.object = BulletObject(client, mechanism, colliders, files, folder, {})
         self._layout = layout
-        self.wrench = [0.0] * 6
-        """Force and moment about the centre of mass, in world axes."""
         self._axes = self.object.root.axes
         self.set_state(layout.T, layout.twist)
 
@@ -62,7 +60,3 @@ class BulletBody:
         if self._layout.fixed:
             return BodyState(self._layout.T.copy(), np.zeros(6))
         return BodyState(*self.object.root.pose_and_twist(self.object.base_state()))
-
-    def push(self) -> None:
-        """Apply the wrench during the next step."""
-        self.object.push_base(self.wrench[:3], self.wrench[3:])

@@ -1,4 +1,4 @@
-"""Contacts and distances of a Bullet world, by the numbers of colliders."""
+"""Contacts of a Bullet world, by the numbers of colliders."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class ContactReader:
     def __init__(self, client: WorldClient, places: Sequence[Sequence[Place]]) -> None:
         """`places` are the bodies and links of each collider."""
         self._client = client
-        self._places = places
+        self.places = places
         self._collider = {place: k for k, found in enumerate(places) for place in found}
         self.fresh = True
         """True if no step was taken since the state was set, so that there are no forces."""
@@ -29,7 +29,7 @@ class ContactReader:
         found = []
         for a, b, point in self._touching_points():
             force, friction = (0.0, np.zeros(3)) if self.fresh else (point[9], _friction(point))
-            found.append(_touching(a, b, point, force, friction))
+            found.append(touching_point(a, b, point, force, friction))
         return found
 
     def pairs(self) -> set[tuple[int, int]]:
@@ -43,24 +43,16 @@ class ContactReader:
             if a is not None and b is not None and (point[8] <= 0.0 or point[9] > 0.0):
                 yield a, b, point
 
-    def closest(self, a: int, b: int, within: float) -> TouchingPoint | None:
-        """Return the nearest points of two colliders."""
-        found: list[TouchingPoint] = []
-        for body_a, link_a in self._places[a]:
-            for body_b, link_b in self._places[b]:
-                points = self._client.call(
-                    self._client.engine.getClosestPoints, body_a, body_b, within, link_a, link_b
-                )
-                found += [_touching(a, b, point, 0.0, None) for point in points or ()]
-        return min(found, key=lambda point: point.distance, default=None)
-
 
 def _friction(point: Sequence[Any]) -> Floats:
     """Return the friction on the first body: two forces along two directions of the tangent plane."""
     return np.asarray(point[10] * np.array(point[11]) + point[12] * np.array(point[13]))
 
 
-def _touching(a: int, b: int, point: Sequence[Any], force: float, friction: Floats | None) -> TouchingPoint:
+def touching_point(
+    a: int, b: int, point: Sequence[Any], force: float, friction: Floats | None
+) -> TouchingPoint:
+    """Return a contact or nearest point from Bullet's report of it."""
     return TouchingPoint(
         a, b, np.array(point[5]), np.array(point[6]), np.array(point[7]), point[8], force, friction
     )

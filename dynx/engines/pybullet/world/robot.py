@@ -11,11 +11,10 @@ import numpy as np
 
 from dynx.backends import Backend, backend
 from dynx.backends.solvability import Solvability
-from dynx.control.engine_motors import MotorCommand
+from dynx.engines.pybullet.motors import BulletMotorCommand
 from dynx.engines.pybullet.world.client import WorldClient
 from dynx.engines.pybullet.world.objects import UNLIMITED, BulletObject
 from dynx.engines.pybullet.world.shapes import ShapeFiles
-from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.branchless import quat_exp
 from dynx.spatial.scalar import Floats
@@ -25,9 +24,6 @@ from dynx.steppers.state import RobotState
 
 STIFF = 0.25
 """Share of a joint's speed that damping may remove in a step by Bullet's own, explicit law."""
-
-MODES = ("POSITION_CONTROL", "VELOCITY_CONTROL", "TORQUE_CONTROL", "PD_CONTROL")
-"""Control modes of Bullet for a joint's motor."""
 
 
 class BulletRobot:
@@ -78,7 +74,6 @@ class BulletRobot:
         self._control = client.engine.setJointMotorControlArray
         self._torque_control = client.engine.TORQUE_CONTROL
         self._body, self._links, self._number = self.object.body, self.object.links, client.number
-        self.motor: MotorCommand | None = None
         stiff = self._is_stiff(layout)
         self.corrected = self._coupling is not None or stiff
         """True if the robot has mimic joints or stiff damping, so that `before_step` and `after_step` must be
@@ -164,38 +159,17 @@ class BulletRobot:
         moment -= cross(self.object.root.center, force)
         self.object.push_base((R @ force).tolist(), (R @ moment).tolist())
 
-    def command(self, command: MotorCommand | None) -> None:
+    def command(self, command: BulletMotorCommand | None) -> None:
         """Set Bullet's motors of all joints; None releases them."""
         self.release_motors()
-        self.motor = command
-        if command is None:
-            return
-        if command.mode not in MODES:
-            raise ArgumentError(f"mode is {shown(command.mode)}; wanted one of {', '.join(MODES)}")
-        if self._coupling is not None:
-            raise UnsupportedFeatureError(
-                f"PyBullet's motors do not support the mimic joints of {self.model.name}; use those of dynx"
-            )
-        given = {
-            "targetPositions": command.positions,
-            "targetVelocities": command.velocities,
-            "forces": command.forces,
-            "positionGains": command.position_gains,
-            "velocityGains": command.velocity_gains,
-        }
-        self._motor_options = {name: numbers for name, numbers in given.items() if numbers is not None}
-        self.apply_motor()
-
-    def apply_motor(self) -> None:
-        """Send the command of Bullet's motors, which forgets torques after each step."""
-        if self.motor is not None and self.object.links:
-            mode = getattr(self._client.engine, self.motor.mode)
+        if command is not None and self.object.links:
+            engine = self._client.engine
             self._client.call(
-                self._client.engine.setJointMotorControlArray,
+                engine.setJointMotorControlArray,
                 self.object.body,
                 self.object.links,
-                mode,
-                **self._motor_options,
+                getattr(engine, command.mode),
+                **command.options(),
             )
 
     def release_motors(self) -> None:

@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from dynx.backends import backend
-from dynx.control.engine_motors import MotorCommand
+from dynx.control.bullet import BulletMotorCommand
 from dynx.model import Model, Pose
 from dynx.model.geometry import Box, Collision
 from dynx.model.loading import load
@@ -149,7 +149,7 @@ LEG_MOTOR = VelocityMotor(
 """Motor that spreads the legs slowly, and that a landing overcomes."""
 
 LEG_MOTORS = {
-    "pybullet": MotorCommand(
+    "pybullet": BulletMotorCommand(
         "VELOCITY_CONTROL",
         velocities=[0.0, 0.0, 0.0, -LEG_SPEED, LEG_SPEED],
         forces=[0.0, 0.0, 0.0, LEG_TORQUE, LEG_TORQUE],

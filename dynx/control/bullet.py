@@ -1,14 +1,13 @@
 """The motors inside PyBullet, as controllers for its plant alone.
 
 They are constraints of PyBullet's solver, which determines their torque during the step. So they return a
-`MotorCommand`, and their `torque` raises an error.
+`BulletMotorCommand`, and their `torque` raises an error.
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,36 +16,31 @@ from dynx.control.base import Controller, Measurement, gain, parameter, refuse_o
 from dynx.control.gains import checked_gain
 from dynx.control.joint_space import JointSpace
 from dynx.control.saturation import checked_limit
+from dynx.engines.pybullet.motors import BulletMotorCommand, refuse_mimic_joints
 from dynx.errors import UnsupportedFeatureError
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 
+__all__ = [
+    "BulletMotor",
+    "BulletMotorCommand",
+    "BulletPDMotor",
+    "BulletPositionMotor",
+    "BulletTorqueMotor",
+    "BulletVelocityMotor",
+]
+
 UNLIMITED_FORCE = 1e30
 """Force of a motor without a limit [N m or N]; an infinite one becomes NaN in Bullet."""
 
 
-class MotorCommand(NamedTuple):
-    """Arguments of `setJointMotorControlArray`, one number per joint each; None for the engine's default."""
-
-    mode: str
-    positions: list[float] | None = None
-    velocities: list[float] | None = None
-    forces: list[float] | None = None
-    position_gains: list[float] | None = None
-    velocity_gains: list[float] | None = None
-
-
 @dataclass(frozen=True)
-class EngineMotor(JointSpace[None]):
+class BulletMotor(JointSpace[None]):
     """A motor mode of PyBullet, for ``plant="pybullet"`` alone."""
 
     def __init__(self, model: Model) -> None:
-        if model.mechanism.coupling is not None:
-            raise UnsupportedFeatureError(
-                f"PyBullet's motors do not support the mimic joints of {model.name}; lock them, or use a "
-                "controller that computes torques"
-            )
+        refuse_mimic_joints(model, "lock them, or use a controller that computes torques")
         super().__init__(model)
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
@@ -57,7 +51,7 @@ class EngineMotor(JointSpace[None]):
         )
 
     @abstractmethod
-    def command(self, measurement: Measurement, setpoint: Setpoint) -> MotorCommand:
+    def command(self, measurement: Measurement, setpoint: Setpoint) -> BulletMotorCommand:
         """Return the command to the motors of all joints."""
 
     def _per_joint(self, name: str, number: ArrayLike) -> Floats:
@@ -76,7 +70,7 @@ def _forces(limits: Floats | None) -> list[float] | None:
 
 
 @dataclass(frozen=True)
-class PositionMotor(EngineMotor):
+class BulletPositionMotor(BulletMotor):
     """PyBullet's POSITION_CONTROL: each step ends at v = kd v* + kp (q* - q) / dt, if the force suffices.
 
     `position_gain` and `velocity_gain` are the fractions of the errors that one step removes; the engine's
@@ -103,9 +97,9 @@ class PositionMotor(EngineMotor):
             force=self._limits(force),
         )
 
-    def command(self, measurement: Measurement, setpoint: Setpoint) -> MotorCommand:
+    def command(self, measurement: Measurement, setpoint: Setpoint) -> BulletMotorCommand:
         """Return the position and velocity of the setpoint."""
-        return MotorCommand(
+        return BulletMotorCommand(
             "POSITION_CONTROL",
             positions=setpoint.q[self.q_joints].tolist(),
             velocities=setpoint.v[self.v_joints].tolist(),
@@ -116,7 +110,7 @@ class PositionMotor(EngineMotor):
 
 
 @dataclass(frozen=True)
-class VelocityMotor(EngineMotor):
+class BulletVelocityMotor(BulletMotor):
     """PyBullet's VELOCITY_CONTROL: each step ends at the velocity of the setpoint, if the force suffices."""
 
     force: Floats | None = parameter("N m or N")
@@ -126,14 +120,14 @@ class VelocityMotor(EngineMotor):
         super().__init__(model)
         self._set(force=self._limits(force))
 
-    def command(self, measurement: Measurement, setpoint: Setpoint) -> MotorCommand:
+    def command(self, measurement: Measurement, setpoint: Setpoint) -> BulletMotorCommand:
         """Return the velocity of the setpoint."""
         velocities = setpoint.v[self.v_joints].tolist()
-        return MotorCommand("VELOCITY_CONTROL", velocities=velocities, forces=_forces(self.force))
+        return BulletMotorCommand("VELOCITY_CONTROL", velocities=velocities, forces=_forces(self.force))
 
 
 @dataclass(frozen=True)
-class PDMotor(EngineMotor):
+class BulletPDMotor(BulletMotor):
     """PyBullet's PD_CONTROL: tau = kp (q* - q) + kd (v* - v), computed inside the engine."""
 
     kp: Floats = gain("N m/rad or N/m")
@@ -147,9 +141,9 @@ class PDMotor(EngineMotor):
         kp, kd = self._per_joint("kp", kp), self._per_joint("kd", kd)
         self._set(kp=kp, kd=kd, force=self._limits(force))
 
-    def command(self, measurement: Measurement, setpoint: Setpoint) -> MotorCommand:
+    def command(self, measurement: Measurement, setpoint: Setpoint) -> BulletMotorCommand:
         """Return the position and velocity of the setpoint, and the gains."""
-        return MotorCommand(
+        return BulletMotorCommand(
             "PD_CONTROL",
             positions=setpoint.q[self.q_joints].tolist(),
             velocities=setpoint.v[self.v_joints].tolist(),
@@ -160,7 +154,7 @@ class PDMotor(EngineMotor):
 
 
 @dataclass(frozen=True)
-class TorqueMotor(EngineMotor):
+class BulletTorqueMotor(BulletMotor):
     """PyBullet's TORQUE_CONTROL: the torque of another controller, passed to the engine's motors unchanged.
 
     The plant does the same with any controller; this class exists so that all four modes have a name.
@@ -176,11 +170,11 @@ class TorqueMotor(EngineMotor):
         self._wrap(inner)
         if inner.initial_state() is not None:
             raise UnsupportedFeatureError(
-                f"{inner.name} has a state, and TorqueMotor takes a controller without one; plant='pybullet' "
-                "applies the torque of any controller without TorqueMotor"
+                f"{inner.name} has a state, and BulletTorqueMotor takes a controller without one; "
+                "plant='pybullet' applies the torque of any controller without BulletTorqueMotor"
             )
 
-    def command(self, measurement: Measurement, setpoint: Setpoint) -> MotorCommand:
+    def command(self, measurement: Measurement, setpoint: Setpoint) -> BulletMotorCommand:
         """Return the joint torques of the inner controller."""
         tau, _ = self.inner.torque(measurement, setpoint, None)
-        return MotorCommand("TORQUE_CONTROL", forces=tau[self.v_joints].tolist())
+        return BulletMotorCommand("TORQUE_CONTROL", forces=tau[self.v_joints].tolist())

@@ -1,4 +1,4 @@
-"""`BulletWorld`: a scene in PyBullet.
+"""`BulletStepper`: a scene in PyBullet.
 
 Robots are dynx's canonical mechanisms, stepped as `dynx.simulate(plant="pybullet")` steps them, without
 motors, damping or limits that the scene does not have. Every link with shapes has a Bullet link of its own,
@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, ClassVar
 
 import numpy as np
 
-from dynx.control.engine_motors import MotorCommand
 from dynx.engines.pybullet.library import bullet, bullet_version
+from dynx.engines.pybullet.motors import BulletMotorCommand
 from dynx.engines.pybullet.world.bodies import BulletBody
 from dynx.engines.pybullet.world.client import WorldClient
 from dynx.engines.pybullet.world.constraints import add_constraint
@@ -24,26 +25,27 @@ from dynx.engines.pybullet.world.contacts import ContactReader
 from dynx.engines.pybullet.world.filters import set_filters
 from dynx.engines.pybullet.world.materials import bullet_materials
 from dynx.engines.pybullet.world.objects import BulletObject
-from dynx.engines.pybullet.world.renderer import draw
 from dynx.engines.pybullet.world.robot import BulletRobot
 from dynx.engines.pybullet.world.settings import SETTINGS
 from dynx.engines.pybullet.world.shapes import ShapeFiles, is_ground, load_ground
 from dynx.errors import EngineError
 from dynx.model.mechanism import ROOT
 from dynx.spatial.scalar import Floats
+from dynx.steppers.forces import NO_COMMANDS, NO_FORCES, EngineCommand, Forces
 from dynx.steppers.layout import Collider, Layout
 from dynx.steppers.materials import EffectiveCoefficient
 from dynx.steppers.settings import Setting
 from dynx.steppers.state import BodyState, RobotState
-from dynx.steppers.stepper import Stepper, Torque, TouchingPoint
+from dynx.steppers.stepper import Stepper, TouchingPoint
 
 
-class BulletWorld(Stepper):
+class BulletStepper(Stepper):
     """A scene in a Bullet client of its own."""
 
     name = "pybullet"
     settings: ClassVar[Mapping[str, Setting]] = SETTINGS
-    draw = staticmethod(draw)
+    commands: ClassVar[tuple[type[EngineCommand], ...]] = (BulletMotorCommand,)
+    native_queries: ClassVar[str] = "dynx.engines.pybullet.native_queries:BulletQueries"
 
     @classmethod
     def require_engine(cls) -> None:
@@ -52,7 +54,7 @@ class BulletWorld(Stepper):
     def __init__(self, layout: Layout, dt: float, settings: Mapping[str, Any]) -> None:
         super().__init__(layout, dt, settings)
         engine = bullet()
-        self._client = client = WorldClient(engine, layout.name, dt, settings)
+        self.client = client = WorldClient(engine, layout.name, dt, settings)
         self._number = client.number
         self._step_simulation = engine.stepSimulation
         try:
@@ -64,14 +66,14 @@ class BulletWorld(Stepper):
         except BaseException:
             client.close()
             raise
-        self._pushed: list[BulletBody] = []
         self._corrected = [robot for robot in self._robots if robot.corrected]
         self._apply = [robot.apply for robot in self._robots]
-        self._list_calls()
+        self._before = [robot.before_step for robot in self._corrected]
+        self._commands: Mapping[int, EngineCommand] = NO_COMMANDS
         self._touch()
 
     def _load(self, folder: Path, settings: Mapping[str, Any]) -> None:
-        layout, client = self.layout, self._client
+        layout, client = self.layout, self.client
         client.call(client.engine.setGravity, *layout.gravity.tolist())
         self._materials = bullet_materials(layout)
         rebounds = self._materials.rebounds
@@ -101,7 +103,7 @@ class BulletWorld(Stepper):
                 ground = load_ground(client, files, shape, T, rebounds=bool(rebounds[number]))
                 places[number].append((ground, ROOT))
         set_filters(client, layout, places, self._materials, settings, self.dt)
-        self._contacts = ContactReader(client, places)
+        self.contact_reader = ContactReader(client, places)
         for constraint in layout.constraints:
             add_constraint(client, constraint, self._robots, self._bodies, settings["constraint_force"])
 
@@ -110,38 +112,44 @@ class BulletWorld(Stepper):
 
     # -- motion -------------------------------------------------------------------------------
 
-    def set_wrenches(self, wrenches: Floats) -> None:
-        self._pushed = []
-        for body, wrench in zip(self._bodies, wrenches, strict=True):
-            body.wrench = wrench.tolist()
-            if wrench.any():
-                self._pushed.append(body)
-        self._list_calls()
-
-    def _list_calls(self) -> None:
-        """List what is called before every step of the engine."""
-        self._before: list[Callable[[], None]] = [body.push for body in self._pushed]
-        self._before += [robot.before_step for robot in self._corrected]
-
-    def command_motors(self, robot: int, command: MotorCommand | None) -> None:
-        self._robots[robot].command(command)
-
-    def step(self, n: int, torques: Sequence[Torque] = ()) -> None:
-        self._contacts.fresh = False
+    def step(self, n: int, forces: Forces = NO_FORCES) -> None:
+        if forces.commands is not self._commands:
+            self._command(forces.commands)
+        self.contact_reader.fresh = False
         step, number = self._step_simulation, self._number
+        # Bullet forgets torques and wrenches after each step.
+        applied: list[Callable[[], object]] = [
+            partial(self._apply[k], tau.tolist()) for k, tau in forces.torques
+        ]
+        if forces.wrenches is not None:
+            applied += [
+                partial(
+                    self._bodies[k].object.push_base,
+                    forces.wrenches[k, :3].tolist(),
+                    forces.wrenches[k, 3:].tolist(),
+                )
+                for k in np.flatnonzero(forces.wrenches.any(axis=1)).tolist()
+            ]
+        applied += self._before
         try:
             while n:
                 n -= 1
-                # Bullet forgets torques after each step.
-                for k, _, entries in torques:
-                    self._apply[k](entries)
-                for call in self._before:
+                for call in applied:
                     call()
                 step(physicsClientId=number)
                 for robot in self._corrected:
                     robot.after_step()
-        except self._client.errors as error:
-            raise self._client.failure("stepSimulation", error) from error
+        except self.client.errors as error:
+            raise self.client.failure("stepSimulation", error) from error
+
+    def _command(self, commands: Mapping[int, EngineCommand]) -> None:
+        """Set Bullet's motors of the robots that have a command, and release those that had one."""
+        for k in self._commands.keys() - commands.keys():
+            self._robots[k].command(None)
+        for k, command in commands.items():
+            if isinstance(command, BulletMotorCommand):
+                self._robots[k].command(command)
+        self._commands = commands
 
     # -- state --------------------------------------------------------------------------------
 
@@ -164,15 +172,15 @@ class BulletWorld(Stepper):
 
     def _touch(self) -> None:
         """Find the contacts of a state that was set."""
-        self._client.call(self._client.engine.performCollisionDetection)
-        self._contacts.fresh = True
+        self.client.call(self.client.engine.performCollisionDetection)
+        self.contact_reader.fresh = True
 
     def dump(self) -> bytes:
         near = np.array([robot.near for robot in self._robots]).tobytes()
         with TemporaryDirectory(prefix="dynx-", ignore_cleanup_errors=True) as folder:
             path = Path(folder) / "world.bullet"
-            self._client.call(self._client.engine.saveBullet, str(path))
-            return struct.pack("<?", self._contacts.fresh) + near + path.read_bytes()
+            self.client.call(self.client.engine.saveBullet, str(path))
+            return struct.pack("<?", self.contact_reader.fresh) + near + path.read_bytes()
 
     def load(self, data: bytes) -> None:
         size = 32 * len(self._robots)
@@ -180,22 +188,19 @@ class BulletWorld(Stepper):
         with TemporaryDirectory(prefix="dynx-", ignore_cleanup_errors=True) as folder:
             path = Path(folder) / "world.bullet"
             path.write_bytes(data[1 + size :])
-            self._client.call(self._client.engine.restoreState, fileName=str(path))
+            self.client.call(self.client.engine.restoreState, fileName=str(path))
         for robot, quat in zip(self._robots, near, strict=True):
             robot.near = quat.tolist()
-        (self._contacts.fresh,) = struct.unpack("<?", data[:1])
+        (self.contact_reader.fresh,) = struct.unpack("<?", data[:1])
 
     # -- queries ------------------------------------------------------------------------------
 
     def contacts(self) -> Sequence[TouchingPoint]:
-        return [point for point in self._contacts.contacts() if self.layout.collides[point.a, point.b]]
+        return [point for point in self.contact_reader.contacts() if self.layout.collides[point.a, point.b]]
 
     def touching_pairs(self) -> Iterable[tuple[int, int]]:
         collides = self.layout.collides
-        return [pair for pair in self._contacts.pairs() if collides[pair]]
-
-    def closest(self, a: int, b: int, within: float) -> TouchingPoint | None:
-        return self._contacts.closest(a, b, within)
+        return [pair for pair in self.contact_reader.pairs() if collides[pair]]
 
     # -- end ----------------------------------------------------------------------------------
 
@@ -206,4 +211,4 @@ class BulletWorld(Stepper):
     def close(self) -> None:
         for robot in self._robots:
             robot.close()
-        self._client.close()
+        self.client.close()

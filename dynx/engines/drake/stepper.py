@@ -12,49 +12,45 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from dynx.distance import distance
 from dynx.engines.drake.library import DRAKE_FAILURES, captured_log, drake_version, error_message
 from dynx.engines.drake.world.build import build_scene
 from dynx.engines.drake.world.contacts import read_contacts, touching_point
-from dynx.engines.drake.world.distances import closest_of_pair
 from dynx.engines.drake.world.materials import effective_materials
 from dynx.engines.drake.world.options import SETTINGS
-from dynx.model.geometry import HeightField, Plane
-from dynx.rbd.kinematics import body_poses
 from dynx.spatial.scalar import Floats
-from dynx.spatial.se3 import homogeneous
 from dynx.steppers.failures import translate_failures
-from dynx.steppers.layout import WORLD, Collider, Layout
+from dynx.steppers.forces import NO_FORCES, Forces
+from dynx.steppers.layout import Layout
 from dynx.steppers.materials import EffectiveCoefficient
 from dynx.steppers.settings import Setting
 from dynx.steppers.state import BodyState, RobotState
-from dynx.steppers.stepper import Stepper, Torque, TouchingPoint
+from dynx.steppers.stepper import Stepper, TouchingPoint
 
 LONGEST = 1.001
 """Squared length of a quaternion above which it is normalised."""
 
-_engine_errors = translate_failures(DRAKE_FAILURES, error_message)
+engine_errors = translate_failures(DRAKE_FAILURES, error_message)
 
 
-class DrakeWorld(Stepper):
+class DrakeStepper(Stepper):
     """A scene in Drake behind the interface of `Stepper`."""
 
     name: ClassVar[str] = "drake"
     settings: ClassVar[Mapping[str, Setting]] = SETTINGS
+    native_queries: ClassVar[str] = "dynx.engines.drake.native_queries:DrakeQueries"
 
-    @_engine_errors
+    @engine_errors
     def __init__(self, layout: Layout, dt: float, settings: Mapping[str, Any]) -> None:
         super().__init__(layout, dt, settings)
         self.closed = self._diverged = False
         with captured_log():
-            self._built = built = build_scene(layout, dt, settings)
+            self.built = built = build_scene(layout, dt, settings)
             self._root = built.diagram.CreateDefaultContext()
         self._plant, self._diagram = built.plant, built.diagram
         self._past_root: Any = None
         self._context = self._plant.GetMyMutableContextFromRoot(self._root)
         self._updates = self._diagram.AllocateDiscreteVariables()
         self._port = self._plant.get_applied_generalized_force_input_port()
-        self._wrenches: Floats = np.zeros(self._plant.num_velocities())
         self._applied: Floats = np.zeros(self._plant.num_velocities())
         self._port.FixValue(self._context, self._applied)
         self._quaternions = built.quaternions
@@ -73,20 +69,18 @@ class DrakeWorld(Stepper):
 
     # -- motion -------------------------------------------------------------------------------
 
-    @_engine_errors
-    def set_wrenches(self, wrenches: Floats) -> None:
-        for number, body in self._built.bodies.items():
-            force, moment = wrenches[number, :3], wrenches[number, 3:]
-            self._wrenches[body.forces] = np.concatenate([moment, force])
-
-    @_engine_errors
-    def step(self, n: int, torques: Sequence[Torque] = ()) -> None:
-        forces = self._wrenches.copy()
-        for k, tau, _ in torques:
-            self._built.robots[k].write_forces(tau, self._plant.GetPositions(self._context), forces)
-        if not np.array_equal(forces, self._applied):
-            self._port.FixValue(self._context, forces)
-            self._applied = forces
+    @engine_errors
+    def step(self, n: int, forces: Forces = NO_FORCES) -> None:
+        applied = np.zeros(len(self._applied))
+        if forces.wrenches is not None:
+            for number, body in self.built.bodies.items():
+                force, moment = forces.wrenches[number, :3], forces.wrenches[number, 3:]
+                applied[body.forces] = np.concatenate([moment, force])
+        for k, tau in forces.torques:
+            self.built.robots[k].write_forces(tau, self._plant.GetPositions(self._context), applied)
+        if not np.array_equal(applied, self._applied):
+            self._port.FixValue(self._context, applied)
+            self._applied = applied
         diagram, root, updates = self._diagram, self._root, self._updates
         for taken in range(n):
             if self._diverged:
@@ -116,33 +110,33 @@ class DrakeWorld(Stepper):
 
     # -- state --------------------------------------------------------------------------------
 
-    @_engine_errors
+    @engine_errors
     def robot_state(self, robot: int) -> RobotState:
-        return self._built.robots[robot].read(*self._state())
+        return self.built.robots[robot].read(*self._state())
 
-    @_engine_errors
+    @engine_errors
     def body_state(self, body: int) -> BodyState:
-        if body in self._built.bodies:
-            return self._built.bodies[body].read(*self._state())
+        if body in self.built.bodies:
+            return self.built.bodies[body].read(*self._state())
         return BodyState(self.layout.bodies[body].T.copy(), np.zeros(6))
 
-    @_engine_errors
+    @engine_errors
     def set_robot_state(self, robot: int, q: Floats, v: Floats) -> None:
         state = self._state()
-        self._built.robots[robot].write(q, v, *state)
+        self.built.robots[robot].write(q, v, *state)
         self._set_state(*state)
 
-    @_engine_errors
+    @engine_errors
     def set_body_state(self, body: int, T: Floats, twist: Floats) -> None:
         state = self._state()
-        self._built.bodies[body].write(T, twist, *state)
+        self.built.bodies[body].write(T, twist, *state)
         self._set_state(*state)
 
-    @_engine_errors
+    @engine_errors
     def dump(self) -> bytes:
         return np.concatenate(self._state()).tobytes()
 
-    @_engine_errors
+    @engine_errors
     def load(self, data: bytes) -> None:
         state = np.frombuffer(data).copy()
         self._set_state(*np.split(state, [self._plant.num_positions()]))
@@ -160,20 +154,20 @@ class DrakeWorld(Stepper):
 
     # -- queries ------------------------------------------------------------------------------
 
-    @_engine_errors
+    @engine_errors
     def contacts(self) -> Sequence[TouchingPoint]:
         if self._past is None:
-            pairs = self._query().ComputePointPairPenetration()
-            return [touching_point(pair, np.zeros(3), self._built.collider_of) for pair in pairs]
+            pairs = self.query().ComputePointPairPenetration()
+            return [touching_point(pair, np.zeros(3), self.built.collider_of) for pair in pairs]
         state, forces = self._past
         query = self._query_at(state)
         self._port.FixValue(self._plant.GetMyMutableContextFromRoot(self._past_root), forces)
         results = self._plant.get_contact_results_output_port().Eval(
             self._plant.GetMyContextFromRoot(self._past_root)
         )
-        return read_contacts(results, query, self._built.collider_of)
+        return read_contacts(results, query, self.built.collider_of)
 
-    @_engine_errors
+    @engine_errors
     def touching_pairs(self) -> Iterable[tuple[int, int]]:
         if self._past is None:
             return super().touching_pairs()
@@ -186,7 +180,7 @@ class DrakeWorld(Stepper):
             surfaces, points = query.ComputeContactSurfacesWithFallback(self._surfaces)
         pairs = [(pair.id_A, pair.id_B) for pair in points]
         pairs += [(surface.id_M(), surface.id_N()) for surface in surfaces]
-        collider_of = self._built.collider_of
+        collider_of = self.built.collider_of
         return [(collider_of[a.get_value()], collider_of[b.get_value()]) for a, b in pairs]
 
     def _query_at(self, state: Floats) -> Any:
@@ -196,51 +190,13 @@ class DrakeWorld(Stepper):
                 self._past_root = self._diagram.CreateDefaultContext()
         context = self._plant.GetMyMutableContextFromRoot(self._past_root)
         self._plant.SetPositionsAndVelocities(context, state)
-        graph = self._built.scene_graph
+        graph = self.built.scene_graph
         return graph.get_query_output_port().Eval(graph.GetMyContextFromRoot(self._past_root))
 
-    @_engine_errors
-    def closest(self, a: int, b: int, within: float) -> TouchingPoint | None:
-        first, second = (self.layout.colliders[number] for number in (a, b))
-        found: list[TouchingPoint] = []
-        if _is_plane(first) or _is_plane(second):
-            found = self._closest_to_planes(a, b)
-        else:
-            query = self._query()
-            for one in self._built.geometries[a]:
-                for other in self._built.geometries[b]:
-                    found.append(TouchingPoint(a, b, *closest_of_pair(query, one, other)))
-        nearest = min(found, key=lambda point: point.distance, default=None)
-        return nearest if nearest is not None and nearest.distance <= within else None
-
-    def _closest_to_planes(self, a: int, b: int) -> list[TouchingPoint]:
-        """Return the nearest points of a ground and other shapes by dynx: Drake has them for balls only."""
-        found = []
-        first, second = self.layout.colliders[a], self.layout.colliders[b]
-        T_first, T_second = self._pose(first), self._pose(second)
-        for one in first.shapes:
-            for other in second.shapes:
-                planes = isinstance(one.shape, Plane) + isinstance(other.shape, Plane)
-                if planes != 1 or isinstance(one.shape, HeightField) or isinstance(other.shape, HeightField):
-                    continue
-                near = distance(one.shape, T_first @ one.T, other.shape, T_second @ other.T)
-                found.append(TouchingPoint(a, b, near.point_a, near.point_b, near.normal, near.distance))
-        return found
-
-    def _query(self) -> Any:
+    def query(self) -> Any:
         """Return Drake's query of the shapes at the present state."""
-        graph = self._built.scene_graph
+        graph = self.built.scene_graph
         return graph.get_query_output_port().Eval(graph.GetMyContextFromRoot(self._root))
-
-    def _pose(self, collider: Collider) -> Floats:
-        """Return the pose (4, 4) of the owner of a collider."""
-        robot, body = collider.owner
-        if robot is None:
-            return np.eye(4) if body == WORLD else self.body_state(body).T_world_body
-        mechanism = self.layout.robots[robot].model.mechanism
-        q = self.robot_state(robot).q
-        poses = body_poses(mechanism, mechanism.tree_q(q))
-        return np.asarray(homogeneous(*poses[body]))
 
     # -- end ----------------------------------------------------------------------------------
 
@@ -253,8 +209,4 @@ class DrakeWorld(Stepper):
         if not self.closed:
             self.closed = True
             del self._port, self._updates, self._context, self._root, self._past_root
-            del self._plant, self._diagram, self._built
-
-
-def _is_plane(collider: Collider) -> bool:
-    return any(isinstance(placed.shape, Plane) for placed in collider.shapes)
+            del self._plant, self._diagram, self.built

@@ -1,8 +1,4 @@
-"""PyBullet's software renderer, as a second way to draw what a camera sees.
-
-It draws balls, cylinders and capsules as polyhedra, and samples the lower left corners of pixels, which the
-projection makes up for.
-"""
+"""Bullet's own nearest points of a scene in its stepper, and pictures by its software renderer."""
 
 from __future__ import annotations
 
@@ -10,11 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import ModuleType
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from dynx.engines.pybullet.library import bullet
+from dynx.engines.pybullet.stepper import BulletStepper
+from dynx.engines.pybullet.world.contacts import touching_point
 from dynx.engines.pybullet.world.shapes import binary_stl
 from dynx.errors import EngineError, EngineLimitError
 from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
@@ -22,34 +20,59 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import inverse
 from dynx.spatial.so3 import quat_from_rotation
 from dynx.steppers.camera import Camera, Drawing, DrawnShape
+from dynx.steppers.native_queries import NativeQueries
+from dynx.steppers.stepper import TouchingPoint
 
 GROUND_SIDE = 200.0
 """Length of the edges of the square that is drawn for a plane [m]."""
 
 
-def draw(shapes: Sequence[DrawnShape], T_world_camera: Floats, camera: Camera) -> Drawing:
-    """Return what PyBullet draws of the shapes in a client of its own.
+class BulletQueries(NativeQueries):
+    """Nearest points by Bullet, and pictures by its software renderer.
 
-    Raises EngineLimitError for a camera whose `far` PyBullet cannot resolve, EngineError where it fails.
+    The renderer draws balls, cylinders and capsules as polyhedra, and samples the lower left corners of
+    pixels, which the projection makes up for.
     """
-    if camera.far > 1e5 * camera.near:
-        raise EngineLimitError(
-            f"far is {camera.far}; wanted at most 1e5 times near, {camera.near}, because PyBullet stores "
-            "depths in single precision"
-        )
-    engine = bullet()
-    client = int(engine.connect(engine.DIRECT))
-    if client < 0:
-        raise EngineError("Bullet has no client left (1,024 at most); close worlds that are not needed")
-    try:
-        with TemporaryDirectory() as folder:
-            for number, each in enumerate(shapes):
-                _add(engine, client, each, Path(folder, f"{number}.stl"))
-            return _picture(engine, client, T_world_camera, camera)
-    except (SystemError, TypeError, ValueError, engine.error) as error:
-        raise EngineError(f"pybullet failed to draw: {error}") from error
-    finally:
-        engine.disconnect(client)
+
+    name: ClassVar[str] = "pybullet"
+
+    def __init__(self, stepper: BulletStepper) -> None:
+        super().__init__(stepper)
+        self.stepper: BulletStepper = stepper
+
+    def closest(self, a: int, b: int, within: float) -> TouchingPoint | None:
+        client, places = self.stepper.client, self.stepper.contact_reader.places
+        found: list[TouchingPoint] = []
+        for body_a, link_a in places[a]:
+            for body_b, link_b in places[b]:
+                points = client.call(client.engine.getClosestPoints, body_a, body_b, within, link_a, link_b)
+                found += [touching_point(a, b, point, 0.0, None) for point in points or ()]
+        return min(found, key=lambda point: point.distance, default=None)
+
+    @classmethod
+    def draw(cls, shapes: Sequence[DrawnShape], T_world_camera: Floats, camera: Camera) -> Drawing:
+        """Return what PyBullet draws of the shapes in a client of its own.
+
+        Raises EngineLimitError for a camera whose `far` PyBullet cannot resolve, EngineError where it fails.
+        """
+        if camera.far > 1e5 * camera.near:
+            raise EngineLimitError(
+                f"far is {camera.far}; wanted at most 1e5 times near, {camera.near}, because PyBullet stores "
+                "depths in single precision"
+            )
+        engine = bullet()
+        client = int(engine.connect(engine.DIRECT))
+        if client < 0:
+            raise EngineError("Bullet has no client left (1,024 at most); close worlds that are not needed")
+        try:
+            with TemporaryDirectory() as folder:
+                for number, each in enumerate(shapes):
+                    _add(engine, client, each, Path(folder, f"{number}.stl"))
+                return _picture(engine, client, T_world_camera, camera)
+        except (SystemError, TypeError, ValueError, engine.error) as error:
+            raise EngineError(f"pybullet failed to draw: {error}") from error
+        finally:
+            engine.disconnect(client)
 
 
 def _add(engine: ModuleType, client: int, drawn: DrawnShape, file: Path) -> None:

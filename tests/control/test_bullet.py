@@ -5,18 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dynx import control
 from dynx.backends import installed_backends
 from dynx.control import (
     PD,
+    BulletPDMotor,
+    BulletPositionMotor,
+    BulletTorqueMotor,
+    BulletVelocityMotor,
     ComputedTorque,
     Measurement,
     MotorLag,
-    PDMotor,
-    PositionMotor,
-    TorqueMotor,
-    VelocityMotor,
 )
-from dynx.control.engine_motors import MotorCommand
+from dynx.control.bullet import BulletMotorCommand
 from dynx.engines.pybullet.canonical_urdf import bullet_tree
 from dynx.engines.pybullet.inertia import ballast_for
 from dynx.engines.pybullet.library import bullet
@@ -41,8 +42,8 @@ def client_of(robot: Model) -> SteppingClient:
 
 def test_position_and_velocity_motors_follow_a_motion() -> None:
     robot, motion = tutorial_robot(), tutorial_motion()
-    position = simulate(robot, PositionMotor(robot), motion, plant="pybullet", dt=2e-3)
-    velocity = simulate(robot, VelocityMotor(robot), motion, plant="pybullet", dt=2e-3)
+    position = simulate(robot, BulletPositionMotor(robot), motion, plant="pybullet", dt=2e-3)
+    velocity = simulate(robot, BulletVelocityMotor(robot), motion, plant="pybullet", dt=2e-3)
     # Each step ends at the wanted speed, which is that at its beginning: late by one step.
     np.testing.assert_allclose(velocity.v[1:], motion(velocity.t[:-1]).v, atol=1e-2)
     assert np.abs(position.error).max() < 2e-2
@@ -53,7 +54,7 @@ def test_position_and_velocity_motors_follow_a_motion() -> None:
 def test_a_motor_tells_the_engine_the_most_that_it_gives() -> None:
     robot, motion = tutorial_robot(), tutorial_motion()
     measurement, setpoint = Measurement(0.0, motion.start.q, motion.start.v), motion.start
-    for kind in (PositionMotor, VelocityMotor):
+    for kind in (BulletPositionMotor, BulletVelocityMotor):
         assert kind(robot).command(measurement, setpoint).forces is None
         limits = [10.0, 20.0, 30.0, 4.0, 5.0, np.inf]
         forces = kind(robot, force=limits).command(measurement, setpoint).forces
@@ -65,7 +66,7 @@ def test_a_motor_tells_the_engine_the_most_that_it_gives() -> None:
 def test_a_pd_motor_is_the_pd_law() -> None:
     robot, motion = tutorial_robot(), tutorial_motion()
     gains = {"kp": [300.0, 300.0, 200.0, 30.0, 30.0, 10.0], "kd": [30.0, 30.0, 20.0, 3.0, 3.0, 1.0]}
-    motor = simulate(robot, PDMotor(robot, **gains), motion, plant="pybullet", duration=0.2)
+    motor = simulate(robot, BulletPDMotor(robot, **gains), motion, plant="pybullet", duration=0.2)
     law = simulate(robot, PD(robot, **gains), motion, plant="pybullet", duration=0.2)
     assert apart(motor.q, law.q) <= PLANTS_AGREE
     assert apart(motor.tau, law.tau) <= PLANTS_AGREE
@@ -74,7 +75,7 @@ def test_a_pd_motor_is_the_pd_law() -> None:
 def test_a_torque_motor_is_the_law_within() -> None:
     robot, motion = tutorial_robot(), tutorial_motion()
     law = ComputedTorque(robot, kp=400, kd=40)
-    motor = simulate(robot, TorqueMotor(law), motion, plant="pybullet", duration=0.2)
+    motor = simulate(robot, BulletTorqueMotor(law), motion, plant="pybullet", duration=0.2)
     bare = simulate(robot, law, motion, plant="pybullet", duration=0.2)
     np.testing.assert_array_equal(motor.q, bare.q)
     assert apart(motor.tau, bare.tau) <= PLANTS_AGREE
@@ -84,19 +85,19 @@ def test_motors_of_the_engine_neither_wrap_a_state_nor_are_wrapped() -> None:
     robot = tutorial_robot()
     lag = MotorLag(PD(robot, kp=1.0, kd=1.0), control_dt=1e-3, time_constant=1e-3)
     with pytest.raises(
-        UnsupportedFeatureError, match="PD, with motor lag has a state, and TorqueMotor takes"
+        UnsupportedFeatureError, match="PD, with motor lag has a state, and BulletTorqueMotor takes"
     ):
-        TorqueMotor(lag)  # type: ignore[arg-type]  # the mistake that is tested
+        BulletTorqueMotor(lag)  # type: ignore[arg-type]  # the mistake that is tested
     with pytest.raises(ArgumentError, match="the inner controller is of type Model"):
-        TorqueMotor(robot)  # type: ignore[arg-type]  # the mistake that is tested
-    wrapped = MotorLag(PositionMotor(robot), control_dt=1e-3)
+        BulletTorqueMotor(robot)  # type: ignore[arg-type]  # the mistake that is tested
+    wrapped = MotorLag(BulletPositionMotor(robot), control_dt=1e-3)
     with pytest.raises(ControlError, match="plant='pybullet' only, and inside no other controller"):
         simulate(robot, wrapped, np.zeros(6), plant="pybullet", duration=0.01)
 
 
 def test_a_motor_that_may_not_pull_does_not() -> None:
     robot = tutorial_robot()
-    weak = simulate(robot, PositionMotor(robot, force=0.5), np.zeros(6), plant="pybullet", duration=0.2)
+    weak = simulate(robot, BulletPositionMotor(robot, force=0.5), np.zeros(6), plant="pybullet", duration=0.2)
     assert np.abs(weak.tau).max() == pytest.approx(0.5, rel=1e-9)
     assert np.abs(weak.error[-1]).max() > 0.1
 
@@ -104,9 +105,15 @@ def test_a_motor_that_may_not_pull_does_not() -> None:
 def test_motors_move_joints_whatever_else_acts() -> None:
     """Friction and pushes reach the plant past the motors, and are not reported as theirs."""
     robot = tutorial_robot()
-    free = simulate(robot, VelocityMotor(robot), np.zeros(6), plant="pybullet", duration=0.02)
+    free = simulate(robot, BulletVelocityMotor(robot), np.zeros(6), plant="pybullet", duration=0.02)
     damped = simulate(
-        robot, VelocityMotor(robot), np.zeros(6), plant="pybullet", duration=0.02, damping=5.0, v0=np.ones(6)
+        robot,
+        BulletVelocityMotor(robot),
+        np.zeros(6),
+        plant="pybullet",
+        duration=0.02,
+        damping=5.0,
+        v0=np.ones(6),
     )
     # The first step stops the arm: the motor gives all that is missing.
     np.testing.assert_allclose(damped.v[1], 0.0, atol=2e-2)
@@ -125,7 +132,7 @@ def test_the_tutorial_s_trap(mode: str) -> None:
         client.advance()
         fresh = client.joint_states()[1]
         client.place(rest, rest, None)
-        client.command(MotorCommand(mode, positions=rest, velocities=rest))
+        client.command(BulletMotorCommand(mode, positions=rest, velocities=rest))
         client.advance()
         client.place(rest, rest, None)
         client.add_torques(torque)
@@ -144,17 +151,30 @@ def test_the_tutorial_s_trap(mode: str) -> None:
 def test_what_motors_cannot_be() -> None:
     robot = tutorial_robot()
     with pytest.raises(UnsupportedFeatureError, match="mimic"):
-        PositionMotor(mixed_robot(mimic=True))
+        BulletPositionMotor(mixed_robot(mimic=True))
     with pytest.raises(GainError, match="position_gain"):
-        PositionMotor(robot, position_gain=-1.0)
+        BulletPositionMotor(robot, position_gain=-1.0)
     with pytest.raises(UnsupportedFeatureError, match="armature"):
-        simulate(robot, PositionMotor(robot), np.zeros(6), plant="pybullet", duration=0.01, armature=0.1)
+        simulate(
+            robot, BulletPositionMotor(robot), np.zeros(6), plant="pybullet", duration=0.01, armature=0.1
+        )
     floating = load("solo12", base="floating")
-    moved = simulate(floating, PositionMotor(floating), floating.neutral(), plant="pybullet", duration=0.02)
+    moved = simulate(
+        floating, BulletPositionMotor(floating), floating.neutral(), plant="pybullet", duration=0.02
+    )
     assert np.abs(moved.error[:, 6:]).max() < 1e-3
     client = client_of(robot)
     try:
         with pytest.raises(ArgumentError, match="one of POSITION_CONTROL"):
-            client.command(MotorCommand("MAGIC"))
+            client.command(BulletMotorCommand("MAGIC"))
     finally:
         client.close()
+
+
+@pytest.mark.parametrize("name", ["PositionMotor", "VelocityMotor", "PDMotor", "TorqueMotor", "EngineMotor"])
+def test_former_names_are_answered_with_those_of_today(name: str) -> None:
+    with pytest.raises(AttributeError, match=r"dynx\.control\.Bullet"):
+        getattr(control, name)
+    if name in ("PositionMotor", "VelocityMotor"):
+        found = control.controller_from_document(tutorial_robot(), {"controller": name, "force": 5.0})
+        assert type(found).__name__ == f"Bullet{name}"

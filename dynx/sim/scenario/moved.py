@@ -1,0 +1,31 @@
+"""Classes that documents name by an earlier module or name, and where they are now."""
+
+from __future__ import annotations
+
+MODULES = {
+    "dynx.control.engine_motors": "dynx.control.bullet",
+    "dynx.sim.clock": "dynx.steppers.clock",
+    "dynx.world.camera.view": "dynx.steppers.camera",
+    "dynx.world.layout": "dynx.steppers.layout",
+    "dynx.world.scene.material": "dynx.steppers.material",
+    "dynx.world.settings": "dynx.steppers.settings",
+    "dynx.world.state": "dynx.steppers.state",
+}
+"""Modules that moved with all their classes."""
+
+CLASSES = {
+    "dynx.control.bullet:EngineMotor": "dynx.control.bullet:BulletMotor",
+    "dynx.control.bullet:MotorCommand": "dynx.engines.pybullet.motors:BulletMotorCommand",
+    "dynx.control.bullet:PDMotor": "dynx.control.bullet:BulletPDMotor",
+    "dynx.control.bullet:PositionMotor": "dynx.control.bullet:BulletPositionMotor",
+    "dynx.control.bullet:TorqueMotor": "dynx.control.bullet:BulletTorqueMotor",
+    "dynx.control.bullet:VelocityMotor": "dynx.control.bullet:BulletVelocityMotor",
+}
+"""Classes by module and name, the module being the present one."""
+
+
+def present_name(name: str) -> str:
+    """Return the present ``module:Class`` of a class that a document names."""
+    module, colon, kind = name.partition(":")
+    name = MODULES.get(module, module) + colon + kind
+    return CLASSES.get(name, name)
