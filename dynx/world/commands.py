@@ -189,7 +189,7 @@ class Commands:
 
     def _sum(self, engine: Stepper, pushes: Mapping[int, Sequence[Wrench]]) -> Floats:
         """Return the force and the moment on every body (n_bodies, 6), in world axes."""
-        total = self._no_wrench.copy()
+        total: Floats = self._no_wrench.copy()
         for k, wrenches in pushes.items():
             T, center = engine.body_state(k).T_world_body, self._layout.bodies[k].center
             total[k] = np.sum([wrench.at(T, center) for wrench in wrenches], axis=0)

@@ -48,7 +48,7 @@ class BulletMotorCommand(EngineCommand):
     def checked(self, model: Model) -> BulletMotorCommand:
         refuse_mimic_joints(model, "use those of dynx.world")
         n = len(model.joint_names)
-        numbers: dict[str, list[float]] = {}
+        numbers: dict[str, Any] = {}
         for name in _BULLET_NAMES:
             if getattr(self, name) is not None:
                 array = checked_array(f"{name} of a motor command", getattr(self, name), n)
@@ -66,10 +66,11 @@ class BulletMotorCommand(EngineCommand):
         """Return the command with forces, and gains that are forces, in a unit of mass `unit` [kg]."""
         names = ["forces"]
         names += ["position_gains", "velocity_gains"] if self.mode == "PD_CONTROL" else []
-        given: dict[str, Any] = {name: getattr(self, name) for name in names}
-        return replace(
-            self, **{name: [x / unit for x in list_] for name, list_ in given.items() if list_ is not None}
-        )
+        given: dict[str, Any] = {}
+        for name in names:
+            numbers = getattr(self, name)
+            given[name] = None if numbers is None else [x / unit for x in numbers]
+        return replace(self, **given)
 
 
 def refuse_mimic_joints(model: Model, remedy: str) -> None:

@@ -13,6 +13,7 @@ from dynx.engines.drake.world.build import build_scene
 from dynx.engines.drake.world.contacts import parts_of_force
 from dynx.errors import SingularMassMatrixError, UnsupportedFeatureError
 from dynx.model.geometry import Box, Collision, HeightField
+from dynx.steppers.forces import Forces
 from dynx.steppers.layout import Layout
 from dynx.world import Material, PointToPoint, Scene, SceneBody, SceneRobot, Weld, World, box, ground, sphere
 from dynx.world.preparation import prepare
@@ -113,7 +114,7 @@ def test_mimic_joints_stay_coupled() -> None:
     engine = DrakeStepper(layout_of(Scene("s", robots=(SceneRobot("r", model),))), 1e-3, DEFAULTS)
     tau = np.zeros(model.nv)
     tau[-1] = 1.0
-    engine.step(200, [(0, tau, tau.tolist())])
+    engine.step(200, Forces([(0, tau)]))
     q, _ = engine._state()
     assert q[-1] > 1e-3
     assert_allclose(q[-1], q[-2], atol=1e-6)

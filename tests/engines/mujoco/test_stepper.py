@@ -15,6 +15,7 @@ from dynx.engines.mujoco.world.build import build_scene
 from dynx.engines.mujoco.world.filters import collision_masks, pairs_to_exclude
 from dynx.errors import SingularMassMatrixError
 from dynx.model.geometry import Box, Collision, HeightField, Sphere
+from dynx.steppers.forces import Forces
 from dynx.steppers.layout import Layout
 from dynx.world import Material, PointToPoint, Scene, SceneBody, SceneRobot, Weld, World, box, ground, sphere
 from dynx.world.preparation import prepare
@@ -91,8 +92,8 @@ def test_mimic_joints_stay_coupled_under_contact() -> None:
     engine = MujocoStepper(layout, 1e-3, DEFAULTS)
     tau = np.zeros(model.nv)
     tau[-1] = -5.0  # closes the gripper, against the lower limit of both fingers
-    engine.step(500, [(0, tau, tau.tolist())])
-    positions = np.array(engine._data.qpos[-2:])
+    engine.step(500, Forces([(0, tau)]))
+    positions = np.array(engine.data.qpos[-2:])
     assert_allclose(positions[0], positions[1], atol=1e-4)
     assert engine.robot_state(0).q[-1] < 1e-3
 
