@@ -10,7 +10,7 @@ of your own. Needs the extra ``envs``.
 """
 
 from dynx.envs.environment import TaskEnvironment
-from dynx.envs.randomization.randomization import Randomization
+from dynx.envs.randomization import Randomization
 from dynx.envs.registration import make_environment, register_task, register_tasks
 from dynx.envs.robot.state import State
 from dynx.envs.robot.task import RobotTask

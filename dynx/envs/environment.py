@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from dynx.envs.actions import checked_action
 from dynx.envs.library import Env
-from dynx.envs.randomization.randomization import Randomization
-from dynx.envs.randomization.variation import Variation
+from dynx.envs.randomization import Randomization
 from dynx.envs.task import Episodes, Task, checked_engine
+from dynx.envs.variation import Variation
 from dynx.errors import ArgumentError, ClosedError, EpisodeError, nearest, shown
 from dynx.model.numbers import whole_number
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from dynx.envs.environment import TaskEnvironment
 from dynx.envs.library import AutoresetMode, register, registry
-from dynx.envs.randomization.randomization import Randomization
+from dynx.envs.randomization import Randomization
 from dynx.envs.robot.array_task import ArrayTask
 from dynx.envs.task import Task
 from dynx.envs.vector.environment import RobotVectorEnvironment

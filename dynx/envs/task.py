@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.envs.library import Space
-from dynx.envs.randomization.draws import Parameter
-from dynx.envs.randomization.randomization import Randomization
+from dynx.envs.randomization import Parameter, Randomization
 from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError, nearest, shown
 
 Kind = TypeVar("Kind", bound="Task")

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from dynx.backends import backend
 from dynx.control.dynamics import EngineDynamics
 from dynx.envs.library import spaces
-from dynx.envs.randomization.draws import Parameter
-from dynx.envs.randomization.randomization import Randomization
+from dynx.envs.randomization import Parameter, Randomization
 from dynx.envs.robot.array_task import ArrayTask
 from dynx.envs.robot.pictures import draw_robot
 from dynx.envs.robot.state import State

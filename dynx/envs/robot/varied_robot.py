@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from dynx.compiled.scaled_links import ScaledLinks
-from dynx.envs.randomization.draws import Parameter, parameters_of, require_name
-from dynx.envs.randomization.randomization import Randomization
+from dynx.envs.randomization import Parameter, Randomization, parameters_of, require_name
 from dynx.envs.robot.array_task import ArrayTask
 from dynx.errors import UnsupportedFeatureError
 from dynx.model import Model

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dynx.envs.library import AutoresetMode, VectorEnv, batch_space, spaces
-from dynx.envs.randomization.randomization import Randomization
-from dynx.envs.randomization.variation import Variation
+from dynx.envs.randomization import Randomization
 from dynx.envs.robot.array_task import ArrayTask
 from dynx.envs.robot.pictures import draw_robot
 from dynx.envs.robot.varied_robot import VariedRobot
+from dynx.envs.variation import Variation
 from dynx.envs.vector.checks import checked_actions, checked_mode, checked_reset_mask, raise_defect
 from dynx.envs.vector.kernels import INVALID, VectorKernels
 from dynx.errors import ArgumentError, ClosedError, EpisodeError, ShapeError, nearest, shown

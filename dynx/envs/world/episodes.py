@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.envs.randomization.draws import Parameter
-from dynx.envs.randomization.randomization import Randomization
-from dynx.envs.randomization.scenes import VariedScene
+from dynx.envs.randomization import Parameter, Randomization
 from dynx.envs.task import Episodes, Outcome
 from dynx.envs.world.scene_task import Episode, SceneTask
+from dynx.envs.world.varied_scene import VariedScene
 from dynx.world import Scene, Snapshot, World
 
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from dynx.sim.batch.settling import Settling
 from dynx.sim.batch.stopping import BatchStops
-from dynx.sim.loop.noise import BLOCK_STEPS, NoiseStream, Purpose
 from dynx.simd.kernel import Kernel
 from dynx.spatial.scalar import Floats
 from dynx.steppers.clock import Clock
+from dynx.steppers.random import BLOCK_STEPS, Purpose, Streams
 from dynx.trajectory.base import Setpoint
 
 
@@ -115,7 +115,7 @@ class _Run:
         self._noise: dict[str, Floats] = {}
         self._drawn: dict[Purpose, Floats] = {}
         if part.noise is not None:
-            self._stream = NoiseStream(part.noise.seed)
+            self._stream = Streams(part.noise.seed)
             blocks, size = (self._rows, BLOCK_STEPS), part.noise.random_size
             if part.noise.deviations is not None:
                 self._drawn[Purpose.MEASUREMENT] = np.zeros((*blocks, 2, nv))
@@ -198,7 +198,7 @@ class _Run:
             left = self._part.clock.n_controls - number
             for purpose, drawn in self._drawn.items():
                 for row in range(self._part.count):
-                    self._stream.draw(noise.first + row, number, drawn[row, :left], purpose)
+                    self._stream.normal(purpose, noise.first + row, number // BLOCK_STEPS, drawn[row, :left])
         if noise.deviations is not None:
             drawn = self._drawn[Purpose.MEASUREMENT]
             for half, (name, deviation) in enumerate(

@@ -1,4 +1,4 @@
-"""Measurement noise and random numbers of controllers: streams of normal numbers for each rollout.
+"""Measurement noise and random numbers of controllers: normal numbers of a stream for each rollout.
 
 The numbers depend only on the seed, the rollout and the control step. So a rollout of a batch has the same
 noise in any partition of the batch, on any processor and thread, and when it is simulated alone.
@@ -7,30 +7,18 @@ noise in any partition of the batch, on any processor and thread, and when it is
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
-from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.control.gains import checked_gain
 from dynx.model import Model
 from dynx.model.numbers import whole_number
 from dynx.spatial.scalar import Floats
-
-BLOCK_STEPS = 64
-"""Number of control steps whose noise is drawn from one state of the generator."""
+from dynx.steppers.random import Purpose, stream_normals
 
 MAX_ROLLOUT = 2**63 - 1
 """Largest number of a rollout: half of the range of a word of the generator's key, so that the numbers of
 a batch, which follow it, still fit."""
-
-
-class Purpose(IntEnum):
-    """Use of normal numbers; each has a stream of its own."""
-
-    MEASUREMENT = 0
-    CONTROLLER = 1
 
 
 @dataclass(frozen=True)
@@ -70,38 +58,4 @@ class Noise:
 
     def numbers(self, purpose: Purpose, shape: tuple[int, ...]) -> Floats:
         """Return the normal numbers of this rollout, with a row for each control step."""
-        stream, drawn = NoiseStream(self.seed), np.empty(shape)
-        for first in range(0, len(drawn), BLOCK_STEPS):
-            stream.draw(self.rollout, first, drawn[first : first + BLOCK_STEPS], purpose)
-        return drawn
-
-
-class NoiseStream:
-    """Standard normal numbers by Philox4x64 (Salmon et al., Parallel Random Numbers, 2011).
-
-    The generator's key is the seed and the number of the rollout; its counter is the purpose of the numbers
-    and the block of control steps.
-    """
-
-    def __init__(self, seed: int) -> None:
-        self._bits: Any = np.random.Philox(0)
-        self._normal = np.random.Generator(self._bits).standard_normal
-        # The setter copies these arrays, so one dictionary can be reused for all states.
-        # In float64, which NumPy makes of a uint64 and an int, large numbers of rollouts would be rounded.
-        self._key = np.zeros(2, dtype=np.uint64)
-        self._key[0] = np.random.SeedSequence(seed).generate_state(1, np.uint64)[0]
-        self._counter = np.zeros(4, dtype=np.uint64)
-        self._state: dict[str, Any] = {
-            **self._bits.state,
-            "state": {"counter": self._counter, "key": self._key},
-            "buffer": np.zeros(4, dtype=np.uint64),
-            "buffer_pos": 4,
-        }
-
-    def draw(self, rollout: int, control_step: int, numbers: Floats, purpose: Purpose) -> None:
-        """Fill `numbers` (n, ...) from `control_step` on, which must be the first of a block; n is at most
-        `BLOCK_STEPS`."""
-        self._key[1] = rollout
-        self._counter[2:] = purpose, control_step // BLOCK_STEPS
-        self._bits.state = self._state
-        self._normal(out=numbers)
+        return stream_normals(self.seed, purpose, self.rollout, shape)

@@ -6,10 +6,11 @@ from typing import Any
 
 from dynx.control.base import Controller, Measurement
 from dynx.model import Model
-from dynx.sim.loop.noise import Noise, Purpose
+from dynx.sim.loop.noise import Noise
 from dynx.sim.step import measure
 from dynx.spatial.scalar import Floats
 from dynx.steppers.clock import Clock
+from dynx.steppers.random import Purpose
 
 
 class Sensors:

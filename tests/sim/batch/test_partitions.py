@@ -19,12 +19,12 @@ from dynx.model.loading import load
 from dynx.sim import BatchRollouts, Noise, Push, simulate, simulate_batch
 from dynx.sim.batch import batch as batch_module
 from dynx.sim.batch import kernel as kernel_module
-from dynx.sim.loop.noise import BLOCK_STEPS
 from dynx.sim.loop.sensors import Sensors
 from dynx.simd.cache import load_kernel
 from dynx.simd.emit import Settings
 from dynx.spatial.scalar import Floats
 from dynx.steppers.clock import Clock
+from dynx.steppers.random import BLOCK_STEPS
 from tests.sim.batch.batches import assert_same
 
 ARM = load("ur5")

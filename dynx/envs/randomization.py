@@ -1,0 +1,271 @@
+"""`Randomization`: the parameters that an environment draws for each episode (domain randomisation)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
+from zlib import crc32
+
+import numpy as np
+
+from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
+from dynx.model.numbers import MAX_MAGNITUDE, is_real
+from dynx.spatial.scalar import Floats
+from dynx.steppers.random import BLOCK_STEPS, Purpose, Streams
+
+Range = float | Sequence[float] | Mapping[str, Sequence[float]]
+"""One number; ``(low, high)`` for uniform numbers between them; ``{"log_uniform": (low, high)}``, or
+``{"normal": (mean, deviation)}``, whose numbers are clamped at three deviations."""
+
+UNIFORM, LOG_UNIFORM, NORMAL = "uniform", "log_uniform", "normal"
+KINDS = (UNIFORM, LOG_UNIFORM, NORMAL)
+
+ANY, NOT_NEGATIVE, POSITIVE = "of any sign", "of at least 0", "above 0"
+"""Numbers that a parameter can have."""
+
+MAX_DEVIATIONS = 3.0
+"""Distance from the mean, in deviations, at which normal numbers are clamped."""
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """A distribution of one of the `KINDS` with its two numbers."""
+
+    kind: str
+    first: float
+    second: float
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Least and greatest number that can be drawn."""
+        if self.kind == NORMAL:
+            reach = MAX_DEVIATIONS * self.second
+            return self.first - reach, self.first + reach
+        return self.first, self.second
+
+    def numbers(self, random: Floats) -> Floats:
+        """Return numbers (...) from standard normal ones for `NORMAL`, else from those uniform in [0, 1)."""
+        if self.kind == NORMAL:
+            return np.asarray(self.first + self.second * np.clip(random, -MAX_DEVIATIONS, MAX_DEVIATIONS))
+        if self.kind == LOG_UNIFORM:
+            return np.asarray(self.first * (self.second / self.first) ** random)
+        return self.first + (self.second - self.first) * random
+
+
+def is_distribution(given: object) -> bool:
+    """Check whether a value is meant as a distribution, and not as one for each of several names."""
+    return not isinstance(given, Mapping) or (len(given) == 1 and next(iter(given)) in KINDS)
+
+
+def read_distribution(name: str, given: Any, valid: str = NOT_NEGATIVE) -> Distribution:
+    """Return the distribution that a user gave, whose numbers are `valid`: `ANY`, `NOT_NEGATIVE`, `POSITIVE`.
+
+    Raises ArgumentError, which names the parameter, for anything else.
+    """
+    kind, pair = UNIFORM, (given, given) if is_real(given) else given
+    if isinstance(given, Mapping):
+        if len(given) != 1:
+            raise ArgumentError(
+                f"{name} is {shown(given)}; wanted one of {', '.join(KINDS)} with two numbers"
+            )
+        ((kind, pair),) = given.items()
+        if kind not in KINDS:
+            raise UnknownNameError(f"{name} has no distribution {shown(kind)}{nearest(str(kind), KINDS)}")
+    if (
+        not isinstance(pair, Sequence | np.ndarray)
+        or isinstance(pair, str)
+        or len(pair) != 2
+        or not all(is_real(x) and abs(x) < MAX_MAGNITUDE for x in pair)
+    ):
+        raise ArgumentError(
+            f"{name} is {shown(given)}; wanted a number, (low, high), or {{'log_uniform': (low, high)}} or "
+            "{'normal': (mean, deviation)}"
+        )
+    found = Distribution(kind, float(pair[0]), float(pair[1]))
+    low, high = found.bounds
+    if low > high:
+        fault = "a deviation below 0" if kind == NORMAL else "a lower bound above the upper one"
+        raise ArgumentError(f"{name} is {shown(given)}, with {fault}")
+    if kind == LOG_UNIFORM:
+        valid = POSITIVE
+    if (valid != ANY and low < 0.0) or (valid == POSITIVE and low == 0.0):
+        raise ArgumentError(f"{name} is {shown(given)}, which reaches {low:g}; wanted numbers {valid}")
+    return found
+
+
+Ranges = Range | Mapping[str, Range]
+"""One distribution for all parts, of which an episode draws one number; or one for each named part."""
+
+PAYLOAD_FIELDS = ("frame", "mass", "center")
+AXES = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Randomization:
+    """Parameters that each episode draws; None for those that keep the values of the task.
+
+    A distribution is a number, ``(low, high)`` for uniform numbers, ``{"log_uniform": (low, high)}``, or
+    ``{"normal": (mean, deviation)}`` clamped at three deviations. A mapping from names to distributions draws
+    a number for each part that it names.
+
+    The robot that moves has the drawn parameters; the task computes with the nominal ones (a torque of
+    gravity, for example), as a controller does. Raises ArgumentError (and its kinds) for numbers that no
+    robot has.
+    """
+
+    mass_scale: Ranges | None = None
+    """Factor on mass and inertia of links, by name; in worlds also of bodies."""
+    payload: Mapping[str, Any] | None = None
+    """Point mass fixed to a frame: ``{"frame": "tool0", "mass": (0.0, 2.0), "center": (0.0, 0.0, 0.05)}``,
+    with a distribution of the mass [kg] and one of each coordinate in the frame [m]."""
+    joint_damping: Ranges | None = None
+    """Viscous damping of joints, by name [N m s/rad or N s/m]."""
+    joint_friction: Ranges | None = None
+    """Dry friction of joints, by name [N m or N]."""
+    friction_scale: Ranges | None = None
+    """Factor on the coefficients of contact friction of links and bodies, by name; in worlds only."""
+    delay: Range | None = None
+    """Time from an action until it acts [s]."""
+    observation_noise: Range | Mapping[int | str, Range] | None = None
+    """Standard deviation of Gaussian noise on observations: of all entries, or by the number of the entry."""
+    action_noise: Range | Mapping[int | str, Range] | None = None
+    """Standard deviation of Gaussian noise on the numbers of actions, which are clamped to their space."""
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            self.distributions(each.name)
+        if not any(getattr(self, each.name) is not None for each in fields(self)):
+            known = ", ".join(each.name for each in fields(self))
+            raise ArgumentError(f"a randomization names no parameter; known: {known}")
+
+    @classmethod
+    def read(cls, given: Randomization | Mapping[str, Any]) -> Randomization:
+        """Return a randomization given itself, or as a mapping of its fields.
+
+        Raises UnknownNameError for a field that does not exist, with the nearest one.
+        """
+        if isinstance(given, Randomization):
+            return given
+        if not isinstance(given, Mapping):
+            raise ArgumentError(
+                f"randomize is {shown(given)}; wanted a dict such as {{'mass_scale': (0.8, 1.2)}}"
+            )
+        known = [each.name for each in fields(cls)]
+        for name in given:
+            if name not in known:
+                raise UnknownNameError(f"randomize has no parameter {shown(name)}{nearest(str(name), known)}")
+        return cls(**given)
+
+    def distributions(self, name: str) -> dict[str | None, Distribution]:
+        """Return the distributions of a field by the name of the part, which is None for all parts."""
+        given = getattr(self, name)
+        if given is None:
+            return {}
+        if name == "payload":
+            return _payload(given)
+        valid = POSITIVE if name == "mass_scale" else NOT_NEGATIVE
+        if is_distribution(given) or name == "delay":
+            return {None: read_distribution(name, given, valid)}
+        if not given:
+            raise ArgumentError(f"{name} names no part; wanted a distribution, or one for each of some names")
+        return {
+            str(part): read_distribution(f"{name} of {shown(part)}", each, valid)
+            for part, each in given.items()
+        }
+
+    @property
+    def payload_frame(self) -> str | None:
+        """Frame to which the payload is fixed."""
+        return None if self.payload is None else str(self.payload["frame"])
+
+
+def _payload(given: Any) -> dict[str | None, Distribution]:
+    """Return the distributions of the mass and of the coordinates x, y and z of a payload."""
+    if not isinstance(given, Mapping):
+        raise ArgumentError(f"payload is {shown(given)}; wanted {{'frame': name, 'mass': (low, high)}}")
+    for name in given:
+        if name not in PAYLOAD_FIELDS:
+            raise UnknownNameError(f"payload has no {shown(name)}{nearest(str(name), PAYLOAD_FIELDS)}")
+    for name in PAYLOAD_FIELDS[:2]:
+        if name not in given:
+            raise ArgumentError(f"payload has no {name}: {shown(given)}")
+    if not isinstance(given["frame"], str):
+        raise ArgumentError(
+            f"the frame of the payload is {shown(given['frame'])}; wanted the name of a frame"
+        )
+    center = given.get("center", (0.0, 0.0, 0.0))
+    if not isinstance(center, Sequence) or isinstance(center, str) or len(center) != len(AXES):
+        raise ArgumentError(f"the center of the payload is {shown(center)}; wanted three numbers or ranges")
+    found: dict[str | None, Distribution] = {
+        "mass": read_distribution("the mass of the payload", given["mass"])
+    }
+    for axis, each in zip(AXES, center, strict=True):
+        found[axis] = read_distribution(f"{axis} of the payload", each, ANY)
+    return found
+
+
+class Parameter(NamedTuple):
+    """A parameter that episodes draw."""
+
+    field: str
+    """Field of `Randomization`."""
+    part: str | None
+    """Link, joint, body or entry that has it; None for all of them."""
+    distribution: Distribution
+    step: float = 0.0
+    """Distance of the values to which it is rounded; 0 for none."""
+
+    @property
+    def name(self) -> str:
+        """Name in `info`, such as ``mass_scale.pole``."""
+        return self.field if self.part is None else f"{self.field}.{self.part}"
+
+
+def parameters_of(
+    randomization: Randomization,
+    fields: Iterable[str],
+    require: Callable[[str, str], str] = lambda _, part: part,
+    delay_step: float = 0.0,
+) -> tuple[Parameter, ...]:
+    """Return the parameters of these fields; a delay is rounded to multiples of `delay_step`.
+
+    ``require(field, part)`` returns the name of a part, or raises.
+    """
+    return tuple(
+        Parameter(
+            field,
+            None if part is None else require(field, part),
+            distribution,
+            delay_step if field == "delay" else 0.0,
+        )
+        for field in fields
+        for part, distribution in randomization.distributions(field).items()
+    )
+
+
+def require_name(kind: str, name: str, known: Sequence[str]) -> str:
+    """Return the name. Raises UnknownNameError for one that is not known."""
+    if name not in known:
+        raise UnknownNameError(f"no {kind} {shown(name)}{nearest(name, known)}")
+    return name
+
+
+class Draws:
+    """Values of parameters in the episodes of environments."""
+
+    def __init__(self, parameters: Sequence[Parameter]) -> None:
+        self.parameters = tuple(parameters)
+        self.names = tuple(each.name for each in parameters)
+        # By the name, so that a value does not depend on what else is drawn.
+        self._lanes = [crc32(name.encode()) for name in self.names]
+
+    def values(self, streams: Streams, row: int, block: int) -> Floats:
+        """Return the values (BLOCK_STEPS, k) in the episodes of a block, in the environment number `row`."""
+        values, random = np.empty((BLOCK_STEPS, len(self.parameters))), np.empty(BLOCK_STEPS)
+        for column, (each, lane) in enumerate(zip(self.parameters, self._lanes, strict=True)):
+            draw = streams.normal if each.distribution.kind == NORMAL else streams.uniform
+            draw(Purpose.PARAMETERS, lane, block, random, row)
+            drawn = each.distribution.numbers(random)
+            values[:, column] = np.round(drawn / each.step) * each.step if each.step else drawn
+        return values
