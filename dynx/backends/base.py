@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.backends.evaluation import common_batch
-from dynx.backends.hooks import apply_matrix, solve_mass_matrix
+from dynx.backends.hooks import apply_matrix, solution_or_nan
 from dynx.backends.quantity_calls import ALL_FRAMES, ONE_FRAME, Forces, QuantityCalls
 from dynx.errors import ArgumentError
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, shift_jacobian
@@ -320,7 +320,7 @@ class Backend(QuantityCalls):
         if not (joint_dynamics and self._joint_terms.has_armature):
             return self._evaluate("forward_dynamics", (q, v, tau))
         M = self.mass_matrix(q, joint_dynamics=joint_dynamics)
-        a = solve_mass_matrix(M, tau - self.bias_torque(q, v))
+        a = solution_or_nan(M, tau - self.bias_torque(q, v))
         return self._arguments.finite_acceleration(a)
 
     def mass_matrix(self, q: ArrayLike, *, joint_dynamics: bool = False) -> Floats:

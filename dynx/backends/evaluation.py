@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dynx.backends.hooks import solve_mass_matrix
+from dynx.backends.hooks import solution_or_nan
 from dynx.errors import ShapeError
 from dynx.model import Mechanism
 from dynx.spatial.scalar import Floats
@@ -106,13 +106,17 @@ class Evaluation:
         self, mass_matrix: Callable[..., Any], bias_torque: Callable[..., Any]
     ) -> Callable[..., Floats]:
         """Return the function of a backend, q, v and tau in model coordinates that solves for the
-        acceleration of one sample, given the functions of two hooks."""
+        acceleration of one sample, given the functions of two hooks; NaN where it is not unique."""
+        if self._coupling is None:
+            return lambda backend, q, v, tau: solution_or_nan(
+                np.asarray(mass_matrix(backend, q)), tau - bias_torque(backend, q, v)
+            )
         expand_q, S, S_T = self._expansion_of_sample(), self._S, self._S_T
 
         def solved(backend: object, q: Floats, v: Floats, tau: Floats) -> Floats:
             q, v = expand_q(q), S.dot(v)
             M = S_T.dot(mass_matrix(backend, q)).dot(S)
-            return solve_mass_matrix(M, tau - bias_torque(backend, q, v).dot(S))
+            return solution_or_nan(M, tau - bias_torque(backend, q, v).dot(S))
 
         return solved
 

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.backends.quantities import QUANTITIES, Quantity
+from dynx.backends.solvability import magnitudes_of_rows, rounding_of_eigenvalues
 from dynx.backends.straight import BindingCall
 from dynx.errors import SingularMassMatrixError
 from dynx.model import Mechanism, Model
@@ -147,8 +148,8 @@ class EngineHooks(ABC):
         return self._mass_matrix(q), self._bias_torque(q, v)
 
     def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        """Return the acceleration a (..., nv) with M a + bias = tau."""
-        return solve_mass_matrix(self._mass_matrix(q), tau - self._bias_torque(q, v))
+        """Return the acceleration a (..., nv) with M a + bias = tau, not finite where M is singular."""
+        return solution_or_nan(self._mass_matrix(q), tau - self._bias_torque(q, v))
 
     def _kinetic_energy(self, q: Floats, v: Floats) -> Floats:
         """Return v' M v / 2, (...,)."""
@@ -180,25 +181,36 @@ def _with_details(hook: Callable[..., Any], arguments: int, *details: Any) -> Ca
 
 
 def solve_mass_matrix(M: Floats, torque: Floats) -> Floats:
-    """Solve M a = torque for a. Raises SingularMassMatrixError where M is singular to double precision.
+    """Return a (..., nv) with M a = torque. Raises SingularMassMatrixError where M is singular to rounding.
 
-    M is scaled to a unit diagonal first. It may be indefinite, because the inertias of a file are used as
-    they are; a unique acceleration still exists then.
+    M (..., nv, nv) may be indefinite, because the inertias of a file are used as they are.
+    """
+    a = solution_or_nan(M, torque)
+    if not np.isfinite(a).all():
+        raise SingularMassMatrixError("the mass matrix is singular: no unique acceleration exists")
+    return a
+
+
+def solution_or_nan(M: Floats, torque: Floats) -> Floats:
+    """Return a (..., nv) with M a = torque, NaN at samples where M is singular to rounding.
+
+    M is scaled to a unit diagonal first, and singular if its smallest eigenvalue is
+    `rounding_of_eigenvalues`. Pivots are chosen by size, whatever the signs of the eigenvalues are.
     """
     if M.ndim == 2 and torque.ndim == 1:
         a = _definite_solution(M, torque)
         if a is not None:
             return a
-    diagonal = np.abs(np.diagonal(M, axis1=-2, axis2=-1))
-    size = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+    size = magnitudes_of_rows(M)
     scaled = M / (size[..., :, None] * size[..., None, :])
-    try:
-        smallest = np.min(np.abs(np.linalg.eigvalsh(scaled)), axis=-1, initial=np.inf)
-        if np.all(smallest > M.shape[-1] * np.finfo(np.float64).eps):
-            return np.asarray(np.linalg.solve(scaled, (torque / size)[..., None])[..., 0] / size)
-    except np.linalg.LinAlgError:
-        pass  # NaN or infinity in M also means that there is no acceleration.
-    raise SingularMassMatrixError("the mass matrix is singular: no unique acceleration exists")
+    identity = np.eye(M.shape[-1])
+    regular = np.asarray(np.isfinite(scaled).all(axis=(-2, -1)))
+    scaled = np.where(regular[..., None, None], scaled, identity)
+    values = np.abs(np.linalg.eigvalsh(scaled))
+    regular = regular & (np.min(values, axis=-1, initial=np.inf) > rounding_of_eigenvalues(values))
+    scaled = np.where(regular[..., None, None], scaled, identity)
+    a = np.linalg.solve(scaled, (torque / size)[..., None])[..., 0] / size
+    return np.where(regular[..., None], a, np.nan)
 
 
 def _definite_solution(M: Floats, torque: Floats) -> Floats | None:

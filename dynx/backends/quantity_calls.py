@@ -8,7 +8,7 @@ arguments, quantities that dynx derives) is checked argument by argument and eva
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from dynx.backends.arguments import Arguments
 from dynx.backends.evaluation import Evaluation, Reduction, common_batch
-from dynx.backends.hooks import EngineHooks, solve_mass_matrix, untranslated
+from dynx.backends.hooks import EngineHooks, solution_or_nan, untranslated
 from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.backends.lifecycle import Lifecycle
 from dynx.backends.quantities import QUANTITIES
@@ -66,6 +66,11 @@ class QuantityCalls(Lifecycle, EngineHooks):
         # evaluated.
         self._straight: dict[Key, StraightCall] = {}
 
+    @cached_property
+    def _eliminates(self) -> bool:
+        """True if forward dynamics is evaluated by its hook, rather than solved for by the mass matrix."""
+        return self._uncoupled
+
     def _evaluate(self, key: Key, arguments: tuple[Any, ...]) -> Floats:
         """Check the arguments of the quantity `key`, with any leading axes, and evaluate it; an acceleration
         that is solved for is finite."""
@@ -95,7 +100,8 @@ class QuantityCalls(Lifecycle, EngineHooks):
         if plan.solves:
             common_batch(q, *rates)
             self._solvability.refuse_singular(False)
-            if not self._uncoupled:
+            if not self._eliminates:
+                self._store_solution()
                 return self._arguments.finite_acceleration(self._solved_acceleration(q, *rates))
         hook: Callable[..., Any] | None = getattr(self, plan.hook, None)
         if hook is None:
@@ -107,18 +113,27 @@ class QuantityCalls(Lifecycle, EngineHooks):
             binding = self._binding_call(plan.hook) if self._uncoupled else None
             self._store_straight(key, function, len(arguments), solves=plan.solves, binding=binding)
         result = self._evaluation(hook, plan.result_shape, q, *rates, args=details, reduce=plan.reduction)
-        return self._arguments.finite_acceleration(result) if plan.solves else result
+        if not plan.solves:
+            return result
+        found = np.isfinite(result).all(axis=-1, keepdims=True)
+        if not found.all():
+            # An engine may divide by a pivot of zero, although the mass matrix is regular.
+            result = np.where(found, result, self._solved_acceleration(q, *rates))
+        return self._arguments.finite_acceleration(result)
 
     def _solved_acceleration(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        """Solve for the acceleration of a robot with mimic joints, which reduce the equation of motion."""
+        """Solve for the acceleration by the reduced mass matrix; NaN where it is singular."""
+        return solution_or_nan(
+            self._evaluate("mass_matrix", (q,)), tau - self._evaluate("bias_torque", (q, v))
+        )
+
+    def _store_solution(self) -> None:
+        """Store the function that solves for the acceleration of one sample."""
         hooks = ("_mass_matrix", "_bias_torque")
         if vars(self).keys().isdisjoint(hooks):
             functions = (untranslated(getattr(type(self), hook)) for hook in hooks)
             function = self._evaluation.solution_of_sample(*functions)
             self._store_straight("forward_dynamics", function, 3, solves=True)
-        return solve_mass_matrix(
-            self._evaluate("mass_matrix", (q,)), tau - self._evaluate("bias_torque", (q, v))
-        )
 
     def _store_straight(
         self,

@@ -58,12 +58,37 @@ class SingularCoordinates(NamedTuple):
         return ", and ".join(clauses)
 
 
+def magnitudes_of_rows(M: Floats) -> Floats:
+    """Return d (..., nv) by whose products d_i d_j the entries of a mass matrix are divided to scale it.
+
+    The diagonal is then 1 or -1. Where it is zero, which an impossible inertia can cause beside entries that
+    are not, the largest entry of the row is 1; for a row of zeros d is 1.
+    """
+    size = np.sqrt(np.abs(np.diagonal(M, axis1=-2, axis2=-1)))
+    if size.all():
+        return np.asarray(size)
+    coupled = np.max(np.abs(M) / np.where(size > 0.0, size, np.inf)[..., None, :], axis=-1)
+    # Rows whose entries are all in columns with a diagonal of zero.
+    largest = np.where(coupled > 0.0, coupled, np.sqrt(np.max(np.abs(M), axis=-1)))
+    return np.where(size > 0.0, size, np.where(largest > 0.0, largest, 1.0))
+
+
+def rounding_of_eigenvalues(values: Floats) -> Floats:
+    """Return the rounding error (...,) of eigenvalues (..., n) of a mass matrix with a diagonal of ones.
+
+    An eigenvalue of that magnitude is indistinguishable from zero. Without negative eigenvalues their sum is
+    n, and so none is larger.
+    """
+    largest = np.max(np.abs(values), axis=-1, initial=0.0)
+    return np.asarray(np.finfo(np.float64).eps * np.maximum(values.shape[-1], largest))
+
+
 @lru_cache(maxsize=64)
 def singular_coordinates(model: Model, joint_dynamics: bool = False) -> SingularCoordinates:
     """Return the coordinates that make M singular at every configuration.
 
-    Determined at three random configurations, where M scaled to a unit diagonal has an eigenvalue below nv
-    times the rounding error of its entries. The result is cached, because it takes as long as some hundred
+    Determined at three random configurations, where M scaled to a unit diagonal has an eigenvalue below four
+    times `rounding_of_eigenvalues`. The result is cached, because it takes as long as some hundred
     steps of a simulation.
     """
     q = model.random(np.random.default_rng(0), 3)
@@ -92,17 +117,17 @@ def _listed(names: tuple[str, ...]) -> str:
 
 
 def _null_coordinates(M: Floats) -> tuple[set[int], set[int]]:
-    """Return the numbers of the coordinates with a diagonal of zero, and those of other null vectors."""
-    diagonal = np.diagonal(M)
-    if not len(diagonal):
+    """Return the numbers of the coordinates with a row of zeros, and those of other null vectors."""
+    if not len(M):
         return set(), set()
-    smallest = 1e-20 * max(float(np.max(np.abs(diagonal))), np.finfo(float).tiny)
-    massless = np.flatnonzero(diagonal <= smallest)
-    scale = 1.0 / np.sqrt(np.where(diagonal > smallest, diagonal, 1.0))
+    largest = max(float(np.max(np.abs(M))), np.finfo(float).tiny)
+    # Without negative eigenvalues an entry is at most the geometric mean of two entries of the diagonal.
+    massless = (np.abs(np.diagonal(M)) <= 1e-20 * largest) & (np.max(np.abs(M), axis=1) <= 1e-10 * largest)
+    scale = np.where(massless, 1.0, 1.0 / magnitudes_of_rows(M))
     scaled = M * scale[:, None] * scale[None, :]
     if not np.isfinite(scaled).all():
         return set(), set()  # overflow: undecided
     values, vectors = np.linalg.eigh(scaled)
-    null = vectors[:, np.abs(values) < len(M) * 4 * np.finfo(float).eps]
+    null = vectors[:, np.abs(values) < 4 * rounding_of_eigenvalues(values)]
     mixed = np.flatnonzero(np.max(np.abs(null), axis=1, initial=0.0) > 1e-3)
-    return set(massless.tolist()), set(mixed.tolist())
+    return set(np.flatnonzero(massless).tolist()), set(mixed.tolist())

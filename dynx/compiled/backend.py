@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -33,8 +34,9 @@ from dynx.compiled.kernels import (
     routines_evaluate,
 )
 from dynx.compiled.looped.kernels import looped_kernel
-from dynx.compiled.simplification import has_physical_inertias, simplify_mechanism
+from dynx.compiled.simplification import simplify_mechanism
 from dynx.model import Model
+from dynx.rbd.elimination import has_physical_inertias
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
 from dynx.simd.image import COMPILE_LOCK
 from dynx.simd.kernel import Kernel
@@ -70,14 +72,16 @@ class CompiledBackend(Backend):
         self._arguments = BatchArguments(model)
         self._simplified = simplify_mechanism(self._mechanism)
         self._all_frames = tuple(range(len(self._frame_index)))
-        # Otherwise the acceleration is solved for, by the mass matrix and the bias torque.
-        self._eliminates = self._uncoupled or (
-            has_physical_inertias(self._mechanism) and compiles(self._simplified, "forward_dynamics")
-        )
         self._calls: dict[object, KernelCall | NumericCall | CoupledCall] = {}
         self._chain_kernels: dict[object, Kernel] = {}
         # The same calls under the arguments of the public methods, which saves looking up names.
         self._public_calls: dict[object, Call] = {}
+
+    @cached_property
+    def _eliminates(self) -> bool:
+        return has_physical_inertias(self._mechanism) and (
+            self._uncoupled or compiles(self._simplified, "forward_dynamics")
+        )
 
     @property
     def threads(self) -> int:
@@ -230,7 +234,7 @@ class CompiledBackend(Backend):
         return call
 
     def _unchecked_callable(self, quantity: str) -> Call | None:
-        if not self._uncoupled:
+        if not self._uncoupled or (quantity == "forward_dynamics" and not self._eliminates):
             return None
         self._arguments.refuse_closed()
         call = self._found_call(quantity)

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from dynx.model import Mechanism
-from dynx.rbd.aba import inertia_matrix
 from dynx.rbd.base_parameters import align_frames
 from dynx.spatial.scalar import Floats
 
@@ -36,13 +35,3 @@ def _zero_rounding_residue(mechanism: Mechanism) -> Mechanism:
 
 def _rounded_to_zero(R: Floats) -> Floats:
     return np.where(np.abs(R) < 0.5 * np.finfo(np.float64).eps, 0.0, R)
-
-
-def has_physical_inertias(mechanism: Mechanism) -> bool:
-    """Check whether every body's inertia is positive semidefinite; then every mass matrix is too.
-
-    Elimination without pivoting is then as accurate as the matrix allows.
-    """
-    inertias = [mechanism.root, *(body.inertia for body in mechanism.bodies)]
-    values = [np.linalg.eigvalsh(inertia_matrix(inertia)) for inertia in inertias]
-    return all(v[0] >= -8 * np.finfo(np.float64).eps * abs(v[-1]) for v in values)

@@ -9,9 +9,24 @@ from __future__ import annotations
 import numpy as np
 
 from dynx.model import Mechanism
+from dynx.rbd.aba import inertia_matrix
 from dynx.rbd.kinematics import ancestry
 from dynx.rbd.linear import Factors, ldl_factors, solve_ldl
 from dynx.spatial.scalar import Array
+
+
+def has_physical_inertias(mechanism: Mechanism) -> bool:
+    """Check whether every moving body's inertia is positive semidefinite; then every mass matrix is too.
+
+    Elimination without pivoting is then as accurate as the matrix allows, with a pivot of zero only where the
+    matrix is singular. An indefinite matrix may be regular and have such a pivot.
+    """
+    root = [mechanism.root] if mechanism.floating else []
+    inertias = [*root, *(body.inertia for body in mechanism.bodies)]
+    if not inertias:
+        return True
+    values = np.linalg.eigvalsh(np.stack([inertia_matrix(inertia) for inertia in inertias]))
+    return bool(np.all(values[:, 0] >= -8 * np.finfo(np.float64).eps * np.abs(values[:, -1])))
 
 
 def filled_entries(mechanism: Mechanism) -> tuple[int, list[tuple[int, int]]]:

@@ -6,6 +6,7 @@ long. It has neither an engine nor state, so any number of threads may use it.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from dynx._version import __version__
 from dynx.backends.base import Backend
 from dynx.rbd import aba, centroidal, crba, kinematics, rnea
+from dynx.rbd.elimination import has_physical_inertias
 from dynx.spatial.scalar import Floats
 
 
@@ -31,6 +33,10 @@ class ReferenceBackend(Backend):
     def engine_version(self) -> str:
         """``dynx`` and its version."""
         return f"dynx {__version__}"
+
+    @cached_property
+    def _eliminates(self) -> bool:
+        return self._uncoupled and has_physical_inertias(self._mechanism)
 
     def _frame_placements(self, q: Floats) -> Floats:
         return kinematics.frame_placements(self._mechanism, q)

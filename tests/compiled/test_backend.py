@@ -19,9 +19,9 @@ from dynx.compiled.backend import CompiledBackend
 from dynx.compiled.call import MAX_COPIED_SAMPLES, KernelCall, NumericCall
 from dynx.compiled.coupled_call import CoupledCall
 from dynx.compiled.looped.kernels import LOOPED
-from dynx.compiled.simplification import has_physical_inertias
 from dynx.errors import ArgumentError, ClosedError
 from dynx.model import Inertial, Link, Mechanism, Model
+from dynx.rbd.elimination import has_physical_inertias
 from dynx.simd.kernel import Kernel
 from tests.backends.robots import chain
 from tests.compiled.robots import ROBOTS, TIP, made, state
