@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ClosedError, SimulationError, shown
 from dynx.model.numbers import checked_array
+from dynx.sim.compiled_loop import LaneLoop, cut_loop, lane_loop
 from dynx.sim.loop.controller_checks import ControllerWatch
 from dynx.sim.loop.plain import Loop, LoopState
 from dynx.sim.loop.record import Record
 from dynx.sim.loop.references import setpoints_of
 from dynx.sim.loop.sensors import Sensors
-from dynx.sim.loop.staged import staged_loop
 from dynx.sim.loop.stops import Stops
 from dynx.sim.plants.plant import plant_errors
 from dynx.sim.plants.registry import make_plant
@@ -86,6 +86,8 @@ class Simulation:
         self._watch = None if setup.controller is None else ControllerWatch(setup.controller)
         self._loop_state: LoopState | None = None
         self._plant_needs_reset = self._closed = False
+        self._lane: LaneLoop | None = None
+        self._lane_known = False
         self._executor: tuple[str, ...] = ()
         self._departures: tuple[str, ...] = ()
         try:
@@ -115,7 +117,6 @@ class Simulation:
             if given.ndim != 1:
                 raise ArgumentError(f"tau has shape {given.shape}; wanted ({self._setup.model.nv},)")
             self._note_departure("torques of the caller")
-        self._note("plain: stepped by the caller")
         end = self._record.steps + int(n)
         loop_state = self._advance(end, given)
         return State(end * self._dt, loop_state.q.copy(), loop_state.v.copy())
@@ -159,6 +160,7 @@ class Simulation:
         progress = self._progress
         if progress is not None:
             self._loop = replace(self._loop, progress=lambda taken: progress(taken, end))
+            self._lane_known = False
         if end <= self._record.steps:
             return
         self._advance(end, None, compiled=True)
@@ -186,6 +188,13 @@ class Simulation:
             elif self._plant_needs_reset:
                 self._loop.recover(loop_state)
             self._plant_needs_reset = False
+            lane = self._one_lane()
+            if lane is not None:
+                lane.run(record, loop_state, end, given)
+                self._note(lane.executor)
+                return loop_state
+            if not compiled:
+                self._note("plain: stepped by the caller")
             if end == record.steps + 1 and not compiled:
                 self._loop.advance(record, loop_state, end, given)
                 return loop_state
@@ -193,7 +202,7 @@ class Simulation:
             # therefore silenced. Not for a single step, where silencing would add too much time.
             with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
                 if compiled:
-                    self._advance_staged(record, loop_state, end)
+                    self._advance_in_pieces(record, loop_state, end)
                 if record.steps < end:
                     self._loop.advance(record, loop_state, end, given)
         except BaseException as error:
@@ -204,16 +213,21 @@ class Simulation:
             raise
         return loop_state
 
-    def _advance_staged(self, record: Record, loop_state: LoopState, end: int) -> None:
-        """Take as many steps to `end` as the staged executor can, and note which executor computed them."""
-        staged = staged_loop(self._loop, end - record.steps)
-        if isinstance(staged, str):
-            self._note(f"plain: {staged}")
+    def _one_lane(self) -> LaneLoop | None:
+        """Return the loop as one lane of a batch's kernel, if its steps are computed so."""
+        if not self._lane_known:
+            found = lane_loop(self._loop)
+            self._lane, self._lane_known = found if isinstance(found, LaneLoop) else None, True
+        return self._lane
+
+    def _advance_in_pieces(self, record: Record, loop_state: LoopState, end: int) -> None:
+        """Take all steps to `end` in pieces between engine calls if possible, and note how they are taken."""
+        pieces = cut_loop(self._loop, end - record.steps)
+        if isinstance(pieces, str):
+            self._note(f"plain: {pieces}")
             return
-        self._note("staged")
-        staged.run(record, loop_state, end)
-        if record.steps < end:
-            self._note(f"plain from step {record.steps}: {staged.stopped}")
+        self._note(pieces.executor)
+        pieces.run(record, loop_state, end)
 
     def _refuse_closed(self) -> None:
         if self._closed:
@@ -235,6 +249,7 @@ class Simulation:
         setpoints = setpoints_of(self._setup.setpoint_of, clock, self._setup.controller)
         sensors = Sensors(self.scenario.model, clock, self.scenario.noise, self._setup.controller)
         self._loop = replace(self._loop, clock=clock, setpoints=setpoints, sensors=sensors)
+        self._lane_known = False
 
     # -- state and record ---------------------------------------------------------------------
 
@@ -278,6 +293,7 @@ class Simulation:
         """Return to the start and discard the record. Raises ArgumentError for a controller that changed."""
         self._refuse_changed_controller()
         self._record.steps = 0
+        self._lane_known = False
         self._loop_state, self._executor, self._departures = None, (), ()
         return self.state
 
@@ -317,6 +333,7 @@ class Simulation:
         self._loop.refuse_self_changing(self._record)
         changed = [] if theirs is ours else changed_parts(theirs, ours)
         self._record.take(snapshot.record, n)
+        self._lane_known = False
         self._executor, self._departures = snapshot.executor, snapshot.departures
         loop_state = replace(snapshot.loop_state)
         self._loop.place(loop_state.q, loop_state.v)
@@ -353,6 +370,7 @@ class Simulation:
         if step > len(self._record):
             self._extend(step)
         self._record.take(theirs, step)
+        self._lane_known = False
         self._loop_state, self._executor, self._departures = None, (), ()
 
     # -- end ----------------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 """Parts of a step of a closed loop that its executors share, for arrays of any scalar.
 
-The plain executor evaluates them on floats; the staged executor and batches trace them on symbols. Other
+The plain executor evaluates them on floats; compiled steps trace them (`dynx.sim.loop_step`). Other
 parts that they share are `clamp` (`dynx.spatial.scalar`), the law of friction and semi-implicit Euler
 (`dynx.sim.plants`), control steps and the delay (`dynx.steppers.clock`), and the checks of what a controller
 returns (`dynx.sim.loop.controller_checks`).

@@ -130,33 +130,6 @@ class Kernel:
         least as many samples as lanes, rows must be contiguous, and outputs must not share memory with any
         other array; otherwise raises ArgumentError. Raises also the errors of a plain call.
         """
-        code, words, arrays = self._bound(inputs, outputs)
-        entry, start = code.entry, words.ctypes.data
-
-        def call(_kept: object = (code, words, arrays)) -> None:
-            entry(start)
-
-        return call
-
-    def bind_groups(self, inputs: Sequence[Floats], outputs: Sequence[Floats]) -> Callable[[int], None]:
-        """Return a function that does the same for one group of samples: for as many as there are lanes, from
-        the number that it is given. Raises as `bind`."""
-        code, words, arrays = self._bound(inputs, outputs)
-        places, strides = words[1::2].copy(), words[2::2].copy()
-        words[0] = self.image.lanes
-        start, chosen = words.ctypes.data, words[1::2]
-
-        def call_group(first: int, _kept: object = (words, arrays)) -> None:
-            np.multiply(strides, first, out=chosen)
-            np.add(chosen, places, out=chosen)
-            code.entry(start)
-
-        return call_group
-
-    def _bound(
-        self, inputs: Sequence[Floats], outputs: Sequence[Floats]
-    ) -> tuple[Code, NDArray[np.int64], tuple[Floats, ...]]:
-        """Return the code, its arguments, whose address it is called with, and the arrays."""
         code, arrays = self._open_code(), (*inputs, *outputs)
         n = check_arrays(self.inputs, self.outputs, inputs, outputs)
         if n < self.image.lanes:
@@ -167,10 +140,16 @@ class Kernel:
         places = [extent_of(array) for array in arrays]
         if not all(is_disjoint(places, len(inputs) + k, out) for k, out in enumerate(outputs)):
             raise ArgumentError("an output of a bound call shares memory with another array")
-        words = [n]
+        listed = [n]
         for array in arrays:
-            words += [array.ctypes.data, array.strides[0]]
-        return code, np.array(words, dtype=np.int64), arrays
+            listed += [array.ctypes.data, array.strides[0]]
+        words = np.array(listed, dtype=np.int64)
+        entry, start = code.entry, words.ctypes.data
+
+        def call(_kept: object = (code, words, arrays)) -> None:
+            entry(start)
+
+        return call
 
     def workspace(self, samples: int = 1) -> Workspace:
         """Return a workspace for up to `samples` samples, for callers that evaluate few at a time."""
@@ -184,6 +163,11 @@ class Kernel:
     def locked_entry(self) -> Callable[[int], None]:
         """Machine code called with the address of its arguments (`dynx.simd.emit`), global lock held."""
         return self._open_code().locked_entry
+
+    @property
+    def address(self) -> int:
+        """Address of the machine code, which is called with the address of its arguments."""
+        return self._open_code().address
 
     def close(self) -> None:
         """Release the code; later calls raise ClosedError."""

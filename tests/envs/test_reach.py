@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 
 import dynx
 from dynx.backends import installed_backends
+from dynx.control.array_dynamics import ArrayDynamics
 from dynx.envs.environment import TaskEnvironment
 from dynx.envs.robot.state import State
 from dynx.envs.tasks.reach import ROTATION_WEIGHT, SERVO_RATE, Reach
 from dynx.envs.vector.environment import RobotVectorEnvironment
 from dynx.errors import ArgumentError, UnknownNameError
-from dynx.sim.batch.traced_controller import ArrayDynamics
 from dynx.spatial.so3 import rotation_about
 from tests.envs.scripted import Reaching, run
 

@@ -17,8 +17,7 @@ from dynx.control import PD, PID, BulletPositionMotor, ComputedTorque, OpenLoop
 from dynx.control.base import Controller, Measurement
 from dynx.errors import ArgumentError, ClosedError, ControlError, DivergedError
 from dynx.model.loading import load
-from dynx.sim import Noise, Payload, Push, Scenario, Simulation, simulate
-from dynx.sim.loop import staged
+from dynx.sim import Noise, Payload, Push, Scenario, Simulation, compiled_loop, simulate
 from dynx.trajectory.base import Setpoint
 from tests.sim.bars import tutorial_motion, tutorial_robot
 from tests.sim.loop.test_resume import the_same
@@ -55,6 +54,9 @@ SCENARIOS: dict[str, Scenario] = {
     "floating": Scenario(DOG, PD(DOG, kp=3.0, kd=0.1), DOG.neutral(), duration=0.04),
     "passive": Scenario(ARM, q0=np.full(6, 0.3), duration=0.04),
 }
+SCENARIOS |= {
+    f"{name} compiled": replace(SCENARIOS[name], plant="compiled") for name in ("sensors", "disturbances")
+}
 if "pybullet" in installed_backends():
     SCENARIOS |= {
         "pybullet": replace(SCENARIOS["sensors"], plant="pybullet"),
@@ -82,7 +84,7 @@ def test_simulate_is_a_loop_over_steps(name: str) -> None:
 def test_how_many_steps_at_a_time_changes_no_bit(name: str, parts: list[int], compiled: bool) -> None:
     scenario = replace(SCENARIOS[name], duration=0.1)
     with pytest.MonkeyPatch.context() as patch, Simulation(scenario) as simulation:
-        patch.setattr(staged, "MIN_STEPS_TO_COMPILE", 1)
+        patch.setattr(compiled_loop, "MIN_STEPS_TO_COMPILE", 1)
         for n in parts:
             if compiled:
                 simulation.run(simulation.time + n * scenario.dt)
@@ -299,16 +301,18 @@ def test_the_record_says_how_its_steps_were_computed() -> None:
         law = options.pop("law", ComputedTorque(ARM, kp=400, kd=40))
         return simulate(ARM, law, tutorial_motion(), duration=0.3, **options).executor
 
-    assert executor() == "staged"
+    assert executor() == "compiled pieces"
     with Simulation(replace(SCENARIOS["passive"], duration=0.3)) as simulation:
         simulation.run()
         simulation.step()
-        assert simulation.rollout.executor == "staged; plain: stepped by the caller"
-    assert executor(position_limits=True) == "staged"
-    assert executor(damping=1.0, friction=0.1, armature=0.1) == "staged"
+        assert simulation.rollout.executor == "compiled pieces; plain: stepped by the caller"
+    assert executor(plant="compiled", dt=0.01) == "compiled"
+    assert executor(plant="compiled", integrator="rk4", dt=1e-4) == "compiled pieces"
+    assert executor(position_limits=True) == "compiled pieces"
+    assert executor(damping=1.0, friction=0.1, armature=0.1) == "compiled pieces"
     push = Push("tool0", [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     assert executor(pushes=[push]) == "plain: pushes are not compiled"
-    few = staged.MIN_STEPS_TO_COMPILE
+    few = compiled_loop.MIN_STEPS_TO_COMPILE
     assert executor(dt=0.01) == f"plain: fewer than {few} steps"
     assert executor(integrator="rk4") == f"plain: fewer than {4 * few} steps"
 

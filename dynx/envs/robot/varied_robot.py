@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from dynx.compiled.scaled_links import ScaledLinks
+from dynx.control.array_dynamics import ArrayDynamics
 from dynx.envs.randomization import Parameter, Randomization, parameters_of, require_name
 from dynx.envs.robot.array_task import ArrayTask
 from dynx.errors import UnsupportedFeatureError
 from dynx.model import Model
-from dynx.sim.batch.traced_controller import ArrayDynamics
 from dynx.sim.plants.model_error import Payload, plant_model
 from dynx.spatial.scalar import Array
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from dynx.control.array_dynamics import ArrayDynamics
 from dynx.control.dynamics import Dynamics
 from dynx.envs.library import spaces
 from dynx.envs.robot.state import State
@@ -24,7 +25,6 @@ from dynx.model import Model
 from dynx.model.configuration import sampling_range
 from dynx.model.loading import load
 from dynx.rbd.kinematics import ancestry
-from dynx.sim.batch.traced_controller import ArrayDynamics
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import homogeneous, pose_error
 from dynx.world import Camera

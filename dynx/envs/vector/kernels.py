@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from dynx.control.array_dynamics import ArrayDynamics
 from dynx.envs.library import AutoresetMode, spaces
 from dynx.envs.robot.array_task import ArrayTask
 from dynx.envs.robot.state import State
@@ -22,7 +23,6 @@ from dynx.envs.robot.varied_robot import VariedRobot
 from dynx.envs.vector.layout import Layout
 from dynx.errors import ArgumentError, ShapeError, TraceError, UnsupportedFeatureError
 from dynx.model.numbers import DIVERGENCE_SPEED
-from dynx.sim.batch.traced_controller import ArrayDynamics
 from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.kernel import Kernel
 from dynx.simd.program import Program

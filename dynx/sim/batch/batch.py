@@ -14,13 +14,12 @@ from numpy.typing import ArrayLike
 
 from dynx.backends.solvability import Solvability
 from dynx.compiled.parametric import ParametricDynamics
-from dynx.errors import ArgumentError, shown
+from dynx.compiled.step import CompiledStep
+from dynx.errors import ArgumentError, TraceError, UnsupportedFeatureError, shown
 from dynx.model.configuration import checked_q
 from dynx.model.numbers import whole_number
 from dynx.option_names import takes
-from dynx.sim.batch.disturbances import PLACEHOLDER, BatchDisturbances
-from dynx.sim.batch.kernel import FusedStep
-from dynx.sim.batch.part import Part, PartNoise, PartOutcome, StepKernels, pushing
+from dynx.sim.batch.part import Part, PartNoise, PartOutcome, StepKernels
 from dynx.sim.batch.rollouts import BatchRollouts
 from dynx.sim.batch.rows import (
     COEFFICIENTS,
@@ -32,14 +31,14 @@ from dynx.sim.batch.rows import (
     split_rows,
 )
 from dynx.sim.batch.slip_bounds import refuse_small_slips
-from dynx.sim.batch.stopping import BatchStops
 from dynx.sim.batch.store import Store
-from dynx.sim.batch.traced_controller import gain_shapes, innermost
 from dynx.sim.loop.noise import Noise
+from dynx.sim.loop_step import PLACEHOLDER, ArrayDisturbances, LoopStep, gain_shapes, innermost
 from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.scenario.options import OPTIONS, option
 from dynx.sim.scenario.scenario import Scenario, ScenarioArguments
 from dynx.sim.setup import Setup, require_duration
+from dynx.sim.step_completion import LaneStops
 from dynx.simd.machine import require_memory
 from dynx.simd.threads import checked_threads
 from dynx.spatial.scalar import Floats
@@ -52,10 +51,6 @@ PLANT = "compiled"
 PART = 1024
 """Number of rollouts in one part: small enough that their state stays in the processor's caches, and large
 enough that starting a call costs little. Results do not depend on it."""
-
-MAX_NV_WITHOUT_PUSHES = 32
-"""Largest number of coordinates for which steps without a push have a kernel of their own: it saves computing
-the place where pushes act, but compiles for seconds if the robot is larger."""
 
 Progress = Callable[[int, int], object]
 """Called with the number of finished rollouts and the total number."""
@@ -165,15 +160,24 @@ def simulate_batch(given: BatchArguments) -> BatchRollouts:
         )
     if progress is not None and not callable(progress):
         raise ArgumentError(f"progress is {shown(progress)}; wanted a function of two numbers of rollouts")
-    acting = BatchDisturbances.of(moved, setup.disturbances, varied)
+    acting = ArrayDisturbances.of(moved, setup.disturbances, varied)
     if parametric is None and not acting.armature.any():
         Solvability(moved).refuse_singular(False)
     delayed = clock.delay_steps > 0
     noise = scenario.noise or Noise()
     random_size, noisy = controller.random_size, noise.on_measurements(moved.nv)
     deviations = noise.deviations(moved.nv) if noisy else None
-    step = FusedStep(
-        moved, controller, clock.dt, tuple(gains or ()), parametric, noisy, delayed, limit, acting
+    step = LoopStep(
+        moved,
+        controller,
+        clock.dt,
+        tuple(gains or ()),
+        parametric,
+        noisy,
+        delayed,
+        limit,
+        scenario.position_limits,
+        acting,
     )
     rows = RolloutRows(rollouts)
     q, v = setup.start
@@ -190,13 +194,13 @@ def simulate_batch(given: BatchArguments) -> BatchRollouts:
     refuse_small_slips(acting, parametric, clock.dt, start["q"], fixed)
     for name, values in (gains or {}).items():
         size = prod(gain_shapes(innermost(controller))[name])
-        fixed[f"gain_{name}"] = rows.of(name, columns_of(name, values), size, spread=True)
+        fixed[step.gain_input(name)] = rows.of(name, columns_of(name, values), size, spread=True)
     n = rows.count
     refuse_ambiguous(given, joints, n)
     kept = clock.n_steps // record_every if record_every else 0
     require_memory(f"{n} rollouts", 8 * n * (kept + 4) * (moved.nq + 4 * moved.nv))
     start = {name: rows.spread(array) for name, array in start.items()}
-    fixed = {name: rows.spread(array) for name, array in fixed.items()}
+    fixed = step.gain_values() | {name: rows.spread(array) for name, array in fixed.items()}
     state = controller.initial_state()
     zeros = np.zeros((n, moved.nv))
     start |= {"max_error": zeros, "squared_errors": zeros, "sound_steps": np.zeros((n, 1))}
@@ -204,9 +208,12 @@ def simulate_batch(given: BatchArguments) -> BatchRollouts:
         start["steps_at_limit"] = zeros
     if state is not None:
         start["state"] = np.tile(state, (n, 1))
-    wrenches = acting.wrenches(clock) if acting.pushes else np.zeros((clock.n_steps, 0))
-    kernels = _step_kernels(step, clock, wrenches)
-    stops = BatchStops.of(step) if scenario.position_limits else None
+    wrenches = np.zeros((clock.n_steps, 0))
+    if acting.pushes:
+        wrenches = acting.wrenches(clock.dt, np.arange(clock.n_steps))
+    pushed = step.pushed_steps(wrenches).tolist()
+    kernels = _step_kernels(step, clock, pushed)
+    stops = LaneStops.of(step) if scenario.position_limits else None
     references = setup.setpoint_of(clock.times()[1:]).q
     setpoints = Setpoint(*setup.setpoint_of(clock.control_times(controller.lead)))
     parts = [
@@ -214,10 +221,14 @@ def simulate_batch(given: BatchArguments) -> BatchRollouts:
             kernels,
             clock,
             {name: array[first : first + PART] for name, array in start.items()},
-            {name: array[first : first + PART] for name, array in fixed.items()},
+            {
+                name: array if array.ndim == 1 else array[first : first + PART]
+                for name, array in fixed.items()
+            },
             setpoints,
             references,
             wrenches,
+            pushed,
             PartNoise(noise.seed, noise.rollout + first, deviations, random_size)
             if noisy or random_size
             else None,
@@ -258,20 +269,21 @@ def refuse_uncompiled(scenario: Scenario) -> None:
     require_duration(scenario)
 
 
-def _step_kernels(step: FusedStep, clock: Clock, wrenches: Floats) -> StepKernels:
+def _step_kernels(step: LoopStep, clock: Clock, pushed: list[bool]) -> StepKernels:
     """Return the kernels of a step with and without controller and pushes, for combinations that occur.
 
-    For a large robot the steps without a push are steps with a push of zero.
+    Raises UnsupportedFeatureError for a controller that cannot be compiled.
     """
     controlled = clock.is_control_step(np.arange(clock.n_steps))
-    pushed = pushing(wrenches)
-    if step.model.nv > MAX_NV_WITHOUT_PUSHES:
-        pushed = [any(pushed)] * clock.n_steps
     kinds = set(zip(controlled.tolist(), pushed, strict=True))
-    return {
-        (controlled, pushed): step.kernel(controlled=controlled, pushed=pushed)
-        for controlled, pushed in sorted(kinds)
-    }
+    compiled = CompiledStep(step.text)
+    try:
+        return {variant: compiled.kernel(variant) for variant in sorted(kinds)}
+    except TraceError as error:
+        assert step.controller is not None
+        raise UnsupportedFeatureError(
+            f"{step.controller.name} cannot be compiled together with the plant: {error}"
+        ) from error
 
 
 def _run_parts(

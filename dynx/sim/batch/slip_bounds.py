@@ -8,7 +8,7 @@ import numpy as np
 
 from dynx.backends import backend
 from dynx.compiled.parametric import ParametricDynamics
-from dynx.sim.batch.disturbances import BatchDisturbances
+from dynx.sim.loop_step import ArrayDisturbances
 from dynx.sim.plants.slip_bound import refuse_unstable
 from dynx.spatial.scalar import Floats
 
@@ -20,7 +20,7 @@ SEMI_IMPLICIT = 2.0
 
 
 def refuse_small_slips(
-    acting: BatchDisturbances,
+    acting: ArrayDisturbances,
     parametric: ParametricDynamics | None,
     h: float,
     q: Floats,
@@ -52,7 +52,7 @@ def refuse_small_slips(
             refuse_unstable(model, slip, SEMI_IMPLICIT, h, M, dry, first if n > 1 else None)
 
 
-def _coefficients(acting: BatchDisturbances, rows: Mapping[str, Floats]) -> tuple[Floats, Floats]:
+def _coefficients(acting: ArrayDisturbances, rows: Mapping[str, Floats]) -> tuple[Floats, Floats]:
     """Return dry friction (n, nv) and the armature matrices (n, nv, nv) of rollouts."""
     own = acting.joint_friction
     friction, armature = (

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from dynx.compiled.step import Status
 from dynx.control.base import Controller, Measurement
 from dynx.control.bullet import BulletMotor
 from dynx.errors import ControlError, DivergedError, DynxError, SimulationError, shown
@@ -127,7 +128,7 @@ class Loop:
                     else:
                         outcome = controller.torque(measurement, setpoint, state)
                 except Exception as error:
-                    raise self._control_failed(k, record, f"{type(error).__name__}: {error}") from error
+                    raise self.engine_failed(k, record, error, in_controller=True) from error
                 if motors is None:
                     if not isinstance(outcome, tuple) or len(outcome) != 2:
                         raise self._control_failed(k, record, str(defect_of_outcome(outcome)))
@@ -135,7 +136,7 @@ class Loop:
                     if type(tau) is not np.ndarray or tau.shape != shape or tau.dtype is not FLOAT64:
                         tau = self._as_torque(k, record, tau)
                     if not isfinite(torque_sum(tau)):
-                        raise self._control_failed(k, record, f"its torque is not finite: {shown(tau)}")
+                        raise self.error_of(Status.TORQUE, k, record, tau)
                     if limit is not None:
                         tau = clamp(tau, limit)
             try:
@@ -151,11 +152,9 @@ class Loop:
             except Exception as error:
                 # This includes the engine's own exceptions, because its hooks are called directly
                 # (`dynx.control.dynamics`).
-                raise self._step_failed(k, record, error) from error
+                raise self.engine_failed(k, record, error, in_controller=False) from error
             if is_diverged(v):
-                raise self._diverged(
-                    k, record, f"the velocity is not finite, or its norm is above {DIVERGENCE_SPEED:g}"
-                )
+                raise self.error_of(Status.DIVERGED, k, record, tau)
             applied[k], A[k], Q[k + 1], V[k + 1] = tau, a, q, v
             record.steps = k + 1
             loop_state.q, loop_state.v, loop_state.tau, loop_state.command, loop_state.controller_state = (
@@ -242,9 +241,22 @@ class Loop:
             return none, self.controller.command(measurement, self._setpoint(number))
         return record.tau[begin - 1].copy(), None
 
-    def _step_failed(self, k: int, record: Record, error: Exception) -> SimulationError:
-        """Return the error of a step: a failure for a plant of the user, divergence for one of dynx."""
+    def error_of(self, status: Status, k: int, record: Record, tau: Floats) -> SimulationError:
+        """Return the error of the status of step `k`, in which the controller commanded `tau`."""
+        if status & Status.TORQUE:
+            return self._control_failed(k, record, f"its torque is not finite: {shown(tau)}")
+        return self._diverged(
+            k, record, f"the velocity is not finite, or its norm is above {DIVERGENCE_SPEED:g}"
+        )
+
+    def engine_failed(
+        self, k: int, record: Record, error: Exception, *, in_controller: bool
+    ) -> SimulationError:
+        """Return the error of step `k` in which the controller or the plant raised an exception: a failure
+        for a controller or a plant of the user, divergence for a plant of dynx."""
         kind, why = type(self.plant), f"{type(error).__name__}: {error}"
+        if in_controller:
+            return self._control_failed(k, record, why)
         if is_own(kind):
             return self._diverged(k, record, why)
         return self._ended(SimulationError, k, record, f"plant {kind.__name__} failed", why)

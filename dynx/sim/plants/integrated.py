@@ -80,6 +80,11 @@ class IntegratedPlant(Plant):
         return f"{' and '.join(found)} {verb}" if found else ""
 
     @property
+    def is_one_semi_implicit_step(self) -> bool:
+        """True if a step is one of semi-implicit Euler, as in a batch."""
+        return isinstance(self._scheme, SemiImplicitEuler) and self.substeps == 1
+
+    @property
     def evaluations(self) -> int:
         """Number of evaluations of the acceleration in one step that can be compiled."""
         return self.substeps * (4 if isinstance(self._scheme, RungeKutta4) else 1)

@@ -122,7 +122,8 @@ class RolloutData:
     scenario: Scenario | None = None
     """The simulation whose record this is; None for a record made in another way."""
     executor: str = ""
-    """Executor of the steps: ``staged``, or ``plain`` with the reason; semicolons separate several."""
+    """Executor of the steps: ``compiled`` (one kernel), ``compiled pieces`` (between the calls of an
+    engine), or ``plain`` with the reason; semicolons separate several."""
     departures: tuple[str, ...] = ()
     """Interventions that make the record differ from its scenario, such as torques given by the caller."""
     surroundings: Surroundings | None = None

@@ -9,6 +9,7 @@ import numpy as np
 from dynx.control.base import Controller
 from dynx.model import Model
 from dynx.sim import BatchRollouts, Rollout, simulate, simulate_batch
+from dynx.sim.compiled_loop import ONE_KERNEL
 from tests.sim.bars import EXACT_ON_DYNX, apart
 
 
@@ -27,11 +28,16 @@ def assert_same(many: BatchRollouts, row: int, one: Rollout) -> None:
 def batch_and_one(
     model: Model, law: Controller[Any], reference: Any, **options: Any
 ) -> tuple[BatchRollouts, Rollout]:
-    """Simulate a scenario as a batch of 3 and alone, and assert that they agree."""
+    """Simulate a scenario as a batch of 3 and alone, and assert that they agree: to the last bit where the
+    rollout alone is one lane of the same kernel."""
     one = simulate(model, law, reference, plant="compiled", **options)
     many = simulate_batch(model, law, reference, rollouts=3, record_every=1, **options)
     assert many.done.all()
     assert np.isnan(many.diverged).all()
     for row in range(3):
         assert_same(many, row, one)
+        if one.executor == ONE_KERNEL:
+            np.testing.assert_array_equal(many.q_record[row], one.q[1:])
+            np.testing.assert_array_equal(many.v_record[row], one.v[1:])
+            np.testing.assert_array_equal(many.tau_record[row], one.tau)
     return many, one

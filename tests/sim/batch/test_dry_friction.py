@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 import dynx
+from dynx.compiled import step
 from dynx.control import PD, GravityCompensatedPD
 from dynx.errors import ArgumentError
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.sim import simulate, simulate_batch
-from dynx.sim.batch import batch, kernel
+from dynx.sim.batch import batch
 from dynx.sim.plants import friction_law
 from tests.backends.robots import mixed_robot
 from tests.oracles.closed_form import MODELS
@@ -133,7 +134,7 @@ def test_mimic_joints_and_bases(base: str) -> None:
 def test_bits_do_not_depend_on_the_neighbours(arm: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     """Steps are repeated for some rollouts, here for many because no mode is corrected in the kernel."""
     monkeypatch.setattr(friction_law, "CORRECTIONS", 0)
-    monkeypatch.setattr(kernel, "_made", {})
+    monkeypatch.setattr(step, "_kernels", {})
     rng = np.random.default_rng(1)
     law = PD(arm, kp=5.0, kd=0.02)
     start: dict[str, Any] = {"q0": 0.3 * rng.normal(size=(37, 6)), "v0": rng.normal(size=(37, 6))}
@@ -147,7 +148,7 @@ def test_bits_do_not_depend_on_the_neighbours(arm: Model, monkeypatch: pytest.Mo
     shuffled = simulate_batch(arm, law, arm.neutral(), **other, **options)
     np.testing.assert_array_equal(shuffled.v, whole.v[rows])
     one = simulate(arm, law, arm.neutral(), plant="compiled", q0=start["q0"][3], v0=start["v0"][3], **options)
-    np.testing.assert_allclose(whole.v[3], one.v[-1], atol=1e-10)
+    np.testing.assert_array_equal(whole.v[3], one.v[-1])
 
 
 def test_friction_as_a_parameter_is_the_same_friction(arm: Model) -> None:

@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dynx.compiled import step
 from dynx.control import PD, ComputedTorque, FrictionCompensation, Saturated
 from dynx.control.base import Controller, Measurement
 from dynx.control.content import content_of
 from dynx.sim import simulate, simulate_batch
-from dynx.sim.batch import kernel as fused
-from dynx.sim.batch import stopping
-from dynx.sim.batch.traced_controller import traced_controller
+from dynx.sim.loop_step import traced_controller
 from dynx.simd.program import Program
 from dynx.simd.trace import trace
 from dynx.spatial.scalar import Floats
@@ -29,7 +28,7 @@ def law(**gains: Any) -> ComputedTorque:
 
 
 def content(controller: Controller[Any]) -> Any:
-    return content_of(traced_controller(controller, {}))
+    return content_of(traced_controller(controller, lambda depth, each: {}))
 
 
 def test_equal_controllers_are_equal_and_others_are_not() -> None:
@@ -97,27 +96,34 @@ def test_a_changed_law_has_another_kernel() -> None:
 
 def test_the_next_batch_traces_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     first = worst(law())
-    monkeypatch.setattr(fused, "trace", None)
+    monkeypatch.setattr(step, "trace", None)
     assert worst(law()) == first
 
 
+def test_other_gains_have_the_same_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
+    first = worst(law())
+    monkeypatch.setattr(step, "trace", None)
+    assert worst(law(kp=100.0)) != first
+
+
 def test_only_so_many_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fused, "_made", {})
-    monkeypatch.setattr(fused, "MAX_CACHED_KERNELS", 2)
-    for kp in (1.0, 2.0, 3.0):
-        worst(PD(ARM, kp=kp, kd=1.0))
-    assert len(fused._made) == 2
+    monkeypatch.setattr(step, "_kernels", {})
+    monkeypatch.setattr(step, "MAX_CACHED_KERNELS", 2)
+    for dt in (1e-3, 2e-3, 5e-3):
+        simulate_batch(ARM, law(), tutorial_motion(), rollouts=2, duration=0.01, dt=dt)
+    assert len(step._kernels) == 2
 
 
 def test_impacts_at_position_limits_are_traced_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fused, "_made", {})
+    monkeypatch.setattr(step, "_kernels", {})
     traced = []
 
-    def trace_and_count(*arguments: Any) -> Program:
+    def trace_and_count(*arguments: Any, **options: Any) -> Program:
         traced.append(arguments)
-        return trace(*arguments)
+        return trace(*arguments, **options)
 
-    monkeypatch.setattr(stopping, "trace", trace_and_count)
+    monkeypatch.setattr(step, "trace", trace_and_count)
     for _ in range(2):
         simulate_batch(ARM, law(), tutorial_motion(), rollouts=2, duration=0.01, position_limits=True)
-    assert len(traced) == 1
+    # One kernel is that of the step.
+    assert len(traced) == 2

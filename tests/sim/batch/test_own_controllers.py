@@ -145,7 +145,7 @@ class Pure(Own, pure=True):
 @pytest.mark.parametrize(
     ("law", "executor"),
     [
-        (saturated, "staged"),
+        (saturated, "compiled pieces"),
         (lambda self, m, s: np.diag(self.kp) @ (s.q - m.q) - m.v, "plain: np.matmul is not rounded as"),
         (lambda self, m, s: -self.kd * m.v * np.sum(m.v**2), "plain: np.add is not rounded as"),
         (lambda self, m, s: -self.kd * m.v + random.random(), "plain: Pure.torque() depends on more"),

@@ -13,12 +13,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dynx.compiled import step as step_module
 from dynx.control import PID, FrictionCompensation
 from dynx.errors import ArgumentError
 from dynx.model.loading import load
 from dynx.sim import BatchRollouts, Noise, Push, simulate, simulate_batch
 from dynx.sim.batch import batch as batch_module
-from dynx.sim.batch import kernel as kernel_module
 from dynx.sim.loop.sensors import Sensors
 from dynx.simd.cache import load_kernel
 from dynx.simd.emit import Settings
@@ -94,9 +94,9 @@ def test_rows_of_a_batch_do_not_depend_on_its_partition(
     whole()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(batch_module, "PART", part)
-        patch.setattr(kernel_module, "_made", {})
+        patch.setattr(step_module, "_kernels", {})
         patch.setattr(
-            kernel_module, "load_kernel", lambda *given: load_kernel(*given, settings=Settings(lanes))
+            step_module, "load_kernel", lambda *given: load_kernel(*given, settings=Settings(lanes))
         )
         assert_rows(batch(rows, noise=replace(NOISE, rollout=first), threads=threads), rows)
 

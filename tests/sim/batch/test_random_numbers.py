@@ -77,7 +77,7 @@ def test_a_rollout_has_the_numbers_of_its_stream(
     executor, tau = torques(
         kind(ARM, size), noise=noise, plant=plant, control_dt=per_control * DT, delay=2 * DT
     )
-    assert executor.startswith("staged") == (kind is Explorer and plant == "reference")
+    assert executor.startswith("compiled pieces") == (kind is Explorer and plant == "reference")
     seed, rollout = (0, 0) if noise is None else (noise.seed, noise.rollout)
     wanted = stream(seed, rollout, STEPS // per_control, size)[:, : ARM.nv]
     np.testing.assert_array_equal(tau[::per_control], wanted)

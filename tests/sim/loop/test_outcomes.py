@@ -16,7 +16,7 @@ from dynx.sim import Scenario, Simulation, simulate, simulate_batch
 from dynx.trajectory.base import Setpoint
 from tests.backends.robots import chain
 from tests.sim.loop.test_resume import the_same
-from tests.sim.loop.test_staged import both, glue
+from tests.sim.test_compiled_loop import both, glue
 
 ROBOT = chain(2, "prismatic")
 GOAL = np.array([0.1, -0.2])

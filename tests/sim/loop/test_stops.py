@@ -18,7 +18,7 @@ from dynx.sim.loop.stops import Stops
 from dynx.spatial.scalar import Floats
 from tests.sim.bars import tutorial_robot
 from tests.sim.loop.test_resume import the_same
-from tests.sim.loop.test_staged import both
+from tests.sim.test_compiled_loop import both
 
 ARM = tutorial_robot()
 MASS = backend("reference", ARM)
@@ -106,10 +106,10 @@ def test_mimic_joints_and_floating_bases_stop_alike_in_both_loops(robot: str) ->
     def run(plant: str) -> Rollout:
         return simulate(model, v0=v0, duration=0.3, position_limits=True, plant=plant)
 
-    staged = run("pinocchio")
-    assert staged.executor == "staged"
+    pieces = run("pinocchio")
+    assert pieces.executor == "compiled pieces"
     joints = slice(7 if model.floating else 0, None)
-    reached = (staged.q == model.upper) | (staged.q == model.lower)
+    reached = (pieces.q == model.upper) | (pieces.q == model.lower)
     assert reached[:, joints].any()
-    resumed = simulate(model, v0=v0, duration=0.3, position_limits=True, resume=staged, step=40)
-    the_same(staged, resumed)
+    resumed = simulate(model, v0=v0, duration=0.3, position_limits=True, resume=pieces, step=40)
+    the_same(pieces, resumed)

@@ -1,14 +1,17 @@
-"""Stops at position limits in a batch, with the impacts of `dynx.sim.loop.stops`.
+"""Completion of a step whose kernel did not settle which joints stick, or moved joints beyond their limits.
 
-After each step, joints beyond their limits are set to them. For the rollouts in which such a joint moves
-outwards, and for no other, a kernel computes the velocities after the impact.
+A kernel corrects the modes of the law of friction (`dynx.sim.plants.friction_law`) once, which mostly
+suffices. For the other lanes it is called again with the corrected modes, until they are right. A lane whose
+modes are right gives the same bits again, so no result depends on its neighbours.
+
+Joints beyond their limits are set to them, with the impacts of `dynx.sim.loop.stops`. For the lanes in which
+such a joint moves outwards, and for no other, a kernel computes the velocities after the impact.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,20 +19,49 @@ from numpy.typing import NDArray
 
 from dynx.compiled.kernels import evaluate_quantity
 from dynx.compiled.simplification import simplify_mechanism
-from dynx.sim.batch.kernel import FusedStep
+from dynx.compiled.step import BoundSteps, Status, StepText, compiled
+from dynx.sim.loop_step import LoopStep
 from dynx.sim.plants.friction_law import FrictionLaw
+from dynx.sim.plants.friction_solver import BLOCK_CORRECTIONS, MAX_SOLUTIONS
 from dynx.sim.step import held_at_limits
-from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.kernel import Kernel
-from dynx.simd.trace import trace
 from dynx.spatial.scalar import Array, Floats
 
 Rows = NDArray[np.signedinteger[Any]]
 """Numbers of rollouts."""
 
 
+class Settling:
+    """Arrays of a kernel that concern the modes of dry friction, and the status of each rollout."""
+
+    def __init__(self, rows: int, joints: int) -> None:
+        self.arrays: dict[str, Floats] = {
+            "modes": np.zeros((1, rows, joints)),
+            "one_by_one": np.zeros((1, rows, 1)),
+            "next_modes": np.zeros((1, rows, joints)),
+            "status": np.zeros((1, rows, 1)),
+        }
+        """Change of the modes from the signs of the velocities, whether they are corrected one at a time, the
+        next change, and the status."""
+
+    def __call__(self, bound: BoundSteps, step: int, lanes: int) -> None:
+        """Repeat a step where necessary, for a vector of `lanes` rollouts at a time."""
+        modes, one_by_one, following, status = (array[0] for array in self.arrays.values())
+        status = status[:, 0]
+        wrong = np.flatnonzero(status >= Status.UNSETTLED)
+        for first in np.unique(np.minimum(wrong // lanes * lanes, len(status) - lanes)).tolist():
+            group = slice(first, first + lanes)
+            for count in range(MAX_SOLUTIONS):
+                modes[group] = following[group]
+                one_by_one[group] = count >= BLOCK_CORRECTIONS
+                bound.repeat_group(step, first)
+                if not (status[group] >= Status.UNSETTLED).any():
+                    break
+            modes[group] = one_by_one[group] = 0.0
+
+
 @dataclass(frozen=True)
-class BatchStops:
+class LaneStops:
     """Position limits (rows, n) of the joints, which are the last n coordinates, and the kernel of an impact.
 
     There is one row of limits, or one for each rollout, which NumPy compares four times as fast.
@@ -40,18 +72,18 @@ class BatchStops:
     kernel: Kernel
 
     @classmethod
-    def of(cls, step: FusedStep) -> BatchStops | None:
+    def of(cls, step: LoopStep) -> LaneStops | None:
         """Make the stops of a batch; None for a robot without limits."""
         base = 7 if step.model.floating else 0
         lower, upper = step.model.lower[None, base:], step.model.upper[None, base:]
         if not np.isfinite([lower, upper]).any():
             return None
-        return cls(lower, upper, step.cached("impact", partial(_impact_kernel, step)))
+        return cls(lower, upper, _impact_kernel(step))
 
-    def of_rows(self, rows: int) -> BatchStops:
+    def of_rows(self, rows: int) -> LaneStops:
         """Return the stops for a number of rollouts."""
         lower, upper = (np.repeat(limits, rows, axis=0) for limits in (self.lower, self.upper))
-        return BatchStops(lower, upper, self.kernel)
+        return LaneStops(lower, upper, self.kernel)
 
     def __call__(
         self,
@@ -100,7 +132,7 @@ class BatchStops:
             rows, struck = rows[wrong], np.where(pulled, 0.0, struck)[wrong]
 
 
-def _impact_kernel(step: FusedStep) -> Kernel:
+def _impact_kernel(step: LoopStep) -> Kernel:
     """Compile the velocities after inelastic impulses on the coordinates that are struck.
 
     The change of velocity x has x = -v for these, and no impulse M x on the others: the equation of joints
@@ -124,5 +156,4 @@ def _impact_kernel(step: FusedStep) -> Kernel:
         x, left = equation.accelerations(M, [0.0] * len(v), list(1.0 - stuck), list(-stuck * v))
         return {"v": v + np.array(x), "pull": -given["struck"] * np.array(left)}
 
-    program = trace(impact, {name: (size,) for name, size in sizes.items()})
-    return load_kernel(program_recipe(program), lambda: program)
+    return compiled(StepText(impact, sizes, step.key("impact")))

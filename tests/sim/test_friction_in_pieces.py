@@ -9,7 +9,7 @@ import pytest
 
 from dynx.control import PD
 from dynx.model.loading import load
-from tests.sim.loop.test_staged import ARM, both
+from tests.sim.test_compiled_loop import ARM, both
 
 
 @pytest.mark.parametrize("plant", ["pinocchio", "compiled"])

@@ -1,9 +1,10 @@
-"""The loop in compiled stages gives the record of the plain loop, to the last bit."""
+"""The loop in compiled pieces gives the record of the plain loop, to the last bit."""
 
 from __future__ import annotations
 
 import signal
 import threading
+from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import FrozenInstanceError
@@ -31,9 +32,19 @@ from dynx.engines.pinocchio.backend import PinocchioBackend
 from dynx.errors import ControlError, DivergedError
 from dynx.model import Model
 from dynx.model.loading import load
-from dynx.sim import Noise, Push, Rollout, RolloutInterrupted, simulate
-from dynx.sim.loop import staged, stages
+from dynx.sim import (
+    Noise,
+    Push,
+    Rollout,
+    RolloutInterrupted,
+    Scenario,
+    Simulation,
+    compiled_loop,
+    simulate,
+    simulate_batch,
+)
 from dynx.sim.plants import registry
+from dynx.simd import cuts
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models
 from dynx.trajectory.base import Setpoint, Trajectory
@@ -75,16 +86,17 @@ OPTIONS: dict[str, dict[str, Any]] = {
 def glue(*, on: bool, seen: list[bool] | None = None) -> Iterator[None]:
     """Glue for rollouts of any length, or for none; `seen` is told whether it was used."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(staged, "MIN_STEPS_TO_COMPILE", 1 if on else 10**9)
-        patch.setattr(staged, "MAX_CHUNK_STEPS", 32)
+        patch.setattr(compiled_loop, "MIN_STEPS_TO_COMPILE", 1 if on else 10**9)
+        patch.setattr(compiled_loop, "is_one_lane", lambda plant, controller: False)
+        patch.setattr(compiled_loop.CutLoop, "chunk_steps", 32)
         if seen is not None:
-            run = staged.StagedLoop.run
+            run = compiled_loop.CutLoop.run
 
-            def watched(loop: staged.StagedLoop, *arguments: Any) -> None:
+            def watched(loop: compiled_loop.CutLoop, *arguments: Any) -> None:
                 seen.append(True)
                 run(loop, *arguments)
 
-            patch.setattr(staged.StagedLoop, "run", watched)
+            patch.setattr(compiled_loop.CutLoop, "run", watched)
         yield
 
 
@@ -224,6 +236,70 @@ def test_errors_are_those_of_the_plain_loop(kd: float) -> None:
         simulate(ARM, law, np.zeros(6), q0=np.zeros(6), v0=np.full(6, speed), duration=1.0)
 
 
+@pytest.mark.parametrize(("kd", "limits"), [(-3e3, False), (-1e306, False), (-1e306, 15.0)])
+def test_errors_of_one_lane_are_those_of_the_plain_loop(kd: float, limits: Any) -> None:
+    """The same error at the same step, whether steps are taken one by one or together, and as in a batch."""
+    law = substitute(Velocity(ARM, kd=0.0), kd=np.full(6, kd))
+    v0 = np.full(6, 1e-3 if kd > -1e300 else 300.0)
+    start: dict[str, Any] = {"q0": np.zeros(6), "v0": v0, "effort_limits": limits, "duration": 0.5}
+    caught = []
+    for plant in ("compiled", "reference"):
+        with pytest.raises((DivergedError, ControlError)) as error:
+            simulate(ARM, law, np.zeros(6), plant=plant, **start)
+        caught.append(error.value)
+    with Simulation(Scenario(ARM, law, np.zeros(6), plant="compiled", **start)) as simulation:
+        with pytest.raises((DivergedError, ControlError)) as error:
+            deque(iter(simulation.step, None), maxlen=0)
+        caught.append(error.value)
+        the_same(simulation.rollout, caught[0].rollout)
+    assert len({(type(each), each.step) for each in caught}) == 1
+    assert str(caught[0]) == str(caught[2])
+    many = simulate_batch(ARM, law, np.zeros(6), rollouts=2, **start)
+    np.testing.assert_array_equal(many.diverged, caught[0].time)
+
+
+def test_a_rollout_of_a_batch_is_that_of_simulate_with_its_noise() -> None:
+    law = PID(ARM, kp=300, ki=2000, kd=30, control_dt=2e-3, limit=500.0)
+    options: dict[str, Any] = {"control_dt": 2e-3, "delay": 4e-3, "effort_limits": 40.0, "duration": 0.3}
+    options |= {"friction": 0.3, "pushes": [Push("tool0", [5, 0, 0, 0, 1, 0], 0.01, 0.1)]}
+    many = simulate_batch(
+        ARM, law, tutorial_motion(), rollouts=11, record_every=1, noise=Noise(1e-3, 1e-2, 4, 5), **options
+    )
+    for row in (0, 7, 10):
+        noise = Noise(1e-3, 1e-2, 4, 5 + row)
+        one = simulate(ARM, law, tutorial_motion(), plant="compiled", noise=noise, **options)
+        np.testing.assert_array_equal(many.q_record[row], one.q[1:])
+        np.testing.assert_array_equal(many.v_record[row], one.v[1:])
+        np.testing.assert_array_equal(many.tau_record[row], one.tau)
+
+
+def test_torques_of_the_caller_are_held_in_one_lane() -> None:
+    """Also between control steps, after torques of the controller and before them."""
+    law, tau = PD(ARM, kp=100, kd=10), np.linspace(-3.0, 3.0, 6)
+    records = []
+    for plant in ("compiled", "reference"):
+        with Simulation(Scenario(ARM, law, np.zeros(6), plant=plant, control_dt=3e-3, duration=0.1)) as run:
+            for n, given in ((4, None), (1, tau), (2, 2.0 * tau), (5, None), (1, tau), (7, None)):
+                run.step(n, given)
+            records.append(run.rollout)
+    assert records[0].executor == "compiled"
+    np.testing.assert_allclose(records[0].tau, records[1].tau, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(records[0].q, records[1].q, rtol=1e-9, atol=1e-12)
+    np.testing.assert_array_equal(records[0].tau[4:6], [tau, 2.0 * tau])
+
+
+def test_an_engine_of_one_s_own_is_believed_on_the_compiled_plant() -> None:
+    class Own(PinocchioBackend):
+        """An engine of a user."""
+
+    for law, executor in (
+        (ComputedTorque(ARM, kp=400, kd=40), "compiled"),
+        (ComputedTorque(ARM, kp=400, kd=40, backend=Own(ARM)), "plain"),
+    ):
+        found = simulate(ARM, law, np.zeros(6), plant="compiled", q0=np.full(6, 0.1), duration=0.02)
+        assert found.executor.startswith(executor)
+
+
 @pytest.mark.parametrize(
     "law",
     [
@@ -270,10 +346,10 @@ def test_an_engine_with_answers_of_its_own_is_believed(question: str, where: str
 
 
 def test_gains_are_inputs_of_one_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stages, "_made", {})
+    monkeypatch.setattr(cuts, "_made", {})
     for kp in (100.0, 200.0, 300.0):
         both(ARM, ComputedTorque(ARM, kp=kp, kd=20.0), np.zeros(6), q0=np.full(6, 0.1), duration=0.02)
-    assert len(stages._made) == 3
+    assert len(cuts._made) == 3
 
 
 class Narrow(Trajectory):
@@ -296,7 +372,7 @@ def test_no_controller_is_at_no_limit() -> None:
 
 
 def test_progress_is_told_in_time_where_steps_are_slow(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(staged, "PROGRESS_INTERVAL", 1e-6)
+    monkeypatch.setattr(compiled_loop, "PROGRESS_INTERVAL", 1e-6)
     told: list[int] = []
     simulate(ARM, q0=np.zeros(6), duration=0.5, progress=lambda taken, wanted: told.append(taken))
     assert len(told) > 200

@@ -1,0 +1,138 @@
+"""One traced step of something that moves, in lanes: a controller or a task with its robot.
+
+The text of a step is array code (`dynx.sim.loop_step`, `dynx.envs.task_step`). It runs on symbols and becomes
+one kernel. Where another engine evaluates the dynamics, it becomes pieces between the calls of that engine
+(`dynx.simd.cuts`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import IntFlag
+from typing import NamedTuple
+
+from dynx.simd.cache import load_kernel, program_recipe
+from dynx.simd.call_sequence import CallSequence, Integers, StridedRows
+from dynx.simd.kernel import Kernel
+from dynx.simd.trace import trace
+from dynx.spatial.scalar import Array, Floats
+
+MAX_CACHED_KERNELS = 32
+"""Number of kernels that this process keeps for later steps with an equal key."""
+
+STATUS = "status"
+"""Name of the output with the status of each lane."""
+
+
+class Status(IntFlag):
+    """What ended the steps of a lane; `DONE` is none of it."""
+
+    DONE = 0
+    TORQUE = 1
+    """The torque of the controller is not finite."""
+    DIVERGED = 2
+    """The velocity after the step is not finite or too large to be meaningful."""
+    AT_LIMIT = 4
+    """A joint is beyond a position limit, to which it is to be stopped before the next step."""
+    UNSETTLED = 8
+    """It is not settled which joints stick: the step is to be repeated with corrected modes."""
+
+
+class Stop(NamedTuple):
+    """The step and the lane at which steps ended before their end, and why."""
+
+    step: int
+    lane: int
+    status: Status
+
+
+@dataclass(frozen=True)
+class StepText:
+    """The text of a step: array code for one lane."""
+
+    function: Callable[..., Mapping[str, Array]]
+    """Function of the inputs by name, arrays of symbols, that returns outputs by name; it branches on no
+    value. Outputs with the name of an input are that input of the next step."""
+    inputs: Mapping[str, int]
+    """Sizes of the inputs."""
+    key: Hashable | None = None
+    """Content that finds the kernel in this process without tracing; None: trace."""
+
+
+_kernels: dict[Hashable, Kernel] = {}
+
+
+class CompiledStep:
+    """A step in several variants, each compiled when it is first needed."""
+
+    def __init__(self, text: Callable[[Hashable], StepText]) -> None:
+        """`text` returns the text of a variant. Kernels raise what it and tracing raise, such as
+        TraceError."""
+        self._text = text
+        self._variants: dict[Hashable, Kernel] = {}
+
+    def kernel(self, variant: Hashable = None) -> Kernel:
+        """Return the kernel of a variant."""
+        kernel = self._variants.get(variant)
+        if kernel is None:
+            kernel = self._variants[variant] = compiled(self._text(variant))
+        return kernel
+
+    def __getstate__(self) -> dict[str, object]:
+        # Another process gets machine code and not the text, whose objects need not be transferable.
+        return {"_variants": self._variants, "_text": None}
+
+
+def compiled(text: StepText) -> Kernel:
+    """Return the kernel of a text: of an earlier equal one of this process, from the cache on disk, or
+    compiled."""
+    kernel = None if text.key is None else _kernels.get(text.key)
+    if kernel is None:
+        program = trace(text.function, {name: (size,) for name, size in text.inputs.items()})
+        kernel = load_kernel(program_recipe(program), lambda: program)
+        if text.key is not None:
+            _kernels[text.key] = kernel
+            for old in list(_kernels)[:-MAX_CACHED_KERNELS]:
+                _kernels.pop(old, None)
+    return kernel
+
+
+class BoundSteps:
+    """Steps of lanes whose arrays are known, numbered from `first` on."""
+
+    def __init__(
+        self,
+        kernels: Sequence[Kernel],
+        chosen: Integers,
+        rows: Mapping[str, tuple[Floats, Integers]],
+        written: Mapping[str, tuple[Floats, Integers]],
+        *,
+        first: int,
+        lanes: int = 1,
+        bound: Status = Status.DONE,
+    ) -> None:
+        """`chosen` (n,) is the number of the kernel of each step. `rows` has for each name an array, (height,
+        size) for all lanes or (height, lanes, size), and the row (n,) of each step; `written` has those of
+        outputs where they are others. Steps end at a status above `bound`."""
+        inputs = {name: StridedRows(array, number) for name, (array, number) in rows.items()}
+        outputs = {name: StridedRows(array, number) for name, (array, number) in written.items()}
+        self.first = first
+        self._status = rows[STATUS][0]
+        self._calls = CallSequence(
+            kernels, chosen, inputs, lanes, outputs=outputs, status=STATUS, bound=float(bound)
+        )
+        self.end = first + len(chosen)
+
+    def run(self, begin: int, end: int) -> Stop | None:
+        """Take the steps from `begin` to before `end`; return where they ended before that."""
+        stopped = self._calls.run(begin - self.first, end - self.first)
+        if stopped is None:
+            return None
+        call, lane = stopped
+        found = self._status[0, lane, 0] if self._status.ndim == 3 else self._status[0, 0]
+        return Stop(self.first + call, lane, Status(int(found)))
+
+    def repeat_group(self, step: int, lane: int) -> None:
+        """Repeat a step for one vector of lanes, from number `lane` on."""
+        self._calls.repeat_group(step - self.first, lane)
