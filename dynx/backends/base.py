@@ -24,13 +24,11 @@ if TYPE_CHECKING:
 
     from dynx.distance.avoidance import AvoidanceSource
     from dynx.ik.closed_forms.solutions import IKSolutions
-    from dynx.ik.frame_target import FrameTarget
-    from dynx.ik.options import IKOptions
+    from dynx.ik.options import FrameTarget, IKOptions
     from dynx.ik.result import IKResult
-    from dynx.ik.tracking.result import TrackResult
+    from dynx.ik.tracking.path import TrackResult
     from dynx.ik.tracking.tracker import Motion
-    from dynx.ik.velocity.programme import VelocityResult
-    from dynx.ik.velocity.tasks import VelocityTask
+    from dynx.ik.velocity import VelocityResult, VelocityTask
 
 
 class Backend(QuantityCalls):
@@ -230,7 +228,7 @@ class Backend(QuantityCalls):
         """
         raise NotImplementedError
 
-    @door("dynx.ik.velocity.programme:velocity_ik")
+    @door("dynx.ik.velocity:velocity_ik")
     def velocity_ik(
         self,
         q: ArrayLike,

@@ -11,8 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from dynx.errors import nearest
-from dynx.ik.frame_target import FrameTarget
-from dynx.ik.options import IKOptions, Options
+from dynx.ik.options import FrameTarget, IKOptions, Options
 from dynx.ik.result import IKResult
 from dynx.ik.solver import inverse_kinematics
 

@@ -3,23 +3,86 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dynx.backends.base import Backend
-from dynx.ik.axes import AxisRequirement
+from dynx.errors import ArgumentError, ShapeError, nearest, shown
 from dynx.ik.coordinates import FrameCoordinates
-from dynx.ik.search import SearchLimits
-from dynx.ik.secondary import Secondary
-from dynx.ik.tasks import AxisTask, FrameTask, SeveralTasks, Task
-from dynx.model.targets import Targets
+from dynx.ik.options import AxisRequirement, Options, SearchLimits, checked_axes, frame_targets
+from dynx.ik.search import AxisTask, FrameTask, SeveralTasks, Task
+from dynx.model import Model
+from dynx.model.configuration import checked_q
+from dynx.model.numbers import checked_vector, real_array
+from dynx.model.targets import Targets, checked_targets
 from dynx.spatial.scalar import Floats
 
 if TYPE_CHECKING:
-    from dynx.distance.avoidance import Avoidance
+    from dynx.distance.avoidance import Avoidance, AvoidanceSource
+
+
+MAXIMA = ("manipulability", "limit_distance")
+"""Values of the option `maximize`."""
+
+Objective = Callable[[Floats], float]
+"""Function of q (nq,) that is to become small."""
+
+
+@dataclass(frozen=True, eq=False)
+class Posture:
+    """An objective that is a sum of squares: weights (n,) times squared distances of joints from a goal (n,)
+    [rad or m]."""
+
+    goal: Floats
+    weights: Floats
+
+    @property
+    def inverse(self) -> Floats:
+        """Inverse weights (n,), of mean 1; those of joints that do not count are 1."""
+        found = np.where(self.weights > 0.0, 1.0 / np.where(self.weights > 0.0, self.weights, 1.0), 1.0)
+        return np.asarray(found / found.mean())
+
+
+@dataclass(frozen=True, eq=False)
+class Secondary:
+    """What a solution is chosen by."""
+
+    nearest: Floats | None
+    """Configurations (..., nq) to which solutions are to be near, or None."""
+    maximize: str | None
+    """One of `MAXIMA`, or None."""
+
+    def posture(self, coordinates: FrameCoordinates) -> Posture | None:
+        """Return the posture of one sample, or None if the objective is no sum of squared distances."""
+        if self.nearest is not None:
+            goal = coordinates.joint_values(self.nearest)
+            return Posture(goal, np.ones(len(goal)))
+        if self.maximize == "manipulability":
+            return None
+        low, high = coordinates.joint_limits
+        bounded = np.isfinite(low) & np.isfinite(high)
+        middle = np.where(bounded, 0.5 * (np.where(bounded, low, 0.0) + np.where(bounded, high, 0.0)), 0.0)
+        half = np.where(bounded, 0.5 * (np.where(bounded, high, 0.0) - np.where(bounded, low, 0.0)), np.inf)
+        return Posture(middle, np.where(bounded, 1.0 / np.maximum(half, 1e-12) ** 2, 0.0))
+
+    def objective(self, coordinates: FrameCoordinates, task: Task) -> Objective:
+        """Return the objective of one sample."""
+        posture = self.posture(coordinates)
+        if posture is None:
+            return lambda q: -_log_manipulability(task, q)
+        goal, weights = posture.goal, posture.weights
+        return lambda q: float(weights @ (coordinates.joint_values(q) - goal) ** 2)
+
+
+def _log_manipulability(task: Task, q: Floats) -> float:
+    """Return the logarithm of Yoshikawa's measure sqrt(det(J J')) of the task at q."""
+    values = np.linalg.svd(task.jacobian(q, task.error(q)), compute_uv=False)
+    return float(np.log(np.maximum(values, 1e-12)).sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,3 +180,163 @@ class Problem:
                 for requirement, (position, rotation) in zip(self.requirements, sample, strict=True)
             ]
             yield k, tasks[0] if len(tasks) == 1 else SeveralTasks(tasks)
+
+
+def checked_problem(
+    model: Model, target: Any, frame: str | None, q0: ArrayLike | None, options: Options
+) -> Problem:
+    """Return the problem that arguments describe.
+
+    Raises UnknownNameError for a frame; ArgumentError, ShapeError, DTypeError or NotFiniteError for other
+    arguments.
+    """
+    wanted = frame_targets(target, frame, options)
+    for name, _, _ in wanted:
+        model.frame_index(name)
+    requirements = tuple(_requirement(name, value, each) for name, value, each in wanted)
+    limits, rng = options.search_limits(), options.checked_rng()
+    margin = checked_margin(model, options.limit_margin)
+    frames = tuple(requirement.frame for requirement in requirements)
+    coordinates = stored_coordinates(model, frames, None if margin is None else tuple(margin.tolist()))
+    secondary = _secondary(model, options)
+    goal = None if secondary is None else secondary.nearest
+    start = _start(model, goal if q0 is None else q0)
+    if margin is not None:
+        start = coordinates.clipped(start)
+    shapes = [requirement.targets.batch for requirement in requirements]
+    if goal is not None:
+        shapes.append(goal.shape[:-1])
+    try:
+        batch = np.broadcast_shapes(*shapes, start.shape[:-1])
+    except ValueError:
+        of_targets = shapes[0] if len(shapes) == 1 else shapes
+        raise ShapeError(
+            f"leading axes do not broadcast: target has {of_targets}, q0 has {start.shape[:-1]}"
+        ) from None
+    avoidance = checked_avoidance(model, options.avoid)
+    if avoidance is not None and options.method != "dynx":
+        raise ArgumentError("avoid needs method 'dynx'")
+    return Problem(
+        requirements, coordinates, margin, start, q0 is not None, batch, limits, rng, secondary, avoidance
+    )
+
+
+def checked_avoidance(model: Model, avoid: AvoidanceSource | None) -> Avoidance | None:
+    """Return what the robot is to avoid, or None. Raises ArgumentError."""
+    if avoid is None:
+        return None
+    from dynx.distance.avoidance import AvoidanceSource
+
+    if not isinstance(avoid, AvoidanceSource):
+        raise ArgumentError(
+            f"avoid is {shown(avoid)}; wanted a dynx.world.Scene or World, or its avoidance(...)"
+        )
+    return avoid.avoidance_for(model)
+
+
+def _secondary(model: Model, options: Options) -> Secondary | None:
+    """Return what solutions are chosen by, or None."""
+    goal = options.nearest
+    if goal is None and options.maximize is None:
+        return None
+    if goal is not None and options.maximize is not None:
+        raise ArgumentError("nearest and maximize are both given; a choice has one objective")
+    if options.method != "dynx":
+        raise ArgumentError("nearest and maximize need method 'dynx'")
+    if goal is None:
+        if options.maximize not in MAXIMA:
+            raise ArgumentError(
+                f"maximize is {shown(options.maximize)}{nearest(str(options.maximize), MAXIMA)}"
+            )
+        return Secondary(None, options.maximize)
+    return Secondary(checked_q(model, goal, "nearest"), None)
+
+
+def _requirement(frame: str, target: ArrayLike, options: Options) -> Requirement:
+    """Return the checked target of one frame."""
+    free, axes = checked_axes(
+        options.free, options.weights, options.position_tolerance, options.rotation_tolerance, options.axes
+    )
+    targets: Targets = checked_targets(target, _part_read(target, options) if axes is not None else free)
+    if axes is not None:
+        axes = axes.for_targets(targets)
+        if options.axes == "target" and targets.rotations is None and options.free != "rotation":
+            _refuse_axes_of_position(options)
+    point = None if options.point is None else checked_vector("point", options.point)
+    placed = targets.positions is not None and (axes is None or any(axes.weights[:3]))
+    if point is not None and not placed:
+        raise ArgumentError("point is given in addition to free='position', with which it has no effect")
+    return Requirement(frame, targets, point, axes, options.search_limits())
+
+
+def _part_read(target: ArrayLike, options: Options) -> str | None:
+    """Return what `free` says on how to read an array that may be positions or rotations."""
+    names = (options.free,) if isinstance(options.free, str) else tuple(options.free or ())
+    shape = np.shape(target)
+    if len(shape) >= 2 and shape[-2:] == (4, 4):
+        return None
+    return "position" if "position" in names else "rotation" if "rotation" in names else None
+
+
+def _refuse_axes_of_position(options: Options) -> None:
+    """Refuse rotation axes of a target that is a position."""
+    names = (options.free,) if isinstance(options.free, str) else tuple(options.free or ())
+    for name in names:
+        if name.startswith("rotation_"):
+            raise ArgumentError(
+                f"free has {shown(name)}, but the target is a position (..., 3), whose rotation is free"
+            )
+
+
+def checked_margin(model: Model, margin: ArrayLike) -> Floats | None:
+    """Return the margin (nq,) [rad or m], or None if it is 0."""
+    if isinstance(margin, float) and margin == 0.0:
+        return None
+    array = real_array("limit_margin", margin)
+    if array.shape not in ((), (model.nq,)):
+        raise ShapeError(f"limit_margin has shape {array.shape}; wanted a number, or ({model.nq},)")
+    if not (np.isfinite(array).all() and (array >= 0.0).all()):
+        raise ArgumentError(f"limit_margin is {shown(margin)}; wanted a number of at least 0 [rad or m]")
+    return np.broadcast_to(array, (model.nq,)).copy() if array.any() else None
+
+
+def _start(model: Model, q0: ArrayLike | None) -> Floats:
+    """Return q0, or the neutral configuration, moved into the limits and with a unit quaternion."""
+    q = model.neutral() if q0 is None else checked_q(model, q0, "q0")
+    q = np.minimum(np.maximum(q, model.lower), model.upper)
+    if model.floating:
+        q[..., 3:7] /= np.linalg.norm(q[..., 3:7], axis=-1, keepdims=True)
+    return q
+
+
+def argument_note(model: Model, q0: ArrayLike | None, avoidance: Avoidance | None) -> str:
+    """Return sentences on a q0 that was moved into the limits and on what the avoidance leaves out."""
+    notes = ("" if q0 is None else start_note(model, q0), "" if avoidance is None else avoidance.note)
+    return "; ".join(filter(None, notes))
+
+
+def start_note(model: Model, q0: ArrayLike) -> str:
+    """Return a sentence if a q0 (..., nq) that was checked is outside the limits, otherwise an empty text."""
+    q = np.asarray(q0, dtype=np.float64)
+    outside = (q < model.lower) | (q > model.upper)
+    if not outside.any():
+        return ""
+    offset, names = model.nq - len(model.joint_names), model.joint_names
+    if q.ndim > 1:
+        columns = np.flatnonzero(outside.any(axis=tuple(range(q.ndim - 1))))
+        joints = ", ".join(names[k - offset] for k in columns.tolist())
+        count, size = int(outside.any(axis=-1).sum()), q[..., 0].size
+        return f"{count} of {size} q0 were outside the limits and moved into them ({joints})"
+    moved = [
+        f"{names[k - offset]} from {q[k]:.6g} to {min(max(q[k], model.lower[k]), model.upper[k]):.6g}"
+        for k in np.flatnonzero(outside).tolist()
+    ]
+    return f"q0 was outside the limits and moved into them: {', '.join(moved)}"
+
+
+@lru_cache(maxsize=64)
+def stored_coordinates(
+    model: Model, frames: tuple[str, ...], margin: tuple[float, ...] | None = None
+) -> FrameCoordinates:
+    """Return the coordinates that move frames, the same object for equal arguments."""
+    return FrameCoordinates(model, frames, None if margin is None else np.array(margin))

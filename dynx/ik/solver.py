@@ -12,12 +12,11 @@ from numpy.typing import ArrayLike
 
 from dynx.backends.base import Backend
 from dynx.errors import ArgumentError, nearest, shown
-from dynx.ik.checking import argument_note, checked_problem
-from dynx.ik.kernels.kernels import KernelSolvers, kernel_solution
+from dynx.ik.kernels import KernelSolvers, kernel_solution
 from dynx.ik.options import IKOptions, Options, spells_options
-from dynx.ik.preference import preferred_solutions
-from dynx.ik.problem import Problem
+from dynx.ik.problem import Problem, argument_note, checked_problem
 from dynx.ik.reach import proofs
+from dynx.ik.refine import preferred_solutions
 from dynx.ik.result import IKResult
 from dynx.ik.search import Candidate, Search
 from dynx.spatial.scalar import Floats
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
     from dynx.ik.closed_forms.solutions import IKSolutions
-    from dynx.ik.frame_target import FrameTarget
+    from dynx.ik.options import FrameTarget
 
 METHODS = ("dynx", "engine")
 """Values of the option `method`."""
@@ -85,7 +84,7 @@ def inverse_kinematics(
     neutral configuration). Angles whose range is a full turn are returned nearest to q0.
 
     The result is checked by forward kinematics. If a target is not reached, no error is raised: the result
-    has the best q found, and the status UNREACHABLE if a bound on distances, heights or angles proves that no
+    has the best q found, and the status UNREACHABLE if it is farther than the chain is long, so that no
     configuration reaches it (`dynx.ik.reach`), otherwise NOT_FOUND.
 
     With `avoid`, a scene or what `Scene.avoidance` returns, a solution keeps the robot's links at least a
@@ -147,7 +146,7 @@ def _solved(backend: Backend, problem: Problem, method: str) -> IKResult:
             return found
         avoidance, is_clear = problem.avoidance, None
         if avoidance is not None:
-            from dynx.ik.clear_solutions import clear_solutions
+            from dynx.ik.clear import clear_solutions
 
             found = clear_solutions(backend, problem, avoidance, found)
             is_clear = partial(avoidance.is_clear, backend)
@@ -237,6 +236,6 @@ def _all_solutions(
     backend.model.frame_index(frame)
     limits = options.search_limits()
     tolerances = (limits.position_tolerance, limits.rotation_tolerance)
-    from dynx.ik.closed_forms.checking import all_solutions
+    from dynx.ik.closed_forms.solver import all_solutions
 
     return all_solutions(backend, target, frame, q0, options.given, *tolerances)

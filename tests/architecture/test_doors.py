@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 DOORS = {
     "dynx.backends.base:Backend.inverse_kinematics": "dynx.ik.solver:inverse_kinematics",
     "dynx.backends.base:Backend.track": "dynx.ik.tracking.tracker:track",
-    "dynx.backends.base:Backend.velocity_ik": "dynx.ik.velocity.programme:velocity_ik",
+    "dynx.backends.base:Backend.velocity_ik": "dynx.ik.velocity:velocity_ik",
     "dynx.model.model:Model.view": "dynx.viewer.viewer:view",
     "dynx.sim.record.rollout:Rollout.view": "dynx.viewer.viewer:view",
     "dynx.world.world:World.view": "dynx.viewer.viewer:view",

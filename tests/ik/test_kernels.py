@@ -18,7 +18,7 @@ from dynx.errors import ArgumentError, ClosedError
 from dynx.files.cache import keep
 from dynx.ik import IKResult
 from dynx.ik.coordinates import FrameCoordinates
-from dynx.ik.kernels.starts import BOXES, ROTATIONS, STARTS_OF_CELL, Cells, StartTable
+from dynx.ik.starts import BOXES, ROTATIONS, STARTS_OF_CELL, Cells, StartTable
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.spatial.scalar import Floats

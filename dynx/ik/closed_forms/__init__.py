@@ -1,10 +1,9 @@
 """Closed forms of inverse kinematics: all solutions of six-axis arms, with the names of their branches.
 
-From the robot to its solutions: `chain` (axes of the joints), `lines`, `recognition` and
-`sliding_recognition` (which family), the families, from `subproblems` and `quartic` (`spherical_wrist`,
-`parallel_axes` and `outer_parallel_axes` of six revolute joints; `three_slides`, `sliding_arm` and
-`parallel_arm` with prismatic ones), `polish` (Newton's method on the chain itself), `candidates` (one
-branch), `review` and `branch_kernel` (all, by NumPy or a kernel), `solver`.
+From the robot to its solutions: `chain` (axes of the joints), `recognition` (which family), the families,
+from `subproblems` (`spherical_wrist` and `parallel_axes` of six revolute joints; `sliding_arms` with
+prismatic ones), `candidates` (one branch, polished by Newton's method on the chain itself, and reviewed),
+`branch_kernel` (all branches), `solver`.
 """
 
 from dynx.ik.closed_forms.solutions import IKSolutions

@@ -19,9 +19,18 @@ import dynx.model.numbers
 import dynx.model.targets
 import dynx.rbd
 import dynx.spatial
-from dynx.ik.closed_forms.branches import N_BRANCHES, SIGNS
-from dynx.ik.closed_forms.candidates import ARBITRARY, POSITION, ROTATION, SEPARATION, VIOLATION, Candidates
-from dynx.ik.closed_forms.review import AT_LIMIT, ROUNDING
+from dynx.ik.closed_forms.candidates import (
+    ARBITRARY,
+    AT_LIMIT,
+    N_BRANCHES,
+    POSITION,
+    ROTATION,
+    ROUNDING,
+    SEPARATION,
+    SIGNS,
+    VIOLATION,
+    Candidates,
+)
 from dynx.model.numbers import MAX_MAGNITUDE
 from dynx.model.targets import ROUNDING_TOLERANCE
 from dynx.simd.cache import source_version

@@ -1,34 +1,49 @@
-"""`ClosedForm`: all solutions of one arm, from the candidates of its branches."""
+"""`ClosedForm`: all solutions of one arm, from the candidates of its branches, on a backend or alone.
+
+A compiled closed form has the solutions of one pose in a few microseconds.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
 from itertools import combinations
 from math import prod
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import NoClosedFormError, ShapeError, shown
-from dynx.ik.closed_forms.branches import N_BRANCHES, branch_names
-from dynx.ik.closed_forms.candidates import ARBITRARY, POSITION, ROTATION, Candidates
-from dynx.ik.closed_forms.chain import MAX_JOINTS, Chain, chain_to
-from dynx.ik.closed_forms.full_turns import FullTurns
-from dynx.ik.closed_forms.polish import AxisFrames
+from dynx.backends.base import Backend
+from dynx.errors import ArgumentError, NoClosedFormError, ShapeError, shown
+from dynx.ik.closed_forms.candidates import (
+    ACCURACY,
+    ARBITRARY,
+    N_BRANCHES,
+    POSITION,
+    ROTATION,
+    AxisFrames,
+    Candidates,
+    Mask,
+    Review,
+    branch_names,
+    near_to,
+)
+from dynx.ik.closed_forms.chain import MAX_JOINTS, Chain, chain_to, checked_given
 from dynx.ik.closed_forms.recognition import TOLERANCES, Recognised, recognise
-from dynx.ik.closed_forms.review import ACCURACY, Mask, Review, near_to
-from dynx.ik.closed_forms.solutions import IKSolutions
+from dynx.ik.closed_forms.solutions import FullTurns, IKSolutions
+from dynx.ik.options import SearchLimits
 from dynx.model import Model
 from dynx.model.configuration import checked_q
 from dynx.model.model import refuse_other_than_model
 from dynx.model.targets import checked_targets
+from dynx.simd.variants import BoundVariants
 from dynx.spatial.scalar import Floats
-from dynx.spatial.se3 import homogeneous
+from dynx.spatial.se3 import homogeneous, pose_error
 
 if TYPE_CHECKING:
     from dynx.ik.closed_forms.branch_kernel import BranchKernel
+
 
 _NEARNESS = 1e-6, 100.0, 3.0
 """Error above which a candidate is not near a solution: at least, in units of the chain's tolerance, and in
@@ -333,3 +348,112 @@ def _sets_to_give(
         return []
     surplus = len(joints) - MAX_JOINTS
     return list(combinations(joints, surplus)) if 1 <= surplus <= MAX_SURPLUS else []
+
+
+def all_solutions(
+    backend: Backend,
+    target: ArrayLike,
+    frame: str,
+    q0: ArrayLike | None,
+    given: Mapping[str, float] | None,
+    position_tolerance: float,
+    rotation_tolerance: float,
+) -> IKSolutions:
+    """Return the solutions of `ClosedForm.solve` that are within the tolerances [m], [rad] by the forward
+    kinematics of the backend.
+
+    A backend that compiles (attribute ``compiles``) uses the compiled form, whose kernel measures the
+    solutions, unless joints are given: each position of theirs would be compiled anew.
+    """
+    compiled = backend.compiles and not given
+    positions = () if given is None else _within_limits(backend.model, given)
+    form = stored_closed_form(backend.model, frame, positions, compiled)
+    found = form.solve(target, q0, threads=backend.threads)
+    if compiled and min(position_tolerance, rotation_tolerance) >= form.accuracy:
+        return found
+    errors, rows = np.stack([found.position_error, found.rotation_error], axis=-1), found.success
+    if not compiled:
+        wanted = np.broadcast_to(np.asarray(target, dtype=np.float64)[..., None, :, :], (*rows.shape, 4, 4))
+        parts = pose_error(wanted[rows], backend.forward_kinematics(found.q[rows], frame))
+        errors[rows] = np.stack([np.linalg.norm(part, axis=-1) for part in parts], axis=-1)
+    within = (errors <= (position_tolerance, rotation_tolerance)).all(axis=-1)
+    return found.measured(errors, rows & within)
+
+
+def _within_limits(model: Model, given: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
+    """Return the positions by joint; raise ArgumentError for one outside the limits: no solution has it."""
+    checked = tuple(checked_given(model, given).items())
+    for name, value in checked:
+        at = model.coordinate_index(name)
+        low, high = float(model.lower[at]), float(model.upper[at])
+        if not low <= value <= high:
+            unit = "m" if model.joint(name).type == "prismatic" else "rad"
+            raise ArgumentError(
+                f"the given position of joint {shown(name)} is {value:.6g} {unit}, outside its limits: "
+                f"{low:.6g} to {high:.6g} {unit}"
+            )
+    return checked
+
+
+_FLOAT64 = np.dtype(np.float64)
+
+_ALL = 2**N_BRANCHES - 1
+
+_Workspace = tuple[Callable[[], None], memoryview, Floats, Floats, BoundVariants]
+"""Function that evaluates the pose, its masks, the pose (4, 4), and the block (8, n + 2) of results; last
+what holds their memory."""
+
+_ROWS = [np.flatnonzero([bits >> k & 1 for k in range(N_BRANCHES)]) for bits in range(2**N_BRANCHES)]
+"""Numbers of the branches whose bits are set, for every byte."""
+
+
+class SinglePose:
+    """Function from one pose to its solutions, for an arm whose joints are those of the model.
+
+    Safe to use from several threads.
+    """
+
+    def __init__(self, form: ClosedForm) -> None:
+        assert form.kernel is not None
+        self._kernel, self._names = form.kernel, form.branches
+        self._turns, self._count = form.full_turns, len(form.joints)
+        # Workspaces that no call uses at the moment.
+        self._free: list[_Workspace] = [self._workspace()]
+
+    def __call__(self, target: Any, q0: Any = None) -> IKSolutions | None:
+        """Return the solutions for a pose (4, 4) without q0, or None for q0, and if the pose is not valid or
+        needs a review."""
+        if (
+            q0 is not None
+            or type(target) is not np.ndarray
+            or target.dtype is not _FLOAT64
+            or target.shape != (4, 4)
+        ):
+            return None
+        try:
+            workspace = self._free.pop()
+        except IndexError:
+            workspace = self._workspace()
+        run, masks, pose, block, _ = workspace
+        pose[...] = target
+        run()
+        bits = masks[0]
+        # The bits of solutions are the first byte; others are set where there is something to review.
+        rows = None if bits > _ALL else block.copy() if bits == _ALL else block.take(_ROWS[bits], 0)
+        self._free.append(workspace)
+        if rows is None:
+            return None
+        count = self._count
+        return IKSolutions(rows[:, :count], rows[:, count:], self._names, bits, full_turns=self._turns)
+
+    def _workspace(self) -> _Workspace:
+        block = np.empty((N_BRANCHES, self._count + 2))
+        bound = self._kernel.bind(block)
+        return bound.run, bound.masks, bound.inputs[0].reshape(4, 4), block, bound
+
+
+def single_pose_call(model: Model, frame: str, limits: SearchLimits) -> SinglePose | None:
+    """Return the call for poses of a frame, or None if its solutions are to be checked or completed."""
+    form = stored_closed_form(model, frame, (), True)
+    tolerance = min(limits.position_tolerance, limits.rotation_tolerance)
+    return SinglePose(form) if form.covers_model and tolerance >= form.accuracy else None

@@ -25,14 +25,17 @@ from typing import Literal
 
 import numpy as np
 
-from dynx.ik.closed_forms.quartic import combined, conic_root, linear, squared
 from dynx.ik.closed_forms.subproblems import (
     Angle,
     angle_from_to,
+    combined,
     component_terms,
+    conic_root,
     dot,
+    linear,
     positive_root,
     solve_linear,
+    squared,
     turn,
     turn_back,
     value_at,

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from dynx.ik.closed_forms.branches import SIGNS
-from dynx.ik.closed_forms.quartic import conic_root
+from dynx.ik.closed_forms.candidates import SIGNS
+from dynx.ik.closed_forms.subproblems import conic_root
 
 angles = st.floats(-np.pi, np.pi)
 numbers = st.floats(-10.0, 10.0)

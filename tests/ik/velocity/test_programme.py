@@ -13,9 +13,7 @@ from scipy.optimize import LinearConstraint, lsq_linear, minimize
 
 from dynx.backends import backend
 from dynx.errors import ArgumentError, NotInstalledError, ShapeError, UnknownNameError
-from dynx.ik.velocity import VelocityTask
-from dynx.ik.velocity.limits import velocity_bounds
-from dynx.ik.velocity.programme import AT_BOUND
+from dynx.ik.velocity import AT_BOUND, VelocityTask, velocity_bounds
 from dynx.model.elements import Pose
 from dynx.model.loading import load
 from dynx.testing.strategies import configurations, models

@@ -10,11 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.backends import backend
-from dynx.ik.axes import AxisRequirement
-from dynx.ik.axis_residual import AxisResidual
-from dynx.ik.checking import checked_problem
-from dynx.ik.kernels.axis_residual import AxisKind, axis_residual, axis_values
-from dynx.ik.options import Options
+from dynx.ik.options import AxisRequirement, Options
+from dynx.ik.problem import checked_problem
+from dynx.ik.search import AxisResidual
+from dynx.ik.step import AxisKind, axis_residual, axis_values
 from dynx.model.loading import load
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import rotation_from_rpy

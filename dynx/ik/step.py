@@ -5,10 +5,14 @@ a start is abandoned when the squared error has not fallen enough over a few ste
 projection (Bertsekas, Projected Newton methods for optimization problems with simple constraints, SIAM J.
 Control and Optimization 20(2), 1982): a coordinate at a limit does not move if the error would decrease
 beyond it, the step is solved for the others, and then clipped to the limits.
+
+A kernel is compiled for what is prescribed, weighted and bounded (`TargetKind`, `AxisKind`); the weights and
+bounds are its inputs.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -16,10 +20,9 @@ from typing import Any
 import numpy as np
 
 from dynx.ik.coordinates import FULL_TURN, FrameCoordinates
-from dynx.ik.kernels.axis_residual import N_AXIS_VALUES, AxisKind, axis_residual, axis_values
-from dynx.ik.kernels.residual import TracedResidual
+from dynx.ik.options import AxisRequirement
 from dynx.ik.problem import Problem
-from dynx.ik.search import DAMPING, MIN_DAMPING, REQUIRED_REDUCTION, WINDOW
+from dynx.ik.search import DAMPING, INSIDE, MIN_DAMPING, REQUIRED_REDUCTION, SMALL_SINE, WINDOW
 from dynx.model.mechanism import Mechanism
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, frame_jacobian
 from dynx.rbd.kinematics import ancestry, body_poses, frame_pose
@@ -27,8 +30,199 @@ from dynx.rbd.linear import solve_positive_definite
 from dynx.simd.inlining import less, less_equal, maximum, minimum, select
 from dynx.simd.iteration import GIVEN_UP, NO_RESTART, REACHED, RUNNING, Iteration
 from dynx.simd.trace import trace
-from dynx.spatial.scalar import Array, Floats
-from dynx.spatial.so3 import rotate
+from dynx.spatial.scalar import Array, Floats, arctan, sqrt
+from dynx.spatial.so3 import cross, rotate
+
+_SMALL_SINE = 1e-7
+"""Twice the sine of an angle below which the antisymmetric part of a rotation does not give its axis."""
+
+
+@dataclass(frozen=True)
+class TracedResidual:
+    """Error vector (m,), the distance [m] and the angle [rad]; a part that is free has no rows."""
+
+    vector: Array
+    distance: Any
+    angle: Any
+    within: Any = 1.0
+    """1 where every component is within its own bound."""
+    bounds_distance: bool = True
+    bounds_angle: bool = True
+    """Whether the tolerances bound the distance and the angle; otherwise the bounds of components do."""
+
+    def reached(self, position_tolerance: Any, rotation_tolerance: Any) -> Any:
+        """Return 1 where the error is within the tolerances, otherwise 0."""
+        within = self.within
+        if self.bounds_distance:
+            within = within * less_equal(self.distance, position_tolerance)
+        return within * less_equal(self.angle, rotation_tolerance) if self.bounds_angle else within
+
+    @classmethod
+    def of(cls, position: Array | None, rotation: Array | None) -> TracedResidual:
+        """Make the error from the displacement (3,) to the target and the rotation (3, 3) to it, in world
+        axes."""
+        parts: list[Array] = []
+        distance: Any = 0.0
+        angle: Any = 0.0
+        if position is not None:
+            parts.append(position)
+            distance = root(squared_length(position))
+        if rotation is not None:
+            vector, angle = rotation_vector(rotation)
+            parts.append(vector)
+        return cls(np.concatenate(parts), distance, angle)
+
+
+def rotation_vector(R: Array) -> tuple[Array, Any]:
+    """Return the rotation vector of R (3, 3) and its norm in [0, pi] [rad] (Siciliano et al., eq. 2.27)."""
+    axial = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    twice_sine = root(squared_length(axial))
+    twice_cosine = R[0, 0] + R[1, 1] + R[2, 2] - 1.0
+    obtuse = less(twice_cosine, 0.0)
+    # tan(angle / 2), or that of pi - angle, so that its denominator is at least 2.
+    half = np.asarray(arctan(twice_sine / (abs(twice_cosine) + 2.0)))[()]
+    angle = select(obtuse, math.pi - 2.0 * half, 2.0 * half)
+    # At an angle of pi the antisymmetric part vanishes: R + 1 = 2 a a'.
+    columns = list((R + np.eye(3)).T)
+    longest, square = columns[0], squared_length(columns[0])
+    for column in columns[1:]:
+        other = squared_length(column)
+        longer = less(square, other)
+        longest = np.array([select(longer, a, b) for a, b in zip(column, longest, strict=True)])
+        square = select(longer, other, square)
+    small = less(twice_sine, _SMALL_SINE)
+    straight = small * obtuse
+    divisor = select(straight, root(square), maximum(twice_sine, _SMALL_SINE))
+    scale = select(small * (1.0 - obtuse), 0.5, angle / divisor)
+    vector = [scale * select(straight, a, b) for a, b in zip(longest, axial, strict=True)]
+    return np.array(vector), angle
+
+
+def squared_length(a: Array) -> Any:
+    """Return a' a for a vector (3,)."""
+    return a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
+
+
+def root(x: Any) -> Any:
+    """Return the square root of a symbol."""
+    return np.asarray(sqrt(np.asarray(x)))[()]
+
+
+@dataclass(frozen=True)
+class AxisKind:
+    """Axes that are not free, parts whose components are bounded one by one, and whose axes they are."""
+
+    used: tuple[bool, ...]
+    """Whether each of position x, y, z and rotation x, y, z has a weight above 0."""
+    bounds_position: bool
+    bounds_rotation: bool
+    of_target: bool
+    free_rotation: int | None
+
+    @classmethod
+    def of(cls, axes: AxisRequirement) -> AxisKind:
+        """Return the kind of a requirement."""
+        return cls(
+            tuple(weight != 0.0 for weight in axes.weights),
+            axes.position_tolerances is not None,
+            axes.rotation_tolerances is not None,
+            axes.of_target,
+            axes.free_rotation,
+        )
+
+    def bounded(self, component: int) -> bool:
+        """Return whether a component has a bound of its own."""
+        return self.bounds_position if component < 3 else self.bounds_rotation
+
+
+N_AXIS_VALUES = 12
+"""Number of weights and bounds."""
+
+
+def axis_values(axes: AxisRequirement) -> Floats:
+    """Return the weights (6,), then the bounds (6,), 0 where there is none."""
+    bounds = [*(axes.position_tolerances or (0.0,) * 3), *(axes.rotation_tolerances or (0.0,) * 3)]
+    return np.array([*axes.weights, *(bound if bound < math.inf else 0.0 for bound in bounds)])
+
+
+def axis_residual(
+    kind: AxisKind,
+    frame: tuple[Array, Array, Array],
+    position: Array | None,
+    rotation: Array | None,
+    values: Array,
+) -> tuple[TracedResidual, Array]:
+    """Return the weighted error (m,) of a frame (R, p, J) with respect to its target, and its Jacobian."""
+    R, p, J = frame
+    of_target = kind.of_target and rotation is not None
+
+    def along(a: Array) -> Array:
+        """Return vectors (3, ...) along the axes that count."""
+        assert not of_target or rotation is not None
+        return np.asarray(rotation.T @ a) if of_target and rotation is not None else a
+
+    errors: list[Any] = [0.0] * 6
+    rows: list[Array] = [J[0]] * 6
+    if position is not None:
+        errors[:3], rows[:3] = along(position - p), list(along(J[:3]))
+    if rotation is not None:
+        turning = J[3:]
+        if kind.free_rotation is None:
+            vector, _ = rotation_vector(rotation @ R.T)
+        else:
+            k = kind.free_rotation
+            direction = rotation[:, k] if of_target else np.eye(3)[k]
+            current = np.asarray(R[:, k] if of_target else R @ rotation[k])
+            vector = _turn_between(current, direction)
+            turning = turning - current[:, None] * (current @ turning)[None]
+        errors[3:], rows[3:] = along(vector), list(along(turning))
+    weighted: list[Any] = []
+    counted: list[Array] = []
+    within: Any = 1.0
+    for k in (k for k in range(6) if kind.used[k]):
+        excess, counts = errors[k], values[k]
+        if kind.bounded(k):
+            size, bound = abs(errors[k]), values[6 + k]
+            over = maximum(size - INSIDE * bound, 0.0)
+            excess = select(less(errors[k], 0.0), -over, over)
+            # An error within its tolerance restricts nothing.
+            counts = counts * less(0.0, over)
+            within = within * less_equal(size, bound)
+        weighted.append(counts * excess)
+        counted.append(counts * rows[k])
+    distance, angle = (
+        root(sum((errors[k] * errors[k] for k in part if kind.used[k]), start=0.0 * values[0]))
+        for part in (range(3), range(3, 6))
+    )
+    residual = TracedResidual(
+        np.array(weighted, dtype=object), distance, angle, within,
+        not kind.bounds_position, not kind.bounds_rotation,
+    )  # fmt: skip
+    return residual, np.array(counted, dtype=object)
+
+
+def _turn_between(a: Array, b: Array) -> Array:
+    """Return the smallest rotation vector (3,) [rad] that turns the unit vector a to b."""
+    normal = np.asarray(cross(a, b))
+    sine, cosine = root(squared_length(normal)), a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    obtuse = less(cosine, 0.0)
+    half = np.asarray(arctan(sine / (abs(cosine) + 1.0)))[()]
+    angle = select(obtuse, math.pi - 2.0 * half, 2.0 * half)
+    small = less(sine, SMALL_SINE)
+    scale = select(small, 1.0, angle / maximum(sine, SMALL_SINE))
+    # Opposite directions: any axis perpendicular to them, here across the smallest component of b.
+    squares = [b[k] * b[k] for k in range(3)]
+    first = less_equal(squares[0], squares[1]) * less_equal(squares[0], squares[2])
+    second = (1.0 - first) * less_equal(squares[1], squares[2])
+    least = np.array([first, second, 1.0 - first - second], dtype=object)
+    across = least - b * (least @ b)
+    length = maximum(root(squared_length(across)), SMALL_SINE)
+    opposite = small * obtuse
+    return np.array(
+        [select(opposite, math.pi * x / length, scale * y) for x, y in zip(across, normal, strict=True)],
+        dtype=object,
+    )
+
 
 _ROUNDING_SHIFT = 6755399441055744.0
 """1.5 * 2^52: adding it to a double and subtracting it again rounds the double to an integer."""
@@ -129,7 +323,7 @@ def solver_iteration(
     of a pose (12,), a position (3,) or a rotation (9,); ``near`` (n,), to which periodic angles are shifted;
     ``cell``, the first row of starts near the target; ``point`` (3,) if there is one; and ``axes`` (12,),
     weights and bounds per axis, if there are such. The constants are those of `SETTINGS`, then the numbers
-    that the rows of starts follow from (`dynx.ik.kernels.starts`).
+    that the rows of starts follow from (`dynx.ik.starts`).
     """
     n = coordinates.count
     path = FramePath.of(mechanism, frame, coordinates)

@@ -1,7 +1,7 @@
 """Starts of the solver: configurations whose poses are near the target, then random ones.
 
-A table is made once for a frame from the poses of random configurations, and kept in the cache on disk.
-Poses are divided into cells: boxes of the frame's position, times the 24 rotations of a cube, of which one is
+A table is made once for a frame from the poses of random configurations, and kept in the cache on disk. Poses
+are divided into cells: boxes of the frame's position, times the 24 rotations of a cube, of which one is
 nearest to the frame's axes. Each cell has a few starts; a target begins at those of its own cell. Finding a
 cell takes a few comparisons.
 """
@@ -169,7 +169,7 @@ class Starts:
 
     @property
     def constants(self) -> Floats:
-        """Numbers that the kernel finds the row of a start with (`dynx.ik.kernels.step`)."""
+        """Numbers that the kernel finds the row of a start with (`dynx.ik.step`)."""
         return np.array([self.near, self.offset, self.base], dtype=np.float64)
 
     def first_rows(self, problem: Problem) -> Integers:

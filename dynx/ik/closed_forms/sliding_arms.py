@@ -1,4 +1,11 @@
-"""A spherical wrist on an arm of three joints of which one or two are prismatic, such as the Stanford arm.
+"""Arms with prismatic joints, and of three parallel revolute axes alone.
+
+Three prismatic joints and up to three revolute ones, in any order, such as a gantry with a wrist.
+
+The revolute joints alone determine the rotation: with three of them in two ways, whether or not their axes
+meet. With their angles the position is linear in the positions of the prismatic joints.
+
+A spherical wrist on an arm of three joints of which one or two are prismatic, such as the Stanford arm.
 
 The arm places the wrist centre c at x. With a the direction of a prismatic joint and d its position, what the
 revolute joints do not change gives equations in few unknowns. With two prismatic joints:
@@ -8,11 +15,18 @@ revolute joints do not change gives equations in few unknowns. With two prismati
 
 With one, K(q_3) and S(q_3) being heights along the axis before and squared distances from a point of it,
 
-- R R P, axes 1 and 2 meeting: the distance from the common point gives d (two), its height q_2 (two);
-- R R P, axes 1 and 2 parallel: the height gives d, the distance q_2 (two);
-- R P R, P R R: height = K + d a'h and distance^2 = S + 2 d (...) + d^2. If the slide is normal to the axis, K
-  gives q_3 (two) and the other equation d (two); if both axes are parallel, K is constant; in general the
-  first gives d by q_3, and the second a quartic for q_3.
+- R R P, axes 1 and 2 meeting: the distance from the common point gives d (two), its height q_2 (two); - R R
+P, axes 1 and 2 parallel: the height gives d, the distance q_2 (two); - R P R, P R R: height = K + d a'h and
+distance^2 = S + 2 d (...) + d^2. If the slide is normal to the axis, K gives q_3 (two) and the other equation
+d (two); if both axes are parallel, K is constant; in general the first gives d by q_3, and the second a
+quartic for q_3.
+
+Three parallel revolute axes: their angles from the plane motion that they make together.
+
+Three parallel revolute joints, alone or with one prismatic joint along them: SCARA arms.
+
+The joints move the frame in four directions: a pose has solutions if its rotation is one about the axes, and
+without a prismatic joint if its height is that of the arm.
 """
 
 from __future__ import annotations
@@ -22,23 +36,110 @@ from typing import Literal
 
 import numpy as np
 
-from dynx.ik.closed_forms.quartic import combined, conic_root, linear, multiplied, squared
 from dynx.ik.closed_forms.spherical_wrist import wrist_angles
 from dynx.ik.closed_forms.subproblems import (
+    ALIGNMENT,
     Angle,
     Coordinate,
     Slide,
     angle_from_to,
+    combined,
     component_terms,
+    conic_root,
     dot,
+    linear,
+    multiplied,
     quadratic_root,
     solve_linear,
+    squared,
     turn,
     turn_back,
     value_at,
 )
 from dynx.spatial.scalar import Array, Floats, append_axis, where_less
 from dynx.spatial.so3 import cross, rotate
+
+_SINGULAR = 1e-12
+"""Determinant of the directions of the slides below which they do not span space."""
+
+
+@dataclass(frozen=True, eq=False)
+class ThreeSlides:
+    """Geometry at the zero configuration; lengths are relative."""
+
+    axes: Floats
+    """Directions (n, 3), n from 3 to 6."""
+    points: Floats
+    """Points on the axes (n, 3)."""
+    revolute: tuple[bool, ...]
+    preferred: Floats
+    """Angles (n,) [rad] that stand for arbitrary ones."""
+    normal: Floats
+    """A unit normal of the last revolute axis."""
+    arbitrary: tuple[int, ...]
+    """The first of three revolute joints: its angle is arbitrary if the other axes put the third along it."""
+    case: str = "three slides"
+
+    def angles(self, R: Array, p: Array, signs: Array) -> list[Coordinate]:
+        """Return the coordinates of the branch `signs` (..., 3) for E_1 ... E_n = (R, p)."""
+        arm, elbow, flip = signs[..., 0], signs[..., 1], signs[..., 2]
+        turns = dict(zip(self._turning, self._rotations(R, flip), strict=True))
+        a, b, c = (self._before(k, turns) for k, turning in enumerate(self.revolute) if not turning)
+        y: Array = np.zeros(3)
+        for k in reversed(self._turning):
+            y = self.points[k] + turn(self.axes[k], turns[k], y - self.points[k])
+        r = p - y
+        determinant = dot(a, cross(b, c))
+        determinant = where_less(abs(determinant), _SINGULAR, _SINGULAR, determinant)
+        # The signs that select nothing are 1.
+        exists = where_less(arm, elbow, arm, elbow)
+        if len(turns) < 3:
+            exists = where_less(flip, exists, flip, exists)
+        slides = iter(
+            Slide(dot(r, each) / determinant, separation=exists)
+            for each in (cross(b, c), cross(c, a), cross(a, b))
+        )
+        return [turns[k] if turning else next(slides) for k, turning in enumerate(self.revolute)]
+
+    def reaches(self, least: float) -> bool:
+        """Return whether the joints move the frame in as many directions as there are joints."""
+        h = self.axes[self._turning]
+        if any(np.linalg.norm(cross(h[k], h[k + 1])) < least for k in range(len(h) - 1)):
+            return False
+        largest = 0.0
+        for value in (0.3, 1.4, 2.9):
+            angles = value + 0.7 * np.arange(len(self.axes))
+            turns = {k: Angle(np.cos(angles[k]), np.sin(angles[k])) for k in self._turning}
+            a, b, c = (self._before(k, turns) for k, turning in enumerate(self.revolute) if not turning)
+            largest = max(largest, abs(float(a @ cross(b, c))))
+        return largest > least
+
+    @property
+    def _turning(self) -> list[int]:
+        """Numbers of the revolute joints."""
+        return [k for k, turning in enumerate(self.revolute) if turning]
+
+    def _rotations(self, R: Array, flip: Array) -> list[Angle]:
+        """Return the angles of the revolute joints."""
+        of, h = self._turning, self.axes[self._turning]
+        if len(of) == 3:
+            return wrist_angles(h, self.normal, lambda a: rotate(R, a), flip, self.preferred[of[0]])
+        if not of:
+            return []
+        found, side = [], rotate(R, self.normal)
+        if len(of) == 2:
+            found = [angle_from_to(h[0], h[1], rotate(R, h[1]), 0.0)]
+            side = turn_back(h[0], found[0], side)
+        return [*found, angle_from_to(h[-1], self.normal, side, 0.0)]
+
+    def _before(self, k: int, turns: dict[int, Angle]) -> Array:
+        """Return the direction of joint k after the turns of the joints before it."""
+        a: Array = self.axes[k]
+        for j in reversed(self._turning):
+            if j < k:
+                a = turn(self.axes[j], turns[j], a)
+        return a
+
 
 SlidingCase = Literal[
     "PPR", "PRP", "RPP", "RRP meeting", "RRP parallel",
@@ -244,3 +345,115 @@ def _like(terms: Terms, x: Array) -> Terms:
     """Return constant terms with the shape of x."""
     a, b, c = (each + 0.0 * x for each in terms)
     return a, b, c
+
+
+@dataclass(frozen=True, eq=False)
+class PlanarArm:
+    """Geometry at the zero configuration: directions (3, 3), which are the first or its opposite, points on
+    the axes (3, 3), and a unit normal of the axes."""
+
+    axes: Floats
+    points: Floats
+    normal: Floats
+
+    def angles(self, turned: Array, tip: Array, elbow: Array, preferred: float) -> list[Angle]:
+        """Return the three angles for a plane motion that moves the normal to `turned` and the point on the
+        third axis to `tip`; `elbow` (1 or -1) selects one of two solutions.
+
+        The first angle is `preferred` [rad] where the first and the third axis coincide.
+        """
+        h = self.axes
+        upper, fore = self.links
+        reach = self.across(tip - self.points[0])
+        constant, cosine, sine = (2.0 * float(each) for each in component_terms(upper, h[1], fore))
+        fixed = constant + float(upper @ upper + fore @ fore)
+        second = solve_linear(cosine, sine, dot(reach, reach) - fixed, elbow, 0.0)
+        first = angle_from_to(h[0], upper + turn(h[1], second, fore), reach, preferred)
+        rest = turn_back(h[1], second, turn_back(h[0], first, turned))
+        return [first, second, angle_from_to(h[2], self.normal, rest, 0.0)]
+
+    @property
+    def links(self) -> tuple[Floats, Floats]:
+        """The vectors from the first to the second axis and from that to the third, normal to the axes."""
+        upper, fore = (self.across(self.points[k + 1] - self.points[k]) for k in (0, 1))
+        return upper, fore
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Least and greatest distance between the first and the third axis."""
+        upper, fore = (float(np.linalg.norm(each)) for each in self.links)
+        return abs(upper - fore), upper + fore
+
+    def reaches(self, least: float) -> bool:
+        """Return whether both links are longer than `least`."""
+        return bool(min(np.linalg.norm(each) for each in self.links) > least)
+
+    def reachable(self, angle: Angle, terms: tuple[Array, Array, Array], preferred: float) -> Angle:
+        """Return the angle of another joint, and where it is arbitrary one that puts the third axis within
+        reach: `preferred` [rad] if possible, otherwise the nearest to the border.
+
+        `terms` are (constant, cosine, sine) of the squared distance from the first axis as a function of it.
+        """
+        constant, cosine, sine = terms
+        here = constant + cosine * np.cos(preferred) + sine * np.sin(preferred)
+        least, most = (each * each for each in self.extent)
+        wanted = where_less(here, least, least, where_less(most, here, most, here))
+        found = solve_linear(cosine, sine, wanted - constant, 1.0 + 0.0 * constant, preferred)
+        inside = where_less(abs(wanted - here), ALIGNMENT, 1.0, 0.0)
+        c = where_less(0.5, inside, np.cos(preferred), found.cos)
+        s = where_less(0.5, inside, np.sin(preferred), found.sin)
+        return Angle(
+            where_less(0.5, angle.arbitrary, c, angle.cos),
+            where_less(0.5, angle.arbitrary, s, angle.sin),
+            angle.arbitrary,
+        )
+
+    def across(self, a: Array) -> Array:
+        """Return the part of vectors (..., 3) that is normal to the axes."""
+        return np.asarray(a - self.axes[0] * append_axis(dot(self.axes[0], a)))
+
+
+@dataclass(frozen=True, eq=False)
+class ParallelArm:
+    """Geometry at the zero configuration; lengths are relative. The joints are in any order."""
+
+    axes: Floats
+    """Directions (n, 3), n 3 or 4, all along the first revolute axis or opposite to it."""
+    points: Floats
+    """Points on the axes (n, 3)."""
+    revolute: tuple[bool, ...]
+    preferred: Floats
+    """Angles (n,) [rad] that stand for arbitrary ones."""
+    normal: Floats
+    """A unit normal of the axes."""
+    arbitrary: tuple[int, ...]
+    """The first revolute joint, whose angle is arbitrary where the first axis and the third coincide."""
+    case: str = "parallel arm"
+
+    def angles(self, R: Array, p: Array, signs: Array) -> list[Coordinate]:
+        """Return the coordinates of the branch `signs` (..., 3) for E_1 ... E_n = (R, p)."""
+        arm, elbow, flip = signs[..., 0], signs[..., 1], signs[..., 2]
+        exists = where_less(arm, flip, arm, flip)
+        plane, lifted = self.plane, p
+        slide: Slide | None = None
+        if not all(self.revolute):
+            axis = self.axes[self.revolute.index(False)]
+            slide = Slide(dot(axis, p), separation=exists)
+            lifted = p - axis * append_axis(slide.value)
+        tip = rotate(R, plane.points[2]) + lifted
+        first, second, third = plane.angles(
+            rotate(R, self.normal), tip, elbow, self.preferred[self.arbitrary[0]]
+        )
+        least = where_less(second.separation, exists, second.separation, exists)
+        angles = iter([first, replace(second, separation=least), third])
+        return [next(angles) if turning or slide is None else slide for turning in self.revolute]
+
+    @property
+    def plane(self) -> PlanarArm:
+        """The revolute axes."""
+        turning = list(self.revolute)
+        return PlanarArm(self.axes[turning], self.points[turning], self.normal)
+
+    def reaches(self, least: float) -> bool:
+        """Return whether both links are longer than `least`."""
+        return self.plane.reaches(least)

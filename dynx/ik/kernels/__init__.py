@@ -1,1 +1,0 @@
-"""Inverse kinematics in compiled kernels: the step of the solver traced for one frame of one robot."""

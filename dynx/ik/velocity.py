@@ -1,0 +1,419 @@
+"""Velocity inverse kinematics as a bounded quadratic programme: tasks, limits, dampers and the solver.
+
+The programme is solved by DAQP (Arnstrom, Bemporad and Axehill, A dual active-set solver for embedded
+quadratic programming using recursive LDL' updates, IEEE Trans. Automatic Control 67(8), 2022).
+
+Velocity dampers bound how fast bodies that are near may approach one another. For a pair at the distance d,
+d' >= -gain (d - margin) lets d fall to the margin no faster than exponentially, and grow back to it where it
+is below (Faverjon and Tournassoud, A local based approach for path planning of manipulators with a high
+number of degrees of freedom, IEEE ICRA 1987; as rows of a quadratic programme: Kanoun, Lamiraux and Wieber,
+IEEE Trans. Robotics 27(4), 2011).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dynx.backends.base import Backend
+from dynx.errors import ArgumentError, NotInstalledError, ShapeError, shown
+from dynx.ik.problem import checked_avoidance
+from dynx.ik.search import Residual, frame_jacobian
+from dynx.model import Model
+from dynx.model.configuration import checked_q
+from dynx.model.numbers import checked_array, checked_vector, is_real, positive_seconds, real_array
+from dynx.model.targets import checked_targets
+from dynx.option_names import checks_field_names, checks_option_names
+from dynx.spatial.scalar import Floats
+
+if TYPE_CHECKING:
+    from dynx.distance.avoidance import AvoidanceSource
+
+
+@checks_field_names
+@dataclass(frozen=True, eq=False)
+class VelocityTask:
+    """The velocity of one frame, its weights, and whether it must be met.
+
+    With neither a velocity nor a target the frame holds still: its velocity is 0.
+    """
+
+    frame: str
+    velocity: ArrayLike | None = None
+    """Velocity (6,) of the frame's origin [m/s], then angular velocity [rad/s], in world axes; None is 0."""
+    target: ArrayLike | None = None
+    """Pose T_world_target (4, 4) or `dynx.Pose`, or position (3,) [m] with free rotation, that the frame
+    moves towards: `gain` times the error is added to `velocity`."""
+    gain: float = 1.0
+    """Velocity per error [1/s]: the error falls by exp(-gain t)."""
+    weights: ArrayLike = 1.0
+    """Weight of each component of the velocity, one number or (6,): at least 0."""
+    hard: bool = False
+    """Whether components with a weight above 0 are met exactly, before all tasks that are not hard."""
+    point: ArrayLike | None = None
+    """Point (3,) [m] of the frame, in its axes, that has the velocity instead of the origin."""
+
+    def rows(self, backend: Backend, q: Floats) -> tuple[Floats, Floats]:
+        """Return the weighted Jacobian (m, nv) and the weighted velocity (m,) at q.
+
+        A component of weight 0 has no row; the weights of a hard task only select components. Raises
+        UnknownNameError, ArgumentError, ShapeError, DTypeError or NotFiniteError.
+        """
+        backend.model.frame_index(self.frame)
+        point = None if self.point is None else checked_vector("point", self.point)
+        velocity = (
+            np.zeros(6) if self.velocity is None else checked_array("velocity", self.velocity, 6).copy()
+        )
+        if velocity.shape != (6,):
+            raise ShapeError(f"velocity has shape {velocity.shape}; wanted (6,)")
+        weights = real_array("weights", self.weights)
+        if weights.shape not in ((), (6,)):
+            raise ShapeError(f"weights have shape {weights.shape}; wanted one number, or (6,)")
+        if not (np.isfinite(weights).all() and (weights >= 0.0).all()):
+            raise ArgumentError(f"weights are {shown(self.weights)}; wanted finite numbers of at least 0")
+        weights = np.array(np.broadcast_to(weights, (6,)))
+        if self.target is not None:
+            if not (is_real(self.gain) and 0.0 <= self.gain < np.inf):
+                raise ArgumentError(f"gain is {shown(self.gain)}; wanted a number of at least 0 [1/s]")
+            targets = checked_targets(self.target)
+            if targets.batch:
+                raise ShapeError(f"target has shape {np.shape(self.target)}; wanted (4, 4) or (3,)")
+            residual = Residual(targets.positions, targets.rotations, point)
+            error, _, _ = residual(backend.forward_kinematics(q, self.frame))
+            velocity[residual.rows] += self.gain * np.array(error)
+            if targets.rotations is None and self.velocity is None:
+                weights[3:] = 0.0
+        chosen = weights > 0.0
+        J = frame_jacobian(backend, q, self.frame, point)[chosen]
+        scale = np.ones(int(chosen.sum())) if self.hard else weights[chosen]
+        return scale[:, None] * J, scale * velocity[chosen]
+
+
+OUTSIDE = 1e-6
+"""Distance from a limit [rad or m] above which a joint outside is named; less is rounding of float32."""
+
+
+def velocity_bounds(
+    model: Model, q: Floats, dt: float, velocity_limit: Floats, acceleration_limit: Floats, v0: Floats | None
+) -> tuple[Floats, Floats]:
+    """Return the bounds (nv,) on a velocity that is kept for `dt` [s].
+
+    The joints stay within their position limits, and within their acceleration limits can still stop before
+    them: after a step of velocity v at a distance d from the limit, v^2 / (2 a) <= d - v dt, so that
+    v <= sqrt((a dt)^2 + 2 a d) - a dt. With `v0` the change of velocity is at most a dt. A joint outside its
+    limits returns as fast as these bounds allow, and arrives at the limit. Where bounds contradict each
+    other, those of position and velocity count more than that of the change.
+    """
+    offset = 6 if model.floating else 0
+    room_below, room_above = np.full(model.nv, np.inf), np.full(model.nv, np.inf)
+    joints = q[7:] if model.floating else q
+    lower, upper = (model.lower[7:], model.upper[7:]) if model.floating else (model.lower, model.upper)
+    room_below[offset:] = joints - lower
+    room_above[offset:] = upper - joints
+    # The room is negative outside a limit, and so is the velocity towards it.
+    low = -_towards(room_below, dt, velocity_limit, acceleration_limit)
+    high = _towards(room_above, dt, velocity_limit, acceleration_limit)
+    if v0 is not None:
+        change = acceleration_limit * dt
+        low, high = np.clip(v0 - change, low, high), np.clip(v0 + change, low, high)
+    return low, high
+
+
+def joints_outside(model: Model, q: Floats) -> str:
+    """Return a sentence that names the joints whose position q is outside the limits, or an empty text."""
+    beyond = np.maximum(model.lower - q, q - model.upper)
+    offset = model.nq - len(model.joint_names)
+    names = [
+        f"{model.joint_names[k - offset]} by {beyond[k]:.6g}"
+        for k in np.flatnonzero(beyond > OUTSIDE).tolist()
+    ]
+    return f"q is outside the position limits [rad or m]: {', '.join(names)}" if names else ""
+
+
+def _towards(room: Floats, dt: float, velocity_limit: Floats, acceleration_limit: Floats) -> Floats:
+    """Return the largest velocity in the direction of a limit at the signed distance `room`."""
+    most = np.minimum(_most(np.abs(room), dt, acceleration_limit), velocity_limit)
+    return np.where(room < 0.0, -most, most)
+
+
+def _most(room: Floats, dt: float, acceleration: Floats) -> Floats:
+    """Return the largest velocity towards a limit at the distance `room`, for each coordinate."""
+    found: Floats = room / dt
+    brakes = np.isfinite(acceleration) & np.isfinite(room)
+    a = acceleration[brakes]
+    # The difference of nearly equal numbers, written as a quotient.
+    root = np.sqrt((a * dt) ** 2 + 2.0 * a * room[brakes]) + a * dt
+    braking = np.divide(2.0 * a * room[brakes], root, out=np.zeros(len(a)), where=root > 0.0)
+    found[brakes] = np.minimum(found[brakes], braking)
+    return found
+
+
+FREE_SPEED = 1.0
+"""Speed of approach [m/s] that the damper of a pair allows where it begins to count."""
+
+
+@dataclass(frozen=True, eq=False)
+class Dampers:
+    """Rows J v >= bound, one for each pair that is near."""
+
+    J: Floats
+    """Derivatives (m, nv) of the distances."""
+    bound: Floats
+    """Least rates (m,) of the distances [m/s]; positive for a pair that is closer than its margin."""
+    names: tuple[tuple[str, str], ...]
+    """Names of the bodies of each pair."""
+    note: str = ""
+    """What the avoidance leaves out (`Avoidance.note`)."""
+
+    def missed(self, v: Floats, tolerance: float) -> tuple[tuple[str, str], ...]:
+        """Return the pairs that approach faster than they may, by more than `tolerance` [m/s]."""
+        lack = self.bound - self.J @ v
+        return tuple(name for name, x in zip(self.names, lack.tolist(), strict=True) if x > tolerance)
+
+    def active(self, v: Floats, tolerance: float) -> tuple[tuple[str, str], ...]:
+        """Return the pairs that approach as fast as they may, or faster."""
+        room = self.J @ v - self.bound
+        return tuple(name for name, x in zip(self.names, room.tolist(), strict=True) if x <= tolerance)
+
+
+def dampers(backend: Backend, q: Floats, avoid: AvoidanceSource | None, gain: float, dt: float) -> Dampers:
+    """Return the dampers at q (nq,); `gain` [1/s] is at most 1 / dt, so that a step does not pass the margin.
+
+    Raises ArgumentError for `avoid` or `gain`.
+    """
+    model = backend.model
+    avoidance = checked_avoidance(model, avoid)
+    if avoidance is None:
+        return Dampers(np.zeros((0, model.nv)), np.zeros(0), ())
+    if not (is_real(gain) and 0.0 < gain * dt <= 1.0):
+        raise ArgumentError(
+            f"avoid_gain is {shown(gain)}; wanted a number above 0, at most 1 / dt = {1.0 / dt:.6g} [1/s]"
+        )
+    near = avoidance.near(backend, q, FREE_SPEED / gain)
+    room = np.array([each.separation.lower - each.pair.margin for each in near])
+    names = tuple(avoidance.names(each.pair) for each in near)
+    return Dampers(avoidance.gradients(backend, q, near), -gain * room, names, avoidance.note)
+
+
+_UNLIMITED = 1e30
+"""Bound from which on DAQP takes a constraint as absent."""
+
+_EQUALITY = 5
+"""Kind of a constraint whose two bounds are one value."""
+
+PRIMAL_TOLERANCE = 1e-11
+"""Violation of a constraint that counts as rounding, relative to constraints of norm 1."""
+
+_SOLVED = 1
+
+
+def solve_programme(
+    H: Floats, g: Floats, lower: Floats, upper: Floats, A: Floats, b: Floats, G: Floats, least: Floats
+) -> Floats | None:
+    """Return the x (n,) that minimises x'Hx / 2 + g'x over lower <= x <= upper, A x = b and G x >= least.
+
+    H (n, n) is positive definite. Returns None if no x satisfies the constraints. Raises NotInstalledError
+    without DAQP.
+    """
+    try:
+        import daqp
+    except ImportError:
+        raise NotInstalledError("velocity_ik needs daqp: pip install 'dynx[qp]'") from None
+    # Rows of norm 1 give the tolerance one meaning for all constraints.
+    rows, values = np.concatenate([A, G]), np.concatenate([b, least])
+    norms = np.linalg.norm(rows, axis=1, keepdims=True)
+    norms[norms == 0.0] = 1.0
+    rows, values = rows / norms, values / norms[:, 0]
+    equal, count = slice(len(upper), len(upper) + len(A)), len(A)
+    high = np.concatenate([np.minimum(upper, _UNLIMITED), values[:count], np.full(len(G), _UNLIMITED)])
+    low = np.concatenate([np.maximum(lower, -_UNLIMITED), values])
+    kinds = np.zeros(len(high), dtype=np.int32)
+    kinds[equal] = _EQUALITY
+    kinds[: len(upper)][lower == upper] = _EQUALITY
+    found: tuple[Floats, float, int, Any] = daqp.solve(
+        np.ascontiguousarray(H), np.ascontiguousarray(g), np.ascontiguousarray(rows), high, low, kinds,
+        primal_tol=PRIMAL_TOLERANCE,
+    )  # fmt: skip
+    x, _, outcome, _ = found
+    # The bounds hold exactly, not only within the tolerance.
+    return np.clip(np.asarray(x), lower, upper) if outcome == _SOLVED else None
+
+
+RELAXED_WEIGHT = 1e4
+"""Weight of hard tasks that cannot all be met within the bounds."""
+
+DAMPER_WEIGHT = 1e5
+"""Weight of the rates of distances that cannot all be kept within the bounds."""
+
+AT_BOUND = 1e-9
+"""Distance from a bound [rad/s or m/s] below which a velocity is at it."""
+
+
+@dataclass(frozen=True, eq=False)
+class VelocityResult:
+    """Velocity of one step; `success` says whether all hard tasks are met."""
+
+    v: Floats
+    """Velocity (nv,) [rad/s or m/s], within the bounds."""
+    success: bool
+    """False if the hard tasks cannot all be met within the bounds; they are then met as well as possible."""
+    errors: tuple[Floats, ...]
+    """For each task the weighted error J v - velocity (m,), of its components with a weight above 0."""
+    limited: NDArray[np.bool_]
+    """Coordinates (nv,) whose velocity is at a bound."""
+    held_back: tuple[tuple[str, str], ...] = ()
+    """With `avoid` the pairs of bodies that approach one another as fast as they may."""
+    too_fast: tuple[tuple[str, str], ...] = ()
+    """Pairs of bodies that approach faster than they may, because no velocity within the bounds prevents it;
+    empty otherwise."""
+    note: str = ""
+    """Sentences that name joints of q outside their limits, which are brought back, and the links that
+    `avoid` keeps nothing from; empty without them."""
+
+    def __bool__(self) -> bool:
+        """Return whether all hard tasks are met."""
+        return self.success
+
+
+@checks_option_names
+def velocity_ik(
+    backend: Backend,
+    q: ArrayLike,
+    tasks: VelocityTask | Sequence[VelocityTask],
+    *,
+    dt: float,
+    damping: float = 1e-6,
+    posture: ArrayLike | None = None,
+    posture_weight: float = 1e-2,
+    posture_gain: float = 1.0,
+    velocity_limit: ArrayLike | None = None,
+    acceleration_limit: ArrayLike | None = None,
+    v0: ArrayLike | None = None,
+    avoid: AvoidanceSource | None = None,
+    avoid_gain: float = 5.0,
+) -> VelocityResult:
+    """Find the velocity v (nv,) at q (nq,) that meets tasks best and keeps the limits for `dt` [s].
+
+    v minimises the sum of ``|W (J v - velocity)|^2`` of the tasks that are not hard, of ``posture_weight^2
+    |v - posture_gain (posture - q)|^2`` over the joints if a `posture` (nq,) is given, and of ``damping
+    |v|^2`` (damping > 0), under the hard tasks and the bounds: ``q + dt v`` is within the position limits,
+    |v| within `velocity_limit` (one number or (nv,), by default the model's), and with `acceleration_limit`
+    [rad/s^2 or m/s^2] the joints can stop before their limits; with `v0` (nv,), the velocity before, the
+    change is at most ``acceleration_limit dt``. A joint outside its position limits returns to them as fast
+    as the other bounds allow, before all tasks, and `note` names it. A base that floats has no bounds but
+    those given.
+
+    With `avoid`, a scene or what `Scene.avoidance` returns, the distance d of each pair of bodies that is
+    near changes by at least ``-avoid_gain (d - margin)`` [m/s], before all tasks: d does not fall below the
+    margin but by what the linear rate neglects, of the order ``dt^2``, and where it is below, it grows back.
+    `avoid_gain` [1/s] is at most ``1 / dt``. Pairs count from where 1 m/s is allowed (``1 / avoid_gain`` m).
+
+    If the hard tasks contradict each other or the bounds, they count as soft ones of a large weight, and
+    `success` is False. The quadratic programme is solved by DAQP (extra ``qp``). Siciliano et al., section
+    3.5, with inequalities as in Kanoun, Lamiraux and Wieber, IEEE Trans. Robotics 27(4), 2011.
+
+    Raises NotInstalledError without the extra; UnknownNameError for a frame; ArgumentError (ShapeError,
+    DTypeError, NotFiniteError) for an invalid argument.
+    """
+    model = backend.model
+    seconds = positive_seconds("dt", dt)
+    position = checked_q(model, q, "q")
+    if position.ndim != 1:
+        raise ShapeError(f"q has shape {position.shape}; wanted ({model.nq},)")
+    wanted = _checked_tasks(tasks)
+    for name, number, least in (
+        ("damping", damping, "above 0"),
+        ("posture_weight", posture_weight, ""),
+        ("posture_gain", posture_gain, ""),
+    ):
+        if not (is_real(number) and 0.0 <= number < math.inf and (number > 0.0 or not least)):
+            raise ArgumentError(f"{name} is {shown(number)}; wanted a number {least or 'of at least 0'}")
+    speed, acceleration = model.velocity_limit, np.full(model.nv, math.inf)
+    if velocity_limit is not None:
+        speed = _limit("velocity_limit", velocity_limit, model)
+    if acceleration_limit is not None:
+        acceleration = _limit("acceleration_limit", acceleration_limit, model)
+    if v0 is not None and acceleration_limit is None:
+        raise ArgumentError("v0 is given without acceleration_limit, with which alone it has an effect")
+    before = None if v0 is None else checked_array("v0", v0, model.nv)
+    if before is not None and before.ndim != 1:
+        raise ShapeError(f"v0 has shape {before.shape}; wanted ({model.nv},)")
+    lower, upper = velocity_bounds(model, position, seconds, speed, acceleration, before)
+
+    rows = [task.rows(backend, position) for task in wanted]
+    soft = [pair for task, pair in zip(wanted, rows, strict=True) if not task.hard]
+    hard = [pair for task, pair in zip(wanted, rows, strict=True) if task.hard]
+    if posture is not None:
+        goal = checked_q(model, posture, "posture")
+        if goal.ndim != 1:
+            raise ShapeError(f"posture has shape {goal.shape}; wanted ({model.nq},)")
+        offset = 6 if model.floating else 0
+        select = np.eye(model.nv)[offset:]
+        error = (goal - position)[7 if model.floating else 0 :]
+        soft.append((posture_weight * select, posture_weight * posture_gain * error))
+    A, b = _stacked(hard, model.nv)
+    near = dampers(backend, position, avoid, avoid_gain, seconds)
+    G, rates = near.J, near.bound
+    v = solve_programme(*_quadratic(soft, damping, model.nv), lower, upper, A, b, G, rates)
+    success = v is not None
+    if v is None:
+        soft += [(RELAXED_WEIGHT * J, RELAXED_WEIGHT * velocity) for J, velocity in hard]
+        v = solve_programme(*_quadratic(soft, damping, model.nv), lower, upper, A[:0], b[:0], G, rates)
+    if v is None:
+        # Bodies that are too close cannot part as fast as they should: they count before the tasks, and those
+        # that are not are kept as far as the bounds permit.
+        close = rates > 0.0
+        soft.append((DAMPER_WEIGHT * G[close], DAMPER_WEIGHT * rates[close]))
+        H, g = _quadratic(soft, damping, model.nv)
+        v = solve_programme(H, g, lower, upper, A[:0], b[:0], G[~close], rates[~close])
+        if v is None:
+            soft.append((DAMPER_WEIGHT * G[~close], DAMPER_WEIGHT * np.zeros(int((~close).sum()))))
+            H, g = _quadratic(soft, damping, model.nv)
+            v = solve_programme(H, g, lower, upper, A[:0], b[:0], G[:0], rates[:0])
+    assert v is not None
+    at_bound = (v <= lower + AT_BOUND) | (v >= upper - AT_BOUND)
+    errors = tuple(J @ v - velocity for J, velocity in rows)
+    return VelocityResult(
+        v, success, errors, at_bound, near.active(v, AT_BOUND), near.missed(v, AT_BOUND),
+        "; ".join(filter(None, (joints_outside(model, position), near.note))),
+    )  # fmt: skip
+
+
+def _checked_tasks(tasks: VelocityTask | Sequence[VelocityTask]) -> list[VelocityTask]:
+    if isinstance(tasks, VelocityTask):
+        return [tasks]
+    if isinstance(tasks, str) or not isinstance(tasks, Iterable):
+        raise ArgumentError(
+            f"tasks is {shown(tasks)}; wanted dynx.ik.velocity.VelocityTask, or a list of them"
+        )
+    wanted = list(tasks)
+    for task in wanted:
+        if not isinstance(task, VelocityTask):
+            raise ArgumentError(f"tasks has {shown(task)}; wanted dynx.ik.velocity.VelocityTask")
+    return wanted
+
+
+def _quadratic(soft: list[tuple[Floats, Floats]], damping: float, nv: int) -> tuple[Floats, Floats]:
+    """Return H (nv, nv) and g (nv,) of the weighted squares."""
+    J, velocity = _stacked(soft, nv)
+    return J.T @ J + damping * np.eye(nv), -J.T @ velocity
+
+
+def _stacked(rows: list[tuple[Floats, Floats]], nv: int) -> tuple[Floats, Floats]:
+    if not rows:
+        return np.zeros((0, nv)), np.zeros(0)
+    return np.concatenate([J for J, _ in rows]), np.concatenate([velocity for _, velocity in rows])
+
+
+def _limit(name: str, bound: ArrayLike, model: Model) -> Floats:
+    array = real_array(name, bound)
+    if array.shape not in ((), (model.nv,)):
+        raise ShapeError(f"{name} has shape {array.shape}; wanted one number, or ({model.nv},)")
+    if not (array >= 0.0).all():
+        raise ArgumentError(f"{name} has the least entry {np.min(array):g}; wanted at least 0")
+    return np.array(np.broadcast_to(array, (model.nv,)))
