@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 
 from dynx.contacts import case_names
+from dynx.registry import DEFAULT_ENGINE
 from dynx.rules import all_rules
+from dynx.sim.scenario.options import OPTIONS
 from tests.cli.contacts.documents import example
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -26,6 +28,14 @@ def rules_page() -> str:
 def test_the_page_of_rules_is_current(rules_page: str) -> None:
     current = (DOCS / "rules.md").read_text(encoding="utf-8")
     assert current == rules_page, "run: python docs/write_rules.py"
+
+
+@pytest.mark.skipif(DEFAULT_ENGINE != "pinocchio", reason="the table has the default of most machines")
+def test_the_table_of_options_is_current() -> None:
+    written = runpy.run_path(str(DOCS / "write_options.py"))
+    current = (DOCS / "simulation.md").read_text(encoding="utf-8")
+    assert current == written["page"](current), "run: python docs/write_options.py"
+    assert [name for name in OPTIONS if f"\n| `{name}` |" not in current] == []
 
 
 def test_every_rule_has_one_anchor_and_its_trap_is_linked(rules_page: str) -> None:

@@ -59,10 +59,14 @@ class Number(Kind):
     """One real number."""
 
     def checked(self, name: str, value: Any, model: Model) -> Any:
-        """Return a float; other objects are left to the check of the simulation, which knows their bounds."""
+        """Return a float, or None; bounds are checked where the number is used."""
         from dynx.model.numbers import is_real
 
-        return float(value) if is_real(value) else value
+        if value is None:
+            return None
+        if not is_real(value):
+            raise ArgumentError(f"{name} is {shown(value)}; wanted {self.values}")
+        return float(value)
 
 
 class Count(Kind):
@@ -201,7 +205,7 @@ def as_array(name: str, value: Any) -> Any:
 
 
 NUMBER = Number("a number", float)
-SECONDS = Number("seconds", float)
+SECONDS = Number("a number of seconds", float)
 COUNT = Count("a whole number", int)
 FLAG = Flag("True or False", bool)
 PLANT = PlantKind("the name of a backend or plant, or a ScenePlant", str | dict[str, Any])
