@@ -33,8 +33,8 @@ from dynx.compiled.kernels import (
     quantity_kernel,
     routines_evaluate,
 )
-from dynx.compiled.looped.kernels import looped_kernel
 from dynx.compiled.simplification import simplify_mechanism
+from dynx.compiled.table_kernels import table_kernel
 from dynx.model import Model
 from dynx.rbd.elimination import has_physical_inertias
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
@@ -274,12 +274,12 @@ class CompiledBackend(Backend):
         if not compiles(mechanism, quantity):
             if not routines_evaluate(mechanism, quantity):
                 return NumericCall(mechanism, quantity, details, checks, check_result=check_result)
-            table = looped_kernel(replace(mechanism, coupling=None), quantity, details)
+            table = table_kernel(replace(mechanism, coupling=None), quantity, details)
             if mechanism.coupling is None:
                 return KernelCall(table, checks, **options)
-            looped = KernelCall(table, (np.asarray,) * len(checks), threads=self._threads, validate=False)
+            in_tree = KernelCall(table, (np.asarray,) * len(checks), threads=self._threads, validate=False)
             options = {"threads": self._threads, "validate": self._validate, "shape": table.outputs[0].shape}
-            return CoupledCall(self.model, mechanism, quantity, looped.evaluate, checks, **options)
+            return CoupledCall(self.model, mechanism, quantity, in_tree.evaluate, checks, **options)
         if quantity not in ON_CHAINS:
             kernel = quantity_kernel(mechanism, quantity, details)
             return KernelCall(kernel, checks, **options)

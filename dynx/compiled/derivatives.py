@@ -2,7 +2,7 @@
 
 There is no step size. For small robots the graph of the algorithm itself is differentiated
 (`dynx.simd.differentiate`); for others a closed form (`dynx.rbd.derivatives`) gives shorter code. For large
-ones that is evaluated by routines, which are compiled once for all robots (`dynx.compiled.looped`). With
+ones that is evaluated by routines, which are compiled once for all robots (`dynx.compiled.table_loops`). With
 mimic joints, derivatives are by the coordinates of the model.
 
 Forward dynamics is differentiated by the implicit function theorem: at a = FD(q, v, tau) the torque
@@ -27,10 +27,10 @@ from dynx.backends.arguments import Arguments
 from dynx.backends.solvability import Solvability
 from dynx.compiled import derivative_programs as programs
 from dynx.compiled.backend import CompiledBackend
-from dynx.compiled.looped.kernels import looped_derivatives
 from dynx.compiled.model_coordinates import reduce_columns, reduce_rows, tree_coordinates
 from dynx.compiled.robot_kernel import Making, RobotKernels
 from dynx.compiled.simplification import simplify_mechanism
+from dynx.compiled.table_kernels import derivatives_kernel
 from dynx.model import Model
 from dynx.model.model import refuse_other_than_model
 from dynx.simd.call_table import TableKernel
@@ -144,7 +144,7 @@ class Derivatives:
 
     @cached_property
     def _routines(self) -> TableKernel:
-        return looped_derivatives(replace(simplify_mechanism(self.model.mechanism), coupling=None))
+        return derivatives_kernel(replace(simplify_mechanism(self.model.mechanism), coupling=None))
 
     def _solve(self, factors: Floats, b: Floats) -> Floats:
         """Solve M x = b for matrices b (..., nv, nv), from the factors of M."""

@@ -36,13 +36,13 @@ from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.compiled import frames as compiled_frames
 from dynx.compiled.defect import argument_defect, result_defect
 from dynx.compiled.frames import Chain, on_chain
-from dynx.compiled.looped.kernels import LOOPED
 from dynx.compiled.model_coordinates import (
     argument_shapes,
     reduce_columns,
     reduce_rows,
     tree_coordinates,
 )
+from dynx.compiled.table_kernels import TABLE_QUANTITIES
 from dynx.model import Mechanism
 from dynx.rbd import coriolis
 from dynx.rbd.base_parameters import regroup_inertias
@@ -141,7 +141,7 @@ def _pose_density(mechanism: Mechanism) -> float:
 
 def compiles(mechanism: Mechanism, name: str) -> bool:
     """Check whether a quantity of this mechanism is compiled, rather than evaluated by routines that are
-    compiled for all robots (`dynx.compiled.looped`) or by NumPy."""
+    compiled for all robots (`dynx.compiled.table_loops`) or by NumPy."""
     has_routines = routines_evaluate(mechanism, name)
     matrix = has_routines and kernel_quantity(name).growth != "joints"
     limit = MAX_SECONDS_BESIDE_ROUTINES if matrix else MAX_COMPILE_SECONDS
@@ -152,7 +152,7 @@ def compiles(mechanism: Mechanism, name: str) -> bool:
 
 def routines_evaluate(mechanism: Mechanism, name: str) -> bool:
     """Check whether routines can evaluate a quantity: they solve no equations that mimic joints reduce."""
-    return name in LOOPED and not (kernel_quantity(name).solves and mechanism.coupling is not None)
+    return name in TABLE_QUANTITIES and not (kernel_quantity(name).solves and mechanism.coupling is not None)
 
 
 def evaluate_quantity(

@@ -8,14 +8,15 @@ symmetric blocks is computed.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from dynx.model.mechanism import ROOT, Body, Mechanism
-from dynx.rbd.kinematics import joint_value
+from dynx.model.mechanism import Body, Mechanism
 from dynx.rbd.linear import solve_positive_definite
+from dynx.rbd.loops import Loops, PythonLoops
 from dynx.rbd.placement import Placement, SpatialVector
-from dynx.rbd.rnea import add_spatial, body_wrench, child_motion, root_motion
+from dynx.rbd.rnea import Motion, add_spatial, body_wrench, child_motion, root_motion
 from dynx.spatial.inertia import RigidInertia, symmetric_from_upper
 from dynx.spatial.scalar import Array, append_axis
 from dynx.spatial.so3 import rotate, rotate_back, skew
@@ -78,65 +79,103 @@ class ArticulatedInertia:
         return np.concatenate([top, bottom], axis=-2)
 
 
-def forward_dynamics(mechanism: Mechanism, q: Array, v: Array, tau: Array) -> Array:
+class ArticulatedBody(NamedTuple):
+    """Apparent inertia of a body and its bias wrench: the one that keeps it from accelerating."""
+
+    inertia: ArticulatedInertia
+    bias: SpatialVector
+
+
+class JointPassed(NamedTuple):
+    """Placement of a body, and its velocity-product acceleration: that of the body when its parent and its
+    joint do not accelerate."""
+
+    placement: Placement
+    velocity_product: SpatialVector
+
+
+class JointAcceleration(NamedTuple):
+    """Acceleration of an eliminated joint: `u_over_D` minus the product of `K` with that of the body."""
+
+    K: SpatialVector
+    u_over_D: Array
+
+
+def forward_dynamics(
+    mechanism: Mechanism, q: Array, v: Array, tau: Array, *, loops: Loops | None = None
+) -> Array:
     """Return the acceleration (..., nv) caused by `tau` (..., nv), in tree coordinates.
 
     q is (..., nq), v is (..., nv). Raises no error for a singular mass matrix: if nothing that a joint moves
     has inertia, it divides by zero.
     """
-    bodies, zero = mechanism.bodies, 0 * v
-    root = root_motion(mechanism, q, v, zero)
-    motions, placements, velocity_products = [root.without_acceleration()], [], []
-    for index, body in enumerate(bodies):
-        placement = Placement.of(body, joint_value(mechanism, q, index))
-        speed = joint_value(mechanism, v, index)
-        # c is the velocity-product acceleration: that of the body when parent and joint do not accelerate.
-        motion = child_motion(body, placement, motions[body.parent + 1], speed, 0 * speed)
-        placements.append(placement)
-        velocity_products.append((motion.proper_acceleration, motion.alpha))
-        motions.append(motion.without_acceleration())
-
-    inertias = [mechanism.root, *(body.inertia for body in bodies)]
-    articulated = [ArticulatedInertia.of_rigid_body(inertia) for inertia in inertias]
-    bias = [body_wrench(inertia, motion) for inertia, motion in zip(inertias, motions, strict=True)]
-    joint_terms: dict[int, EliminatedJoint] = {}
-    for index in reversed(range(len(bodies))):
-        body = bodies[index]
-        joint = eliminate_joint(
-            body,
-            articulated[index + 1],
-            bias[index + 1],
-            joint_value(mechanism, tau, index),
-            velocity_products[index],
-        )
-        joint_terms[index] = joint
-        parent, placement = body.parent + 1, placements[index]
-        articulated[parent] = articulated[parent] + joint.apparent.to_parent(placement)
-        bias[parent] = add_spatial(bias[parent], placement.wrench_to_parent(*joint.wrench))
-
+    loops = loops or PythonLoops(mechanism)
+    root = loops.root(_root_motion, q, v)
+    omegas, passed = loops.outward(_pass_joint, root.omega, q, v)
+    bodies = [loops.root(_root_body, root.omega), *loops.each(_rigid_body, omegas)]
+    articulated, eliminated = loops.inward(_add_articulated, bodies, passed, tau)
     if mechanism.floating:
-        net_wrench = tau[..., :6] - np.concatenate(bias[0], axis=-1)
-        base = solve_positive_definite(articulated[0].matrix(), net_wrench)
-        accelerations: list[SpatialVector] = [(base[..., :3], base[..., 3:])]
+        base = loops.root(_base_acceleration, articulated[0], tau)
     else:
-        accelerations = [(root.proper_acceleration, root.alpha)]
-    a: list[Array] = []
-    for index, body in enumerate(bodies):
-        acceleration, joint_acceleration = accelerate_joint(
-            body,
-            joint_terms[index].K,
-            joint_terms[index].u_over_D,
-            placements[index].motion_to_child(*accelerations[body.parent + 1]),
-            velocity_products[index],
-        )
-        a.append(joint_acceleration)
-        accelerations.append(acceleration)
+        base = loops.root(_fixed_acceleration, root)
+    _, a = loops.outward(_accelerate, base, passed, eliminated)
     if mechanism.floating:
-        # `root` was computed with a = 0: its proper acceleration is omega x v minus gravity.
-        linear, angular = accelerations[ROOT + 1]
-        base_acceleration = linear - root.proper_acceleration
-        return np.concatenate([base_acceleration, angular, *(append_axis(x) for x in a)], axis=-1)
-    return np.stack(a, axis=-1) if a else np.zeros(v.shape)
+        base = loops.root(_without_gravity, root, base)
+    return loops.vector(base, a, like=v)
+
+
+def _root_motion(mechanism: Mechanism, q: Array, v: Array) -> Motion:
+    return root_motion(mechanism, q, v, 0 * v)
+
+
+def _pass_joint(body: Body, omega: Array, q: Array, v: Array) -> tuple[Array, JointPassed]:
+    placement = Placement.of(body, q)
+    motion = child_motion(body, placement, Motion(omega, 0 * omega, 0 * omega), v, 0 * v)
+    return motion.omega, JointPassed(placement, (motion.proper_acceleration, motion.alpha))
+
+
+def _root_body(mechanism: Mechanism, omega: Array) -> ArticulatedBody:
+    return _rotating_body(mechanism.root, omega)
+
+
+def _rigid_body(body: Body, omega: Array) -> ArticulatedBody:
+    return _rotating_body(body.inertia, omega)
+
+
+def _rotating_body(inertia: RigidInertia, omega: Array) -> ArticulatedBody:
+    bias = body_wrench(inertia, Motion(omega, 0 * omega, 0 * omega))
+    return ArticulatedBody(ArticulatedInertia.of_rigid_body(inertia), bias)
+
+
+def _add_articulated(
+    body: Body, own: ArticulatedBody, parent: ArticulatedBody, passed: JointPassed, tau: Array
+) -> tuple[ArticulatedBody, JointAcceleration]:
+    joint = eliminate_joint(body, own.inertia, own.bias, tau, passed.velocity_product)
+    inertia = parent.inertia + joint.apparent.to_parent(passed.placement)
+    bias = add_spatial(parent.bias, passed.placement.wrench_to_parent(*joint.wrench))
+    return ArticulatedBody(inertia, bias), JointAcceleration(joint.K, joint.u_over_D)
+
+
+def _base_acceleration(mechanism: Mechanism, body: ArticulatedBody, tau: Array) -> SpatialVector:
+    net_wrench = tau[..., :6] - np.concatenate(body.bias, axis=-1)
+    acceleration = solve_positive_definite(body.inertia.matrix(), net_wrench)
+    return acceleration[..., :3], acceleration[..., 3:]
+
+
+def _fixed_acceleration(mechanism: Mechanism, root: Motion) -> SpatialVector:
+    return root.proper_acceleration, root.alpha
+
+
+def _accelerate(
+    body: Body, parent: SpatialVector, passed: JointPassed, joint: JointAcceleration
+) -> tuple[SpatialVector, Array]:
+    moved = passed.placement.motion_to_child(*parent)
+    return accelerate_joint(body, joint.K, joint.u_over_D, moved, passed.velocity_product)
+
+
+def _without_gravity(mechanism: Mechanism, root: Motion, acceleration: SpatialVector) -> SpatialVector:
+    # `root` was computed with a = 0: its proper acceleration is omega x v minus gravity.
+    return acceleration[0] - root.proper_acceleration, acceleration[1]
 
 
 @dataclass(frozen=True)

@@ -32,8 +32,9 @@ from functools import cached_property
 
 import numpy as np
 
-from dynx.model.mechanism import ROOT, Body, Mechanism
-from dynx.rbd.kinematics import Poses, ancestry, joint_value
+from dynx.model.mechanism import Body, Mechanism
+from dynx.rbd.kinematics import Poses
+from dynx.rbd.loops import Loops, PythonLoops
 from dynx.rbd.placement import Placement
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, append_axis
@@ -47,13 +48,13 @@ def coriolis_matrix(mechanism: Mechanism, poses: Poses, v: Array) -> Array:
         (R_parent, p_parent), (R, p) = poses[body.parent], poses[index]
         R_joint = _transposed(R_parent) @ R
         placements.append(Placement(R_joint, rotate_back(R_parent, p - p_parent), R_joint, None))
-    return _matrix(mechanism, placements, v)
+    return _matrix(PythonLoops(mechanism), placements, v)
 
 
-def coriolis_matrix_at(mechanism: Mechanism, q: Array, v: Array) -> Array:
+def coriolis_matrix_at(mechanism: Mechanism, q: Array, v: Array, *, loops: Loops | None = None) -> Array:
     """Return C (..., nv, nv) from the tree configuration (..., nq), in fewer operations than from poses."""
-    bodies = enumerate(mechanism.bodies)
-    return _matrix(mechanism, [Placement.of(body, joint_value(mechanism, q, k)) for k, body in bodies], v)
+    loops = loops or PythonLoops(mechanism)
+    return _matrix(loops, loops.each(Placement.of, q), v)
 
 
 @dataclass(frozen=True)
@@ -81,12 +82,11 @@ class ToParent:
 
 @dataclass(frozen=True)
 class Subspace:
-    """Motion subspace: velocity fields `linear` + `angular` x r at unit speed of the `coordinates`.
+    """Motion subspace: velocity fields `linear` + `angular` x r at unit speed of each of d coordinates.
 
     They and their time derivatives are columns (..., 3, d) in the axes of the body that moves.
     """
 
-    coordinates: range
     linear: Array
     angular: Array
     linear_rate: Array
@@ -166,84 +166,95 @@ class Composite:
         )
 
 
-def _matrix(mechanism: Mechanism, placements: Sequence[Placement], v: Array) -> Array:
-    omega, steps = _angular_velocities_and_steps(mechanism, placements, v)
-    moving = range(ROOT if mechanism.floating else 0, len(mechanism.bodies))
-    composites = {body: Composite.of_rigid_body(_inertia(mechanism, body), omega[body]) for body in moving}
-    for body in reversed(range(len(mechanism.bodies))):
-        parent = mechanism.bodies[body].parent
-        if parent in composites:
-            composites[parent] = composites[parent] + composites[body].to_parent(steps[body])
-
-    zero = 0 * np.sum(v, axis=-1)
-    C = [[zero] * mechanism.nv for _ in range(mechanism.nv)]
-    first = mechanism.nv - len(mechanism.bodies)
-    subspaces = {
-        body: base_subspace(omega[body])
-        if body == ROOT
-        else joint_subspace(mechanism.bodies[body], first + body, omega[body])
-        for body in moving
-    }
-    for body in moving:
-        response = composites[body].response(subspaces[body])
-        path = ancestry(mechanism, body) + ([ROOT] if mechanism.floating else [])
-        for ancestor in path:
-            block, mirror_block = response.entries(subspaces[ancestor])
-            for i, row in enumerate(subspaces[ancestor].coordinates):
-                for j, column in enumerate(subspaces[body].coordinates):
-                    C[row][column] = block[..., i, j]
-                    if ancestor != body:
-                        C[column][row] = mirror_block[..., j, i]
-            if ancestor != path[-1]:
-                response = response.to_parent(steps[ancestor])
-    if not C:
-        return np.zeros((*v.shape[:-1], 0, 0))
-    entries = np.stack(np.broadcast_arrays(*(np.asarray(entry) for row in C for entry in row)), axis=-1)
-    return entries.reshape(*entries.shape[:-1], mechanism.nv, mechanism.nv)
+def _matrix(loops: Loops, placements: Sequence[Placement], v: Array) -> Array:
+    omegas, steps = loops.outward(_step_to_child, loops.root(_root_omega, v), placements, v)
+    rigid = [loops.root(_root_composite, omegas[0]), *loops.each(_rigid_composite, omegas)]
+    composites, _ = loops.inward(_add_composite, rigid, steps)
+    base = loops.root(_base_subspace, omegas[0], stored=False)
+    subspaces = loops.each(_joint_subspace, omegas, stored=False)
+    C = loops.matrices(1, like=v)
+    loops.base_block(C, _base_block, composites[0], base)
+    loops.to_root(
+        C,
+        _respond,
+        _entries,
+        _base_entries,
+        own=(composites, subspaces),
+        below=(steps,),
+        here=(subspaces,),
+        at_base=(base,),
+    )
+    return loops.assembled(C)[0]
 
 
-def _angular_velocities_and_steps(
-    mechanism: Mechanism, placements: Sequence[Placement], v: Array
-) -> tuple[dict[int, Array], list[ToParent]]:
-    """Return the angular velocity of every body in its own axes, and the transforms to the parents."""
-    omega = {ROOT: v[..., 3:6] if mechanism.floating else 0 * mechanism.gravity}
-    steps = []
-    for index, (body, placement) in enumerate(zip(mechanism.bodies, placements, strict=True)):
-        omega[index], step = step_to_child(
-            body, placement, omega[body.parent], joint_value(mechanism, v, index)
-        )
-        steps.append(step)
-    return omega, steps
+def _root_omega(mechanism: Mechanism, v: Array) -> Array:
+    return v[..., 3:6] if mechanism.floating else 0 * mechanism.gravity
 
 
-def step_to_child(body: Body, placement: Placement, omega: Array, speed: Array) -> tuple[Array, ToParent]:
+def _step_to_child(body: Body, omega: Array, placement: Placement, speed: Array) -> tuple[Array, ToParent]:
     """Return the angular velocity of a body in its own axes, and its transform to the parent, from the
     angular velocity `omega` of the parent and the speed (...,) of the joint."""
     R = placement.R
     own = body.axis * append_axis(speed)
     dp = cross(omega, placement.p)
-    turned = rotate_back(R, omega)
+    rotated = rotate_back(R, omega)
     if body.revolute:
-        return turned + own, ToParent(placement, dp)
-    return turned, ToParent(placement, dp + rotate(R, own))
+        return rotated + own, ToParent(placement, dp)
+    return rotated, ToParent(placement, dp + rotate(R, own))
 
 
-def _inertia(mechanism: Mechanism, body: int) -> RigidInertia:
-    return mechanism.root if body == ROOT else mechanism.bodies[body].inertia
+def _root_composite(mechanism: Mechanism, omega: Array) -> Composite:
+    return Composite.of_rigid_body(mechanism.root, omega)
 
 
-def base_subspace(w: Array) -> Subspace:
+def _rigid_composite(body: Body, omega: Array) -> Composite:
+    return Composite.of_rigid_body(body.inertia, omega)
+
+
+def _add_composite(
+    body: Body, composite: Composite, parent: Composite, step: ToParent
+) -> tuple[Composite, None]:
+    return parent + composite.to_parent(step), None
+
+
+def _respond(body: Body, composite: Composite, subspace: Subspace) -> tuple[Response, tuple[Array]]:
+    response = composite.response(subspace)
+    block, _ = response.entries(subspace)
+    return response, (block[..., 0, 0],)
+
+
+def _entries(
+    body: Body, response: Response, step: ToParent, subspace: Subspace
+) -> tuple[Response, tuple[Array], tuple[Array]]:
+    moved = response.to_parent(step)
+    block, mirror_block = moved.entries(subspace)
+    return moved, (mirror_block[..., 0, 0],), (block[..., 0, 0],)
+
+
+def _base_entries(
+    response: Response, step: ToParent, base: Subspace
+) -> tuple[tuple[Array], tuple[list[Array]]]:
+    block, mirror_block = response.to_parent(step).entries(base)
+    return (mirror_block[..., 0, :],), ([block[..., k, 0] for k in range(6)],)
+
+
+def _base_block(mechanism: Mechanism, composite: Composite, base: Subspace) -> tuple[list[Array]]:
+    block, _ = composite.response(base).entries(base)
+    return ([block[..., k, :] for k in range(6)],)
+
+
+def _base_subspace(mechanism: Mechanism, w: Array) -> Subspace:
     """Return the motion subspace of a floating base with angular velocity w: the axes of its frame."""
     axes = np.eye(3, dtype=int)
     linear, angular = (np.concatenate(pair, axis=-1) for pair in ((axes, 0 * axes), (0 * axes, axes)))
-    return Subspace(range(6), linear, angular, skew(w) @ linear, skew(w) @ angular)
+    return Subspace(linear, angular, skew(w) @ linear, skew(w) @ angular)
 
 
-def joint_subspace(body: Body, coordinate: int, w: Array) -> Subspace:
-    """Return the motion subspace of the joint of a body with angular velocity w, number `coordinate`."""
+def _joint_subspace(body: Body, w: Array) -> Subspace:
+    """Return the motion subspace of the joint of a body with angular velocity w."""
     axis = body.axis[..., None]
     linear, angular = (0 * axis, axis) if body.revolute else (axis, 0 * axis)
-    return Subspace(range(coordinate, coordinate + 1), linear, angular, skew(w) @ linear, skew(w) @ angular)
+    return Subspace(linear, angular, skew(w) @ linear, skew(w) @ angular)
 
 
 def _transposed(A: Array) -> Array:

@@ -4,48 +4,71 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynx.model.mechanism import ROOT, Mechanism
-from dynx.rbd.kinematics import joint_value
-from dynx.rbd.placement import Placement
-from dynx.spatial.scalar import Array
+from dynx.model.mechanism import Body, Mechanism
+from dynx.rbd.loops import Loops, PythonLoops
+from dynx.rbd.placement import Placement, SpatialVector
+from dynx.spatial.inertia import RigidInertia
+from dynx.spatial.scalar import Array, append_axis
 from dynx.spatial.so3 import skew
 
 
-def mass_matrix(mechanism: Mechanism, q: Array) -> Array:
+def mass_matrix(mechanism: Mechanism, q: Array, *, loops: Loops | None = None) -> Array:
     """Return the joint-space inertia M (..., nv, nv) in tree coordinates at q (..., nq)."""
-    bodies = mechanism.bodies
-    placements = [Placement.of(body, joint_value(mechanism, q, k)) for k, body in enumerate(bodies)]
-    composite = {ROOT: mechanism.root, **{k: body.inertia for k, body in enumerate(bodies)}}
-    for index in reversed(range(len(bodies))):
-        parent = bodies[index].parent
-        composite[parent] = composite[parent] + placements[index].inertia_to_parent(composite[index])
+    loops = loops or PythonLoops(mechanism)
+    placements = loops.each(Placement.of, q)
+    inertias = [loops.root(root_inertia), *loops.each(body_inertia)]
+    composites, _ = loops.inward(_add_composite, inertias, placements)
+    M = loops.matrices(1, like=q)
+    loops.to_root(M, _momentum, _entry, _base_entries, own=(composites,), below=(placements,))
+    loops.base_block(M, _base_block, composites[0])
+    return loops.assembled(M)[0]
 
-    base = 6 if mechanism.floating else 0
-    zero = 0 * np.sum(q, axis=-1)
-    M = [[zero] * mechanism.nv for _ in range(mechanism.nv)]
-    for index, body in enumerate(bodies):
-        no_motion = 0 * body.axis
-        twist = (no_motion, body.axis) if body.revolute else (body.axis, no_motion)
-        force, moment = composite[index].momentum(*twist)
-        row = index
-        while row != ROOT:
-            owner = bodies[row]
-            along = np.sum(owner.axis * (moment if owner.revolute else force), axis=-1)
-            M[base + row][base + index] = M[base + index][base + row] = along + zero
-            force, moment = placements[row].wrench_to_parent(force, moment)
-            row = owner.parent
-        if mechanism.floating:
-            for k in range(3):
-                M[k][base + index] = M[base + index][k] = force[..., k] + zero
-                M[3 + k][base + index] = M[base + index][3 + k] = moment[..., k] + zero
-    if mechanism.floating:
-        root = composite[ROOT]
-        coupling = skew(root.first_moment)
-        for i in range(3):
-            for j in range(3):
-                M[i][j] = (root.mass if i == j else 0) + zero
-                M[3 + i][j] = M[j][3 + i] = coupling[..., i, j] + zero
-                M[3 + i][3 + j] = root.rotational_inertia[..., i, j] + zero
-    if not M:
-        return np.zeros((*q.shape[:-1], 0, 0))
-    return np.stack([np.stack(row, axis=-1) for row in M], axis=-2)
+
+def root_inertia(mechanism: Mechanism) -> RigidInertia:
+    """Return the inertia of the root."""
+    return mechanism.root
+
+
+def body_inertia(body: Body) -> RigidInertia:
+    """Return the inertia of a body."""
+    return body.inertia
+
+
+def _add_composite(
+    body: Body, composite: RigidInertia, parent: RigidInertia, placement: Placement
+) -> tuple[RigidInertia, None]:
+    return parent + placement.inertia_to_parent(composite), None
+
+
+def _momentum(body: Body, composite: RigidInertia) -> tuple[SpatialVector, tuple[Array]]:
+    """Return the momentum of a subtree whose joint moves at unit speed, and its part along the axis."""
+    no_motion = 0 * body.axis
+    momentum = composite.momentum(*((no_motion, body.axis) if body.revolute else (body.axis, no_motion)))
+    return momentum, (_along_axis(body, momentum),)
+
+
+def _entry(
+    body: Body, momentum: SpatialVector, placement: Placement
+) -> tuple[SpatialVector, tuple[Array], tuple[Array]]:
+    moved = placement.wrench_to_parent(*momentum)
+    entry = (_along_axis(body, moved),)
+    return moved, entry, entry
+
+
+def _base_entries(momentum: SpatialVector, placement: Placement) -> tuple[tuple[Array], tuple[list[Array]]]:
+    entries = np.concatenate(placement.wrench_to_parent(*momentum), axis=-1)
+    return (entries,), ([entries[..., k] for k in range(6)],)
+
+
+def _base_block(mechanism: Mechanism, composite: RigidInertia) -> tuple[list[Array]]:
+    coupling = skew(composite.first_moment)
+    mass = np.eye(3, dtype=int) * append_axis(append_axis(composite.mass))
+    # Blocks that depend on no joint position have no batch axes yet.
+    top = np.concatenate(np.broadcast_arrays(mass, np.swapaxes(coupling, -1, -2)), axis=-1)
+    bottom = np.concatenate(np.broadcast_arrays(coupling, composite.rotational_inertia), axis=-1)
+    return ([*(top[..., k, :] for k in range(3)), *(bottom[..., k, :] for k in range(3))],)
+
+
+def _along_axis(body: Body, momentum: SpatialVector) -> Array:
+    linear, angular = momentum
+    return np.asarray(np.sum(body.axis * (angular if body.revolute else linear), axis=-1))

@@ -27,8 +27,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dynx.model.mechanism import ROOT, Body, Mechanism
-from dynx.rbd.kinematics import joint_value
+from dynx.model.mechanism import Body, Mechanism
+from dynx.rbd.loops import Loops, PythonLoops
 from dynx.rbd.placement import Placement, SpatialVector
 from dynx.rbd.rnea import add_spatial
 from dynx.spatial.inertia import RigidInertia
@@ -54,9 +54,10 @@ class Base(NamedTuple):
     gravity: Array
 
     @classmethod
-    def of(cls, q: Array, v: Array, gravity: Array) -> Base:
-        """Make the base from q (..., 7 or more), v (..., 6 or more) and gravity (3,) in the world."""
-        return cls(v[..., :3], v[..., 3:6], rotate_back(rotation_from_quat(q[..., 3:7]), gravity))
+    def of(cls, mechanism: Mechanism, q: Array, v: Array) -> Base:
+        """Make the base from q (..., 7 or more) and v (..., 6 or more)."""
+        gravity = rotate_back(rotation_from_quat(q[..., 3:7]), mechanism.gravity)
+        return cls(v[..., :3], v[..., 3:6], gravity)
 
     def motion(self, a: Array) -> BodyMotion:
         """Return the motion of the root at acceleration a, relative to that of its origin."""
@@ -121,69 +122,75 @@ class Entries(NamedTuple):
 
 
 def inverse_dynamics_derivatives(
-    mechanism: Mechanism, q: Array, v: Array, a: Array
-) -> tuple[Array, Array, Array]:
+    mechanism: Mechanism, q: Array, v: Array, a: Array, *, loops: Loops | None = None
+) -> tuple[Array, ...]:
     """Return dtau/dq, dtau/dv and dtau/da (..., nv, nv) in tree coordinates, at q (..., nq), v, a (..., nv).
 
     With a floating base the derivative by q is the one by a displacement in the axes of the base.
     """
-    bodies, first = mechanism.bodies, mechanism.nv - len(mechanism.bodies)
-    base = Base.of(q, v, mechanism.gravity) if mechanism.floating else None
-    motions = [fixed_root(mechanism.gravity) if base is None else base.motion(a)]
-    joints: list[JointMotion] = []
-    for index, body in enumerate(bodies):
-        placement = Placement.of(body, joint_value(mechanism, q, index))
-        speeds = (joint_value(mechanism, x, index) for x in (v, a))
-        motion, joint = move_child(body, placement, motions[body.parent + 1], *speeds)
-        motions.append(motion)
-        joints.append(joint)
-    inertias = (mechanism.root, *(body.inertia for body in bodies))
-    subtrees = [Subtree.of_body(x, motion) for x, motion in zip(inertias, motions, strict=True)]
-    for index in reversed(range(len(bodies))):
-        parent = bodies[index].parent + 1
-        subtrees[parent] = subtrees[parent] + subtrees[index + 1]
-
-    zero = 0 * np.sum(v, axis=-1)
-    tables = [[[zero] * mechanism.nv for _ in range(mechanism.nv)] for _ in range(3)]
-
-    def put(row: int, column: int, entries: tuple[Array, ...]) -> None:
-        for table, entry in zip(tables, entries, strict=True):
-            table[row][column] = entry + zero
-
-    for index in range(len(bodies)):
-        own, response = first + index, respond(subtrees[index + 1], joints[index])
-        row = index
-        while row != ROOT:
-            put(own, first + row, by_ancestor(response, joints[row]))
-            if row != index:
-                put(first + row, own, of_ancestor(response, joints[row]))
-            row = bodies[row].parent
-        if base is not None:
-            columns, rows = by_base(response.IS, response.BS, base), base_wrenches(response)
-            for k in range(6):
-                put(own, k, tuple(entry[..., k] for entry in columns))
-                put(k, own, tuple(entry[..., k] for entry in rows))
-    if base is not None:
-        for row, columns in enumerate(base_block(subtrees[0], base)):
-            for k in range(6):
-                put(row, k, tuple(entry[..., k] for entry in columns))
-    if not mechanism.nv:
-        empty = np.zeros((*q.shape[:-1], 0, 0))
-        return empty, empty, empty
-    by_q, by_v, M = (np.stack([np.stack(row, axis=-1) for row in table], axis=-2) for table in tables)
-    return by_q, by_v, M
+    loops = loops or PythonLoops(mechanism)
+    if mechanism.floating:
+        base = loops.root(Base.of, q, v)
+        root = loops.root(_floating_root, base, a)
+    else:
+        base, root = None, loops.root(_fixed_root)
+    motions, joints = loops.outward(move_child, root, q, v, a)
+    bodies = [loops.root(_root_subtree, root), *loops.each(_body_subtree, motions)]
+    subtrees, _ = loops.inward(_add_subtree, bodies)
+    matrices = loops.matrices(3, like=v)
+    loops.to_root(
+        matrices, _respond, _entries, _base_entries, own=(subtrees, joints), here=(joints,), at_base=(base,)
+    )
+    if mechanism.floating:
+        loops.base_block(matrices, _base_block, subtrees[0], base)
+    return loops.assembled(matrices)
 
 
-def fixed_root(gravity: Array) -> BodyMotion:
-    """Return the motion of a fixed root, which gravity (3,) accelerates upwards."""
-    zero = 0 * gravity
-    return BodyMotion(np.eye(3, dtype=int), zero, (zero, zero), (-gravity, zero))
+def _floating_root(mechanism: Mechanism, base: Base, a: Array) -> BodyMotion:
+    return base.motion(a)
+
+
+def _fixed_root(mechanism: Mechanism) -> BodyMotion:
+    """Return the motion of a fixed root, which gravity accelerates upwards."""
+    zero = 0 * mechanism.gravity
+    return BodyMotion(np.eye(3, dtype=int), zero, (zero, zero), (-mechanism.gravity, zero))
+
+
+def _root_subtree(mechanism: Mechanism, motion: BodyMotion) -> Subtree:
+    return Subtree.of_body(mechanism.root, motion)
+
+
+def _body_subtree(body: Body, motion: BodyMotion) -> Subtree:
+    return Subtree.of_body(body.inertia, motion)
+
+
+def _add_subtree(body: Body, subtree: Subtree, parent: Subtree) -> tuple[Subtree, None]:
+    return parent + subtree, None
+
+
+def _respond(body: Body, subtree: Subtree, joint: JointMotion) -> tuple[Response, Entries]:
+    response = respond(subtree, joint)
+    return response, by_ancestor(response, joint)
+
+
+def _entries(body: Body, response: Response, joint: JointMotion) -> tuple[Response, Entries, Entries]:
+    # All vectors are in the axes of the root: the response is the same at every ancestor.
+    return response, by_ancestor(response, joint), of_ancestor(response, joint)
+
+
+def _base_entries(response: Response, base: Base) -> tuple[Entries, tuple[list[Array], ...]]:
+    """Return the derivatives of the torque of the joint by the coordinates of a floating base, and those of
+    the base's wrench by the coordinate of the joint."""
+    columns = by_base(response.IS, response.BS, base)
+    wrenches = (np.concatenate(x, axis=-1) for x in (response.by_q, response.by_v, response.IS))
+    return columns, tuple([wrench[..., k] for k in range(6)] for wrench in wrenches)
 
 
 def move_child(
-    body: Body, placement: Placement, parent: BodyMotion, speed: Array, acceleration: Array
+    body: Body, parent: BodyMotion, q: Array, speed: Array, acceleration: Array
 ) -> tuple[BodyMotion, JointMotion]:
-    """Return the motion of a body and of its joint, from those of its parent and the joint's rates (...,)."""
+    """Return the motion of a body and of its joint, from those of its parent and the joint's state (...,)."""
+    placement = Placement.of(body, q)
     R, p = parent.R @ placement.R, parent.p + rotate(parent.R, placement.p)
     axis = rotate(R, body.axis)
     S = (cross(p, axis), axis) if body.revolute else (axis, 0 * axis)
@@ -224,11 +231,6 @@ def of_ancestor(response: Response, joint: JointMotion) -> Entries:
     return Entries(*(_dot(joint.S, x) for x in (response.by_q, response.by_v, response.IS)))
 
 
-def base_wrenches(response: Response) -> Entries:
-    """Return the derivatives (..., 6) of the wrench of a floating base by the coordinate of the joint."""
-    return Entries(*(np.concatenate(x, axis=-1) for x in (response.by_q, response.by_v, response.IS)))
-
-
 def by_base(IS: SpatialVector, BS: Array, base: Base) -> Entries:
     """Return the derivatives (..., 6) of a torque by the coordinates of a floating base.
 
@@ -244,7 +246,7 @@ def by_base(IS: SpatialVector, BS: Array, base: Base) -> Entries:
     )
 
 
-def base_block(subtree: Subtree, base: Base) -> list[Entries]:
+def _base_block(mechanism: Mechanism, subtree: Subtree, base: Base) -> tuple[list[Array], ...]:
     """Return the derivatives of the wrench of a floating base by its own coordinates, row by row."""
     axes, zero = np.eye(3, dtype=int) + 0 * subtree.E, 0 * subtree.momentum
     unit = [*((axes[..., k, :], zero) for k in range(3)), *((zero, axes[..., k, :]) for k in range(3))]
@@ -252,7 +254,7 @@ def base_block(subtree: Subtree, base: Base) -> list[Entries]:
     for linear, angular in unit:
         BS = cross(subtree.momentum, linear) + rotate_back(subtree.E, angular)
         rows.append(by_base(subtree.inertia.momentum(linear, angular), BS, base))
-    return rows
+    return tuple(list(matrix) for matrix in zip(*rows, strict=True))
 
 
 def _cross_motion(a: SpatialVector, b: SpatialVector) -> SpatialVector:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from dynx.model.mechanism import ROOT, Mechanism, joint_motion
+from dynx.model.mechanism import ROOT, Body, Mechanism, joint_motion
+from dynx.rbd.loops import Loops, PythonLoops
 from dynx.spatial.scalar import Array, append_axis
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import cross, rotate, rotation_from_quat
+
+BodyPose = tuple[Array, Array]
+"""Rotation R (..., 3, 3) and position p (..., 3) of a body in the world."""
 
 
 @dataclass(frozen=True)
@@ -44,17 +49,26 @@ def joint_value(mechanism: Mechanism, x: Array, body: int) -> Array:
 
 def body_poses(mechanism: Mechanism, q: Array) -> Poses:
     """Return the poses of all bodies at the tree configuration `q` (..., nq)."""
+    return Poses(*zip(*pose_pairs(PythonLoops(mechanism), q), strict=True))
+
+
+def pose_pairs(loops: Loops, q: Array) -> Sequence[BodyPose]:
+    """Return the pose (R, p) of every body at `q` (..., nq), the root's first."""
+    poses, _ = loops.outward(_child_pose, loops.root(_root_pose, q), q)
+    return poses
+
+
+def _root_pose(mechanism: Mechanism, q: Array) -> BodyPose:
     if mechanism.floating:
-        R, p = [rotation_from_quat(q[..., 3:7])], [q[..., :3]]
-    else:
-        zero = 0 * mechanism.gravity
-        R, p = [np.eye(3, dtype=int) + zero[:, None]], [zero]
-    for index, body in enumerate(mechanism.bodies):
-        R_joint, p_joint = joint_motion(body, joint_value(mechanism, q, index))
-        R_parent, p_parent = R[body.parent + 1], p[body.parent + 1]
-        R.append(R_parent @ R_joint)
-        p.append(p_parent + rotate(R_parent, p_joint))
-    return Poses(tuple(R), tuple(p))
+        return rotation_from_quat(q[..., 3:7]), q[..., :3]
+    zero = 0 * mechanism.gravity
+    return np.eye(3, dtype=int) + zero[:, None], zero
+
+
+def _child_pose(body: Body, parent: BodyPose, value: Array) -> tuple[BodyPose, None]:
+    R_joint, p_joint = joint_motion(body, value)
+    R_parent, p_parent = parent
+    return (R_parent @ R_joint, p_parent + rotate(R_parent, p_joint)), None
 
 
 def poses_from_frames(mechanism: Mechanism, placements: Array) -> Poses:

@@ -16,14 +16,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from dynx.model import Model
-from dynx.model.mechanism import Mechanism, ScalarConverter, float64, pose_arrays
+from dynx.model.mechanism import Body, BodyFrame, Mechanism, ScalarConverter, float64, pose_arrays
 from dynx.model.model import refuse_other_than_model
-from dynx.rbd.jacobians import frame_jacobian
-from dynx.rbd.kinematics import BodyVectors, Poses, body_twists, frame_pose, joint_axis, joint_value
+from dynx.rbd.kinematics import BodyPose, Poses, pose_pairs
+from dynx.rbd.loops import Loops, PythonLoops
 from dynx.spatial.inertia import RigidInertia, inertia_about_origin
 from dynx.spatial.scalar import Array, append_axis
 from dynx.spatial.so3 import cross, rotate, rotate_back, skew
@@ -42,106 +43,128 @@ def inertial_regressor(
 
     Columns of bodies that no coordinate moves are zero.
     """
-    twists = body_twists(mechanism, poses, v)
-    accelerations = body_accelerations(mechanism, poses, twists, v, a)
-    blocks = []
-    for frame in frames:
-        body = mechanism.frames[frame].body
-        R, p = frame_pose(mechanism, poses, frame)
-        omega, alpha = twists[body][1], accelerations[body][1]
-        acceleration = accelerations[body][0] + fixed_point_acceleration(omega, alpha, p - poses[body][1])
-        proper_acceleration = rotate_back(R, acceleration - mechanism.gravity)
-        wrench = wrench_regressor(proper_acceleration, rotate_back(R, omega), rotate_back(R, alpha))
-        J = frame_jacobian(mechanism, poses, frame, "local")
-        blocks.append(np.swapaxes(J, -1, -2) @ wrench)
-    shape = np.broadcast_shapes(*(block.shape for block in blocks))
-    return np.concatenate([np.broadcast_to(block, shape) for block in blocks], axis=-1)
+    return _regressor(PythonLoops(mechanism), list(zip(poses.R, poses.p, strict=True)), v, a, frames)
 
 
-def wrench_regressor(proper_acceleration: Array, omega: Array, alpha: Array) -> Array:
-    """Return A (..., 6, 10) such that A pi is the wrench that gives a body the stated motion.
-
-    Force and moment are about the origin of the body frame. `proper_acceleration` (..., 3) d is that of the
-    origin (acceleration minus gravity), `omega` the angular velocity w and `alpha` the angular
-    acceleration, all in the axes of the frame (Newton and Euler, with h = m c):
-
-        f = m d + alpha x h + w x (w x h),   n = h x d + I alpha + w x I w
-    """
-    d, omega, alpha = np.broadcast_arrays(proper_acceleration, omega, alpha)
-    return assemble_wrench_regressor(d, *moment_matrices(omega, alpha))
-
-
-def moment_matrices(omega: Array, alpha: Array) -> tuple[Array, Array]:
-    """Return the matrices (..., 3, 3) by which the first moment is multiplied in the force, and (..., 3, 6)
-    by which the second moments are multiplied in the moment."""
-    W = skew(omega)
-    return skew(alpha) + W @ W, _tensor_columns(alpha) + W @ _tensor_columns(omega)
-
-
-def assemble_wrench_regressor(d: Array, acceleration_matrix: Array, moments: Array) -> Array:
-    """Return the matrix of `wrench_regressor` from its blocks."""
-    column = d[..., None]
-    force = np.concatenate([column, acceleration_matrix, 0 * moments], axis=-1)
-    moment = np.concatenate([0 * column, -skew(d), moments], axis=-1)
-    return np.concatenate([force, moment], axis=-2)
-
-
-def body_accelerations(
-    mechanism: Mechanism, poses: Poses, twists: BodyVectors, v: Array, a: Array
-) -> BodyVectors:
-    """Return the linear acceleration of each body's origin and its angular acceleration, in world axes."""
-    R, p = poses.R[0], poses.p[0]
-    if mechanism.floating:
-        # v is expressed in axes that rotate with the base: the acceleration in the world includes omega x v.
-        linear = [rotate(R, a[..., :3]) + cross(twists.angular[0], twists.linear[0])]
-        angular = [rotate(R, a[..., 3:6])]
-    else:
-        linear, angular = [0 * p], [0 * p]
-    for index, body in enumerate(mechanism.bodies):
-        axis = joint_axis(mechanism, poses, index)
-        parent = BodyState(
-            poses[body.parent][1], twists[body.parent][1], linear[body.parent + 1], angular[body.parent + 1]
-        )
-        acceleration, alpha = child_acceleration(
-            parent,
-            poses[index][1],
-            axis * append_axis(joint_value(mechanism, v, index)),
-            axis * append_axis(joint_value(mechanism, a, index)),
-            revolute=body.revolute,
-        )
-        linear.append(acceleration)
-        angular.append(alpha)
-    return BodyVectors(tuple(linear), tuple(angular))
+def inertial_regressor_at(
+    mechanism: Mechanism, q: Array, v: Array, a: Array, frames: Sequence[int], *, loops: Loops | None = None
+) -> Array:
+    """Return Y (..., nv, 10 n) at the tree configuration q (..., nq)."""
+    loops = loops or PythonLoops(mechanism)
+    return _regressor(loops, pose_pairs(loops, q), v, a, frames)
 
 
 @dataclass(frozen=True)
 class BodyState:
-    """Position and acceleration of the origin of a body, its angular velocity and acceleration, in world
-    axes."""
+    """Rotation R and position p of a body, its angular velocity, the proper acceleration of its origin
+    (acceleration minus gravity) and its angular acceleration, in world axes."""
 
+    R: Array
     p: Array
     omega: Array
     acceleration: Array
     alpha: Array
 
 
-def child_acceleration(
-    parent: BodyState, p: Array, speed: Array, joint_acceleration: Array, *, revolute: bool
-) -> tuple[Array, Array]:
-    """Return the linear acceleration of the origin `p` of a body and its angular acceleration.
+@dataclass(frozen=True)
+class FrameMotion:
+    """Pose (R, p) of a frame, and the blocks of its wrench regressor.
 
-    `speed` and `joint_acceleration` are those of the joint along its axis, in world axes (..., 3).
+    `d` is its proper acceleration. `U` (..., 3, 3) multiplies the first moment in the force; `moments`
+    (..., 3, 6) multiplies the second moments in the moment.
     """
-    omega, alpha = parent.omega, parent.alpha
-    acceleration = parent.acceleration + fixed_point_acceleration(omega, alpha, p - parent.p)
-    if revolute:
-        return acceleration, alpha + joint_acceleration + cross(omega, speed)
-    return acceleration + joint_acceleration + 2 * cross(omega, speed), alpha
+
+    R: Array
+    p: Array
+    d: Array
+    U: Array
+    moments: Array
+
+    @cached_property
+    def wrench(self) -> Array:
+        """Matrix A (..., 6, 10) such that A pi is the wrench that gives a body of inertia pi this motion.
+
+        Force and moment are about the origin of the frame, in its axes. With the angular velocity w and the
+        angular acceleration alpha in the axes of the frame (Newton and Euler, with h = m c)
+
+            f = m d + alpha x h + w x (w x h),   n = h x d + I alpha + w x I w
+        """
+        column = self.d[..., None]
+        force = np.concatenate([column, self.U, 0 * self.moments], axis=-1)
+        moment = np.concatenate([0 * column, -skew(self.d), self.moments], axis=-1)
+        return np.concatenate([force, moment], axis=-2)
 
 
-def fixed_point_acceleration(omega: Array, alpha: Array, lever: Array) -> Array:
+def _regressor(loops: Loops, poses: Sequence[BodyPose], v: Array, a: Array, frames: Sequence[int]) -> Array:
+    states, axes = loops.outward(_move, loops.root(_root_state, poses[0], v, a), poses, v, a)
+    Y = loops.matrices(1, like=v, blocks=len(frames), width=10)
+    loops.frames_to_root(
+        Y, frames, _frame_motion, _row, _base_rows, own=(states,), here=(states, axes), at_base=(states[0],)
+    )
+    return loops.assembled(Y)[0]
+
+
+def _root_state(mechanism: Mechanism, pose: BodyPose, v: Array, a: Array) -> BodyState:
+    R, p = pose
+    if not mechanism.floating:
+        return BodyState(R, p, 0 * p, 0 * p - mechanism.gravity, 0 * p)
+    # v is expressed in axes that rotate with the base: the acceleration in the world includes omega x v.
+    omega = rotate(R, v[..., 3:6])
+    acceleration = rotate(R, a[..., :3]) + cross(omega, rotate(R, v[..., :3])) - mechanism.gravity
+    return BodyState(R, p, omega, acceleration, rotate(R, a[..., 3:6]))
+
+
+def _move(body: Body, parent: BodyState, pose: BodyPose, v: Array, a: Array) -> tuple[BodyState, Array]:
+    """Return the state of a body, and the axis of its joint in world axes."""
+    R, p = pose
+    axis = rotate(R, body.axis)
+    speed, joint_acceleration = axis * append_axis(v), axis * append_axis(a)
+    acceleration = parent.acceleration + _fixed_point_acceleration(parent, p - parent.p)
+    across = cross(parent.omega, speed)
+    if body.revolute:
+        alpha = parent.alpha + joint_acceleration + across
+        return BodyState(R, p, parent.omega + speed, acceleration, alpha), axis
+    return BodyState(R, p, parent.omega, acceleration + joint_acceleration + 2 * across, parent.alpha), axis
+
+
+def _fixed_point_acceleration(body: BodyState, lever: Array) -> Array:
     """Return the acceleration of a point of a body relative to its origin, from which it is `lever` away."""
-    return cross(alpha, lever) + cross(omega, cross(omega, lever))
+    return cross(body.alpha, lever) + cross(body.omega, cross(body.omega, lever))
+
+
+def _frame_motion(frame: BodyFrame, body: BodyState) -> FrameMotion:
+    R, p = body.R @ frame.R, body.p + rotate(body.R, frame.p)
+    d = rotate_back(R, body.acceleration + _fixed_point_acceleration(body, p - body.p))
+    d, omega, alpha = np.broadcast_arrays(d, rotate_back(R, body.omega), rotate_back(R, body.alpha))
+    W = skew(omega)
+    moments = _tensor_columns(alpha) + W @ _tensor_columns(omega)
+    return FrameMotion(R, p, d, skew(alpha) + W @ W, moments)
+
+
+def _row(body: Body, frame: FrameMotion, state: BodyState, axis: Array) -> tuple[Array]:
+    """Return the row of the regressor for the joint of a body that moves the frame."""
+    if body.revolute:
+        return (_rotation_row(frame, axis, state.p),)
+    return (_translation_row(frame, axis),)
+
+
+def _base_rows(frame: FrameMotion, root: BodyState) -> tuple[list[Array]]:
+    axes = [root.R[..., k] for k in range(3)]
+    translations = [_translation_row(frame, axis) for axis in axes]
+    return ([*translations, *(_rotation_row(frame, axis, root.p) for axis in axes)],)
+
+
+def _translation_row(frame: FrameMotion, axis: Array) -> Array:
+    return _times(rotate_back(frame.R, axis), frame.wrench[..., :3, :])
+
+
+def _rotation_row(frame: FrameMotion, axis: Array, p: Array) -> Array:
+    motion = rotate_back(frame.R, cross(axis, frame.p - p)), rotate_back(frame.R, axis)
+    return _times(np.concatenate(np.broadcast_arrays(*motion), axis=-1), frame.wrench)
+
+
+def _times(row: Array, A: Array) -> Array:
+    return np.asarray((row[..., None, :] @ A)[..., 0, :])
 
 
 def inertial_parameters(model: Model, convert: ScalarConverter = float64) -> Array:

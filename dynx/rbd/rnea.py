@@ -15,11 +15,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from dynx.model.mechanism import ROOT, Body, Mechanism
-from dynx.rbd.kinematics import joint_value
+from dynx.model.mechanism import Body, Mechanism
+from dynx.rbd.loops import Loops, PythonLoops
 from dynx.rbd.placement import Placement, SpatialVector
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, append_axis
@@ -67,46 +68,59 @@ class Motion:
         return np.asarray(self.proper_acceleration + rotate(self.acceleration_matrix, p))
 
 
-def inverse_dynamics(mechanism: Mechanism, q: Array, v: Array, a: Array) -> Array:
+class Moved(NamedTuple):
+    """Placement of a body whose joint moves, and the wrench that moves the body."""
+
+    placement: Placement
+    wrench: SpatialVector
+
+
+def inverse_dynamics(
+    mechanism: Mechanism, q: Array, v: Array, a: Array, *, loops: Loops | None = None
+) -> Array:
     """Return the torque (..., nv) that produces the acceleration `a` (..., nv), in tree coordinates.
 
     q is (..., nq), v is (..., nv). Gravity enters as an acceleration of the root. With a floating base the
     first six entries are the force and the moment at the origin of the base frame, in its axes.
     """
-    motions, placements = [root_motion(mechanism, q, v, a)], list[Placement]()
+    loops = loops or PythonLoops(mechanism)
+    root = loops.root(root_motion, q, v, a)
+    root_wrench = loops.root(_root_wrench, root)
+    _, moved = loops.outward(_move, root, q, v, a)
+    wrenches, tau = loops.inward(_react, [root_wrench, *(body.wrench for body in moved)], moved)
+    return loops.vector(wrenches[0], tau, like=v)
+
+
+def _root_wrench(mechanism: Mechanism, motion: Motion) -> SpatialVector:
+    return body_wrench(mechanism.root, motion)
+
+
+def _move(body: Body, parent: Motion, q: Array, v: Array, a: Array) -> tuple[Motion, Moved]:
     # A body's wrench is computed together with its motion, most of which nothing else needs: compiled code
     # then keeps few values in memory, which makes that of a humanoid a quarter faster.
-    wrenches = [body_wrench(mechanism.root, motions[0])]
-    for index, body in enumerate(mechanism.bodies):
-        placement = Placement.of(body, joint_value(mechanism, q, index))
-        speed, acceleration = (joint_value(mechanism, x, index) for x in (v, a))
-        placements.append(placement)
-        motions.append(child_motion(body, placement, motions[body.parent + 1], speed, acceleration))
-        wrenches.append(body_wrench(body.inertia, motions[-1]))
-
-    tau: list[Array] = []
-    for index in reversed(range(len(mechanism.bodies))):
-        body = mechanism.bodies[index]
-        force, moment = wrenches[index + 1]
-        tau.append(np.sum(body.axis * (moment if body.revolute else force), axis=-1))
-        reaction = placements[index].wrench_to_parent(force, moment)
-        wrenches[body.parent + 1] = add_spatial(wrenches[body.parent + 1], reaction)
-    joints = tau[::-1]
-    if mechanism.floating:
-        force, moment = wrenches[ROOT + 1]
-        return np.concatenate([force, moment, *(append_axis(t) for t in joints)], axis=-1)
-    return np.stack(joints, axis=-1) if joints else np.zeros(v.shape)
+    placement = Placement.of(body, q)
+    motion = child_motion(body, placement, parent, v, a)
+    return motion, Moved(placement, body_wrench(body.inertia, motion))
 
 
-def bias_torque(mechanism: Mechanism, q: Array, v: Array) -> Array:
+def _react(
+    body: Body, wrench: SpatialVector, parent: SpatialVector, moved: Moved
+) -> tuple[SpatialVector, Array]:
+    """Add the wrench on a body to that on its parent; return also the torque of its joint."""
+    force, moment = wrench
+    torque = np.sum(body.axis * (moment if body.revolute else force), axis=-1)
+    return add_spatial(parent, moved.placement.wrench_to_parent(force, moment)), torque
+
+
+def bias_torque(mechanism: Mechanism, q: Array, v: Array, *, loops: Loops | None = None) -> Array:
     """Return C v + g (..., nv): inverse dynamics at zero acceleration."""
-    return inverse_dynamics(mechanism, q, v, np.zeros(v.shape))
+    return inverse_dynamics(mechanism, q, v, np.zeros(v.shape), loops=loops)
 
 
-def gravity_torque(mechanism: Mechanism, q: Array) -> Array:
+def gravity_torque(mechanism: Mechanism, q: Array, *, loops: Loops | None = None) -> Array:
     """Return g (..., nv): inverse dynamics at rest."""
     rest = np.zeros((*q.shape[:-1], mechanism.nv))
-    return inverse_dynamics(mechanism, q, rest, rest)
+    return inverse_dynamics(mechanism, q, rest, rest, loops=loops)
 
 
 def root_motion(mechanism: Mechanism, q: Array, v: Array, a: Array) -> Motion:

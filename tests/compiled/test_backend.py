@@ -18,7 +18,7 @@ from dynx.compiled import kernels
 from dynx.compiled.backend import CompiledBackend
 from dynx.compiled.call import MAX_COPIED_SAMPLES, KernelCall, NumericCall
 from dynx.compiled.coupled_call import CoupledCall
-from dynx.compiled.looped.kernels import LOOPED
+from dynx.compiled.table_kernels import TABLE_QUANTITIES
 from dynx.errors import ArgumentError, ClosedError
 from dynx.model import Inertial, Link, Mechanism, Model
 from dynx.rbd.elimination import has_physical_inertias
@@ -170,7 +170,7 @@ def test_quantities_that_are_not_compiled_are_evaluated_by_routines_or_numpy(
     looped = CoupledCall if mimics else KernelCall
     for key, result in numbers._calls.items():
         name = key[0] if isinstance(key, tuple) else ""
-        by_routines = name in LOOPED and not (mimics and name == "forward_dynamics")
+        by_routines = name in TABLE_QUANTITIES and not (mimics and name == "forward_dynamics")
         assert isinstance(getattr(result, "__self__", result), looped if by_routines else NumericCall)
     assert not kernels._calls
 

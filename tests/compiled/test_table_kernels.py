@@ -12,7 +12,7 @@ from dynx.backends import backend
 from dynx.backends.evaluation import MIN_SUMMED_COLUMNS, Evaluation
 from dynx.backends.quantities import QUANTITIES
 from dynx.compiled.call import MAX_COPIED_SAMPLES
-from dynx.compiled.looped.kernels import LOOPED
+from dynx.compiled.table_kernels import TABLE_QUANTITIES
 from dynx.model import Model
 from dynx.model.tree import Base
 from dynx.simd.target import host
@@ -34,7 +34,7 @@ def _arguments(model: Model, quantity: str, size: tuple[int, ...]) -> list[Float
     return [values[argument] for argument in QUANTITIES[quantity].arguments]
 
 
-@pytest.mark.parametrize("quantity", sorted(LOOPED))
+@pytest.mark.parametrize("quantity", sorted(TABLE_QUANTITIES))
 @pytest.mark.parametrize("model", [*ROBOTS.values(), tree(30), serial_arm(20)], ids=lambda m: m.name)
 def test_routines_give_the_results_of_the_reference(model: Model, quantity: str) -> None:
     q, v, a = state(model, (3,))
@@ -48,7 +48,7 @@ def test_routines_give_the_results_of_the_reference(model: Model, quantity: str)
     ErrorBounds(samples_at(model, q, v, a, a)).check(quantity, found, expected)
 
 
-@pytest.mark.parametrize("quantity", sorted(LOOPED))
+@pytest.mark.parametrize("quantity", sorted(TABLE_QUANTITIES))
 def test_results_do_not_depend_on_the_other_samples_or_on_threads(quantity: str) -> None:
     """One sample has code of one lane, few are repeated to fill the lanes, many are divided into parts."""
     model = ROBOTS["floating"]
