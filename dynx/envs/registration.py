@@ -19,6 +19,7 @@ COMPILED = "compiled"
 """The engine of vector environments, whose kernels are compiled."""
 
 NAMESPACE = "dynx"
+ENTRY_POINT = "dynx.envs.registration:make_environment"
 VECTOR_ENTRY_POINT = "dynx.envs.registration:make_vector_environment"
 
 TASKS = {
@@ -117,7 +118,7 @@ def register_task(env_id: str, task: str | type[Task]) -> None:
     registry.pop(env_id, None)
     register(
         env_id,
-        entry_point="dynx.envs.registration:make_environment",
+        entry_point=ENTRY_POINT,
         vector_entry_point=VECTOR_ENTRY_POINT if issubclass(kind, ArrayTask) else None,
         max_episode_steps=kind.max_episode_steps,
         reward_threshold=kind.reward_threshold,

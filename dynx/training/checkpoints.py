@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from dynx.errors import ArgumentError, shown
+from dynx.files.arrays import read_arrays
 from dynx.files.writing import atomic_file
 from dynx.training.library import read_weights, replay_arrays, restore_replay
 from dynx.training.policy import Policy, read_policy_document, scaling_of
@@ -37,13 +38,12 @@ class Checkpoint:
         with open(self.path, "rb") as file:
             read_weights(algorithm, file, str(self.path))
         algorithm.num_timesteps = self.steps_done
-        scaling = scaling_of(self.document)
+        scaling = scaling_of(self.document, vector.observation_space.shape, str(self.path))
         if scaling is not None:
             scaling.give(vector)
         replay = _replay_path(self.path)
         if replay.exists():
-            with np.load(replay, allow_pickle=False) as arrays:
-                restore_replay(algorithm, dict(arrays))
+            restore_replay(algorithm, read_arrays(replay, "a replay buffer").arrays, str(replay))
 
 
 class Checkpoints:
@@ -68,6 +68,8 @@ class Checkpoints:
 
     def newest(self, spec: TrainingSpec) -> Checkpoint | None:
         """Return the newest checkpoint that is readable; None if there is none at all.
+
+        The task of a checkpoint is only compared with that of the run, which the caller names.
 
         Raises ArgumentError if there are checkpoints, and none is readable or of the run.
         """

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dynx.model.numbers import is_real
 from dynx.training.checkpoints import Checkpoints
 from dynx.training.evaluation import Evaluation, evaluate
 from dynx.training.library import log_to
@@ -82,8 +83,8 @@ class Learning:
         self._checkpoints, self._progress = checkpoints, progress
         done = int(algorithm.num_timesteps)
         self._evaluations, self._curve = Lines(place / EVALUATIONS, done), Lines(place / CURVE, done)
-        means = (float(line["mean"]) for line in read_lines(place / EVALUATIONS))
-        self._best = max(means, default=-float("inf"))
+        means = (line.get("mean") for line in read_lines(place / EVALUATIONS))
+        self._best = max((float(each) for each in means if is_real(each)), default=-float("inf"))
         self._last: Evaluation | None = None
         if schedule.tensorboard:
             log_to(algorithm, str(place / TENSORBOARD))

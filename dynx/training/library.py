@@ -1,13 +1,17 @@
 """The one import of stable-baselines3: its algorithms, what it learns on, and its files of weights.
 
 Weights are read without unpickling anything (`set_parameters` loads tensors alone), so that a policy from
-somebody else runs no code of theirs.
+somebody else runs no code of theirs; numbers of a file are finite, and fit the algorithm and the memory.
 """
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+import io
+import os
+import zipfile
+from collections.abc import Callable, Iterator, Mapping
+from itertools import pairwise
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -44,6 +48,7 @@ __all__ = [
     "replay_arrays",
     "restore_replay",
     "set_threads",
+    "weights_of_file",
     "write_weights",
 ]
 
@@ -78,11 +83,35 @@ _FRACTIONS = ("gamma", "gae_lambda", "tau")
 _REPLAYED = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 
 
-def new_algorithm(name: str, env: VecEnv, hyperparameters: dict[str, Any], seed: int | None) -> Any:
-    """Make an algorithm with new weights.
+_BYTES_PER_WEIGHT = 24
+"""Memory for a weight of a network and its optimizer, and for a copy (a target network) [bytes]."""
+
+_ALGORITHM_REFUSES = (
+    ArithmeticError,
+    AssertionError,
+    AttributeError,
+    LookupError,
+    MemoryError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+)
+"""Exceptions of stable-baselines3 and PyTorch for values of hyperparameters."""
+
+
+def new_algorithm(
+    name: str,
+    env: VecEnv,
+    hyperparameters: dict[str, Any],
+    seed: int | None,
+    *,
+    most_weights: int | None = None,
+) -> Any:
+    """Make an algorithm with new weights, at most `most_weights` in a network.
 
     Raises UnknownNameError for an algorithm or a hyperparameter that does not exist, ArgumentError for a
-    value that the algorithm refuses or an action space that it cannot use.
+    value that the algorithm refuses, an action space that it cannot use, and networks or buffers that are
+    larger than the memory.
     """
     if name not in ALGORITHMS:
         raise UnknownNameError(f"no algorithm {shown(name)}{nearest(name, ALGORITHMS)}")
@@ -109,10 +138,57 @@ def new_algorithm(name: str, env: VecEnv, hyperparameters: dict[str, Any], seed:
     values = {each: schedule_of(each, value) for each, value in hyperparameters.items()}
     if "policy_kwargs" in values:
         values["policy_kwargs"] = _policy_options(values["policy_kwargs"])
+        _check_weights(values["policy_kwargs"], env, most_weights)
+    _check_buffers(hyperparameters, env)
     try:
         return algorithm("MlpPolicy", env, seed=seed, device="cpu", **values)
-    except (AssertionError, TypeError, ValueError, RuntimeError) as error:
-        raise ArgumentError(f"{name} refuses: {error}") from error
+    except _ALGORITHM_REFUSES as error:
+        raise ArgumentError(f"{name} refuses: {str(error) or type(error).__name__}") from error
+
+
+def _memory() -> int:
+    """Return the memory of this machine [bytes]; where it is not known, the largest number of bytes."""
+    names = getattr(os, "sysconf_names", {})
+    if "SC_PHYS_PAGES" not in names:
+        return 2**63
+    return int(os.sysconf("SC_PAGE_SIZE")) * int(os.sysconf("SC_PHYS_PAGES"))
+
+
+def _check_weights(options: Mapping[str, Any], env: VecEnv, most: int | None) -> None:
+    """Raise ArgumentError for layers that are no numbers, or have more weights than `most` or the memory."""
+    layers = options.get("net_arch", [])
+    lists = [*layers.values()] if isinstance(layers, dict) else [layers]
+    critics = options.get("n_critics", 1)
+    for each in [*lists, [critics]]:
+        if not isinstance(each, list | tuple) or not all(type(width) is int and width > 0 for width in each):
+            raise ArgumentError(
+                "net_arch is a list of the widths of layers, or one for each network, and n_critics a "
+                f"number, all above 0; got {shown(options)}"
+            )
+    inputs = int(spaces.flatdim(env.observation_space)) + int(spaces.flatdim(env.action_space))
+    weights = critics * max((sum(a * b for a, b in pairwise([inputs, *each])) for each in lists), default=0)
+    if most is not None and weights > most:
+        raise ArgumentError(f"net_arch describes {weights:,} weights, more than the file holds")
+    if weights * _BYTES_PER_WEIGHT > _memory():
+        raise ArgumentError(f"net_arch describes {weights:,} weights, which the memory does not hold")
+
+
+def _check_buffers(hyperparameters: Mapping[str, Any], env: VecEnv) -> None:
+    """Raise ArgumentError for a buffer of samples that is larger than the memory."""
+    one = 2 * _bytes_of(env.observation_space) + _bytes_of(env.action_space)
+    for name, copies in (("buffer_size", 1), ("n_steps", env.num_envs), ("batch_size", 1)):
+        count = hyperparameters.get(name, 0)
+        if isinstance(count, int) and count * copies * one > _memory():
+            raise ArgumentError(
+                f"{name} is {count:,}: the samples need {count * copies * one:,} bytes of memory"
+            )
+
+
+def _bytes_of(space: Any) -> int:
+    """Return the size of an element of a space in a buffer [bytes]."""
+    if space.shape is None or space.dtype is None:
+        return 0
+    return int(np.prod(space.shape)) * int(space.dtype.itemsize)
 
 
 def _check_kind(name: str, value: object, default: object) -> None:
@@ -150,6 +226,8 @@ def action_of(algorithm: Any, observation: Any, deterministic: bool) -> Any:
     restore = set_threads(1)
     try:
         action, _ = algorithm.predict(observation, deterministic=deterministic)
+    except ValueError as error:  # of a distribution whose parameters are no numbers
+        raise ArgumentError(f"the policy has no action: {' '.join(str(error).split())[:300]}") from error
     finally:
         restore()
     return action
@@ -163,16 +241,112 @@ def write_weights(algorithm: Any, file: BinaryIO) -> None:
 def read_weights(algorithm: Any, file: BinaryIO, source: str) -> None:
     """Read weights and the state of the optimizer into an algorithm of the same kind and size.
 
-    Raises ArgumentError for a file with other weights.
+    Raises ArgumentError for a file with other weights, weights that are not finite, and a file that is
+    larger when it is expanded.
     """
     try:
+        _check_archive(file)
         _, weights, variables = load_from_zip_file(file, device="cpu", load_data=False)
+        if not all(bool(torch.isfinite(each).all()) for each in _tensors([weights, variables])):
+            raise ValueError("a number is not finite")
+        modules, others = algorithm._get_torch_save_params()
+        options = {name: _options_of(_part_of(algorithm, name)) for name in modules}
         algorithm.set_parameters(weights, device="cpu")
-        for name, value in (variables or {}).items():  # the entropy coefficient of SAC, which is no module
-            getattr(algorithm, name).data = value.data
+        for name in modules:
+            _check_optimizer(_part_of(algorithm, name), options[name])
+        _set_variables(algorithm, others, variables or {})
     except Exception as error:  # torch raises whatever a damaged or foreign file leads to
         reason = " ".join(str(error).split())
         raise ArgumentError(f"{shown(source, 300)} has no weights that fit: {reason[:300]}") from error
+
+
+def weights_of_file(file: BinaryIO) -> int:
+    """Return a number of weights that a file of a policy cannot exceed."""
+    return file.seek(0, os.SEEK_END) // 4
+
+
+def _check_archive(file: BinaryIO) -> None:
+    """Raise ValueError for an archive, or one inside it, that is larger when it is expanded."""
+    size = file.seek(0, os.SEEK_END)
+    with zipfile.ZipFile(file) as archive:
+        parts = archive.infolist()
+        if sum(part.file_size for part in parts) > size:
+            raise ValueError("it is compressed: its members are larger than the file")
+        for part in parts:
+            if part.filename.endswith(".pth"):
+                with zipfile.ZipFile(io.BytesIO(archive.read(part))) as inner:
+                    if sum(each.file_size for each in inner.infolist()) > part.file_size:
+                        raise ValueError(f"{part.filename} is compressed: its members are larger than it")
+    file.seek(0)
+
+
+def _tensors(value: object) -> Iterator[Any]:
+    """Yield the tensors in nested dictionaries and lists."""
+    waiting = [value]
+    while waiting:
+        each = waiting.pop()
+        if isinstance(each, torch.Tensor):
+            yield each
+        elif isinstance(each, Mapping):
+            waiting += each.values()
+        elif isinstance(each, list | tuple):
+            waiting += each
+
+
+def _part_of(algorithm: Any, path: str) -> Any:
+    """Return what an algorithm calls ``policy.optimizer``."""
+    found = algorithm
+    for name in path.split("."):
+        found = getattr(found, name)
+    return found
+
+
+def _options_of(part: Any) -> list[dict[str, Any]]:
+    """Return the options of an optimizer by group of parameters; none of a network."""
+    if not isinstance(part, torch.optim.Optimizer):
+        return []
+    return [{name: value for name, value in group.items() if name != "params"} for group in part.param_groups]
+
+
+def _check_optimizer(part: Any, before: list[dict[str, Any]]) -> None:
+    """Raise ValueError for a loaded optimizer whose options or moments are of another kind or shape."""
+    for group, known in zip(_options_of(part), before, strict=True):
+        if group.keys() != known.keys():
+            raise ValueError("the optimizer has other options")
+        for name, value in group.items():
+            if not _alike(value, known[name]):
+                raise ValueError(f"{name} of the optimizer is {shown(value)}")
+    if isinstance(part, torch.optim.Optimizer):
+        for parameter, state in part.state.items():
+            if any(each.ndim > 0 and each.shape != parameter.shape for each in _tensors(state)):
+                raise ValueError("the state of the optimizer has another shape")
+
+
+def _alike(value: object, known: object) -> bool:
+    """Check whether an option is of the kind of another; numbers must be finite, and may be of any kind."""
+    if isinstance(known, list | tuple):
+        return isinstance(value, list | tuple) and all(_is_number(each) for each in value)
+    return _is_number(value) if _is_number(known) else type(value) is type(known)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and bool(np.isfinite(value))
+
+
+def _set_variables(algorithm: Any, names: list[str], variables: Mapping[str, Any]) -> None:
+    """Set tensors that belong to no network, such as the entropy coefficient of SAC.
+
+    Raises ValueError for others than those of the algorithm, and for other shapes.
+    """
+    if set(variables) != set(names):
+        raise ValueError(
+            f"its variables are {shown(sorted(map(str, variables)))}; wanted {shown(sorted(names))}"
+        )
+    for name, value in variables.items():
+        own = getattr(algorithm, name)
+        if not isinstance(value, torch.Tensor) or value.shape != own.shape:
+            raise ValueError(f"{name} has another shape")
+        own.data = value.data
 
 
 def replay_arrays(algorithm: Any) -> dict[str, NDArray[Any]] | None:
@@ -185,12 +359,30 @@ def replay_arrays(algorithm: Any) -> dict[str, NDArray[Any]] | None:
     return {**arrays, "pos": np.array(buffer.pos), "full": np.array(buffer.full)}
 
 
-def restore_replay(algorithm: Any, arrays: dict[str, NDArray[Any]]) -> None:
-    """Fill the replay buffer of an algorithm with arrays of `replay_arrays`."""
-    buffer = algorithm.replay_buffer
+def restore_replay(algorithm: Any, arrays: Mapping[str, NDArray[Any]], source: str) -> None:
+    """Fill the replay buffer of an algorithm with arrays of `replay_arrays`.
+
+    Raises ArgumentError for arrays that another buffer had, or that are not finite.
+    """
+    buffer: Any = getattr(algorithm, "replay_buffer", None)
+    found = {name: arrays.get(name, np.empty(0)) for name in (*_REPLAYED, "pos", "full")}
+    pos, full = found["pos"], found["full"]
+    fits = (
+        buffer is not None and pos.shape == full.shape == () and pos.dtype.kind == "i" and full.dtype == bool
+    )
+    count = 0
+    if fits:
+        count = buffer.buffer_size if full else int(pos)
+        fits = 0 <= int(pos) < buffer.buffer_size
+        for name in _REPLAYED:
+            own, given = getattr(buffer, name), found[name]
+            fits = fits and given.dtype == own.dtype and given.shape == (count, *own.shape[1:])
+            fits = fits and bool(np.isfinite(given).all())
+    if not fits:
+        raise ArgumentError(f"{shown(source, 300)} is not the replay buffer of this run")
     for name in _REPLAYED:
-        getattr(buffer, name)[: len(arrays[name])] = arrays[name]
-    buffer.pos, buffer.full = int(arrays["pos"]), bool(arrays["full"])
+        getattr(buffer, name)[:count] = found[name]
+    buffer.pos, buffer.full = int(pos), bool(full)
 
 
 def log_to(algorithm: Any, folder: str) -> None:

@@ -7,7 +7,7 @@ import json
 import os
 import warnings
 import zipfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +19,16 @@ from dynx.errors import ArgumentError, shown
 from dynx.files.documents import convert_document, json_text, to_json_values
 from dynx.files.reading import irregularity
 from dynx.files.writing import atomic_file
+from dynx.model.numbers import whole_number
 from dynx.training.environments import CLIPPED_AT, make
+from dynx.training.file_tasks import task_of_file
 from dynx.training.library import (
     DummyVecEnv,
     VecNormalize,
     action_of,
     new_algorithm,
     read_weights,
+    weights_of_file,
     write_weights,
 )
 from dynx.training.specification import PolicyDocument, TaskSpec, TrainingSpec
@@ -116,7 +119,7 @@ class Policy:
 
 
 def read_policy_document(path: str | os.PathLike[str]) -> PolicyDocument:
-    """Read what a file of a policy says about itself.
+    """Read what a file of a policy says about itself, which may be anything: `task_of_file` checks its task.
 
     Raises ArgumentError for a file that is no policy of dynx.
     """
@@ -137,7 +140,9 @@ def read_policy_document(path: str | os.PathLike[str]) -> PolicyDocument:
             raise
         raise ArgumentError(f"{where} is damaged, or no policy: {' '.join(str(error).split())}") from error
     try:
-        return convert_document(document, PolicyDocument)
+        found = convert_document(document, PolicyDocument)
+        whole_number("steps_done", found.steps_done, 0)
+        return found
     except ArgumentError as error:
         raise ArgumentError(f"{where}: {error}") from error
 
@@ -145,19 +150,26 @@ def read_policy_document(path: str | os.PathLike[str]) -> PolicyDocument:
 def load_policy(path: str | os.PathLike[str], task: TaskSpec | None = None) -> Policy:
     """Load a policy, for the task that it was trained on or for `task`, such as the same on another engine.
 
-    Only tensors and JSON are read from the file, so that it runs no code. Raises ArgumentError for a file
-    that is no policy, is damaged, or has a policy for other observations or actions.
+    Only tensors and JSON are read from the file, so that it runs no code and opens no other file: it names a
+    registered task, with options that are numbers, words and robots. A task of your own, an id
+    ``module:Env-v0`` and options that name a file are given as `task`, which is also the task of the policy
+    then. Raises ArgumentError for a file that is no policy, is damaged, or has a policy for other
+    observations or actions.
     """
     document = read_policy_document(path)
-    spec = document.spec
+    spec = _spec_of(document, task, os.fspath(path))
     vector = DummyVecEnv([lambda: make(task or spec.task)])
     try:
-        with warnings.catch_warnings():
-            # Warnings about the number of environments concern training.
-            warnings.simplefilter("ignore", UserWarning)
-            algorithm = new_algorithm(spec.algorithm, vector, spec.hyperparameters, None)
         with open(path, "rb") as file:
+            with warnings.catch_warnings():
+                # Warnings about the number of environments concern training.
+                warnings.simplefilter("ignore", UserWarning)
+                most = weights_of_file(file)
+                algorithm = new_algorithm(
+                    spec.algorithm, vector, spec.hyperparameters, None, most_weights=most
+                )
             read_weights(algorithm, file, os.fspath(path))
+        scaling = scaling_of(document, vector.observation_space.shape, os.fspath(path))
     except ArgumentError as error:
         if task is None or task.id == spec.task.id:
             raise
@@ -167,16 +179,41 @@ def load_policy(path: str | os.PathLike[str], task: TaskSpec | None = None) -> P
         ) from error
     finally:
         vector.close()
-    return Policy(algorithm, spec, document.steps_done, scaling_of(document))
+    return Policy(algorithm, spec, document.steps_done, scaling)
 
 
-def scaling_of(document: PolicyDocument) -> Scaling | None:
-    """Return the scaling that a policy was trained with."""
-    if document.observation_mean is None or document.observation_variance is None:
+def _spec_of(document: PolicyDocument, task: TaskSpec | None, source: str) -> TrainingSpec:
+    """Return what a policy was trained with; the task is the caller's where a file may not name it."""
+    try:
+        return replace(document.spec, task=task_of_file(document.spec.task, source))
+    except ArgumentError:
+        if task is None:
+            raise
+        return replace(document.spec, task=task)
+
+
+def scaling_of(document: PolicyDocument, shape: tuple[int, ...] | None, source: str) -> Scaling | None:
+    """Return the scaling that a policy was trained with, for observations of a shape.
+
+    Raises ArgumentError for numbers of another shape, that are not finite, and for negative variances.
+    """
+    if document.observation_mean is None and document.observation_variance is None:
         return None
-    return Scaling(
-        np.array(document.observation_mean),
-        np.array(document.observation_variance),
+    scaling = Scaling(
+        np.array(document.observation_mean, dtype=np.float64),
+        np.array(document.observation_variance, dtype=np.float64),
         1.0 if document.return_variance is None else document.return_variance,
         1.0 if document.samples is None else document.samples,
     )
+    where = shown(source, 300)
+    for name, array in (("observation_mean", scaling.mean), ("observation_variance", scaling.variance)):
+        if array.shape != shape:
+            raise ArgumentError(f"{where}: {name} has shape {array.shape}; wanted {shape}")
+    numbers = np.concatenate([scaling.mean, scaling.variance, [scaling.return_variance, scaling.samples]])
+    if not np.isfinite(numbers).all():
+        raise ArgumentError(
+            f"{where}: the scaling of observations and returns has a number that is not finite"
+        )
+    if (scaling.variance < 0.0).any() or scaling.return_variance < 0.0 or scaling.samples <= 0.0:
+        raise ArgumentError(f"{where}: a variance is negative, or the number of samples is not above 0")
+    return scaling

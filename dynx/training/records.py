@@ -10,6 +10,7 @@ from typing import Any
 
 from dynx.errors import ArgumentError, shown
 from dynx.files.documents import to_json_values
+from dynx.files.reading import read_file
 from dynx.files.writing import write_text
 
 
@@ -37,14 +38,18 @@ class Lines:
 
 
 def read_lines(path: Path) -> list[dict[str, Any]]:
-    """Return the documents of a file of JSON lines; none if there is no file."""
-    found = []
-    with contextlib.suppress(FileNotFoundError):
-        for line in path.read_text("ascii", errors="replace").splitlines():
-            with contextlib.suppress(ValueError):
-                document = json.loads(line)
-                if isinstance(document, dict) and isinstance(document.get("steps"), int):
-                    found.append(document)
+    """Return the documents of a file of JSON lines; none if there is no file.
+
+    Raises DescriptionError for a device, a FIFO, and a file that is too large.
+    """
+    found: list[dict[str, Any]] = []
+    if not path.exists():
+        return found
+    for line in read_file(str(path)).decode("ascii", "replace").splitlines():
+        with contextlib.suppress(ValueError, RecursionError):
+            document = json.loads(line)
+            if isinstance(document, dict) and type(document.get("steps")) is int:
+                found.append(document)
     return found
 
 

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dynx._version import __version__
-from dynx.errors import ArgumentError, shown
+from dynx.errors import ArgumentError, DescriptionError, RobotNotFoundError, shown
 from dynx.files.documents import json_text
+from dynx.files.reading import read_file
 from dynx.files.writing import write_text
 from dynx.training.checkpoints import Checkpoints
 from dynx.training.environments import make, make_vector
@@ -82,14 +83,17 @@ def train(
 
 
 def read_run(folder: str | os.PathLike[str]) -> TrainingSpec:
-    """Read what a folder was trained with. Raises ArgumentError for a folder without a run."""
+    """Read what a folder was trained with, which may be anything: it is compared, and nothing is made of it.
+
+    Raises ArgumentError for a folder without a run.
+    """
     path = Path(folder) / RUN
     try:
-        document = json.loads(path.read_text("ascii"))
+        document = json.loads(read_file(str(path)))
         spec: object = document["spec"]
-    except FileNotFoundError:
+    except RobotNotFoundError:
         raise ArgumentError(f"{shown(folder, 300)} has no training run: there is no {RUN} in it") from None
-    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+    except (DescriptionError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise ArgumentError(f"{shown(path, 300)} cannot be read: {error}") from error
     return read_spec(spec, str(path))
 
@@ -104,6 +108,11 @@ def _check_folder(place: Path, spec: TrainingSpec, resume: bool) -> None:
         raise ArgumentError(
             f"{shown(place, 300)} has a training run already; resume it (--resume) or name another folder"
         )
+    linked = next(
+        (each for each in (*place.glob("*"), *place.glob("checkpoints/*")) if each.is_symlink()), None
+    )
+    if linked is not None:
+        raise ArgumentError(f"{shown(linked, 300)} is a link, through which the run would write; remove it")
     difference = spec.obstacle_to_continuing(read_run(place))
     if difference is not None:
         raise ArgumentError(f"{shown(place, 300)} has another run: {difference}")

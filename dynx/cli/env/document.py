@@ -143,14 +143,17 @@ def policy_entry(path: str, engines: Sequence[str], options: dict[str, Any], epi
     """Judge a policy on each engine."""
     # Imports PyTorch.
     from dynx.training import TaskSpec, load_policy
+    from dynx.training.file_tasks import task_of_file
     from dynx.training.judging import judge
+    from dynx.training.policy import read_policy_document
 
     rows: list[ReturnEntry] = []
     trained_on = None
     for engine in engines:
-        policy = load_policy(path)
-        trained_on = policy.spec.task.engine
-        task = TaskSpec(policy.spec.task.id, engine, {**policy.spec.task.options, **options})
+        task = task_of_file(read_policy_document(path).spec.task, path, options)
+        trained_on = task.engine
+        task = TaskSpec(task.id, engine, task.options)
+        policy = load_policy(path, task)
         found = judge(policy, task, episodes)
         low, high = found.interval
         rows.append(

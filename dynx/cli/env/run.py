@@ -16,7 +16,7 @@ from dynx.envs.distance import Act, engine_distance
 from dynx.envs.ids import is_of_dynx, task_id
 from dynx.envs.library import make_env, registry
 from dynx.envs.registration import task_class
-from dynx.errors import ArgumentError
+from dynx.errors import ArgumentError, shown
 
 
 def distance(
@@ -72,11 +72,14 @@ def _first_policy(policies: tuple[str, ...], env_id: str, engine: str) -> Act | 
         return None
     # Imports PyTorch.
     from dynx.training import TaskSpec, load_policy
+    from dynx.training.policy import read_policy_document
 
-    found = [load_policy(path, TaskSpec(env_id, engine)) for path in policies]
-    for each, path in zip(found, policies, strict=True):
-        if each.spec.task.id != env_id:
-            raise ArgumentError(f"{path} is a policy for {each.spec.task.id}, not for {env_id}")
+    found = []
+    for path in policies:
+        trained_on = read_policy_document(path).spec.task.id
+        if trained_on != env_id:
+            raise ArgumentError(f"{path} is a policy for {shown(trained_on)}, not for {env_id}")
+        found.append(load_policy(path, TaskSpec(env_id, engine)))
     return found[0]
 
 

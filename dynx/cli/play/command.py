@@ -19,6 +19,13 @@ from dynx.cli.shell.options import GroupedCommand, group, json_option, name_list
         metavar="A,B,C",
         help="Engines on which the policy is judged (default: that of its training).",
     ),
+    click.option(
+        "--task",
+        "own_task",
+        metavar="ID",
+        help="Task instead of the one that the file names, such as one of your own: module:Env-v0, whose "
+        "module is imported.",
+    ),
     task_options,
     click.option(
         "--episodes",
@@ -47,7 +54,8 @@ from dynx.cli.shell.options import GroupedCommand, group, json_option, name_list
 def play() -> None:
     """Judge a policy that `dynx train` wrote, show it in the browser, or film it.
 
-    FILE is final.zip or best.zip of a run. Only numbers are read from it, so that it runs no code.
+    FILE is final.zip or best.zip of a run. Only numbers are read from it, so that it runs no code: it names a
+    registered task. A task of your own, and options that name a file, are given by you.
     On several engines, each episode begins alike: the table tells what the policy is worth where it was not
     trained.
 

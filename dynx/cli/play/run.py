@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import closing, suppress
-from dataclasses import replace
 from itertools import count
 from typing import Any
 
@@ -18,9 +17,10 @@ from dynx.cli.shell.options import json_value
 from dynx.cli.shell.output_file import check_json, check_writable
 from dynx.cli.shell.progress import progress_bar
 from dynx.cli.shell.terminal import console, present
-from dynx.envs.ids import is_of_dynx
+from dynx.envs.ids import is_of_dynx, task_id
 from dynx.errors import ArgumentError
 from dynx.training import Evaluation, Policy, TaskSpec, judge, load_policy, make
+from dynx.training.file_tasks import task_of_file
 from dynx.training.policy import read_policy_document
 from dynx.viewer.export.gif import write_gif
 
@@ -32,6 +32,7 @@ PICTURES_PER_SECOND = 25.0
 
 def play(
     policy: str,
+    own_task: str | None,
     engines: tuple[str, ...] | None,
     options: Sequence[tuple[str, str]],
     episodes: int | None,
@@ -49,7 +50,7 @@ def play(
     shown_only = "--view" if view else "--export"
     if (view or export_path is not None) and (json_path is not None or len(engines or ()) > 1):
         raise ArgumentError(f"{shown_only} shows episodes of one engine; --json and more engines judge them")
-    task = _task_of(policy, options)
+    task = _task_of(policy, options, own_task)
     if engines is not None and not is_of_dynx(task.id):
         raise ArgumentError(f"--engine chooses the engine of a task of dynx; {task.id} has its own")
     first = task.on(engines[0] if engines else None)
@@ -82,10 +83,11 @@ def play(
     return DONE
 
 
-def _task_of(policy: str, options: Sequence[tuple[str, str]]) -> TaskSpec:
+def _task_of(policy: str, options: Sequence[tuple[str, str]], own_task: str | None) -> TaskSpec:
+    """Return the task of a policy with the options and the name that the command gives."""
     task = read_policy_document(policy).spec.task
     given = {name: json_value(word) for name, word in options}
-    return replace(task, options={**task.options, **given})
+    return task_of_file(task, policy, given, None if own_task is None else task_id(own_task))
 
 
 def _show(policy: Policy, task: TaskSpec, episodes: int | None, seed: int, deterministic: bool) -> int:

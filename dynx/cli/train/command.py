@@ -116,7 +116,8 @@ def train() -> None:
     """Train a policy on a task by reinforcement learning, and judge it.
 
     TASK is a task of dynx (`dynx env list`), such as CartPole, or the id of any registered task of Gymnasium,
-    such as LunarLander-v3. Training needs the extra train.
+    such as LunarLander-v3, or a task of your own as module:Env-v0, whose module is imported. Training needs
+    the extra train.
 
     The folder of a run gets checkpoints, evaluations (evaluations.jsonl), the mean return of the last hundred
     episodes (curve.jsonl), and the policies best.zip and final.zip, which `dynx play` shows and
