@@ -12,7 +12,7 @@ coefficient, or the error is unexplained::
         print(result.case, result.trial, result.figure, result.errors, result.verdict.kind)
 
 A case is a module in `dynx.contacts.cases` with a subclass of `Case`, and a line in
-`dynx.contacts.registry.BUILT_IN`; a package offers its cases by entry points in the group
+`dynx.contacts.case.BUILT_IN`; a package offers its cases by entry points in the group
 ``dynx.contact_cases``. Its `trials` are independent scenes, which `measure` steps in a world of any engine,
 with the help of `dynx.contacts.motion`. A case names no engine and contains no verdict. It states for each
 figure the tolerance below which an error counts as none, and in `Figure.rests_on` the coefficients without
@@ -25,11 +25,10 @@ error, which then falls with the step.
 """
 
 from dynx.contacts.candidates import CANDIDATES, Candidate
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import Case, Figure, case_names, find_case, find_cases
+from dynx.contacts.case import register as register_case
+from dynx.contacts.case import unregister as unregister_case
 from dynx.contacts.conformance import STEPS, Conformance, FigureResult, NoResult, conform
-from dynx.contacts.registry import case_names, find_case, find_cases
-from dynx.contacts.registry import register as register_case
-from dynx.contacts.registry import unregister as unregister_case
 from dynx.contacts.verdict import VERDICTS, Attribution, Outcome, Price, Verdict, VerdictKind
 
 __all__ = [

@@ -2,9 +2,9 @@
 
 An error is attributed to the first candidate that at least halves it at the smallest step, makes it larger
 at no step, and under which it is within the tolerance or falls with the step, or in proportion to which it
-falls, as `dynx.contacts.trend` judges. Where the error is within the tolerance at the smallest step, the step
-of the largest error counts. Of several settings changed together, those are left out again without which the
-change does the same. The price of a change is measured by running the whole case with it.
+falls, as `dynx.contacts.series` judges. Where the error is within the tolerance at the smallest step, the
+step of the largest error counts. Of several settings changed together, those are left out again without
+which the change does the same. The price of a change is measured by running the whole case with it.
 
 Runs that cannot matter are left out: a change is run at all steps only if it reduces the error at that step,
 and further values of a candidate only if the one before changes the error and is not its cause.
@@ -12,18 +12,81 @@ and further values of a candidate only if the one before changes the error and i
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
 from dynx.contacts.candidates import SUBSTEPS, Candidate
-from dynx.contacts.reruns import Change, Reruns
-from dynx.contacts.runner import Runner
-from dynx.contacts.series import Series
-from dynx.contacts.trend import judge
-from dynx.contacts.verdict import Attribution, Outcome, Verdict
+from dynx.contacts.run import Measured, Runner, Unmeasured
+from dynx.contacts.series import FigureSeries, TrialOfEngine, judge
+from dynx.contacts.verdict import Attribution, Outcome, Price, Verdict
 from dynx.steppers.registry import world_class
+
+Change = Mapping[str, Any]
+"""Settings that are changed together, with their new values."""
+
+Rerun = tuple[TrialOfEngine, Change, Sequence[float]]
+"""A trial, the settings that are changed in it, and the steps [s] at which it is run again."""
+
+WORSE = 2.0
+"""Factor from which on an error that a change increases is part of its price."""
+
+
+class Reruns:
+    """Errors of trials under changes of settings, from runs that are kept."""
+
+    def __init__(self, settings: Mapping[str, Mapping[str, Any]], runner: Runner) -> None:
+        self._settings = settings
+        self._runner = runner
+        self._outcomes: dict[tuple[TrialOfEngine, str, float], Measured | Unmeasured | None] = {}
+
+    def carry_out(self, wanted: Iterable[Rerun]) -> None:
+        """Carry out what has not been run yet, all together."""
+        missing = {
+            (trial, _key(change), dt): trial.run(dt, {**self._settings[trial.engine], **change})
+            for trial, change, steps in wanted
+            for dt in steps
+            if (trial, _key(change), dt) not in self._outcomes
+        }
+        self._outcomes.update(zip(missing, self._runner.run([*missing.values()]), strict=True))
+
+    def errors(
+        self, trial: TrialOfEngine, change: Change, steps: Sequence[float], figure: str
+    ) -> tuple[float, ...] | None:
+        """Return the errors of a figure at steps that were carried out; None where a run has no figures."""
+        found: list[float] = []
+        for dt in steps:
+            outcome = self._outcomes.get((trial, _key(change), dt))
+            if not isinstance(outcome, Measured):
+                return None
+            found += [each.error for each in outcome.figures if each.name == figure]
+        return tuple(found) if len(found) == len(steps) else None
+
+    def price(
+        self, series: Sequence[FigureSeries], cause: FigureSeries, change: Change, dt: float
+    ) -> tuple[Price, ...]:
+        """Return the other errors in the case of `cause` that a change makes worse at the smallest step."""
+        found = []
+        for each in series:
+            if each is cause:
+                continue
+            after = self.errors(each.trial, change, (dt,), each.name)
+            if after is None:
+                outcome = self._outcomes.get((each.trial, _key(change), dt))
+                if not isinstance(outcome, Unmeasured):
+                    continue
+                after = (math.inf,)
+            before = each.errors[-1]
+            if not after[0] <= max(WORSE * before, each.tolerance):
+                found.append(Price(each.trial.trial, each.name, before, after[0]))
+        return tuple(found)
+
+
+def _key(change: Change) -> str:
+    return repr(sorted(change.items()))
+
 
 LEAST_GAIN = 2.0
 """Factor by which a change has to reduce the error at the smallest step to be its cause."""
@@ -45,14 +108,16 @@ class Attributor:
         self._runner = runner
         self._reruns = Reruns(settings, runner)
 
-    def attribute(self, open_series: Sequence[Series], series: Sequence[Series]) -> dict[Series, Verdict]:
+    def attribute(
+        self, open_series: Sequence[FigureSeries], series: Sequence[FigureSeries]
+    ) -> dict[FigureSeries, Verdict]:
         """Return the verdict on every open series: a setting that is its cause, or none.
 
         `series` are all that were measured, in which the price of a change is looked for. Series are left out
         where the runner was interrupted before a cause was found.
         """
         left = list(open_series)
-        causes: dict[Series, Attribution] = {}
+        causes: dict[FigureSeries, Attribution] = {}
         for number in range(max(map(len, self._candidates.values()), default=0)):
             tried = {
                 each: self._candidates[each.trial.engine][number]
@@ -67,9 +132,9 @@ class Attributor:
             {} if self._runner.interrupted else {each: Verdict("unexplained") for each in left}
         )
 
-    def _round(self, tried: Mapping[Series, Candidate]) -> dict[Series, Attribution]:
+    def _round(self, tried: Mapping[FigureSeries, Candidate]) -> dict[FigureSeries, Attribution]:
         """Return the causes among one candidate for each series."""
-        causes: dict[Series, Attribution] = {}
+        causes: dict[FigureSeries, Attribution] = {}
         left = dict(tried)
         for place in range(max((len(each.changes) for each in tried.values()), default=0)):
             changes = {
@@ -88,8 +153,8 @@ class Attributor:
         return causes | {each: cause for each, cause in in_proportion.items() if cause is not None}
 
     def _causes(
-        self, changes: Mapping[Series, Change], reasons: Mapping[Series, str]
-    ) -> dict[Series, Attribution]:
+        self, changes: Mapping[FigureSeries, Change], reasons: Mapping[FigureSeries, str]
+    ) -> dict[FigureSeries, Attribution]:
         """Return the causes among one change for each series, which is run at the decisive step first."""
         self._reruns.carry_out((each.trial, change, self._decisive(each)) for each, change in changes.items())
         helpful = {each: change for each, change in changes.items() if self._may_help(each, change)}
@@ -97,21 +162,21 @@ class Attributor:
         found = {each: self._caused(each, change, reasons[each]) for each, change in helpful.items()}
         return {each: cause for each, cause in found.items() if cause is not None}
 
-    def _may_help(self, series: Series, change: Change) -> bool:
+    def _may_help(self, series: FigureSeries, change: Change) -> bool:
         """Check whether a change reduces an error at the decisive step as far as a cause has to."""
         errors = self._reruns.errors(series.trial, change, self._decisive(series), series.name)
         return errors is not None and errors[0] * LEAST_GAIN <= series.errors[series.decisive]
 
-    def _has_no_effect(self, series: Series, change: Change) -> bool:
+    def _has_no_effect(self, series: FigureSeries, change: Change) -> bool:
         """Check whether a change leaves an error as it is, to the last digit."""
         errors = self._reruns.errors(series.trial, change, self._decisive(series), series.name)
         return errors == (series.errors[series.decisive],)
 
-    def _decisive(self, series: Series) -> Sequence[float]:
+    def _decisive(self, series: FigureSeries) -> Sequence[float]:
         """Return the step at which a cause has to reduce an error."""
         return (self._steps[series.decisive],)
 
-    def _caused(self, series: Series, change: Change, reason: str) -> Attribution | None:
+    def _caused(self, series: FigureSeries, change: Change, reason: str) -> Attribution | None:
         """Return a change as the cause of an error that it removes or makes fall with the step, or None."""
         errors = self._reruns.errors(series.trial, change, self._steps, series.name)
         at = series.decisive
@@ -124,10 +189,10 @@ class Attributor:
         acting = self._acting(series, change)
         return Attribution(acting, reason, (series.errors, errors), outcome, trend.order)
 
-    def _reduced(self, causes: dict[Series, Attribution]) -> dict[Series, Attribution]:
+    def _reduced(self, causes: dict[FigureSeries, Attribution]) -> dict[FigureSeries, Attribution]:
         """Return the causes without the settings whose change does nothing."""
         for place in range(max((len(each.values) for each in causes.values()), default=0)):
-            fewer: dict[Series, dict[str, Any]] = {}
+            fewer: dict[FigureSeries, dict[str, Any]] = {}
             for each, cause in causes.items():
                 if cause.outcome == "proportion" or len(cause.values) < 2:
                     continue
@@ -144,7 +209,7 @@ class Attributor:
                     causes = causes | {each: alone}
         return causes
 
-    def _along(self, series: Series, candidate: Candidate) -> float | None:
+    def _along(self, series: FigureSeries, candidate: Candidate) -> float | None:
         """Return the order at which an error at the smallest step falls along the values of the first setting
         of a candidate, if that is numeric, or None."""
         last = self._steps[-1:]
@@ -163,7 +228,7 @@ class Attributor:
             return None
         return judge(sizes, found, series.tolerance).order
 
-    def _proportion(self, series: Series, candidate: Candidate) -> Attribution | None:
+    def _proportion(self, series: FigureSeries, candidate: Candidate) -> Attribution | None:
         """Return the candidate as the cause of an error that falls in proportion to it, or None."""
         order = self._along(series, candidate)
         rows = [
@@ -178,10 +243,10 @@ class Attributor:
         return Attribution(acting, candidate.reason, (series.errors, *errors), "proportion", order)
 
     def _priced(
-        self, causes: Mapping[Series, Attribution], series: Sequence[Series]
-    ) -> dict[Series, Attribution]:
+        self, causes: Mapping[FigureSeries, Attribution], series: Sequence[FigureSeries]
+    ) -> dict[FigureSeries, Attribution]:
         """Return the causes with their price: the errors in the same case that they make worse."""
-        around: dict[tuple[str, str], list[Series]] = {}
+        around: dict[tuple[str, str], list[FigureSeries]] = {}
         for each in series:
             around.setdefault((each.trial.engine, each.trial.case.name), []).append(each)
         changes = {
@@ -196,12 +261,12 @@ class Attributor:
             for each, cause in causes.items()
         }
 
-    def _acting(self, series: Series, change: Change) -> dict[str, tuple[Any, Any]]:
+    def _acting(self, series: FigureSeries, change: Change) -> dict[str, tuple[Any, Any]]:
         """Return the settings that a change gives another value, each with both values."""
         used = self._in_use(series, change)
         return {name: (used[name], value) for name, value in change.items() if used[name] != value}
 
-    def _in_use(self, series: Series, names: Mapping[str, Any]) -> dict[str, Any]:
+    def _in_use(self, series: FigureSeries, names: Mapping[str, Any]) -> dict[str, Any]:
         """Return the values of settings before a change."""
         known = world_class(series.trial.engine).settings
         defaults = {name: setting.default for name, setting in known.items()} | {SUBSTEPS: 1}
@@ -209,14 +274,14 @@ class Attributor:
         return {name: given.get(name, defaults[name]) for name in names}
 
 
-def _larger(series: Series, errors: Sequence[float]) -> bool:
+def _larger(series: FigureSeries, errors: Sequence[float]) -> bool:
     """Check whether an error is larger at some step than before, beyond the tolerance."""
     return any(
         not after <= before + series.tolerance for before, after in zip(series.errors, errors, strict=True)
     )
 
 
-def _as_good(series: Series, fewer: Attribution, cause: Attribution) -> bool:
+def _as_good(series: FigureSeries, fewer: Attribution, cause: Attribution) -> bool:
     """Check whether a change of fewer settings leaves no more of an error than the cause does."""
     return fewer.outcome == cause.outcome and all(
         one <= max(LEAST_GAIN * both, series.tolerance)

@@ -13,7 +13,7 @@ from dynx.world import World, WorldState
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class RecordedMotion:
     """States of a world after every step, the first of them before the first step."""
 
     times: Floats
@@ -33,14 +33,14 @@ class Motion:
         return np.array([state.bodies[body].twist for state in self.states])
 
 
-def record(world: World, duration: float, **loads: Any) -> Motion:
+def record(world: World, duration: float, **loads: Any) -> RecordedMotion:
     """Take steps for `duration` [s], during which `loads` act (arguments of `World.step`); return the
     motion."""
     states = [world.state]
     for _ in range(step_count(world, duration)):
         world.step(**loads)
         states.append(world.state)
-    return Motion(np.array([state.time for state in states]), tuple(states))
+    return RecordedMotion(np.array([state.time for state in states]), tuple(states))
 
 
 def step_count(world: World, duration: float) -> int:

@@ -1,11 +1,11 @@
-"""One run: a trial of a case in one engine at one step, in a worker process."""
+"""Runs: a trial of a case in one engine at one step, and the worker processes that carry them out."""
 
 from __future__ import annotations
 
 import math
 import sys
 import traceback
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -21,11 +21,12 @@ from dynx.errors import (
 )
 from dynx.steppers.registry import register, world_names
 from dynx.steppers.stepper import Stepper
+from dynx.workers import Outcome, Workers
 from dynx.world import World
 
 
 @dataclass(frozen=True)
-class Run:
+class CaseRun:
     """A trial of a case in one engine at the step `dt` [s], with settings that differ from the defaults."""
 
     engine: str
@@ -56,7 +57,7 @@ class Unmeasured:
     message: str
 
 
-def carry_out(run: Run) -> Measured | Unmeasured:
+def carry_out(run: CaseRun) -> Measured | Unmeasured:
     """Open the world of a run, and measure."""
     if run.kind is not None and run.engine not in world_names():
         kind = run.kind
@@ -107,3 +108,61 @@ def line_in_case(case: Case, error: BaseException) -> str | None:
         if frame.filename == getattr(module, "__file__", None)
     ]
     return lines[-1] if lines else None
+
+
+class Runner:
+    """Worker processes that carry out runs, or this process where `jobs` is 0; leaving the context ends them.
+
+    With `interruptible`, KeyboardInterrupt ends the runs and is not raised again.
+    """
+
+    def __init__(
+        self,
+        jobs: int,
+        timeout: float | None,
+        progress: Callable[[int, int], object] | None,
+        *,
+        interruptible: bool = False,
+    ) -> None:
+        self._workers = Workers(carry_out, jobs, timeout) if jobs else None
+        self._progress = progress
+        self._interruptible = interruptible
+        self.interrupted = False
+        """True once KeyboardInterrupt has ended the runs."""
+        self.done = 0
+        """Number of runs that have been carried out."""
+
+    def __enter__(self) -> Runner:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._workers is not None:
+            self._workers.close()
+
+    def run(self, runs: Sequence[CaseRun]) -> list[Measured | Unmeasured | None]:
+        """Carry out all runs and return their outcomes in the order of the runs; None for a run left out."""
+        outcomes: list[Measured | Unmeasured | None] = [None] * len(runs)
+        try:
+            if not self.interrupted:
+                self._carry_out(runs, outcomes)
+        except KeyboardInterrupt:
+            if not self._interruptible:
+                raise
+            self.interrupted = True
+        return outcomes
+
+    def _carry_out(self, runs: Sequence[CaseRun], outcomes: list[Measured | Unmeasured | None]) -> None:
+        total = self.done + len(runs)
+        for outcome in self._outcomes(runs):
+            if outcome.failure is not None:
+                outcomes[outcome.index] = Unmeasured(outcome.failure.kind, outcome.failure.message)
+            else:
+                outcomes[outcome.index] = outcome.value
+            self.done += 1
+            if self._progress is not None:
+                self._progress(self.done, total)
+
+    def _outcomes(self, runs: Sequence[CaseRun]) -> Iterator[Outcome]:
+        if self._workers is not None:
+            return self._workers.run(runs)
+        return (Outcome(number, carry_out(run)) for number, run in enumerate(runs))

@@ -1,13 +1,17 @@
-"""Series of one figure over the steps, collected from the runs of a trial."""
+"""Series of one figure over the steps, collected from the runs of a trial, and the trend of its errors."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from itertools import pairwise
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
 
 from dynx.contacts.case import Case, Figure
-from dynx.contacts.run import Measured, Run, Unmeasured
+from dynx.contacts.run import CaseRun, Measured, Unmeasured
 from dynx.errors import ArgumentError, shown
 from dynx.steppers.registry import world_class
 
@@ -19,13 +23,13 @@ class TrialOfEngine(NamedTuple):
     case: Case
     trial: str
 
-    def run(self, dt: float, settings: Mapping[str, Any]) -> Run:
+    def run(self, dt: float, settings: Mapping[str, Any]) -> CaseRun:
         """Return the run of the trial at a step, with these settings of the engine."""
-        return Run(self.engine, self.case, self.trial, dt, settings, world_class(self.engine))
+        return CaseRun(self.engine, self.case, self.trial, dt, settings, world_class(self.engine))
 
 
 @dataclass(frozen=True, eq=False)
-class Series:
+class FigureSeries:
     """One figure of a trial at every step, largest first."""
 
     trial: TrialOfEngine
@@ -57,7 +61,7 @@ class Series:
         return last if not errors[last] <= self.tolerance else errors.index(max(errors))
 
 
-def collect(trial: TrialOfEngine, outcomes: Sequence[Measured | Unmeasured | None]) -> list[Series]:
+def collect(trial: TrialOfEngine, outcomes: Sequence[Measured | Unmeasured | None]) -> list[FigureSeries]:
     """Return the series of every figure of a trial; none where a run of it has no figures."""
     measured = [outcome for outcome in outcomes if isinstance(outcome, Measured)]
     if len(measured) < len(outcomes):
@@ -75,5 +79,37 @@ def collect(trial: TrialOfEngine, outcomes: Sequence[Measured | Unmeasured | Non
     for number, first in enumerate(measured[0].figures):
         reasons = [lacking[name] for name in first.rests_on if name in lacking]
         figures = tuple(outcome.figures[number] for outcome in measured)
-        series.append(Series(trial, figures, reasons[0] if reasons else None))
+        series.append(FigureSeries(trial, figures, reasons[0] if reasons else None))
     return series
+
+
+MIN_ORDER = 0.5
+"""Least order at which an error counts as falling: half the step leaves at most 71 % of it."""
+
+TrendKind = Literal["within", "falls", "stays"]
+
+
+@dataclass(frozen=True)
+class Trend:
+    """Trend of a series of errors, with the order at which they fall (None unless they do)."""
+
+    kind: TrendKind
+    order: float | None = None
+
+
+def judge(steps: Sequence[float], errors: Sequence[float], tolerance: float) -> Trend:
+    """Return the trend of `errors` at `steps`, largest step first."""
+    if not all(math.isfinite(error) for error in errors):
+        return Trend("stays")
+    counted = [max(error, tolerance) for error in errors]
+    if max(counted) <= tolerance:
+        return Trend("within")
+    if len(counted) < 2:
+        return Trend("stays")
+    logs = [math.log(error) for error in counted]
+    sizes = [math.log(step) for step in steps]
+    for (a, b), (s, t) in zip(pairwise(logs), pairwise(sizes), strict=True):
+        to_tolerance = b == math.log(tolerance)
+        if not to_tolerance and a - b < MIN_ORDER * (s - t):
+            return Trend("stays")
+    return Trend("falls", float(np.polyfit(sizes, logs, 1)[0]))

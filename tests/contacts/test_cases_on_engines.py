@@ -8,7 +8,7 @@ from importlib import import_module
 import pytest
 
 from dynx.contacts import case_names, find_case
-from dynx.contacts.run import Measured, Run, carry_out
+from dynx.contacts.run import CaseRun, Measured, carry_out
 from dynx.steppers.registry import installed_worlds
 from dynx.world import Material
 
@@ -25,7 +25,7 @@ IMPACTS = [
 
 
 def measured(engine: str, name: str, trial: str, dt: float, **settings: float) -> Measured:
-    outcome = carry_out(Run(engine, find_case(name), trial, dt, settings))
+    outcome = carry_out(CaseRun(engine, find_case(name), trial, dt, settings))
     assert isinstance(outcome, Measured), outcome
     return outcome
 

@@ -10,7 +10,7 @@ import pytest
 
 from dynx.contacts import Figure, find_case
 from dynx.contacts.cases.stack import BOXES, EDGE
-from dynx.contacts.run import Measured, Run, carry_out
+from dynx.contacts.run import CaseRun, Measured, carry_out
 from dynx.contacts.scenes import G
 from dynx.steppers.registry import installed_worlds
 
@@ -28,7 +28,7 @@ def needs(engine: str) -> pytest.MarkDecorator:
 
 def figures(engine: str, case: str, trial: str, dt: float, settings: Mapping[str, Any]) -> dict[str, Figure]:
     """Return the figures of a run by name."""
-    outcome = carry_out(Run(engine, find_case(case), trial, dt, settings))
+    outcome = carry_out(CaseRun(engine, find_case(case), trial, dt, settings))
     assert isinstance(outcome, Measured), outcome
     return {each.name: each for each in outcome.figures}
 

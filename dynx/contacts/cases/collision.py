@@ -24,7 +24,7 @@ MASSES = {"equal masses": 1.0, "a third of the mass": 1.0 / 3.0, "thrice the mas
 """Masses of the moving ball [kg]."""
 
 
-class Collision(Case):
+class CentralCollision(Case):
     """Balls that meet balls at rest, without gravity and friction."""
 
     name: ClassVar[str] = "collision"

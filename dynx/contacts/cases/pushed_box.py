@@ -23,7 +23,7 @@ TILT = 0.3
 """Angle [rad] at which the angular velocity of a cube that tips is measured."""
 
 
-class Push(NamedTuple):
+class BoxPush(NamedTuple):
     """A horizontal force on a cube, and the friction of cube and ground."""
 
     force: float
@@ -46,19 +46,19 @@ class PushedBox(Case):
     source: ClassVar[str] = (
         "Coulomb's law, balance of moments about the edge, and the theorem of work and energy"
     )
-    trials: ClassVar[dict[str, Push]] = {
-        "stays": Push(4.0, HALF, 0.5),
-        "slides": Push(6.0, HALF, 0.5),
-        "tips": Push(7.0, 2.0 * HALF, 1.0),
+    trials: ClassVar[dict[str, BoxPush]] = {
+        "stays": BoxPush(4.0, HALF, 0.5),
+        "slides": BoxPush(6.0, HALF, 0.5),
+        "tips": BoxPush(7.0, 2.0 * HALF, 1.0),
     }
 
-    def scene(self, parameters: Push) -> Scene:
+    def scene(self, parameters: BoxPush) -> Scene:
         material = Material(friction=parameters.friction)
         size = (2.0 * HALF,) * 3
         body = box("box", size, mass=1.0, pose=Pose((0.0, 0.0, HALF)), material=material)
         return Scene("pushed_box", bodies=(ground(material=material), body))
 
-    def measure(self, world: World, parameters: Push) -> Sequence[Figure]:
+    def measure(self, world: World, parameters: BoxPush) -> Sequence[Figure]:
         push = Wrench("box", (parameters.force, 0.0, 0.0), point=(0.0, 0.0, parameters.height - HALF))
         if parameters.force * parameters.height > G * HALF:
             motion = record(world, DURATION, wrenches=[push])

@@ -10,7 +10,7 @@ import numpy as np
 
 from dynx.contacts.case import Case, Figure
 from dynx.contacts.impacts import farthest
-from dynx.contacts.motion import Motion, record
+from dynx.contacts.motion import RecordedMotion, record
 from dynx.contacts.scenes import G, ball_name, balls_above
 from dynx.world import Material, Scene, World, ground
 
@@ -42,7 +42,7 @@ class Rebound(Case):
         return [Figure("height", farthest(ratios, exact), exact, "", 1.0, rests_on=("restitution",))]
 
 
-def rebound_height(motion: Motion, ball: str) -> float:
+def rebound_height(motion: RecordedMotion, ball: str) -> float:
     """Return the largest height of a ball above the ground after it was lowest first [m]."""
     height = motion.positions(ball)[:, 2] - RADIUS
     rises = np.flatnonzero(np.diff(height) >= 0.0)

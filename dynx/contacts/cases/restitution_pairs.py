@@ -24,7 +24,7 @@ DURATION = 0.25
 """Time [s] by which every ball has met the slab."""
 
 
-class Pair(NamedTuple):
+class RestitutionPair(NamedTuple):
     """Restitution of the slab and of the balls."""
 
     slab: float
@@ -42,11 +42,12 @@ class RestitutionPairs(Case):
     source: ClassVar[str] = (
         "Newton's law of restitution, with dynx's rule for two materials: the geometric mean"
     )
-    trials: ClassVar[dict[str, Pair]] = {
-        f"{a:g} and {b:g}": Pair(a, b) for a, b in combinations_with_replacement((0.0, 0.25, 0.5, 1.0), 2)
+    trials: ClassVar[dict[str, RestitutionPair]] = {
+        f"{a:g} and {b:g}": RestitutionPair(a, b)
+        for a, b in combinations_with_replacement((0.0, 0.25, 0.5, 1.0), 2)
     }
 
-    def scene(self, parameters: Pair) -> Scene:
+    def scene(self, parameters: RestitutionPair) -> Scene:
         slab = Material(friction=0.0, restitution=parameters.slab)
         ball = Material(friction=0.0, restitution=parameters.ball)
         twist = (0.0, 0.0, -SPEED, 0.0, 0.0, 0.0)
@@ -54,7 +55,7 @@ class RestitutionPairs(Case):
         ground = box("slab", (2.0, 1.0, 0.2), pose=Pose((0.4, 0.0, -0.1)), material=slab)
         return Scene("restitution_pairs", bodies=(ground, *balls), gravity=(0.0, 0.0, 0.0))
 
-    def measure(self, world: World, parameters: Pair) -> Sequence[Figure]:
+    def measure(self, world: World, parameters: RestitutionPair) -> Sequence[Figure]:
         world.run(DURATION)
         speeds = [float(world.state.bodies[ball_name(k)].twist[2]) / SPEED for k in range(len(HEIGHTS))]
         exact = math.sqrt(parameters.slab * parameters.ball)
