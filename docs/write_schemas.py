@@ -18,7 +18,8 @@ from dynx.cli.compare.document import CompareDocument
 from dynx.cli.contacts.document import ContactsDocument
 from dynx.cli.env.document import EnvDistanceDocument, TasksDocument
 from dynx.cli.play.document import PlayDocument
-from dynx.cli.sim.document_types import SimDocument, TutorialDocument
+from dynx.cli.sim.document import SimDocument
+from dynx.cli.sim.tutorial import TutorialDocument
 from dynx.cli.train.document import TrainDocument
 from dynx.cli.world.document import WorldDocument
 from dynx.doctor.formats.baseline import BaselineDocument

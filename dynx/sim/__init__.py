@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from dynx.sim.record.rollout import Rollout
     from dynx.sim.record.rollout_data import Summary
     from dynx.sim.scenario.scenario import Scenario
-    from dynx.sim.simulation import Simulation
-    from dynx.sim.snapshot import Snapshot, State
+    from dynx.sim.simulation import Simulation, Snapshot, State
 
 _HOME = {
     "BatchInterrupted": "batch.batch",

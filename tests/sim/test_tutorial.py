@@ -18,8 +18,7 @@ from dynx.errors import (
     UnsupportedFeatureError,
 )
 from dynx.model.loading import load
-from dynx.sim.tutorial import BULLET, DYNX, MODES, PLANTS, Row, tutorial
-from dynx.sim.tutorial_plot import LEAST, plot_rows
+from dynx.sim.tutorial import BULLET, DYNX, LEAST, MODES, PLANTS, Row, plot_rows, tutorial
 from tests.oracles.closed_form import MODELS
 from tests.sim.bars import EXACT_ON_BULLET, EXACT_ON_DYNX, PLANTS_AGREE, TRACKING
 

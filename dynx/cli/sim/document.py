@@ -1,8 +1,11 @@
-"""JSON document of one simulation."""
+"""JSON document of one simulation: its keys and types, from which its schema is generated, and its values.
+
+Lengths are in m, angles in rad, torques in N m or N; errors are null without a reference.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal, TypedDict
 
 import numpy as np
 
@@ -14,6 +17,111 @@ from dynx.model.documents import pose_numbers
 from dynx.sim import Noise, Push, Rollout, RolloutInterrupted
 from dynx.sim.record.tracking_error import base_error, frame_error, joint_error
 from dynx.spatial.scalar import Floats
+
+
+class BodyErrorPart(TypedDict):
+    """Norm of a position or rotation error: its maximum, the time of that, and its final value."""
+
+    max: float
+    max_time: float
+    final: float
+
+
+class BodyError(TypedDict):
+    """Error of a floating base or of a frame."""
+
+    position: BodyErrorPart
+    rotation: BodyErrorPart
+
+
+class JointEntry(TypedDict):
+    """Coordinate of v, those of a floating base first; `saturated` is the fraction of steps at the limit."""
+
+    name: str
+    unit: Literal["rad", "m"]
+    max_error: float | None
+    rms_error: float | None
+    final_error: float | None
+    max_speed: float
+    max_torque: float
+    effort_limit: float | None
+    saturated: float
+
+
+class SimulationEnd(TypedDict):
+    """Reason why a simulation ended early, and the state there."""
+
+    type: str
+    message: str
+    time: float
+    step: int
+    q: list[float]
+    v: list[float]
+
+
+class PayloadEntry(TypedDict):
+    """A mass [kg] rigidly connected to a frame, with its center in that frame."""
+
+    frame: str
+    mass: float
+    center: list[float]
+
+
+class FinalState(TypedDict):
+    """Last state of the record."""
+
+    t: float
+    q: list[float]
+    v: list[float]
+
+
+class SimDocument(TypedDict):
+    """One simulation with its options and results; `settings` are the main settings of its scenario."""
+
+    schema: int
+    dynx: str
+    robot: str
+    source: str | None
+    base: str
+    base_pose: list[float]
+    gravity: list[float]
+    nq: int
+    nv: int
+    law: str
+    backend: str | None
+    frame: str | None
+    frame_given: bool
+    motion: dict[str, Any]
+    gains: dict[str, Any]
+    motor_limits: list[float] | None
+    settings: dict[str, Any]
+    payload: list[PayloadEntry]
+    mass_scale: float | dict[str, float]
+    total_mass: float
+    passive: bool
+    status: Literal["done", "diverged", "control failed", "interrupted"]
+    error: SimulationEnd | None
+    overshoot: dict[str, Any] | None
+    dt: float
+    steps: int
+    steps_asked: int
+    simulated: float
+    seconds: float
+    max_error: float | None
+    max_error_joint: str | None
+    max_error_time: float | None
+    rms_error: float | None
+    final_error: float | None
+    energy_change: float
+    energy_drift: float
+    max_kinetic_energy: float
+    saturated: float
+    base_error: BodyError | None
+    frame_error: BodyError | None
+    joints: list[JointEntry]
+    final: FinalState
+    files: list[str]
+
 
 SCHEMA = 1
 

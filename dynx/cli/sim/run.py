@@ -1,25 +1,80 @@
-"""Run of ``dynx sim``: one simulation with progress, then its files, tables and exit code."""
+"""Run of ``dynx sim``: one simulation with progress, and its files (checked before), tables and exit code."""
 
 from __future__ import annotations
 
+import os
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import Any
 
 import click
 
-from dynx.cli.shell.exits import BAD_INPUT, DONE, INTERRUPTED, NEGATIVE_RESULT, complain
+from dynx.cli.shell.exits import BAD_INPUT, DONE, INTERRUPTED, NEGATIVE_RESULT, complain, failure_of
 from dynx.cli.shell.interruption import interruptible
-from dynx.cli.shell.output_file import check_json
+from dynx.cli.shell.output_file import check_json, check_writable
 from dynx.cli.shell.progress import progress_bar
 from dynx.cli.shell.terminal import present
 from dynx.cli.sim.document import EarlyEnd, document
 from dynx.cli.sim.motion import limit_message
-from dynx.cli.sim.outputs import Outputs
 from dynx.cli.sim.request import SimulationRequest, prepare
 from dynx.cli.sim.tables import show
-from dynx.cli.sim.tutorial_run import run_tutorial
-from dynx.errors import ArgumentError, LimitError, SimulationError
+from dynx.cli.sim.tutorial import run_tutorial
+from dynx.errors import ArgumentError, DynxError, LimitError, NotInstalledError, SimulationError, shown
+from dynx.files.figures import picture_format
 from dynx.sim import Rollout, RolloutInterrupted, simulate
+from dynx.sim.record.formats import WRITERS
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Files for the record, each in the format of its suffix, and for the plot (None for none)."""
+
+    save: tuple[str, ...] = ()
+    plot: str | None = None
+
+    @property
+    def files(self) -> list[str]:
+        """All files."""
+        return [*self.save, *([] if self.plot is None else [self.plot])]
+
+    def check(self) -> None:
+        """Raise ArgumentError for a file that cannot be written or has an unknown format.
+
+        NotInstalledError where a format needs a package that is missing.
+        """
+        for path in self.save:
+            check_record(path)
+        for path in self.files:
+            check_writable(path)
+            if self.files.count(path) > 1:
+                raise ArgumentError(f"{shown(path, 300)} would be written twice")
+        if self.plot is not None:
+            picture_format(self.plot)
+
+    def write(self, rollout: Rollout) -> dict[str, DynxError]:
+        """Write all files; return the errors of those that cannot be written, by path."""
+        calls: list[tuple[str, Callable[[str], object]]] = [(path, rollout.save) for path in self.save]
+        if self.plot is not None:
+            calls.append((self.plot, rollout.plot))
+        errors = {path: failure_of(call, path) for path, call in calls}
+        return {path: error for path, error in errors.items() if error is not None}
+
+
+def check_record(path: str) -> None:
+    """Raise ArgumentError for a name without the suffix of a record format.
+
+    NotInstalledError where the format needs a package that is missing.
+    """
+    suffix = os.path.splitext(path)[1].lower()
+    if suffix not in WRITERS:
+        raise ArgumentError(
+            f"--save {shown(path, 300)} has no suffix of a record format; wanted one of {', '.join(WRITERS)}"
+        )
+    if suffix == ".mcap" and find_spec("mcap") is None:
+        raise NotInstalledError("--save with .mcap needs mcap: pip install 'dynx[mcap]'")
+
 
 TUTORIAL_OPTIONS = {
     *("tutorial", "robot", "lock", "gravity", "to", "start", "duration", "dt", "backend"),

@@ -1,4 +1,4 @@
-"""Rollouts as tables of text, for spreadsheets and programs without NumPy's formats.
+"""Rollouts as tables of text, written and read, for spreadsheets and programs without NumPy's formats.
 
 The first line names the columns, in this order; ``c`` stands for each coordinate:
 
@@ -20,11 +20,19 @@ same float64. Text is UTF-8, and a name with a comma or a quote in it stands in 
 
 from __future__ import annotations
 
-from typing import BinaryIO
+import csv
+import io
+import math
+import os
+from collections.abc import Sequence
+from typing import Any, BinaryIO
 
 import numpy as np
 
+from dynx.errors import ArgumentError, nearest, shown
+from dynx.files.reading import checked_path, irregularity
 from dynx.model import Model
+from dynx.model.configuration import checked_q
 from dynx.sim.record.rollout_data import RolloutData
 from dynx.spatial.scalar import Floats
 
@@ -96,3 +104,134 @@ def _named(kind: str, coordinates: list[str]) -> list[str]:
 
 def _quoted(text: str) -> str:
     return '"' + text.replace('"', '""') + '"' if any(c in text for c in ',"\n\r') else text
+
+
+TIMES = ("t", "time", "timestamp")
+"""Names of the column of times [s]."""
+
+POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
+TWIST = ("vx", "vy", "vz", "wx", "wy", "wz")
+
+
+def load_csv(path: str | os.PathLike[str], model: Model) -> dict[str, Any]:
+    """Read the fields of a rollout of `model` from a table whose first line names the columns.
+
+    Needed are times [s], in a column `t`, `time` or `timestamp`, and the position ``q:JOINT`` (or ``JOINT``)
+    of every joint [rad or m], for a floating base ``q:x`` to ``q:qw`` as well. A velocity ``v:JOINT`` that is
+    missing is the central difference of the positions, an acceleration ``a:JOINT`` the difference of the
+    velocities. A torque ``tau:JOINT`` [N m or N] that is missing is NaN. Other columns are ignored.
+
+    Raises ArgumentError for a file that cannot be read, a column that is missing or there twice, text that is
+    no number, a quaternion of another length than 1, and times that do not increase.
+    """
+    name = shown(checked_path(path), 300)
+    problem = irregularity(path)
+    if problem:
+        raise ArgumentError(f"{name} {problem}")
+    try:
+        with open(path, newline="", encoding="utf-8-sig") as file:
+            rows = list(csv.reader(io.StringIO(file.read()), skipinitialspace=True))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise ArgumentError(f"{name} cannot be read as a table: {reason}") from None
+    if not rows:
+        raise ArgumentError(f"{name} is empty; wanted a line of names of columns")
+    header = [each.strip() for each in rows[0]]
+    body = [(number, row) for number, row in enumerate(rows[1:], start=2) if any(map(str.strip, row))]
+    table = _Table(name, header, body)
+    t = table.column(TIMES)
+    if len(t) < 2:
+        raise ArgumentError(f"{name} has too few rows of numbers ({len(t)}); wanted 2 or more")
+    later = np.flatnonzero(np.diff(t) <= 0.0)
+    if len(later):
+        k = int(later[0])
+        raise ArgumentError(
+            f"{name}:{body[k + 1][0]}: the time {t[k + 1]:.12g} s follows {t[k]:.12g} s; "
+            "wanted times that increase"
+        )
+    base = model.floating
+    positions = [*(POSE if base else ()), *model.joint_names]
+    rates = [*(TWIST if base else ()), *model.joint_names]
+    try:
+        q = checked_q(model, table.positions(positions, plain=not base))
+        v = table.filled("v", rates, _rates(model, t, q))
+        a = table.filled("a", rates, np.diff(v, axis=0) / np.diff(t)[:, None])
+        tau = table.filled("tau", rates, np.full((len(t) - 1, model.nv), math.nan))
+    except ArgumentError as error:
+        # Numbers that are too large, and quaternions of another length than 1, are found by the model.
+        raise (
+            error if name in str(error) else ArgumentError(f"{name} has invalid positions: {error}")
+        ) from None
+    return {
+        "model": model,
+        "t": t,
+        "q": q,
+        "v": v,
+        "a": a,
+        "tau": tau,
+        "saturated": np.zeros(tau.shape, bool),
+        "reference": None,
+        "rotors": np.zeros((model.nv, model.nv)),
+    }
+
+
+class _Table:
+    """Columns of text by name, converted to numbers where they are read."""
+
+    def __init__(self, path: str, header: Sequence[str], rows: Sequence[tuple[int, Sequence[str]]]) -> None:
+        self._path, self._header, self._rows = path, header, rows
+
+    def column(self, names: Sequence[str], *, last: bool = True) -> Floats:
+        """Return the first column of these names; without `last` its last number may be missing."""
+        found = next((name for name in names if name in self._header), None)
+        if found is None:
+            wanted = " or ".join(map(shown, names))
+            separator = next((each for each in ";\t" if self._header and each in self._header[0]), None)
+            if separator is not None and len(self._header) == 1:
+                raise ArgumentError(
+                    f"{self._path} is separated by {separator!r}; wanted commas between columns"
+                )
+            raise ArgumentError(f"{self._path} has no column {wanted}{nearest(names[0], self._header)}")
+        if self._header.count(found) > 1:
+            raise ArgumentError(
+                f"{self._path} has {self._header.count(found)} columns {shown(found)}; wanted one"
+            )
+        k, numbers = self._header.index(found), np.full(len(self._rows), math.nan)
+        for row, (line, cells) in enumerate(self._rows):
+            text = cells[k].strip() if k < len(cells) else ""
+            try:
+                numbers[row] = float(text)
+            except ValueError:
+                if not (text == "" and row == len(self._rows) - 1 and not last):
+                    raise ArgumentError(
+                        f"{self._path}:{line}: column {shown(found)} has {shown(text)}; wanted a number"
+                    ) from None
+                continue
+            if not math.isfinite(numbers[row]) and last:
+                raise ArgumentError(
+                    f"{self._path}:{line}: column {shown(found)} has {shown(text)}; wanted a finite number"
+                )
+        return numbers
+
+    def positions(self, names: Sequence[str], *, plain: bool) -> Floats:
+        """Return the positions (rows, names); with `plain` a column may have the name alone."""
+        found = [self.column([f"q:{name}", *([name] if plain else [])]) for name in names]
+        return np.column_stack(found) if found else np.zeros((len(self._rows), 0))
+
+    def filled(self, kind: str, names: Sequence[str], rest: Floats) -> Floats:
+        """Return `rest` with the columns of this kind that there are, in as many rows."""
+        found: Floats = rest.copy()
+        for k, name in enumerate(names):
+            if f"{kind}:{name}" in self._header:
+                found[:, k] = self.column([f"{kind}:{name}"], last=kind == "v")[: len(rest)]
+        return found
+
+
+def _rates(model: Model, t: Floats, q: Floats) -> Floats:
+    """Return velocities (n, nv) by central differences, at the ends by one-sided ones."""
+    before, after = np.maximum(np.arange(len(t)) - 1, 0), np.minimum(np.arange(len(t)) + 1, len(t) - 1)
+    spans = (t[after] - t[before])[:, None]
+    if not model.floating:
+        return model.difference(q[before], q[after]) / spans
+    # Displacements are in the axes of the base where they begin: both are taken from the middle state.
+    return (model.difference(q, q[after]) - model.difference(q, q[before])) / spans

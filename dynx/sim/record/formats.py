@@ -18,8 +18,7 @@ from dynx.files.writing import atomic_file
 from dynx.model import Model
 from dynx.model.documents import robot_document, robot_from_document
 from dynx.model.model import refuse_other_than_model
-from dynx.sim.record.csv_file import write_csv
-from dynx.sim.record.csv_reading import load_csv
+from dynx.sim.record.csv_file import load_csv, write_csv
 from dynx.sim.record.mcap_file import write_mcap
 from dynx.sim.record.mcap_reading import load_mcap
 from dynx.sim.record.rollout_data import RolloutData

@@ -35,7 +35,7 @@ class Rollout(RolloutData):
 
         A ``.csv`` of `save`, or the log of a robot from elsewhere, is read as a rollout of `model`: its
         columns are ``t`` and ``q:JOINT``, and where they are known ``v:JOINT``, ``a:JOINT`` and ``tau:JOINT``
-        (`dynx.sim.record.csv_reading.load_csv`).
+        (`dynx.sim.record.csv_file.load_csv`).
 
         Raises ArgumentError for any other file, NotInstalledError for ``.mcap`` without mcap.
         """

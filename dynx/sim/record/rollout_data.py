@@ -1,4 +1,4 @@
-"""Data of one simulation, and a summary in a few numbers."""
+"""Data of one simulation, its settings, and a summary in a few numbers."""
 
 from __future__ import annotations
 
@@ -10,11 +10,15 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from dynx.backends import backend
+from dynx.control.base import Controller
 from dynx.errors import ArgumentError
 from dynx.files.notebook import html_grid
 from dynx.model import Model
-from dynx.sim.record.settings import settings_of
+from dynx.sim.loop.controller_checks import controller_numbers
+from dynx.sim.plants.model_error import plant_model
+from dynx.sim.scenario.documents import Unknown
 from dynx.sim.scenario.scenario import Scenario
+from dynx.sim.setup import clock_of, disturbances_of, effort_limits_of, refuse_unknown
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 from dynx.trajectory.limit_check import UNITS
@@ -198,3 +202,37 @@ class RolloutData:
 
     def _repr_html_(self) -> str:
         return self.summary().to_html(repr(self)[1:-1])
+
+
+def settings_of(scenario: Scenario) -> dict[str, Any]:
+    """Return plant, controller, times, limits, friction, noise and pushes of a scenario, fit for JSON."""
+    refuse_unknown(*scenario.payloads, *scenario.all_pushes)
+    controller, clock, limit = scenario.controller, clock_of(scenario), effort_limits_of(scenario)
+    moved = plant_model(scenario.model, scenario.payloads, scenario.mass_scale)
+    disturbances = disturbances_of(scenario, moved)
+    friction = disturbances.friction
+    return {
+        "plant": str(scenario.plant),
+        "integrator": scenario.with_defaults().integrator,
+        "controller": "none" if controller is None else controller.name,
+        "law": _numbers(controller),
+        "dt": clock.dt,
+        "control_dt": clock.control_dt,
+        "delay": clock.delay_steps * clock.dt,
+        "substeps": scenario.substeps,
+        "effort_limits": None if limit is None else limit.tolist(),
+        "position_limits": scenario.position_limits,
+        "joints": {
+            "damping": friction.damping.tolist(),
+            "friction": friction.friction.tolist(),
+            "slip": friction.slip,
+        },
+        "noise": None if scenario.noise is None else repr(scenario.noise),
+        "pushes": [repr(push) for push in disturbances.pushes],
+    }
+
+
+def _numbers(controller: Controller[Any] | Unknown | None) -> dict[str, Any]:
+    if isinstance(controller, Unknown):
+        return controller.numbers
+    return {} if controller is None else controller_numbers(controller)

@@ -135,7 +135,7 @@ def test_a_plot_that_cannot_be_written_loses_no_table(
     def full(*_: object) -> None:
         raise ArgumentError("errors.png cannot be written: no space left")
 
-    monkeypatch.setattr("dynx.cli.sim.tutorial_run.plot_rows", full)
+    monkeypatch.setattr("dynx.cli.sim.tutorial.plot_rows", full)
     result = tutorial(*QUICK, "--plot", str(tmp_path / "errors.png"))
     assert result.exit_code == 2
     assert "computed-torque " in result.stdout

@@ -1,27 +1,72 @@
-"""Run of ``dynx sim --tutorial``: every controller with progress, then document and table."""
+"""Run of ``dynx sim --tutorial``: every controller with progress, then its JSON document and its table, which
+is made from the document alone."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
+from rich.console import Console
 
 from dynx._version import __version__
 from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, failure_of, one_line
 from dynx.cli.shell.inputs import configuration
 from dynx.cli.shell.interruption import interruptible
 from dynx.cli.shell.progress import progress_bar
-from dynx.cli.shell.terminal import counted, present
+from dynx.cli.shell.tables import Table
+from dynx.cli.shell.terminal import counted, number, present
 from dynx.cli.sim.motion import limit_message
-from dynx.cli.sim.tutorial_tables import show
+from dynx.cli.sim.tables import error_text
 from dynx.errors import ArgumentError, LimitError
 from dynx.model.loading import load
 from dynx.sim.named_controllers import NATURAL_FREQUENCY
 from dynx.sim.scenario.options import OPTIONS
-from dynx.sim.tutorial import DURATION, GRAVITY, MODES, ROBOT, Outcome, Row, Tutorial, tutorial
-from dynx.sim.tutorial_plot import plot_rows
+from dynx.sim.tutorial import DURATION, GRAVITY, MODES, ROBOT, Outcome, Row, Tutorial, plot_rows, tutorial
 from dynx.steppers.clock import Clock
+
+
+class ModeOnPlant(TypedDict):
+    """Tracking errors of one mode of control on one plant; null where it failed, for the reason `problem`."""
+
+    max_error: float | None
+    rms_error: float | None
+    final_error: float | None
+    joint_max_errors: list[float] | None
+    steps: int
+    problem: str | None
+
+
+class ModeEntry(TypedDict):
+    """One mode of control on each plant."""
+
+    mode: str
+    what: str
+    plants: dict[str, ModeOnPlant]
+
+
+TutorialEnds = TypedDict("TutorialEnds", {"from": list[float], "to": list[float]})
+
+
+class TutorialDocument(TutorialEnds):
+    """All modes of control on one motion; `not_done` are the modes that an interrupted run left out."""
+
+    schema: int
+    dynx: str
+    robot: str
+    source: str | None
+    base: str
+    gravity: list[float]
+    joint_names: list[str]
+    duration: float
+    dt: float
+    plants: list[str]
+    backend: str
+    kp: float
+    kd: float
+    modes: list[ModeEntry]
+    not_done: list[str]
+
 
 SCHEMA = 1
 
@@ -118,3 +163,53 @@ def _experiments(robot: str | None, given: dict[str, Any]) -> Tutorial:
         return tutorial(model, start=start, to=to, duration=duration, dt=dt, backend=given["backend"])
     except LimitError as error:
         raise ArgumentError(limit_message(error, model.name, ignorable=False)) from error
+
+
+Entry = dict[str, Any]
+
+_NAMES = {"pybullet": "PyBullet"}
+"""Plants with a stepper of their own, by their title; all others use the stepper of dynx."""
+
+
+def show(out: Console, report: Entry) -> None:
+    """Print the motion, a line for each controller, and why some have no numbers."""
+    out.print(
+        f"{one_line(report['robot'])}, {report['base']} base: cycloidal motion of "
+        f"{number(report['duration'])} s in steps of {number(report['dt'])} s, "
+        f"gravity {' '.join(map(number, report['gravity']))} m/s^2",
+        style="bold",
+    )
+    out.print(f"to {' '.join(number(q) for q in report['to'])}; controllers compute with {report['backend']}")
+    gains = f"kp {number(report['kp'])} 1/s^2, kd {number(report['kd'])} 1/s"
+    out.print(f"{gains}; times the inertia of the joint for gains in N m")
+    plants: list[str] = report["plants"]
+    heads = [f"{_NAMES.get(plant, 'dynx')}\n{what}" for plant in plants for what in ("max", "RMS")]
+    table = Table("controller", *heads, "torque", right=heads, keys=1)
+    for mode in report["modes"]:
+        outcomes = [mode["plants"][plant] for plant in plants]
+        errors = [outcome[key] for outcome in outcomes for key in ("max_error", "rms_error")]
+        table.add_row(mode["mode"], *map(error_text, errors), mode["what"])
+    out.print("\nlargest and RMS tracking error of all joints [rad or m]")
+    out.print(table)
+    steppers = ", ".join(
+        "PyBullet: its own stepper" if plant in _NAMES else f"dynx: semi-implicit Euler over {plant}"
+        for plant in plants
+    )
+    out.print(f"\n{steppers}")
+    for (where, problem), modes in _problems(report).items():
+        out.print(f"{', '.join(modes)} on {where}: {one_line(problem)}")
+    if report["not_done"]:
+        out.print(f"{counted(len(report['not_done']), 'controller')} not done", style="yellow")
+
+
+def _problems(report: Entry) -> dict[tuple[str, str], list[str]]:
+    """Return the controllers without numbers, by the plants and the reason."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for mode in report["modes"]:
+        of_mode: dict[str, list[str]] = {}
+        for plant, outcome in mode["plants"].items():
+            if outcome["problem"] is not None:
+                of_mode.setdefault(outcome["problem"], []).append(_NAMES.get(plant, "dynx"))
+        for problem, where in of_mode.items():
+            found.setdefault((" and ".join(where), problem), []).append(mode["mode"])
+    return found
