@@ -26,7 +26,7 @@ from dynx.doctor.formats.baseline import BaselineDocument
 from dynx.doctor.report_document import DoctorDocument
 from dynx.files.documents import json_schema
 from dynx.sim.scenario.scenario import ScenarioDocument
-from dynx.world.scene.document_types import SceneDocument
+from dynx.world.scene.documents import SceneDocument
 
 FOLDER = Path(__file__).with_name("schemas")
 

@@ -26,7 +26,7 @@ from dynx.sim import Noise, Payload, Push, compare, simulate
 from dynx.sim.scenario.scenario import Scenario
 from dynx.trajectory import cycloidal
 from dynx.world import read_scene
-from dynx.world.scene.writing import scene_document
+from dynx.world.scene.documents import scene_document
 from tests.doctor.formats.reports import alike, differing, hostile, refused
 
 DOCS = Path(__file__).parents[1] / "docs"

@@ -35,9 +35,8 @@ from dynx.world.queries import MAX_RAY_LENGTH, Queries
 from dynx.world.running import run_for
 from dynx.world.scene import Scene
 from dynx.world.scene.avoidance import MARGIN
+from dynx.world.scene.documents import scene_document, scene_from_document
 from dynx.world.scene.paths import ScenePaths
-from dynx.world.scene.reading import scene_from_document
-from dynx.world.scene.writing import scene_document
 from dynx.world.snapshot import Snapshot, read_snapshot, write_snapshot
 from dynx.world.state_checks import apply_state, checked_state
 

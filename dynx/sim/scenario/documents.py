@@ -33,8 +33,7 @@ from dynx.sim.loop.controller_checks import controller_numbers
 from dynx.sim.scenario.moved import present_name
 from dynx.trajectory.base import Trajectory
 from dynx.world.scene import Scene
-from dynx.world.scene.reading import scene_from_document
-from dynx.world.scene.writing import scene_document
+from dynx.world.scene.documents import scene_document, scene_from_document
 
 MAX_WORDS_LENGTH = 80
 """Largest number of characters of a value in a message."""

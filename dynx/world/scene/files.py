@@ -15,10 +15,9 @@ from dynx.files.reading import checked_path, printable, read_file
 from dynx.files.writing import write_bytes
 from dynx.model.library import SCENES, own_roots, robots, scene_names
 from dynx.model.package_paths import StrPath
+from dynx.world.scene.documents import scene_document, scene_from_document
 from dynx.world.scene.paths import ScenePaths
-from dynx.world.scene.reading import scene_from_document
 from dynx.world.scene.scene import Scene
-from dynx.world.scene.writing import scene_document
 
 SUFFIXES = (".toml", ".json")
 

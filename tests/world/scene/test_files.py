@@ -36,8 +36,7 @@ from dynx.world import (
     scene_names,
     write_scene,
 )
-from dynx.world.scene.reading import scene_from_document
-from dynx.world.scene.writing import scene_document
+from dynx.world.scene.documents import scene_document, scene_from_document
 
 numbers = st.floats(-10.0, 10.0, allow_nan=False)
 sizes = st.floats(0.01, 2.0)

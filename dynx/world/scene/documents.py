@@ -1,19 +1,37 @@
-"""A scene from its document; every error names the place in it."""
+"""A scene as a document of text and numbers, complete but for the files of its meshes, and back.
+
+The classes declare the keys and types, from which the JSON Schema is generated. Lengths are in m, angles in
+rad, masses in kg. A pose is x, y, z, alone or followed by roll, pitch, yaw or by the quaternion qx, qy, qz,
+qw. Keys with a default may be left out. Every error of reading names the place in the document.
+"""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from typing import Any, Literal
 
 import numpy as np
 
 from dynx.errors import ArgumentError, DescriptionError, RobotNotFoundError, shown
 from dynx.files.documents import convert_document
 from dynx.model import Model, Pose
+from dynx.model.documents import pose_numbers
 from dynx.model.elements import IDENTITY, ZERO
-from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
+from dynx.model.geometry import (
+    Box,
+    Capsule,
+    Collision,
+    Cylinder,
+    HeightField,
+    Mesh,
+    Plane,
+    Shape,
+    Sphere,
+    Visual,
+)
 from dynx.model.geometry.sizes import finite_numbers, finite_vector
 from dynx.model.loading import load, read_model
 from dynx.model.xacro_reading import split_arguments
@@ -23,18 +41,12 @@ from dynx.steppers.material import DEFAULT_MATERIAL, Material
 from dynx.world.motors import Motor, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
 from dynx.world.scene.bodies import SceneBody
 from dynx.world.scene.constraints import Constraint, PointToPoint, Weld
-from dynx.world.scene.document_types import (
-    BodyDocument,
-    ConstraintDocument,
-    MaterialDocument,
-    MotorDocument,
-    RobotDocument,
-    SceneDocument,
-    ShapeDocument,
-)
 from dynx.world.scene.paths import ScenePaths
 from dynx.world.scene.robots import SceneRobot
 from dynx.world.scene.scene import Scene
+
+Vector = list[float]
+Numbers = float | list[float]
 
 SCHEMA = "dynx.scene/1"
 """Name and version of the layout of a scene's document."""
@@ -49,6 +61,122 @@ MOTORS: dict[str, type[Motor]] = {
 
 QUATERNION_TOLERANCE = 1e-6
 """Largest deviation of the norm of a quaternion from 1."""
+
+
+# -- keys and types --------------------------------------------------------------------------------
+
+
+@dataclass
+class MaterialDocument:
+    """A material; see `dynx.world.Material`."""
+
+    friction: float = 0.5
+    torsional_friction: float = 0.0
+    rolling_friction: float = 0.0
+    restitution: float = 0.0
+    rgba: Vector = field(default_factory=lambda: [0.7, 0.7, 0.7, 1.0])
+
+
+@dataclass
+class ShapeDocument:
+    """One shape; exactly one of the keys before `scale` is given.
+
+    `box` has three edge lengths, `cylinder` and `capsule` radius and length, `mesh` a file beside the scene,
+    scaled by `scale`, `heights` the rows of a height field of the extent `size` along x and y.
+    """
+
+    box: Vector | None = None
+    sphere: float | None = None
+    cylinder: Vector | None = None
+    capsule: Vector | None = None
+    plane: Literal[True] | None = None
+    mesh: str | None = None
+    heights: list[Vector] | None = None
+    scale: Vector | None = None
+    size: Vector | None = None
+    pose: Vector | None = None
+
+
+@dataclass
+class MotorDocument:
+    """A motor on the joints named, or on all; see `dynx.world.PositionMotor` and its siblings."""
+
+    kind: Literal["position", "velocity", "pd", "torque"]
+    target: Numbers | None = None
+    velocity: Numbers | None = None
+    torque: Numbers | None = None
+    kp: Numbers | None = None
+    kd: Numbers | None = None
+    max_force: Numbers | None = None
+    joints: list[str] | None = None
+
+
+@dataclass
+class RobotDocument:
+    """A robot: `robot` is the name of one that dynx knows, a file beside the scene, or
+    ``package://pybullet_data/FILE``; `urdf` is the text of its description,
+    whose meshes are looked for in `mesh_folders`.
+
+    `q` is a list (nq) or the positions of joints by name; `pose` is that of the base, fixed or floating.
+    """
+
+    name: str
+    robot: str | None = None
+    urdf: str | None = None
+    mesh_folders: list[str] = field(default_factory=list)
+    base: Literal["fixed", "floating"] = "fixed"
+    pose: Vector | None = None
+    lock: dict[str, float] = field(default_factory=dict)
+    q: list[float] | dict[str, float] | None = None
+    v: list[float] | dict[str, float] | None = None
+    self_collision: bool = False
+    material: MaterialDocument | None = None
+    materials: dict[str, MaterialDocument] = field(default_factory=dict)
+    motors: list[MotorDocument] = field(default_factory=list)
+
+
+@dataclass
+class BodyDocument:
+    """A body of one shape or several; without `mass` it is fixed in the world."""
+
+    name: str
+    shape: ShapeDocument | None = None
+    shapes: list[ShapeDocument] = field(default_factory=list)
+    pose: Vector | None = None
+    mass: float | None = None
+    inertia: list[Vector] | None = None
+    center_of_mass: Vector | None = None
+    twist: Vector | None = None
+    material: MaterialDocument | None = None
+
+
+@dataclass
+class ConstraintDocument:
+    """A weld, with the pose of the frame of `b` in that of `a`, or a point-to-point constraint."""
+
+    kind: Literal["weld", "point"]
+    a: str
+    b: str
+    pose: Vector | None = None
+    point_a: Vector | None = None
+    point_b: Vector | None = None
+
+
+@dataclass
+class SceneDocument:
+    """A scene; see `dynx.world.Scene`."""
+
+    schema: Literal["dynx.scene/1"]
+    name: str = "scene"
+    gravity: Vector = field(default_factory=lambda: [0.0, 0.0, -9.81])
+    robots: list[RobotDocument] = field(default_factory=list)
+    bodies: list[BodyDocument] = field(default_factory=list)
+    constraints: list[ConstraintDocument] = field(default_factory=list)
+    ignored: list[list[str]] = field(default_factory=list)
+    groups: dict[str, list[str]] = field(default_factory=dict)
+
+
+# -- reading --------------------------------------------------------------------------------------
 
 
 def scene_from_document(document: object, paths: ScenePaths | None = None) -> Scene:
@@ -93,9 +221,6 @@ def _place(place: str) -> Iterator[None]:
     except (ArgumentError, DescriptionError, RobotNotFoundError) as error:
         kind = DescriptionError if isinstance(error, DescriptionError) else type(error)
         raise kind(f"{place}: {error}") from error
-
-
-# -- robots ---------------------------------------------------------------------------------------
 
 
 def _robot(given: RobotDocument, paths: ScenePaths | None) -> SceneRobot:
@@ -179,9 +304,6 @@ def _motor(k: int, given: MotorDocument) -> Motor:
     return kind(**values)
 
 
-# -- bodies ---------------------------------------------------------------------------------------
-
-
 def _body(given: BodyDocument, paths: ScenePaths) -> SceneBody:
     if (given.shape is None) == (not given.shapes):
         raise ArgumentError("wanted either shape or shapes")
@@ -232,9 +354,6 @@ def _solid(given: ShapeDocument, paths: ScenePaths) -> Shape:
     return Plane()
 
 
-# -- parts ----------------------------------------------------------------------------------------
-
-
 def _constraint(given: ConstraintDocument) -> Constraint:
     points = {name: getattr(given, name) for name in ("point_a", "point_b")}
     if given.kind == "weld":
@@ -254,7 +373,7 @@ def _material(given: MaterialDocument | None) -> Material:
 
 
 def _pose(name: str, numbers: list[float] | None) -> Pose | None:
-    """Return the pose of 3, 6 or 7 numbers; see `document_types`."""
+    """Return the pose of 3, 6 or 7 numbers; see the top of this module."""
     if numbers is None:
         return None
     entries = finite_numbers(name, numbers, len(numbers))
@@ -267,3 +386,136 @@ def _pose(name: str, numbers: list[float] | None) -> Pose | None:
     if len(entries) not in (3, 6):
         raise ArgumentError(f"{name} has {len(entries)} numbers; wanted 3, 6 or 7")
     return Pose(finite_vector(name, entries[:3]), finite_vector(name, entries[3:] or ZERO))
+
+
+# -- writing --------------------------------------------------------------------------------------
+
+_MOTOR_KINDS = {kind: name for name, kind in MOTORS.items()}
+
+
+def scene_document(scene: Scene, paths: ScenePaths | None = None) -> dict[str, Any]:
+    """Return the document of a scene, from which `scene_from_document` makes an equal one.
+
+    Robots are written as URDF text, with the full paths of their meshes; meshes of bodies as `paths` writes
+    them. Raises DescriptionError for a collision shape with a fault in the description of a robot.
+    """
+    written: dict[str, Any] = _without_defaults(
+        SceneDocument(
+            SCHEMA,
+            scene.name,
+            list(scene.gravity),
+            [_robot_document(each) for each in scene.robots],
+            [_body_document(each, paths or ScenePaths(None)) for each in scene.bodies],
+            [_constraint_document(each) for each in scene.constraints],
+            [list(pair) for pair in scene.ignored],
+            {name: list(members) for name, members in scene.groups},
+        )
+    )
+    return written
+
+
+def _without_defaults(part: Any) -> Any:
+    """Return a document as dicts and lists, without the keys that have their default."""
+    if isinstance(part, list | tuple):
+        return [_without_defaults(each) for each in part]
+    if isinstance(part, dict):
+        return {name: _without_defaults(each) for name, each in part.items()}
+    if not is_dataclass(part):
+        return part
+    found = {each.name: (each, getattr(part, each.name)) for each in fields(part)}
+    return {
+        name: _without_defaults(value)
+        for name, (each, value) in found.items()
+        if value != (each.default if each.default_factory is MISSING else each.default_factory())
+    }
+
+
+def _robot_document(robot: SceneRobot) -> RobotDocument:
+    model = robot.model
+    return RobotDocument(
+        robot.name,
+        urdf=model.to_urdf(geometry=True),
+        mesh_folders=_mesh_folders(model),
+        base=model.base,
+        pose=_pose_document(model.base_pose),
+        q=list(robot.q or ()),
+        v=list(robot.v or ()),
+        self_collision=robot.self_collision,
+        material=_material_document(robot.material),
+        materials={link: _all_of_material(each) for link, each in robot.materials},
+        motors=[_motor_document(each) for each in robot.motors],
+    )
+
+
+def _mesh_folders(model: Model) -> list[str]:
+    """Return the folders of the meshes that were found."""
+    placed: list[Visual | Collision] = []
+    for link in model.geometry.links.values():
+        placed += [*link.visuals, *link.collisions]
+    meshes = [each.shape for each in placed if isinstance(each.shape, Mesh)]
+    return sorted({os.path.dirname(mesh.file) for mesh in meshes if mesh.fault is None})
+
+
+def _motor_document(motor: Motor) -> MotorDocument:
+    if type(motor) not in _MOTOR_KINDS:
+        raise ArgumentError(f"a {type(motor).__name__} cannot be written to a file of a scene")
+    given: dict[str, Any] = {each.name: getattr(motor, each.name) for each in fields(motor)}
+    return MotorDocument(_MOTOR_KINDS[type(motor)], **given)
+
+
+def _body_document(body: SceneBody, paths: ScenePaths) -> BodyDocument:
+    shapes = [_shape_document(each, paths) for each in body.shapes]
+    single = len(shapes) == 1
+    return BodyDocument(
+        body.name,
+        shapes[0] if single else None,
+        [] if single else shapes,
+        _pose_document(body.pose),
+        body.mass,
+        None if body.inertia is None else [list(row) for row in body.inertia],
+        None if body.center_of_mass is None else list(body.center_of_mass),
+        list(body.twist) if any(body.twist) else None,
+        _material_document(body.material),
+    )
+
+
+def _shape_document(placed: Collision, paths: ScenePaths) -> ShapeDocument:
+    shape, pose = placed.shape, _pose_document(placed.origin)
+    if isinstance(shape, Box):
+        return ShapeDocument(box=list(shape.size), pose=pose)
+    if isinstance(shape, Sphere):
+        return ShapeDocument(sphere=shape.radius, pose=pose)
+    if isinstance(shape, Cylinder):
+        return ShapeDocument(cylinder=[shape.radius, shape.length], pose=pose)
+    if isinstance(shape, Capsule):
+        return ShapeDocument(capsule=[shape.radius, shape.length], pose=pose)
+    if isinstance(shape, HeightField):
+        heights = [list(row) for row in shape.heights]
+        return ShapeDocument(heights=heights, size=list(shape.size), pose=pose)
+    if isinstance(shape, Mesh):
+        return ShapeDocument(mesh=paths.write(shape.file), scale=list(shape.scale), pose=pose)
+    assert isinstance(shape, Plane)
+    return ShapeDocument(plane=True, pose=pose)
+
+
+def _constraint_document(constraint: Constraint) -> ConstraintDocument:
+    if isinstance(constraint, Weld):
+        pose = constraint.T_a_b
+        return ConstraintDocument(
+            "weld", constraint.a, constraint.b, None if pose is None else pose_numbers(pose)
+        )
+    points = list(constraint.point_a), list(constraint.point_b)
+    return ConstraintDocument("point", constraint.a, constraint.b, None, *points)
+
+
+def _material_document(material: Material) -> MaterialDocument | None:
+    return None if material == DEFAULT_MATERIAL else _all_of_material(material)
+
+
+def _all_of_material(material: Material) -> MaterialDocument:
+    given: dict[str, Any] = {each.name: getattr(material, each.name) for each in fields(material)}
+    return MaterialDocument(**given)
+
+
+def _pose_document(pose: Pose) -> list[float] | None:
+    return None if pose == IDENTITY else pose_numbers(pose)

@@ -11,7 +11,7 @@ import pytest
 from dynx.errors import ArgumentError
 from dynx.files.documents import convert_document
 from dynx.world import read_scene
-from dynx.world.scene.document_types import SceneDocument
+from dynx.world.scene.documents import SceneDocument
 
 BODY: dict[str, Any] = {"name": "cube", "shape": {"box": [1, 1, 1]}}
 ROBOT: dict[str, Any] = {"name": "arm", "robot": "planar_2r"}
