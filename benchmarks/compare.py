@@ -16,7 +16,7 @@ from benchmarks.libraries.jax_peers import JaxPeer, OnDevice
 from benchmarks.peers import COMPILED, FRAMES, SUPPORTED, make_implementation
 from dynx.bench.cases import BENCHMARK_QUANTITIES, BenchmarkCase, draw_batch
 from dynx.bench.implementations import Implementation
-from dynx.bench.measurement import Measurement, measure
+from dynx.bench.measurement import BenchmarkMeasurement, measure
 from dynx.errors import DynxError
 from dynx.model import Model
 from dynx.model.loading import load
@@ -81,7 +81,7 @@ def implementations_of(
     return implementations, absent
 
 
-def table(found: Sequence[Measurement], implementations: Sequence[Implementation]) -> Iterator[str]:
+def table(found: Sequence[BenchmarkMeasurement], implementations: Sequence[Implementation]) -> Iterator[str]:
     """Lines of Markdown, the fastest implementation first."""
     compiling = {
         implementation.name: implementation.compile_seconds
@@ -105,7 +105,7 @@ def table(found: Sequence[Measurement], implementations: Sequence[Implementation
         )
 
 
-def faster_than_dynx(found: Sequence[Measurement]) -> list[Measurement]:
+def faster_than_dynx(found: Sequence[BenchmarkMeasurement]) -> list[BenchmarkMeasurement]:
     """The peers that took less time than the compiled backend."""
     times = {each.implementation: each.times.median for each in found if each.times is not None}
     return [

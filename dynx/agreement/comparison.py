@@ -55,7 +55,7 @@ class Comparison:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class ErrorVerdict:
     """The largest absolute and relative error, and the position of the latter in the array."""
 
     absolute: float
@@ -63,16 +63,16 @@ class Verdict:
     position: tuple[int, ...] | None
 
 
-def judge(error: Array, scale: Floats) -> Verdict:
+def judge(error: Array, scale: Floats) -> ErrorVerdict:
     """Return the largest error relative to `scale`, which broadcasts against it; NaN counts as infinite."""
     absolute = np.abs(error).astype(np.float64)
     if not absolute.size:
-        return Verdict(0.0, 0.0, None)
+        return ErrorVerdict(0.0, 0.0, None)
     absolute = np.where(np.isfinite(absolute), absolute, np.inf)
     relative = np.where(absolute == 0.0, 0.0, np.inf)
     np.divide(absolute, np.broadcast_to(scale, absolute.shape), out=relative, where=scale > 0.0)
     worst = np.unravel_index(int(np.argmax(relative)), relative.shape)
-    return Verdict(float(np.max(absolute)), float(relative[worst]), tuple(int(k) for k in worst))
+    return ErrorVerdict(float(np.max(absolute)), float(relative[worst]), tuple(int(k) for k in worst))
 
 
 def compare(
@@ -108,7 +108,7 @@ def concluded(
     name: str,
     first: BackendResults,
     second: BackendResults,
-    verdict: Verdict,
+    verdict: ErrorVerdict,
     tolerance: float,
     worst: WorstSample | None = None,
     note: str | None = None,
@@ -134,7 +134,7 @@ def compare_refusals(
         return None
     if len(refused) == len(results) and all(result.singular for result in refused):
         note = f"refused alike: {refused[0].error}"
-        return concluded(name, first, second, Verdict(0.0, 0.0, None), tolerance, note=note)
+        return concluded(name, first, second, ErrorVerdict(0.0, 0.0, None), tolerance, note=note)
     note = "; ".join(
         f"{each.name} refuses: {result}"
         for each, result in zip((first, second), results, strict=False)
@@ -147,7 +147,7 @@ def failed_comparison(
     name: str, first: BackendResults, second: BackendResults, tolerance: float, note: str
 ) -> Comparison:
     """Return a comparison that fails without a finite error."""
-    return concluded(name, first, second, Verdict(np.inf, np.inf, None), tolerance, note=note)
+    return concluded(name, first, second, ErrorVerdict(np.inf, np.inf, None), tolerance, note=note)
 
 
 def state(samples: Samples, k: int, frame: str | None = None, reference: str | None = None) -> WorstSample:

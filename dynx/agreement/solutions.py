@@ -14,7 +14,7 @@ import numpy as np
 from dynx.agreement import tolerances
 from dynx.agreement.comparison import (
     Comparison,
-    Verdict,
+    ErrorVerdict,
     compare_refusals,
     concluded,
     failed_comparison,
@@ -61,7 +61,7 @@ def compare_forward_dynamics(
     refused = compare_refusals(name, solver, verifier, solutions, tolerance)
     if refused is not None:
         return refused
-    worst = Verdict(0.0, 0.0, None)
+    worst = ErrorVerdict(0.0, 0.0, None)
     left_out = len(samples) - len(chosen)
     notes = []
     if left_out:
@@ -87,10 +87,10 @@ def _required_torque(backend: Any, samples: Samples, *, a: Array, chosen: list[i
     return np.asarray(backend.inverse_dynamics(samples.q[chosen], samples.v[chosen], a))
 
 
-def _backward_error(a: Array, tau: Array, chosen: list[int], magnitudes: Magnitudes) -> Verdict:
+def _backward_error(a: Array, tau: Array, chosen: list[int], magnitudes: Magnitudes) -> ErrorVerdict:
     samples = magnitudes.samples
     if tau.shape != a.shape or not np.isfinite(tau.astype(np.float64)).all():
-        return Verdict(np.inf, np.inf, (0,))
+        return ErrorVerdict(np.inf, np.inf, (0,))
     everywhere = np.zeros_like(samples.tau)
     everywhere[chosen] = a
     return judge(tau - samples.tau[chosen], magnitudes.solved_torque(everywhere)[chosen, None])

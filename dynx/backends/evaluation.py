@@ -33,7 +33,7 @@ class Reduction(NamedTuple):
     of_batch: Callable[[Floats], Floats]
 
 
-class Evaluation:
+class HookEvaluation:
     """Evaluator of an engine's hooks on batches of samples of one model."""
 
     def __init__(self, mechanism: Mechanism, *, vectorized: bool) -> None:

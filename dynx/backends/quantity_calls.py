@@ -2,7 +2,7 @@
 
 Control loops evaluate one sample thousands of times a second, so one sample has a straight path for every
 quantity: one check of all arguments together, and the engine's hook. All else (batches, lists, invalid
-arguments, quantities that dynx derives) is checked argument by argument and evaluated by `Evaluation`.
+arguments, quantities that dynx derives) is checked argument by argument and evaluated by `HookEvaluation`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy import ndarray
 from numpy.typing import ArrayLike
 
 from dynx.backends.arguments import Arguments
-from dynx.backends.evaluation import Evaluation, Reduction, common_batch
+from dynx.backends.evaluation import HookEvaluation, Reduction, common_batch
 from dynx.backends.hooks import EngineHooks, solution_or_nan, untranslated
 from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.backends.lifecycle import Lifecycle
@@ -35,7 +35,7 @@ ONE_FRAME, ALL_FRAMES = "frame_placement", "frame_placements"
 """Names under which `QuantityCalls` evaluates the poses of one frame and of all frames."""
 
 
-class _Plan(NamedTuple):
+class _PreparedQuantity(NamedTuple):
     """The entry of a quantity in the table, prepared for one backend."""
 
     arguments: tuple[str, ...]
@@ -52,15 +52,15 @@ class QuantityCalls(Lifecycle, EngineHooks):
     def __init__(self, model: Model, *, validate: bool = True) -> None:
         super().__init__(model, Arguments(model), validate=validate)
         self._mechanism = model.mechanism
-        self._evaluation = Evaluation(self._mechanism, vectorized=self.vectorized)
+        self._evaluation = HookEvaluation(self._mechanism, vectorized=self.vectorized)
         self._uncoupled = self._mechanism.coupling is None
         self._joint_terms = JointDynamicsTerms(model)
         self._solvability = Solvability(model)
         self._frame_index = {name: index for index, name in enumerate(model.frame_names)}
         all_poses = (len(self._frame_index), 4, 4)
         self._plans = {
-            ONE_FRAME: _Plan(("q",), "_frame_placement", (4, 4)),
-            ALL_FRAMES: _Plan(("q",), "_frame_placements", all_poses),
+            ONE_FRAME: _PreparedQuantity(("q",), "_frame_placement", (4, 4)),
+            ALL_FRAMES: _PreparedQuantity(("q",), "_frame_placements", all_poses),
         }
         # Functions that call hooks without the translation of exceptions, made when a quantity is first
         # evaluated.
@@ -161,9 +161,9 @@ class QuantityCalls(Lifecycle, EngineHooks):
             return ()
         return (self._index(names[0]), *map(self._arguments.reference, names[1:]))
 
-    def _plan(self, name: str) -> _Plan:
+    def _plan(self, name: str) -> _PreparedQuantity:
         quantity = QUANTITIES[name]
-        plan = self._plans[name] = _Plan(
+        plan = self._plans[name] = _PreparedQuantity(
             quantity.arguments,
             quantity.hook,
             quantity.shape_of(self.model, self._mechanism.nv),

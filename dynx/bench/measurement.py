@@ -33,7 +33,7 @@ LOST_IN_NOISE = "not measurable: in a quarter of the repetitions a call took no 
 
 
 @dataclass(frozen=True)
-class Measurement:
+class BenchmarkMeasurement:
     """Result of one implementation of a case.
 
     `times` are the times of one sample, or None if the implementation was not timed; `problem` is then the
@@ -55,7 +55,7 @@ class Measurement:
 
 def measure(
     case: BenchmarkCase, implementations: Sequence[Implementation], batch: Batch, repetitions: int
-) -> list[Measurement]:
+) -> list[BenchmarkMeasurement]:
     """Measure all `implementations` that support this case; results have their order.
 
     `batch` holds at least ``case.batch`` samples, the first of which are used.
@@ -67,14 +67,14 @@ def measure(
     return [_timed(each, times) for each in candidates]
 
 
-class Candidate(NamedTuple):
+class CheckedImplementation(NamedTuple):
     """A checked implementation; `ready` is its prepared call, or None if it will not be timed."""
 
-    found: Measurement
+    found: BenchmarkMeasurement
     ready: PreparedCall | None
 
 
-def _timed(candidate: Candidate, times: Iterator[Times]) -> Measurement:
+def _timed(candidate: CheckedImplementation, times: Iterator[Times]) -> BenchmarkMeasurement:
     found, ready = candidate
     if ready is None:
         return found
@@ -94,11 +94,11 @@ class Preparation:
         self._judges: dict[tuple[Model, int], tuple[Judge, list[int]]] = {}
         self._memory = np.empty(0)
 
-    def prepare(self, implementation: Implementation, batch: Batch) -> Candidate:
+    def prepare(self, implementation: Implementation, batch: Batch) -> CheckedImplementation:
         """Prepare an implementation for the samples of `batch`, and check its results."""
         case, each = self._case, implementation
         own = each.samples(batch.first(case.batch))
-        found = Measurement(case, each.name, each.role, each.version, each.threads, len(own))
+        found = BenchmarkMeasurement(case, each.name, each.role, each.version, each.threads, len(own))
         try:
             if not implementation.whole:
                 own = own.first(self._timed_samples(implementation, own))
@@ -112,12 +112,12 @@ class Preparation:
             judge, rows = self._judge(own)
             check = judge.check(case.quantity, results[rows])
         except DynxError as error:
-            return Candidate(replace(found, problem=str(error)), None)
+            return CheckedImplementation(replace(found, problem=str(error)), None)
         found = replace(found, error=check.error, tolerance=check.tolerance)
         if check.right:
-            return Candidate(found, ready)
+            return CheckedImplementation(found, ready)
         problem = f"wrong result, not timed: error {check.error:.1e}, tolerance {check.tolerance:.1e}"
-        return Candidate(replace(found, problem=problem), None)
+        return CheckedImplementation(replace(found, problem=problem), None)
 
     def _timed_samples(self, implementation: Implementation, batch: Batch) -> int:
         """Return the number of samples that fit into a repetition: all of them, or a power of two."""

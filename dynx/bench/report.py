@@ -8,7 +8,7 @@ from typing import Any
 
 from dynx._version import __version__
 from dynx.bench.cost import Cost
-from dynx.bench.measurement import Measurement
+from dynx.bench.measurement import BenchmarkMeasurement
 from dynx.bench.roofline import Peak, roofline
 from dynx.bench.session import Session
 
@@ -18,7 +18,9 @@ _OF_MEASUREMENT = ("role", "version", "threads", "samples", "error", "tolerance"
 """Attributes of a measurement that the document has under the same name."""
 
 
-def document(session: Session, found: Sequence[Sequence[Measurement]], processor: str) -> dict[str, Any]:
+def document(
+    session: Session, found: Sequence[Sequence[BenchmarkMeasurement]], processor: str
+) -> dict[str, Any]:
     """Assemble the document of a session: one entry of `found` for each measured case, in order."""
     plan = session.plan
     measured = {group[0].case for group in found if group}
@@ -44,7 +46,7 @@ def document(session: Session, found: Sequence[Sequence[Measurement]], processor
 
 
 def result(
-    group: Sequence[Measurement], costs: Sequence[Cost | None], peaks: Mapping[int, Peak]
+    group: Sequence[BenchmarkMeasurement], costs: Sequence[Cost | None], peaks: Mapping[int, Peak]
 ) -> dict[str, Any]:
     """Return the entry of one case with all its implementations; a ratio is the time of a peer divided by
     that of the implementation."""
@@ -56,19 +58,22 @@ def result(
     }
 
 
-def wrong(found: Sequence[Sequence[Measurement]]) -> list[Measurement]:
+def wrong(found: Sequence[Sequence[BenchmarkMeasurement]]) -> list[BenchmarkMeasurement]:
     """Return the measurements of implementations with wrong results."""
     return [each for group in found for each in group if is_wrong(each)]
 
 
-def is_wrong(measurement: Measurement) -> bool:
+def is_wrong(measurement: BenchmarkMeasurement) -> bool:
     """Check whether the error exceeds the tolerance."""
     error, tolerance = measurement.error, measurement.tolerance
     return error is not None and tolerance is not None and not error <= tolerance
 
 
 def _entry(
-    measurement: Measurement, cost: Cost | None, peers: Mapping[str, float], peaks: Mapping[int, Peak]
+    measurement: BenchmarkMeasurement,
+    cost: Cost | None,
+    peers: Mapping[str, float],
+    peaks: Mapping[int, Peak],
 ) -> dict[str, Any]:
     times = measurement.times
     peak = peaks.get(measurement.threads)

@@ -12,7 +12,7 @@ from dynx.bench.cases import BENCHMARK_QUANTITIES, Batch, BenchmarkCase, draw_ba
 from dynx.bench.cost import Cost, cost_of, program_of
 from dynx.bench.implementations import Implementation, PreparedCall, Role
 from dynx.bench.machine import load, measure_peak
-from dynx.bench.measurement import Measurement, measure
+from dynx.bench.measurement import BenchmarkMeasurement, measure
 from dynx.bench.roofline import Peak
 from dynx.errors import ArgumentError, DynxError, NotInstalledError
 from dynx.model import Model
@@ -108,7 +108,7 @@ class Session:
         """Measure the peaks on a number of threads and store them in `peaks`."""
         self.peaks[threads] = self._measure_peak(threads)
 
-    def measure(self, case: BenchmarkCase) -> list[Measurement]:
+    def measure(self, case: BenchmarkCase) -> list[BenchmarkMeasurement]:
         """Measure one case.
 
         With several threads, backends that use one thread are left out if the plan also times them on one.
@@ -126,7 +126,7 @@ class Session:
         ]
         return measure(case, implementations, self._batch, plan.repetitions)
 
-    def cost(self, measurement: Measurement) -> Cost | None:
+    def cost(self, measurement: BenchmarkMeasurement) -> Cost | None:
         """Return the least cost of one sample; None if the operations of the implementation are not known."""
         if measurement.implementation != COMPILED:
             return None

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dynx.backends.evaluation import Evaluation, batch_rows, common_batch
+from dynx.backends.evaluation import HookEvaluation, batch_rows, common_batch
 from dynx.backends.straight import straight_call
 from dynx.compiled.call import ABSENT, Check, given_arguments, write_into
 from dynx.compiled.kernels import kernel_quantity
@@ -37,7 +37,7 @@ class CoupledCall:
         validate: bool,
     ) -> None:
         described = kernel_quantity(quantity)
-        self._evaluation = Evaluation(mechanism, vectorized=True)
+        self._evaluation = HookEvaluation(mechanism, vectorized=True)
         self._reduce = self._evaluation.reduction(
             rows=described.reduces_rows, columns=described.reduces_columns
         )

@@ -29,7 +29,7 @@ from dynx.doctor.prove.mending import (
 )
 from dynx.doctor.prove.proofs import Proofs
 from dynx.doctor.prove.refusals import with_refusals
-from dynx.doctor.prove.selection import Selection, smallest_mending
+from dynx.doctor.prove.selection import SelectedPlaces, smallest_mending
 from dynx.doctor.report import (
     DoctorReport,
     Unexplained,
@@ -196,7 +196,7 @@ def _diagnosis_of(
     best = smallest_mending(
         case,
         rules,
-        Selection(full, after, attributions),
+        SelectedPlaces(full, after, attributions),
         examiner,
         tolerance,
         lambda rule: proofs.measure(rule, minor=True),
@@ -277,7 +277,7 @@ def _rules_for(examiner: Examiner) -> list[Rule]:
 
 
 def _with_contacts(
-    found: Sequence[tuple[Rule, Detection]], best: Selection, mended: Case, seed: int
+    found: Sequence[tuple[Rule, Detection]], best: SelectedPlaces, mended: Case, seed: int
 ) -> list[tuple[Rule, Detection]]:
     """Name the links in contact where contacts have an effect."""
     touching = {each.rule: engine for each in best.proofs if each.rule.present_as for engine in each.effects}

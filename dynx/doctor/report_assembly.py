@@ -8,7 +8,7 @@ from itertools import combinations
 
 from dynx.doctor.examine.examination import QUANTITIES, TORQUE, Examination, Examiner
 from dynx.doctor.examine.reference_values import referee_error
-from dynx.doctor.prove.attribution import Attribution
+from dynx.doctor.prove.attribution import AttributedCause
 from dynx.doctor.prove.levels import changed_parts, level_of
 from dynx.doctor.prove.mending import Mending, Place, differs, place_of
 from dynx.doctor.report import (
@@ -148,13 +148,13 @@ def _pairs(examination: Examination) -> tuple[PairError, ...]:
 
 def all_findings(
     found: Sequence[tuple[Rule, Detection]],
-    proofs: Sequence[Attribution],
+    proofs: Sequence[AttributedCause],
     mended: Mending,
     engines: Collection[str],
 ) -> tuple[Finding, ...]:
     """Report everything detected, with the effect where one was measured, or is known in all `engines`; texts
     name these engines only."""
-    proved: dict[Place, list[Attribution]] = {}
+    proved: dict[Place, list[AttributedCause]] = {}
     for each in proofs:
         proved.setdefault(place_of(each.rule, each.detection), []).append(each)
     done = {rule.id: remedy.changed for rule, remedy in mended.applied}
@@ -191,7 +191,7 @@ def all_findings(
     return tuple(sorted(findings, key=lambda finding: finding.kind))
 
 
-def _condition(attribution: Attribution) -> str:
+def _condition(attribution: AttributedCause) -> str:
     """Write in which variants the effect is measured with the remedy of another cause, that of the call."""
     behind = {name: rule for name, rule in attribution.behind.items() if name in attribution.effects}
     return "".join(f"; measured in {name} with the remedy of {rule}" for name, rule in behind.items())

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from dynx.doctor.examine.examination import Examination, Examiner
 from dynx.doctor.examine.reference_values import ReferenceValues
-from dynx.doctor.prove.attribution import Attribution, Attributor
+from dynx.doctor.prove.attribution import AttributedCause, CauseAttributor
 from dynx.doctor.prove.mending import detections, mend, readable
 from dynx.doctor.report import VariantResult
 from dynx.doctor.report_assembly import all_findings, variant_result
@@ -62,11 +62,11 @@ def _proofs(
     before: Examination,
     after: Examination,
     tolerance: float,
-) -> list[Attribution]:
+) -> list[AttributedCause]:
     slim = case.with_source(examiner.without_unused(case.source))
     sound = readable(slim).case
     readably = before if sound is slim else examiner.examine(sound, reference=before.reference)
-    attributor = Attributor(examiner, sound, rules, readably, after, tolerance, lambda step: None)
+    attributor = CauseAttributor(examiner, sound, rules, readably, after, tolerance, lambda step: None)
     return [
         proof
         for rule in own

@@ -56,7 +56,7 @@ _LOADER_NAMES = {
 
 
 @dataclass(frozen=True)
-class RobotEntry:
+class LibraryRobot:
     """A robot of the library: its name, file, source and aliases."""
 
     name: str
@@ -66,7 +66,7 @@ class RobotEntry:
 
 
 @lru_cache(maxsize=1)
-def robots() -> tuple[RobotEntry, ...]:
+def robots() -> tuple[LibraryRobot, ...]:
     """List every robot of the library: example-robot-data, then dynx's own, each sorted by name.
 
     Names are unique, and no alias equals the name or an alias of another robot.
@@ -89,7 +89,7 @@ def robots() -> tuple[RobotEntry, ...]:
         path, source, _ = files[index]
         alias = path.stem
         unused = alias not in names and stems.count(alias) == 1
-        entries.append(RobotEntry(name, path, source, (alias,) if unused else ()))
+        entries.append(LibraryRobot(name, path, source, (alias,) if unused else ()))
     return tuple(sorted(entries, key=lambda entry: (entry.source != EXAMPLE_ROBOT_DATA, entry.name)))
 
 

@@ -183,7 +183,7 @@ def _kill(process: subprocess.Popen[bytes]) -> None:
             os.killpg(process.pid, signal.SIGKILL)
 
 
-class _Arguments(dict[str, str]):
+class _XacroArguments(dict[str, str]):
     """Values of arguments by name, which remembers the names that xacro looked up.
 
     xacro adds the defaults of the arguments that the file declares.
@@ -238,7 +238,7 @@ def expand_here(path: str, roots: list[str], arguments: dict[str, str]) -> None:
         os.dup2(nowhere, 2)
         try:
             _bound_memory()
-            values = _Arguments(arguments)
+            values = _XacroArguments(arguments)
             document = xacro.process_file(path, mappings=values)
             values.refuse_unused()
             text = document.toprettyxml(indent="  ", encoding="utf-8")

@@ -9,7 +9,7 @@ from typing import Any
 
 from dynx.doctor import DoctorReport, Finding, diagnose
 from dynx.doctor.formats import Baseline, wording
-from dynx.doctor.formats.baseline import Difference
+from dynx.doctor.formats.baseline import PlacedDifference
 from dynx.doctor.report import Effect
 from dynx.errors import DynxError
 from dynx.model.tree import Base
@@ -39,13 +39,13 @@ def require_same_loading(plan: RobotPlan, robot: str, label: str, base: Base) ->
         raise Disagreement("\n".join(lines))
 
 
-def _difference(each: Difference, report: DoctorReport) -> list[str]:
+def _difference(each: PlacedDifference, report: DoctorReport) -> list[str]:
     engines = ", ".join(sorted(each.engines))
     lines = [f"  {each.place} ({engines}): {_error(each, report)}"]
     return lines + [f"    {_where(found, report)}{found.message}" for found in _findings(each, report)]
 
 
-def _error(each: Difference, report: DoctorReport) -> str:
+def _error(each: PlacedDifference, report: DoctorReport) -> str:
     if math.isfinite(each.relative_error):
         return f"relative error {each.relative_error:.2e}"
     effects = (found.effect for found in _findings(each, report) if found.effect is not None)
@@ -53,7 +53,7 @@ def _error(each: Difference, report: DoctorReport) -> str:
     return wording.effect(largest or Effect(each.place.quantity or "", each.relative_error))
 
 
-def _findings(each: Difference, report: DoctorReport) -> list[Finding]:
+def _findings(each: PlacedDifference, report: DoctorReport) -> list[Finding]:
     place = each.place
     return [
         found

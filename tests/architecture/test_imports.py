@@ -8,6 +8,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 
+TYPES_OF_DOORS = ("dynx.backends.base", "dynx.ik")
+"""The interface of backends imports types from inverse kinematics, whose functions open as doors
+(`dynx.registry.door`)."""
+
 
 @cache
 def modules() -> dict[str, Path]:
@@ -45,6 +49,9 @@ def packages_above(module: str) -> set[str]:
 def loads(module: str) -> set[str]:
     """Return what importing a module runs directly: its imports and the packages around them, not its own."""
     imported = imports()[module]
+    importer, room = TYPES_OF_DOORS
+    if module == importer:
+        imported = {each for each in imported if not f"{each}.".startswith(f"{room}.")}
     around = {package for each in imported for package in packages_above(each)}
     return imported | (around - packages_above(module) - {module})
 

@@ -9,7 +9,7 @@ import pytest
 import dynx
 from dynx.bench.cases import BenchmarkCase
 from dynx.bench.cost import Cost
-from dynx.bench.measurement import Measurement
+from dynx.bench.measurement import BenchmarkMeasurement
 from dynx.bench.report import SCHEMA, document, is_wrong, result, wrong
 from dynx.bench.session import benchmark_cases
 from dynx.bench.timing import Times
@@ -19,10 +19,12 @@ CASE = BenchmarkCase("inverse_dynamics", 65536)
 COST = Cost(bytes=192, operations=750, multiply_adds=400)
 
 
-def found(implementation: str, nanoseconds: tuple[float, ...] | None, role: str = "backend") -> Measurement:
+def found(
+    implementation: str, nanoseconds: tuple[float, ...] | None, role: str = "backend"
+) -> BenchmarkMeasurement:
     """Return a measurement of the given nanoseconds."""
     times = None if nanoseconds is None else Times(tuple(1e-9 * each for each in nanoseconds))
-    return Measurement(CASE, implementation, role, "1.0", 1, 65536, 1e-15, 1e-13, times)
+    return BenchmarkMeasurement(CASE, implementation, role, "1.0", 1, 65536, 1e-15, 1e-13, times)
 
 
 GROUP = [
@@ -62,9 +64,9 @@ def test_the_roofline_is_that_of_the_threads_of_the_implementation() -> None:
 
 
 def test_wrong_results_and_failures_are_listed() -> None:
-    right, refused = GROUP[0], Measurement(CASE, "x", "backend", "", 1, 8, problem="cannot")
-    bad = Measurement(CASE, "x", "backend", "", 1, 8, 1e-3, 1e-13, problem="wrong result")
-    nothing = Measurement(CASE, "x", "backend", "", 1, 8, float("nan"), 1e-13)
+    right, refused = GROUP[0], BenchmarkMeasurement(CASE, "x", "backend", "", 1, 8, problem="cannot")
+    bad = BenchmarkMeasurement(CASE, "x", "backend", "", 1, 8, 1e-3, 1e-13, problem="wrong result")
+    nothing = BenchmarkMeasurement(CASE, "x", "backend", "", 1, 8, float("nan"), 1e-13)
     assert [is_wrong(each) for each in (right, refused, bad, nothing)] == [False, False, True, True]
     assert wrong([[right, bad], [refused]]) == [bad]
 

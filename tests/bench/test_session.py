@@ -8,7 +8,7 @@ import dynx
 from dynx.backends.registry import installed_backends
 from dynx.bench.cases import BenchmarkCase
 from dynx.bench.cost import cost_of, program_of
-from dynx.bench.measurement import Measurement
+from dynx.bench.measurement import BenchmarkMeasurement
 from dynx.bench.session import (
     BATCHES,
     MIN_BATCH_FOR_THREADS,
@@ -94,9 +94,9 @@ def test_the_cost_is_that_of_the_compiled_program() -> None:
     assert session.cost(measured("pinocchio")) is None
 
 
-def measured(implementation: str) -> Measurement:
+def measured(implementation: str) -> BenchmarkMeasurement:
     """Return a measurement of the mass matrix."""
-    return Measurement(BenchmarkCase("mass_matrix", 8), implementation, "backend", "", 1, 8)
+    return BenchmarkMeasurement(BenchmarkCase("mass_matrix", 8), implementation, "backend", "", 1, 8)
 
 
 def test_all_implementations_are_the_backends_then_the_peers() -> None:

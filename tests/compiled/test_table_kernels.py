@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.every_quantity import serial_arm, tree
 from dynx.backends import backend
-from dynx.backends.evaluation import MIN_SUMMED_COLUMNS, Evaluation
+from dynx.backends.evaluation import MIN_SUMMED_COLUMNS, HookEvaluation
 from dynx.backends.quantities import QUANTITIES
 from dynx.compiled.call import MAX_COPIED_SAMPLES
 from dynx.compiled.table_kernels import TABLE_QUANTITIES
@@ -108,7 +108,7 @@ def test_rows_and_columns_are_reduced_by_the_coupling(
     assert mechanism.coupling is not None
     S = mechanism.coupling.matrix()
     A = np.random.default_rng(0).normal(size=(*batch, len(S), columns))
-    evaluation = Evaluation(mechanism, vectorized=True)
+    evaluation = HookEvaluation(mechanism, vectorized=True)
     np.testing.assert_allclose(evaluation.reduce_rows(A), S.T @ A, rtol=0.0, atol=1e-14)
     A = np.swapaxes(A, -1, -2)
     np.testing.assert_allclose(evaluation.reduce_columns(A), A @ S, rtol=0.0, atol=1e-14)

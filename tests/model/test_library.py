@@ -87,7 +87,7 @@ def test_names_do_not_depend_on_the_order_of_the_file_system(monkeypatch: pytest
 
 
 @pytest.mark.parametrize("entry", robots(), ids=lambda entry: entry.name)
-def test_every_robot_loads_but_the_empty_shell(entry: library.RobotEntry) -> None:
+def test_every_robot_loads_but_the_empty_shell(entry: library.LibraryRobot) -> None:
     if entry.name == "ur_description_ur3":
         with pytest.raises(DescriptionError, match="the robot has no link"):
             load(entry.name)

@@ -7,7 +7,7 @@ from itertools import count
 from dynx.backends.registry import backend_class
 from dynx.bench.cases import BENCHMARK_QUANTITIES
 from dynx.bench.machine import processor_description
-from dynx.bench.measurement import Measurement
+from dynx.bench.measurement import BenchmarkMeasurement
 from dynx.bench.report import document, wrong
 from dynx.bench.session import (
     BATCHES,
@@ -67,7 +67,7 @@ def bench(
 
 def run_bench(session: Session, *, json_path: str | None) -> int:
     """Measure every case and show the results, also after Ctrl-C; return the exit code."""
-    found: list[list[Measurement]] = []
+    found: list[list[BenchmarkMeasurement]] = []
     cases = session.plan.cases
     with interruptible() as interruption:
         try:

@@ -16,7 +16,7 @@ from dynx.cli.shell.terminal import counted
 from dynx.doctor.formats import wording
 from dynx.doctor.formats.causes import (
     ROUNDING,
-    Cause,
+    RuleFindings,
     catalogue_entry,
     causes,
 )
@@ -144,7 +144,7 @@ def show_variants(out: Console, report: DoctorReport) -> None:
                 sentence(out, f"-> {one_line(rule.advice)}", 2)
 
 
-def _show_findings(out: Console, found: Sequence[Cause], places: int) -> None:
+def _show_findings(out: Console, found: Sequence[RuleFindings], places: int) -> None:
     """Print the causes with an effect, those without, and bad practice; above them the command that explains
     a rule."""
     rest = [each for each in found if each.largest_effect is None]
@@ -162,7 +162,7 @@ def _show_findings(out: Console, found: Sequence[Cause], places: int) -> None:
             more = ""
 
 
-def _show_causes(out: Console, found: Sequence[Cause], places: int) -> None:
+def _show_causes(out: Console, found: Sequence[RuleFindings], places: int) -> None:
     for cause in found:
         out.print(_cause_line(cause))
         sentence(out, f"{one_line(cause.title)} ({_extent(cause)})", 6)
@@ -171,7 +171,7 @@ def _show_causes(out: Console, found: Sequence[Cause], places: int) -> None:
             sentence(out, f"-> {one_line(cause.advice)}", 6)
 
 
-def _show_places(out: Console, cause: Cause, places: int) -> None:
+def _show_places(out: Console, cause: RuleFindings, places: int) -> None:
     shown = cause.findings[:places]
     more = f"; and {len(cause.findings) - len(shown)} more" if len(cause.findings) > len(shown) else ""
     for finding in shown:
@@ -185,7 +185,7 @@ def _place(finding: Finding) -> str:
     return f"{line}{wording.part(finding)}"
 
 
-def _cause_line(cause: Cause) -> Text:
+def _cause_line(cause: RuleFindings) -> Text:
     """Make the line of a cause: rule, largest effect, and whether it is proved."""
     largest = cause.largest_effect
     line = Text(f"  {wording.name(cause.rule)} {wording.name(cause.name)}", STYLES[cause.severity])
@@ -198,7 +198,7 @@ def _cause_line(cause: Cause) -> Text:
     return line
 
 
-def _extent(cause: Cause) -> str:
+def _extent(cause: RuleFindings) -> str:
     """Write the number of places with an effect and the engines, and the number of places without effect."""
     engines = f" in {', '.join(map(wording.name, cause.engines))}" if cause.engines else ""
     acting = sum(each.effect is not None for each in cause.findings) or len(cause.findings)

@@ -32,7 +32,7 @@ from dynx.doctor.counterexample.tree_reductions import (
     fewer_moving_joints,
     higher_links,
 )
-from dynx.doctor.counterexample.trials import Difference, Trials
+from dynx.doctor.counterexample.trials import Difference, ReductionTrials
 from dynx.doctor.examine.reference_values import draw_states
 from dynx.doctor.report import Counterexample
 from dynx.errors import DescriptionError
@@ -79,7 +79,7 @@ def smallest_counterexample(
     Returns None where dynx cannot read the case, or `INITIAL_STATES` random states, which follow from
     `seed`, show no error above `tolerance`.
     """
-    trials = Trials(difference, case, budget)
+    trials = ReductionTrials(difference, case, budget)
     state = _first_state(case, trials, tolerance, seed)
     if state is None:
         return None
@@ -95,7 +95,7 @@ def smallest_counterexample(
     return _result(_format_case(case, state, trials), state, trials)
 
 
-def _first_state(case: Case, trials: Trials, tolerance: float, seed: int) -> ReducibleState | None:
+def _first_state(case: Case, trials: ReductionTrials, tolerance: float, seed: int) -> ReducibleState | None:
     """Find the state of the largest error, and set the threshold of the trials by it."""
     model = trials.model(case)
     if model is None:
@@ -113,7 +113,7 @@ def _first_state(case: Case, trials: Trials, tolerance: float, seed: int) -> Red
 def _reduce(
     case: Case,
     state: ReducibleState,
-    trials: Trials,
+    trials: ReductionTrials,
     kinds: Sequence[Callable[[XmlSource], Reductions]],
 ) -> Case:
     for kind in kinds:
@@ -136,7 +136,7 @@ def _reduce(
     return case
 
 
-def _format_case(case: Case, state: ReducibleState, trials: Trials) -> Case:
+def _format_case(case: Case, state: ReducibleState, trials: ReductionTrials) -> Case:
     """Format the text of the case, if the formatted text shows the difference too."""
     for numbers in (True, False):
         text = format_document(case.source, numbers=numbers)
@@ -146,7 +146,7 @@ def _format_case(case: Case, state: ReducibleState, trials: Trials) -> Case:
     return case
 
 
-def _result(case: Case, state: ReducibleState, trials: Trials) -> Counterexample:
+def _result(case: Case, state: ReducibleState, trials: ReductionTrials) -> Counterexample:
     model = trials.model(case)
     assert model is not None
     q, v, a = (tuple(row.tolist()) for row in state.on(model))

@@ -26,12 +26,16 @@ def fewer_links(source: XmlSource) -> Reductions:
     """Remove links with their parent joints; their children are connected to the nearest remaining link
     towards the root. The links of a limb follow each other in the list, so that whole limbs can be removed
     at once."""
-    return Reductions(_Tree(source).below_root(), lambda chosen: _Tree(source).without_children(chosen))
+    return Reductions(
+        _LinkTree(source).below_root(), lambda chosen: _LinkTree(source).without_children(chosen)
+    )
 
 
 def higher_links(source: XmlSource) -> Reductions:
     """Remove links, including the root, with one of their child joints, whose child replaces them."""
-    return Reductions(_Tree(source).below_root(), lambda chosen: _Tree(source).without_parents(chosen))
+    return Reductions(
+        _LinkTree(source).below_root(), lambda chosen: _LinkTree(source).without_parents(chosen)
+    )
 
 
 def fewer_moving_joints(source: XmlSource) -> Reductions:
@@ -43,7 +47,7 @@ def fewer_moving_joints(source: XmlSource) -> Reductions:
     )
 
 
-class _Tree:
+class _LinkTree:
     """The joints of a document with their ends, which reductions change."""
 
     def __init__(self, source: XmlSource) -> None:

@@ -26,7 +26,7 @@ MAX_TRIALS = 1500
 """Largest number of trials; each loads an engine, which takes 5 to 50 ms."""
 
 
-class Trials:
+class ReductionTrials:
     """Evaluator of `difference` that stores its values and stops when the budget [s] is spent.
 
     A robot is tried only if it has no cause of the catalogue that the `original` does not have: a link

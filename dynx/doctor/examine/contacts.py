@@ -23,7 +23,7 @@ _MAX_PAIRS = 4
 
 
 @dataclass
-class Contact:
+class LinkContact:
     """Number of states in which two links touch, how deep they penetrate each other at most [m], and the
     positions of the joints where they do."""
 
@@ -62,11 +62,11 @@ def deepest_contact(case: Case, engines: Iterable[str], seed: int) -> Mapping[st
     return None
 
 
-def links_in_contact(case: Case, engine: str, seed: int) -> Mapping[tuple[str, str], Contact]:
+def links_in_contact(case: Case, engine: str, seed: int) -> Mapping[tuple[str, str], LinkContact]:
     """Find the pairs of links that touch; raises EngineError where the engine refuses the file."""
     model = model_without_mimics(case.source, case.base)
     base = 7 if model.floating else 0
-    found: dict[tuple[str, str], Contact] = {}
+    found: dict[tuple[str, str], LinkContact] = {}
     with (
         temporary_urdf(without_meshes(case.source)) as path,
         silence(),
@@ -74,7 +74,7 @@ def links_in_contact(case: Case, engine: str, seed: int) -> Mapping[tuple[str, s
     ):
         for q in following_positions(case, STATES, seed):
             for pair, depth in robot.contacts(q).items():
-                contact = found.setdefault(pair, Contact())
+                contact = found.setdefault(pair, LinkContact())
                 contact.states += 1
                 if depth > contact.depth:
                     contact.depth = depth

@@ -65,7 +65,7 @@ class BaselineDocument:
 
 
 @dataclass(frozen=True)
-class Difference:
+class PlacedDifference:
     """A difference with its engines; `relative_error` is shown, and not compared."""
 
     place: Place
@@ -74,12 +74,12 @@ class Difference:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class BaselineComparison:
     """Differences of a report that are new or known, and known ones that have vanished."""
 
-    new: tuple[Difference, ...]
-    known: tuple[Difference, ...]
-    vanished: tuple[Difference, ...]
+    new: tuple[PlacedDifference, ...]
+    known: tuple[PlacedDifference, ...]
+    vanished: tuple[PlacedDifference, ...]
 
 
 @dataclass(frozen=True)
@@ -88,9 +88,9 @@ class Baseline:
     checkout elsewhere has the same baseline."""
 
     folder: str
-    known: tuple[Difference, ...] = ()
+    known: tuple[PlacedDifference, ...] = ()
 
-    def compare(self, report: DoctorReport) -> Comparison:
+    def compare(self, report: DoctorReport) -> BaselineComparison:
         """Compare a report. A difference of an engine that did not take part has not vanished."""
         allowed: dict[Place, frozenset[str]] = {}
         for each in self.known:
@@ -106,17 +106,17 @@ class Baseline:
             for each in self.known
             if each.place in gone and (each.place.robot, each.place.base) == robot and each.engines & present
         )
-        return Comparison(new, known, vanished)
+        return BaselineComparison(new, known, vanished)
 
 
-def differences(report: DoctorReport, folder: str) -> tuple[Difference, ...]:
+def differences(report: DoctorReport, folder: str) -> tuple[PlacedDifference, ...]:
     """Collect the differences of a report: each cause with an effect, and each unexplained difference."""
     robot, base = robot_key(report, folder), report.base or ""
-    merged: dict[Place, Difference] = {}
+    merged: dict[Place, PlacedDifference] = {}
 
     def add(place: Place, engines: Iterable[str], error: float) -> None:
-        old = merged.get(place, Difference(place, frozenset()))
-        merged[place] = Difference(place, old.engines | set(engines), max(old.relative_error, error))
+        old = merged.get(place, PlacedDifference(place, frozenset()))
+        merged[place] = PlacedDifference(place, old.engines | set(engines), max(old.relative_error, error))
 
     def add_unexplained(engine: str, quantity: str, error: float, joint: str | None = None) -> None:
         add(Place(robot, base, UNEXPLAINED, None, joint, quantity), (engine,), error)
@@ -181,7 +181,7 @@ def read_baseline(text: str, path: str) -> Baseline:
             f"{where} has schema {document.schema}; this version of dynx reads schema {SCHEMA}"
         )
     known = tuple(
-        Difference(
+        PlacedDifference(
             Place(each.robot, each.base, each.rule, each.link, each.joint, each.quantity),
             frozenset(each.engines),
             math.inf if each.relative_error is None else each.relative_error,

@@ -22,7 +22,7 @@ _ORDER: tuple[Severity, ...] = ("error", "warning", "note")
 
 
 @dataclass(frozen=True)
-class Cause:
+class RuleFindings:
     """One rule of the catalogue and all places where it was found."""
 
     rule: str
@@ -73,14 +73,16 @@ class Cause:
         return min((severity(each) for each in self.findings), key=_ORDER.index)
 
 
-def causes(report: DoctorReport) -> list[Cause]:
+def causes(report: DoctorReport) -> list[RuleFindings]:
     """Group the findings by rule. Rules are ordered by severity, largest effect and number; the places of
     a rule by the magnitude of their effect, then as in the file."""
     groups: dict[str, list[Finding]] = {}
     for finding in report.findings:
         groups.setdefault(finding.rule, []).append(finding)
     found = [
-        Cause(rule, each[0].name, each[0].kind, tuple(sorted(each, key=lambda one: -_size(one.effect))))
+        RuleFindings(
+            rule, each[0].name, each[0].kind, tuple(sorted(each, key=lambda one: -_size(one.effect)))
+        )
         for rule, each in groups.items()
     ]
     return sorted(

@@ -11,8 +11,8 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from xml.etree import ElementTree
 
 from dynx.doctor.formats import wording
-from dynx.doctor.formats.baseline import Baseline, Difference
-from dynx.doctor.formats.causes import Cause, causes
+from dynx.doctor.formats.baseline import Baseline, PlacedDifference
+from dynx.doctor.formats.causes import RuleFindings, causes
 from dynx.doctor.report import DoctorReport, Finding
 from dynx.errors import located
 
@@ -66,7 +66,9 @@ def _suite_of(title: str, seconds: float, cases: Iterable[tuple[str, Element | N
     return suite
 
 
-def _cases(report: DoctorReport, new: Collection[Difference] | None) -> Iterator[tuple[str, Element | None]]:
+def _cases(
+    report: DoctorReport, new: Collection[PlacedDifference] | None
+) -> Iterator[tuple[str, Element | None]]:
     """Yield the name of each test case with its result; None for one that passes."""
     if report.error is not None:
         message = wording.name(report.error.message, 2000)
@@ -97,7 +99,7 @@ def _quantities(report: DoctorReport, *, accepted: bool) -> Iterator[tuple[str, 
         yield f"{wording.quantity(key)} as loaded", _failure(message, known=accepted) if far else None
 
 
-def _cause(cause: Cause, report: DoctorReport, *, known: bool) -> Element:
+def _cause(cause: RuleFindings, report: DoctorReport, *, known: bool) -> Element:
     lines = [cause.title, *(_place(each, report) for each in cause.findings[:_SHOWN_PLACES])]
     if len(cause.findings) > _SHOWN_PLACES:
         lines.append(f"and {len(cause.findings) - _SHOWN_PLACES} more")

@@ -28,7 +28,7 @@ _COMPONENTS = {
 
 
 @dataclass(frozen=True)
-class Row:
+class ModelTableRow:
     """One number of the file and, by engine, the values that differ from it, as text."""
 
     title: str
@@ -41,7 +41,7 @@ class ModelTable:
     """Rows by their owner, such as ``link tool0``; `count` is the number of deviations in the table."""
 
     engines: tuple[str, ...]
-    owners: tuple[tuple[str, tuple[Row, ...]], ...]
+    owners: tuple[tuple[str, tuple[ModelTableRow, ...]], ...]
     left_out: int
     count: int
 
@@ -72,9 +72,9 @@ def _table(deviations: Sequence[Deviation], engines: Iterable[str]) -> ModelTabl
     return ModelTable(tuple(engines), tuple(owners), max(count - SHOWN_ROWS, 0), len(deviations))
 
 
-def _row(title: str, file: Any, engine_values: Mapping[str, Any]) -> Row:
+def _row(title: str, file: Any, engine_values: Mapping[str, Any]) -> ModelTableRow:
     texts = wording.values([file, *engine_values.values()])
-    return Row(title, texts[0], dict(zip(engine_values, texts[1:], strict=True)))
+    return ModelTableRow(title, texts[0], dict(zip(engine_values, texts[1:], strict=True)))
 
 
 def _components(each: Deviation) -> Iterator[tuple[str, Any, Any]]:

@@ -40,7 +40,7 @@ MINOR_SHARE = 1e-3
 
 
 @dataclass(frozen=True)
-class Attribution:
+class AttributedCause:
     """The effect of one rule at one place on each engine where it has one above the tolerance.
 
     `minor` has the effects that are smaller, which may add up; None where they were not measured place by
@@ -61,7 +61,7 @@ class Attribution:
 
 
 @dataclass(frozen=True, eq=False)
-class Attributor:
+class CauseAttributor:
     """Proves the causes in one case from its examinations `before` and `after` mending."""
 
     examiner: Examiner
@@ -72,7 +72,9 @@ class Attributor:
     tolerance: float
     progress: Callable[[str], None]
 
-    def attribute(self, rule: Rule, found: Sequence[Detection], *, minor: bool = False) -> list[Attribution]:
+    def attribute(
+        self, rule: Rule, found: Sequence[Detection], *, minor: bool = False
+    ) -> list[AttributedCause]:
         """Measure the effect of the rule at each of the places where it was found.
 
         Places are measured one by one if together they have an effect above the tolerance, or `minor` effects
@@ -87,7 +89,7 @@ class Attributor:
         if len(found) == 1:
             return [self._attribution(rule, each, whole) for each in found]
         if not affected:
-            return [Attribution(rule, each, {}, False) for each in found]
+            return [AttributedCause(rule, each, {}, False) for each in found]
         places: dict[Place, list[Detection]] = {}
         for each in found:
             places.setdefault(place_of(rule, each), []).append(each)
@@ -250,14 +252,14 @@ class Attributor:
                 largest = Effect(quantity, error)
         return largest
 
-    def _attribution(self, rule: Rule, each: Detection, measured: Mapping[str, Effect]) -> Attribution:
+    def _attribution(self, rule: Rule, each: Detection, measured: Mapping[str, Effect]) -> AttributedCause:
         measured = {name: measured[name] for name in self.examiner.engines if name in measured}
         effects = self._large(measured)
         if rule.present_as:
             effects = {name: Effect(rule.present_as, inf) for name in effects}
         right = all(self.after.max_error(engine) <= self.tolerance for engine in effects)
         minor = {name: effect for name, effect in measured.items() if name not in effects}
-        return Attribution(rule, each, effects, bool(effects) and right, minor, self._behind(rule))
+        return AttributedCause(rule, each, effects, bool(effects) and right, minor, self._behind(rule))
 
     def _reference_of(self, remedy: Remedy) -> ReferenceValues:
         """Return the reference values of the file after a remedy: those of the file before it where the robot

@@ -77,7 +77,7 @@ def _after_reading_rules(case: Case, level: Level) -> Mending:
 
 
 @dataclass(frozen=True)
-class Appearance:
+class TextCause:
     """A cause in the text that shows only in `case`, after the remedies of other rules about the text.
 
     `line` is that of the detection in the text as it is.
@@ -89,10 +89,10 @@ class Appearance:
     line: int | None
 
 
-def appearances(case: Case, rules: Sequence[Rule]) -> list[Appearance]:
+def appearances(case: Case, rules: Sequence[Rule]) -> list[TextCause]:
     """Find the causes that hide behind others in text that dynx refuses."""
     known = {place_of(rule, each) for rule in rules if rule.stage == "reading" for each in rule.detect(case)}
-    found: list[Appearance] = []
+    found: list[TextCause] = []
     here = case
     for rule, remedy in readable(case).applied:
         lines: dict[int, int] | None = None
@@ -102,7 +102,7 @@ def appearances(case: Case, rules: Sequence[Rule]) -> list[Appearance]:
             known.add(place_of(rule, each))
             lines = lines or line_map(*(_lines(one) for one in (case, here)))
             line = None if each.line is None else lines.get(each.line, each.line)
-            found.append(Appearance(rule, each, here, line))
+            found.append(TextCause(rule, each, here, line))
         here = remedy.case
     return found
 

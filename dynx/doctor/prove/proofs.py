@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from dynx.doctor.examine.contacts import deepest_contact
 from dynx.doctor.examine.examination import Examination, Examiner
-from dynx.doctor.prove.attribution import Attribution, Attributor
+from dynx.doctor.prove.attribution import AttributedCause, CauseAttributor
 from dynx.doctor.prove.mending import appearances, detections, place_of, readable
 from dynx.rules import Case, Rule
 
@@ -49,13 +49,13 @@ class Proofs:
         self._by_text = self._attributor(self._text, examiner, before, after)
         self._by_robot = self._attributor(self._robot, examiner, readably, after)
 
-    def attributions(self) -> list[Attribution]:
+    def attributions(self) -> list[AttributedCause]:
         """Measure the effect of every rule about differences at every place."""
         rules = dict.fromkeys([*(rule for rule, _ in self._found), *(each.rule for each in self._hidden)])
         return [each for rule in rules for each in self.measure(rule)]
 
-    def measure(self, rule: Rule, *, minor: bool = False) -> list[Attribution]:
-        """Measure the effect of one rule at every place; see `Attributor.attribute`."""
+    def measure(self, rule: Rule, *, minor: bool = False) -> list[AttributedCause]:
+        """Measure the effect of one rule at every place; see `CauseAttributor.attribute`."""
         places = [each for other, each in self._found if other is rule]
         by = self._by_text if rule.stage == "reading" else self._by_robot
         found = by.attribute(rule, places, minor=minor) if places else []
@@ -63,7 +63,7 @@ class Proofs:
             found = self._at_more_states(rule).attribute(rule, places, minor=minor)
         return [*found, *self._measure_hidden(rule, minor=minor)]
 
-    def _measure_hidden(self, rule: Rule, *, minor: bool) -> list[Attribution]:
+    def _measure_hidden(self, rule: Rule, *, minor: bool) -> list[AttributedCause]:
         """Measure the effect of one rule at the places that show only after other remedies, in that text."""
         hidden = [each for each in self._hidden if each.rule is rule]
         if not hidden:
@@ -73,7 +73,7 @@ class Proofs:
         by = self._attributor(case, self._examiner, before, self._after)
         return by.attribute(rule, [each.detection for each in hidden], minor=minor)
 
-    def _at_more_states(self, rule: Rule) -> Attributor:
+    def _at_more_states(self, rule: Rule) -> CauseAttributor:
         more = self._examiner.with_samples(RARE_STATES)
         engines = rule.named_of(more.engines)
         if rule.present_as and (touching := deepest_contact(self._robot, engines, more.seed)) is not None:
@@ -84,5 +84,5 @@ class Proofs:
 
     def _attributor(
         self, case: Case, examiner: Examiner, before: Examination, after: Examination
-    ) -> Attributor:
-        return Attributor(examiner, case, self._rules, before, after, self._tolerance, self._progress)
+    ) -> CauseAttributor:
+        return CauseAttributor(examiner, case, self._rules, before, after, self._tolerance, self._progress)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from dynx.doctor.examine.examination import LOADING, RESULT, Examination, Examiner
-from dynx.doctor.prove.attribution import Attribution
+from dynx.doctor.prove.attribution import AttributedCause
 from dynx.doctor.prove.mending import mend, place_of
 from dynx.doctor.prove.proofs import Proofs
 from dynx.rules import Case, Rule
@@ -21,26 +21,26 @@ _LEAST = {"DX118": "least"}
 
 
 def with_refusals(
-    attributions: Sequence[Attribution],
+    attributions: Sequence[AttributedCause],
     case: Case,
     rules: Sequence[Rule],
     examiner: Examiner,
     before: Examination,
     tolerance: float,
     progress: Callable[[str], None],
-) -> list[Attribution]:
+) -> list[AttributedCause]:
     """Add the effects on loading that show only where every moving body has a mass."""
     massive = replace(case, choices={**(case.choices or {}), **_LEAST})
     mended = mend(massive, rules).case
     after = examiner.examine(mended)
     proofs = Proofs(massive, rules, examiner, before, mended, after, tolerance, progress)
-    found: dict[tuple[object, ...], list[Attribution]] = {}
+    found: dict[tuple[object, ...], list[AttributedCause]] = {}
     for each in proofs.attributions():
         found.setdefault(place_of(each.rule, each.detection), []).append(each)
     return [_with_loading(each, found.get(place_of(each.rule, each.detection), [])) for each in attributions]
 
 
-def _with_loading(each: Attribution, found: list[Attribution]) -> Attribution:
+def _with_loading(each: AttributedCause, found: list[AttributedCause]) -> AttributedCause:
     if not found:
         return each
     other = found.pop(0)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 from dynx.doctor.examine.examination import Examination, Examiner
-from dynx.doctor.prove.attribution import Attribution
+from dynx.doctor.prove.attribution import AttributedCause
 from dynx.doctor.prove.mending import Mending, Place, all_except, mend, place_of
 from dynx.rules import CallingRule, Case, Rule
 
@@ -17,28 +17,28 @@ larger at other states."""
 _SHARES = (0.3, 0.1, 0.03, 0.01, 0.003, 0.0)
 """Effects, as shares of the tolerance, up to which places are left as they are, one after the other."""
 
-MeasureMinor = Callable[[Rule], Sequence[Attribution]]
+MeasureMinor = Callable[[Rule], Sequence[AttributedCause]]
 """Measurement of a rule place by place, with the effects that are smaller than the tolerance."""
 
 
 @dataclass(frozen=True)
-class Selection:
+class SelectedPlaces:
     """A mending, its examination, the proofs of causes, and the places that it leaves as they are."""
 
     mending: Mending
     examination: Examination
-    proofs: Sequence[Attribution]
+    proofs: Sequence[AttributedCause]
     omitted: frozenset[Place] = frozenset()
 
 
 def smallest_mending(
     case: Case,
     rules: Sequence[Rule],
-    full: Selection,
+    full: SelectedPlaces,
     examiner: Examiner,
     tolerance: float,
     measure: MeasureMinor,
-) -> Selection:
+) -> SelectedPlaces:
     """Leave the places without effect as they are, if that reduces the errors as far as `full` does.
 
     Effects below the tolerance can add up to more than that. Then the largest of them count as effects.
@@ -58,7 +58,7 @@ def smallest_mending(
         return full
     least, result, wrong = attempt(idle)
     if not wrong:
-        return Selection(least, result, proofs, frozenset(idle))
+        return SelectedPlaces(least, result, proofs, frozenset(idle))
     unknown = {each.rule.id: each.rule for each in proofs if each.minor is None and each.rule.named_of(wrong)}
     measured = {name: list(measure(rule)) for name, rule in unknown.items()}
     proofs = [measured[each.rule.id].pop(0) if each.rule.id in measured else each for each in proofs]
@@ -66,11 +66,11 @@ def smallest_mending(
         grown = [_with_minor(each, share * tolerance, right) for each in proofs]
         least, result, wrong = attempt(_idle_places(grown))
         if not wrong:
-            return Selection(least, result, grown, frozenset(_idle_places(grown)))
+            return SelectedPlaces(least, result, grown, frozenset(_idle_places(grown)))
     return replace(full, proofs=grown)
 
 
-def _idle_places(proofs: Sequence[Attribution]) -> set[Place]:
+def _idle_places(proofs: Sequence[AttributedCause]) -> set[Place]:
     """Find the places without effect. Calls that change no file are made on the whole robot or not at all."""
     places = {place_of(each.rule, each.detection) for each in proofs}
     effective = {place_of(each.rule, each.detection) for each in proofs if each.effects}
@@ -78,7 +78,7 @@ def _idle_places(proofs: Sequence[Attribution]) -> set[Place]:
     return {place for place in places - effective if place[0] not in called}
 
 
-def _with_minor(each: Attribution, bound: float, right: Collection[str]) -> Attribution:
+def _with_minor(each: AttributedCause, bound: float, right: Collection[str]) -> AttributedCause:
     """Count the minor effects above the bound as effects, proved if all their engines end up `right`."""
     larger = {name: minor for name, minor in (each.minor or {}).items() if minor.relative_error > bound}
     effects = {**each.effects, **larger}

@@ -131,12 +131,12 @@ def scenes(
     for name, flag in flags.items():
         if not isinstance(flag, bool):
             raise DTypeError(f"{name} is {shown(flag)}; wanted True or False")
-    options = _Options(max_bodies, max_robots, ground, meshes=_checked_meshes(meshes), **flags)
+    options = _SceneOptions(max_bodies, max_robots, ground, meshes=_checked_meshes(meshes), **flags)
     return _scenes(options)
 
 
 @dataclass(frozen=True)
-class _Options:
+class _SceneOptions:
     max_bodies: int
     max_robots: int
     ground: GroundChoice
@@ -148,7 +148,7 @@ class _Options:
 
 
 @lru_cache(maxsize=32)
-def _scenes(options: _Options) -> Strategy[Scene]:
+def _scenes(options: _SceneOptions) -> Strategy[Scene]:
     body = _bodies(options)
     robot = _robots(options.moving)
     grounds = _grounds(options.ground)
@@ -183,7 +183,7 @@ def _scenes(options: _Options) -> Strategy[Scene]:
 # -- parts ----------------------------------------------------------------------------------------
 
 
-def _bodies(options: _Options) -> Strategy[SceneBody]:
+def _bodies(options: _SceneOptions) -> Strategy[SceneBody]:
     shape = _shapes(options.meshes)
     more = st.lists(st.tuples(shape, poses(0.2).map(Pose.from_matrix)), max_size=2)
     mass = st.sampled_from((1.0, 0.1, 10.0)) | st.floats(-1.0, 1.0).map(lambda x: _rounded(10.0**x))

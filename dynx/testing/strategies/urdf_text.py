@@ -71,12 +71,12 @@ def _check_expressible(model: Model) -> None:
 
 
 @dataclass(frozen=True)
-class _Element:
+class _SpelledElement:
     """An XML element before it is written as text."""
 
     tag: str
     attributes: Pairs
-    children: tuple[_Element, ...] = ()
+    children: tuple[_SpelledElement, ...] = ()
 
 
 def _text(model: Model, spellings: set[str]) -> str:
@@ -89,8 +89,8 @@ def _text(model: Model, spellings: set[str]) -> str:
     if "namespaces" in spellings:
         attributes.append(("xmlns:xacro", "http://www.ros.org/wiki/xacro"))
         attributes.append(("xmlns:known", "http://example.org/known"))
-        parts.append(_Element("known:thing", [("value", "1")]))
-    lines = _lines_of(_Element("robot", attributes, tuple(parts)), spellings, 0)
+        parts.append(_SpelledElement("known:thing", [("value", "1")]))
+    lines = _lines_of(_SpelledElement("robot", attributes, tuple(parts)), spellings, 0)
     if "comments" in spellings:
         decoy = '<!-- <link name="decoy"/> <joint name="decoy" type="none"/> a < b & c > d -->'
         lines = [lines[0], decoy, *lines[1:], decoy]
@@ -103,65 +103,69 @@ def _text(model: Model, spellings: set[str]) -> str:
     return mark + end.join(lines) + end
 
 
-def _link(link: Link, spellings: set[str]) -> _Element:
+def _link(link: Link, spellings: set[str]) -> _SpelledElement:
     children = []
     if "missing_meshes" in spellings:
-        mesh = _Element("mesh", [("filename", "package://nowhere/meshes/part.stl"), ("scale", "1 1 1")])
-        children.append(_Element("visual", [], (_Element("geometry", [], (mesh,)),)))
+        mesh = _SpelledElement(
+            "mesh", [("filename", "package://nowhere/meshes/part.stl"), ("scale", "1 1 1")]
+        )
+        children.append(_SpelledElement("visual", [], (_SpelledElement("geometry", [], (mesh,)),)))
     if link.inertial is not None:
         children.append(_inertial(link.inertial, spellings))
     if "undeclared_prefixes" in spellings:
-        children.append(_Element("drake:proximity_properties", [("drake:value", "0.1")]))
-    return _Element("link", [("name", link.name)], _ordered(children, spellings))
+        children.append(_SpelledElement("drake:proximity_properties", [("drake:value", "0.1")]))
+    return _SpelledElement("link", [("name", link.name)], _ordered(children, spellings))
 
 
-def _inertial(inertial: Inertial, spellings: set[str]) -> _Element:
+def _inertial(inertial: Inertial, spellings: set[str]) -> _SpelledElement:
     moments = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
     values = [(name, _number(getattr(inertial, name), spellings)) for name in moments]
     children = [
         *_origin(inertial.origin, spellings),
-        _Element("mass", [("value", _number(inertial.mass, spellings))]),
-        _Element("inertia", values),
+        _SpelledElement("mass", [("value", _number(inertial.mass, spellings))]),
+        _SpelledElement("inertia", values),
     ]
-    return _Element("inertial", [], _ordered(children, spellings))
+    return _SpelledElement("inertial", [], _ordered(children, spellings))
 
 
-def _joint(joint: Joint, spellings: set[str]) -> _Element:
+def _joint(joint: Joint, spellings: set[str]) -> _SpelledElement:
     children = [
         *_origin(joint.origin, spellings),
-        _Element("parent", [("link", joint.parent)]),
-        _Element("child", [("link", joint.child)]),
+        _SpelledElement("parent", [("link", joint.parent)]),
+        _SpelledElement("child", [("link", joint.child)]),
     ]
     explicit = "explicit_defaults" in spellings
     if joint.moves and (explicit or joint.axis != (1.0, 0.0, 0.0)):
-        children.append(_Element("axis", [("xyz", _vector(joint.axis, spellings))]))
+        children.append(_SpelledElement("axis", [("xyz", _vector(joint.axis, spellings))]))
     elif not joint.moves and "axis_of_fixed_joint" in spellings:
-        children.append(_Element("axis", [("xyz", "0 0 0")]))
+        children.append(_SpelledElement("axis", [("xyz", "0 0 0")]))
     children += _limit(joint, spellings) + _dynamics(joint, spellings) + _mimic(joint, spellings)
-    return _Element("joint", [("name", joint.name), ("type", joint.type)], _ordered(children, spellings))
+    return _SpelledElement(
+        "joint", [("name", joint.name), ("type", joint.type)], _ordered(children, spellings)
+    )
 
 
-def _limit(joint: Joint, spellings: set[str]) -> list[_Element]:
+def _limit(joint: Joint, spellings: set[str]) -> list[_SpelledElement]:
     if joint.type not in ("revolute", "prismatic"):
         return []
     values = [(end, getattr(joint.limits, end)) for end in ("lower", "upper")]
     values = [(end, math.copysign(sys.float_info.max, x) if math.isinf(x) else x) for end, x in values]
     most = ((name, getattr(joint.limits, name)) for name in ("velocity", "effort"))
     values += [(name, x) for name, x in most if x != INFINITY]
-    return [_Element("limit", [(name, _number(x, spellings)) for name, x in values])]
+    return [_SpelledElement("limit", [(name, _number(x, spellings)) for name, x in values])]
 
 
-def _dynamics(joint: Joint, spellings: set[str]) -> list[_Element]:
+def _dynamics(joint: Joint, spellings: set[str]) -> list[_SpelledElement]:
     # URDF has no armature, so the extension is written only for a joint that has one.
     always = ("damping", "friction") if "explicit_defaults" in spellings else ()
     values = ((name, getattr(joint.dynamics, name)) for name in ("damping", "friction", "armature"))
     given = [(name, value) for name, value in values if value or name in always]
     if not joint.moves or not given:
         return []
-    return [_Element("dynamics", [(name, _number(value, spellings)) for name, value in given])]
+    return [_SpelledElement("dynamics", [(name, _number(value, spellings)) for name, value in given])]
 
 
-def _mimic(joint: Joint, spellings: set[str]) -> list[_Element]:
+def _mimic(joint: Joint, spellings: set[str]) -> list[_SpelledElement]:
     if joint.mimic is None:
         return []
     attributes = [("joint", joint.mimic.joint)]
@@ -171,32 +175,34 @@ def _mimic(joint: Joint, spellings: set[str]) -> list[_Element]:
     ):
         if value != default or "explicit_defaults" in spellings:
             attributes.append((name, _number(value, spellings)))
-    return [_Element("mimic", attributes)]
+    return [_SpelledElement("mimic", attributes)]
 
 
-def _origin(pose: Pose, spellings: set[str]) -> list[_Element]:
+def _origin(pose: Pose, spellings: set[str]) -> list[_SpelledElement]:
     explicit = "explicit_defaults" in spellings
     vectors = (("xyz", pose.xyz), ("rpy", pose.rpy))
     given = [(name, _vector(vector, spellings)) for name, vector in vectors if explicit or any(vector)]
     if not given and "empty_origins" not in spellings:
         return []
-    return [_Element("origin", given)]
+    return [_SpelledElement("origin", given)]
 
 
-def _unknown_tags(model: Model) -> list[_Element]:
+def _unknown_tags(model: Model) -> list[_SpelledElement]:
     """Make tags of other programs, with inner links and joints that do not belong to the robot."""
     name = model.joints[0].name if model.joints else "none"
-    actuator = _Element("actuator", [("name", "motor")], (_Element("mechanicalReduction", []),))
-    inner = _Element("joint", [("name", name)], (_Element("hardwareInterface", []),))
-    sensor = _Element("sensor", [("name", "eye")], (_Element("link", [("name", model.root)]),))
+    actuator = _SpelledElement("actuator", [("name", "motor")], (_SpelledElement("mechanicalReduction", []),))
+    inner = _SpelledElement("joint", [("name", name)], (_SpelledElement("hardwareInterface", []),))
+    sensor = _SpelledElement("sensor", [("name", "eye")], (_SpelledElement("link", [("name", model.root)]),))
     return [
-        _Element("transmission", [("name", "drive")], (inner, actuator)),
-        _Element("gazebo", [("reference", model.root)], (sensor,)),
-        _Element("material", [("name", "grey")], (_Element("color", [("rgba", "0.5 0.5 0.5 1")]),)),
+        _SpelledElement("transmission", [("name", "drive")], (inner, actuator)),
+        _SpelledElement("gazebo", [("reference", model.root)], (sensor,)),
+        _SpelledElement(
+            "material", [("name", "grey")], (_SpelledElement("color", [("rgba", "0.5 0.5 0.5 1")]),)
+        ),
     ]
 
 
-def _ordered(children: list[_Element], spellings: set[str]) -> tuple[_Element, ...]:
+def _ordered(children: list[_SpelledElement], spellings: set[str]) -> tuple[_SpelledElement, ...]:
     return tuple(reversed(children)) if "children_reversed" in spellings else tuple(children)
 
 
@@ -222,7 +228,7 @@ def _number(x: float, spellings: set[str]) -> str:
     return ("-" if plain.startswith("-") else "+") + odd
 
 
-def _lines_of(element: _Element, spellings: set[str], depth: int) -> list[str]:
+def _lines_of(element: _SpelledElement, spellings: set[str], depth: int) -> list[str]:
     """Write the lines of an element."""
     indent = "" if "no_indentation" in spellings else "  " * depth
     attributes = list(element.attributes)

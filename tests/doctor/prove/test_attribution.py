@@ -8,7 +8,7 @@ from typing import ClassVar
 import pytest
 
 from dynx.doctor.examine.examination import LOADING, TORQUE
-from dynx.doctor.prove.attribution import Attribution, Attributor
+from dynx.doctor.prove.attribution import AttributedCause, CauseAttributor
 from dynx.doctor.prove.mending import mend
 from dynx.loaded import LoadedRobot
 from dynx.rules import Case, Detection, Remedy, Rule, find_rule
@@ -57,11 +57,11 @@ def attribute(
     *rules: Rule,
     engine: type[LoadedRobot] = FaultyEngine,
     tolerance: float = BAR,
-) -> list[Attribution]:
+) -> list[AttributedCause]:
     """Attribute the differences in a case to rules."""
     made = examiner(engine)
     before, after = made.examine(case), made.examine(mend(case, rules).case)
-    attributor = Attributor(made, case, rules, before, after, tolerance, lambda step: None)
+    attributor = CauseAttributor(made, case, rules, before, after, tolerance, lambda step: None)
     return [each for rule in rules for each in attributor.attribute(rule, rule.detect(case))]
 
 

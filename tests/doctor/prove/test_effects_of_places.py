@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from dynx.doctor.diagnosis import diagnose
 from dynx.doctor.examine.examination import ACCELERATION, TORQUE, Examiner
-from dynx.doctor.prove.attribution import Attribution, Attributor
+from dynx.doctor.prove.attribution import AttributedCause, CauseAttributor
 from dynx.doctor.prove.mending import mend, place_of
 from dynx.loaded import installed_engines, loader_class
 from dynx.model.xml.source import XmlSource
@@ -25,14 +25,14 @@ BAR = 1e-12
 SAMPLES, SEED = 3, 0
 
 
-def attributions(case: Case, rule: Rule) -> list[Attribution]:
+def attributions(case: Case, rule: Rule) -> list[AttributedCause]:
     """Attribute the differences in a case to one rule, all causes of other rules being there too."""
     examiner = Examiner(installed_engines(), SAMPLES, SEED)
     rules = [each for each in all_rules() if each.kind == "difference"]
     full = mend(case, rules)
     sound = examiner.reference(mend(case, [each for each in rules if each.stage == "reading"]).case)
     before, after = examiner.examine(case, reference=sound), examiner.examine(full.case)
-    attributor = Attributor(examiner, case, rules, before, after, BAR, lambda step: None)
+    attributor = CauseAttributor(examiner, case, rules, before, after, BAR, lambda step: None)
     return list(attributor.attribute(rule, rule.detect(case)))
 
 

@@ -53,7 +53,7 @@ def collada_points(data: bytes, *, by_bullet: bool = False) -> Floats | None:
     """
     try:
         with_text = _tags(data, _WITH_TEXT | {"p"} if by_bullet else _WITH_TEXT)
-        scene = _Scene(read_xml(data, "<mesh>", [], with_text=with_text))
+        scene = _ColladaScene(read_xml(data, "<mesh>", [], with_text=with_text))
         points_of = scene.points_of_faces if by_bullet else scene.points
         found = [points_of(geometry) @ T[:3, :3].T + T[:3, 3] for geometry, T in scene.placed()]
     except (_NotSupported, DescriptionError, ValueError):
@@ -71,7 +71,9 @@ def collada_triangles(data: bytes) -> tuple[Floats, NDArray[np.intp]]:
     Raises ValueError, with the reason, for a file that is damaged or has elements that are not supported.
     """
     try:
-        scene = _Scene(read_xml(data, "<mesh>", [], with_text=_tags(data, _WITH_TEXT | {"p", "vcount"})))
+        scene = _ColladaScene(
+            read_xml(data, "<mesh>", [], with_text=_tags(data, _WITH_TEXT | {"p", "vcount"}))
+        )
         vertices, faces, count, placed = [np.zeros((0, 3))], [np.zeros((0, 3), np.intp)], 0, 0
         for geometry, T in scene.placed():
             points = scene.points(geometry)
@@ -105,7 +107,7 @@ class _NotSupported(Exception):
     """An unsupported element, or a scene larger than the bounds; the text gives the reason."""
 
 
-class _Scene:
+class _ColladaScene:
     def __init__(self, root: Element) -> None:
         self._by_id: dict[str, Element] = {}
         for element in _all_below(root):

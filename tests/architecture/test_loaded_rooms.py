@@ -1,0 +1,116 @@
+"""Modules that a fresh process loads until a first result: which rooms, how many modules, how many lines.
+
+A ceiling is about what was measured when it was last lowered, and may only fall. `loaded_now` are the
+exceptions: what is still loaded of the rooms that a flow does not need. An entry is deleted with its imports.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import dataclass
+from functools import cache
+
+import pytest
+
+COUNT = """
+import json, sys
+modules = {n: m.__file__ for n, m in sys.modules.items() if n == "dynx" or n.startswith("dynx.")}
+lines = sum(len(open(f, encoding="utf-8").read().splitlines()) for f in modules.values())
+print(json.dumps([sorted(modules), lines]))
+"""
+
+ROBOT = "import dynx, numpy as np\nrobot = dynx.load('ur5')\nq = np.full(6, 0.3)\n"
+ENGINE = ROBOT + "engine = dynx.backend('pinocchio', robot)\n"
+
+
+@dataclass(frozen=True)
+class Flow:
+    """What a program does first, the rooms it does not need, and ceilings of modules and lines."""
+
+    program: str
+    not_needed: tuple[str, ...]
+    loaded_now: tuple[str, ...]
+    modules: int
+    lines: int
+
+
+FLOWS = {
+    "inverse dynamics": Flow(
+        ENGINE + "engine.inverse_dynamics(q, q, q)",
+        (
+            "ik",
+            "distance",
+            "world",
+            "sim",
+            "control",
+            "trajectory",
+            "compiled",
+            "simd",
+            "doctor",
+            "envs",
+            "viewer",
+        ),
+        (),
+        95,
+        12000,
+    ),
+    "inverse kinematics": Flow(
+        ENGINE + "engine.inverse_kinematics(engine.forward_kinematics(q, 'tool0'), 'tool0', q)",
+        ("world", "sim", "ik.closed_forms"),
+        (),
+        140,
+        20500,
+    ),
+    "simulate": Flow(
+        ROBOT + "from dynx import control\n"
+        "law = control.ComputedTorque(robot, natural_frequency=20.0)\n"
+        "dynx.simulate(robot, law, robot.neutral(), duration=0.01, plant='pinocchio')",
+        ("world.camera", "steppers.camera", "world.queries", "distance", "ik", "envs"),
+        ("distance", "steppers.camera", "world.camera", "world.queries"),
+        320,
+        42500,
+    ),
+    "step of a box": Flow(
+        "from dynx.world import Scene, World, box\n"
+        "World(Scene('box', bodies=(box('box', (0.1, 0.1, 0.1), mass=1.0),)), 'mujoco').step()",
+        ("ik", "sim", "envs", "doctor"),
+        (),
+        190,
+        22000,
+    ),
+    "step of the cart-pole": Flow(
+        "import gymnasium, dynx.envs\n"
+        "environment = gymnasium.make('dynx/CartPole-v0')\n"
+        "environment.reset(seed=0)\n"
+        "environment.step(environment.action_space.sample())",
+        ("distance", "ik", "world.camera", "steppers.camera"),
+        ("distance", "steppers.camera", "world.camera"),
+        310,
+        38000,
+    ),
+}
+
+
+@cache
+def loaded(name: str) -> tuple[frozenset[str], int]:
+    """Return the modules of dynx that a fresh process has loaded after a flow, and their lines."""
+    run = [sys.executable, "-c", FLOWS[name].program + "\n" + COUNT]
+    modules, lines = json.loads(subprocess.run(run, capture_output=True, text=True, check=True).stdout)
+    return frozenset(modules), lines
+
+
+@pytest.mark.parametrize("name", FLOWS)
+def test_a_flow_loads_no_room_that_it_does_not_need(name: str) -> None:
+    flow, (modules, _) = FLOWS[name], loaded(name)
+    needless = {
+        room for room in flow.not_needed for module in modules if f"{module}.".startswith(f"dynx.{room}.")
+    }
+    assert needless <= set(flow.loaded_now)
+
+
+@pytest.mark.parametrize("name", FLOWS)
+def test_a_flow_loads_no_more_modules_and_lines_than_before(name: str) -> None:
+    flow, (modules, lines) = FLOWS[name], loaded(name)
+    assert (len(modules) <= flow.modules, lines <= flow.lines) == (True, True), (len(modules), lines)
