@@ -24,8 +24,8 @@ class MujocoPeer(Implementation):
 
     def __init__(self, model: Model) -> None:
         # Imported here, for MuJoCo is an extra.
+        from dynx.engines.mujoco.build import build_tree
         from dynx.engines.mujoco.library import mujoco
-        from dynx.engines.mujoco.tree import build_tree
 
         self.version = f"mujoco {mujoco.__version__}"
         if model.mechanism.coupling is not None:

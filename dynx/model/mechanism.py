@@ -136,6 +136,14 @@ class Mechanism:
         return any(inertia.mass != 0 for inertia in (self.root, *(b.inertia for b in self.bodies)))
 
     @property
+    def root_center(self) -> Array:
+        """Centre of mass (3,) of a floating root in the base frame [m]; zero without mass or with a fixed
+        base."""
+        if not self.floating or self.root.mass == 0.0:
+            return np.zeros(3)
+        return np.asarray(self.root.first_moment / self.root.mass)
+
+    @property
     def nv(self) -> int:
         """Number of tree velocities."""
         return len(self.bodies) + (6 if self.floating else 0)

@@ -18,10 +18,9 @@ from dynx.control import (
     MotorLag,
 )
 from dynx.control.bullet import BulletMotorCommand
-from dynx.engines.pybullet.canonical_urdf import bullet_tree
-from dynx.engines.pybullet.inertia import ballast_for
+from dynx.engines.pybullet.canonical_urdf import ballast_for, bullet_tree
 from dynx.engines.pybullet.library import bullet
-from dynx.engines.pybullet.stepping import SteppingClient
+from dynx.engines.pybullet.plant import SteppingClient
 from dynx.errors import ArgumentError, ControlError, GainError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.model.loading import load

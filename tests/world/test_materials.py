@@ -64,7 +64,7 @@ def test_every_pair_of_a_scene_of_many_materials_has_its_mean(
 ) -> None:
     name, _, without = engine.partition(" ")
     if without:
-        monkeypatch.setattr("dynx.engines.mujoco.world.materials.MAX_PAIRS", 0)
+        monkeypatch.setattr("dynx.engines.mujoco.materials.MAX_PAIRS", 0)
     with World(four_materials(), name) as world:
         assert [each for each in world.inexact_materials() if each.quantity == "friction"] == []
         world.run(0.1)

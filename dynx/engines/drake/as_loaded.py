@@ -5,11 +5,17 @@ compared and a discrete plant returns a step of its contact solver. Inverse dyna
 `InverseDynamics` system calls it, with the forces of `CalcForceElementsContribution`, which are gravity and
 joint damping. A mimic joint becomes a constraint: kinematics, mass matrix and inverse dynamics leave it out,
 and forward dynamics of a continuous plant raises an exception.
+
+**Files that Drake must not load.** For most faults Drake raises an exception, but some fail an internal check
+(``DRAKE_DEMAND``). In C++ that ends the process; pydrake raises ``SystemExit``, which also ends programs that
+catch ``Exception``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+import math
+import re
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar
@@ -17,24 +23,221 @@ from typing import Any, ClassVar
 import numpy as np
 
 from dynx.engines.drake.coordinates import DrakeCoordinates
-from dynx.engines.drake.file_checks import require_harmless
 from dynx.engines.drake.library import (
     DRAKE_FAILURES,
     JacobianWrtVariable,
     MultibodyForces,
     MultibodyPlant,
     Parser,
+    SpatialInertia,
+    UnitInertia,
     captured_log,
     drake_version,
     error_message,
 )
-from dynx.engines.drake.loaded_description import describe_joint, describe_link, remarks
-from dynx.engines.drake.settings import CALLS, set_before_finalize, set_in_context
-from dynx.errors import EngineError, UnusableEngineError, shown
-from dynx.loaded.description import LoadedModel
-from dynx.loaded.robot import LoadedRobot, lacking_joints
+from dynx.errors import EngineError, ModelError, UnusableEngineError, located, shown
+from dynx.files.reading import read_file
+from dynx.loaded.calls import called_joints
+from dynx.loaded.description import LoadedInertial, LoadedJoint, LoadedModel
+from dynx.loaded.robot import LoadedRobot, lacking_joints, require_file
 from dynx.model import Model
+from dynx.model.mechanism import float64, pose_arrays
+from dynx.model.xml.source import SourceElement, XmlSource
+from dynx.spatial.inertia import inertia_about_origin
 from dynx.spatial.scalar import Floats
+
+CALLS: Mapping[str, str] = {
+    "drake.no_damping": (
+        "for i in plant.GetJointIndices():  # before plant.Finalize()\n"
+        "    joint = plant.get_mutable_joint(i)\n"
+        "    joint.set_default_damping_vector(0 * joint.default_damping_vector())"
+    ),
+    "drake.free_mimics": (
+        "for i in plant.GetConstraintIds(): plant.RemoveConstraint(i)  # before plant.Finalize()"
+    ),
+    "drake.no_rotors": (
+        "for i in plant.GetJointActuatorIndices():  # before plant.Finalize()\n"
+        "    plant.get_mutable_joint_actuator(i).set_default_rotor_inertia(0)"
+    ),
+    "drake.set_inertias": (
+        "# for each link in Drake's warnings; I is about the link's origin, in its axes;\n"
+        "# where the file has no mass, m = 2**-200, because Drake holds an inertia per unit of mass\n"
+        "G = UnitInertia(*(I[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]] / m))\n"
+        "M = SpatialInertia(m, center_of_mass, G, skip_validity_check=True)\n"
+        "plant.GetBodyByName(link).SetSpatialInertiaInBodyFrame(context, M)"
+    ),
+}
+
+NEGLIGIBLE_MASS = 2.0**-200
+"""Mass [kg] of a link for which the file states an inertia and no mass: a power of two, so that dividing
+by it is exact, and so small that its weight is below rounding."""
+
+
+def set_before_finalize(plant: Any, joints: Mapping[str, Any], path: Path, calls: Collection[str]) -> None:
+    """Apply those of `calls` that must precede `Finalize`; `joints` are those of the file, by name."""
+    for name in called_joints(calls, "drake.no_damping", joints):
+        joint = plant.get_mutable_joint(joints[name].index())
+        joint.set_default_damping_vector(0.0 * joint.default_damping_vector())
+    constraints = plant.GetConstraintIds()
+    if "drake.free_mimics" in calls:
+        freed = constraints
+    else:
+        # Drake numbers them in document order and does not name their joints.
+        followers = _followers(path) if constraints else []
+        known = dict(zip(followers, constraints, strict=False)) if len(followers) == len(constraints) else {}
+        freed = [known[name] for name in called_joints(calls, "drake.free_mimics", known)]
+    for constraint in freed:
+        plant.RemoveConstraint(constraint)
+    for index in plant.GetJointActuatorIndices():
+        actuator = plant.get_mutable_joint_actuator(index)
+        if any(called_joints(calls, "drake.no_rotors", [actuator.joint().name()])):
+            actuator.set_default_rotor_inertia(0.0)
+
+
+def _followers(path: Path) -> list[str]:
+    """Name the joints with a ``<mimic>``, in document order."""
+    joints = XmlSource(path.read_bytes(), str(path)).root.all("joint")
+    return [joint.attributes.get("name", "") for joint in joints if joint.first("mimic") is not None]
+
+
+def set_in_context(context: Any, bodies: Mapping[str, Any], model: Model, calls: Collection[str]) -> None:
+    """Apply those of `calls` that act on a context; the inertias are those of `model`."""
+    if "drake.set_inertias" not in calls:
+        return
+    for link in model.links:
+        if link.inertial is None or link.name not in bodies or link.name == "world":
+            continue
+        R, p = pose_arrays(link.inertial.origin, float64)
+        stated = inertia_about_origin(float64(link.inertial.mass), p, R, float64(link.inertial.tensor))
+        mass = float(stated.mass) or NEGLIGIBLE_MASS
+        G = np.asarray(stated.rotational_inertia / mass)
+        unit = UnitInertia(G[0, 0], G[1, 1], G[2, 2], G[0, 1], G[0, 2], G[1, 2])
+        inertia = SpatialInertia(mass, p, unit, skip_validity_check=True)
+        bodies[link.name].SetSpatialInertiaInBodyFrame(context, inertia)
+
+
+def describe_link(body: Any, context: Any) -> LoadedInertial:
+    """Return the inertia of a body about its centre of mass. Drake stores it about the link's origin.
+
+    Drake's world, which is the body of a link named ``world``, has no mass.
+    """
+    if body.index() == 0:
+        return LoadedInertial(0.0, np.zeros(3), np.zeros((3, 3)))
+    held = body.CalcSpatialInertiaInBodyFrame(context)
+    mass, center = float(held.get_mass()), np.array(held.get_com())
+    unit: Floats = np.array(held.get_unit_inertia().CopyToFullMatrix3())
+    central = mass * (unit - (center @ center) * np.eye(3) + np.outer(center, center))
+    return LoadedInertial(mass, center, central)
+
+
+def describe_joint(joint: Any, actuator: Any | None) -> LoadedJoint:
+    """Return the description of a joint that moves; effort and armature are those of its actuator, if any."""
+    placement = np.array(joint.frame_on_parent().GetFixedPoseInBodyFrame().GetAsMatrix4())
+    kind = str(joint.type_name())
+    if joint.num_velocities() != 1:
+        return LoadedJoint(kind, placement)
+    prismatic = kind == "prismatic"
+    lower, upper = float(joint.position_lower_limits()[0]), float(joint.position_upper_limits()[0])
+    unbounded = not prismatic and bool(np.isinf([lower, upper]).all())
+    return LoadedJoint(
+        type="continuous" if unbounded else kind,
+        placement=placement,
+        axis=np.array(joint.translation_axis() if prismatic else joint.revolute_axis()),
+        limits=(lower, upper),
+        velocity=float(joint.velocity_upper_limits()[0]),
+        effort=None if actuator is None else float(actuator.effort_limit()),
+        damping=float(joint.default_damping_vector()[0]),
+        friction=0.0,
+        armature=0.0 if actuator is None else float(actuator.default_reflected_inertia()),
+    )
+
+
+def remarks(log: Iterable[str], path: str, plant: Any) -> tuple[str, ...]:
+    """Return Drake's log messages, each once and on one line, and the number of constraints that it made."""
+    lines = [" ".join(message.replace(f"{path}:", "line ").split()) for message in log]
+    if plant.num_constraints():
+        lines.append(f"{plant.num_constraints()} mimic joints are constraints")
+    return tuple(dict.fromkeys(lines))
+
+
+MAX_LINKS = 2000
+"""Largest number of links: the time to load grows with its square, and loading cannot be interrupted."""
+
+_MOVING = ("revolute", "continuous", "prismatic")
+
+
+def require_harmless(path: Path, model: Model) -> None:
+    """Raise EngineError for a file on which Drake would end the process or misplace the robot."""
+    require_file(path)
+    if len(model.links) > MAX_LINKS:
+        count = len(model.links)
+        raise UnusableEngineError(f"{model.name} has {count} links; drake can load at most {MAX_LINKS}")
+    _require_own_world(model)
+    try:
+        source = XmlSource(read_file(str(path)), str(path))
+    except ModelError as error:
+        raise EngineError(f"drake cannot load a file that is not XML: {error}") from error
+    for message, line in _fatal_faults(source):
+        raise UnusableEngineError(located(f"drake would end the process: {message}", str(path), line))
+
+
+def _require_own_world(model: Model) -> None:
+    """Raise EngineError if Drake would mistake a link named ``world`` for its world."""
+    if "world" not in {link.name for link in model.links}:
+        return
+    if model.root != "world":
+        raise UnusableEngineError(
+            f"drake mistakes the link 'world' of {model.name} for the world itself, so the robot is attached "
+            "there and not at its root"
+        )
+    if model.floating:
+        raise UnusableEngineError(
+            f"drake mistakes the link 'world' of {model.name} for the world itself, so its base cannot float"
+        )
+
+
+def _fatal_faults(source: XmlSource) -> Iterator[tuple[str, int]]:
+    root = source.root
+    if root.attributes.get("name") == "":
+        yield "the robot's name is empty", root.line
+    for transmission in root.all("transmission"):
+        kind = transmission.first("type")
+        # Drake does not check whether the element has text.
+        if kind is not None and "type" not in transmission.attributes and not _begins_with_text(source, kind):
+            yield "the <type> of a <transmission> has no text", kind.line
+    for joint in root.all("joint"):
+        if joint.attributes.get("type") not in _MOVING:
+            continue
+        name = shown(joint.attributes.get("name", ""))
+        for limit in joint.all("limit")[:1]:
+            lower, upper = _number(limit, "lower", -math.inf), _number(limit, "upper", math.inf)
+            if lower > upper:
+                yield f"joint {name} has lower limit {lower:g} above its upper limit {upper:g}", limit.line
+            for bound in ("velocity", "drake:acceleration"):
+                value = _number(limit, bound, math.inf)
+                if value < 0.0:
+                    yield f"joint {name} has a negative limit, {bound} {value:g}", limit.line
+
+
+def _begins_with_text(source: XmlSource, element: SourceElement) -> bool:
+    """Check whether an element begins with text, other than blanks and comments."""
+    if element.empty:
+        return False
+    end = (
+        element.children[0].span.start if element.children else source.data.rindex(b"</", 0, element.span.end)
+    )
+    inside = source.data[element.start_tag.end : end]
+    return bool(re.sub(rb"<!--.*?-->", b"", inside, flags=re.DOTALL).strip())
+
+
+def _number(element: SourceElement, attribute: str, default: float) -> float:
+    """Return the attribute as a number; the default where it is absent or not a number."""
+    try:
+        value = float(element.attributes.get(attribute, default))
+    except ValueError:
+        return default
+    return default if math.isnan(value) else value
+
 
 _V = JacobianWrtVariable.kV
 _ORIGIN: Floats = np.zeros(3)

@@ -20,6 +20,7 @@ import numpy as np
 
 from dynx.backends.base import Backend
 from dynx.backends.engine_errors import engine_errors
+from dynx.engines.drake.build import build_plant
 from dynx.engines.drake.library import (
     DRAKE_FAILURES,
     JacobianWrtVariable,
@@ -27,7 +28,6 @@ from dynx.engines.drake.library import (
     drake_version,
     error_message,
 )
-from dynx.engines.drake.multibody_plant import build_plant
 from dynx.errors import DynxError, EngineError
 from dynx.model import Model
 from dynx.rbd.jacobians import Reference

@@ -10,20 +10,248 @@ With a fixed base MuJoCo merges the root link, and all links on fixed joints, in
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+import warnings
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
-from dynx.engines.mujoco.file_loading import CALLS, load_file, loading_lines
-from dynx.engines.mujoco.library import mujoco, silence_warnings
-from dynx.engines.mujoco.loaded_description import WORLD, describe_model
-from dynx.loaded.description import LoadedModel
-from dynx.loaded.robot import LoadedRobot, lacking_joints
+from dynx.engines.mujoco.library import MAX_DEPTH, mujoco, silence_warnings
+from dynx.engines.silence import silence
+from dynx.errors import EngineError, UnusableEngineError, nonblank_lines, shown
+from dynx.loaded.calls import called_joints
+from dynx.loaded.description import LoadedInertial, LoadedJoint, LoadedModel
+from dynx.loaded.robot import LoadedRobot, lacking_joints, require_file
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
+from dynx.spatial.se3 import homogeneous
+from dynx.spatial.so3 import rotation_from_quat
+
+CALLS: Mapping[str, str] = {
+    "mujoco.no_damping": "model.dof_damping[:] = 0",
+    "mujoco.no_friction": "model.dof_frictionloss[:] = 0",
+    "mujoco.no_limits": "model.jnt_limited[:] = 0",
+    "mujoco.no_mimic": "model.eq_active0[:] = 0",
+    "mujoco.exact_inertial_frames": (
+        "model.body_sameframe[:] = model.body_simple[:] = model.dof_simplenum[:] = 0"
+    ),
+    "mujoco.no_contacts": "model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT",
+}
+"""Remedies at run time: id -> the line of code, which comes after loading and before `mujoco.MjData`."""
+
+FIXED = "model = mujoco.MjModel.from_xml_path(path)"
+
+
+def load_file(path: Path, model: Model, loading: str, calls: Collection[str]) -> Any:
+    """Load the file in MuJoCo by the lines `loading` and apply `calls`; raises EngineError with MuJoCo's
+    message if that fails."""
+    _refuse_crashes(path, model)
+    names: dict[str, Any] = {"mujoco": mujoco, "path": str(path)}
+    try:
+        with _without_warnings():
+            # The lines shown to users are those that are executed.
+            exec(loading, names)
+            for call, code in CALLS.items():
+                if call in calls:
+                    exec(code, names)
+            _set_joints(names["model"], calls)
+    except Exception as error:
+        raise EngineError(f"mujoco refuses {path.name}: {_message(error)}") from error
+    loaded = names["model"]
+    if model.floating:
+        name = loaded.body(int(loaded.jnt_bodyid[0])).name if loaded.njnt else "nothing"
+        if name != model.root:
+            raise UnusableEngineError(
+                f"mujoco lets {shown(name)} float instead of the root {shown(model.root)} of {path.name}"
+                + (": MuJoCo mistakes a root named 'world' for the world" if model.root == "world" else "")
+            )
+    return loaded
+
+
+def loading_lines(*, floating: bool, options: str = "") -> str:
+    """Return the documented lines that load a URDF with compiler options, and with a floating base, for which
+    MuJoCo's reader has no option."""
+    free = "spec.worldbody.first_body().add_freejoint()" if floating else ""
+    lines = ("spec = mujoco.MjSpec.from_file(path)", options, free, "model = spec.compile()")
+    return "\n".join(filter(None, lines)) if floating or options else FIXED
+
+
+def _set_joints(loaded: Any, calls: Collection[str]) -> None:
+    """Apply those of `calls` that are made on single joints."""
+    joints = {loaded.joint(k).name: k for k in range(loaded.njnt)}
+    for call, change in _ON_JOINT.items():
+        if call not in calls:
+            for name in called_joints(calls, call, joints):
+                change(loaded, joints[name])
+
+
+def _free_follower(loaded: Any, joint: int) -> None:
+    """Switch off the constraints by which a joint follows another."""
+    follows = (loaded.eq_type == mujoco.mjtEq.mjEQ_JOINT) & (loaded.eq_obj1id == joint)
+    loaded.eq_active0[follows] = 0
+
+
+def _disable_damping(loaded: Any, joint: int) -> None:
+    loaded.dof_damping[loaded.jnt_dofadr[joint]] = 0
+
+
+def _disable_friction(loaded: Any, joint: int) -> None:
+    loaded.dof_frictionloss[loaded.jnt_dofadr[joint]] = 0
+
+
+def _disable_limits(loaded: Any, joint: int) -> None:
+    loaded.jnt_limited[joint] = 0
+
+
+_ON_JOINT: Mapping[str, Callable[[Any, int], None]] = {
+    "mujoco.no_damping": _disable_damping,
+    "mujoco.no_friction": _disable_friction,
+    "mujoco.no_limits": _disable_limits,
+    "mujoco.no_mimic": _free_follower,
+}
+"""The calls of `CALLS` that can be made on one joint, by its number."""
+
+
+@contextmanager
+def _without_warnings() -> Iterator[None]:
+    """Keep warnings out of stderr, Python's warnings and the log file in the working directory.
+
+    MuJoCo writes that file unless a program handles the warnings.
+    """
+    before = mujoco.get_mju_user_warning()
+    with silence(), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        mujoco.set_mju_user_warning(_ignore)
+        try:
+            yield
+        finally:
+            mujoco.set_mju_user_warning(before)
+
+
+def _ignore(message: str) -> None:
+    """Handle a warning by doing nothing."""
+
+
+def _refuse_crashes(path: Path, model: Model) -> None:
+    require_file(path)
+    depth = {model.root: 1}
+    for joint in model.joints:
+        depth[joint.child] = depth[joint.parent] + 1
+    if max(depth.values()) > MAX_DEPTH:
+        raise UnusableEngineError(
+            f"{path.name} has {max(depth.values())} links in a row; long chains crash mujoco, so dynx loads "
+            f"at most {MAX_DEPTH}"
+        )
+
+
+def _message(error: Exception) -> str:
+    # Such as "Error: inertia must satisfy A + B >= C" and "Element name 'arm', id 2".
+    return "; ".join(nonblank_lines(error)[:2]) or type(error).__name__
+
+
+WORLD = 0
+NAMES = {
+    int(mujoco.mjtJoint.mjJNT_HINGE): "revolute",
+    int(mujoco.mjtJoint.mjJNT_SLIDE): "prismatic",
+    int(mujoco.mjtJoint.mjJNT_BALL): "spherical",
+    int(mujoco.mjtJoint.mjJNT_FREE): "floating",
+}
+
+
+def describe_model(loaded: Any, model: Model, gravity: Floats) -> LoadedModel:
+    """Describe a MuJoCo model `loaded` from a file with the names of `model`."""
+    here = {loaded.body(number).name: number for number in range(1, loaded.nbody)}
+    merged = _merged_links(model, here)
+    links = {
+        link.name: _inertial(loaded, here[link.name], merged.get(link.name, ()))
+        for link in model.links
+        if link.name in here
+    }
+    first = int(model.floating)
+    joints = {loaded.jnt(k).name: _joint(loaded, k, model, here) for k in range(first, loaded.njnt)}
+    remarks = []
+    if model.root not in here:
+        remarks.append(f"the root link {model.root} is merged into the world")
+    if loaded.neq:
+        remarks.append(f"{loaded.neq} equality constraints stand for <mimic>")
+    if np.any(loaded.geom_contype[:] * loaded.geom_conaffinity[:]):
+        remarks.append(f"{loaded.ngeom} collision shapes can touch each other")
+    return LoadedModel(
+        engine="mujoco",
+        links=links,
+        joints=joints,
+        # MuJoCo puts the root link at the origin of the world, even if it merges it.
+        base_frame=_pose(loaded.body_pos[here[model.root]], loaded.body_quat[here[model.root]])
+        if model.root in here
+        else np.eye(4),
+        gravity=gravity,
+        missing_links=tuple(link.name for link in model.links if link.name not in here),
+        remarks=tuple(remarks),
+    )
+
+
+def _merged_links(model: Model, here: dict[str, int]) -> dict[str, tuple[str, ...]]:
+    """For each link that MuJoCo kept, the links that it merged into it."""
+    carrier = {model.root: model.root}
+    found: dict[str, list[str]] = {}
+    for joint in model.joints:
+        kept = joint.child in here or joint.moves
+        carrier[joint.child] = joint.child if kept else carrier[joint.parent]
+        if not kept:
+            found.setdefault(carrier[joint.child], []).append(joint.child)
+    return {name: tuple(members) for name, members in found.items()}
+
+
+def _inertial(loaded: Any, body: int, merged: tuple[str, ...]) -> LoadedInertial:
+    R = _rotation(loaded.body_iquat[body])
+    return LoadedInertial(
+        mass=float(loaded.body_mass[body]),
+        center=np.array(loaded.body_ipos[body]),
+        inertia=np.asarray((R * loaded.body_inertia[body]) @ R.T),
+        merged=merged,
+    )
+
+
+def _joint(loaded: Any, number: int, model: Model, here: dict[str, int]) -> LoadedJoint:
+    kind = int(loaded.jnt_type[number])
+    body, dof = int(loaded.jnt_bodyid[number]), int(loaded.jnt_dofadr[number])
+    limited = bool(loaded.jnt_limited[number])
+    low, high = loaded.jnt_range[number] if limited else (-np.inf, np.inf)
+    effort = float(loaded.jnt_actfrcrange[number, 1]) if loaded.jnt_actfrclimited[number] else None
+    return LoadedJoint(
+        type="continuous" if NAMES[kind] == "revolute" and not limited else NAMES[kind],
+        placement=_placement(loaded, body, model, here),
+        axis=np.array(loaded.jnt_axis[number]),
+        limits=(float(low), float(high)),
+        effort=effort,
+        damping=float(loaded.dof_damping[dof]),
+        friction=float(loaded.dof_frictionloss[dof]),
+        armature=float(loaded.dof_armature[dof]),
+    )
+
+
+def _placement(loaded: Any, body: int, model: Model, here: dict[str, int]) -> Floats | None:
+    """Return the pose of a body in its parent link; None where MuJoCo has merged that link."""
+    child = loaded.body(body).name
+    parents = [joint.parent for joint in model.joints if joint.child == child]
+    if not parents:
+        return None
+    parent = int(loaded.body_parentid[body])
+    # A root link that became the world keeps its frame.
+    kept = here.get(parents[0], WORLD if parents[0] == model.root else None)
+    return _pose(loaded.body_pos[body], loaded.body_quat[body]) if kept == parent else None
+
+
+def _pose(p: Floats, quat_wxyz: Floats) -> Floats:
+    return np.asarray(homogeneous(_rotation(quat_wxyz), np.array(p)))
+
+
+def _rotation(quat_wxyz: Floats) -> Floats:
+    w, x, y, z = quat_wxyz
+    return np.asarray(rotation_from_quat(np.array([x, y, z, w])))
 
 
 class LoadedMujoco(LoadedRobot):

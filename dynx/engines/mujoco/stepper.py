@@ -1,8 +1,14 @@
-"""A world in MuJoCo: the scene compiled into one model (`build`), its state, contacts and queries.
+"""A world in MuJoCo: the scene compiled into one model (`build`), its state and contacts.
 
 `mj_step` computes everything at the state before the step and then integrates. So contacts and their forces
 are those of the beginning of the last step, and the poses that queries need are computed when they are asked
 for.
+
+**Mimic joints** are coupled by torques, so that they follow exactly where nothing touches the robot. MuJoCo
+couples joints by soft equality constraints only. Here the torque of every joint is chosen so that the
+acceleration of the tree is that of the coupled robot: with v_tree = S v and the equation of motion M a = tau
+- b of the tree, the coupled robot has (S' M S) a = tau - S' b, and the tree needs the torque M S a + b. The
+constraints are then idle, except where contacts and limits act on mimic joints.
 """
 
 from __future__ import annotations
@@ -12,20 +18,78 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from dynx.engines.mujoco.build import build_scene
+from dynx.engines.mujoco.coordinates import BodyCoordinates, RobotCoordinates
 from dynx.engines.mujoco.library import mujoco
-from dynx.engines.mujoco.world.build import build_scene
-from dynx.engines.mujoco.world.coordinates import BodyCoordinates, RobotCoordinates
-from dynx.engines.mujoco.world.mimics import CoupledRobot
-from dynx.engines.mujoco.world.options import LEAST_STEPS, SETTINGS, time_constant
-from dynx.engines.mujoco.world.touching import read_contacts
+from dynx.engines.mujoco.materials import LEAST_STEPS, SETTINGS, time_constant
 from dynx.errors import EngineError, nonblank_lines, shown
 from dynx.spatial.scalar import Floats
 from dynx.steppers.failures import translate_failures
 from dynx.steppers.forces import NO_FORCES, Forces
-from dynx.steppers.layout import Layout
+from dynx.steppers.layout import Layout, RobotLayout
 from dynx.steppers.materials import EffectiveCoefficient
 from dynx.steppers.state import BodyState, RobotState
 from dynx.steppers.stepper import Stepper, TouchingPoint
+
+
+class CoupledRobot:
+    """A robot with mimic joints: its torque in coordinates of the model, and the torque of its tree."""
+
+    def __init__(self, robot: RobotLayout, first: int, dt: float) -> None:
+        """`first` is the index in MuJoCo's v at which the robot begins."""
+        coupling = robot.model.mechanism.coupling
+        if coupling is None:
+            raise AssertionError("a robot without mimic joints")
+        self._S = S = coupling.matrix()
+        self._slice = slice(first, first + len(S))
+        self._damping = np.concatenate([np.zeros(len(S) - len(robot.damping)), robot.damping])
+        # Damping is taken at the end of the step, as MuJoCo's Euler does.
+        self._damped = S.T @ (dt * self._damping[:, None] * S)
+        self.tau: Floats = np.zeros(S.shape[1])
+        """Torque in coordinates of the model, with the wrench on a floating base as in MuJoCo."""
+
+    def apply(self, model: Any, data: Any) -> None:
+        """Write the torque of the tree, between `mj_step1` and `mj_step2`."""
+        part, S = self._slice, self._S
+        M = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, data, M)
+        M = M[part, part]
+        bias = data.qfrc_bias[part] + self._damping * data.qvel[part]
+        a = np.linalg.solve(S.T @ M @ S + self._damped, self.tau - S.T @ bias)
+        data.qfrc_applied[part] = M @ (S @ a) + data.qfrc_bias[part]
+
+
+def read_contacts(
+    model: Any, data: Any, geom_collider: tuple[int, ...], *, forces: bool
+) -> list[TouchingPoint]:
+    """Return the contacts that `data` holds, with the forces of the last step if `forces`."""
+    found = []
+    force = np.zeros(6)
+    for number in range(data.ncon):
+        contact = data.contact[number]
+        first, second = contact.geom
+        # MuJoCo's normal goes from the first geom to the second, and the force acts on the second.
+        frame = contact.frame.reshape(3, 3)
+        normal, distance = -frame[0], float(contact.dist)
+        half = 0.5 * distance * frame[0]
+        along, friction = 0.0, np.zeros(3)
+        if forces and contact.efc_address >= 0:
+            mujoco.mj_contactForce(model, data, number, force)
+            along, friction = float(force[0]), -(force[1] * frame[1] + force[2] * frame[2])
+        found.append(
+            TouchingPoint(
+                geom_collider[first],
+                geom_collider[second],
+                contact.pos - half,
+                contact.pos + half,
+                normal,
+                distance,
+                along,
+                friction,
+            )
+        )
+    return found
+
 
 STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 """Part of MuJoCo's state that determines the later steps; the physics state alone lacks the warm start."""

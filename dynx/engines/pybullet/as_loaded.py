@@ -1,15 +1,21 @@
 """A URDF file as PyBullet loads it, with the flag that makes it read the file's inertias.
 
-Engine calls respect Bullet's conventions: its world is the inertial frame of the
-root (centre of mass, principal axes) for inverse dynamics, mass matrix and Jacobian of a floating base;
-columns are angular before linear; the pose of a link is composed from the double-precision pose of its
-inertial frame; gravity is rotated instead of the base. The frames are those that Bullet reports, never those
-of the file.
+Engine calls respect Bullet's conventions: its world is the inertial frame of the root (centre of mass,
+principal axes) for inverse dynamics, mass matrix and Jacobian of a floating base; columns are angular before
+linear; the pose of a link is composed from the double-precision pose of its inertial frame; gravity is
+rotated instead of the base. The frames are those that Bullet reports, never those of the file.
 
 The effects of loading show in the results: masses and inertias that differ from the file, a base that stays
 in place because its root has no mass, axes that are not of unit length, damping and limits that act in a
 step. With a fixed base, inverse dynamics and the Jacobian are in the axes of the root's inertial frame
 instead of those of the world, because no call changes that.
+
+**Other flags.** By the plain call, without the flag that makes it read inertias, Bullet computes the inertia
+of each link from the bounding box of its collision shapes, for the mass of the file: about axes parallel to
+those of the inertial, through the centre of mass of the file, wherever the shapes are. A link without shapes
+gets an inertia of almost zero.
+
+With the flag that merges links on fixed joints, Bullet sums their inertias about wrong axes.
 """
 
 from __future__ import annotations
@@ -18,31 +24,163 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
-from dynx.engines.pybullet.connection import ORIGIN
+from dynx.engines.pybullet.backend import base_conversion, inverse_base_conversion
+from dynx.engines.pybullet.client import ORIGIN, LoadedClient, Setting
 from dynx.engines.pybullet.file_checks import require_harmless
 from dynx.engines.pybullet.library import bullet
-from dynx.engines.pybullet.loaded_client import LoadedClient
-from dynx.engines.pybullet.loaded_description import describe_model
-from dynx.engines.pybullet.robot import base_conversion, inverse_base_conversion
-from dynx.engines.pybullet.settings import (
-    CALLS,
-    disable_simulation_settings,
-    set_inertias,
-    set_joints,
-    with_ballast,
-)
 from dynx.errors import UnusableEngineError, shown
-from dynx.loaded.description import LoadedModel
+from dynx.loaded.calls import called_joints
+from dynx.loaded.description import LoadedInertial, LoadedJoint, LoadedModel
 from dynx.loaded.robot import LoadedRobot, lacking_joints
 from dynx.model import Model
 from dynx.model.mechanism import ROOT
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, inverse
 from dynx.spatial.so3 import cross, quat_from_rotation, rotation_from_quat, skew
+
+CALLS: Mapping[str, str] = {
+    "pybullet.set_inertias": (
+        "p.changeDynamics(robot, link, localInertiaDiagonal=[ixx, iyy, izz])"
+        "  # the principal moments of the file; before the first calculateInverseDynamics"
+    ),
+    "pybullet.no_damping": (
+        "for j in range(p.getNumJoints(robot)): p.changeDynamics(robot, j, jointDamping=0)"
+    ),
+    "pybullet.no_limits": (
+        "for j in range(p.getNumJoints(robot)): "
+        "p.changeDynamics(robot, j, jointLowerLimit=-1e300, jointUpperLimit=1e300)"
+    ),
+    "pybullet.extrapolate_inertias": (
+        "# load it into two clients; s is larger than any |moment|; k = 1 in the first, 2 in the second\n"
+        "p.changeDynamics(robot, link, localInertiaDiagonal=[ixx + k * s, iyy + k * s, izz + k * s])\n"
+        "tau = 2 * tau_of_the_first - tau_of_the_second  # likewise the mass matrix"
+    ),
+}
+"""The lines of code, by the id of the remedy."""
+
+_JOINT_VALUES = {
+    "pybullet.no_damping": {"jointDamping": 0.0},
+    # Limits that no joint reaches.
+    "pybullet.no_limits": {"jointLowerLimit": -1e300, "jointUpperLimit": 1e300},
+}
+"""The values of joints that a call sets."""
+
+
+def disable_simulation_settings(client: LoadedClient) -> None:
+    """Switch off motors, damping of the base and the limit of speeds, which do not come from the file."""
+    client.disable_damping()
+    client.release_motors()
+
+
+def set_joints(joints: Mapping[str, int], calls: Collection[str]) -> Setting:
+    """Return the setting that applies those of `calls` that act on joints, which `joints` numbers by name."""
+
+    def change(client: LoadedClient) -> None:
+        for call, values in _JOINT_VALUES.items():
+            for name in called_joints(calls, call, joints):
+                client.call(client.engine.changeDynamics, client.body, joints[name], **values)
+
+    return change
+
+
+def set_inertias(model: Model, links: Mapping[str, int]) -> Setting:
+    """Return the setting that restores the moments of the file where Bullet replaced them by zero."""
+
+    def change(client: LoadedClient) -> None:
+        for name, k in links.items():
+            inertial = model.inertial(name)
+            held = client.dynamics(k)
+            if any(held[2]) or not inertial.tensor.any() or (k == ROOT and not client.floating):
+                continue
+            R = rotation_from_quat(np.array(held[4])).T @ inertial.origin.matrix[:3, :3]
+            moments = np.diagonal(R @ inertial.tensor @ R.T).tolist()
+            client.call(client.engine.changeDynamics, client.body, k, localInertiaDiagonal=moments)
+
+    return change
+
+
+def with_ballast(times: int) -> Setting:
+    """Return the setting that adds `times` times a rotational inertia s, the same about every axis, to each
+    impossible inertia.
+
+    Inverse dynamics f and the mass matrix are affine in the inertia of each link, so that
+    f(I) = 2 f(I + s) - f(I + 2 s); and with s larger than any moment Bullet accepts the link.
+    """
+
+    def change(client: LoadedClient) -> None:
+        for k in (ROOT, *client.links):
+            moments = client.dynamics(k)[2]
+            if (k == ROOT and not client.floating) or _possible(*sorted(moments)):
+                continue
+            # A power of two, so that adding it loses the fewest digits.
+            s = 2.0 ** np.ceil(np.log2(2.0 * max(map(abs, moments))))
+            loaded = [float(moment + times * s) for moment in moments]
+            client.call(client.engine.changeDynamics, client.body, k, localInertiaDiagonal=loaded)
+
+    return change
+
+
+def _possible(small: float, middle: float, large: float) -> bool:
+    """Check whether a body can have these principal moments, with a margin for the rounding of Bullet."""
+    return small >= 0.0 and small + middle >= large * (1.0 + 64.0 * float(np.finfo(float).eps))
+
+
+def describe_model(client: LoadedClient, model: Model, links: Mapping[str, int], base: Floats) -> LoadedModel:
+    """Return the description of a loaded robot.
+
+    `links` maps link names to Bullet's numbers; `base` is the pose of the root link at the neutral q.
+    """
+    # Bullet's frame of a link is the inertial frame.
+    com = {k: client.com_frame(k) for k in links.values()}
+    joints = {}
+    for k, info in enumerate(client.joints):
+        if info[2] == client.engine.JOINT_FIXED:
+            continue
+        name = info[1].decode("utf-8", "surrogateescape")
+        joints[name] = _joint(client.engine, info, com[int(info[16])], com[k])
+    return LoadedModel(
+        engine="pybullet",
+        links={name: _inertial(client.dynamics(k)) for name, k in links.items()},
+        joints=joints,
+        base_frame=base,
+        gravity=np.zeros(3),
+        missing_links=tuple(link.name for link in model.links if link.name not in links),
+        remarks=tuple(client.messages),
+    )
+
+
+def _inertial(info: Any) -> LoadedInertial:
+    R = rotation_from_quat(np.array(info[4]))
+    return LoadedInertial(float(info[0]), np.array(info[3]), np.asarray(R @ np.diag(info[2]) @ R.T))
+
+
+def _joint(engine: Any, info: Any, T_parent_com: Floats, T_child_com: Floats) -> LoadedJoint:
+    """Describe a joint from `getJointInfo`: entry 13 is the axis in the inertial frame of the child, 14
+    the joint's position in the inertial frame of the parent, and 15 the attitude of the latter in the
+    former at value 0."""
+    position = T_parent_com[:3, :3] @ np.array(info[14]) + T_parent_com[:3, 3]
+    R_child_parent = rotation_from_quat(np.array(info[15]))
+    R = T_parent_com[:3, :3] @ R_child_parent.T @ T_child_com[:3, :3].T
+    lower, upper = float(info[8]), float(info[9])
+    # Bullet has no continuous type: limits in the wrong order mean that there are none.
+    limited = lower <= upper
+    kinds = {engine.JOINT_PRISMATIC: "prismatic", engine.JOINT_REVOLUTE: "revolute"}
+    kind = kinds.get(info[2], str(info[2]))
+    return LoadedJoint(
+        type="continuous" if kind == "revolute" and not limited else kind,
+        placement=homogeneous(R, position),
+        axis=T_child_com[:3, :3] @ np.array(info[13]),
+        limits=(lower, upper) if limited else (-np.inf, np.inf),
+        velocity=float(info[11]),
+        effort=float(info[10]),
+        damping=float(info[6]),
+        friction=float(info[7]),
+    )
+
 
 USE_INERTIA = "URDF_USE_INERTIA_FROM_FILE"
 """Flag that makes PyBullet read the inertias of the file."""
@@ -298,3 +436,51 @@ class LoadedPyBullet(LoadedRobot):
 
 def _text(name: bytes) -> str:
     return name.decode("utf-8", "surrogateescape")
+
+
+USE_FILE_INERTIA = "pybullet.use_file_inertia"
+"""Id of the setting with which the plain call is that of `LoadedPyBullet`."""
+
+KEEP_FIXED_LINKS = "pybullet.keep_fixed_links"
+"""Id of the setting with which the call that merges links is that of `LoadedPyBullet`."""
+
+_MERGE = "URDF_MERGE_FIXED_LINKS"
+
+
+class PlainPyBullet(LoadedPyBullet):
+    """A robot as PyBullet loads it without any flag; see the module docstring."""
+
+    name: ClassVar[str] = "pybullet:plain"
+    loads_meshes: ClassVar[bool] = True
+    CALLS: ClassVar[Mapping[str, str]] = {
+        **LoadedPyBullet.CALLS,
+        USE_FILE_INERTIA: f"robot = p.loadURDF(path, ..., flags=p.{USE_INERTIA})",
+    }
+
+    @classmethod
+    def _flags(cls, calls: Collection[str]) -> tuple[str, ...]:
+        return (USE_INERTIA,) if USE_FILE_INERTIA in calls else ()
+
+    @classmethod
+    def load_call(cls, floating: bool) -> str:
+        """Return the call: one line, after ``import pybullet as p`` and ``p.connect(p.DIRECT)``."""
+        return "robot = p.loadURDF(path)" if floating else "robot = p.loadURDF(path, useFixedBase=True)"
+
+
+class MergingPyBullet(LoadedPyBullet):
+    """A robot as PyBullet loads it with links on fixed joints merged into their parents."""
+
+    name: ClassVar[str] = "pybullet:merge"
+    CALLS: ClassVar[Mapping[str, str]] = {
+        **LoadedPyBullet.CALLS,
+        KEEP_FIXED_LINKS: f"robot = p.loadURDF(path, ..., flags=p.{USE_INERTIA})  # not p.{_MERGE}",
+    }
+
+    @classmethod
+    def _flags(cls, calls: Collection[str]) -> tuple[str, ...]:
+        return (USE_INERTIA,) if KEEP_FIXED_LINKS in calls else (USE_INERTIA, _MERGE)
+
+    @classmethod
+    def load_call(cls, floating: bool) -> str:
+        """Return the call: one line, after ``import pybullet as p`` and ``p.connect(p.DIRECT)``."""
+        return super().load_call(floating)[:-1] + f" | p.{_MERGE})"

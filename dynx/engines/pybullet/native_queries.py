@@ -10,10 +10,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from dynx.engines.pybullet.build import binary_stl
 from dynx.engines.pybullet.library import bullet
-from dynx.engines.pybullet.stepper import BulletStepper
-from dynx.engines.pybullet.world.contacts import touching_point
-from dynx.engines.pybullet.world.shapes import binary_stl
+from dynx.engines.pybullet.stepper import BulletStepper, touching_point
 from dynx.errors import EngineError, EngineLimitError
 from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
 from dynx.spatial.scalar import Floats

@@ -8,7 +8,7 @@ so that contacts are named by the links of the description.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,27 +16,122 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from dynx.engines.pybullet.build import (
+    SETTINGS,
+    BulletObject,
+    Place,
+    ShapeFiles,
+    bullet_materials,
+    is_ground,
+    load_ground,
+    set_filters,
+    set_parameters,
+)
+from dynx.engines.pybullet.client import BulletClient
 from dynx.engines.pybullet.library import bullet, bullet_version
 from dynx.engines.pybullet.motors import BulletMotorCommand
-from dynx.engines.pybullet.world.bodies import BulletBody
-from dynx.engines.pybullet.world.client import WorldClient
-from dynx.engines.pybullet.world.constraints import add_constraint
-from dynx.engines.pybullet.world.contacts import ContactReader
-from dynx.engines.pybullet.world.filters import set_filters
-from dynx.engines.pybullet.world.materials import bullet_materials
-from dynx.engines.pybullet.world.objects import BulletObject
-from dynx.engines.pybullet.world.robot import BulletRobot
-from dynx.engines.pybullet.world.settings import SETTINGS
-from dynx.engines.pybullet.world.shapes import ShapeFiles, is_ground, load_ground
+from dynx.engines.pybullet.robot import BulletBody, BulletRobot
 from dynx.errors import EngineError
 from dynx.model.mechanism import ROOT
 from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import quat_from_rotation
 from dynx.steppers.forces import NO_COMMANDS, NO_FORCES, EngineCommand, Forces
-from dynx.steppers.layout import Collider, Layout
+from dynx.steppers.layout import WORLD, Anchor, Collider, ConstraintLayout, Layout
 from dynx.steppers.materials import EffectiveCoefficient
 from dynx.steppers.settings import Setting
 from dynx.steppers.state import BodyState, RobotState
 from dynx.steppers.stepper import Stepper, TouchingPoint
+
+NO_BODY = -1
+"""Bullet's number of the world as the second body of a constraint."""
+
+
+def add_constraint(
+    client: BulletClient,
+    constraint: ConstraintLayout,
+    robots: Sequence[BulletRobot],
+    bodies: Sequence[BulletBody],
+    most: float,
+) -> None:
+    """Create a constraint with forces up to `most` [N or N m]."""
+    ends = [_end(each, robots, bodies) for each in (constraint.a, constraint.b)]
+    if ends[0][0] == NO_BODY:
+        ends.reverse()
+    (body_a, link_a, T_a), (body_b, link_b, T_b) = ends
+    engine = client.engine
+    kind = engine.JOINT_FIXED if constraint.kind == "weld" else engine.JOINT_POINT2POINT
+    number = client.call(
+        engine.createConstraint,
+        body_a,
+        link_a,
+        body_b,
+        link_b,
+        kind,
+        [0.0, 0.0, 0.0],
+        T_a[:3, 3].tolist(),
+        T_b[:3, 3].tolist(),
+        quat_from_rotation(T_a[:3, :3]).tolist(),
+        quat_from_rotation(T_b[:3, :3]).tolist(),
+    )
+    client.call(engine.changeConstraint, number, maxForce=most)
+
+
+def _end(
+    anchor: Anchor, robots: Sequence[BulletRobot], bodies: Sequence[BulletBody]
+) -> tuple[int, int, Floats]:
+    """Return body, link and frame of an anchor; the frame is relative to the link's inertial frame."""
+    robot, body = anchor.owner
+    if robot is None and body == WORLD:
+        return NO_BODY, ROOT, anchor.T
+    found = bodies[body].object if robot is None else robots[robot].object
+    part = ROOT if robot is None else body
+    link = ROOT if part == ROOT else found.links[part]
+    return found.body, link, np.linalg.inv(found.inertial_frame(part)) @ anchor.T
+
+
+class ContactReader:
+    """Translation of Bullet's reports, which name bodies and links by number."""
+
+    def __init__(self, client: BulletClient, places: Sequence[Sequence[Place]]) -> None:
+        """`places` are the bodies and links of each collider."""
+        self._client = client
+        self.places = places
+        self._collider = {place: k for k, found in enumerate(places) for place in found}
+        self.fresh = True
+        """True if no step was taken since the state was set, so that there are no forces."""
+
+    def contacts(self) -> list[TouchingPoint]:
+        """Return the contacts that have a force, or overlap."""
+        found = []
+        for a, b, point in self._touching_points():
+            force, friction = (0.0, np.zeros(3)) if self.fresh else (point[9], _friction(point))
+            found.append(touching_point(a, b, point, force, friction))
+        return found
+
+    def pairs(self) -> set[tuple[int, int]]:
+        """Return the colliders that have one of `contacts`."""
+        return {(a, b) for a, b, _ in self._touching_points()}
+
+    def _touching_points(self) -> Iterator[tuple[int, int, Sequence[Any]]]:
+        """Yield the colliders and Bullet's report of each contact."""
+        for point in self._client.call(self._client.engine.getContactPoints) or ():
+            a, b = self._collider.get((point[1], point[3])), self._collider.get((point[2], point[4]))
+            if a is not None and b is not None and (point[8] <= 0.0 or point[9] > 0.0):
+                yield a, b, point
+
+
+def _friction(point: Sequence[Any]) -> Floats:
+    """Return the friction on the first body: two forces along two directions of the tangent plane."""
+    return np.asarray(point[10] * np.array(point[11]) + point[12] * np.array(point[13]))
+
+
+def touching_point(
+    a: int, b: int, point: Sequence[Any], force: float, friction: Floats | None
+) -> TouchingPoint:
+    """Return a contact or nearest point from Bullet's report of it."""
+    return TouchingPoint(
+        a, b, np.array(point[5]), np.array(point[6]), np.array(point[7]), point[8], force, friction
+    )
 
 
 class BulletStepper(Stepper):
@@ -54,10 +149,12 @@ class BulletStepper(Stepper):
     def __init__(self, layout: Layout, dt: float, settings: Mapping[str, Any]) -> None:
         super().__init__(layout, dt, settings)
         engine = bullet()
-        self.client = client = WorldClient(engine, layout.name, dt, settings)
+        self.client = client = BulletClient(engine, layout.name)
+        client.connect(fixedTimeStep=dt, deterministicOverlappingPairs=1)
         self._number = client.number
         self._step_simulation = engine.stepSimulation
         try:
+            set_parameters(client, settings)
             with TemporaryDirectory(prefix="dynx-", ignore_cleanup_errors=True) as folder:
                 self._load(Path(folder), settings)
         except OSError as error:

@@ -25,8 +25,7 @@ from tests.loaded.files import TILTED, assert_alike, clean_robots, loaded
 from tests.loaded.fork import BASES, BODY, check_loaded_as_written, forked
 
 pytest.importorskip("pydrake")
-from dynx.engines.drake.as_loaded import LoadedDrake
-from dynx.engines.drake.file_checks import MAX_LINKS
+from dynx.engines.drake.as_loaded import MAX_LINKS, LoadedDrake
 from dynx.engines.drake.library import MultibodyForces, MultibodyPlant, Parser
 
 

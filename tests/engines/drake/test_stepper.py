@@ -8,9 +8,8 @@ from numpy.testing import assert_allclose
 
 import dynx
 from dynx import Pose
-from dynx.engines.drake.stepper import DrakeStepper
-from dynx.engines.drake.world.build import build_scene
-from dynx.engines.drake.world.contacts import parts_of_force
+from dynx.engines.drake.build import build_scene
+from dynx.engines.drake.stepper import DrakeStepper, parts_of_force
 from dynx.errors import SingularMassMatrixError, UnsupportedFeatureError
 from dynx.model.geometry import Box, Collision, HeightField
 from dynx.steppers.forces import Forces

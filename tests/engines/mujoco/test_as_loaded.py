@@ -30,8 +30,7 @@ from tests.loaded.fork import BASES, BODY, LOSSES, NO_LOSSES
 pytest.importorskip("mujoco")
 import mujoco
 
-from dynx.engines.mujoco.as_loaded import LoadedMujoco
-from dynx.engines.mujoco.file_loading import CALLS
+from dynx.engines.mujoco.as_loaded import CALLS, LoadedMujoco
 from dynx.engines.mujoco.library import MAX_DEPTH
 
 KEPT = '<mujoco><compiler fusestatic="false"/></mujoco>'

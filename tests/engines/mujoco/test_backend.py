@@ -40,8 +40,8 @@ pytest.importorskip("mujoco")
 import mujoco
 
 from dynx.engines.mujoco.backend import MujocoBackend
+from dynx.engines.mujoco.build import MAX_NV
 from dynx.engines.mujoco.library import MAX_DEPTH
-from dynx.engines.mujoco.tree import MAX_NV
 
 
 def test_what_the_engine_computes() -> None:

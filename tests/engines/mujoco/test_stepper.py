@@ -10,9 +10,8 @@ from numpy.testing import assert_allclose
 
 import dynx
 from dynx import Pose
+from dynx.engines.mujoco.build import build_scene, collision_masks, pairs_to_exclude
 from dynx.engines.mujoco.stepper import MujocoStepper
-from dynx.engines.mujoco.world.build import build_scene
-from dynx.engines.mujoco.world.filters import collision_masks, pairs_to_exclude
 from dynx.errors import SingularMassMatrixError
 from dynx.model.geometry import Box, Collision, HeightField, Sphere
 from dynx.steppers.forces import Forces
@@ -47,7 +46,7 @@ def test_masks_and_excluded_pairs_are_the_filter_of_the_scene(monkeypatch: pytes
             tested = bool(masks[a][0] & masks[b][1] or masks[b][0] & masks[a][1])
             assert (tested and not rigid and (a, b) not in excluded) == layout.collides[a, b]
     assert build_scene(layout, 1e-3, DEFAULTS).model.nexclude == 0
-    monkeypatch.setattr("dynx.engines.mujoco.world.materials.MAX_PAIRS", 0)
+    monkeypatch.setattr("dynx.engines.mujoco.materials.MAX_PAIRS", 0)
     built = build_scene(layout, 1e-3, DEFAULTS)
     assert (built.model.npair, built.model.nexclude) == (0, len(excluded))
     # The arm without self-collision needs no excluded pairs.
@@ -153,7 +152,7 @@ def test_references_are_of_one_format_which_mujoco_does_not_replace(
         replace(scene, bodies=tuple(replace(each, material=material) for each in scene.bodies))
     )
     for pairs in (2000, 0):
-        monkeypatch.setattr("dynx.engines.mujoco.world.materials.MAX_PAIRS", pairs)
+        monkeypatch.setattr("dynx.engines.mujoco.materials.MAX_PAIRS", pairs)
         model = build_scene(layout, 1e-3, {**DEFAULTS, **changed}).model
         for name in (
             "geom_solref",

@@ -38,4 +38,4 @@ def assert_solves(model: Model, seed: int = 0, faster: float = 1.0) -> None:
 
 def clients(engine: PyBulletBackend) -> list[int]:
     """Return the numbers of the Bullet clients that a backend holds."""
-    return [robot._client._client for robot in engine._robots]
+    return [robot._client.number for robot in engine._robots]

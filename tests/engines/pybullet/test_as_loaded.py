@@ -161,7 +161,7 @@ def test_clients_are_disconnected() -> None:
     model = forked("floating")
     with loaded(LoadedPyBullet, model) as robot:
         assert isinstance(robot, LoadedPyBullet)
-        clients = [each._client for each in robot._clients]
+        clients = [each.number for each in robot._clients]
         assert all(bullet.isConnected(client) for client in clients)
     assert not any(bullet.isConnected(client) for client in clients)
     with pytest.raises(EngineError, match="failed in"):

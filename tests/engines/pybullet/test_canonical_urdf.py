@@ -7,8 +7,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from dynx.engines.pybullet.canonical_urdf import bullet_tree, locale_free, write_bullet_urdf
-from dynx.engines.pybullet.inertia import ballast_for
+from dynx.engines.pybullet.canonical_urdf import ballast_for, bullet_tree, locale_free, write_bullet_urdf
 from dynx.model import Model
 from dynx.model.mechanism import build_mechanism
 from dynx.spatial.extended import longdouble

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.engines.pybullet.inertia import Ballast, ballast_for, principal_inertia
+from dynx.engines.pybullet.canonical_urdf import Ballast, ballast_for, principal_inertia
 from dynx.model import Inertial, Joint, Link, Model, Pose
 from dynx.model.mechanism import build_mechanism
 from dynx.spatial.extended import longdouble

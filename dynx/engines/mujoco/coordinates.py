@@ -13,23 +13,18 @@ from typing import Any
 import numpy as np
 
 from dynx.engines.mujoco.library import mujoco
-from dynx.engines.mujoco.tree import quat_wxyz
 from dynx.model import Model
-from dynx.model.mechanism import Mechanism
 from dynx.spatial.plain import minus_cross, rotate, rotate_back, rotation_rows
 from dynx.spatial.scalar import Array, Floats
-from dynx.spatial.so3 import cross, rotation_from_quat
+from dynx.spatial.so3 import cross, quat_from_rotation, rotation_from_quat
 from dynx.steppers.layout import BodyLayout
 from dynx.steppers.state import BodyState, RobotState
 
 
-def root_center(mechanism: Mechanism) -> Array:
-    """Return the centre of mass (3,) of the root in the base frame [m]; zero without mass, and for a fixed
-    base."""
-    mass = mechanism.root.mass
-    if not mechanism.floating or mass == 0.0:
-        return np.zeros(3)
-    return np.asarray(mechanism.root.first_moment / mass)
+def quat_wxyz(R: Array) -> Floats:
+    """Return the quaternion (w, x, y, z) of a rotation matrix (3, 3)."""
+    x, y, z, w = quat_from_rotation(np.asarray(R, dtype=np.float64))
+    return np.array([w, x, y, z])
 
 
 class RobotCoordinates:
@@ -39,7 +34,7 @@ class RobotCoordinates:
         """`first` are the indices in q and v at which the robot begins."""
         mechanism = model.mechanism
         self._floating = model.floating
-        self._center = np.asarray(root_center(mechanism), dtype=float)
+        self._center = np.asarray(mechanism.root_center, dtype=float)
         self._coupling = mechanism.coupling
         self._q: Floats = data.qpos[first[0] : first[0] + mechanism.nq]
         self._v: Floats = data.qvel[first[1] : first[1] + mechanism.nv]

@@ -1,1 +1,0 @@
-"""Worlds in MuJoCo: a scene compiled into one MuJoCo model, stepped by MuJoCo."""
