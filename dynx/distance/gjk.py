@@ -15,8 +15,7 @@ from dataclasses import dataclass
 
 from dynx.distance.cores import Core
 from dynx.distance.simplices import nearest_to_origin
-from dynx.distance.vectors import combination, dot, minus, norm
-from dynx.spatial.plain import Vector3
+from dynx.spatial.plain import Vector3, combination, dot, minus, norm
 
 MAX_ITERATIONS = 200
 

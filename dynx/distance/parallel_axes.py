@@ -11,7 +11,7 @@ import numpy as np
 
 from dynx.distance.cores import Core, CylinderCore, PointCore, SegmentCore
 from dynx.distance.penetration import Penetration
-from dynx.distance.vectors import dot, minus
+from dynx.spatial.plain import dot, minus
 
 MAX_SINE = 1e-4
 """Largest sine of the angle between axes at which the bounds may be better than those of a polytope."""

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from dynx.distance.cores import Core
 from dynx.distance.gjk import CorePair
 from dynx.distance.simplices import nearest_to_origin
-from dynx.distance.vectors import dot, minus
+from dynx.spatial.plain import dot, minus
 from dynx.spatial.scalar import Floats
 
 MAX_EXPANSIONS = 40

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from dynx.distance.vectors import cross, dot, minus
-from dynx.spatial.plain import Vector3
+from dynx.spatial.plain import Vector3, cross, dot, minus
 
 
 class Nearest(NamedTuple):

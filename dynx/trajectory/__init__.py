@@ -13,8 +13,7 @@ Each function returns a `Trajectory`; docs/trajectories.md compares them.
 from dynx.trajectory.base import Setpoint, Trajectory
 from dynx.trajectory.concatenation import concatenate
 from dynx.trajectory.cycloidal import cycloidal
-from dynx.trajectory.excitation import excitation
-from dynx.trajectory.identification import Identifiability
+from dynx.trajectory.excitation import Identifiability, excitation
 from dynx.trajectory.limit_check import check, violations
 from dynx.trajectory.line import LineTrajectory, line
 from dynx.trajectory.polynomials import cubic, quintic

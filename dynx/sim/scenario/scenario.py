@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from dynx.control.base import Controller, refuse_other_than_controller
 from dynx.errors import ArgumentError, shown
-from dynx.files.document_checks import check_document
+from dynx.files.documents import check_document
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.model.model import refuse_other_than_model
