@@ -193,7 +193,9 @@ def empty_page(browser: Any, launch: Callable[[], Any] | None) -> float:
     """Return the time in which a page of viser that shows nothing has drawn [s], with the start of a browser
     where `launch` is given."""
     port = _free_port(DEFAULT_HOST, 0)
-    server = serve(DEFAULT_HOST, port, "empty", CLIENT.parent)
+    server = serve(
+        DEFAULT_HOST, port, "empty", CLIENT.parent, lambda answer: answer, lambda messages, _: messages
+    )
     try:
         with ExitStack() as ended:
             began = time.time()

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import io
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -55,25 +55,56 @@ def silent() -> Iterator[None]:
         console.quiet = before
 
 
-def serve(host: str, port: int, title: str, folder: Path) -> Any:
+def serve(
+    host: str,
+    port: int,
+    title: str,
+    folder: Path,
+    guard: Callable[[Any], Any],
+    checked: Callable[[Any, Callable[[str], Any]], Any],
+) -> Any:
     """Start a server of viser, with the page in a folder instead of its own.
 
-    viser takes no folder, so the class that serves it is replaced while the server starts. A version of viser
-    that serves in another way shows its own page.
+    `guard` takes the function that answers requests and returns the one that does so instead; `checked` takes
+    the class that reads messages, with a function that returns the state of a control, and returns the reader
+    that is used instead. viser takes none of these, so the class that serves the page and the function that
+    listens are replaced while the server starts. Raises NotInstalledError for a version of viser that serves
+    in another way.
     """
     infra: Any = viser.infra
     with _starting, silent():
-        original: Any = getattr(infra, "WebsockServer", None)
+        server_class, listening = infra.WebsockServer, infra._infra.websockets.asyncio.server
+        listen, guarded = listening.serve, threading.Event()
+        started: list[Any] = []
+
+        def control(uuid: str) -> Any:
+            for server in started:
+                for owner in (server, *server.get_clients().values()):
+                    handle = owner.gui._gui_input_handle_from_uuid.get(uuid)
+                    if handle is not None:
+                        return handle._impl
+            return None
 
         def from_folder(*arguments: Any, **given: Any) -> Any:
-            if "http_server_root" in given:
-                given["http_server_root"] = folder
-            return original(*arguments, **given)
+            given["http_server_root"] = folder
+            given["message_class"] = checked(given["message_class"], control)
+            return server_class(*arguments, **given)
 
-        if original is not None:
-            infra.WebsockServer = from_folder
+        def listen_guarded(handler: Any, *arguments: Any, **given: Any) -> Any:
+            if handler.__module__ == infra._infra.__name__:
+                given["process_request"] = guard(given["process_request"])
+                guarded.set()
+            return listen(handler, *arguments, **given)
+
+        infra.WebsockServer, listening.serve = from_folder, listen_guarded
         try:
-            return viser.ViserServer(host, port, label=title, verbose=False)
+            server = viser.ViserServer(host, port, label=title, verbose=False)
         finally:
-            if original is not None:
-                infra.WebsockServer = original
+            infra.WebsockServer, listening.serve = server_class, listen
+        if not guarded.is_set():
+            server.stop()
+            raise NotInstalledError(
+                f"viser {viser.__version__} cannot be guarded; the viewer needs viser 1.1"
+            )
+        started.append(server)
+        return server

@@ -16,7 +16,9 @@ import numpy as np
 from dynx.errors import ArgumentError, shown
 from dynx.model.numbers import whole_number
 from dynx.spatial.scalar import Floats
+from dynx.viewer.browser.access import Access, is_loopback
 from dynx.viewer.browser.client import NO_SOFTWARE_MESSAGE, Client
+from dynx.viewer.browser.messages import CheckedMessages
 from dynx.viewer.framing import VIEW_DIRECTION, fitting_distance, round_length
 from dynx.viewer.library import serve, silent
 
@@ -85,6 +87,7 @@ class Page:
     """A page in the browser, served until `close`.
 
     It listens on the loopback interface unless `host` names another; with the port 0 a free one is chosen.
+    Requests need the token of its address, and come from the page itself (`Access`).
     """
 
     def __init__(
@@ -108,7 +111,16 @@ class Page:
             raise ArgumentError(f"port is {wanted}; wanted 0 to 65535")
         self.host, self.port = host, _free_port(host, wanted)
         self._client = Client(title, antialiasing=not plain)
-        self._server = serve(self.host, self.port, title, self._client.folder)
+        self._access = Access(self.host)
+        headers = self._client.headers
+        self._server = serve(
+            self.host,
+            self.port,
+            title,
+            self._client.folder,
+            lambda answer: self._access.guard(answer, headers),
+            CheckedMessages,
+        )
         self.plain, self.dark = plain, dark
         """True for a page drawn as software does fastest, and for a dark page."""
         self._furnish()
@@ -144,9 +156,19 @@ class Page:
 
     @property
     def url(self) -> str:
-        """The address of the page."""
-        host = "127.0.0.1" if self.host in ("", "0.0.0.0") else self.host
-        return f"http://{f'[{host}]' if ':' in host else host}:{self.port}"
+        """The address of the page, with its token: whoever has it sees and moves what the page shows."""
+        host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(self.host, self.host)
+        return f"http://{f'[{host}]' if ':' in host else host}:{self.port}/{self._access.token}/"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Who else can reach the page, a sentence where it listens beyond this machine."""
+        if is_loopback(self.host):
+            return ()
+        return (
+            f"the page listens on {self.host}, beyond this machine, without encryption: whoever has "
+            "or overhears its address sees and moves what it shows",
+        )
 
     @property
     def server(self) -> Any:

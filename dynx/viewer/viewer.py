@@ -98,9 +98,9 @@ class Viewer(Controls):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What cannot be drawn, and what is notable at the start of a world, one sentence each."""
-        notes: tuple[str, ...] = self.view.notes
-        return notes
+        """What cannot be drawn, what is notable at the start of a world, and a host beyond this machine, one
+        sentence each."""
+        return (*self.page.notes, *self.view.notes)
 
     def update(self, q: ArrayLike | None = None) -> None:
         """Show the present state, from a loop of the program: the configuration q (nq,) of a robot, or the

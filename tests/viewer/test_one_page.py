@@ -27,7 +27,7 @@ def test_a_notebook_shows_the_page_inline() -> None:
         client.execute_cell(notebook.cells[0], 0)
         # viser displays its addresses in a notebook unless it is silenced.
         (output,) = notebook.cells[0].outputs
-        source = re.search(r'<iframe src="(http://127\.0\.0\.1:\d+)"', output.data["text/html"])
+        source = re.search(r'<iframe src="(http://127\.0\.0\.1:\d+/[\w-]+/)"', output.data["text/html"])
         assert source is not None
         with urllib.request.urlopen(source[1], timeout=30.0) as page:
             assert b"<title>dynx: six_axis_arm</title>" in page.read()

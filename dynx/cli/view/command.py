@@ -57,7 +57,8 @@ from dynx.cli.shell.options import FiniteRange, GroupedCommand, group, name_list
         "--host",
         default="127.0.0.1",
         show_default=True,
-        help="Address to listen on; 0.0.0.0 lets other machines in.",
+        help="Address to listen on; 0.0.0.0 lets other machines in, without encryption: whoever has the "
+        "address of the page sees and moves what it shows.",
     ),
     click.option(
         "--port",

@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from html import escape
 from pathlib import Path
 
+from dynx.viewer.browser.access import ContentPolicy
+from dynx.viewer.browser.copy_button import HANDLER_HASH
 from dynx.viewer.library import CLIENT
 
 NAMES = "dynx-names"
@@ -44,6 +46,16 @@ _FOR_SOFTWARE = """
 """
 """Draws each pixel once instead of four times, which halves the time of a picture drawn by software, and lets
 viser, which lowers the resolution by a quarter where pictures come slowly, lower it by half."""
+
+_SCRIPTS_OF_SCRIPTS = """
+  const create = document.createElement;
+  document.createElement = function (name, ...options) {
+    const made = create.call(this, name, ...options);
+    if (String(name).toLowerCase() === "script") made.nonce = %s;
+    return made;
+  };
+"""
+"""Lets the page, whose code is compressed, create its own script under its content security policy."""
 
 _PRESSES = """
   const listen = EventTarget.prototype.addEventListener;
@@ -115,7 +127,10 @@ class Client:
         """Without `antialiasing` edges are jagged, and software draws twice as fast."""
         self._folder = tempfile.TemporaryDirectory(prefix="dynx-page-", ignore_cleanup_errors=True)
         script = _PRESSES + _NAMES_ON_HOVER if antialiasing else _FOR_SOFTWARE + _PRESSES + _NAMES_ON_HOVER
-        self._text = _with_script(CLIENT.read_text(encoding="utf-8"), script)
+        policy = ContentPolicy("'self' data: blob:")
+        self.headers = tuple(policy.headers([HANDLER_HASH]))
+        """Headers with which the page is served."""
+        self._text = _guarded(CLIENT.read_text(encoding="utf-8"), script, policy)
         self.entitle(title)
 
     def entitle(self, title: str) -> None:
@@ -147,6 +162,10 @@ def standalone(
 
     With `software` the page does not say that software draws it: its meshes were reduced for that.
     """
+    policy = ContentPolicy("data: blob:")
+    page = _guarded(page, _NAMES_ON_HOVER, policy)
+    meta = f'<meta http-equiv="Content-Security-Policy" content="{escape(policy.text(), quote=True)}">'
+    page = page.replace("<head>", f"<head>{meta}", 1)
     body = page.rfind("</body>")
     if body < 0:
         return page
@@ -155,7 +174,7 @@ def standalone(
         added += f'<div style="{_LEGEND_STYLE}">{legend}</div>'
     if software:
         added += f"<style>{NO_SOFTWARE_MESSAGE}</style>"
-    return _with_script(_with_title(f"{page[:body]}{added}{page[body:]}", title), _NAMES_ON_HOVER)
+    return _with_title(f"{page[:body]}{added}{page[body:]}", title)
 
 
 def _with_title(page: str, title: str) -> str:
@@ -163,7 +182,11 @@ def _with_title(page: str, title: str) -> str:
     return page.replace("<title>Viser</title>", f"<title>{escape(title)}</title>", 1)
 
 
-def _with_script(page: str, script: str) -> str:
-    """Return a page with a script that runs before its own."""
-    head, end, rest = page.partition("</head>")
-    return f"{head}<script>(() => {{{script}}})();</script>{end}{rest}" if end else page
+def _guarded(page: str, script: str, policy: ContentPolicy) -> str:
+    """Return a page of viser's, which has no text of a robot yet, with a script that runs before its own, and
+    the nonce of a policy at every script."""
+    nonce = json.dumps(policy.nonce)
+    first = _SCRIPTS_OF_SCRIPTS % nonce + script
+    page = page.replace("<script", f"<script nonce={nonce}")
+    head, start, rest = page.partition("<script")
+    return f"{head}<script nonce={nonce}>(() => {{{first}}})();</script>{start}{rest}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
+from hashlib import sha256
 from html import escape
 from typing import Any
 
@@ -14,6 +16,9 @@ _COPY = (
     "navigator.clipboard ? navigator.clipboard.writeText(t).then(done, select) : select();"
 )
 """Action of the button. The text is data of the button, never part of a script."""
+
+HANDLER_HASH = f"sha256-{b64encode(sha256(_COPY.encode()).digest()).decode()}"
+"""Hash of the action, by which the content security policy of the page lets it run."""
 
 _LOOK = (
     "display: block; box-sizing: border-box; width: calc(100% - 1.6em); margin: 0.4em 0.8em; height: 2em; "
