@@ -15,6 +15,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -27,6 +28,7 @@ from dynx.compiled.kernels import quantity_kernel
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.model import Model
 from dynx.model.loading import load
+from dynx.simd.call_sequence import CallSequence, StridedRows
 
 SIZES = (8, 64, 256, 1024, 4096)
 SMALL = 64
@@ -105,7 +107,10 @@ def kernel_call(batch: Batch, quantity: str) -> Call:
     """Return a call of the kernel alone."""
     kernel = quantity_kernel(simplify_mechanism(batch.model.mechanism), quantity, ())
     outputs = [np.empty((len(batch), port.size)) for port in kernel.outputs]
-    return kernel.bind(batch.arguments(quantity), outputs)
+    ports, arrays = (*kernel.inputs, *kernel.outputs), (*batch.arguments(quantity), *outputs)
+    first = np.zeros(1, dtype=np.int64)
+    rows = {port.name: StridedRows(array[None], first) for port, array in zip(ports, arrays, strict=True)}
+    return partial(CallSequence([kernel], first, rows, len(batch)).run, 0, 1)
 
 
 if __name__ == "__main__":

@@ -25,7 +25,7 @@ from dynx.envs.library import AutoresetMode
 from dynx.envs.tasks.acrobot import Acrobot
 from dynx.envs.tasks.cart_pole import CartPole
 from dynx.envs.tasks.pendulum import Pendulum
-from dynx.envs.vector.environment import RobotVectorEnvironment
+from dynx.envs.vector import RobotVectorEnvironment
 from dynx.spatial.scalar import Floats
 
 VECTOR = "vector"

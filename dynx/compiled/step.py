@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from enum import IntFlag
 from typing import NamedTuple
 
+from dynx.errors import TraceError, UnsupportedFeatureError
 from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.call_sequence import CallSequence, Integers, StridedRows
 from dynx.simd.kernel import Kernel
@@ -56,6 +57,8 @@ class StepText:
     value. Outputs with the name of an input are that input of the next step."""
     inputs: Mapping[str, int]
     """Sizes of the inputs."""
+    failure: str = "the step cannot be compiled"
+    """Beginning of the error where it cannot be traced."""
     key: Hashable | None = None
     """Content that finds the kernel in this process without tracing; None: trace."""
 
@@ -67,29 +70,30 @@ class CompiledStep:
     """A step in several variants, each compiled when it is first needed."""
 
     def __init__(self, text: Callable[[Hashable], StepText]) -> None:
-        """`text` returns the text of a variant. Kernels raise what it and tracing raise, such as
-        TraceError."""
+        """`text` returns the text of a variant."""
         self._text = text
         self._variants: dict[Hashable, Kernel] = {}
 
     def kernel(self, variant: Hashable = None) -> Kernel:
-        """Return the kernel of a variant."""
+        """Return the kernel of a variant. Raises UnsupportedFeatureError for one that cannot be traced."""
         kernel = self._variants.get(variant)
         if kernel is None:
             kernel = self._variants[variant] = compiled(self._text(variant))
         return kernel
 
-    def __getstate__(self) -> dict[str, object]:
-        # Another process gets machine code and not the text, whose objects need not be transferable.
-        return {"_variants": self._variants, "_text": None}
-
 
 def compiled(text: StepText) -> Kernel:
     """Return the kernel of a text: of an earlier equal one of this process, from the cache on disk, or
-    compiled."""
+    compiled.
+
+    Raises UnsupportedFeatureError for a text that cannot be traced.
+    """
     kernel = None if text.key is None else _kernels.get(text.key)
     if kernel is None:
-        program = trace(text.function, {name: (size,) for name, size in text.inputs.items()})
+        try:
+            program = trace(text.function, {name: (size,) for name, size in text.inputs.items()})
+        except TraceError as error:
+            raise UnsupportedFeatureError(f"{text.failure}: {error}") from error
         kernel = load_kernel(program_recipe(program), lambda: program)
         if text.key is not None:
             _kernels[text.key] = kernel
@@ -110,28 +114,33 @@ class BoundSteps:
         *,
         first: int,
         lanes: int = 1,
+        status: str | None = STATUS,
         bound: Status = Status.DONE,
     ) -> None:
         """`chosen` (n,) is the number of the kernel of each step. `rows` has for each name an array, (height,
         size) for all lanes or (height, lanes, size), and the row (n,) of each step; `written` has those of
-        outputs where they are others. Steps end at a status above `bound`."""
+        outputs where they are others. Steps end at a `status`, if they have one, above `bound`."""
         inputs = {name: StridedRows(array, number) for name, (array, number) in rows.items()}
         outputs = {name: StridedRows(array, number) for name, (array, number) in written.items()}
         self.first = first
-        self._status = rows[STATUS][0]
+        self._status = None if status is None else rows[status][0]
         self._calls = CallSequence(
-            kernels, chosen, inputs, lanes, outputs=outputs, status=STATUS, bound=float(bound)
+            kernels, chosen, inputs, lanes, outputs=outputs, status=status, bound=float(bound)
         )
         self.end = first + len(chosen)
 
     def run(self, begin: int, end: int) -> Stop | None:
         """Take the steps from `begin` to before `end`; return where they ended before that."""
         stopped = self._calls.run(begin - self.first, end - self.first)
-        if stopped is None:
+        if stopped is None or self._status is None:
             return None
         call, lane = stopped
         found = self._status[0, lane, 0] if self._status.ndim == 3 else self._status[0, 0]
         return Stop(self.first + call, lane, Status(int(found)))
+
+    def single(self, step: int) -> Callable[[], None]:
+        """Return a function that takes one step, whatever its status."""
+        return self._calls.single(step - self.first)
 
     def repeat_group(self, step: int, lane: int) -> None:
         """Repeat a step for one vector of lanes, from number `lane` on."""

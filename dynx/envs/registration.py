@@ -12,7 +12,7 @@ from dynx.envs.library import AutoresetMode, register, registry
 from dynx.envs.randomization import Randomization
 from dynx.envs.robot.array_task import ArrayTask
 from dynx.envs.task import Task
-from dynx.envs.vector.environment import RobotVectorEnvironment
+from dynx.envs.vector import RobotVectorEnvironment
 from dynx.errors import ArgumentError, shown
 
 COMPILED = "compiled"

@@ -204,7 +204,11 @@ class LoopStep:
         assert isinstance(variant, tuple)
         controlled, pushed = variant
         function = partial(self._evaluated, controlled=controlled, pushed=pushed)
-        return StepText(function, self.sizes(controlled=controlled, pushed=pushed), self.key(variant))
+        name = "the step" if self.controller is None else self.controller.name
+        failure = f"{name} cannot be compiled together with the plant"
+        return StepText(
+            function, self.sizes(controlled=controlled, pushed=pushed), failure, self.key(variant)
+        )
 
     @property
     def always_pushed(self) -> bool:
@@ -222,16 +226,22 @@ class LoopStep:
 
     def key(self, purpose: Hashable) -> Hashable | None:
         """Return the content that a kernel for this purpose depends on; None for a controller that is not
-        declared pure."""
+        declared pure, or whose content is not known."""
         controller = self.controller
         if controller is not None and not all(each.is_pure for each in chain_of(controller)):
             return None
         others = [
             getattr(self, each.name) for each in fields(self) if each.name not in ("controller", "plant")
         ]
-        gainless = None if controller is None else content_of(traced_controller(controller, self._zero_gains))
+        try:
+            known = content_of(others)
+            inner = (
+                None if controller is None else content_of(traced_controller(controller, self._zero_gains))
+            )
+        except TypeError:
+            return None
         # A plant is immutable and the key keeps a reference to it, so its identity suffices.
-        return content_of(others), gainless, self.plant, purpose
+        return known, inner, self.plant, purpose
 
     def gain_values(self) -> dict[str, Floats]:
         """Return the gains that are inputs, by the names of the inputs; those that differ between rollouts

@@ -156,4 +156,4 @@ def _impact_kernel(step: LoopStep) -> Kernel:
         x, left = equation.accelerations(M, [0.0] * len(v), list(1.0 - stuck), list(-stuck * v))
         return {"v": v + np.array(x), "pull": -given["struck"] * np.array(left)}
 
-    return compiled(StepText(impact, sizes, step.key("impact")))
+    return compiled(StepText(impact, sizes, "impacts cannot be compiled", step.key("impact")))

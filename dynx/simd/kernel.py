@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.errors import ArgumentError, ClosedError, CompileError
+from dynx.errors import ClosedError, CompileError
 from dynx.simd.arrays import (
     address_of,
     array_entry,
@@ -123,34 +123,6 @@ class Kernel:
 
         run_parts(call, parts, threads)
 
-    def bind(self, inputs: Sequence[Floats], outputs: Sequence[Floats]) -> Callable[[], None]:
-        """Return a function that fills these `outputs` from the current contents of these `inputs`.
-
-        It is meant for loops with many calls: arrays are checked here, and not in the calls. There must be at
-        least as many samples as lanes, rows must be contiguous, and outputs must not share memory with any
-        other array; otherwise raises ArgumentError. Raises also the errors of a plain call.
-        """
-        code, arrays = self._open_code(), (*inputs, *outputs)
-        n = check_arrays(self.inputs, self.outputs, inputs, outputs)
-        if n < self.image.lanes:
-            raise ArgumentError(f"a bound call needs at least {self.image.lanes} samples, not {n}")
-        for array in arrays:
-            if not usable_in_place(array):
-                raise ArgumentError("a bound call needs arrays with contiguous rows")
-        places = [extent_of(array) for array in arrays]
-        if not all(is_disjoint(places, len(inputs) + k, out) for k, out in enumerate(outputs)):
-            raise ArgumentError("an output of a bound call shares memory with another array")
-        listed = [n]
-        for array in arrays:
-            listed += [array.ctypes.data, array.strides[0]]
-        words = np.array(listed, dtype=np.int64)
-        entry, start = code.entry, words.ctypes.data
-
-        def call(_kept: object = (code, words, arrays)) -> None:
-            entry(start)
-
-        return call
-
     def workspace(self, samples: int = 1) -> Workspace:
         """Return a workspace for up to `samples` samples, for callers that evaluate few at a time."""
         return Workspace(self._open_code(), self.image, samples)
@@ -163,6 +135,11 @@ class Kernel:
     def locked_entry(self) -> Callable[[int], None]:
         """Machine code called with the address of its arguments (`dynx.simd.emit`), global lock held."""
         return self._open_code().locked_entry
+
+    @property
+    def entry(self) -> Callable[[int], None]:
+        """Machine code called with the address of its arguments, which does not hold the global lock."""
+        return self._open_code().entry
 
     @property
     def address(self) -> int:

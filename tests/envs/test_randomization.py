@@ -22,7 +22,7 @@ from dynx.envs.tasks.pendulum import Pendulum
 from dynx.envs.tasks.push import Push
 from dynx.envs.tasks.reach import Reach
 from dynx.envs.tasks.stand import Stand
-from dynx.envs.vector.environment import RobotVectorEnvironment
+from dynx.envs.vector import RobotVectorEnvironment
 from dynx.envs.world.varied_scene import with_point_mass
 from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError
 from dynx.sim.plants.model_error import Payload, plant_model

@@ -15,7 +15,7 @@ from dynx.control.array_dynamics import ArrayDynamics
 from dynx.envs.environment import TaskEnvironment
 from dynx.envs.robot.state import State
 from dynx.envs.tasks.reach import ROTATION_WEIGHT, SERVO_RATE, Reach
-from dynx.envs.vector.environment import RobotVectorEnvironment
+from dynx.envs.vector import RobotVectorEnvironment
 from dynx.errors import ArgumentError, UnknownNameError
 from dynx.spatial.so3 import rotation_about
 from tests.envs.scripted import Reaching, run

@@ -14,7 +14,7 @@ from dynx.envs.robot.state import State
 from dynx.envs.tasks.acrobot import Acrobot
 from dynx.envs.tasks.cart_pole import CartPole
 from dynx.envs.tasks.pendulum import Pendulum
-from dynx.envs.vector.environment import RobotVectorEnvironment
+from dynx.envs.vector import RobotVectorEnvironment
 from dynx.errors import (
     ArgumentError,
     ClosedError,

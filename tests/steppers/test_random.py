@@ -10,7 +10,7 @@ import pytest
 import dynx
 from dynx.envs.environment import TaskEnvironment
 from dynx.envs.tasks.cart_pole import CartPole
-from dynx.envs.vector.environment import RobotVectorEnvironment
+from dynx.envs.vector import RobotVectorEnvironment
 from dynx.sim import Noise, simulate, simulate_batch
 from dynx.steppers.random import BLOCK_STEPS, Purpose, StepNumbers, Streams
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from dynx.backends.solvability import Solvability
 from dynx.compiled.parametric import ParametricDynamics
 from dynx.compiled.step import CompiledStep
-from dynx.errors import ArgumentError, TraceError, UnsupportedFeatureError, shown
+from dynx.errors import ArgumentError, shown
 from dynx.model.configuration import checked_q
 from dynx.model.numbers import whole_number
 from dynx.option_names import takes
@@ -277,13 +277,7 @@ def _step_kernels(step: LoopStep, clock: Clock, pushed: list[bool]) -> StepKerne
     controlled = clock.is_control_step(np.arange(clock.n_steps))
     kinds = set(zip(controlled.tolist(), pushed, strict=True))
     compiled = CompiledStep(step.text)
-    try:
-        return {variant: compiled.kernel(variant) for variant in sorted(kinds)}
-    except TraceError as error:
-        assert step.controller is not None
-        raise UnsupportedFeatureError(
-            f"{step.controller.name} cannot be compiled together with the plant: {error}"
-        ) from error
+    return {variant: compiled.kernel(variant) for variant in sorted(kinds)}
 
 
 def _run_parts(

@@ -1,6 +1,6 @@
-"""Kernels of a vector environment: a control step with autoreset, and the start of episodes.
+"""The text of one control step of a task with autoreset, and of the start of an episode.
 
-A kernel evaluates one environment in each lane of a vector register. Dynamics, integrator, observation,
+The kernel evaluates one environment in each lane of a vector register. Dynamics, integrator, observation,
 reward, the end of an episode and the start of the next are traced together; where an episode starts, all are
 computed and the start is selected.
 """
@@ -8,25 +8,21 @@ computed and the start is selected.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from dynx.compiled.step import StepText
 from dynx.control.array_dynamics import ArrayDynamics
 from dynx.envs.library import AutoresetMode, spaces
 from dynx.envs.robot.array_task import ArrayTask
 from dynx.envs.robot.state import State
 from dynx.envs.robot.step import control_step
 from dynx.envs.robot.varied_robot import VariedRobot
-from dynx.envs.vector.layout import Layout
-from dynx.errors import ArgumentError, ShapeError, TraceError, UnsupportedFeatureError
+from dynx.errors import ArgumentError, ShapeError, UnsupportedFeatureError
 from dynx.model.numbers import DIVERGENCE_SPEED
-from dynx.simd.cache import load_kernel, program_recipe
-from dynx.simd.kernel import Kernel
-from dynx.simd.program import Program
-from dynx.simd.trace import trace
 from dynx.simd.user_code.arrays import symbol_array, traced_array
 from dynx.simd.user_code.numbers import select
 from dynx.spatial.scalar import Array
@@ -39,8 +35,36 @@ ENDED = -1.0
 """Number of steps of an episode that ended, in mode NEXT_STEP: the step that starts the next makes it 0."""
 
 
-class VectorKernels:
-    """Kernels of one task, one autoreset mode and one time limit."""
+class Layout(NamedTuple):
+    """Sizes of the parts of a row of numbers that keeps the state of one environment: q, v and memory."""
+
+    nq: int
+    nv: int
+    memory: int
+
+    @classmethod
+    def of(cls, task: ArrayTask) -> Layout:
+        """Return the layout for a task."""
+        state = task.start(np.zeros(task.random_size))
+        return cls(len(state.q), len(state.v), len(state.memory))
+
+    @property
+    def size(self) -> int:
+        """Number of entries of a row."""
+        return self.nq + self.nv + self.memory
+
+    def state(self, row: Array) -> State:
+        """Return the state in a row, or in rows (..., size)."""
+        first, second = self.nq, self.nq + self.nv
+        return State(row[..., :first], row[..., first:second], row[..., second:])
+
+    def row(self, state: State) -> list[Any]:
+        """Return the entries of a row."""
+        return [*state.q, *state.v, *state.memory]
+
+
+class TaskStep:
+    """A control step of one task, one autoreset mode and one time limit."""
 
     def __init__(
         self,
@@ -71,53 +95,37 @@ class VectorKernels:
         self.observations = shape[0]
         self.actions = 1 if isinstance(space, spaces.Discrete) else math.prod(space.shape)
 
-    def step(self) -> Kernel:
-        """Return the kernel of a step.
+    def text(self, start: Mapping[str, Any] | None = None) -> StepText:
+        """Return the text of a step, or of the start of episodes with the options `start`.
 
-        Inputs: ``state`` (layout), the number of ``steps``, ``action``, and ``random`` for the start of the
-        next episode; where they are drawn, ``parameters`` of the motion, ``noise`` on the action, and
-        ``earlier`` actions that may still act. Outputs: ``state``, ``steps``, ``observation``, ``reward``,
-        ``flags``, ``earlier`` if it is an input, and in mode SAME_STEP ``final``, the last observation of the
-        episode.
+        Inputs of a step: ``state`` (layout), the number of ``steps``, ``action``, and ``random`` for the
+        start of the next episode; where they are drawn, ``parameters`` of the motion, ``noise`` on the
+        action, and ``earlier`` actions that may still act. Outputs: ``state``, ``steps``, ``observation``,
+        ``reward``, ``flags``, ``earlier`` if it is an input, and in mode SAME_STEP ``final``, the last
+        observation of the episode. A start has ``state`` and ``observation`` of ``random``.
         """
-        sizes = {
-            "state": (self.layout.size,),
-            "steps": (1,),
-            "action": (self.actions,),
-            "random": (self._task.random_size,),
-        }
-        if self._varied is not None and self._varied.parameters:
-            sizes["parameters"] = (len(self._varied.parameters),)
-            if self._varied.delayed_actions:
-                sizes["earlier"] = (self._varied.delayed_actions * self.actions,)
-        if self._noisy_actions:
-            sizes["noise"] = (self.actions,)
-        return self._compiled("step", sizes)
+        sizes = {"random": self._task.random_size}
+        evaluate: Callable[..., dict[str, Any]] = self._step if start is None else self._start
+        if start is None:
+            sizes = {"state": self.layout.size, "steps": 1, "action": self.actions, **sizes}
+            if self._varied is not None and self._varied.parameters:
+                sizes["parameters"] = len(self._varied.parameters)
+                if self._varied.delayed_actions:
+                    sizes["earlier"] = self._varied.delayed_actions * self.actions
+            if self._noisy_actions:
+                sizes["noise"] = self.actions
 
-    def start(self, options: Mapping[str, Any]) -> Kernel:
-        """Return the kernel that starts episodes with these options: ``state`` and ``observation`` of
-        ``random``."""
-        return self._compiled("start", {"random": (self._task.random_size,)}, options)
-
-    def _compiled(
-        self, purpose: str, sizes: Mapping[str, tuple[int, ...]], options: Mapping[str, Any] | None = None
-    ) -> Kernel:
         def traced(**inputs: Array) -> dict[str, Array]:
             given = {name: traced_array(array) for name, array in inputs.items()}
-            results = self._step(given) if options is None else self._start(given["random"], options)
+            results = evaluate(given, **(start or {}))
             # Entries that do not depend on an input are numbers.
             return {name: symbol_array(entries) for name, entries in results.items()}
 
-        try:
-            program: Program = trace(traced, sizes)
-        except TraceError as error:
-            raise UnsupportedFeatureError(
-                f"the {purpose} of {type(self._task).__name__} cannot be compiled: {error}"
-            ) from error
-        return load_kernel(program_recipe(program), lambda: program)
+        purpose = "step" if start is None else "start"
+        return StepText(traced, sizes, f"the {purpose} of {type(self._task).__name__} cannot be compiled")
 
-    def _start(self, random: Array, options: Mapping[str, Any]) -> dict[str, Any]:
-        state = self._task.start(random, **options)
+    def _start(self, inputs: Mapping[str, Array], **options: Any) -> dict[str, Any]:
+        state = self._task.start(inputs["random"], **options)
         return {"state": self.layout.row(state), "observation": self._observation(state)}
 
     def _step(self, inputs: Mapping[str, Array]) -> dict[str, Any]:

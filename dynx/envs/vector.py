@@ -2,21 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dynx.envs.library import AutoresetMode, VectorEnv, batch_space, spaces
+from dynx.compiled.step import BoundSteps, compiled
+from dynx.envs.actions import checked_action
+from dynx.envs.library import AutoresetMode, Space, VectorEnv, batch_space, spaces
 from dynx.envs.randomization import Randomization
 from dynx.envs.robot.array_task import ArrayTask
 from dynx.envs.robot.pictures import draw_robot
 from dynx.envs.robot.varied_robot import VariedRobot
+from dynx.envs.task_step import INVALID, TaskStep
 from dynx.envs.variation import Variation
-from dynx.envs.vector.checks import checked_actions, checked_mode, checked_reset_mask, raise_defect
-from dynx.envs.vector.kernels import INVALID, VectorKernels
-from dynx.errors import ArgumentError, ClosedError, EpisodeError, ShapeError, nearest, shown
+from dynx.errors import (
+    ArgumentError,
+    ClosedError,
+    DivergedError,
+    DTypeError,
+    DynxError,
+    EpisodeError,
+    ShapeError,
+    nearest,
+    shown,
+)
 from dynx.model.numbers import checked_array, whole_number
 from dynx.simd.target import host
 from dynx.spatial.scalar import Floats
@@ -85,8 +96,8 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
             spaces_of_one = task.observation_space, task.action_space
             self._variation = Variation(drawn, varied.parameters, *spaces_of_one, count=n)
         noisy = self._variation is not None and self._variation.action_noise is not None
-        self._kernels = VectorKernels(task, mode, max_episode_steps, varied, noisy_actions=noisy)
-        self._layout = self._kernels.layout
+        self._task_step = TaskStep(task, mode, max_episode_steps, varied, noisy_actions=noisy)
+        self._layout = self._task_step.layout
         self._copy = copy
         self._rows = max(n, host().lanes)
         self._make_buffers()
@@ -95,22 +106,28 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
     def _make_buffers(self) -> None:
         """Allocate the arrays of the kernel, and bind it to them: the state is read from one set and written
         to another, in turn."""
-        kernels, rows, n = self._kernels, self._rows, self.num_envs
-        kernel = kernels.step()
+        kernel, rows, n = compiled(self._task_step.text()), self._rows, self.num_envs
         sizes = {port.name: port.size for port in kernel.inputs + kernel.outputs}
-        twice: list[str] = [name for name in ("state", "steps", "earlier") if name in sizes]
-        sets: list[dict[str, Floats]] = [
-            {name: np.zeros((rows, sizes[name])) for name in twice} for _ in range(2)
-        ]
+        state = {
+            name: np.zeros((2, rows, sizes[name])) for name in ("state", "steps", "earlier") if name in sizes
+        }
         arrays = {name: np.zeros((rows, size)) for name, size in sizes.items()}
-        self._calls: list[Callable[[], None]] = [
-            kernel.bind(
-                [sets[turn].get(port.name, arrays[port.name]) for port in kernel.inputs],
-                [sets[1 - turn].get(port.name, arrays[port.name]) for port in kernel.outputs],
-            )
-            for turn in range(2)
-        ]
-        self._sets, self._turn = sets, 0
+        turns = np.arange(2)
+        known = {name: (array[None], 0 * turns) for name, array in arrays.items()}
+        steps = BoundSteps(
+            [kernel],
+            0 * turns,
+            known | {name: (array, turns) for name, array in state.items()},
+            {name: (array, 1 - turns) for name, array in state.items()},
+            first=0,
+            lanes=rows,
+            status=None,
+        )
+        self._calls = [steps.single(turn) for turn in range(2)]
+        self._sets, self._turn = (
+            [{name: array[turn] for name, array in state.items()} for turn in range(2)],
+            0,
+        )
         self._random, self._arrays = arrays["random"], arrays
         self._actions = arrays["action"][:n, 0] if self._discrete else arrays["action"][:n]
         if not self._discrete:
@@ -120,7 +137,7 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         flags = self._flags.view(np.bool_).reshape(n, 8)
         self._terminated, self._truncated = flags[:, 0], flags[:, 1]
         dtype = self.single_observation_space.dtype
-        self._observations = np.zeros((n, kernels.observations), dtype=dtype)
+        self._observations = np.zeros((n, self._task_step.observations), dtype=dtype)
         self._ended = NONE_ENDED
 
     @property
@@ -169,7 +186,7 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
             self._variation.seed(self.np_random_seed, self.np_random)
         self._renew(rows)
         begun, observation = np.empty_like(now["state"]), np.empty_like(found)
-        self._kernels.start(given)([self._random], [begun, observation])
+        compiled(self._task_step.text(given))([self._random], [begun, observation])
         now["state"][rows], found[rows] = begun[rows], observation[rows]
         now["steps"][rows] = 0.0
         self._ended = self._ended[~mask[self._ended]]
@@ -288,3 +305,56 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
     def _refuse_closed(self) -> None:
         if self.closed:
             raise ClosedError("this vector environment was closed")
+
+
+def checked_mode(mode: AutoresetMode | str) -> AutoresetMode:
+    """Return an autoreset mode, given itself, or by its name or value. Raises ArgumentError for another."""
+    for each in AutoresetMode:
+        if mode is each or mode in (each.name, each.value):
+            return each
+    names = [each.value for each in AutoresetMode]
+    raise ArgumentError(f"autoreset_mode is {shown(mode)}{nearest(str(mode), names)}")
+
+
+def checked_reset_mask(mask: Any, n: int, *, started: bool) -> NDArray[np.bool_]:
+    """Return which environments start an episode (n,), by default all."""
+    if mask is None:
+        return np.ones(n, dtype=np.bool_)
+    array = np.asarray(mask)
+    if array.dtype != np.bool_:
+        raise DTypeError(f"reset_mask is {shown(mask)}; wanted an array of bool")
+    if array.shape != (n,):
+        raise ShapeError(f"reset_mask has shape {array.shape}; wanted ({n},)")
+    if not started and not array.all():
+        raise EpisodeError("the first reset must start an episode in every environment")
+    return array
+
+
+def checked_actions(kinds: str, shape: tuple[int, ...], actions: Any) -> NDArray[Any]:
+    """Return the actions of all environments as an array of this shape, of one of these kinds of dtype.
+
+    Raises ShapeError or DTypeError.
+    """
+    array = np.asarray(actions)
+    if array.dtype.kind not in kinds:
+        wanted = "whole numbers" if kinds == "iu" else "numbers"
+        raise DTypeError(f"actions are of type {array.dtype}; wanted {wanted}")
+    if array.shape != shape:
+        raise ShapeError(f"actions have shape {array.shape}; wanted {shape}")
+    return array
+
+
+def raise_defect(space: Space[Any], actions: Floats, defects: NDArray[np.bool_]) -> NoReturn:
+    """Raise the error of the first environment with a defect (`dynx.envs.task_step`)."""
+    number = int(np.flatnonzero(defects)[0])
+    action = int(actions[number]) if isinstance(space, spaces.Discrete) else actions[number]
+    try:
+        checked_action(space, action)
+    except DynxError as error:
+        raise type(error)(f"environment {number}: {error}") from None
+    raise DivergedError(
+        f"the velocity in environment {number} is not finite or too large to be meaningful",
+        time=float("nan"),
+        step=-1,
+        state=(None, None),
+    )
