@@ -51,7 +51,7 @@ from dynx.model.tree import Base, checked_base
 from dynx.model.xml.source import XmlSource
 from dynx.option_names import checks_option_names
 from dynx.rules import LEVELS, Case, Detection, Level, Rule, all_rules
-from dynx.rules.choices import checked_choices
+from dynx.rules.registry import checked_choices
 
 DEFAULT_SAMPLES = 5
 

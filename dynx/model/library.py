@@ -118,7 +118,7 @@ def _free_name(stem: str, inside: str, source: str, taken: dict[str, int]) -> st
 def _urdf_files(root: Path) -> list[Path]:
     # Descriptions are at most three folders deep; deeper folders hold many mesh files.
     found = {path for depth in ("*", "*/*", "*/*/*", "*/*/*/*") for path in root.glob(f"{depth}.urdf")}
-    # Traps are not robots but examples of defects, listed by `dynx.rules.traps`.
+    # Traps are not robots but examples of defects, listed by `dynx.rules.registry`.
     descriptions = (path for path in found if path.relative_to(root).parts[0] != TRAPS)
     return sorted(path for path in descriptions if path.is_file())
 

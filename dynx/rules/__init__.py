@@ -5,10 +5,23 @@ Other packages offer rules of their own in the entry-point group ``dynx.rules``.
 """
 
 from dynx.rules.case import Case
-from dynx.rules.editing import Correction, EditingRule, OptionalEditingRule, correction, found_at
-from dynx.rules.engine_versions import EVERY_ENGINE, measured_on
 from dynx.rules.registry import all_rules, find_rule
-from dynx.rules.rule import LEVELS, CallingRule, Detection, Level, Remedy, Rule, links_of
+from dynx.rules.rule import (
+    EVERY_ENGINE,
+    LEVELS,
+    CallingRule,
+    Correction,
+    Detection,
+    EditingRule,
+    Level,
+    OptionalEditingRule,
+    Remedy,
+    Rule,
+    correction,
+    found_at,
+    links_of,
+    measured_on,
+)
 
 __all__ = [
     "EVERY_ENGINE",

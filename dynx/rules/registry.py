@@ -5,13 +5,19 @@ An installed package offers a rule in the entry-point group ``dynx.rules``; its 
 
 from __future__ import annotations
 
+import inspect
 import pkgutil
+from collections.abc import Iterable
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 
-from dynx.errors import DynxError, UnknownNameError, nearest, shown
+from dynx.errors import ArgumentError, DynxError, RobotNotFoundError, UnknownNameError, nearest, shown
+from dynx.model.library import TRAPS, own_roots
+from dynx.model.xml.source import XmlSource
 from dynx.registry import ClassRegistry
 from dynx.rules import catalogue
+from dynx.rules.case import Case
 from dynx.rules.rule import Rule
 
 _MAX_SUGGESTIONS = 6
@@ -83,3 +89,52 @@ def _own_rules() -> tuple[Rule, ...]:
         if isinstance(member, type) and issubclass(member, Rule) and member.__module__ == name
     ]
     return tuple(sorted(found, key=lambda rule: rule.id))
+
+
+# The user's choices where a rule has several remedies.
+
+
+def checked_choices(given: Iterable[tuple[str, str]]) -> dict[str, str]:
+    """Return the choices by rule id, from pairs of a rule's id or name and one of its `choices`.
+
+    Raises UnknownNameError for an unknown rule or choice, ArgumentError for a rule that has no choices or is
+    given twice with different ones.
+    """
+    chosen: dict[str, str] = {}
+    for word, choice in given:
+        rule = find_rule(word)
+        if not rule.choices:
+            raise ArgumentError(f"{rule.id} {rule.name} leaves no choice")
+        if choice not in rule.choices:
+            raise UnknownNameError(
+                f"{rule.id} {rule.name} has no choice {shown(choice)}{nearest(choice, rule.choices)}"
+            )
+        if chosen.setdefault(rule.id, choice) != choice:
+            raise ArgumentError(f"{rule.id} {rule.name} is decided twice")
+    return chosen
+
+
+# Traps: small robots, one for each rule, that show its cause and nothing else.
+
+
+def find_trap(rule: Rule | str) -> Path:
+    """Return the trap of a rule, or of its id or name: beside dynx's own models, or beside the rule's module.
+
+    Raises UnknownNameError where there is no such rule, RobotNotFoundError where its trap is missing.
+    """
+    found = find_rule(rule) if isinstance(rule, str) else rule
+    beside_module = Path(inspect.getfile(type(found))).parent
+    for folder in (*(root / TRAPS for root in own_roots()), beside_module):
+        path = folder / found.trap()
+        if path.is_file():
+            return path
+    raise RobotNotFoundError(
+        f"{found.id} has no trap: no file {found.trap()} in {TRAPS} of dynx's models or beside its module"
+    )
+
+
+def trap_case(rule: Rule | str) -> Case:
+    """Return the trap of a rule as the rule sees it, on the base on which it shows the cause."""
+    found = find_rule(rule) if isinstance(rule, str) else rule
+    path = find_trap(found)
+    return Case(XmlSource(path.read_bytes(), str(path)), base=found.trap_base)

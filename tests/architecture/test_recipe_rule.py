@@ -13,7 +13,7 @@ import dynx
 from dynx.doctor import diagnose
 from dynx.errors import DynxError
 from dynx.rules import Rule, all_rules, find_rule, registry
-from dynx.rules.traps import find_trap
+from dynx.rules.registry import find_trap
 
 MODULE = '''"""ACME101 unweighed-link: A link has no <inertial>, which PyBullet reads as 1 kg.
 

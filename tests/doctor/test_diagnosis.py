@@ -19,7 +19,7 @@ from dynx.loaded import ENGINES, installed_engines, loader_class, registry
 from dynx.model import Model
 from dynx.model.tree import Base
 from dynx.rules import Rule, all_rules
-from dynx.rules.traps import find_trap, trap_case
+from dynx.rules.registry import find_trap, trap_case
 from dynx.testing.strategies import models
 
 BOTH = ["pinocchio", "pybullet"]

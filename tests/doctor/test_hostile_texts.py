@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from dynx.doctor import diagnose
 from dynx.doctor.report import DoctorReport
 from dynx.rules import all_rules
-from dynx.rules.traps import find_trap
+from dynx.rules.registry import find_trap
 from tests.rules.documents import case_of, joint, link
 
 ENGINES = ["pinocchio", "pybullet"]

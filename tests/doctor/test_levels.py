@@ -23,7 +23,7 @@ from dynx.errors import UnknownNameError
 from dynx.loaded import ENGINES, installed_engines
 from dynx.model.xml.source import XmlSource
 from dynx.rules import LEVELS, Case, Level, find_rule
-from dynx.rules.traps import trap_case
+from dynx.rules.registry import trap_case
 from dynx.spatial.scalar import Floats
 from tests.doctor.planting.catalogue import PLANTERS
 from tests.doctor.planting.plan import Trial, pair_trials, plant_defects

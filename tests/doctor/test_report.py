@@ -11,7 +11,7 @@ import pytest
 from dynx.doctor import diagnose
 from dynx.doctor.report import Change, DoctorReport, EngineResult
 from dynx.doctor.report_document import results_document
-from dynx.rules.traps import find_trap
+from dynx.rules.registry import find_trap
 from tests.doctor.formats.reports import alike, differing, refused
 
 EXPLAINED = replace(differing(), unexplained=(), residual=1e-13)

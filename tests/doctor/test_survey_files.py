@@ -9,7 +9,7 @@ import pytest
 
 from dynx.agreement.tolerances import BAR
 from dynx.loaded import installed_engines
-from dynx.rules.traps import find_trap
+from dynx.rules.registry import find_trap
 from tests.doctor.raw_agreement import ENGINES, check_entries
 from tests.doctor.survey_files import Loading, examine, listed, load_alone, make_tasks, summary, survey
 

@@ -14,7 +14,7 @@ from dynx.doctor.examine.examination import TORQUE, Examiner
 from dynx.doctor.formats.baseline import differences
 from dynx.loaded import engine_of, installed_engines
 from dynx.rules import Case
-from dynx.rules.traps import find_trap, trap_case
+from dynx.rules.registry import find_trap, trap_case
 from dynx.testing.strategies import models
 
 PLAIN = "pybullet:plain"

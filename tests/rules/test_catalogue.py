@@ -14,8 +14,8 @@ from dynx.errors import UnknownNameError
 from dynx.loaded import ENGINES, VARIANTS
 from dynx.model.xml.source import SourceElement, XmlSource
 from dynx.rules import Case, Detection, Rule, all_rules, find_rule
-from dynx.rules.inertia.rigid_groups import rigid_groups
-from dynx.rules.traps import find_trap, trap_case
+from dynx.rules.inertia import rigid_groups
+from dynx.rules.registry import find_trap, trap_case
 from tests.rules.readings import reading_difference
 
 RULES = all_rules()

@@ -14,9 +14,7 @@ from dynx.model.library import DYNX_MODELS, robots
 from dynx.model.tree import Base
 from dynx.model.xml.source import Edit, XmlSource
 from dynx.rules import Case, all_rules, find_rule
-from dynx.rules.inertia.edits import inertial_edits, with_inertials
-from dynx.rules.inertia.impossible import NUMBERS_OF_THE_FILE
-from dynx.rules.inertia.rigid_groups import rigid_groups
+from dynx.rules.inertia import NUMBERS_OF_THE_FILE, inertial_edits, rigid_groups, with_inertials
 from tests.rules.documents import case_of, joint, link
 
 RULES = [rule for rule in all_rules() if "DX101" <= rule.id <= "DX113"]

@@ -14,8 +14,7 @@ from dynx.model.library import EXAMPLE_ROBOT_DATA, robots
 from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, Remedy, all_rules, find_rule
-from dynx.rules.inertia.central import CentralInertia
-from dynx.rules.inertia.edits import inertial_edits
+from dynx.rules.inertia import CentralInertia, inertial_edits
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models
 from tests.rules.documents import case_of, joint, link

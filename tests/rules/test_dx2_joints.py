@@ -17,7 +17,7 @@ from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
 from dynx.reference.backend import ReferenceBackend
 from dynx.rules import Case, find_rule
-from dynx.rules.joints.splitting import TYPES
+from dynx.rules.joints import TYPES
 from dynx.spatial.so3 import rotation_from_rpy
 from dynx.testing.strategies import unit_vectors
 from tests.rules.trap_cases import assert_same_robot, changed_lines, mended, only, trap

@@ -10,8 +10,8 @@ import pytest
 from dynx.doctor import diagnose
 from dynx.loaded import installed_engines
 from dynx.rules import Rule, all_rules
+from dynx.rules.registry import find_trap, trap_case
 from dynx.rules.rule import Detection
-from dynx.rules.traps import find_trap, trap_case
 
 ENGINES = re.compile(r"pinocchio|(?:py)?bullet|mujoco|drake", re.IGNORECASE)
 

@@ -20,7 +20,7 @@ from dynx.doctor.prove.mending import mend
 from dynx.errors import ModelError
 from dynx.loaded import VARIANTS, engine_of, installed_engines, loader_class
 from dynx.rules import Case, Rule, all_rules
-from dynx.rules.traps import trap_case
+from dynx.rules.registry import trap_case
 
 STATES, SEED = 3, 0
 

@@ -13,8 +13,7 @@ from dynx.engines.pybullet.inertia_checks import MAX_ASYMMETRY, tree_asymmetry
 from dynx.engines.silence import silence
 from dynx.model.elements import Inertial, Pose
 from dynx.rules import Case, find_rule
-from dynx.rules.inertia.central import CentralInertia
-from dynx.rules.inertia.edits import inertial_edits
+from dynx.rules.inertia import CentralInertia, inertial_edits
 from tests.rules.documents import case_of, joint, link
 from tests.rules.trap_cases import assert_same_robot, mended
 

@@ -8,7 +8,7 @@ import pytest
 
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, find_rule
-from dynx.rules.traps import trap_case
+from dynx.rules.registry import trap_case
 from tests.rules.documents import case_of, joint, link
 
 

@@ -15,7 +15,7 @@ from dynx.doctor.task import DoctorTask, check_engines, examine, refused
 from dynx.errors import DynxError
 from dynx.model.expansion import expand, refusals
 from dynx.model.tree import Base
-from dynx.rules.choices import checked_choices
+from dynx.rules.registry import checked_choices
 from dynx.rules.rule import Level
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from dynx.doctor.counterexample.tree_reductions import Reductions
 from dynx.model.xml.quoting import quoteattr
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
-from dynx.rules.text.number_text import is_number
+from dynx.rules.numbers_in_text import is_number
 
 DIGITS = (1, 2, 3)
 """Numbers of significant digits that are tried."""

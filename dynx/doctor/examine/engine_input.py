@@ -18,10 +18,7 @@ from tempfile import TemporaryDirectory
 
 from dynx.doctor.examine.mesh_boxes import with_mesh_boxes
 from dynx.model.xml.source import SourceElement, XmlSource
-from dynx.rules.geometry.bullet_boxes import collision_meshes
-from dynx.rules.geometry.known_shapes import has_shape
-from dynx.rules.geometry.textures import texture_replacements
-from dynx.rules.geometry.visual_faults import may_be_refused
+from dynx.rules.geometry import collision_meshes, has_shape, may_be_refused, texture_replacements
 
 _BOX = '<box size="1 1 1"/>'
 

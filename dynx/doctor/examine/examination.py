@@ -24,7 +24,7 @@ from dynx.loaded import LoadedModel, LoadedRobot, loader_class
 from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
 from dynx.rules.case import Case
-from dynx.rules.inertia.massless_links import has_inertial_data
+from dynx.rules.inertia import has_inertial_data
 from dynx.spatial.scalar import Floats
 
 KINEMATICS, JACOBIAN = "forward_kinematics", "jacobian"

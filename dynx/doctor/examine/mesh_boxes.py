@@ -19,7 +19,7 @@ import numpy as np
 
 from dynx.model.geometry.formats.stl import STL_FACET
 from dynx.model.xml.source import Edit, XmlSource
-from dynx.rules.geometry.bullet_boxes import bullet_box, collision_meshes
+from dynx.rules.geometry import bullet_box, collision_meshes
 
 _FACES = (
     *((0, 1, 2), (1, 3, 2), (4, 6, 5), (5, 6, 7), (0, 4, 1), (1, 4, 5)),

@@ -24,10 +24,15 @@ of the heaviest link rigidly connected to it instead, because PyBullet fixes a r
 from collections.abc import Iterable, Sequence
 
 from dynx.rules import Case, Detection, Remedy, Rule, links_of, measured_on
-from dynx.rules.inertia.edits import with_inertials, zero_inertial
-from dynx.rules.inertia.massless_links import has_inertial_data, heaviest_in_root_group
-from dynx.rules.inertia.merging import merged_inertials
-from dynx.rules.inertia.rigid_groups import rigid_groups, static_links
+from dynx.rules.inertia import (
+    has_inertial_data,
+    heaviest_in_root_group,
+    merged_inertials,
+    rigid_groups,
+    static_links,
+    with_inertials,
+    zero_inertial,
+)
 
 _WORLD = "world"
 """Name of a link without ``<inertial>`` that PyBullet gives no mass."""

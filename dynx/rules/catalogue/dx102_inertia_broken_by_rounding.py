@@ -25,10 +25,16 @@ The equations of motion change by a few 1e-15 of their size.
 from collections.abc import Iterable, Sequence
 
 from dynx.rules import Case, Detection, Remedy, Rule, links_of, measured_on
-from dynx.rules.inertia.edits import line_of, with_inertials
-from dynx.rules.inertia.merging import merged_inertials
-from dynx.rules.inertia.physical import is_borderline, principal_moments, with_raised_moments
-from dynx.rules.inertia.rigid_groups import inertials_in_groups, rigid_groups
+from dynx.rules.inertia import (
+    inertials_in_groups,
+    is_borderline,
+    line_of,
+    merged_inertials,
+    principal_moments,
+    rigid_groups,
+    with_inertials,
+    with_raised_moments,
+)
 
 _ROUNDS = 4
 

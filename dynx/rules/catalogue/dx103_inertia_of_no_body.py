@@ -22,7 +22,7 @@ body can have replaces it, and the report says that the physics changed. Choose 
 the lines that give them to PyBullet and Drake after loading; MuJoCo cannot use these numbers.
 """
 
-from dynx.rules.inertia.impossible import ImpossibleInertia
+from dynx.rules.inertia import ImpossibleInertia
 
 
 class InertiaOfNoBody(ImpossibleInertia):

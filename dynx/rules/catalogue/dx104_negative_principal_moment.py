@@ -23,7 +23,7 @@ even so, its results are extrapolated from those of two robots that it accepts. 
 numbers.
 """
 
-from dynx.rules.inertia.impossible import ImpossibleInertia
+from dynx.rules.inertia import ImpossibleInertia
 
 
 class NegativePrincipalMoment(ImpossibleInertia):

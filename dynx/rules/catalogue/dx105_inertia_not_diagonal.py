@@ -24,10 +24,15 @@ from collections.abc import Iterable, Sequence
 
 from dynx.engines.pybullet.inertia_checks import bullet_reading, diagonalisation_error
 from dynx.rules import Case, Detection, Remedy, Rule, links_of, measured_on
-from dynx.rules.inertia.central import CentralInertia
-from dynx.rules.inertia.edits import line_of, with_inertials
-from dynx.rules.inertia.physical import fault_beyond_rounding, is_borderline, with_raised_moments
-from dynx.rules.inertia.rigid_groups import inertials_in_groups
+from dynx.rules.inertia import (
+    CentralInertia,
+    fault_beyond_rounding,
+    inertials_in_groups,
+    is_borderline,
+    line_of,
+    with_inertials,
+    with_raised_moments,
+)
 
 _MAX_ERROR = 1e-14
 """Largest error, relative to the tensor, that is not reported: 1 % of the tolerance of `dynx.diagnose`."""

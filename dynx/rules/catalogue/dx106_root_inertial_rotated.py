@@ -23,8 +23,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from dynx.rules import Case, Detection, Remedy, Rule, links_of, measured_on
-from dynx.rules.inertia.central import CentralInertia
-from dynx.rules.inertia.edits import line_of, with_inertials
+from dynx.rules.inertia import CentralInertia, line_of, with_inertials
 from dynx.spatial.so3 import rotation_from_rpy
 
 _ROUNDING = 4.0 * float(np.finfo(float).eps)

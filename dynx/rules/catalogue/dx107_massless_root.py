@@ -23,14 +23,14 @@ robot without any mass has no inertial data (DX118).
 from collections.abc import Iterable, Sequence
 
 from dynx.rules import Case, Detection, Remedy, Rule, measured_on
-from dynx.rules.inertia.edits import with_inertials
-from dynx.rules.inertia.massless_links import (
+from dynx.rules.inertia import (
     has_inertial_data,
     heaviest_in_root_group,
+    merged_inertials,
+    rigid_groups,
+    with_inertials,
     with_least_inertia,
 )
-from dynx.rules.inertia.merging import merged_inertials
-from dynx.rules.inertia.rigid_groups import rigid_groups
 
 
 class MasslessRoot(Rule):

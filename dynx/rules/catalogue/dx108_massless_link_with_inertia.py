@@ -27,10 +27,14 @@ import numpy as np
 
 from dynx.model.elements import Inertial
 from dynx.rules import Case, Detection, Remedy, Rule, links_of, measured_on
-from dynx.rules.inertia.edits import with_inertials
-from dynx.rules.inertia.merging import merged_inertials
-from dynx.rules.inertia.physical import MIN_MASS, tensor_fault
-from dynx.rules.inertia.rigid_groups import inertials_in_groups, rigid_groups
+from dynx.rules.inertia import (
+    MIN_MASS,
+    inertials_in_groups,
+    merged_inertials,
+    rigid_groups,
+    tensor_fault,
+    with_inertials,
+)
 
 _READINGS = (("mujoco", "dropped or refused by MuJoCo"), ("drake", "1 kg in Drake"))
 

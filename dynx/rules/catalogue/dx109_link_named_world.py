@@ -22,7 +22,7 @@ reference>`` too. Programs may look the link up by its old name: ``--choose DX10
 from collections.abc import Iterable, Sequence
 
 from dynx.rules import Case, Detection, Remedy, Rule, measured_on
-from dynx.rules.joints.renaming import fresh_name, link_rename
+from dynx.rules.joints import fresh_name, link_rename
 
 _WORLD = "world"
 

@@ -20,7 +20,7 @@ to keep the file. Where nothing beyond the joint has mass, see DX113.
 from collections.abc import Iterable, Sequence
 
 from dynx.rules import Case, Detection, Remedy, Rule, links_of, measured_on
-from dynx.rules.inertia.massless_links import massless_links, with_least_inertia
+from dynx.rules.inertia import massless_links, with_least_inertia
 
 
 class MasslessMovingLink(Rule):

@@ -29,21 +29,24 @@ import numpy as np
 from dynx.model.elements import Inertial
 from dynx.model.mechanism import pose_arrays
 from dynx.rules import Case, Detection, Remedy, Rule, links_of, measured_on
-from dynx.rules.inertia.central import CentralInertia
-from dynx.rules.inertia.edits import line_of, with_inertials
-from dynx.rules.inertia.merging import as_inertial, merged_inertials
-from dynx.rules.inertia.physical import (
+from dynx.rules.inertia import (
     ACCEPTED_MOMENT,
     MIN_MASS,
     MIN_MOMENT,
     ROUNDING,
+    CentralInertia,
+    RigidGroup,
+    as_inertial,
     fault_beyond_rounding,
+    line_of,
+    merged_inertials,
     moment_increase,
     nearest_moments,
     principal_moments,
+    rigid_groups,
+    with_inertials,
     with_raised_moments,
 )
-from dynx.rules.inertia.rigid_groups import RigidGroup, rigid_groups
 from dynx.spatial.extended import longdouble
 
 _MAX_ADDED_SHARE = 1e-3

@@ -20,9 +20,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from dynx.rules import Case, Detection, Rule, measured_on
-from dynx.rules.inertia.central import CentralInertia
-from dynx.rules.inertia.edits import line_of
-from dynx.rules.inertia.rigid_groups import inertials_in_groups
+from dynx.rules.inertia import CentralInertia, inertials_in_groups, line_of
 
 _MAX_CHANGE = 1e-14
 """Largest change, relative to the largest moment, that is not reported."""

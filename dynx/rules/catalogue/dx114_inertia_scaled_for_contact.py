@@ -21,7 +21,7 @@ from collections.abc import Iterable
 
 from dynx.model.xml.source import SourceElement
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.text.attributes import number_or_none
+from dynx.rules.attributes import number_or_none
 
 
 class InertiaScaledForContact(EditingRule):

@@ -27,8 +27,8 @@ as ``pybullet:plain``; its difference counts only where ``--engines`` names it.
 from collections.abc import Iterable
 
 from dynx.rules import CallingRule, Case, Detection, found_at
-from dynx.rules.geometry.bullet_boxes import bullet_box, collision_meshes
-from dynx.rules.inertia.rigid_groups import rigid_groups
+from dynx.rules.geometry import bullet_box, collision_meshes
+from dynx.rules.inertia import rigid_groups
 
 
 class InertiaFromShapes(CallingRule):

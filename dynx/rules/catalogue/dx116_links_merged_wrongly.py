@@ -20,7 +20,7 @@ it, as ``pybullet:merge``.
 from collections.abc import Iterable
 
 from dynx.rules import CallingRule, Case, Detection, found_at
-from dynx.rules.inertia.rigid_groups import rigid_groups
+from dynx.rules.inertia import rigid_groups
 
 
 class LinksMergedWrongly(CallingRule):

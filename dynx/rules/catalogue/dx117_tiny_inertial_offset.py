@@ -30,10 +30,14 @@ import numpy as np
 
 from dynx.model.elements import Inertial
 from dynx.rules import Case, Detection, Remedy, Rule, links_of, measured_on
-from dynx.rules.inertia.central import CentralInertia
-from dynx.rules.inertia.edits import line_of, with_inertials
-from dynx.rules.inertia.merging import merged_inertials
-from dynx.rules.inertia.rigid_groups import RigidGroup, rigid_groups
+from dynx.rules.inertia import (
+    CentralInertia,
+    RigidGroup,
+    line_of,
+    merged_inertials,
+    rigid_groups,
+    with_inertials,
+)
 from dynx.spatial.extended import FLOAT64_EPS
 from dynx.spatial.scalar import Floats
 

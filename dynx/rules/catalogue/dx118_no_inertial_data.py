@@ -25,8 +25,7 @@ DX110 or DX113.
 from collections.abc import Iterable, Mapping, Sequence
 
 from dynx.rules import Case, Detection, Remedy, Rule, measured_on
-from dynx.rules.inertia.massless_links import has_inertial_data, with_least_inertia
-from dynx.rules.inertia.rigid_groups import rigid_groups
+from dynx.rules.inertia import has_inertial_data, rigid_groups, with_least_inertia
 
 
 class NoInertialData(Rule):

@@ -30,7 +30,7 @@ from itertools import product
 from dynx.engines.pybullet.inertia_checks import MAX_ASYMMETRY, tree_asymmetry
 from dynx.model.elements import Inertial
 from dynx.rules import Case, Detection, Remedy, Rule, links_of, measured_on
-from dynx.rules.inertia.edits import line_of, with_inertials
+from dynx.rules.inertia import line_of, with_inertials
 
 _STEPS = range(-16, 17)
 """Units in the last place by which each coordinate is moved."""

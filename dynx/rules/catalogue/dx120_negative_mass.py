@@ -20,7 +20,7 @@ report names. ``--choose DX120=zero`` writes 0 instead.
 from collections.abc import Iterable
 
 from dynx.rules import EVERY_ENGINE, Case, Correction, EditingRule, correction
-from dynx.rules.text.attributes import number_or_none
+from dynx.rules.attributes import number_or_none
 
 
 class NegativeMass(EditingRule):

@@ -22,9 +22,9 @@ from collections.abc import Iterable
 import numpy as np
 
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.joints.elements import SINGLE, elements_in_joints
-from dynx.rules.text.attributes import vector_of
-from dynx.rules.text.number_text import decimal
+from dynx.rules.attributes import vector_of
+from dynx.rules.joints import SINGLE, elements_in_joints
+from dynx.rules.numbers_in_text import decimal
 
 _ROUNDING = 1e-15
 """Distance from 1 of the length of a rounded unit vector; dynx does not change such an axis."""

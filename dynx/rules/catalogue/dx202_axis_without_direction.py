@@ -22,9 +22,8 @@ from collections.abc import Iterable
 
 from dynx.model.xml.source import SourceElement
 from dynx.rules import EVERY_ENGINE, Case, Correction, EditingRule, correction, found_at
-from dynx.rules.joints.axes import misspelled_direction
-from dynx.rules.joints.elements import SINGLE, elements_in_joints
-from dynx.rules.text.number_text import is_number
+from dynx.rules.joints import SINGLE, elements_in_joints, misspelled_direction
+from dynx.rules.numbers_in_text import is_number
 
 _PARTS = frozenset("xyz")
 

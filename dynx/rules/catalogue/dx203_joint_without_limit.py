@@ -20,9 +20,9 @@ from dynx.errors import escaped
 from dynx.model.xml.quoting import quoteattr
 from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules import Case, Correction, EditingRule, correction, found_at, measured_on
-from dynx.rules.joints.elements import UNLIMITED, joints_of_type
-from dynx.rules.text.misspelled_names import meant_name
-from dynx.rules.text.number_text import LARGEST
+from dynx.rules.attributes import meant_name
+from dynx.rules.joints import UNLIMITED, joints_of_type
+from dynx.rules.numbers_in_text import LARGEST
 
 _ZERO = f'<limit lower="0" upper="0" effort="{LARGEST}" velocity="{LARGEST}"/>'
 

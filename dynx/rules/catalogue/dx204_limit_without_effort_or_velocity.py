@@ -16,10 +16,9 @@ double, which every engine reads and which dynx reads as "no limit".
 from collections.abc import Iterable
 
 from dynx.rules import Case, Correction, EditingRule, measured_on
-from dynx.rules.joints.elements import elements_in_joints
-from dynx.rules.text.missing_attributes import completion
-from dynx.rules.text.number_text import LARGEST
-from dynx.rules.text.versions import corrected_version
+from dynx.rules.attributes import completion
+from dynx.rules.joints import elements_in_joints
+from dynx.rules.numbers_in_text import LARGEST, corrected_version
 
 
 class LimitWithoutEffortOrVelocity(EditingRule):

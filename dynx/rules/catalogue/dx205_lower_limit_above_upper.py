@@ -16,9 +16,9 @@ largest double for both, as MuJoCo and PyBullet treat them.
 from collections.abc import Iterable
 
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.joints.elements import SINGLE, elements_in_joints
-from dynx.rules.text.attributes import number_or_none
-from dynx.rules.text.number_text import LARGEST
+from dynx.rules.attributes import number_or_none
+from dynx.rules.joints import SINGLE, elements_in_joints
+from dynx.rules.numbers_in_text import LARGEST
 
 
 class LowerLimitAboveUpper(EditingRule):

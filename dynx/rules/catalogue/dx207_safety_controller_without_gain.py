@@ -14,8 +14,8 @@ under a misspelled name, ``k_velocty="20"``, is what was meant, and gets the rig
 from collections.abc import Iterable
 
 from dynx.rules import Case, Correction, EditingRule, measured_on
-from dynx.rules.joints.elements import elements_in_joints
-from dynx.rules.text.missing_attributes import completion
+from dynx.rules.attributes import completion
+from dynx.rules.joints import elements_in_joints
 
 
 class SafetyControllerWithoutGain(EditingRule):

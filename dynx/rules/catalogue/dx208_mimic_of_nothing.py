@@ -20,9 +20,8 @@ from collections.abc import Iterable
 from dynx.errors import escaped, shown
 from dynx.model.xml.source import SourceElement
 from dynx.rules import Case, Correction, EditingRule, correction, found_at, measured_on
-from dynx.rules.joints.elements import SINGLE, elements_in_joints
-from dynx.rules.text.missing_attributes import renaming
-from dynx.rules.text.misspelled_names import meant_name
+from dynx.rules.attributes import meant_name, renaming
+from dynx.rules.joints import SINGLE, elements_in_joints
 
 
 class MimicOfNothing(EditingRule):

@@ -21,9 +21,9 @@ from dynx.errors import shown
 from dynx.model.elements import Joint
 from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.joints.elements import SINGLE, elements_in_joints
-from dynx.rules.text.attributes import orientation_edits
-from dynx.rules.text.number_text import decimal
+from dynx.rules.attributes import orientation_edits
+from dynx.rules.joints import SINGLE, elements_in_joints
+from dynx.rules.numbers_in_text import decimal
 
 
 class MimicOfFixedJoint(EditingRule):

@@ -24,8 +24,7 @@ from collections.abc import Iterable
 
 from dynx.model.xml.source import Edit
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.joints.elements import joints_of_type, specifies_base
-from dynx.rules.joints.splitting import TYPES, joint_split
+from dynx.rules.joints import TYPES, joint_split, joints_of_type, specifies_base
 
 
 class JointOfSeveralFreedoms(EditingRule):

@@ -18,7 +18,7 @@ What to do: specify the base in one place. ``dynx doctor --fix`` makes the joint
 from collections.abc import Iterable
 
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.joints.elements import joints_of_type, specifies_base
+from dynx.rules.joints import joints_of_type, specifies_base
 
 
 class FloatingJointAtRoot(EditingRule):

@@ -18,7 +18,7 @@ transmissions and Gazebo references too; programs that look the joint up by its 
 from collections.abc import Iterable
 
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.joints.renaming import fresh_name, joint_rename
+from dynx.rules.joints import fresh_name, joint_rename
 
 _RESERVED = "universe"
 

@@ -15,7 +15,7 @@ from collections.abc import Iterable
 from dynx.errors import shown
 from dynx.model.xml.source import SourceElement
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.joints.transmissions import transmissions_drake_reads, type_of
+from dynx.rules.joints import transmissions_drake_reads, type_of
 
 
 class TransmissionOfNothing(EditingRule):

@@ -19,8 +19,7 @@ from collections.abc import Iterable, Iterator
 from dynx.errors import shown
 from dynx.model.xml.source import SourceElement
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.joints.renaming import fresh_name
-from dynx.rules.joints.transmissions import moves_by_actuator, transmissions_drake_reads
+from dynx.rules.joints import fresh_name, moves_by_actuator, transmissions_drake_reads
 
 
 class ActuatorNamedTwice(EditingRule):

@@ -25,9 +25,8 @@ What to do: write the intended end. A number under a misspelled name, ``uper="1"
 from collections.abc import Iterable
 
 from dynx.rules import Case, Correction, EditingRule, measured_on
-from dynx.rules.joints.elements import elements_in_joints
-from dynx.rules.text.attributes import number_or_none
-from dynx.rules.text.missing_attributes import completion
+from dynx.rules.attributes import completion, number_or_none
+from dynx.rules.joints import elements_in_joints
 
 _UPPER_OF_PYBULLET = -1.0
 """Upper limit that PyBullet uses where none is given; URDF has 0."""

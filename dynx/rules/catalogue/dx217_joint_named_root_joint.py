@@ -20,7 +20,7 @@ users who load it in the usual way get no warning.
 from collections.abc import Iterable
 
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.joints.renaming import fresh_name, joint_rename
+from dynx.rules.joints import fresh_name, joint_rename
 
 _RESERVED = "root_joint"
 

@@ -21,7 +21,7 @@ from collections.abc import Iterable
 
 from dynx.errors import escaped
 from dynx.rules import EVERY_ENGINE, Case, Correction, EditingRule, correction
-from dynx.rules.joints.axes import misspelled_axes
+from dynx.rules.joints import misspelled_axes
 
 
 class AxisAttributeMisspelled(EditingRule):

@@ -16,8 +16,7 @@ from collections.abc import Iterable
 
 from dynx.errors import shown
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.joints.axes import misspelled_direction, mujoco_reads
-from dynx.rules.joints.elements import elements_in_joints
+from dynx.rules.joints import elements_in_joints, misspelled_direction, mujoco_reads
 
 
 class UnreadableAxisOfFixedJoint(EditingRule):

@@ -14,9 +14,9 @@ define it; a number under a misspelled name, ``uper="1"``, is what was meant, an
 from collections.abc import Iterable
 
 from dynx.rules import Case, Correction, EditingRule, measured_on
-from dynx.rules.joints.elements import elements_in_joints
-from dynx.rules.text.missing_attributes import completion
-from dynx.rules.text.versions import corrected_version
+from dynx.rules.attributes import completion
+from dynx.rules.joints import elements_in_joints
+from dynx.rules.numbers_in_text import corrected_version
 
 _TYPES = ("revolute", "prismatic", "fixed", "floating", "planar")
 

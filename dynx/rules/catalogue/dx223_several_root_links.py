@@ -22,7 +22,7 @@ from dynx.model.xml.quoting import quoteattr
 from dynx.model.xml.source import Edit
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.case import end_of
-from dynx.rules.joints.renaming import fresh_name
+from dynx.rules.joints import fresh_name
 
 
 class SeveralRootLinks(EditingRule):

@@ -22,8 +22,8 @@ from dataclasses import replace
 
 from dynx.model.elements import Joint
 from dynx.rules import Case, Correction, Detection, EditingRule, Remedy, measured_on
-from dynx.rules.editing import found_at
-from dynx.rules.joints.elements import SINGLE, axis_edit, elements_in_joints
+from dynx.rules.joints import SINGLE, axis_edit, elements_in_joints
+from dynx.rules.rule import found_at
 
 AXES = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
 

@@ -21,8 +21,8 @@ the calls that switch damping off in each engine.
 from collections.abc import Iterable
 
 from dynx.rules import CallingRule, Case, Detection, found_at, measured_on
-from dynx.rules.joints.elements import SINGLE, elements_in_joints
-from dynx.rules.text.attributes import number_or_none
+from dynx.rules.attributes import number_or_none
+from dynx.rules.joints import SINGLE, elements_in_joints
 
 
 class DampingInInverseDynamics(CallingRule):

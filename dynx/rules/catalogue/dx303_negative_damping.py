@@ -13,8 +13,8 @@ What to do: correct the sign. ``dynx doctor --fix`` removes it. ``--choose DX303
 from collections.abc import Iterable
 
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.joints.elements import SINGLE, elements_in_joints
-from dynx.rules.text.attributes import number_or_none
+from dynx.rules.attributes import number_or_none
+from dynx.rules.joints import SINGLE, elements_in_joints
 
 
 class NegativeDamping(EditingRule):

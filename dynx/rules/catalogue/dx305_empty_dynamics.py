@@ -15,9 +15,8 @@ gets the right name.
 from collections.abc import Iterable
 
 from dynx.rules import Case, Correction, EditingRule, measured_on
-from dynx.rules.joints.elements import elements_in_joints
-from dynx.rules.text.missing_attributes import completion
-from dynx.rules.text.misspelled_names import misspelled_numbers
+from dynx.rules.attributes import completion, misspelled_numbers
+from dynx.rules.joints import elements_in_joints
 
 _EITHER = ("damping", "friction")
 

@@ -17,8 +17,8 @@ change it; doctor compares without rotors and prints the call that switches them
 from collections.abc import Iterable
 
 from dynx.rules import CallingRule, Case, Detection, measured_on
-from dynx.rules.joints.transmissions import moves_by_actuator
-from dynx.rules.text.attributes import number_or_none
+from dynx.rules.attributes import number_or_none
+from dynx.rules.joints import moves_by_actuator
 
 _TAG = "drake:rotor_inertia"
 

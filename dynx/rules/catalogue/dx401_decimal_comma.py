@@ -24,8 +24,7 @@ number with commas and a point, ``1,250.5``, is unambiguous.
 """
 
 from dynx.rules import EVERY_ENGINE, Case
-from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
-from dynx.rules.text.number_text import Misspelling
+from dynx.rules.numbers_in_text import MisspelledNumberRule, Misspelling
 
 
 class DecimalComma(MisspelledNumberRule):

@@ -17,7 +17,7 @@ decimal points, see DX401.
 """
 
 from dynx.rules import EVERY_ENGINE
-from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
+from dynx.rules.numbers_in_text import MisspelledNumberRule
 
 
 class CommaBetweenNumbers(MisspelledNumberRule):

@@ -19,7 +19,7 @@ would become 25, so check its changes. Words with no number at the beginning (``
 """
 
 from dynx.rules import EVERY_ENGINE, Case
-from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
+from dynx.rules.numbers_in_text import MisspelledNumberRule
 
 
 class TextAfterNumber(MisspelledNumberRule):

@@ -19,9 +19,7 @@ PyBullet does, and adds zeros where numbers are missing, as a person would read 
 
 from dynx.model.xml.source import Edit
 from dynx.rules import EVERY_ENGINE, Case
-from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
-from dynx.rules.text.number_text import Misspelling
-from dynx.rules.text.numeric_attributes import NumericAttribute
+from dynx.rules.numbers_in_text import MisspelledNumberRule, Misspelling, NumericAttribute
 
 
 class VectorOfWrongLength(MisspelledNumberRule):

@@ -19,8 +19,7 @@ What to do: remove the blank. ``dynx doctor --fix`` does so and changes no digit
 """
 
 from dynx.rules import measured_on
-from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
-from dynx.rules.text.numeric_attributes import NumericAttribute
+from dynx.rules.numbers_in_text import MisspelledNumberRule, NumericAttribute
 
 _READ_ALIKE = ("box", "sphere", "cylinder", "capsule", "mesh")
 

@@ -17,7 +17,7 @@ What to do: separate numbers by blanks. ``dynx doctor --fix`` does so and change
 """
 
 from dynx.rules import measured_on
-from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
+from dynx.rules.numbers_in_text import MisspelledNumberRule
 
 
 class TabInVector(MisspelledNumberRule):

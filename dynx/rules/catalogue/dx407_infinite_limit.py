@@ -15,7 +15,7 @@ no such substitute, see DX420.
 """
 
 from dynx.rules import measured_on
-from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
+from dynx.rules.numbers_in_text import MisspelledNumberRule
 
 
 class InfiniteLimit(MisspelledNumberRule):

@@ -15,9 +15,7 @@ What to do: remove the attribute, or write ``0 0 0``. ``dynx doctor --fix`` remo
 
 from dynx.model.xml.source import Edit
 from dynx.rules import Case, measured_on
-from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
-from dynx.rules.text.number_text import Misspelling
-from dynx.rules.text.numeric_attributes import NumericAttribute
+from dynx.rules.numbers_in_text import MisspelledNumberRule, Misspelling, NumericAttribute
 
 
 class EmptyVector(MisspelledNumberRule):

@@ -18,7 +18,7 @@ the file does not contain the number.
 from collections.abc import Iterable
 
 from dynx.rules import Case, Correction, EditingRule, measured_on
-from dynx.rules.text.missing_attributes import completion
+from dynx.rules.attributes import completion
 
 _MOMENTS = ("ixx", "iyy", "izz")
 _PRODUCTS = ("ixy", "ixz", "iyz")

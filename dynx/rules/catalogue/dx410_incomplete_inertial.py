@@ -24,11 +24,10 @@ from collections.abc import Iterable, Sequence
 from dynx.errors import escaped
 from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules import EVERY_ENGINE, Case, Correction, EditingRule, correction, found_at
-from dynx.rules.inertia.edits import ZERO_TENSOR, zero_inertial
-from dynx.rules.text.element_text import text_in
-from dynx.rules.text.missing_attributes import renaming
-from dynx.rules.text.misspelled_names import misspelled_numbers
-from dynx.rules.text.number_text import is_number
+from dynx.rules.attributes import misspelled_numbers, renaming
+from dynx.rules.inertia import ZERO_TENSOR, zero_inertial
+from dynx.rules.joints import text_in
+from dynx.rules.numbers_in_text import is_number
 
 _MOMENTS = ("ixx", "iyy", "izz")
 

@@ -16,7 +16,7 @@ from collections.abc import Iterable
 
 from dynx.errors import shown
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.joints.renaming import fresh_name, joint_rename, link_rename
+from dynx.rules.joints import fresh_name, joint_rename, link_rename
 
 
 class PercentInName(EditingRule):

@@ -15,7 +15,7 @@ from collections.abc import Iterable
 
 from dynx.errors import shown
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.text.versions import KNOWN_VERSIONS, corrected_version
+from dynx.rules.numbers_in_text import KNOWN_VERSIONS, corrected_version
 
 
 class UnknownUrdfVersion(EditingRule):

@@ -16,7 +16,7 @@ removes the ``<collision>``. ``--choose DX417=keep`` keeps it, and MuJoCo refuse
 from collections.abc import Iterable
 
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.geometry.known_shapes import BULLET_ONLY, KNOWN, shapes_in
+from dynx.rules.geometry import BULLET_ONLY, KNOWN, shapes_in
 
 
 class UnknownCollisionShape(EditingRule):

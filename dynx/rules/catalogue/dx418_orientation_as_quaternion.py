@@ -19,9 +19,8 @@ from collections.abc import Iterable
 
 from dynx.model.urdf.origins import QUATERNION
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.text.attributes import orientation_edits, quaternions_count
-from dynx.rules.text.number_text import decimal
-from dynx.rules.text.quaternions import is_plain, origins_with_quaternion, quaternion_rpy
+from dynx.rules.attributes import orientation_edits, quaternions_count
+from dynx.rules.numbers_in_text import decimal, is_plain, origins_with_quaternion, quaternion_rpy
 
 
 class OrientationAsQuaternion(EditingRule):

@@ -20,8 +20,8 @@ from collections.abc import Iterable
 from dynx.errors import shown
 from dynx.model.urdf.origins import QUATERNION
 from dynx.rules import EVERY_ENGINE, Case, Correction, EditingRule, correction
-from dynx.rules.text.attributes import orientation_edits, quaternions_count
-from dynx.rules.text.quaternions import is_plain, origins_with_quaternion, quaternion_rpy
+from dynx.rules.attributes import orientation_edits, quaternions_count
+from dynx.rules.numbers_in_text import is_plain, origins_with_quaternion, quaternion_rpy
 
 
 class UnreadableQuaternion(EditingRule):

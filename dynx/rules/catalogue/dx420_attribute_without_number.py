@@ -21,9 +21,7 @@ attribute, so that its default holds.
 
 from dynx.model.xml.source import Edit
 from dynx.rules import Case, measured_on
-from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
-from dynx.rules.text.number_text import Misspelling
-from dynx.rules.text.numeric_attributes import NumericAttribute
+from dynx.rules.numbers_in_text import MisspelledNumberRule, Misspelling, NumericAttribute
 
 _REQUIRED = ("mass", "inertia")
 

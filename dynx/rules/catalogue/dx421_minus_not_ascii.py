@@ -15,7 +15,7 @@ What to do: write the hyphen-minus of the keyboard. ``dynx doctor --fix`` does s
 """
 
 from dynx.rules import EVERY_ENGINE
-from dynx.rules.text.misspelled_numbers import MisspelledNumberRule
+from dynx.rules.numbers_in_text import MisspelledNumberRule
 
 
 class MinusNotAscii(MisspelledNumberRule):

@@ -17,7 +17,7 @@ What to do: remove the element, or give it a geometry. ``dynx doctor --fix`` rem
 from collections.abc import Iterable
 
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.geometry.known_shapes import has_shape, shapes_in
+from dynx.rules.geometry import has_shape, shapes_in
 
 
 class ShapeWithoutGeometry(EditingRule):

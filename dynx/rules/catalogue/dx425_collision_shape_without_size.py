@@ -27,9 +27,9 @@ from collections.abc import Iterable, Mapping
 from dynx.errors import DescriptionError
 from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.geometry.bullet_boxes import lacks_file
-from dynx.rules.text.attributes import number_of, vector_of
-from dynx.rules.text.number_text import decimal
+from dynx.rules.attributes import number_of, vector_of
+from dynx.rules.geometry import lacks_file
+from dynx.rules.numbers_in_text import decimal
 
 _SIZES: Mapping[str, tuple[str, ...]] = {
     "box": ("size",),

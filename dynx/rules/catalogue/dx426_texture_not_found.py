@@ -20,7 +20,7 @@ from collections.abc import Iterable
 from dynx.errors import shown
 from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.geometry.textures import GREY, missing_texture, robot_textures
+from dynx.rules.geometry import GREY, missing_texture, robot_textures
 
 
 class TextureNotFound(EditingRule):

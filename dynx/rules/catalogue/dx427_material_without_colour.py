@@ -18,8 +18,8 @@ from collections.abc import Iterable
 from dynx.errors import shown
 from dynx.model.xml.source import SourceElement, XmlSource
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.geometry.textures import GREY
-from dynx.rules.text.number_text import is_number
+from dynx.rules.geometry import GREY
+from dynx.rules.numbers_in_text import is_number
 
 
 class MaterialWithoutColour(EditingRule):

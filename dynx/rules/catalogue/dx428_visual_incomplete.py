@@ -20,8 +20,7 @@ from collections.abc import Iterable
 
 from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.geometry.textures import GREY
-from dynx.rules.geometry.visual_faults import visual_faults
+from dynx.rules.geometry import GREY, visual_faults
 
 
 class VisualIncomplete(EditingRule):

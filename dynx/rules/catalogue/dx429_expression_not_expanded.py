@@ -22,8 +22,14 @@ from collections.abc import Iterable, Iterator
 from dynx.errors import shown
 from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
-from dynx.rules.text.number_text import Misspelling, misspelled_number, misspelled_vector
-from dynx.rules.text.numeric_attributes import NumericAttribute, joint_attributes, shape_attributes
+from dynx.rules.numbers_in_text import (
+    Misspelling,
+    NumericAttribute,
+    joint_attributes,
+    misspelled_number,
+    misspelled_vector,
+    shape_attributes,
+)
 
 _NEVER_READ = ("calibration", "safety_controller")
 _UNREAD_OF_FIXED = (*_NEVER_READ, "limit", "dynamics", "mimic")

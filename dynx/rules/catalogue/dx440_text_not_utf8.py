@@ -18,7 +18,7 @@ from collections.abc import Iterable, Sequence
 
 from dynx.errors import shown
 from dynx.rules import Case, Detection, Remedy, Rule, measured_on
-from dynx.rules.editing import found_at
+from dynx.rules.rule import found_at
 
 _UTF8 = ("utf-8", "ascii", "us-ascii")
 

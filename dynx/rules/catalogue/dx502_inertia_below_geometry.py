@@ -18,7 +18,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from dynx.rules import Case, Detection, Rule
-from dynx.rules.geometry.shapes import link_extent
+from dynx.rules.geometry import link_extent
 
 _SPECK = 0.01
 """Ratio to the shape's diagonal; all but 1 % of the mass is then within a tenth of it (Chebyshev)."""

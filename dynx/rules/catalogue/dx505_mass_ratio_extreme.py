@@ -17,7 +17,7 @@ removes the cause.
 from collections.abc import Iterable
 
 from dynx.rules import Case, Detection, Rule
-from dynx.rules.inertia.rigid_groups import rigid_groups
+from dynx.rules.inertia import rigid_groups
 
 _RATIO = 1e6
 

@@ -14,7 +14,7 @@ and by default leaves them.
 from collections.abc import Iterable
 
 from dynx.rules import Case, Correction, OptionalEditingRule, correction
-from dynx.rules.joints.elements import elements_in_joints
+from dynx.rules.joints import elements_in_joints
 
 _RANGE = ("lower", "upper")
 

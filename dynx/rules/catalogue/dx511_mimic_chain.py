@@ -14,7 +14,7 @@ doctor --fix`` does so with ``--choose DX511=direct``, and by default leaves the
 from collections.abc import Iterable
 
 from dynx.rules import Case, Correction, OptionalEditingRule, correction
-from dynx.rules.text.number_text import decimal
+from dynx.rules.numbers_in_text import decimal
 
 
 class MimicChain(OptionalEditingRule):

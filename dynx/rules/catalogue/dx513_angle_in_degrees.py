@@ -18,7 +18,7 @@ from dynx.errors import DescriptionError
 from dynx.model.urdf.origins import FULL_TURN
 from dynx.model.xml.source import SourceElement
 from dynx.rules import Case, Detection, Rule, found_at
-from dynx.rules.text.attributes import origin_of
+from dynx.rules.attributes import origin_of
 
 _STEP, _SMALLEST, _LARGEST = 5.0, 30.0, 360.0
 _UNLIMITED = (-100.0, 100.0)

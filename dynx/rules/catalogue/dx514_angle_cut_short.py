@@ -17,7 +17,7 @@ import math
 from collections.abc import Iterable
 
 from dynx.rules import Case, Correction, OptionalEditingRule, correction
-from dynx.rules.joints.elements import elements_in_joints
+from dynx.rules.joints import elements_in_joints
 
 
 class AngleCutShort(OptionalEditingRule):

@@ -17,8 +17,8 @@ from collections.abc import Iterable, Iterator
 
 from dynx.model.xml.source import SourceElement
 from dynx.rules import Case, Detection, Rule, found_at
-from dynx.rules.joints.axes import misspelled_direction
-from dynx.rules.text.misspelled_names import ATTRIBUTES, meant_name
+from dynx.rules.attributes import ATTRIBUTES, meant_name
+from dynx.rules.joints import misspelled_direction
 
 _ELEMENTS = {
     "robot": ("link", "joint", "material", "transmission"),

@@ -20,10 +20,9 @@ name.
 
 from collections.abc import Iterable
 
+from dynx.model.geometry.mesh_files import MeshNotFoundError, find_mesh, found_by_bullet
 from dynx.rules import Case, Detection, Rule
-from dynx.rules.geometry import MeshNotFoundError, find_mesh, found_by_bullet
-from dynx.rules.geometry.shapes import geometry_elements
-from dynx.rules.geometry.textures import visual_textures
+from dynx.rules.geometry import geometry_elements, visual_textures
 
 
 class MeshNotFound(Rule):

@@ -16,8 +16,7 @@ without mass (DX110), 2e-15 kg, is not reported.
 from collections.abc import Iterable
 
 from dynx.rules import Case, Detection, Rule
-from dynx.rules.inertia.edits import line_of
-from dynx.rules.inertia.physical import MIN_MASS
+from dynx.rules.inertia import MIN_MASS, line_of
 
 _MICROGRAM = 1e-9
 """One microgram [kg]."""

@@ -22,7 +22,7 @@ import numpy as np
 
 from dynx.rules import Case, Detection, Rule
 from dynx.rules.geometry import body_extents
-from dynx.rules.inertia.rigid_groups import rigid_groups
+from dynx.rules.inertia import rigid_groups
 from dynx.spatial.scalar import Floats
 
 _BOUND = 1e7

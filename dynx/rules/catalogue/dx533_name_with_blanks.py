@@ -17,7 +17,7 @@ from collections.abc import Iterable
 from dynx.errors import shown
 from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules import Case, Correction, OptionalEditingRule, correction
-from dynx.rules.joints.renaming import fresh_name, joint_rename, link_rename
+from dynx.rules.joints import fresh_name, joint_rename, link_rename
 
 
 class NameWithBlanks(OptionalEditingRule):

@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 
 from dynx.cli.shell.main import cli
 from dynx.loaded import installed_engines
-from dynx.rules.traps import find_trap
+from dynx.rules.registry import find_trap
 
 PAGE = Path(__file__).parents[3] / "docs" / "doctor.md"
 

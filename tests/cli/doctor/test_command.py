@@ -18,7 +18,7 @@ from dynx.cli.shell.main import cli
 from dynx.doctor.diagnosis import DEFAULT_SAMPLES, diagnose
 from dynx.errors import ArgumentError
 from dynx.loaded import installed_engines
-from dynx.rules.traps import find_trap
+from dynx.rules.registry import find_trap
 from tests.doctor.formats.test_sarif import require_valid
 
 QUICK = ["--engines", "pinocchio,pybullet", "--samples", "2", "--jobs", "1"]

@@ -14,7 +14,7 @@ from dynx.doctor import diagnose
 from dynx.doctor.report import DoctorReport
 from dynx.doctor.task import DoctorTask
 from dynx.loaded import ENGINES, installed_engines
-from dynx.rules.traps import find_trap
+from dynx.rules.registry import find_trap
 from tests.conftest import needs_examples
 from tests.doctor.formats.reports import differing
 

@@ -14,7 +14,7 @@ from dynx.doctor.examine.examination import LOADING
 from dynx.doctor.examine.reference_values import MAX_LIMIT_DISTANCE, draw_states, model_without_mimics
 from dynx.loaded import installed_engines
 from dynx.model.xml.source import XmlSource
-from dynx.rules.traps import find_trap
+from dynx.rules.registry import find_trap
 
 needs_mujoco = pytest.mark.skipif("mujoco" not in installed_engines(), reason="needs MuJoCo")
 

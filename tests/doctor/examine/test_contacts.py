@@ -19,7 +19,7 @@ from dynx.doctor.examine.reference_values import model_without_mimics
 from dynx.doctor.formats import wording
 from dynx.loaded import installed_engines
 from dynx.rules import Case
-from dynx.rules.traps import trap_case
+from dynx.rules.registry import trap_case
 from tests.rules.documents import case_of, joint, link
 
 pytestmark = pytest.mark.skipif("mujoco" not in installed_engines(), reason="MuJoCo is not installed")

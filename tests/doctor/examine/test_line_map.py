@@ -6,7 +6,7 @@ from dynx.doctor.examine.line_map import with_original_lines
 from dynx.doctor.prove.mending import detections, readable
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, find_rule
-from dynx.rules.traps import trap_case
+from dynx.rules.registry import trap_case
 
 
 def test_lines_behind_an_inserted_chain_of_joints_are_those_of_the_file() -> None:

@@ -13,10 +13,10 @@ import pytest
 from dynx.doctor.examine.engine_input import temporary_urdf, without_meshes
 from dynx.engines.silence import silence
 from dynx.loaded import installed_engines
+from dynx.model.geometry.mesh_files import find_mesh
 from dynx.model.library import find
 from dynx.model.xml.source import XmlSource
-from dynx.rules.geometry import find_mesh
-from dynx.rules.geometry.bullet_boxes import collision_meshes
+from dynx.rules.geometry import collision_meshes
 from dynx.spatial.scalar import Floats
 
 needs_pybullet = pytest.mark.skipif("pybullet" not in installed_engines(), reason="needs PyBullet")

@@ -11,7 +11,7 @@ from dynx.doctor import diagnose
 from dynx.doctor.formats import baseline_document, github_annotations, read_baseline, sarif_document
 from dynx.doctor.report import DoctorReport
 from dynx.files.documents import json_text
-from dynx.rules.traps import find_trap
+from dynx.rules.registry import find_trap
 from tests.doctor.formats.reports import alike, differing, hostile, refused
 
 LINE = re.compile(r"::(error|warning|notice) file=([^,:]+),line=(\d+),title=([^,:]+)::(.+)")

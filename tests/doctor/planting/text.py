@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
-from dynx.rules.text.number_text import is_number
+from dynx.rules.numbers_in_text import is_number
 from tests.doctor.planting.inertia import MOMENTS, PRODUCTS
 from tests.doctor.planting.joints import limited, moving
 from tests.doctor.planting.site import CannotPlant, PlantedDefect, Planter, Site

@@ -17,7 +17,7 @@ from dynx.doctor.prove.mending import mend, place_of
 from dynx.loaded import installed_engines, loader_class
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, Rule, all_rules, find_rule
-from dynx.rules.traps import trap_case
+from dynx.rules.registry import trap_case
 from tests.rules.documents import case_of, joint, link
 
 _VERSIONS = {engine: loader_class(engine).engine_version() for engine in installed_engines()}

@@ -15,7 +15,7 @@ from dynx.engines.pybullet.library import bullet
 from dynx.engines.silence import silence
 from dynx.model.elements import Inertial, Pose
 from dynx.rules.case import Case
-from dynx.rules.inertia.edits import with_inertials
+from dynx.rules.inertia import with_inertials
 from dynx.spatial.so3 import rotation_from_rpy
 from dynx.testing.strategies import inertials
 from tests.rules.documents import case_of, joint, link

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.model.geometry.formats import collada
-from dynx.rules.geometry.meshes import mesh_box
+from dynx.rules.geometry import mesh_box
 from tests.rules.geometry.test_meshes import FACET, ascii_stl, binary_stl, box_of, dae, obj
 
 SECONDS = 20.0

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.model.geometry.formats.collada import collada_points
-from dynx.rules.geometry.meshes import Box, mesh_box
+from dynx.rules.geometry import Box, mesh_box
 from dynx.spatial.scalar import Floats
 
 Corner = tuple[float, float, float]

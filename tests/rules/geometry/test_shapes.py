@@ -11,8 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.model.elements import Pose
-from dynx.rules.geometry import group_extents
-from dynx.rules.geometry.shapes import link_extent
+from dynx.rules.geometry import group_extents, link_extent
 from dynx.spatial.scalar import Floats
 from tests.rules.documents import case_of, joint, link, visual
 

@@ -7,7 +7,7 @@ from hypothesis import given
 
 from dynx.model.elements import Inertial, Pose
 from dynx.model.mechanism import pose_arrays
-from dynx.rules.inertia.central import CentralInertia
+from dynx.rules.inertia import CentralInertia
 from dynx.spatial.extended import longdouble
 from dynx.spatial.inertia import RigidInertia, inertia_about_origin
 from dynx.spatial.scalar import Array, Floats

@@ -7,7 +7,7 @@ import pytest
 import dynx
 from dynx.doctor import diagnose
 from dynx.errors import DescriptionError
-from dynx.rules.traps import find_trap
+from dynx.rules.registry import find_trap
 
 
 @pytest.mark.parametrize(("choice", "mass"), [(None, 1.5), ("absolute", 1.5), ("zero", 0.0)])

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.model.elements import Inertial, Pose
-from dynx.rules.inertia.central import CentralInertia
-from dynx.rules.inertia.physical import (
+from dynx.rules.inertia import (
     ACCEPTED_MOMENT,
+    CentralInertia,
     fault_beyond_rounding,
     is_borderline,
     nearest_moments,

@@ -9,7 +9,7 @@ from dynx.model import Model, Pose
 from dynx.model.mechanism import build_mechanism
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case
-from dynx.rules.inertia.rigid_groups import rigid_groups, static_links
+from dynx.rules.inertia import rigid_groups, static_links
 from dynx.spatial.se3 import homogeneous
 from dynx.testing.strategies import models
 from tests.rules.documents import case_of, joint, link

@@ -7,7 +7,7 @@ import pytest
 from dynx.errors import DescriptionError
 from dynx.model.elements import Pose
 from dynx.model.xml.source import XmlSource
-from dynx.rules.text.attributes import number_of, origin_of, vector_of
+from dynx.rules.attributes import number_of, origin_of, vector_of
 
 ELEMENT = XmlSource('<a n="1.5" v="1 2  3" bad="1,5"><origin xyz="1 2 3" rpy=""/></a>').root
 

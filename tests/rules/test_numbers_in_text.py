@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.rules.text.number_text import Misspelling, decimal, is_number, misspelled_number, misspelled_vector
+from dynx.rules.numbers_in_text import Misspelling, decimal, is_number, misspelled_number, misspelled_vector
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 decimals = numbers.map(repr).filter(lambda text: "." in text)

@@ -8,7 +8,7 @@ from dynx.doctor import diagnose
 from dynx.loaded import installed_engines
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, find_rule
-from dynx.rules.traps import trap_case
+from dynx.rules.registry import trap_case
 
 TEXT = trap_case("DX101").source.text
 RULE = find_rule("DX422")

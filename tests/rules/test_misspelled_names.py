@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from dynx.doctor.prove.levels import level_of
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, find_rule
-from dynx.rules.text.misspelled_names import ATTRIBUTES, meant_name, misspelled_numbers
+from dynx.rules.attributes import ATTRIBUTES, meant_name, misspelled_numbers
 from tests.rules.documents import case_of, joint, link
 from tests.rules.trap_cases import mended, only
 
