@@ -31,7 +31,7 @@ import numpy as np
 
 from benchmarks.every_quantity import serial_arm, tree
 from benchmarks.progress import tell
-from dynx import control
+from dynx import ExternalForce, control
 from dynx.backends import backend
 from dynx.backends.quantities import QUANTITIES
 from dynx.compiled.derivatives import Derivatives
@@ -41,7 +41,7 @@ from dynx.model import Model
 from dynx.model.library import robots
 from dynx.model.loading import load
 from dynx.model.tree import Base
-from dynx.sim import Noise, Push, simulate, simulate_batch
+from dynx.sim import Noise, simulate, simulate_batch
 
 MAX_SECONDS = 10.0
 """Longest time that a compilation may take [s]."""
@@ -169,7 +169,7 @@ def _batch_with(model: Model, **options: Any) -> object:
 
 
 def _batch_with_everything(model: Model) -> object:
-    push = Push(model.frame_names[-1], (1.0, 0.0, 0.0, 0.0, 0.1, 0.0), duration=DT)
+    push = ExternalForce(model.frame_names[-1], (1.0, 0.0, 0.0, 0.0, 0.1, 0.0), duration=DT)
     noise = Noise(q=1e-4, v=1e-3, seed=0)
     options: dict[str, Any] = {"parametric": _everything_a_parameter(model), "pushes": push, "noise": noise}
     options["effort_limits"] = 100.0

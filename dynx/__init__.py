@@ -43,7 +43,6 @@ if TYPE_CHECKING:
         BatchRollouts,
         Noise,
         Payload,
-        Push,
         Rollout,
         Scenario,
         ScenePlant,
@@ -52,6 +51,7 @@ if TYPE_CHECKING:
         simulate,
         simulate_batch,
     )
+    from dynx.steppers.forces import ExternalForce
     from dynx.world import PDMotor, PositionMotor, Scene, TorqueMotor, VelocityMotor, World
 
 __all__ = [
@@ -60,6 +60,7 @@ __all__ = [
     "BatchRollouts",
     "Derivatives",
     "DoctorReport",
+    "ExternalForce",
     "IKResult",
     "Model",
     "Noise",
@@ -68,7 +69,6 @@ __all__ = [
     "Payload",
     "Pose",
     "PositionMotor",
-    "Push",
     "Rollout",
     "Scenario",
     "Scene",
@@ -112,6 +112,7 @@ _HOME = {
     "BatchRollouts": "dynx.sim",
     "Derivatives": "dynx.compiled.derivatives",
     "DoctorReport": "dynx.doctor",
+    "ExternalForce": "dynx.steppers.forces",
     "IKResult": "dynx.ik",
     "Model": "dynx.model",
     "Noise": "dynx.sim",
@@ -120,7 +121,6 @@ _HOME = {
     "Payload": "dynx.sim",
     "Pose": "dynx.model",
     "PositionMotor": "dynx.world",
-    "Push": "dynx.sim",
     "Rollout": "dynx.sim",
     "Scenario": "dynx.sim",
     "Scene": "dynx.world",
@@ -150,7 +150,7 @@ _HOME = {
     "simulate": "dynx.sim",
     "simulate_batch": "dynx.sim",
 }
-_MOVED = {"compare_rollouts": "dynx.compare"}
+_MOVED = {"compare_rollouts": "dynx.compare", "Push": "dynx.ExternalForce"}
 _SUBPACKAGES = ("control", "errors", "ik", "sim", "trajectory", "world")
 _OF_EXTRAS = ("envs", "testing", "training", "viewer")
 

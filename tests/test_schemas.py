@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner
 from jsonschema import Draft202012Validator
 
-from dynx import agree, diagnose, load
+from dynx import ExternalForce, agree, diagnose, load
 from dynx.agreement import refused_report, results_document
 from dynx.cli.compare.document import document as compare_document
 from dynx.cli.shell.main import cli
@@ -22,7 +22,7 @@ from dynx.doctor import results_document as doctor_document
 from dynx.doctor.formats.baseline import baseline_document
 from dynx.errors import DescriptionError
 from dynx.files.documents import json_text
-from dynx.sim import Noise, Payload, Push, compare, simulate
+from dynx.sim import Noise, Payload, compare, simulate
 from dynx.sim.scenario.scenario import Scenario
 from dynx.trajectory import cycloidal
 from dynx.world import read_scene
@@ -134,7 +134,7 @@ def test_documents_of_scenarios_keep_their_schema() -> None:
             friction=0.5,
             payload=Payload(tip, 2.0),
             mass_scale={tip: 1.1},
-            pushes=[Push(tip, rest.tolist() * 3, start=0.1, duration=0.1)],
+            pushes=[ExternalForce(tip, rest.tolist() * 3, start=0.1, duration=0.1)],
         ),
     ]
     for scenario in scenarios:

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from dynx.sim.comparison.comparison import RolloutComparison, compare
     from dynx.sim.loop.noise import Noise
     from dynx.sim.one_rollout import RolloutInterrupted, simulate
-    from dynx.sim.plants.disturbances import Push
     from dynx.sim.plants.model_error import Payload, plant_model
     from dynx.sim.plants.plant import Plant, StepResult
     from dynx.sim.plants.registry import register as register_plant
@@ -32,7 +31,6 @@ _HOME = {
     "Noise": "loop.noise",
     "Payload": "plants.model_error",
     "Plant": "plants.plant",
-    "Push": "plants.disturbances",
     "Rollout": "record.rollout",
     "RolloutComparison": "comparison.comparison",
     "RolloutInterrupted": "one_rollout",
@@ -56,7 +54,6 @@ __all__ = [
     "Noise",
     "Payload",
     "Plant",
-    "Push",
     "Rollout",
     "RolloutComparison",
     "RolloutInterrupted",
@@ -77,7 +74,7 @@ __all__ = [
 
 # Hidden from type checkers, which would take any name for an attribute: they know the imports above.
 if not TYPE_CHECKING:
-    _moved = moved_names(__name__, {"compare_rollouts": "dynx.compare"})
+    _moved = moved_names(__name__, {"compare_rollouts": "dynx.compare", "Push": "dynx.ExternalForce"})
 
     def __getattr__(name: str) -> Any:
         if name not in _HOME:

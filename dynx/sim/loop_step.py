@@ -37,7 +37,7 @@ from dynx.sim.loop.controller_checks import (
     is_row,
 )
 from dynx.sim.loop.own_controllers import refuse_irreproducible, traced_torque
-from dynx.sim.plants.disturbances import Disturbances, Push
+from dynx.sim.plants.disturbances import Disturbances
 from dynx.sim.plants.friction_law import FrictionLaw, FrictionStep, damped_equation
 from dynx.sim.plants.integrated import IntegratedPlant
 from dynx.sim.plants.integrators import SemiImplicitEuler
@@ -48,6 +48,7 @@ from dynx.simd.user_code.arrays import is_traced, symbol_array, traced_array
 from dynx.simd.user_code.numbers import as_symbol, as_traced, select
 from dynx.spatial.branchless import difference
 from dynx.spatial.scalar import Array, Floats, clamp, tanh
+from dynx.steppers.forces import ExternalForce
 from dynx.trajectory.base import Setpoint
 
 MAX_FLOAT = float(np.finfo(np.float64).max)
@@ -84,7 +85,7 @@ class ArrayDisturbances:
     """Armature (nv,) [kg m^2 or kg], added to the diagonal of the mass matrix."""
     varied: Mapping[str, int]
     """Number of joints with a coefficient that differs between rollouts, by the name of the coefficient."""
-    pushes: tuple[Push, ...]
+    pushes: tuple[ExternalForce, ...]
 
     @classmethod
     def of(cls, model: Model, disturbances: Disturbances, varied: Mapping[str, Floats]) -> ArrayDisturbances:
@@ -124,8 +125,12 @@ class ArrayDisturbances:
         friction, pushes = self.joint_friction, []
         if pushed:
             for push, wrench in zip(self.pushes, given["wrenches"].reshape(-1, WRENCH), strict=True):
-                details = (self.model.frame_index(push.frame), push.reference)
-                pushes.append((evaluate_quantity(mechanism, "jacobian", details, q), wrench))
+                frame = self.model.frame_index(push.on)
+                if push.has_point:
+                    T = evaluate_quantity(mechanism, "forward_kinematics", (frame,), q)
+                    wrench = push.at_origin(wrench, T[:3, :3])
+                J = evaluate_quantity(mechanism, "jacobian", (frame, push.reference), q)
+                pushes.append((J, wrench))
         smooth = friction.torque_for(v, *self._coefficients(given)) if friction.smooth else None
         return with_disturbances(tau, smooth, pushes)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from dynx.rbd.link_poses import link_poses
 from dynx.spatial.scalar import Floats
-from dynx.world import World, Wrench
+from dynx.world import ExternalForce, World
 
 _FREQUENCY = 2.0 * math.pi * 1.0
 """Angular frequency [rad/s] at which a free body of the part's mass would swing on the spring."""
@@ -71,7 +71,7 @@ class Spring:
         """Pull a part to the pointer from the next step on; None releases it."""
         self._pull = pull
 
-    def wrenches(self, world: World) -> list[Wrench]:
+    def forces(self, world: World) -> list[ExternalForce]:
         """Return the force of the spring for the next step of `world.dt`."""
         pull = self._pull
         part = self.part if pull is None else pull.part
@@ -87,7 +87,7 @@ class Spring:
         velocity = self._velocity(world, place)
         goal = np.asarray(self._node.position if pull is None else pull.pointer, dtype=np.float64)
         force = self._mass * _FREQUENCY * (_FREQUENCY * (goal - place) - 2.0 * velocity)
-        return [Wrench(part, force, point=self._point)]
+        return [ExternalForce(part, np.concatenate([force, np.zeros(3)]), point=self._point)]
 
     def _velocity(self, world: World, place: Floats) -> Floats:
         """Return the velocity (3,) [m/s] of the point that is held, from its place in the step before; zero

@@ -21,7 +21,7 @@ from dynx.viewer.marks import NamedParts
 from dynx.viewer.motion import Motion, fixed_bodies, motion_of_state
 from dynx.viewer.page import Page
 from dynx.viewer.spring import Spring
-from dynx.world import World, Wrench
+from dynx.world import ExternalForce, World
 from dynx.world.camera.drawing import part_poses
 
 UPDATES_PER_SECOND = 30.0
@@ -37,7 +37,7 @@ _NO_PART_CHOSEN = "choose the part that is pushed"
 _SHARE = 0.6
 """Share of the picture that what can move takes at the start."""
 
-_LOADS = ("motors", "torques", "wrenches")
+_LOADS = ("forces", "motors", "torques")
 
 LoadsOf = Callable[[World], Mapping[str, Any]]
 
@@ -79,7 +79,7 @@ class WorldView:
             page.scene, 0.3 * self._size / (STANDARD_WEIGHT * (mass or 1.0)), 0.006 * self._size
         )
         self._spring = Spring(page.scene, 0.3 * self._size)
-        self._pushes: list[Wrench] = []
+        self._pushes: list[ExternalForce] = []
         self._running = threading.Event()
         if not has_ground(scene.bodies):
             page.add_ground(self._size)
@@ -203,8 +203,8 @@ class WorldView:
                             f"loads returned {shown(name)}; wanted {', '.join(sorted(_LOADS))}"
                         )
                     pushes, self._pushes = self._pushes, []
-                    wrenches = [*given.pop("wrenches", ()), *self._spring.wrenches(self.world), *pushes]
-                    self.world.step(1, wrenches=wrenches, **given)
+                    forces = [*given.pop("forces", ()), *self._spring.forces(self.world), *pushes]
+                    self.world.step(1, forces=forces, **given)
                 # The state is read here, where a motion that diverged in these steps is found.
                 self.draw()
             except ClosedError:
@@ -229,7 +229,7 @@ class WorldView:
         if given.ndim != 1:
             raise ArgumentError(f"impulse has shape {given.shape}; wanted (3,)")
         with self._page.lock:
-            self._pushes.append(Wrench(part, given / self.world.dt))
+            self._pushes.append(ExternalForce(part, np.concatenate([given / self.world.dt, np.zeros(3)])))
 
     def _report(self, message: str) -> None:
         """Show an error; an empty one is hidden."""

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 from dynx.registry import moved_names
+from dynx.steppers.forces import ExternalForce
 from dynx.steppers.materials import InexactMaterial
 from dynx.steppers.registry import register as register_world
 from dynx.steppers.registry import unregister as unregister_world
@@ -11,7 +12,6 @@ from dynx.steppers.state import BodyState, RobotState, WorldState
 from dynx.world.camera import Camera, Picture
 from dynx.world.comparison import WorldComparison
 from dynx.world.contacts import ClosestPoints, Contact, RayHits
-from dynx.world.loads import Wrench
 from dynx.world.motors import Motor, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
 from dynx.world.record import Record
 from dynx.world.scene import (
@@ -45,6 +45,7 @@ __all__ = [
     "ClosestPoints",
     "Contact",
     "ContactTable",
+    "ExternalForce",
     "InexactMaterial",
     "Material",
     "Motor",
@@ -67,7 +68,6 @@ __all__ = [
     "World",
     "WorldComparison",
     "WorldState",
-    "Wrench",
     "body_to_urdf",
     "box",
     "capsule",
@@ -88,4 +88,4 @@ __all__ = [
 
 # Hidden from type checkers, which would take any name for an attribute.
 if not TYPE_CHECKING:
-    __getattr__ = moved_names(__name__, {"compare_worlds": "dynx.compare"})
+    __getattr__ = moved_names(__name__, {"compare_worlds": "dynx.compare", "Wrench": "dynx.ExternalForce"})

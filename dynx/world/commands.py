@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
 
@@ -10,10 +11,10 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError, nearest, shown
 from dynx.spatial.scalar import Floats
-from dynx.steppers.forces import NO_COMMANDS, EngineCommand, Forces
+from dynx.steppers.forces import NO_COMMANDS, EngineCommand, ExternalForce, Forces
 from dynx.steppers.layout import Layout, RobotLayout
 from dynx.steppers.stepper import Stepper
-from dynx.world.loads import RobotLoads, Wrench, checked_torques, found_robot
+from dynx.world.loads import RobotLoads, checked_torques, found_robot
 from dynx.world.motors import Motor
 from dynx.world.notes.divergence import LastLoads, RobotLoad
 from dynx.world.snapshot import Memory
@@ -37,7 +38,7 @@ class Commands:
         h: float,
         engine: type[Stepper],
     ) -> None:
-        self._engine = engine
+        self._engine, self._h = engine, h
         self._layout = layout
         self._robots = robots
         self._bodies = bodies
@@ -98,33 +99,37 @@ class Commands:
         self,
         torques: Mapping[str, ArrayLike] | None,
         motors: MotorsOf | None,
-        wrenches: Sequence[Wrench],
+        forces: Sequence[ExternalForce],
+        time: float,
     ) -> Act:
-        """Check what acts in the next steps, and return the function that applies it before each of them."""
+        """Check what acts in the next steps, the first of which begins at `time` [s], and return the function
+        that returns it before each of them."""
         self._more_than_torques = True
         self._held = checked_torques({} if torques is None else torques, self._torques)
         held = dict(self._held)
         commands = self._set_motors(motors or {})
-        frames, pushes = self._sort_wrenches(wrenches)
+        frames, pushes = self._sort_forces(forces)
         motored = frozenset(k for k, loads in enumerate(self._loads) if loads.has_motors)
         repeated = motored | frames.keys()
         of_joints = {k for k in motored - frames.keys() if self._loads[k].depends_on_joints}
         constant = [(k, tau) for k, tau in self._held if k not in repeated]
         self._forget_steps(motored)
+        steps = itertools.count()
 
         def act(engine: Stepper) -> Forces | None:
-            acting = constant.copy()
+            acting, t = constant.copy(), time + next(steps) * self._h
             for k in repeated:
                 loads, given = self._loads[k], held.get(k)
                 if k in of_joints:
                     tau = loads.torque_of_joints(*engine.joint_state(k), given)
                 else:
-                    tau = loads.torque(*engine.robot_state(k), given, frames.get(k, ()))
+                    on_frames = [(name, force, force.share(t, self._h)) for name, force in frames.get(k, ())]
+                    tau = loads.torque(*engine.robot_state(k), given, on_frames)
                 # A finite sum has finite entries; of few numbers, Python's is the fastest.
                 if not isfinite(sum(tau.tolist())) and not np.isfinite(tau).all():
                     return None
                 acting.append((k, tau))
-            self._wrenches = self._sum(engine, pushes) if pushes else self._no_wrench
+            self._wrenches = self._sum(engine, pushes, t) if pushes else self._no_wrench
             return Forces(acting, self._wrenches if pushes else None, commands)
 
         return act
@@ -157,42 +162,46 @@ class Commands:
             loads.set_motors(given.get(k, ()))
         return commands or NO_COMMANDS
 
-    def _sort_wrenches(
-        self, wrenches: Sequence[Wrench]
-    ) -> tuple[dict[int, list[tuple[str, Wrench]]], dict[int, list[Wrench]]]:
-        """Return the wrenches on the frames of each robot, and on each body, by number."""
-        frames: dict[int, list[tuple[str, Wrench]]] = {}
-        pushes: dict[int, list[Wrench]] = {}
-        for wrench in wrenches:
-            if not isinstance(wrench, Wrench):
-                raise ArgumentError(f"a wrench is {shown(wrench)}; wanted a Wrench")
-            owner, slash, frame = wrench.on.partition("/")
+    def _sort_forces(
+        self, forces: Sequence[ExternalForce]
+    ) -> tuple[dict[int, list[tuple[str, ExternalForce]]], dict[int, list[ExternalForce]]]:
+        """Return the external forces on the frames of each robot, and on each body, by number."""
+        frames: dict[int, list[tuple[str, ExternalForce]]] = {}
+        pushes: dict[int, list[ExternalForce]] = {}
+        for force in forces:
+            if not isinstance(force, ExternalForce):
+                raise ArgumentError(f"a force is {shown(force)}; wanted an ExternalForce")
+            owner, slash, frame = force.on.partition("/")
             if owner in self._robots and slash:
                 k = self._robots[owner]
                 self._layout.robots[k].model.frame_index(frame)
-                frames.setdefault(k, []).append((frame, wrench))
+                frames.setdefault(k, []).append((frame, force))
             elif owner in self._bodies and not slash:
                 k = self._bodies[owner]
                 if self._layout.bodies[k].fixed:
-                    raise ArgumentError(f"a wrench acts on {shown(owner)}, which is fixed in the world")
-                pushes.setdefault(k, []).append(wrench)
+                    raise ArgumentError(f"a force acts on {shown(owner)}, which is fixed in the world")
+                pushes.setdefault(k, []).append(force)
+            elif len(self._robots) == 1 and force.on in self._layout.robots[0].model.frame_names:
+                frames.setdefault(0, []).append((force.on, force))
             else:
                 known = [*self._bodies, *(f"{name}/{r.model.root}" for name, r in self._named_robots())]
                 raise UnknownNameError(
-                    f"a wrench acts on {shown(wrench.on)}; wanted a body or robot/link"
-                    f"{nearest(wrench.on, known)}"
+                    f"a force acts on {shown(force.on)}; wanted a body or robot/link"
+                    f"{nearest(force.on, known)}"
                 )
         return frames, pushes
 
     def _named_robots(self) -> list[tuple[str, RobotLayout]]:
         return [(name, self._layout.robots[k]) for name, k in self._robots.items()]
 
-    def _sum(self, engine: Stepper, pushes: Mapping[int, Sequence[Wrench]]) -> Floats:
-        """Return the force and the moment on every body (n_bodies, 6), in world axes."""
+    def _sum(self, engine: Stepper, pushes: Mapping[int, Sequence[ExternalForce]], t: float) -> Floats:
+        """Return the force and the moment on every body (n_bodies, 6) in the step at `t`, in world axes."""
         total: Floats = self._no_wrench.copy()
-        for k, wrenches in pushes.items():
+        for k, forces in pushes.items():
             T, center = engine.body_state(k).T_world_body, self._layout.bodies[k].center
-            total[k] = np.sum([wrench.at(T, center) for wrench in wrenches], axis=0)
+            total[k] = np.sum(
+                [force.at_center(T, center, force.share(t, self._h)) for force in forces], axis=0
+            )
         return total
 
     def _forget_steps(self, motored: frozenset[int]) -> None:

@@ -1,9 +1,8 @@
-"""Torques, wrenches and motors of one call of `World.step`, as forces that an engine applies."""
+"""Torques, external forces and motors of one call of `World.step`, as forces that an engine applies."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from math import hypot
 from typing import TypeVar
@@ -15,62 +14,18 @@ from numpy.typing import ArrayLike
 from dynx.backends import Backend, backend
 from dynx.backends.hooks import cholesky_solver
 from dynx.errors import ArgumentError, ShapeError, UnknownNameError, nearest, shown
-from dynx.model.numbers import checked_array, checked_entries, real_array
+from dynx.model.numbers import checked_entries, real_array
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
-from dynx.spatial.so3 import cross
-from dynx.steppers.layout import BodyLayout, RobotLayout
-from dynx.steppers.state import BodyState
+from dynx.steppers.forces import ExternalForce
+from dynx.steppers.layout import RobotLayout
 from dynx.world.motors import JointLaw, Motor, combine
 
 _FLOAT64 = np.dtype(np.float64)
 
-AXES = ("world", "local")
-
-
-@dataclass(frozen=True, eq=False)
-class Wrench:
-    """A force [N] and a moment [N m] on a body, ``robot/link`` or ``robot/frame``, during a step.
-
-    The force acts at `point` (3,) [m] of the frame of the part, which moves with it; at its origin by
-    default. `axes` are those of force and moment: ``world``, or ``local`` for the frame of the part.
-    """
-
-    on: str
-    force: ArrayLike = (0.0, 0.0, 0.0)
-    moment: ArrayLike = (0.0, 0.0, 0.0)
-    point: ArrayLike = (0.0, 0.0, 0.0)
-    axes: str = "world"
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.on, str):
-            raise ArgumentError(
-                f"a wrench acts on {shown(self.on)}; wanted a body, robot/link or robot/frame"
-            )
-        for name in ("force", "moment", "point"):
-            what = f"{name} of a wrench on {shown(self.on)}"
-            vector = checked_array(what, getattr(self, name), 3)
-            if vector.ndim != 1:
-                raise ShapeError(f"{what} has shape {vector.shape}; wanted (3,)")
-            object.__setattr__(self, name, vector)
-        if self.axes not in AXES:
-            raise ArgumentError(
-                f"axes of a wrench on {shown(self.on)} is {shown(self.axes)}; wanted {' or '.join(AXES)}"
-            )
-
-    def at(self, T: Floats, center: Floats) -> Floats:
-        """Return the force and the moment about the point `center` (3,) of the part's frame (6,), in world
-        axes, where the frame has the pose `T` (4, 4)."""
-        R = T[:3, :3]
-        force, moment = np.asarray(self.force), np.asarray(self.moment)
-        if self.axes == "local":
-            force, moment = R @ force, R @ moment
-        lever = R @ (np.asarray(self.point) - center)
-        return np.concatenate([force, moment + cross(lever, force)])
-
 
 class RobotLoads:
-    """The generalised force on one robot: torques of the caller, wrenches on its links, and its motors."""
+    """The generalised force on one robot: given torques, external forces on its links, and its motors."""
 
     def __init__(self, robot: RobotLayout, h: float) -> None:
         """`h` is the step of the engine [s]."""
@@ -79,7 +34,6 @@ class RobotLoads:
         self._base = 6 if robot.model.floating else 0
         self._h = h
         self._nothing = np.zeros(robot.model.nv)
-        self._zero_center = np.zeros(3)
         self._motors: tuple[Motor, ...] = ()
         self.memory: tuple[Floats, Floats] | None = None
         """Velocity and generalised force (nv,) of the step before, on which motors at the end of a step
@@ -117,21 +71,26 @@ class RobotLoads:
             self._saturates = bool(np.isfinite(law.max_force).any())
 
     def torque(
-        self, q: Floats, v: Floats, tau: Floats | None, wrenches: Sequence[tuple[str, Wrench]]
+        self,
+        q: Floats,
+        v: Floats,
+        tau: Floats | None,
+        forces: Sequence[tuple[str, ExternalForce, float]],
     ) -> Floats:
-        """Return the generalised force (nv,) in a step from q, v: `tau`, wrenches by frame, motors."""
+        """Return the generalised force (nv,) in a step from q, v: `tau`, external forces on frames with their
+        shares of the step, motors."""
         total = self._nothing if tau is None else tau
-        for frame, wrench in wrenches:
-            T = self.dynamics.forward_kinematics(q, frame)
-            J = self.dynamics.jacobian(q, frame, reference="local_world_aligned")
-            total = total + J.T @ wrench.at(T, self._zero_center)
+        for frame, force, share in forces:
+            J, wrench = force.at_frame(self.dynamics, frame, q, share)
+            total = total + J.T @ wrench
         if not self._motors:
             return total
         return self._with_motors(q, v, total)
 
     def torque_of_joints(self, positions: Floats, rates: Floats, tau: Floats | None) -> Floats:
-        """Return `torque` without wrenches where the motors depend on the joints alone, whose positions and
-        velocities (n,) are given."""
+        """Return `torque` without external forces where the motors depend on the joints alone.
+
+        `positions` and `rates` (n,) are those of the joints."""
         total: Floats = (self._nothing if tau is None else tau).copy()
         total[self._base :] += self._saturated(self._motor_torque(positions, rates))
         return total
@@ -219,8 +178,3 @@ def found_robot(name: str, robots: Mapping[str, _T]) -> _T:
         return robots[name]
     except (KeyError, TypeError):
         raise UnknownNameError(f"no robot {shown(name)}{nearest(str(name), robots)}") from None
-
-
-def body_wrench(wrench: Wrench, body: BodyLayout, state: BodyState) -> Floats:
-    """Return force and moment about the centre of mass (6,) in world axes."""
-    return wrench.at(state.T_world_body, body.center)

@@ -39,7 +39,7 @@ def run_for(
 def _loads_of(loads: Callable[[], object], fixed: Mapping[str, Any]) -> dict[str, Any]:
     """Return the arguments of the next step: those that `loads` gives, or else the fixed ones.
 
-    Raises ArgumentError unless it gives a dict of torques, motors and wrenches.
+    Raises ArgumentError unless it gives a dict of torques, motors and forces.
     """
     given = loads()
     if not isinstance(given, Mapping):

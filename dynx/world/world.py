@@ -16,6 +16,7 @@ from dynx.model.package_paths import StrPath
 from dynx.option_names import checks_option_names
 from dynx.registry import door
 from dynx.spatial.scalar import Floats
+from dynx.steppers.forces import ExternalForce
 from dynx.steppers.materials import InexactMaterial, inexact_materials, open_engine
 from dynx.steppers.registry import renderer_of, world_class
 from dynx.steppers.settings import changed_settings, checked_settings, checked_switches
@@ -25,7 +26,6 @@ from dynx.world.camera import Camera, Picture, cast_rays, draw_picture
 from dynx.world.commands import Commands, MotorsOf, with_scene_motors
 from dynx.world.contacts import ClosestPoints, Contact, RayHits
 from dynx.world.identity import identity
-from dynx.world.loads import Wrench
 from dynx.world.motion import Motion
 from dynx.world.notes.overlaps import Overlap, overlaps_of
 from dynx.world.notes.start_notes import notes_on_engine, notes_on_start
@@ -127,31 +127,32 @@ class World:
         n: int = 1,
         torques: TorquesOf | None = None,
         motors: MotorsOf | None = None,
-        wrenches: Sequence[Wrench] = (),
+        forces: Sequence[ExternalForce] = (),
     ) -> None:
-        """Take `n` steps of `dt`, during which torques, motors and wrenches act.
+        """Take `n` steps of `dt`, during which torques, motors and external forces act.
 
         `torques` maps robots to generalised forces (nv,); `motors` maps robots to a motor or a list of them,
         whose law is evaluated in every step of the engine. The motors of the scene act on robots that
-        neither names; otherwise, what is not given does not act.
+        neither names; otherwise, what is not given does not act. A force acts from its start, a time of this
+        world, for its duration.
 
         Raises ArgumentError (and its kinds) for arguments, DivergedError where the state stops being finite,
         with the likely cause. After that, and after Ctrl-C in a step, the world is at the last state that was
         read, or at a later one at most 1,000 steps old.
         """
         engine = self._motion.ready or self._motion.engine
-        if type(wrenches) is not tuple and not isinstance(wrenches, tuple | list):
-            raise ArgumentError(f"wrenches is of type {type(wrenches).__name__}; wanted a list of Wrench")
+        if type(forces) is not tuple and not isinstance(forces, tuple | list):
+            raise ArgumentError(f"forces is of type {type(forces).__name__}; wanted a list of ExternalForce")
         if type(n) is not int or n < 1:
             n = whole_number("n", n, 1)
         if self._scene_motors:
             motors = with_scene_motors(self._scene_motors, torques, motors)
-        if not motors and not wrenches:
+        if not motors and not forces:
             held = self._commands.hold(torques, n * self.substeps)
             if held is not None:
                 self._motion.advance(engine, n, held)
                 return
-        self._motion.advance(engine, n, act=self._commands.plan(torques, motors, wrenches))
+        self._motion.advance(engine, n, act=self._commands.plan(torques, motors, forces, self._motion.time))
 
     def run(
         self,
@@ -159,14 +160,14 @@ class World:
         *,
         torques: TorquesOf | None = None,
         motors: MotorsOf | None = None,
-        wrenches: Sequence[Wrench] = (),
+        forces: Sequence[ExternalForce] = (),
         loads: LoadsOf | None = None,
         real_time: bool = False,
     ) -> None:
         """Take steps for `duration` [s], rounded up to a multiple of `dt`.
 
         `loads(world)` is called before each step and returns a dict with the arguments of `step` that act
-        during it (``torques``, ``motors``, ``wrenches``); those given here act otherwise. With `real_time` no
+        during it (``torques``, ``motors``, ``forces``); those given here act otherwise. With `real_time` no
         step is taken before its time has come on the clock of the machine.
         """
         _ = self._motion.engine
@@ -176,7 +177,7 @@ class World:
             duration,
             self.dt,
             self.step,
-            {"torques": torques, "motors": motors, "wrenches": wrenches},
+            {"torques": torques, "motors": motors, "forces": forces},
             None if loads is None else lambda: loads(self),
             real_time=real_time,
         )

@@ -22,7 +22,7 @@ from dynx.errors import (
     UnknownNameError,
     UnsupportedFeatureError,
 )
-from dynx.world import Scene, World, Wrench, box, sphere, world_names, write_scene
+from dynx.world import ExternalForce, Scene, World, box, sphere, world_names, write_scene
 from tests.architecture.packages import installed_package
 
 MODULE = '''"""Balls that fly through each other, on the exact solution of their equations of motion."""
@@ -139,7 +139,7 @@ def test_a_world_finds_it_by_name() -> None:
 def test_wrenches_settings_and_saved_states_are_those_of_any_world(tmp_path: Path) -> None:
     with World(balls(), NAME, DT, drag=0.5) as world:
         assert world.settings["drag"] == 0.5
-        world.step(10, wrenches=[Wrench("low", force=(2.0, 0, 0))])
+        world.step(10, forces=[ExternalForce("low", (2.0, 0, 0, 0, 0, 0))])
         # v' = a - c v with a = 1, c = 1/2, v(0) = 3 has the limit 2.
         assert world.state.bodies["low"].twist[0] == pytest.approx(2.0 + np.exp(-0.05), abs=1e-12)
         world.write(tmp_path / "world")

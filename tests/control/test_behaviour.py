@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dynx import ExternalForce
 from dynx.backends import backend
 from dynx.control import (
     PD,
@@ -24,7 +25,7 @@ from dynx.control import (
 from dynx.control.friction import MIN_SLIP
 from dynx.control.saturation import checked_limit
 from dynx.model.loading import load
-from dynx.sim import Push, simulate
+from dynx.sim import simulate
 from dynx.trajectory.base import Setpoint
 from tests.backends.robots import mixed_robot
 from tests.oracles.closed_form import MODELS, G
@@ -108,7 +109,7 @@ def test_a_compliant_frame_gives_way_by_force_over_stiffness() -> None:
     robot = tutorial_robot()
     stiffness, damping = [800, 800, 800, 50, 50, 50], [80, 80, 80, 2, 2, 2]
     law = Impedance(robot, "tool0", stiffness=stiffness, damping=damping, joint_damping=0.5)
-    push = Push("tool0", [8.0, -4.0, 6.0, 0.0, 0.0, 0.0])
+    push = ExternalForce("tool0", [8.0, -4.0, 6.0, 0.0, 0.0, 0.0])
     rollout = simulate(robot, law, POSTURE, q0=POSTURE, duration=3.0, pushes=[push])
     with backend("reference", robot) as engine:
         moved = engine.forward_kinematics(rollout.q[[0, -1]], "tool0")[:, :3, 3]

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dynx import trajectory
+from dynx import ExternalForce, trajectory
 from dynx.backends import backend
 from dynx.control import PD, OpenLoop, Saturated
 from dynx.errors import ArgumentError, DescriptionError, DTypeError, DynxError, SingularMassMatrixError
 from dynx.model import Inertial, Joint, JointDynamics, Limits, Link, Mimic, Model, Pose
 from dynx.model.loading import load
 from dynx.model.numbers import MAX_MAGNITUDE
-from dynx.sim import Noise, Payload, Push, Scenario, simulate, simulate_batch
+from dynx.sim import Noise, Payload, Scenario, simulate, simulate_batch
 
 LARGE = 0.9 * MAX_MAGNITUDE
 PLACES = ("origin", "angle", "mass", "moment", "center", "damping", "friction", "multiplier", "offset")
@@ -158,7 +158,7 @@ def test_no_backend_drops_a_mask(name: str, batch: tuple[int, ...]) -> None:
         lambda: Noise(q=MASKED).deviations(6),
         lambda: Payload("tool0", 1.0, MASKED[:3]),
         lambda: Payload("tool0", 1.0, inertia=np.ma.array(np.eye(3))),
-        lambda: Push("tool0", MASKED).checked(UR5),
+        lambda: ExternalForce("tool0", MASKED).checked(UR5),
         lambda: Scenario(UR5, q0=MASKED),
         lambda: simulate(UR5, PD(UR5, kp=1.0, kd=1.0), MASKED, duration=0.01),
         lambda: simulate(UR5, PD(UR5, kp=1.0, kd=1.0), MOTION, friction=MASKED),

@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from dynx import ExternalForce
 from dynx.control import (
     BulletPositionMotor,
     ComputedTorque,
@@ -30,7 +31,7 @@ from dynx.errors import (
 )
 from dynx.model import Inertial, Joint, Link, Model
 from dynx.model.loading import load
-from dynx.sim import Noise, Payload, Push, simulate, simulate_batch
+from dynx.sim import Noise, Payload, simulate, simulate_batch
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 from tests.sim.bars import tutorial_motion, tutorial_robot
@@ -58,8 +59,8 @@ REST = np.zeros(6)
         ({"plant": "bulet"}, UnknownBackendError, "no plant 'bulet'.*pybullet"),
         ({"plant": ["pybullet"]}, ArgumentError, "plant is of type list; wanted the name"),
         ({"noise": 0.1}, ArgumentError, r"noise is '0\.1'; wanted a dynx\.Noise"),
-        ({"pushes": [1]}, ArgumentError, r"pushes is .*; wanted a Push"),
-        ({"pushes": 1}, ArgumentError, r"pushes is .*; wanted a Push"),
+        ({"pushes": [1]}, ArgumentError, r"pushes is .*; wanted an ExternalForce"),
+        ({"pushes": 1}, ArgumentError, r"pushes is .*; wanted an ExternalForce"),
         ({"payload": 2.0}, ArgumentError, r"payload is '2\.0'; wanted a Payload"),
         ({"integrator": "rk5"}, ArgumentError, "rk4"),
         ({"integrator": "engine"}, ArgumentError, "no stepper"),
@@ -86,7 +87,7 @@ REST = np.zeros(6)
         ({"noise": Noise(-1.0)}, GainError, "noise"),
         ({"noise": Noise(seed=-1)}, ArgumentError, "seed"),
         ({"noise": Noise(rollout=2**63)}, ArgumentError, "rollout"),
-        ({"pushes": [Push("tool", np.zeros(6))]}, UnknownNameError, "tool0"),
+        ({"pushes": [ExternalForce("tool", np.zeros(6))]}, UnknownNameError, "tool0"),
     ],
 )
 def test_options_that_cannot_be_used(options: dict[str, Any], error: type[Exception], says: str) -> None:
@@ -226,7 +227,7 @@ def test_a_batch_has_the_defaults_of_one_rollout() -> None:
         ({"plant": "pinocchio"}, "plant is 'pinocchio'; in a batch it is 'compiled'"),
         ({"parametric": 3.0}, r"parametric is of type float; wanted dynx\.parametric"),
         ({"noise": 0.1}, r"noise is '0\.1'; wanted a dynx\.Noise"),
-        ({"pushes": [1]}, "wanted a Push"),
+        ({"pushes": [1]}, "wanted an ExternalForce"),
         ({"payload": 2.0}, "wanted a Payload"),
     ],
 )

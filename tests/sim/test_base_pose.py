@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dynx import ExternalForce
 from dynx.backends import installed_backends
 from dynx.control import PD, ComputedTorque
 from dynx.errors import ArgumentError
 from dynx.model import Joint, Link, Model, Pose
 from dynx.model.loading import load
-from dynx.sim import Payload, Push, Rollout, Scenario, simulate, simulate_batch
+from dynx.sim import Payload, Rollout, Scenario, simulate, simulate_batch
 from tests.sim.bars import EXACT_ON_DYNX, PLANTS_AGREE, apart, tutorial_robot
 
 MOUNT = Pose((0.4, -1.2, 0.7), (1.1, -0.6, 2.3))
@@ -29,7 +30,7 @@ OPTIONS: dict[str, Any] = {
     "duration": 0.1,
     "q0": START,
     "payload": Payload(ARM.frame_names[-1], 1.5),
-    "pushes": [Push(ARM.frame_names[-1], (5.0, -3.0, 2.0, 0.1, 0.2, 0.3), 0.02, 0.03)],
+    "pushes": [ExternalForce(ARM.frame_names[-1], (5.0, -3.0, 2.0, 0.1, 0.2, 0.3), 0.02, 0.03)],
 }
 PLANTS = [name for name in ("compiled", "pinocchio", "pybullet") if name in installed_backends()]
 

@@ -12,12 +12,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import dynx
+from dynx import ExternalForce
 from dynx.backends import installed_backends
 from dynx.control import PD, PID, BulletPositionMotor, ComputedTorque, OpenLoop
 from dynx.control.base import Controller, Measurement
 from dynx.errors import ArgumentError, ClosedError, ControlError, DivergedError
 from dynx.model.loading import load
-from dynx.sim import Noise, Payload, Push, Scenario, Simulation, compiled_loop, simulate
+from dynx.sim import Noise, Payload, Scenario, Simulation, compiled_loop, simulate
 from dynx.trajectory.base import Setpoint
 from tests.sim.bars import tutorial_motion, tutorial_robot
 from tests.sim.loop.test_resume import the_same
@@ -47,7 +48,7 @@ SCENARIOS: dict[str, Scenario] = {
         friction=0.2,
         armature=0.05,
         payload=Payload("tool0", 1.0),
-        pushes=[Push("tool0", [5, 0, 0, 0, 0, 0], start=0.01, duration=0.01)],
+        pushes=[ExternalForce("tool0", [5, 0, 0, 0, 0, 0], start=0.01, duration=0.01)],
         position_limits=True,
         duration=0.04,
     ),
@@ -310,7 +311,7 @@ def test_the_record_says_how_its_steps_were_computed() -> None:
     assert executor(plant="compiled", integrator="rk4", dt=1e-4) == "compiled pieces"
     assert executor(position_limits=True) == "compiled pieces"
     assert executor(damping=1.0, friction=0.1, armature=0.1) == "compiled pieces"
-    push = Push("tool0", [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    push = ExternalForce("tool0", [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     assert executor(pushes=[push]) == "plain: pushes are not compiled"
     few = compiled_loop.MIN_STEPS_TO_COMPILE
     assert executor(dt=0.01) == f"plain: fewer than {few} steps"

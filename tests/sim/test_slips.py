@@ -35,7 +35,7 @@ class TorqueOnly(control.Controller[None]):
 
 
 def test_a_single_push_and_a_name_are_accepted() -> None:
-    push = dynx.Push("tool0", WRENCH, duration=0.002)
+    push = dynx.ExternalForce("tool0", WRENCH, duration=0.002)
     options: dict[str, Any] = {"plant": "compiled", "duration": 0.004}
     one = simulate(ARM, PD, REST, pushes=push, **options)
     np.testing.assert_array_equal(one.q, simulate(ARM, PD, REST, pushes=[push], **options).q)
@@ -59,14 +59,14 @@ def test_a_single_push_and_a_name_are_accepted() -> None:
 )
 def test_a_push_is_checked_when_it_is_made(values: tuple[Any, ...], message: str) -> None:
     with pytest.raises(ArgumentError, match=message):
-        dynx.Push("tool0", *values)
+        dynx.ExternalForce("tool0", *values)
 
 
 SIMULATIONS: dict[str, tuple[dict[str, Any], type[DynxError], str]] = {
     "payload=2.0": ({"payload": 2.0}, ArgumentError, "payload is '2.0'; wanted a Payload, or a list of them"),
     "payload of a pair": ({"payload": ("tool0", 2.0)}, ArgumentError, "wanted a Payload"),
     "noise=1e-3": ({"noise": 1e-3}, ArgumentError, r"noise is '0.001'; wanted a dynx\.Noise"),
-    "pushes=None": ({"pushes": None}, ArgumentError, "wanted a Push"),
+    "pushes=None": ({"pushes": None}, ArgumentError, "wanted an ExternalForce"),
     "dt=1e-300": (
         {"dt": 1e-300},
         ArgumentError,

@@ -50,8 +50,8 @@ def test_a_click_names_a_body_of_a_world_and_the_pointer_drags_it(open_page: Ope
             page.page.wait_for_timeout(PICTURE)
 
         def pulled() -> Floats:
-            found = viewer.view._spring.wrenches(world)
-            return np.asarray(found[0].force) if found else np.zeros(3)
+            found = viewer.view._spring.forces(world)
+            return np.asarray(found[0].wrench)[:3] if found else np.zeros(3)
 
         until(lambda: np.linalg.norm(pulled()) > 1e-3, "the spring")
         # From the camera's place, right in the picture is along (1, 1, 0).

@@ -12,7 +12,7 @@ import pytest
 from dynx.errors import ArgumentError, DynxError
 from dynx.viewer.spring import Pull
 from dynx.viewer.world_view import _NO_PART_CHOSEN
-from dynx.world import Scene, World, Wrench, box, ground
+from dynx.world import ExternalForce, Scene, World, box, ground
 from dynx.world.scene import read_scene
 from tests.viewer.conftest import until
 
@@ -44,7 +44,7 @@ def test_the_pointer_drags_a_part_by_the_point_taken() -> None:
         taken = before[:3, 3] + before[:3, :3] @ np.array([0.05, 0.0, 0.05])
         viewer.view._spring.pull(Pull(body.name, taken, taken + np.array([0.0, 0.0, 1.0])))
         viewer.view.step(1)
-        (wrench,) = viewer.view._spring.wrenches(world)
+        (wrench,) = viewer.view._spring.forces(world)
         assert np.allclose(wrench.point, [0.05, 0.0, 0.05], atol=1e-12)
         viewer.view.step(300)
         lifted = world.state.bodies[body.name].position[2]
@@ -61,7 +61,7 @@ def test_a_push_gives_a_body_its_impulse_once() -> None:
     with World(scene) as world, World(scene) as alone, world.view() as viewer:
         viewer.view.push(body.name, (0.0, 0.5, 0.0))
         viewer.view.step(4)
-        alone.step(1, wrenches=[Wrench(body.name, np.array([0.0, 0.5, 0.0]) / world.dt)])
+        alone.step(1, forces=[ExternalForce(body.name, np.array([0.0, 0.5, 0.0, 0.0, 0.0, 0.0]) / world.dt)])
         alone.step(3)
         pushed, expected = world.state.bodies[body.name], alone.state.bodies[body.name]
         assert np.allclose(pushed.twist, expected.twist, rtol=0.0, atol=1e-12)
@@ -87,8 +87,8 @@ def test_a_reset_leaves_no_push_and_no_velocity_of_the_spring() -> None:
         viewer.view.reset()
         assert not viewer.view._pushes
         # The handle is on the part again, which rests: the spring does not pull.
-        (wrench,) = viewer.view._spring.wrenches(world)
-        assert np.abs(wrench.force).max() < 1e-9
+        (wrench,) = viewer.view._spring.forces(world)
+        assert np.abs(wrench.wrench).max() < 1e-9
 
 
 def test_a_lower_speed_does_not_stop_a_world() -> None:

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from dynx import Pose
 from dynx.model.geometry import Capsule, Collision, Cylinder, Mesh, Shape, Sphere
 from dynx.spatial.scalar import Floats
-from dynx.world import Contact, Material, Scene, SceneBody, World, Wrench, box, ground
+from dynx.world import Contact, ExternalForce, Material, Scene, SceneBody, World, box, ground
 from tests.world.engines import WORLDS
 
 pytestmark = pytest.mark.parametrize("engine", WORLDS)
@@ -199,6 +199,6 @@ def test_a_held_push_slides_a_box_against_friction(engine: str) -> None:
     with World(on_ground(0.4), engine) as world:
         world.run(0.2)
         x = world.state.bodies["brick"].twist[0]
-        world.step(100, wrenches=[Wrench("brick", force=(12.0, 0, 0), point=(0, 0, -0.1))])
+        world.step(100, forces=[ExternalForce("brick", (12.0, 0, 0, 0, 0, 0), point=(0, 0, -0.1))])
         gained = world.state.bodies["brick"].twist[0] - x
     assert gained == pytest.approx(0.1 * (12.0 / MASS - 0.4 * G), rel=0.05)

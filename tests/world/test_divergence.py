@@ -15,7 +15,7 @@ import dynx
 from dynx import Pose
 from dynx.errors import DivergedError, EngineError, SingularMassMatrixError
 from dynx.steppers.forces import Forces
-from dynx.world import PDMotor, PositionMotor, Scene, SceneRobot, Weld, World, Wrench, box, ground
+from dynx.world import ExternalForce, PDMotor, PositionMotor, Scene, SceneRobot, Weld, World, box, ground
 from tests.world.engines import FAST_WORLDS, WORLDS
 
 
@@ -53,7 +53,7 @@ def test_large_loads_are_named(engine: str) -> None:
     with World(scene, engine) as world:
         message = diverge(world, torques={"arm": [0.0, 1e59]})
         assert "torque of 1e+59 on 'arm/" in message
-        message = diverge(world, wrenches=[Wrench("brick", (1e55, 1e57, 0.0), (1e58, 0, 1e58))])
+        message = diverge(world, forces=[ExternalForce("brick", (1e55, 1e57, 0.0, 1e58, 0, 1e58))])
         assert "changes the velocity of 'brick' by" in message
 
 

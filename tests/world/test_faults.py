@@ -27,6 +27,7 @@ from dynx.errors import (
 )
 from dynx.model.geometry import Box, Collision, Mesh, Plane
 from dynx.world import (
+    ExternalForce,
     Material,
     PDMotor,
     PositionMotor,
@@ -36,13 +37,13 @@ from dynx.world import (
     VelocityMotor,
     Weld,
     World,
-    Wrench,
     box,
     ground,
 )
 from tests.world.engines import WORLDS
 
 NAN, INF = math.nan, math.inf
+ONE = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 NO_PAIR: Any = [0.0, 0.0]
 
 
@@ -114,16 +115,28 @@ CALLS: dict[str, tuple[Callable[[World], object], type[DynxError], str]] = {
         ArgumentError,
         "velocities",
     ),
-    "wrench on nothing": (lambda w: w.step(wrenches=[Wrench("brik")]), UnknownNameError, "'brick'"),
-    "wrench on a fixed body": (lambda w: w.step(wrenches=[Wrench("ground")]), ArgumentError, "fixed"),
-    "wrench on an unknown link": (lambda w: w.step(wrenches=[Wrench("arm/hand")]), UnknownNameError, "hand"),
-    "wrench with NaN": (
-        lambda w: w.step(wrenches=[Wrench("brick", (NAN, 0, 0))]),
+    "wrench on nothing": (lambda w: w.step(forces=[ExternalForce("brik", ONE)]), UnknownNameError, "'brick'"),
+    "wrench on a fixed body": (
+        lambda w: w.step(forces=[ExternalForce("ground", ONE)]),
         ArgumentError,
-        "force of a",
+        "fixed",
     ),
-    "wrench in no axes": (lambda w: w.step(wrenches=[Wrench("brick", axes="x")]), ArgumentError, "axes"),
-    "wrenches in a set": (lambda w: w.step(wrenches={1}), ArgumentError, "list of Wrench"),  # type: ignore[arg-type]
+    "wrench on an unknown link": (
+        lambda w: w.step(forces=[ExternalForce("arm/hand", ONE)]),
+        UnknownNameError,
+        "hand",
+    ),
+    "wrench with NaN": (
+        lambda w: w.step(forces=[ExternalForce("brick", (NAN, 0, 0, 0, 0, 0))]),
+        ArgumentError,
+        "the wrench of",
+    ),
+    "force in no reference": (
+        lambda w: w.step(forces=[ExternalForce("brick", ONE, reference="x")]),
+        ArgumentError,
+        "local_world_aligned",
+    ),
+    "forces in a set": (lambda w: w.step(forces={1}), ArgumentError, "list of ExternalForce"),  # type: ignore[arg-type]
     "state with NaN": (lambda w: w.set_state(robots={"arm": ([NAN, 0], [0, 0])}), ArgumentError, "q of arm"),
     "no pair": (lambda w: w.set_state(robots={"arm": NO_PAIR}), ArgumentError, r"wanted a pair \(q, v\)"),
     "no state": (lambda w: w.set_state(), ArgumentError, "robots= or bodies="),
@@ -172,7 +185,7 @@ def test_a_bad_call_is_refused_and_changes_nothing(world: World, fault: str) -> 
 @pytest.mark.parametrize(
     ("loads", "message"),
     [
-        (lambda world: None, "loads returned 'None'; wanted a dict of torques, motors, wrenches"),
+        (lambda world: None, "loads returned 'None'; wanted a dict of torques, motors, forces"),
         (lambda world: {"torque": {}}, "loads returned 'torque'; did you mean 'torques'"),
         (lambda world: np.zeros(6), "wanted a dict"),
     ],

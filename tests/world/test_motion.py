@@ -14,7 +14,7 @@ from dynx.model import configuration
 from dynx.model.elements import IDENTITY
 from dynx.model.geometry import Box, Collision
 from dynx.model.tree import Base
-from dynx.world import Scene, SceneBody, SceneRobot, World, Wrench, box, read_scene
+from dynx.world import ExternalForce, Scene, SceneBody, SceneRobot, World, box, read_scene
 from tests.world.engines import WORLDS
 
 pytestmark = pytest.mark.parametrize("engine", WORLDS)
@@ -70,7 +70,13 @@ def test_a_body_frame_away_from_the_centre_of_mass_falls_with_it(engine: str) ->
 def test_a_wrench_accelerates_a_body(engine: str) -> None:
     scene = Scene("s", bodies=(box("brick", (0.2, 0.2, 0.2), mass=2.0),), gravity=(0.0, 0.0, 0.0))
     with World(scene, engine, DT) as world:
-        world.step(100, wrenches=[Wrench("brick", force=(2.0, 0, 0)), Wrench("brick", force=(0, 4.0, 0))])
+        world.step(
+            100,
+            forces=[
+                ExternalForce("brick", (2.0, 0, 0, 0, 0, 0)),
+                ExternalForce("brick", (0, 4.0, 0, 0, 0, 0)),
+            ],
+        )
         assert_allclose(world.state.bodies["brick"].twist, [0.1, 0.2, 0, 0, 0, 0], atol=1e-9)
         world.step(100)
         assert_allclose(world.state.bodies["brick"].twist, [0.1, 0.2, 0, 0, 0, 0], atol=1e-9)
@@ -79,7 +85,9 @@ def test_a_wrench_accelerates_a_body(engine: str) -> None:
 def test_a_force_at_a_point_turns_a_body(engine: str) -> None:
     scene = Scene("s", bodies=(box("brick", (0.2, 0.2, 0.2), mass=2.0),), gravity=(0.0, 0.0, 0.0))
     with World(scene, engine, DT) as world:
-        world.step(wrenches=[Wrench("brick", force=(3.0, 0, 0), point=(0, 0.1, 0), axes="local")])
+        world.step(
+            forces=[ExternalForce("brick", (3.0, 0, 0, 0, 0, 0), reference="local", point=(0, 0.1, 0))]
+        )
         inertia = 2.0 * (0.2**2 + 0.2**2) / 12
         expected = [3.0 / 2.0 * DT, 0, 0, 0, 0, -3.0 * 0.1 / inertia * DT]
         assert_allclose(world.state.bodies["brick"].twist, expected, atol=1e-10)
@@ -91,7 +99,7 @@ def test_a_force_at_the_centre_of_mass_turns_nothing(engine: str) -> None:
         "s", bodies=(box("brick", (0.4, 0.2, 0.2), mass=2.0, center_of_mass=center),), gravity=(0, 0, 0)
     )
     with World(scene, engine, DT) as world:
-        world.step(wrenches=[Wrench("brick", force=(3.0, 1.0, -2.0), point=center)])
+        world.step(forces=[ExternalForce("brick", (3.0, 1.0, -2.0, 0, 0, 0), point=center)])
         assert_allclose(world.state.bodies["brick"].twist, [1.5e-3, 0.5e-3, -1e-3, 0, 0, 0], atol=1e-12)
 
 
@@ -120,7 +128,7 @@ def test_a_wrench_on_a_link_acts_as_its_torque(engine: str, name: str, base: Bas
     link = model.links[-1].name
     J = backend.jacobian(q, link, point=point)
     with World(Scene("s", robots=(SceneRobot("r", model, q=tuple(q)),)), engine, DT, **FREE) as world:
-        world.step(wrenches=[Wrench(f"r/{link}", force=force, moment=moment, point=point)])
+        world.step(forces=[ExternalForce(f"r/{link}", (*force, *moment), point=point)])
         pushed = world.state.robots["r"]
         world.reset()
         world.step(torques={"r": J.T @ np.concatenate([force, moment])})

@@ -40,7 +40,7 @@ _PAYLOAD = re.compile(r"(?P<frame>.+?):(?P<mass>[^:,]+)(:(?P<center>[^:,]+(,[^:,
 
 
 class PushInput(NamedTuple):
-    """First fields of a `dynx.sim.Push`."""
+    """First fields of a `dynx.ExternalForce`."""
 
     frame: str
     wrench: list[float]

@@ -14,9 +14,10 @@ from dynx.cli.sim.request import SimulationRequest
 from dynx.errors import DivergedError, SimulationError
 from dynx.model import Model
 from dynx.model.documents import pose_numbers
-from dynx.sim import Noise, Push, Rollout, RolloutInterrupted
+from dynx.sim import Noise, Rollout, RolloutInterrupted
 from dynx.sim.record.tracking_error import base_error, frame_error, joint_error
 from dynx.spatial.scalar import Floats
+from dynx.steppers.forces import ExternalForce
 
 
 class BodyErrorPart(TypedDict):
@@ -233,10 +234,10 @@ def _noise(noise: Noise) -> Entry:
     return {"q": np.asarray(noise.q).tolist(), "v": np.asarray(noise.v).tolist(), "seed": noise.seed}
 
 
-def _push(push: Push) -> Entry:
+def _push(push: ExternalForce) -> Entry:
     """Return the entry of one push; `duration` None lasts until the end."""
     return {
-        "frame": push.frame,
+        "frame": push.on,
         "wrench": np.asarray(push.wrench).tolist(),
         "start": push.start,
         "duration": push.duration if np.isfinite(push.duration) else None,

@@ -10,7 +10,7 @@ from dynx.contacts.case import Case, Figure
 from dynx.contacts.motion import acceleration, rate_at, record, tilts
 from dynx.contacts.scenes import G
 from dynx.model import Pose
-from dynx.world import Material, Scene, World, Wrench, box, ground
+from dynx.world import ExternalForce, Material, Scene, World, box, ground
 
 HALF = 0.1
 """Half the edge of the cube [m], whose mass is 1 kg."""
@@ -59,15 +59,16 @@ class PushedBox(Case):
         return Scene("pushed_box", bodies=(ground(material=material), body))
 
     def measure(self, world: World, parameters: BoxPush) -> Sequence[Figure]:
-        push = Wrench("box", (parameters.force, 0.0, 0.0), point=(0.0, 0.0, parameters.height - HALF))
+        force = (parameters.force, 0.0, 0.0, 0.0, 0.0, 0.0)
+        push = ExternalForce("box", force, point=(0.0, 0.0, parameters.height - HALF))
         if parameters.force * parameters.height > G * HALF:
-            motion = record(world, DURATION, wrenches=[push])
+            motion = record(world, DURATION, forces=[push])
             tilt, rates = tilts(motion.rotations("box")), motion.velocities("box")[:, 4]
             exact = tipping_speed(parameters.force, TILT)
             measured = rate_at(TILT, tilt, rates)
             return [Figure(f"angular velocity at {TILT} rad", measured, exact, "rad/s", exact)]
-        world.run(SETTLING, wrenches=[push])
-        motion = record(world, DURATION, wrenches=[push])
+        world.run(SETTLING, forces=[push])
+        motion = record(world, DURATION, forces=[push])
         exact = max(0.0, parameters.force - parameters.friction * G)
         measured = acceleration(motion.times, motion.velocities("box")[:, 0])
         return [Figure("acceleration", measured, exact, "m/s^2", parameters.force)]

@@ -63,7 +63,7 @@ class SceneTask(Task):
     @abstractmethod
     def loads(self, episode: Episode, action: Any) -> Mapping[str, Any]:
         """Return what acts during a control step, as arguments of `World.step`: ``torques``, ``motors``,
-        ``wrenches``."""
+        ``forces``."""
 
     def settle(self, episode: Episode, action: Any) -> None:
         """Update the memory after a control step; by default it is unchanged."""

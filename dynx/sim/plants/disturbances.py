@@ -1,18 +1,16 @@
-"""Joint friction, external wrenches and armature of a plant.
+"""Joint friction, external forces and armature of a plant.
 
-Every plant uses this code. Wrenches become a torque, as a function of time and state, which is added to that
-of the motors; joint friction is solved for the velocity at the end of a step (`friction_law`). So a push or a
-brake has the same effect in every engine.
+Every plant uses this code. External forces become a torque, as a function of time and state, which is added
+to that of the motors; joint friction is solved for the velocity at the end of a step (`friction_law`). So a
+push or a brake has the same effect in every engine.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from dynx.backends import Backend
 from dynx.backends.hooks import solve_mass_matrix
@@ -26,73 +24,12 @@ from dynx.control.friction import (
     refuse_text,
 )
 from dynx.control.gains import checked_gain
-from dynx.errors import ArgumentError, shown
 from dynx.model import Model
-from dynx.model.numbers import checked_entries, is_real, real_array
-from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, REFERENCES
 from dynx.sim.plants.friction_law import FrictionLaw
 from dynx.sim.plants.friction_solver import FrictionSolver
 from dynx.sim.step import with_disturbances
 from dynx.spatial.scalar import Floats
-
-TIME_ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
-"""Relative difference of two times that counts as rounding."""
-
-SLIVER = 1e-6
-"""Largest part of a push that may be counted in the step before or after its own."""
-
-
-@dataclass(frozen=True)
-class Push:
-    """A wrench (6,), force [N] then moment [N m], on `frame` from `start` [s] for `duration` [s].
-
-    `reference` names the point and the axes of the wrench, as for `external_forces` of a backend. In each
-    step of the plant the wrench is constant, multiplied by the share of the step in which the push lasts. So
-    the impulse is exact for any start, duration and step, under every integrator.
-
-    Raises ArgumentError unless the wrench is six finite numbers, the start is finite, the duration is
-    positive and `reference` is one of the three.
-    """
-
-    frame: str
-    wrench: ArrayLike
-    start: float = 0.0
-    duration: float = np.inf
-    reference: str = LOCAL_WORLD_ALIGNED
-
-    def __post_init__(self) -> None:
-        name = f"the wrench of a push on {shown(self.frame)}"
-        wrench = checked_entries(name, real_array(name, self.wrench))
-        if wrench.shape != (6,) or self.reference not in REFERENCES:
-            raise ArgumentError(
-                f"a push on {shown(self.frame)} has a wrench of shape {wrench.shape} in "
-                f"{shown(self.reference)}; wanted (6,) in one of {', '.join(REFERENCES)}"
-            )
-        seconds = is_real(self.start) and is_real(self.duration)
-        if not seconds or not self.duration > 0.0 or not np.isfinite(self.start):
-            raise ArgumentError(
-                f"a push on {shown(self.frame)} starts at {self.start!r} and lasts {self.duration!r}; "
-                "wanted finite, and positive, seconds"
-            )
-
-    def checked(self, model: Model) -> Push:
-        """Return a copy with its wrench as an array. Raises UnknownNameError for a frame of another robot."""
-        model.frame_index(self.frame)
-        wrench = real_array("wrench", self.wrench)
-        return Push(self.frame, wrench, float(self.start), float(self.duration), self.reference)
-
-    def share(self, t: float, h: float) -> float:
-        """Return the share, from 0 to 1, of the step of length `h` [s] from time `t` [s] in which it acts."""
-        # Times on the grid are rounded; a step that begins with the push must not miss the last bit of it.
-        rounding = min(TIME_ROUNDING * max(abs(t) + h, abs(self.start)), SLIVER * self.duration)
-        since = t - self.start
-        if since >= -rounding and since + h <= self.duration + rounding:
-            return 1.0
-        before, after = (
-            0.0 if each <= rounding else self.duration if each >= self.duration - rounding else each
-            for each in (since, since + h)
-        )
-        return (after - before) / h
+from dynx.steppers.forces import ExternalForce
 
 
 class Disturbances:
@@ -108,7 +45,7 @@ class Disturbances:
         friction: Coefficients = False,
         slip: float = 0.0,
         armature: Coefficients = False,
-        pushes: Sequence[Push] = (),
+        pushes: Sequence[ExternalForce] = (),
         step: float = 0.0,
     ) -> None:
         """Raises GainError and ArgumentError for coefficients and pushes that `model` cannot have."""
@@ -182,11 +119,7 @@ class Disturbances:
         return with_disturbances(
             tau,
             self.friction(v) if self.friction.smooth else None,
-            (
-                (engine.jacobian(q, push.frame, reference=push.reference), share * np.asarray(push.wrench))
-                for push, share in shares
-                if share
-            ),
+            (push.at_frame(engine, push.on, q, share) for push, share in shares if share),
         )
 
 

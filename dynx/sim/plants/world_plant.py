@@ -7,12 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dynx.backends import Backend, backend
 from dynx.errors import EngineError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.model.elements import JointDynamics
 from dynx.model.geometry import Geometry
-from dynx.registry import DEFAULT_ENGINE
 from dynx.sim.plants.disturbances import Disturbances
 from dynx.sim.plants.plant import Plant, StepResult
 from dynx.sim.plants.scene_plant import ScenePlant
@@ -36,7 +34,8 @@ class WorldPlant(Plant):
     """A robot of a scene in `dynx.world.World`.
 
     Joint damping, and dry friction without a slip speed, are those of the engine; friction with a slip speed
-    and pushes are torques, as in the other plants. Contacts and the motion of the surroundings are recorded.
+    is a torque, as in the other plants. Pushes act in each step of the engine. Contacts and the motion of the
+    surroundings are recorded.
     """
 
     def __init__(
@@ -60,11 +59,11 @@ class WorldPlant(Plant):
             joint_friction=disturbances.sticks,
             **dict(place.settings),
         )
+        self._forces = tuple(replace(push, on=f"{self._robot}/{push.on}") for push in disturbances.pushes)
         self._others = tuple(robot.name for robot in place.scene.robots if robot.name != place.robot)
         self._moving = tuple(body.name for body in place.scene.bodies if not body.fixed)
         self._contacts: list[tuple[Contact, ...]] = []
         self._states: list[WorldState] = []
-        self._lazy_engine: Backend | None = None
 
     def reset(self, q: Floats, v: Floats) -> None:
         """Put the scene at its start, and the robot at q, v."""
@@ -85,13 +84,10 @@ class WorldPlant(Plant):
             )
 
     def step(self, t: float, tau: Floats) -> StepResult:
-        acting = tau
-        if self.disturbances.has_torque:
-            now = self._states[-1].robots[self._robot]
-            acting = tau + self.disturbances.torque(self._engine, t, now.q, now.v)
-        world = self._world
+        world, friction = self._world, self.disturbances.friction
         before = self._states[-1].robots[self._robot].v
-        world.step(1, {self._robot: acting})
+        acting = tau - friction(before) if friction.smooth else tau
+        world.step(1, {self._robot: acting}, forces=self._forces)
         state, contacts = world.state, world.contacts()
         self._states.append(state)
         self._contacts.append(contacts)
@@ -115,15 +111,6 @@ class WorldPlant(Plant):
 
     def close(self) -> None:
         self._world.close()
-        if self._lazy_engine is not None:
-            self._lazy_engine.close()
-
-    @property
-    def _engine(self) -> Backend:
-        """The backend whose Jacobians turn pushes into torques."""
-        if self._lazy_engine is None:
-            self._lazy_engine = backend(DEFAULT_ENGINE, self.model, validate=False)
-        return self._lazy_engine
 
 
 def _scene_of(place: ScenePlant, model: Model, disturbances: Disturbances) -> Scene:

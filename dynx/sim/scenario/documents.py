@@ -30,7 +30,7 @@ from dynx.errors import ArgumentError, UnknownNameError, shown
 from dynx.model import Model
 from dynx.model.documents import robot_document, robot_from_document
 from dynx.sim.loop.controller_checks import controller_numbers
-from dynx.sim.scenario.moved import present_name
+from dynx.sim.scenario.moved import present_fields, present_name
 from dynx.trajectory.base import Trajectory
 from dynx.world.scene import Scene
 from dynx.world.scene.documents import scene_document, scene_from_document
@@ -234,7 +234,8 @@ def _decoded(document: Document, model: Model | None) -> Any:
         raise TypeError("a model is written as URDF text")
     if kind is None or _has_other_code(document):
         return Unknown(document[CLASS].rpartition(":")[2], json.dumps(document))
-    return kind(**{name: _decoded(each, model) for name, each in document["fields"].items()})
+    given = present_fields(document[CLASS], document["fields"])
+    return kind(**{name: _decoded(each, model) for name, each in given.items()})
 
 
 def _require_forms(document: Document) -> None:

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import TypeVar
+
+Field = TypeVar("Field")
+
 MODULES = {
     "dynx.control.engine_motors": "dynx.control.bullet",
     "dynx.sim.clock": "dynx.steppers.clock",
@@ -20,8 +25,13 @@ CLASSES = {
     "dynx.control.bullet:PositionMotor": "dynx.control.bullet:BulletPositionMotor",
     "dynx.control.bullet:TorqueMotor": "dynx.control.bullet:BulletTorqueMotor",
     "dynx.control.bullet:VelocityMotor": "dynx.control.bullet:BulletVelocityMotor",
+    "dynx.sim.plants.disturbances:Push": "dynx.steppers.forces:ExternalForce",
 }
 """Classes by module and name, the module being the present one."""
+
+
+FIELDS = {"dynx.sim.plants.disturbances:Push": {"frame": "on"}}
+"""Fields that were renamed, by the earlier name of their class."""
 
 
 def present_name(name: str) -> str:
@@ -29,3 +39,9 @@ def present_name(name: str) -> str:
     module, colon, kind = name.partition(":")
     name = MODULES.get(module, module) + colon + kind
     return CLASSES.get(name, name)
+
+
+def present_fields(name: str, given: Mapping[str, Field]) -> dict[str, Field]:
+    """Return the fields of a class that a document names, with their present names."""
+    renamed = FIELDS.get(name, {})
+    return {renamed.get(field, field): value for field, value in given.items()}

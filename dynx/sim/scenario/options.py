@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from dynx.control.friction import Coefficients
     from dynx.model import Model
     from dynx.sim.loop.noise import Noise
-    from dynx.sim.plants.disturbances import Push
     from dynx.sim.plants.model_error import MassScale, Payload
     from dynx.sim.plants.scene_plant import ScenePlant
+    from dynx.steppers.forces import ExternalForce
 
 T = TypeVar("T")
 
@@ -217,7 +217,9 @@ LIMITS = JointNumbers(_JOINT_VALUES, NumberOrArray, others=math.inf)
 FACTORS = Factors("a factor, or factors by link", float | dict[str, Any])
 NOISE = Parts("a dynx.Noise, as in Noise(v=1e-3)", dict[str, Any], "dynx.sim.loop.noise:Noise", several=False)
 PAYLOADS = Parts("a Payload, or a list of them", list[dict[str, Any]], "dynx.sim.plants.model_error:Payload")
-PUSHES = Parts("a Push, or a list of them", list[dict[str, Any]], "dynx.sim.plants.disturbances:Push")
+PUSHES = Parts(
+    "an ExternalForce, or a list of them", list[dict[str, Any]], "dynx.steppers.forces:ExternalForce"
+)
 INTEGRATOR = Choice("a name", str, "dynx.sim.plants.registry:INTEGRATORS")
 METHOD = Choice("a name", str, "dynx.sim.plants.integrators:METHODS")
 
@@ -441,7 +443,7 @@ class SimulationOptions:
         kind=FACTORS,
         group=ERRORS,
     )
-    pushes: Push | Sequence[Push] = option(
+    pushes: ExternalForce | Sequence[ExternalForce] = option(
         (), "External force [N] and moment [N m] on a frame", kind=PUSHES, group=JOINTS, flag="push"
     )
     check_reference: bool = option(

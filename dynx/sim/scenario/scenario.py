@@ -18,7 +18,6 @@ from dynx.model import Model
 from dynx.model.loading import load
 from dynx.model.model import refuse_other_than_model
 from dynx.model.package_paths import StrPath
-from dynx.sim.plants.disturbances import Push
 from dynx.sim.plants.model_error import Payload
 from dynx.sim.plants.registry import default_integrator
 from dynx.sim.plants.scene_plant import ScenePlant
@@ -38,6 +37,7 @@ from dynx.sim.scenario.documents import (
 from dynx.sim.scenario.documents import NUMBERS as CONTROLLER_NUMBERS
 from dynx.sim.scenario.options import OPTIONS, SimulationOptions, as_array
 from dynx.steppers.clock import TIME_ROUNDING, Clock
+from dynx.steppers.forces import ExternalForce
 from dynx.trajectory.base import Trajectory
 
 SCHEMA = "dynx.scenario/1"
@@ -111,7 +111,7 @@ class Scenario(SimulationOptions):
         return tuple(self.payload) if isinstance(self.payload, tuple) else ()
 
     @property
-    def all_pushes(self) -> tuple[Push, ...]:
+    def all_pushes(self) -> tuple[ExternalForce, ...]:
         """All pushes on the plant."""
         return tuple(self.pushes) if isinstance(self.pushes, tuple) else ()
 

@@ -14,11 +14,12 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import dynx
+from dynx import ExternalForce
 from dynx.control import PD, PID, Velocity
 from dynx.control.base import Controller, Measurement
 from dynx.errors import DivergedError
 from dynx.model import Model
-from dynx.sim import BatchRollouts, Noise, Payload, Push, simulate, simulate_batch
+from dynx.sim import BatchRollouts, Noise, Payload, simulate, simulate_batch
 from dynx.sim.batch import batch as batch_module
 from dynx.sim.batch.part import Part, PartOutcome
 from dynx.sim.plants.floating_step import floating_step
@@ -88,7 +89,7 @@ def test_all_options_together(solo: Model, law: Any) -> None:
         # Fixed to the root: its centre of mass, which takes the step, is moved.
         payload=Payload("base_link", 0.5, (0.1, 0.05, 0.0)),
         mass_scale=1.1,
-        pushes=[Push("base_link", [5, 1, 2, 0.1, 0.2, 0.3], 0.02, 0.02)],
+        pushes=[ExternalForce("base_link", [5, 1, 2, 0.1, 0.2, 0.3], 0.02, 0.02)],
         **falling(solo),
     )
 
@@ -159,7 +160,7 @@ def test_who_computes_it_and_a_stop_on_the_way_change_nothing(
         "control_dt": 2e-3,
         "effort_limits": 1.0,
         "damping": np.linspace(0.0, 0.02, 10),
-        "pushes": [Push("base_link", np.ones(6), 0.01, 0.01)],
+        "pushes": [ExternalForce("base_link", np.ones(6), 0.01, 0.01)],
         "noise": Noise(1e-3, 1e-2, seed=1),
         "record_every": 10,
         "check_reference": False,
@@ -188,7 +189,7 @@ def test_who_computes_it_and_a_stop_on_the_way_change_nothing(
     monkeypatch.setattr(Part, "__call__", counted)
     assert same(one, run(keep=tmp_path))
     assert computed == []
-    for other in ({"delay": 2e-3}, {"pushes": [Push("base_link", np.full(6, 2.0), 0.01, 0.01)]}):
+    for other in ({"delay": 2e-3}, {"pushes": [ExternalForce("base_link", np.full(6, 2.0), 0.01, 0.01)]}):
         found = run(keep=tmp_path, **other)
         assert not np.array_equal(found.q, one.q)
     assert computed == [4, 4, 2, 4, 4, 2]
@@ -236,7 +237,7 @@ def test_random_robots(model: Model, seed: int) -> None:
         "friction": 0.1,
         "friction_slip": 0.5,
         "mass_scale": 1.2,
-        "pushes": [Push(frame, rng.uniform(-0.1, 0.1, 6), 0.005, 0.01)],
+        "pushes": [ExternalForce(frame, rng.uniform(-0.1, 0.1, 6), 0.005, 0.01)],
         "q0": model.random(rng),
         "v0": rng.uniform(-1.0, 1.0, model.nv),
         "check_reference": False,

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import dynx
+from dynx import ExternalForce
 from dynx.compiled.step import StepText
 from dynx.control import BulletPositionMotor, ComputedTorque, FrictionCompensation, GravityCompensatedPD
 from dynx.errors import (
@@ -18,7 +19,7 @@ from dynx.errors import (
     UnsupportedFeatureError,
 )
 from dynx.model import Link, Model
-from dynx.sim import Payload, Push, plant_model, simulate, simulate_batch
+from dynx.sim import Payload, plant_model, simulate, simulate_batch
 from dynx.sim.batch.rollouts import BatchRollouts
 from dynx.sim.loop_step import LoopStep
 from tests.backends.robots import mixed_robot
@@ -28,8 +29,8 @@ from tests.sim.batch.batches import assert_same, batch_and_one
 POSTURE = np.array([0.3, -1.2, 1.0, 0.2, 0.4, 0.1])
 TOOL = Payload("tool0", 2.0, (0.0, 0.0, 0.1), np.diag([0.01, 0.02, 0.015]))
 PUSHES = [
-    Push("tool0", [10, 5, 0, 1, 0, 0], 0.02, 0.02, "local"),
-    Push("forearm_link", [0, 5, 0, 1, 0, 3], 0.03, reference="world"),
+    ExternalForce("tool0", [10, 5, 0, 1, 0, 0], 0.02, 0.02, "local"),
+    ExternalForce("forearm_link", [0, 5, 0, 1, 0, 3], 0.03, reference="world"),
 ]
 OPTIONS: dict[str, dict[str, Any]] = {
     "delay": {"delay": 1e-3},
@@ -109,7 +110,11 @@ def test_mimic_joints_feel_what_they_feel_alone(base: str, through: bool) -> Non
     law = dynx.control.PD(robot, kp=2.0, kd=0.2)
     start: dict[str, Any] = {"q0": robot.random(rng), "v0": rng.uniform(-1.0, 1.0, robot.nv)}
     friction = True if through else 0.3
-    options: dict[str, Any] = {"friction": friction, "armature": True, "pushes": [Push("tip", np.ones(6))]}
+    options: dict[str, Any] = {
+        "friction": friction,
+        "armature": True,
+        "pushes": [ExternalForce("tip", np.ones(6))],
+    }
     batch_and_one(
         robot, law, robot.neutral(), duration=0.03, check_reference=False, damping=True, **start, **options
     )

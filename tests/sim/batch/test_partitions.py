@@ -13,11 +13,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dynx import ExternalForce
 from dynx.compiled import step as step_module
 from dynx.control import PID, FrictionCompensation
 from dynx.errors import ArgumentError
 from dynx.model.loading import load
-from dynx.sim import BatchRollouts, Noise, Push, simulate, simulate_batch
+from dynx.sim import BatchRollouts, Noise, simulate, simulate_batch
 from dynx.sim.batch import batch as batch_module
 from dynx.sim.loop.sensors import Sensors
 from dynx.simd.cache import load_kernel
@@ -38,7 +39,7 @@ OPTIONS: dict[str, Any] = {
     "control_dt": 2e-3,
     "delay": 3e-3,
     "effort_limits": [150, 35, 18, 2.5, 2, 2],
-    "pushes": [Push("tool0", [10, 5, 0, 1, 0, 0], 0.02, 0.02)],
+    "pushes": [ExternalForce("tool0", [10, 5, 0, 1, 0, 0], 0.02, 0.02)],
     "friction": 0.2,
     "record_every": 40,
 }

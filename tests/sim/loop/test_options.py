@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dynx import ExternalForce
 from dynx.backends import backend, installed_backends
 from dynx.control import PD, GravityCompensatedPD, Measurement, OpenLoop, Saturated
 from dynx.control.base import Controller
 from dynx.model import Model
 from dynx.model.loading import load
-from dynx.sim import Noise, Payload, Push, Rollout, plant_model, simulate
+from dynx.sim import Noise, Payload, Rollout, plant_model, simulate
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 from tests.backends.robots import mixed_robot
@@ -27,7 +28,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "armature": {"armature": 0.1},
     "payload": {"payload": Payload("tool0", 2.0, (0.0, 0.0, 0.1), np.diag([0.01, 0.02, 0.015]))},
     "masses": {"mass_scale": {"forearm_link": 1.5}},
-    "pushes": {"pushes": [Push("tool0", [10, 5, 0, 1, 0, 0], 0.02, 0.04, "local")]},
+    "pushes": {"pushes": [ExternalForce("tool0", [10, 5, 0, 1, 0, 0], 0.02, 0.04, "local")]},
     "stops": {"position_limits": True, "v0": [20.0, 0.0, 40.0, 30.0, 10.0, 60.0]},
     "efforts": {"effort_limits": [150, 35, 18, 2.5, 2, 2]},
     "noise": {"noise": Noise(1e-3, 1e-2, seed=3)},
@@ -40,7 +41,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
         "armature": 0.05,
         "payload": Payload("tool0", 1.0),
         "mass_scale": 1.1,
-        "pushes": [Push("tool0", [5, 0, 0, 0, 0, 0], 0.03)],
+        "pushes": [ExternalForce("tool0", [5, 0, 0, 0, 0, 0], 0.03)],
         "noise": Noise(1e-4, 1e-3),
         "delay": 2e-3,
         "control_dt": 2e-3,

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.special import ellipk
 
+from dynx import ExternalForce
 from dynx.backends import backend
 from dynx.model.loading import load
-from dynx.sim import Push, simulate
+from dynx.sim import simulate
 from tests.oracles.closed_form import MODELS, G
 from tests.oracles.pendulums import Pendulum
 from tests.sim.bars import ENERGY, MOMENTUM, tutorial_robot
@@ -75,7 +76,7 @@ def test_semi_implicit_euler_keeps_linear_momentum(plant: str) -> None:
 def test_a_push_gives_its_impulse() -> None:
     body = load(MODELS / "free_body.urdf", base="floating").with_gravity(np.zeros(3))
     force = np.array([2.0, -1.0, 0.5, 0.0, 0.0, 0.0])
-    push = Push(body.root, force, start=0.1, duration=0.2)
+    push = ExternalForce(body.root, force, start=0.1, duration=0.2)
     rollout = simulate(body, duration=0.5, pushes=[push])
     with backend("reference", body) as engine:
         momentum = engine.centroidal_momentum(rollout.q, rollout.v)[:, :3]

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dynx import ExternalForce
 from dynx.backends import installed_backends
 from dynx.control import PD
-from dynx.sim import Push, simulate, simulate_batch
+from dynx.sim import simulate, simulate_batch
 from tests.backends.robots import chain
 
 SLIDER = chain(1, "prismatic").with_gravity(np.zeros(3))
@@ -33,9 +34,9 @@ durations = st.one_of(st.floats(1e-9, 0.03), st.integers(1, 30).map(lambda k: k 
 steps = st.sampled_from([1e-3, 7e-4, 3e-3, 0.01, 0.02, 1 / 240, TIME])
 
 
-def pushed(force: float, start: float, duration: float) -> Push:
+def pushed(force: float, start: float, duration: float) -> ExternalForce:
     """Return a push along the slider."""
-    return Push("link1", np.concatenate([force * AXIS, np.zeros(3)]), start, duration)
+    return ExternalForce("link1", np.concatenate([force * AXIS, np.zeros(3)]), start, duration)
 
 
 @pytest.mark.parametrize(("plant", "integrator"), PLANTS)
@@ -73,14 +74,14 @@ def test_the_impulse_is_exact_in_a_batch(start: float, duration: float, dt: floa
     k=st.integers(0, 10**5), n=st.integers(1, 1000), dt=st.sampled_from([1e-4, 1 / 240, 1e-3, 0.002, 0.01])
 )
 def test_a_push_on_the_grid_acts_in_whole_steps(k: int, n: int, dt: float) -> None:
-    push = Push("link1", np.ones(6), k * dt, n * dt)
+    push = ExternalForce("link1", np.ones(6), k * dt, n * dt)
     for step, share in ((k - 1, 0.0), (k, 1.0), (k + n - 1, 1.0), (k + n, 0.0)):
         assert push.share(step * dt, dt) == share
 
 
 @given(start=st.floats(-10.0, 1000.0), duration=st.floats(1e-9, 100.0), dt=st.floats(1e-4, 0.1))
 def test_the_shares_of_a_push_add_up_to_its_duration(start: float, duration: float, dt: float) -> None:
-    push = Push("link1", np.ones(6), start, duration)
+    push = ExternalForce("link1", np.ones(6), start, duration)
     first, last = int(start // dt) - 2, int((start + duration) // dt) + 3
     if last - first > 10**4:
         return

@@ -118,7 +118,7 @@ def test_a_floating_robot_rests_with_its_payload_on_the_ground(engine: str) -> N
 def test_joint_friction_and_pushes_act_as_in_other_plants(engine: str) -> None:
     slider = dynx.load(SLIDER)
     plant = ScenePlant(Scene("free", robots=(SceneRobot("slider", slider),)), engine=engine)
-    push = dynx.Push("pusher", [4.0, 0, 0, 0, 0, 0], duration=0.25)
+    push = dynx.ExternalForce("pusher", [4.0, 0, 0, 0, 0, 0], duration=0.25)
     given = {"duration": 0.5, "damping": True, "friction": True, "pushes": push}
     inside, alone = (dynx.simulate(slider, plant=each, **given) for each in (plant, "reference"))  # type: ignore[arg-type]
     np.testing.assert_allclose(inside.q, alone.q, atol=2e-3)

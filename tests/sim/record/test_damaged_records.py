@@ -15,12 +15,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx import trajectory
+from dynx import ExternalForce, trajectory
 from dynx.control import ComputedTorque
 from dynx.errors import ArgumentError, DynxError
 from dynx.files.arrays import read_arrays, write_arrays
 from dynx.model.loading import load
-from dynx.sim import Noise, Payload, Push, Rollout, Scenario, simulate, simulate_batch
+from dynx.sim import Noise, Payload, Rollout, Scenario, simulate, simulate_batch
 from dynx.sim.batch.rollouts import BatchRollouts
 from dynx.sim.batch.store import Store
 
@@ -31,7 +31,7 @@ SCENARIO = Scenario(
     trajectory.cycloidal(np.zeros(2), np.full(2, 0.05), duration=0.006),
     plant="compiled",
     noise=Noise(q=1e-5),
-    pushes=[Push("upper_arm", [1.0, 0.0, 0.0, 0.0, 0.0, 0.0], 0.0, 0.002)],
+    pushes=[ExternalForce("upper_arm", [1.0, 0.0, 0.0, 0.0, 0.0, 0.0], 0.0, 0.002)],
     payload=Payload("forearm", 1.0, [0.0, 0.0, 0.0]),
     check_reference=False,
 )

@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dynx import control, trajectory
+from dynx import ExternalForce, control, trajectory
 from dynx.control.base import Controller, Measurement
 from dynx.errors import ArgumentError
 from dynx.model.loading import load
-from dynx.sim import Noise, Payload, Push, Scenario, simulate
+from dynx.sim import Noise, Payload, Scenario, simulate
 from dynx.sim.scenario.documents import Unknown
 from dynx.testing.strategies import models
 from dynx.trajectory.base import Setpoint
@@ -55,7 +55,7 @@ numbers = st.floats(min_value=1e-6, max_value=1e6)
 
 @st.composite
 def scenarios(draw: st.DrawFn) -> Scenario:
-    push = Push("tool0", draw(st.lists(numbers, min_size=6, max_size=6)), start=draw(numbers))
+    push = ExternalForce("tool0", draw(st.lists(numbers, min_size=6, max_size=6)), start=draw(numbers))
     return Scenario(
         ARM,
         draw(st.sampled_from(CONTROLLERS)),

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dynx import ExternalForce
 from dynx.backends import backend
 from dynx.control import PD, register_controller, unregister_controller
 from dynx.control.base import Controller, Measurement, Wrapper
@@ -19,7 +20,7 @@ from dynx.control.code_content import digest_of_code
 from dynx.errors import ArgumentError
 from dynx.model import Model
 from dynx.model.loading import load
-from dynx.sim import Payload, Push, Scenario, simulate
+from dynx.sim import Payload, Scenario, simulate
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 
@@ -96,7 +97,7 @@ def test_a_list_an_array_and_another_order_are_equal() -> None:
         Scenario(
             arm,
             payload=Payload("tool0", 1.0, center=kind([0.0, 0.0, 0.1])),
-            pushes=[Push("tool0", kind([1.0, 0, 0, 0, 0, 0]))],
+            pushes=[ExternalForce("tool0", kind([1.0, 0, 0, 0, 0, 0]))],
             mass_scale={"forearm_link": 1.1, "wrist_1_link": 1.2},
         )
         for kind in (list, np.array, tuple)

@@ -11,10 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dynx import ExternalForce
 from dynx.control import PD, PID, ComputedTorque, Saturated
 from dynx.errors import ArgumentError
 from dynx.model.loading import load
-from dynx.sim import Noise, Payload, Push, Rollout, Scenario, simulate
+from dynx.sim import Noise, Payload, Rollout, Scenario, simulate
 from dynx.sim.scenario.options import OPTIONS
 from dynx.trajectory import cycloidal
 
@@ -37,7 +38,7 @@ SCENARIO = Scenario(
     effort_limits=np.full(6, 80.0),
     payload=Payload("tool0", 1.0),
     mass_scale={"forearm_link": 1.1},
-    pushes=[Push("tool0", [1.0, 0, 0, 0, 0, 0], start=0.002, duration=0.01)],
+    pushes=[ExternalForce("tool0", [1.0, 0, 0, 0, 0, 0], start=0.002, duration=0.01)],
     check_reference=True,
 )
 HEAVY = ARM.with_gravity([0.0, 0.0, -1.0])
@@ -66,7 +67,7 @@ CHANGES: dict[str, Any] = {
     "position_limits": True,
     "payload": Payload("tool0", 1.0, center=(0.0, 0.0, 0.01)),
     "mass_scale": {"forearm_link": 1.2},
-    "pushes": [Push("tool0", [1.0, 0, 0, 0, 0, 1e-9], start=0.002, duration=0.01)],
+    "pushes": [ExternalForce("tool0", [1.0, 0, 0, 0, 0, 1e-9], start=0.002, duration=0.01)],
     "check_reference": False,
 }
 """Another value of each field."""
@@ -102,14 +103,15 @@ INNER: dict[type, tuple[str, dict[str, Any]]] = {
             "inertia": np.eye(3) * 1e-3,
         },
     ),
-    Push: (
+    ExternalForce: (
         "pushes",
         {
-            "frame": "wrist_3_link",
+            "on": "wrist_3_link",
             "wrench": [2.0, 0, 0, 0, 0, 0],
             "start": 0.003,
             "duration": 0.02,
             "reference": "local",
+            "point": (0.0, 0.0, 0.1),
         },
     ),
 }
