@@ -19,8 +19,7 @@ from dynx.model import Model
 from dynx.model.documents import robot_document, robot_from_document
 from dynx.model.model import refuse_other_than_model
 from dynx.sim.record.csv_file import load_csv, write_csv
-from dynx.sim.record.mcap_file import write_mcap
-from dynx.sim.record.mcap_reading import load_mcap
+from dynx.sim.record.mcap_file import load_mcap, write_mcap
 from dynx.sim.record.rollout_data import RolloutData
 from dynx.sim.scenario.scenario import Scenario
 from dynx.trajectory.base import Setpoint
@@ -38,7 +37,7 @@ def save(rollout: RolloutData, path: str | os.PathLike[str]) -> None:
 
     - ``.npz``: complete; `Rollout.load` reads it, and so does `numpy.load`
     - ``.csv``: a table for spreadsheets; `dynx.sim.record.csv_file` describes its columns
-    - ``.mcap``: ROS 2 messages for PlotJuggler, Foxglove and ``ros2 bag``; `dynx.sim.record.ros_topics`
+    - ``.mcap``: ROS 2 messages for PlotJuggler, Foxglove and ``ros2 bag``; `dynx.sim.record.ros_messages`
       describes the topics
 
     All three keep every bit of the numbers. Raises ArgumentError for another format or a file that

@@ -2,8 +2,7 @@
 
 from dynx.model.library import scene_names
 from dynx.steppers.material import Material, contact_material
-from dynx.world.scene.bodies import SceneBody, box, capsule, cylinder, ground, mesh, sphere
-from dynx.world.scene.body_urdf import body_to_urdf
+from dynx.world.scene.bodies import SceneBody, body_to_urdf, box, capsule, cylinder, ground, mesh, sphere
 from dynx.world.scene.constraints import PointToPoint, Weld
 from dynx.world.scene.files import read_scene, write_scene
 from dynx.world.scene.mjcf import scene_to_mjcf

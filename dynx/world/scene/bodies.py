@@ -1,4 +1,4 @@
-"""Bodies of a scene: rigid shapes that move freely or are fixed in the world."""
+"""Bodies of a scene: rigid shapes that move freely or are fixed in the world, and a body as URDF."""
 
 from __future__ import annotations
 
@@ -11,18 +11,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ShapeError, shown
-from dynx.model import Inertial, Pose
+from dynx.model import Inertial, Link, Model, Pose
 from dynx.model.elements import IDENTITY, Vector, checked_pose
 from dynx.model.geometry import (
+    Appearance,
     Box,
     Capsule,
     Collision,
     Cylinder,
+    Geometry,
     HeightField,
+    LinkGeometry,
     Mesh,
     Plane,
     Shape,
     Sphere,
+    Visual,
     solid_properties,
 )
 from dynx.model.geometry.sizes import finite_numbers, finite_vector, positive_number
@@ -193,3 +197,17 @@ def _checked_inertia(what: str, inertia: ArrayLike) -> Tensor:
     if fault is not None or largest == 0.0:
         raise ArgumentError(f"inertia of {what} {fault or 'is zero'}")
     return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+
+
+def body_to_urdf(body: SceneBody) -> str:
+    """Return a body of a scene as URDF text of one link, whose frame is that of the body.
+
+    `dynx.load(text, base="floating")` of it has the same inertia and shapes, in the colour of the body. URDF
+    has neither the pose, the twist nor the coefficients of contact. Raises DescriptionError for a height
+    field, which URDF cannot express.
+    """
+    colour = Appearance(f"{body.name}_colour", body.material.rgba)
+    visuals = tuple(Visual(each.shape, each.origin, colour) for each in body.shapes)
+    geometry = Geometry({body.name: LinkGeometry(visuals, body.shapes)})
+    link = Link(body.name, None if body.fixed else body.inertial)
+    return Model.build(body.name, [link], [], geometry=geometry).to_urdf(geometry=True)

@@ -48,10 +48,12 @@ from dynx.world.scene.scene import Scene
 Vector = list[float]
 Numbers = float | list[float]
 
-SCHEMA = "dynx.scene/1"
+SCHEMA: Literal["dynx.scene/1"] = "dynx.scene/1"
 """Name and version of the layout of a scene's document."""
 
-MOTORS: dict[str, type[Motor]] = {
+MotorKind = Literal["position", "velocity", "pd", "torque"]
+
+MOTORS: dict[MotorKind, type[Motor]] = {
     "position": PositionMotor,
     "velocity": VelocityMotor,
     "pd": PDMotor,
@@ -101,7 +103,7 @@ class ShapeDocument:
 class MotorDocument:
     """A motor on the joints named, or on all; see `dynx.world.PositionMotor` and its siblings."""
 
-    kind: Literal["position", "velocity", "pd", "torque"]
+    kind: MotorKind
     target: Numbers | None = None
     velocity: Numbers | None = None
     torque: Numbers | None = None

@@ -20,7 +20,7 @@ from dynx.control import PD, ComputedTorque
 from dynx.errors import ArgumentError
 from dynx.model.loading import load
 from dynx.sim import Noise, Rollout, simulate
-from dynx.sim.record import csv_file, ros_topics
+from dynx.sim.record import csv_file, ros_messages
 from dynx.sim.record.formats import WRITERS
 from dynx.spatial.scalar import Floats
 from tests.sim.bars import tutorial_motion, tutorial_robot
@@ -323,7 +323,7 @@ def test_a_plot_shows_names_as_they_are() -> None:
 # -- the page ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("module", [csv_file, ros_topics])
+@pytest.mark.parametrize("module", [csv_file, ros_messages])
 def test_the_page_says_what_the_modules_say(module: ModuleType) -> None:
     page = (Path(__file__).parents[3] / "docs" / "rollout_files.md").read_text(encoding="utf-8").splitlines()
     told = [line for line in str(module.__doc__).splitlines() if line.startswith("|")]
@@ -346,7 +346,7 @@ def test_the_topics_are_those_that_are_documented(rollout: Rollout) -> None:
     goal = floating.neutral()
     law = PD(floating, kp=1.0, kd=0.1)
     moved = simulate(floating, law, goal, duration=1e-3, check_reference=False)
-    found = [f"| `{topic.name}` | {topic.message} |" for topic in ros_topics.topics_of(moved)]
-    lines = [line for line in str(ros_topics.__doc__).splitlines() if line.startswith("| `")]
+    found = [f"| `{topic.name}` | {topic.message} |" for topic in ros_messages.topics_of(moved)]
+    lines = [line for line in str(ros_messages.__doc__).splitlines() if line.startswith("| `")]
     documented = {" ".join(line.split(" ")[:4]) + " |" for line in lines}
     assert {line for line in documented if "/contacts/" not in line} == set(found)

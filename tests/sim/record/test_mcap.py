@@ -19,7 +19,7 @@ from dynx.errors import ArgumentError, NotInstalledError
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.sim import Noise, Payload, Rollout, simulate
-from dynx.sim.record.ros_definitions import DEFINITIONS, SEPARATOR, schema_text
+from dynx.sim.record.ros_messages import DEFINITIONS, SEPARATOR, schema_text
 from dynx.spatial.scalar import Floats
 from dynx.trajectory import cycloidal
 from dynx.trajectory.base import Setpoint

@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from dynx.sim.record.cdr import Field, encode_messages
-from dynx.sim.record.ros_definitions import schema_name, schema_text
+from dynx.sim.record.ros_messages import Field, encode_messages, schema_name, schema_text
 from dynx.spatial.scalar import Floats
 
 TEXTS = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=9)

@@ -1,4 +1,4 @@
-"""A rollout as topics of ROS 2 messages.
+"""A rollout as topics of ROS 2 messages, their definitions and their encoding.
 
 | topic | type | content |
 |---|---|---|
@@ -34,20 +34,159 @@ allow in names become ``_``:
 Every number is the float64 of the record. The torque of a step is stamped with the time at which the step
 begins, so the last state has no effort. Mimic joints are not listed, because the description defines how they
 follow others.
+
+Messages are encoded in CDR. Those of a recording have different numbers but the same layout, so each field is
+a column of bytes with one row for each message. The encoding is XCDR1 in little-endian order. After four
+bytes that name the encoding, each number is aligned to a multiple of its size; a string is its length
+including the terminating zero, then its UTF-8 bytes; a sequence is its length, then its elements (DDS-XTypes
+1.3, section 7.4.3). The writer of mcap-ros2-support is not used: it leaves out channels without messages and
+the entry of the quality of service, and encodes one message at a time.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import count
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from dynx.sim.record.cdr import Field, encode_messages
 from dynx.sim.record.rollout_data import RolloutData
 from dynx.spatial.scalar import Floats
+
+DEFINITIONS = {
+    "builtin_interfaces/Time": "int32 sec\nuint32 nanosec\n",
+    "builtin_interfaces/Duration": "int32 sec\nuint32 nanosec\n",
+    "geometry_msgs/Accel": "Vector3 linear\nVector3 angular\n",
+    "geometry_msgs/AccelStamped": "std_msgs/Header header\nAccel accel\n",
+    "geometry_msgs/Point": "float64 x\nfloat64 y\nfloat64 z\n",
+    "geometry_msgs/Pose": "Point position\nQuaternion orientation\n",
+    "geometry_msgs/PoseWithCovariance": "Pose pose\nfloat64[36] covariance\n",
+    "geometry_msgs/Quaternion": "float64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n",
+    "geometry_msgs/Transform": "Vector3 translation\nQuaternion rotation\n",
+    "geometry_msgs/TransformStamped": "std_msgs/Header header\nstring child_frame_id\nTransform transform\n",
+    "geometry_msgs/Twist": "Vector3 linear\nVector3 angular\n",
+    "geometry_msgs/TwistStamped": "std_msgs/Header header\nTwist twist\n",
+    "geometry_msgs/TwistWithCovariance": "Twist twist\nfloat64[36] covariance\n",
+    "geometry_msgs/Vector3": "float64 x\nfloat64 y\nfloat64 z\n",
+    "geometry_msgs/Wrench": "Vector3 force\nVector3 torque\n",
+    "geometry_msgs/WrenchStamped": "std_msgs/Header header\nWrench wrench\n",
+    "nav_msgs/Odometry": (
+        "std_msgs/Header header\nstring child_frame_id\n"
+        "geometry_msgs/PoseWithCovariance pose\ngeometry_msgs/TwistWithCovariance twist\n"
+    ),
+    "sensor_msgs/JointState": (
+        "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n"
+    ),
+    "std_msgs/Float64": "float64 data\n",
+    "std_msgs/Header": "builtin_interfaces/Time stamp\nstring frame_id\n",
+    "std_msgs/String": "string data\n",
+    "tf2_msgs/TFMessage": "geometry_msgs/TransformStamped[] transforms\n",
+    "trajectory_msgs/JointTrajectory": (
+        "std_msgs/Header header\nstring[] joint_names\nJointTrajectoryPoint[] points\n"
+    ),
+    "trajectory_msgs/JointTrajectoryPoint": (
+        "float64[] positions\nfloat64[] velocities\nfloat64[] accelerations\nfloat64[] effort\n"
+        "builtin_interfaces/Duration time_from_start\n"
+    ),
+}
+"""Definition of each message by ``package/Name``; a field type of its own package is written without it. They
+are those of ROS 2 common_interfaces and rcl_interfaces without comments, from Humble to Rolling."""
+
+SEPARATOR = "=" * 80
+
+
+def schema_name(message: str) -> str:
+    """Return the name of a type in ROS 2, ``package/msg/Name``."""
+    package, name = message.split("/")
+    return f"{package}/msg/{name}"
+
+
+def schema_text(message: str) -> str:
+    """Return the definition of `message` and, after separators, of all types inside it (``ros2msg``)."""
+    needed = _needed(message)
+    parts = [DEFINITIONS[message], *(f"{SEPARATOR}\nMSG: {name}\n{DEFINITIONS[name]}" for name in needed)]
+    return "".join(parts)
+
+
+def _needed(message: str) -> list[str]:
+    """List the message types inside `message`, each once, in order of appearance."""
+    found: dict[str, None] = {}
+    for line in DEFINITIONS[message].splitlines():
+        kind = line.split()[0].split("[")[0]
+        name = kind if "/" in kind else f"{message.split('/')[0]}/{kind}"
+        if name in DEFINITIONS:
+            found |= dict.fromkeys([name, *_needed(name)])
+    return list(found)
+
+
+LITTLE_ENDIAN = b"\x00\x01\x00\x00"
+"""The first four bytes of a message: plain CDR, little-endian."""
+
+Bytes = NDArray[np.uint8]
+Field = str | int | NDArray[np.int64] | Floats
+"""Part of n messages: a text or a number for all, whole numbers of four bytes (n,), or float64 (n, k)."""
+
+
+def encode_messages(n: int, fields: Iterable[Field]) -> list[bytes]:
+    """Encode n messages whose fields follow each other; a sequence is its length and then its elements."""
+    columns, size = [_repeated(n, LITTLE_ENDIAN)], 0  # the header does not count for alignment
+    for field in fields:
+        text = field.encode() + b"\0" if isinstance(field, str) else b""
+        numbers = np.asarray(len(text) if isinstance(field, str) else field)
+        kind = np.dtype("<f8" if numbers.dtype.kind == "f" else "<u4")
+        values = numbers if numbers.ndim == 2 else numbers.reshape(-1, 1)
+        rows = np.broadcast_to(values, (n, values.shape[1])).astype(kind, order="C")
+        for column in (_repeated(n, bytes(-size % kind.itemsize)), rows.view(np.uint8), _repeated(n, text)):
+            columns.append(column)
+            size += column.shape[1]
+    whole = np.concatenate(columns, axis=1)
+    width, data = whole.shape[1], whole.tobytes()
+    return [data[k * width : (k + 1) * width] for k in range(n)]
+
+
+def _repeated(n: int, data: bytes) -> Bytes:
+    return np.broadcast_to(np.array(list(data), dtype=np.uint8), (n, len(data)))
+
+
+class MessageReader:
+    """The fields of one message, read one after the other.
+
+    Each method raises ValueError where the message ends before the field does.
+    """
+
+    def __init__(self, data: bytes) -> None:
+        """Raises ValueError for another encoding than plain CDR in little-endian order."""
+        if data[:4] != LITTLE_ENDIAN:
+            raise ValueError(f"a message has the encoding {data[:4]!r}; wanted little-endian CDR")
+        self._data, self._at = memoryview(data)[4:], 0
+
+    def whole(self) -> int:
+        """Return a whole number of four bytes."""
+        return int.from_bytes(self._bytes(4, 4), "little")
+
+    def text(self) -> str:
+        """Return a text."""
+        return bytes(self._bytes(self.whole(), 1)).removesuffix(b"\0").decode()
+
+    def texts(self) -> tuple[str, ...]:
+        """Return a sequence of texts."""
+        return tuple(self.text() for _ in range(self.whole()))
+
+    def numbers(self, count: int | None = None) -> Floats:
+        """Return so many float64, or those of a sequence, which begins with their number."""
+        n = self.whole() if count is None else count
+        return np.frombuffer(self._bytes(8 * n, 8), "<f8").astype(np.float64) if n else np.zeros(0)
+
+    def _bytes(self, size: int, alignment: int) -> memoryview:
+        begin = self._at + -self._at % alignment
+        if begin + size > len(self._data):
+            raise ValueError(f"a message of {len(self._data)} bytes ends before its fields do")
+        self._at = begin + size
+        return self._data[begin : self._at]
+
 
 NO_VALUES = np.zeros((0, 0))
 """Empty field of a joint state."""
