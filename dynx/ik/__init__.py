@@ -45,7 +45,7 @@ _MOVED = {
     "Kinematics": "dynx.Backend",
     "Problem": "dynx.ik.problem.Problem",
     "Requirement": "dynx.ik.problem.Requirement",
-    "SearchLimits": "dynx.ik.search.SearchLimits",
+    "SearchLimits": "dynx.ik.options.SearchLimits",
     "Targets": "dynx.model.targets.Targets",
     "checked_targets": "dynx.model.targets.checked_targets",
     "is_rigid": "dynx.model.targets.is_rigid",

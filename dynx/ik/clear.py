@@ -38,7 +38,8 @@ from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.problem import Problem
 from dynx.ik.refine import Target, from_closed_form, from_kernel
 from dynx.ik.result import IKResult
-from dynx.ik.search import BoundedStep, Candidate, Search, Task, TaskError
+from dynx.ik.search import Candidate, Search, Task, TaskError
+from dynx.ik.step import ACCEPTED_FACTOR, DAMPING, MIN_DAMPING, REJECTED_FACTOR, bounded_step
 from dynx.spatial.scalar import Floats
 
 BUFFER = 1e-4
@@ -50,11 +51,8 @@ REACH = 0.03
 MAX_STEPS = 60
 """Most steps, rejected ones included."""
 
-DAMPING, MIN_DAMPING = 0.1, 1e-9
-"""Damping per unit of squared error at first, and the least damping (as in `dynx.ik.search`)."""
-
-ACCEPTED_FACTOR, REJECTED_FACTOR, MAX_FACTOR = 0.3, 4.0, 1e6
-"""Factors of the damping after an accepted and a rejected step, and the damping per unit that ends."""
+MAX_FACTOR = 1e6
+"""Damping per unit of squared error that ends a descent."""
 
 WINDOW, REQUIRED_REDUCTION = 4, 0.8
 """A descent ends unless the sum of squares falls below this fraction of itself within so many steps."""
@@ -93,7 +91,7 @@ class AvoidingDescent:
         self._fixed = fixed_pairs(avoidance, coordinates)
         limits = (coordinates.lower, coordinates.upper)
         lower, upper = limits if bounds is None else (bounds[0].tolist(), bounds[1].tolist())
-        self._step = BoundedStep(lower, upper)
+        self._bounds = lower, upper
 
     def run(self, q: Floats) -> tuple[Floats, int, bool]:
         """Descend from q (nq,); return the configuration, the number of steps, and whether it reaches the
@@ -133,7 +131,7 @@ class AvoidingDescent:
                 np.concatenate([J, G[active]]),
                 [*state.error.vector, *state.lacks[active].tolist()],
             )
-            y = self._step(rows, vector, x, damping)
+            y = bounded_step(rows, np.array(vector), x, *self._bounds, damping)
             needed = state.lacks - G @ (np.array(y) - x) > 0.0
             if not (needed & ~active).any():
                 break

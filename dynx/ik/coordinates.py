@@ -72,7 +72,8 @@ class FrameCoordinates:
         """Upper bounds of the search."""
         limited = np.isfinite(self._low) & np.isfinite(self._high)
         self._span = self._high - self._low if limited.all() else None
-        self._is_all = self.indices == list(range(model.nq))
+        self.is_all = self.indices == list(range(model.nq))
+        """Whether they are all coordinates of q, in order."""
         self._default_range = np.array([_DEFAULT_RANGE.get(joint.type, math.pi) for joint in kinds])
 
     def limits(self, k: int) -> tuple[float, float]:
@@ -91,12 +92,12 @@ class FrameCoordinates:
 
     def values(self, q: Floats) -> list[float]:
         """Return the coordinates at configuration q (nq,)."""
-        joints: list[float] = q.tolist() if self._is_all else q[self._in_q].tolist()
+        joints: list[float] = q.tolist() if self.is_all else q[self._in_q].tolist()
         return [0.0] * 6 + joints if self._base else joints
 
     def with_values(self, q: Floats, to: list[float]) -> Floats:
         """Return the configuration q (nq,) with these coordinates set to `to`."""
-        if self._is_all:
+        if self.is_all:
             return np.array(to)
         if self._base:
             v = np.zeros(self._model.nv)

@@ -1,14 +1,8 @@
-"""Iterations of two more kernels: refinement of targets that are not reached, and of postures.
+"""Iterations of kernels for one frame of one robot: the steps of `dynx.ik.step` behind the poses of
+`dynx.rbd`.
 
-Refinement of targets that no start reached to a local minimum of the error: the iteration of its kernel.
-
-Where the error stays large the full step overshoots, so a step that does not reduce the error is rejected and
-the damping raised (Marquardt 1963), as in `dynx.ik.search`. A rejected step is followed by an evaluation of
-the best configuration, from which the next step starts.
-
-Solutions that are nearest to a posture in the null space of their target: the iteration of a kernel.
-
-Of the configurations that reach a target one of least sum of weighted squared distances from a posture g is
+A search, a refinement of targets that no start reached, a tracking, and solutions nearest to a posture. Of
+the configurations that reach a target one of least sum of weighted squared distances from a posture g is
 sought, as in `dynx.ik.refine`: from the best configuration that reaches the target a step goes along the
 projection of g - x to the null space (Siciliano et al., eq. 3.54, in the metric of the weights), and returns
 to the target by Newton steps. It counts if the target is reached and the objective is lower; otherwise a
@@ -17,46 +11,133 @@ shorter step is tried.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from dynx.ik.coordinates import FrameCoordinates
-from dynx.ik.search import DAMPING, MIN_DAMPING, MIN_RELATIVE_GAIN
+from dynx.ik.coordinates import FULL_TURN, FrameCoordinates
 from dynx.ik.step import (
+    DAMPING,
     HUGE_ERROR,
+    MIN_DAMPING,
     SETTINGS,
-    FramePath,
+    TRACKING_SETTINGS,
+    WINDOW,
+    Memory,
+    RefinementMemory,
     TargetKind,
+    TrackingMemory,
     bounded_step,
-    shifted_to,
-    traced_residual,
+    frame_error,
+    refinement_step,
+    search_step,
+    tracking_step,
+    within_bounds,
 )
-from dynx.model import Mechanism
+from dynx.model.mechanism import Mechanism
+from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, frame_jacobian
+from dynx.rbd.kinematics import ancestry, body_poses, frame_pose
 from dynx.rbd.linear import solve_positive_definite
-from dynx.simd.inlining import less, less_equal, maximum, minimum, select
 from dynx.simd.iteration import GIVEN_UP, NO_RESTART, REACHED, RUNNING, Iteration
 from dynx.simd.trace import trace
-from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.scalar import Array, Floats, less, less_equal, maximum, minimum, select
+
+_ROUNDING_SHIFT = 6755399441055744.0
+"""1.5 * 2^52: adding it to a double and subtracting it again rounds the double to an integer."""
 
 
 @dataclass(frozen=True)
-class RefinementMemory:
-    """Layout of the variables of a task: result, then what the next steps need."""
+class FramePath:
+    """The bodies between root and frame, and their joint positions as an affine map of the coordinates."""
 
-    n: int
-    """Number of coordinates."""
+    mechanism: Mechanism
+    A: Floats
+    b: Floats
 
-    @property
-    def n_results(self) -> int:
-        """Size of the result: coordinates, distance, angle, success, iterations."""
-        return self.n + 4
+    @classmethod
+    def of(cls, mechanism: Mechanism, frame: int, coordinates: FrameCoordinates) -> FramePath:
+        placed = mechanism.frames[frame]
+        bodies = tuple(reversed(ancestry(mechanism, placed.body)))
+        chain = tuple(replace(mechanism.bodies[body], parent=k - 1) for k, body in enumerate(bodies))
+        path = replace(mechanism, bodies=chain, frames=(replace(placed, body=len(chain) - 1),), coupling=None)
+        n = len(mechanism.bodies)
+        if mechanism.coupling is None:
+            A, b = np.eye(n), np.zeros(n)
+        else:
+            A, b = mechanism.coupling.affine_map()
+        return cls(path, A[np.ix_(bodies, coordinates.indices)], b[list(bodies)])
 
-    @property
-    def initial(self) -> Floats:
-        """Variables of a new task: result, squared error, damping factor, and whether x is the best one."""
-        return np.array([0.0] * (self.n + 4) + [HUGE_ERROR, DAMPING, 1.0])
+    def pose(self, x: Array) -> tuple[Array, Array, Array]:
+        """Return rotation, position and Jacobian (6, n) of the frame in world axes."""
+        poses = body_poses(self.mechanism, self.A @ x + self.b)
+        R, p = frame_pose(self.mechanism, poses, 0)
+        J = frame_jacobian(self.mechanism, poses, 0, LOCAL_WORLD_ALIGNED) @ self.A
+        return np.asarray(R), np.asarray(p), np.asarray(J)
+
+
+def shifted_to(x: Sequence[Any], near: Array, coordinates: FrameCoordinates) -> Array:
+    """Return x with its periodic angles shifted by full turns, within their limits and nearest to `near`."""
+    shifted = list(x)
+    for k in coordinates.periodic:
+        turns = (x[k] - near[k]) * (1.0 / FULL_TURN)
+        value = x[k] - FULL_TURN * ((turns + _ROUNDING_SHIFT) - _ROUNDING_SHIFT)
+        low, high = coordinates.limits(k)
+        if np.isfinite(low):
+            value = value + FULL_TURN * less(value, low)
+        if np.isfinite(high):
+            value = value - FULL_TURN * less(high, value)
+        if np.isfinite(low):
+            value = maximum(low, value)
+        shifted[k] = minimum(high, value) if np.isfinite(high) else value
+    return np.array(shifted, dtype=object)
+
+
+def solver_iteration(
+    mechanism: Mechanism, frame: int, coordinates: FrameCoordinates, kind: TargetKind
+) -> Iteration:
+    """Return the iteration that solves for the coordinates that move frame number `frame`.
+
+    Tasks have the arrays ``x``, the first start (n,); ``memory`` (`Memory`); ``target``, the first three rows
+    of a pose (12,), a position (3,) or a rotation (9,); ``near`` (n,), to which periodic angles are shifted;
+    ``cell``, the first row of starts near the target; ``point`` (3,) if there is one; and ``axes`` (12,),
+    weights and bounds per axis, if there are such. The constants are those of `SETTINGS`, then the numbers
+    that the rows of starts follow from (`dynx.ik.starts`).
+    """
+    n = coordinates.count
+    path = FramePath.of(mechanism, frame, coordinates)
+
+    def step(
+        x: Array,
+        memory: Array,
+        target: Array,
+        near: Array,
+        cell: Array,
+        settings: Array,
+        starts: Array,
+        point: Array | None = None,
+        axes: Array | None = None,
+    ) -> dict[str, Any]:
+        error, J = frame_error(kind, path.pose(x), target, point, axes)
+        found = search_step(error, J, x, memory, settings, coordinates.lower, coordinates.upper)
+        found["x"] = shifted_to(found["x"], near, coordinates)
+        found["restart"] = select(found.pop("again"), _row(memory, cell, starts), NO_RESTART)
+        return found
+
+    sizes = {"x": n, "memory": len(Memory(n).initial), "target": kind.size, "near": n}
+    sizes |= {"cell": 1, "settings": len(SETTINGS), "starts": 3} | kind.optional_sizes
+    shapes = {name: (size,) for name, size in sizes.items()}
+    return Iteration(trace(step, shapes), ("settings", "starts"), Memory(n).n_results)
+
+
+def _row(memory: Array, cell: Array, starts: Array) -> Any:
+    """Return the row of the next start."""
+    near, offset, base = starts
+    number = memory[-WINDOW - 3] + 1.0
+    turned = number + offset
+    turned = turned - near * less_equal(near, turned)
+    return select(less(number, near), cell[0] + turned, base + number)
 
 
 def refinement_iteration(
@@ -80,38 +161,55 @@ def refinement_iteration(
         point: Array | None = None,
         axes: Array | None = None,
     ) -> dict[str, Any]:
-        residual, J, squared = traced_residual(path, kind, x, target, point, axes)
-        position_tolerance, rotation_tolerance, max_iterations, _ = settings
-        iterations, least, factor, at_best = memory[n + 3 : n + 7]
-        trial = 1.0 - at_best
-        iterations = iterations + trial
-        gain = least - squared
-        accepted = maximum(at_best, less(0.0, gain))
-        reached = residual.reached(position_tolerance, rotation_tolerance)
-        found = [*x, residual.distance, residual.angle, reached]
-        best = [select(accepted, a, b) for a, b in zip(found, memory[: n + 3], strict=True)]
-        factor = select(at_best, factor, factor * select(accepted, 0.3, 4.0))
-        converged = trial * less_equal(abs(gain), MIN_RELATIVE_GAIN * least)
-        ends = maximum(converged, less_equal(max_iterations, iterations))
-        stepped = bounded_step(J, residual.vector, x, coordinates, factor * squared + MIN_DAMPING)
-        next_x = [
-            select(accepted, a, b)
-            for a, b in zip(shifted_to(stepped, near, coordinates), memory[:n], strict=True)
-        ]
-        after = [*best, iterations, select(accepted, squared, least), factor, 1.0 - accepted]
-        status = select(reached * accepted, REACHED, select(ends, GIVEN_UP, RUNNING))
-        return {
-            "x": np.array(next_x, dtype=object),
-            "memory": np.array(after, dtype=object),
-            "status": status,
-            "restart": NO_RESTART + 0.0 * squared,
-        }
+        error, J = frame_error(kind, path.pose(x), target, point, axes)
+        found = refinement_step(error, J, x, memory, settings, coordinates.lower, coordinates.upper)
+        found["x"] = shifted_to(found["x"], near, coordinates)
+        return {**found, "restart": NO_RESTART + 0.0 * error.distance}
 
     memory = RefinementMemory(n)
     sizes = {"x": n, "memory": len(memory.initial), "target": kind.size, "near": n}
     sizes |= {"settings": len(SETTINGS)} | kind.optional_sizes
     shapes = {name: (size,) for name, size in sizes.items()}
     return Iteration(trace(step, shapes), ("settings",), memory.n_results)
+
+
+def tracking_iteration(
+    mechanism: Mechanism, frame: int, coordinates: FrameCoordinates, kind: TargetKind
+) -> Iteration:
+    """Return the iteration that descends to one target of frame number `frame`.
+
+    Tasks have ``x`` and ``near`` (n,), both the start; ``memory``; and ``target`` (`TargetKind`). The
+    constants are those of `TRACKING_SETTINGS`, the bounds ``lower``, ``upper`` and ``reach`` (n,) of
+    `StepBounds`, and ``point`` (3,) if there is one. The tasks of a kernel are the samples of a path,
+    computed in order by one lane: the start of a task is the result of the one before. The kernel returns at
+    the first sample that is not reached, if the settings say so.
+    """
+    n = coordinates.count
+    path = FramePath.of(mechanism, frame, coordinates)
+
+    def step(
+        x: Array,
+        memory: Array,
+        target: Array,
+        near: Array,
+        settings: Array,
+        lower: Array,
+        upper: Array,
+        reach: Array,
+        point: Array | None = None,
+    ) -> dict[str, Any]:
+        error, J = frame_error(kind, path.pose(x), target, point)
+        low = [maximum(a, b - c) for a, b, c in zip(lower, near, reach, strict=True)]
+        high = [minimum(a, b + c) for a, b, c in zip(upper, near, reach, strict=True)]
+        return {**tracking_step(error, J, x, memory, settings, low, high), "restart": NO_RESTART}
+
+    layout = TrackingMemory(n)
+    sizes = {"x": n, "memory": len(layout.initial), "target": kind.size, "near": n}
+    constants = {"settings": len(TRACKING_SETTINGS), "lower": n, "upper": n, "reach": n}
+    if kind.point:
+        constants["point"] = 3
+    shapes = {name: (size,) for name, size in (sizes | constants).items()}
+    return Iteration(trace(step, shapes), tuple(constants), layout.n_results)
 
 
 MAX_STEPS = 300
@@ -186,7 +284,8 @@ def posture_iteration(
         axes: Array | None = None,
     ) -> dict[str, Any]:
         x = shifted_to(list(x), near, coordinates)
-        residual, J, squared = traced_residual(path, kind, x, target, point, axes)
+        residual, J = frame_error(kind, path.pose(x), target, point, axes)
+        squared = residual.squared
         position_tolerance, rotation_tolerance, max_iterations, _ = settings
         iterations, least = memory[n + 3 : n + 5]
         along, (share, back) = memory[n + 5 : 2 * n + 5], memory[2 * n + 5 :]
@@ -205,9 +304,11 @@ def posture_iteration(
         fails = (1.0 - better) * best[n + 2] * maximum(reached, less_equal(_NEWTON_STEPS, back))
         share = select(better, minimum(1.0, _GROWTH * share), select(fails, _REDUCTION * share, share))
         begins = maximum(better, fails)
-        tried = [_bounded(best[k] + share * along[k], *limits[k]) for k in range(n)]
-        newton = bounded_step(J, residual.vector, x, coordinates, DAMPING * squared + MIN_DAMPING)
-        returned = [_bounded(newton[k], *limits[k]) for k in range(n)]
+        tried = [within_bounds(best[k] + share * along[k], *limits[k]) for k in range(n)]
+        newton = bounded_step(
+            J, residual.vector, x, coordinates.lower, coordinates.upper, DAMPING * squared + MIN_DAMPING
+        )
+        returned = [within_bounds(newton[k], *limits[k]) for k in range(n)]
         size = share * _largest(along)
         stationary = best[n + 2] * less(size, _STATIONARY)
         back = select(begins, 0.0, back + 1.0)
@@ -279,8 +380,3 @@ def _room(x: Any, d: Any, low: float, high: float) -> Any:
         beyond = less(x, high - _AT_LIMIT) * less(high, x + d)
         room = select(beyond, (high - x) / maximum(d, 1e-300), room)
     return room
-
-
-def _bounded(x: Any, low: float, high: float) -> Any:
-    bounded = maximum(low, x) if np.isfinite(low) else x
-    return minimum(high, bounded) if np.isfinite(high) else bounded

@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 import dynx.compiled.simplification
 import dynx.ik.coordinates
 import dynx.ik.iterations
-import dynx.ik.search
 import dynx.ik.starts
 import dynx.ik.step
 import dynx.model.mechanism
@@ -36,16 +35,16 @@ from dynx.ik.iterations import (
     MAX_STEPS,
     SHARE_OF_TOLERANCE,
     PostureMemory,
-    RefinementMemory,
     posture_iteration,
     refinement_iteration,
+    solver_iteration,
 )
 from dynx.ik.options import Options, SearchLimits
 from dynx.ik.problem import Posture, Problem, Requirement
 from dynx.ik.reach import proofs
 from dynx.ik.result import IKResult, ReachedTarget
 from dynx.ik.starts import STARTS_OF_CELL, Starts, StartTable
-from dynx.ik.step import POSES, SETTINGS, Memory, TargetKind, solver_iteration
+from dynx.ik.step import POSES, SETTINGS, Memory, RefinementMemory, TargetKind
 from dynx.model.mechanism import Mechanism
 from dynx.model.model import Model
 from dynx.model.targets import checked_targets, is_rigid
@@ -78,7 +77,7 @@ class Race:
         """Set everything but the target; `indices` are those of the coordinates in q."""
         limits = problem.limits
         self.near[:] = problem.q0.reshape(-1)[indices]
-        for array, values in zip(self._optional, self._kind.optional_values(problem), strict=True):
+        for array, values in zip(self._optional, problem.requirements[0].optional, strict=True):
             array[:] = values
         self._settings[:3] = limits.position_tolerance, limits.rotation_tolerance, limits.max_iterations
 
@@ -93,7 +92,7 @@ class Race:
             self.x[0] = starts.random[0]
         if problem.begins_at_q0:
             self.x[0] = self.near
-        self.target[:] = self._kind.rows(problem)[0]
+        self.target[:] = self._kind.rows(problem.targets, problem.batch)[0]
         n, completed = self._n, self.run()
         last, done = completed - 1, self.result[:completed]
         if not done[last, n + 2]:
@@ -168,7 +167,7 @@ class PoseCall:
         return bool(q0.flags.c_contiguous) and all(low <= x <= high for x, (low, high) in values)
 
     def _workspace(self) -> Workspace:
-        race = Race(self._kernel, TargetKind.of(self._problem), self._memory, self._starts)
+        race = Race(self._kernel, self._problem.requirements[0].kind, self._memory, self._starts)
         race.prepare(self._problem, self._indices)
         x, results = (array.reshape(-1).data for array in (race.x, race.result))
         return race, race.target.data, x, race.near.data, results
@@ -241,9 +240,9 @@ class FrameSolver:
         begin = np.ascontiguousarray(near[:, self._coordinates.indices])
         shared = (posture.goal, posture.weights, posture.inverse)
         tasks = [begin, np.broadcast_to(memory.initial, (count, len(memory.initial)))]
-        tasks.append(self._kind.rows(problem))
+        tasks.append(self._kind.rows(problem.targets, problem.batch))
         tasks += [np.broadcast_to(each, (count, n)) for each in shared]
-        optional = self._kind.optional_values(problem)
+        optional = problem.requirements[0].optional
         limits = replace(
             problem.limits,
             position_tolerance=SHARE_OF_TOLERANCE * problem.limits.position_tolerance,
@@ -292,9 +291,9 @@ class FrameSolver:
         cell = starts.first_rows(problem)
         first = near if problem.begins_at_q0 else starts.rows[cell + starts.offset]
         memory = np.broadcast_to(self._memory.initial, (n, len(self._memory.initial)))
-        target = self._kind.rows(problem)
+        target = self._kind.rows(problem.targets, problem.batch)
         arrays = [first, memory, target, near, cell[:, None].astype(np.float64)]
-        arrays += [np.broadcast_to(each, (n, len(each))) for each in self._kind.optional_values(problem)]
+        arrays += [np.broadcast_to(each, (n, len(each))) for each in problem.requirements[0].optional]
         return arrays
 
     def _batch(self, arrays: list[Floats], problem: Problem, starts: Starts, max_restarts: int) -> Floats:
@@ -383,7 +382,7 @@ def kernel_applies(backend: Backend, problem: Problem) -> bool:
 def solver_key(problem: Problem) -> SolverKey:
     """Return the key of the solver for a problem."""
     margin = b"" if problem.margin is None else problem.margin.tobytes()
-    return problem.frame, TargetKind.of(problem), margin
+    return problem.frame, problem.requirements[0].kind, margin
 
 
 class KernelSolvers:
@@ -500,5 +499,5 @@ def _key(frame: Any, options: Mapping[str, Any]) -> object:
 @cache
 def algorithms() -> str:
     """Return the hash of the source of everything that is traced."""
-    own = (dynx.ik.coordinates, dynx.ik.iterations, dynx.ik.search, dynx.ik.starts, dynx.ik.step)
+    own = (dynx.ik.coordinates, dynx.ik.iterations, dynx.ik.starts, dynx.ik.step)
     return source_version(dynx.rbd, dynx.spatial, *own, dynx.model.mechanism, dynx.compiled.simplification)

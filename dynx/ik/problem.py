@@ -15,7 +15,8 @@ from dynx.backends.base import Backend
 from dynx.errors import ArgumentError, ShapeError, nearest, shown
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.options import AxisRequirement, Options, SearchLimits, checked_axes, frame_targets
-from dynx.ik.search import AxisTask, FrameTask, SeveralTasks, Task
+from dynx.ik.search import FrameTask, SeveralTasks, Task
+from dynx.ik.step import TargetKind
 from dynx.model import Model
 from dynx.model.configuration import checked_q
 from dynx.model.numbers import checked_vector, real_array
@@ -104,12 +105,20 @@ class Requirement:
         coordinates: FrameCoordinates,
         position: Floats | None,
         rotation: Floats | None,
-    ) -> Task:
+    ) -> FrameTask:
         """Return the task of one target: a position (3,) [m] and a rotation (3, 3)."""
-        arguments = (
-            backend, self.frame, self.point, coordinates, self.tolerances, position, rotation
-        )  # fmt: skip
-        return FrameTask(*arguments) if self.axes is None else AxisTask(*arguments, self.axes)
+        target = Targets(position, rotation)
+        return FrameTask(backend, self.frame, self.point, coordinates, self.tolerances, target, self.axes)
+
+    @property
+    def kind(self) -> TargetKind:
+        """Kind of the targets."""
+        return TargetKind.of(self.targets, self.point, self.axes)
+
+    @property
+    def optional(self) -> list[Floats]:
+        """Values of what only some kinds have (`TargetKind.optional_values`)."""
+        return self.kind.optional_values(self.point, self.axes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +188,7 @@ class Problem:
                 requirement.task(backend, self.coordinates, position, rotation)
                 for requirement, (position, rotation) in zip(self.requirements, sample, strict=True)
             ]
-            yield k, tasks[0] if len(tasks) == 1 else SeveralTasks(tasks)
+            yield k, tasks[0] if len(tasks) == 1 else SeveralTasks(tasks, self.coordinates)
 
 
 def checked_problem(

@@ -22,8 +22,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from dynx.backends.base import Backend
 from dynx.errors import ArgumentError, NotInstalledError, ShapeError, shown
+from dynx.ik.descent import ErrorCall, Target
 from dynx.ik.problem import checked_avoidance
-from dynx.ik.search import Residual, frame_jacobian
+from dynx.ik.step import TargetKind
 from dynx.model import Model
 from dynx.model.configuration import checked_q
 from dynx.model.numbers import checked_array, checked_vector, is_real, positive_seconds, real_array
@@ -83,13 +84,14 @@ class VelocityTask:
             targets = checked_targets(self.target)
             if targets.batch:
                 raise ShapeError(f"target has shape {np.shape(self.target)}; wanted (4, 4) or (3,)")
-            residual = Residual(targets.positions, targets.rotations, point)
-            error, _, _ = residual(backend.forward_kinematics(q, self.frame))
-            velocity[residual.rows] += self.gain * np.array(error)
+            kind = TargetKind.of(targets, point, None)
+            target = Target(kind, kind.rows(targets, ())[0], tuple(kind.optional_values(point, None)))
+            error, *_ = ErrorCall(target, (0.0, 0.0))(backend.forward_kinematics(q, self.frame))
+            velocity[: len(error)] += self.gain * np.array(error)
             if targets.rotations is None and self.velocity is None:
                 weights[3:] = 0.0
         chosen = weights > 0.0
-        J = frame_jacobian(backend, q, self.frame, point)[chosen]
+        J = backend.jacobian(q, self.frame, point=point)[chosen]
         scale = np.ones(int(chosen.sum())) if self.hard else weights[chosen]
         return scale[:, None] * J, scale * velocity[chosen]
 

@@ -233,6 +233,14 @@ class Symbol:
             raise TraceError(f"{caller_location()} selects something other than a number")
         return self.kind(self.graph, self.graph.apply("select", self.index, sides[0], sides[1]))
 
+    def traced_operation(self, op: Op, *arguments: Any) -> Symbol:
+        """Return `op` of symbols of this graph and numbers (`dynx.spatial.scalar.less`, `select`, ...)."""
+        graph = self.graph
+        nodes = [
+            each.index if isinstance(each, Symbol) else graph.constant(float(each)) for each in arguments
+        ]
+        return self.kind(graph, graph.apply(op, *nodes))
+
     def clamp(self, bound: Any) -> Symbol:
         """Clamp to [-bound, bound]; NaN stays NaN."""
         clamped: Symbol = _at_most(_at_least(self, -bound), bound)

@@ -1,7 +1,4 @@
-"""Evaluation of a finished program on arrays of symbols, within another trace, or on arrays of numbers.
-
-Here are also comparison and selection of numbers and symbols: traced code must not branch on values.
-"""
+"""Evaluation of a finished program on arrays of symbols, within another trace, or on arrays of numbers."""
 
 from __future__ import annotations
 
@@ -10,9 +7,22 @@ from typing import Any
 
 import numpy as np
 
-from dynx.simd.expr import Op, Symbol
 from dynx.simd.program import Program, scalar_ranges
-from dynx.spatial.scalar import Array, arctan, cos, exp, sin, sqrt, tanh
+from dynx.spatial.scalar import (
+    Array,
+    arctan,
+    cos,
+    equal,
+    exp,
+    less,
+    less_equal,
+    maximum,
+    minimum,
+    select,
+    sin,
+    sqrt,
+    tanh,
+)
 
 
 def inline(program: Program, inputs: Mapping[str, Array]) -> dict[str, Array]:
@@ -36,48 +46,6 @@ def inline(program: Program, inputs: Mapping[str, Array]) -> dict[str, Array]:
         entries[:] = [values[program.results[k]] for k in scalars]
         outputs[port.name] = entries.reshape(port.shape)
     return outputs
-
-
-def less(a: Any, b: Any) -> Any:
-    """Return 1 where a < b, otherwise 0."""
-    return _apply("less", a, b) if _any_symbol(a, b) else float(a < b)
-
-
-def less_equal(a: Any, b: Any) -> Any:
-    """Return 1 where a <= b, otherwise 0."""
-    return _apply("less_equal", a, b) if _any_symbol(a, b) else float(a <= b)
-
-
-def equal(a: Any, b: Any) -> Any:
-    """Return 1 where a == b, otherwise 0."""
-    return _apply("equal", a, b) if _any_symbol(a, b) else float(a == b)
-
-
-def select(condition: Any, yes: Any, no: Any) -> Any:
-    """Return `yes` where `condition` is not 0, otherwise `no`."""
-    if _any_symbol(condition, yes, no):
-        return _apply("select", condition, yes, no)
-    return yes if condition != 0.0 else no
-
-
-def minimum(a: Any, b: Any) -> Any:
-    """Return the smaller of two numbers; b if either is NaN."""
-    return _apply("min", a, b) if _any_symbol(a, b) else a if a < b else b
-
-
-def maximum(a: Any, b: Any) -> Any:
-    """Return the larger of two numbers; b if either is NaN."""
-    return _apply("max", a, b) if _any_symbol(a, b) else a if a > b else b
-
-
-def _any_symbol(*args: Any) -> bool:
-    return any(isinstance(arg, Symbol) for arg in args)
-
-
-def _apply(op: Op, *args: Any) -> Symbol:
-    graph = next(arg.graph for arg in args if isinstance(arg, Symbol))
-    nodes = [arg.index if isinstance(arg, Symbol) else graph.constant(float(arg)) for arg in args]
-    return Symbol(graph, graph.apply(op, *nodes))
 
 
 def _elementary(function: Callable[[Array], Array]) -> Callable[[Any], Any]:

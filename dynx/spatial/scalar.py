@@ -93,6 +93,57 @@ def _where_less_one(a: Any, b: Any, yes: Any, no: Any) -> Any:
 _where_less_of_objects = np.frompyfunc(_where_less_one, 4, 1)
 
 
+def less(a: Any, b: Any) -> Any:
+    """Return 1 where the number a < b, otherwise 0; a traced symbol for symbols."""
+    traced = _traced(a, b)
+    return float(a < b) if traced is None else traced("less", a, b)
+
+
+def less_equal(a: Any, b: Any) -> Any:
+    """Return 1 where the number a <= b, otherwise 0; a traced symbol for symbols."""
+    traced = _traced(a, b)
+    return float(a <= b) if traced is None else traced("less_equal", a, b)
+
+
+def equal(a: Any, b: Any) -> Any:
+    """Return 1 where the number a == b, otherwise 0; a traced symbol for symbols."""
+    traced = _traced(a, b)
+    return float(a == b) if traced is None else traced("equal", a, b)
+
+
+def select(condition: Any, yes: Any, no: Any) -> Any:
+    """Return `yes` where the number `condition` is not 0, otherwise `no`; a traced symbol for symbols."""
+    traced = _traced(condition, yes, no)
+    if traced is None:
+        return yes if condition != 0.0 else no
+    return traced("select", condition, yes, no)
+
+
+def minimum(a: Any, b: Any) -> Any:
+    """Return the smaller of two numbers; b if either is NaN; a traced symbol for symbols."""
+    traced = _traced(a, b)
+    if traced is None:
+        return a if a < b else b
+    return traced("min", a, b)
+
+
+def maximum(a: Any, b: Any) -> Any:
+    """Return the larger of two numbers; b if either is NaN; a traced symbol for symbols."""
+    traced = _traced(a, b)
+    if traced is None:
+        return a if a > b else b
+    return traced("max", a, b)
+
+
+def _traced(*numbers: Any) -> Callable[..., Any] | None:
+    """Return the function that applies an operation, by name, to the numbers; None without symbols."""
+    for number in numbers:
+        operation: Callable[..., Any] | None = getattr(number, "traced_operation", None)
+        if operation is not None:
+            return operation
+    return None
+
+
 def arctan2(y: Array, x: Array) -> Array:
     """Return the angle [rad] of the point (x, y), between -pi and pi; 0 at the origin."""
     y, x = np.asarray(y), np.asarray(x)

@@ -23,7 +23,7 @@ from dynx.backends.base import Backend
 from dynx.files.notebook import html_table
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.problem import Requirement
-from dynx.ik.search import rotation_between
+from dynx.ik.step import rotation_between
 from dynx.ik.tracking.followers import Followed, Follower, StepBounds, part_of
 from dynx.model.targets import Targets
 from dynx.spatial.scalar import Floats

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from dynx.errors import CompileError, ShapeError
 from dynx.simd.emit import Settings
-from dynx.simd.inlining import less, select
 from dynx.simd.iteration import (
     GIVEN_UP,
     NO_RESTART,
@@ -21,7 +20,7 @@ from dynx.simd.iteration import (
 )
 from dynx.simd.target import host
 from dynx.simd.trace import trace
-from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.scalar import Array, Floats, less, select
 
 TOLERANCE = 1e-12
 """Largest relative error of a square."""

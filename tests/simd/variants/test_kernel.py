@@ -9,12 +9,11 @@ from hypothesis import strategies as st
 
 from dynx.errors import ArgumentError, CompileError
 from dynx.simd.emit import Settings
-from dynx.simd.inlining import less
 from dynx.simd.target import host
 from dynx.simd.trace import trace
 from dynx.simd.variants import VariantKernel, Variants, emit_variants
 from dynx.simd.variants.kernel import Bytes, compile_variants
-from dynx.spatial.scalar import Array, Floats, sqrt, where_less
+from dynx.spatial.scalar import Array, Floats, less, sqrt, where_less
 
 TABLE = ((1.0, 2.0), (-1.0, 2.0), (1.0, 3.0), (-1.0, 3.0))
 
