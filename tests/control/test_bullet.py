@@ -18,25 +18,32 @@ from dynx.control import (
     MotorLag,
 )
 from dynx.control.bullet import BulletMotorCommand
-from dynx.engines.pybullet.canonical_urdf import ballast_for, bullet_tree
-from dynx.engines.pybullet.library import bullet
-from dynx.engines.pybullet.plant import SteppingClient
+from dynx.engines.pybullet.stepper import BulletStepper
 from dynx.errors import ArgumentError, ControlError, GainError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.model.loading import load
-from dynx.model.mechanism import build_mechanism
 from dynx.sim import simulate
-from dynx.spatial.extended import longdouble
+from dynx.spatial.scalar import Floats
+from dynx.steppers.forces import Forces
+from dynx.world.preparation import prepare
+from dynx.world.scene import Scene, SceneRobot
 from tests.backends.robots import mixed_robot
 from tests.sim.bars import PLANTS_AGREE, apart, tutorial_motion, tutorial_robot
 
 pytestmark = pytest.mark.skipif("pybullet" not in installed_backends(), reason="PyBullet is not installed")
 
 
-def client_of(robot: Model) -> SteppingClient:
-    mechanism = build_mechanism(robot, longdouble)
-    tree = bullet_tree(mechanism, ballast_for(mechanism), 0)
-    return SteppingClient(bullet(), tree, robot.name, gravity=list(robot.gravity), dt=1e-3)
+def stepper_of(robot: Model) -> BulletStepper:
+    layout = prepare(
+        Scene("one", robots=(SceneRobot("arm", robot),)),
+        collisions=False,
+        joint_limits=False,
+        joint_damping=False,
+        joint_friction=False,
+    )
+    return BulletStepper(
+        layout, 1e-3, {name: setting.default for name, setting in BulletStepper.settings.items()}
+    )
 
 
 def test_position_and_velocity_motors_follow_a_motion() -> None:
@@ -123,28 +130,24 @@ def test_motors_move_joints_whatever_else_acts() -> None:
 def test_the_tutorial_s_trap(mode: str) -> None:
     """After a motor was used, torque moves the arm as if there had been none; in the engine it does not."""
     robot = tutorial_robot()
-    client = client_of(robot)
-    rest, torque = [0.0] * 6, [3.0, 2.0, 1.0, 0.1, 0.1, 0.1]
+    stepper = stepper_of(robot)
+    rest, forces = np.zeros(6), Forces([(0, np.array([3.0, 2.0, 1.0, 0.1, 0.1, 0.1]))])
+    command = BulletMotorCommand(mode, positions=[0.0] * 6, velocities=[0.0] * 6)
+
+    def step(forces: Forces) -> Floats:
+        stepper.set_robot_state(0, rest, rest)
+        stepper.step(1, forces)
+        return stepper.robot_state(0).v
+
     try:
-        client.place(rest, rest, None)
-        client.apply(torque)
-        client.advance()
-        fresh = client.joint_states()[1]
-        client.place(rest, rest, None)
-        client.command(BulletMotorCommand(mode, positions=rest, velocities=rest))
-        client.advance()
-        client.place(rest, rest, None)
-        client.add_torques(torque)
-        client.advance()
-        trapped = client.joint_states()[1]
-        client.place(rest, rest, None)
-        client.apply(torque)
-        client.advance()
-        released = client.joint_states()[1]
+        fresh = step(forces)
+        step(Forces(commands={0: command}))
+        trapped = step(forces._replace(commands=stepper._commands))
+        released = step(forces)
     finally:
-        client.close()
+        stepper.close()
     assert np.abs(trapped).max() < 0.1 * np.abs(fresh).max()
-    assert released == fresh
+    assert (released == fresh).all()
 
 
 def test_what_motors_cannot_be() -> None:
@@ -162,12 +165,8 @@ def test_what_motors_cannot_be() -> None:
         floating, BulletPositionMotor(floating), floating.neutral(), plant="pybullet", duration=0.02
     )
     assert np.abs(moved.error[:, 6:]).max() < 1e-3
-    client = client_of(robot)
-    try:
-        with pytest.raises(ArgumentError, match="one of POSITION_CONTROL"):
-            client.command(BulletMotorCommand("MAGIC"))
-    finally:
-        client.close()
+    with pytest.raises(ArgumentError, match="one of POSITION_CONTROL"):
+        BulletMotorCommand("MAGIC")
 
 
 @pytest.mark.parametrize("name", ["PositionMotor", "VelocityMotor", "PDMotor", "TorqueMotor", "EngineMotor"])

@@ -463,13 +463,13 @@ class BulletObject:
         call(engine.resetBasePositionAndOrientation, self.body, base.position, base.quat_xyzw)
         call(engine.resetBaseVelocity, self.body, base.linear, base.angular)
 
-    def place_joints(self, positions: Reals, rates: Reals) -> None:
-        """Set the state of all joints of the tree."""
+    def place_joints(self, positions: Reals, rates: Reals, joints: Sequence[int] | None = None) -> None:
+        """Set the state of all joints of the tree, or of those with these numbers."""
         if positions:
             self.client.call(
                 self.client.engine.resetJointStatesMultiDof,
                 self.body,
-                self.links,
+                self.links if joints is None else [self.links[k] for k in joints],
                 [[x] for x in positions],
                 [[x] for x in rates],
             )

@@ -62,16 +62,6 @@ class BulletMotorCommand(EngineCommand):
         given = {_BULLET_NAMES[each.name]: getattr(self, each.name) for each in fields(self)[1:]}
         return {name: numbers for name, numbers in given.items() if numbers is not None}
 
-    def in_units(self, unit: float) -> BulletMotorCommand:
-        """Return the command with forces, and gains that are forces, in a unit of mass `unit` [kg]."""
-        names = ["forces"]
-        names += ["position_gains", "velocity_gains"] if self.mode == "PD_CONTROL" else []
-        given: dict[str, Any] = {}
-        for name in names:
-            numbers = getattr(self, name)
-            given[name] = None if numbers is None else [x / unit for x in numbers]
-        return replace(self, **given)
-
 
 def refuse_mimic_joints(model: Model, remedy: str) -> None:
     """Raise UnsupportedFeatureError for a robot with mimic joints, which Bullet's motors do not support."""

@@ -1,4 +1,12 @@
-"""Robots and bodies of a scene in Bullet, in the coordinates of dynx."""
+"""Robots and bodies of a scene in Bullet, in the coordinates of dynx.
+
+**The trap.** Bullet gives every joint of a loaded robot a velocity motor that holds it at speed 0, and
+POSITION_CONTROL or VELOCITY_CONTROL leave one active when they are no longer called. A torque that is
+commanded afterwards is added to that of the motor, which cancels it: the arm does not move, and there is no
+message. A motor is released by VELOCITY_CONTROL with a force of 0, as `BulletRobot` does when it is made and
+whenever torques follow a command. Bullet also damps the base (0.04 of its speed per second), damps joints as
+in the URDF, and limits speeds to 100: dynx switches all of that off.
+"""
 
 from __future__ import annotations
 
@@ -115,6 +123,8 @@ class BulletRobot:
         self._friction = layout.friction
         self.near = [0.0, 0.0, 0.0, 1.0]
         """Quaternion (4,) of the last state read, whose sign the next one has."""
+        self.placed: BaseState | None = None
+        """State of a floating root that was set last."""
         # Looked up once, because every step applies torques.
         self._control = client.engine.setJointMotorControlArray
         self._torque_control = client.engine.TORQUE_CONTROL
@@ -156,7 +166,8 @@ class BulletRobot:
         tree_v = self._S @ v
         if self._base:
             self.near = q[3:7].tolist()
-            self.object.place_base(self.object.root.base_state(q, v))
+            self.placed = self.object.root.base_state(q, v)
+            self.object.place_base(self.placed)
             tree_q = tree_q[7:]
         self.object.place_joints(tree_q.tolist(), tree_v[self._base :].tolist())
 

@@ -163,8 +163,8 @@ class BulletStepper(Stepper):
         except BaseException:
             client.close()
             raise
-        self._corrected = [robot for robot in self._robots if robot.corrected]
-        self._apply = [robot.apply for robot in self._robots]
+        self._corrected = [robot for robot in self.robots if robot.corrected]
+        self._apply = [robot.apply for robot in self.robots]
         self._before = [robot.before_step for robot in self._corrected]
         self._commands: Mapping[int, EngineCommand] = NO_COMMANDS
         self._touch()
@@ -180,7 +180,7 @@ class BulletStepper(Stepper):
         for number, collider in enumerate(layout.colliders):
             robot, body = collider.owner
             owned.setdefault((robot, body if robot is None else ROOT), {})[number] = collider
-        self._robots = [
+        self.robots = [
             BulletRobot(client, robot, owned.get((k, ROOT), {}), files, folder, self.dt)
             for k, robot in enumerate(layout.robots)
         ]
@@ -189,7 +189,7 @@ class BulletStepper(Stepper):
             for k, body in enumerate(layout.bodies)
         ]
         places: list[list[tuple[int, int]]] = [[] for _ in layout.colliders]
-        objects: list[BulletObject] = [robot.object for robot in self._robots]
+        objects: list[BulletObject] = [robot.object for robot in self.robots]
         objects += [body.object for body in self._bodies]
         for each in objects:
             for number, link in each.link_of.items():
@@ -202,7 +202,7 @@ class BulletStepper(Stepper):
         set_filters(client, layout, places, self._materials, settings, self.dt)
         self.contact_reader = ContactReader(client, places)
         for constraint in layout.constraints:
-            add_constraint(client, constraint, self._robots, self._bodies, settings["constraint_force"])
+            add_constraint(client, constraint, self.robots, self._bodies, settings["constraint_force"])
 
     def effective_materials(self) -> Mapping[str, EffectiveCoefficient]:
         return self._materials.effective()
@@ -242,25 +242,25 @@ class BulletStepper(Stepper):
     def _command(self, commands: Mapping[int, EngineCommand]) -> None:
         """Set Bullet's motors of the robots that have a command, and release those that had one."""
         for k in self._commands.keys() - commands.keys():
-            self._robots[k].command(None)
+            self.robots[k].command(None)
         for k, command in commands.items():
             if isinstance(command, BulletMotorCommand):
-                self._robots[k].command(command)
+                self.robots[k].command(command)
         self._commands = commands
 
     # -- state --------------------------------------------------------------------------------
 
     def robot_state(self, robot: int) -> RobotState:
-        return self._robots[robot].state()
+        return self.robots[robot].state()
 
     def joint_state(self, robot: int) -> RobotState:
-        return self._robots[robot].joint_state()
+        return self.robots[robot].joint_state()
 
     def body_state(self, body: int) -> BodyState:
         return self._bodies[body].state()
 
     def set_robot_state(self, robot: int, q: Floats, v: Floats) -> None:
-        self._robots[robot].set_state(q, v)
+        self.robots[robot].set_state(q, v)
         self._touch()
 
     def set_body_state(self, body: int, T: Floats, twist: Floats) -> None:
@@ -273,20 +273,20 @@ class BulletStepper(Stepper):
         self.contact_reader.fresh = True
 
     def dump(self) -> bytes:
-        near = np.array([robot.near for robot in self._robots]).tobytes()
+        near = np.array([robot.near for robot in self.robots]).tobytes()
         with TemporaryDirectory(prefix="dynx-", ignore_cleanup_errors=True) as folder:
             path = Path(folder) / "world.bullet"
             self.client.call(self.client.engine.saveBullet, str(path))
             return struct.pack("<?", self.contact_reader.fresh) + near + path.read_bytes()
 
     def load(self, data: bytes) -> None:
-        size = 32 * len(self._robots)
+        size = 32 * len(self.robots)
         near = np.frombuffer(data[1 : 1 + size]).reshape(-1, 4)
         with TemporaryDirectory(prefix="dynx-", ignore_cleanup_errors=True) as folder:
             path = Path(folder) / "world.bullet"
             path.write_bytes(data[1 + size :])
             self.client.call(self.client.engine.restoreState, fileName=str(path))
-        for robot, quat in zip(self._robots, near, strict=True):
+        for robot, quat in zip(self.robots, near, strict=True):
             robot.near = quat.tolist()
         (self.contact_reader.fresh,) = struct.unpack("<?", data[:1])
 
@@ -306,6 +306,6 @@ class BulletStepper(Stepper):
         return bullet_version()
 
     def close(self) -> None:
-        for robot in self._robots:
+        for robot in self.robots:
             robot.close()
         self.client.close()
