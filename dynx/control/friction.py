@@ -33,7 +33,7 @@ class JointFriction:
 
     With `slip` 0 it is d v + f sign(v), as with ``joint_dynamics=True`` in every backend. A joint at rest
     then has any torque between -f and f, whichever keeps it at rest; a function of the velocity cannot tell
-    it, so plants solve for it (`dynx.sim.plants.friction_law`). A mimic joint's coefficients act on its
+    it, so plants solve for it (`dynx.rbd.joint_friction`). A mimic joint's coefficients act on its
     driver through its multiplier.
     """
 

@@ -29,6 +29,8 @@ from dynx.control.friction import JointFriction
 from dynx.errors import ArgumentError, TraceError, UnsupportedFeatureError, shown
 from dynx.model import Mechanism, Model
 from dynx.rbd.elimination import factorize_mass_matrix, solve_with_factors
+from dynx.rbd.integration import SemiImplicitEuler
+from dynx.rbd.joint_friction import FrictionLaw, FrictionStep, damped_equation
 from dynx.sim.loop.controller_checks import (
     ControllerWatch,
     defect_of_next_state,
@@ -38,9 +40,7 @@ from dynx.sim.loop.controller_checks import (
 )
 from dynx.sim.loop.own_controllers import refuse_irreproducible, traced_torque
 from dynx.sim.plants.disturbances import Disturbances
-from dynx.sim.plants.friction_law import FrictionLaw, FrictionStep, damped_equation
 from dynx.sim.plants.integrated import IntegratedPlant
-from dynx.sim.plants.integrators import SemiImplicitEuler
 from dynx.sim.step import MAX_SQUARED_SPEED, at_limit, measure, squared_speed, torque_sum, with_disturbances
 from dynx.simd.call_sequence import Integers
 from dynx.simd.cuts import CutStep, EngineCall, EngineCallTracer

@@ -68,7 +68,7 @@ def simulate(given: SimulateArguments) -> Rollout:
     **Joints**, the same in every plant: `damping`, dry `friction` and `armature`, each True for those of the
     description, one number, one for each joint, or numbers by joint, ``{"elbow_joint": 0.5}``, where joints
     that are not named have none. Dry friction holds a joint at rest up to its magnitude and opposes the
-    motion beyond (`dynx.sim.plants.friction_law`), at any step; with `friction_slip` [rad/s or m/s] above 0
+    motion beyond (`dynx.rbd.joint_friction`), at any step; with `friction_slip` [rad/s or m/s] above 0
     it is smoothed over that speed instead, so that loaded joints creep (`JointFriction`).
     `effort_limits`, True for the model's, saturate torques and are recorded; `position_limits` are inelastic
     stops (`Stops`); `pushes` are external wrenches.

@@ -1,6 +1,6 @@
 """Completion of a step whose kernel did not settle which joints stick, or moved joints beyond their limits.
 
-A kernel corrects the modes of the law of friction (`dynx.sim.plants.friction_law`) once, which mostly
+A kernel corrects the modes of the law of friction (`dynx.rbd.joint_friction`) once, which mostly
 suffices. For the other lanes it is called again with the corrected modes, until they are right. A lane whose
 modes are right gives the same bits again, so no result depends on its neighbours.
 
@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from dynx.compiled.kernels import evaluate_quantity
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.compiled.step import BoundSteps, Status, StepText, compiled
+from dynx.rbd.joint_friction import FrictionLaw
 from dynx.sim.loop_step import LoopStep
-from dynx.sim.plants.friction_law import FrictionLaw
 from dynx.sim.plants.friction_solver import BLOCK_CORRECTIONS, MAX_SOLUTIONS
 from dynx.sim.step import held_at_limits
 from dynx.simd.kernel import Kernel

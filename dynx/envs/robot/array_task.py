@@ -4,18 +4,26 @@ from __future__ import annotations
 
 import inspect
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any, ClassVar
 
 from dynx.control.dynamics import Dynamics
-from dynx.envs.robot.integration import SCHEMES, Accelerate
 from dynx.envs.robot.state import State
 from dynx.envs.task import Task
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model import Model
+from dynx.rbd.integration import Accelerate, ExplicitEuler, RungeKutta4
+from dynx.sim.plants.integrators import CompiledBaseEuler
 from dynx.spatial.scalar import Array
 from dynx.world import Camera
+
+SCHEMES: dict[str, Callable[[Model, float], Any]] = {
+    "euler": ExplicitEuler,
+    "semi_implicit": CompiledBaseEuler,
+    "rk4": RungeKutta4,
+}
+"""Integration schemes by name, made of a model and a step [s]."""
 
 
 class ArrayTask(Task):

@@ -15,12 +15,12 @@ import numpy as np
 
 from dynx.control.dynamics import Dynamics
 from dynx.envs.library import spaces
-from dynx.envs.robot.integration import Accelerate
 from dynx.envs.robot.state import State
 from dynx.envs.robot.task import RobotTask
 from dynx.envs.task_options import refuse_unknown_choice, refuse_unphysical
 from dynx.model import Model
 from dynx.model.loading import load
+from dynx.rbd.integration import Accelerate
 from dynx.spatial.scalar import Array
 from dynx.world import Camera
 

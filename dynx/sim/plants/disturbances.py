@@ -1,8 +1,8 @@
 """Joint friction, external forces and armature of a plant.
 
 Every plant uses this code. External forces become a torque, as a function of time and state, which is added
-to that of the motors; joint friction is solved for the velocity at the end of a step (`friction_law`). So a
-push or a brake has the same effect in every engine.
+to that of the motors; joint friction is solved for the velocity at the end of a step
+(`dynx.rbd.joint_friction`). So a push or a brake has the same effect in every engine.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from dynx.control.friction import (
 )
 from dynx.control.gains import checked_gain
 from dynx.model import Model
-from dynx.sim.plants.friction_law import FrictionLaw
+from dynx.rbd.joint_friction import FrictionLaw
 from dynx.sim.plants.friction_solver import FrictionSolver
 from dynx.sim.step import with_disturbances
 from dynx.spatial.scalar import Floats

@@ -1,4 +1,4 @@
-"""The law of joint friction (`dynx.sim.plants.friction_law`) for one robot and one step at a time."""
+"""The law of joint friction (`dynx.rbd.joint_friction`) for one robot and one step at a time."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dynx.sim.plants.friction_law import TOLERANCE, FrictionLaw, damped_equation
+from dynx.rbd.joint_friction import TOLERANCE, FrictionLaw, damped_equation
 from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.emit import Settings
 from dynx.simd.kernel import Kernel

@@ -9,13 +9,14 @@ import numpy as np
 
 from dynx.backends import Backend
 from dynx.backends.solvability import singular_coordinates
+from dynx.rbd.integration import MotionState, RungeKutta4, SemiImplicitEuler
 from dynx.sim.plants.disturbances import Disturbances, DisturbedAcceleration
-from dynx.sim.plants.integrators import Adaptive, RungeKutta4, SemiImplicitEuler, State
+from dynx.sim.plants.integrators import Adaptive, CompiledBaseEuler
 from dynx.sim.plants.plant import Plant, StepResult
 from dynx.spatial.scalar import Array, Floats
 
 SCHEMES: dict[str, Callable[..., SemiImplicitEuler | RungeKutta4 | Adaptive]] = {
-    "semi_implicit": SemiImplicitEuler,
+    "semi_implicit": CompiledBaseEuler,
     "rk4": RungeKutta4,
     "adaptive": Adaptive,
 }
@@ -89,7 +90,7 @@ class IntegratedPlant(Plant):
         """Number of evaluations of the acceleration in one step that can be compiled."""
         return self.substeps * (4 if isinstance(self._scheme, RungeKutta4) else 1)
 
-    def advanced(self, record: RecordCall, q: Array, v: Array, tau: Array) -> State:
+    def advanced(self, record: RecordCall, q: Array, v: Array, tau: Array) -> MotionState:
         """Take one step from q, v on symbols; `record(call, shape, *arguments)` stands for an engine call."""
         state = self._advanced(record, q, v, tau)
         first = state[2]
@@ -97,7 +98,7 @@ class IntegratedPlant(Plant):
             state = self._advanced(record, *state[:2], tau)
         return *state[:2], first
 
-    def _advanced(self, record: RecordCall, q: Array, v: Array, tau: Array) -> State:
+    def _advanced(self, record: RecordCall, q: Array, v: Array, tau: Array) -> MotionState:
         if self.disturbances.sticks and isinstance(self._scheme, SemiImplicitEuler):
             return self._scheme.moved(q, v, *record(self._slowed, (2, len(v)), q, v, tau))
         call: Callable[..., Floats] = self._accelerate
@@ -105,7 +106,7 @@ class IntegratedPlant(Plant):
             call = self.dynamics.bound_to_thread("forward_dynamics")
         return self._scheme(lambda q, v, tau: record(call, v.shape, q, v, tau), q, v, tau)
 
-    def _advance(self, t: float, tau: Floats) -> State:
+    def _advance(self, t: float, tau: Floats) -> MotionState:
         if self._undisturbed:
             state = self._scheme(self._forward, self._q, self._v, tau)
         elif not self.disturbances.sticks:
@@ -122,7 +123,7 @@ class IntegratedPlant(Plant):
         stick, (2, nv)."""
         return self._accelerate.with_friction(self._friction, q, v, tau, t)
 
-    def _advance_in_modes(self, scheme: RungeKutta4 | Adaptive, t: float, tau: Floats) -> State:
+    def _advance_in_modes(self, scheme: RungeKutta4 | Adaptive, t: float, tau: Floats) -> MotionState:
         """Take one step in which each joint sticks or slides as the law of friction has it for Euler's step.
 
         A joint whose velocity would have changed its sign at the end of the step stops there instead.

@@ -13,9 +13,9 @@ from dynx.control import PD, GravityCompensatedPD
 from dynx.errors import ArgumentError
 from dynx.model import Model
 from dynx.model.loading import load
+from dynx.rbd import joint_friction
 from dynx.sim import simulate, simulate_batch
 from dynx.sim.batch import batch
-from dynx.sim.plants import friction_law
 from tests.backends.robots import mixed_robot
 from tests.oracles.closed_form import MODELS
 from tests.sim.batch.batches import assert_same, batch_and_one
@@ -133,7 +133,7 @@ def test_mimic_joints_and_bases(base: str) -> None:
 
 def test_bits_do_not_depend_on_the_neighbours(arm: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     """Steps are repeated for some rollouts, here for many because no mode is corrected in the kernel."""
-    monkeypatch.setattr(friction_law, "CORRECTIONS", 0)
+    monkeypatch.setattr(joint_friction, "CORRECTIONS", 0)
     monkeypatch.setattr(step, "_kernels", {})
     rng = np.random.default_rng(1)
     law = PD(arm, kp=5.0, kd=0.02)

@@ -17,8 +17,8 @@ from dynx.model import Joint, Link, Model
 from dynx.model.elements import Inertial
 from dynx.model.library import robots
 from dynx.model.loading import load
+from dynx.rbd.joint_friction import TOLERANCE, FrictionLaw
 from dynx.sim import Rollout, Scenario, Simulation, simulate
-from dynx.sim.plants.friction_law import TOLERANCE, FrictionLaw
 from dynx.sim.plants.friction_solver import BLOCK_CORRECTIONS, FrictionSolver
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models

@@ -25,7 +25,7 @@ def no_law_of_friction(monkeypatch: pytest.MonkeyPatch, tmp_path: Any) -> None:
     def refuse(*_: Any) -> None:
         raise AssertionError("friction is computed")
 
-    monkeypatch.setattr("dynx.sim.plants.friction_law.FrictionLaw.of", refuse)
+    monkeypatch.setattr("dynx.rbd.joint_friction.FrictionLaw.of", refuse)
     monkeypatch.setenv("DYNX_CACHE_DIR", str(tmp_path))
 
 

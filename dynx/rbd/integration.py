@@ -1,0 +1,147 @@
+"""Integration of a robot's motion, for arrays of any scalar: semi-implicit and explicit Euler, Runge-Kutta 4.
+
+Each scheme takes one step of length h from the state (q, v) under a constant torque, and depends on its
+arguments alone. `accelerate(q, v, *given)` returns the acceleration. The quaternion of a floating base is a
+point of the unit sphere, so increments cannot simply be added to it.
+
+Under semi-implicit Euler a floating base moves as in Bullet (btMultiBody): Euler's method is applied to the
+velocity of the root's centre of mass and to its angular velocity, both in world axes. Because those axes do
+not rotate, a free body keeps its linear momentum exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from dynx.errors import UnsupportedFeatureError
+from dynx.model import Model
+from dynx.spatial.branchless import quat_exp
+from dynx.spatial.scalar import Array
+from dynx.spatial.so3 import cross, quat_product, rotate, rotate_back, rotation_from_quat
+
+Accelerate = Callable[..., Array]
+
+MotionState = tuple[Array, Array, Array]
+"""q and v after the step, and the acceleration at its beginning."""
+
+
+def floating_step(
+    q: Array, v: Array, a: Array, h: float, center: Array, moves: Array | float = 1.0
+) -> tuple[Array, Array]:
+    """Return q (nq,) and v (nv,) after a step of length `h` [s] with acceleration `a` (nv,).
+
+    `center` (3,) [m] is the centre of mass of the root, in the axes of the base frame. Joints where `moves`
+    is 0 and not 1 end at rest.
+    """
+    R, w = rotation_from_quat(q[3:7]), v[3:6]
+    lever = cross(w, center)
+    # The classical acceleration of the centre of mass, because v is expressed in axes that rotate with the
+    # base.
+    rising = a[:3] + cross(w, v[:3]) + cross(a[3:6], center) + cross(w, lever)
+    linear = R @ (v[:3] + lever + h * rising)
+    angular = R @ (w + h * a[3:6])
+    quat = quat_product(quat_exp(h * angular), q[3:7])
+    quat = quat / np.sqrt(quat.dot(quat))
+    R_next = rotation_from_quat(quat)
+    at = q[:3] + R @ center + h * linear
+    w_next = rotate_back(R_next, angular)
+    joints = moves * (v[6:] + h * a[6:])
+    v_next = np.concatenate([rotate_back(R_next, linear) - cross(w_next, center), w_next, joints])
+    return np.concatenate([at - R_next @ center, quat, q[7:] + h * joints]), v_next
+
+
+class SemiImplicitEuler:
+    """First-order integrator v' = v + h a(q, v), q' = q (+) h v'; energy that is conserved stays bounded."""
+
+    def __init__(self, model: Model, h: float, center: Array | None = None) -> None:
+        """`center` (3,) [m] is the centre of mass of the root, by default that of `model`."""
+        self._floating = model.floating
+        self._h: Array = np.full(model.nv, h)
+        self._step = h
+        if center is None:
+            root = model.mechanism.root
+            mass = float(root.mass)
+            center = np.array(root.first_moment, dtype=float) / mass if mass else np.zeros(3)
+        self._center = center
+
+    def __call__(self, accelerate: Accelerate, q: Array, v: Array, *given: Any) -> MotionState:
+        """Take one step, on floats or on symbols."""
+        return self.moved(q, v, accelerate(q, v, *given))
+
+    def moved(self, q: Array, v: Array, a: Array, moves: Array | None = None) -> MotionState:
+        """Take one step with a known acceleration; coordinates where `moves` is 0 and not 1 end at rest."""
+        if self._floating:
+            return self._float(q, v, a, moves)
+        h = self._h
+        v = v + h * a
+        if moves is not None:
+            v = moves * v
+        return q + h * v, v, a
+
+    def _float(self, q: Array, v: Array, a: Array, moves: Array | None) -> MotionState:
+        held = 1.0 if moves is None else moves[6:]
+        return *floating_step(q, v, a, self._step, self._center, held), a
+
+
+class ExplicitEuler:
+    """First-order integrator q' = q + h v, v' = v + h a(q, v), which adds energy to an oscillation.
+
+    It is here because environments of Gymnasium use it; for a fixed base only.
+    """
+
+    def __init__(self, model: Model, h: float) -> None:
+        if model.floating:
+            raise UnsupportedFeatureError("the integrator euler is for robots with a fixed base")
+        self._h = h
+
+    def __call__(self, accelerate: Accelerate, q: Array, v: Array) -> MotionState:
+        """Return q and v after the step, and the acceleration at its beginning."""
+        a = accelerate(q, v)
+        return q + self._h * v, v + self._h * a, a
+
+
+class Flow:
+    """Time derivative of the state y = (q, v); between steps its quaternion need not be of unit length."""
+
+    def __init__(self, model: Model) -> None:
+        self._floating = model.floating
+        self.nq = model.nq
+
+    def configuration(self, y: Array) -> Array:
+        """Return q with its quaternion on the unit sphere."""
+        q = y[: self.nq]
+        if self._floating:
+            q = q.copy()
+            q[3:7] /= np.sqrt(q[3:7].dot(q[3:7]))
+        return q
+
+    def __call__(self, accelerate: Accelerate, y: Array, given: tuple[Any, ...]) -> Array:
+        v = y[self.nq :]
+        q = self.configuration(y)
+        a = accelerate(q, v, *given)
+        if not self._floating:
+            return np.concatenate([v, a])
+        turning = 0.5 * quat_product(y[3:7], np.array([v[3], v[4], v[5], 0.0]))
+        return np.concatenate([rotate(rotation_from_quat(q[3:7]), v[:3]), turning, v[6:], a])
+
+
+class RungeKutta4:
+    """The classical Runge-Kutta method of fourth order."""
+
+    def __init__(self, model: Model, h: float) -> None:
+        self._flow = Flow(model)
+        self._h = h
+
+    def __call__(self, accelerate: Accelerate, q: Array, v: Array, *given: Any) -> MotionState:
+        """Return one step."""
+        flow, h = self._flow, self._h
+        y = np.concatenate([q, v])
+        k1 = flow(accelerate, y, given)
+        k2 = flow(accelerate, y + 0.5 * h * k1, given)
+        k3 = flow(accelerate, y + 0.5 * h * k2, given)
+        k4 = flow(accelerate, y + h * k3, given)
+        y = y + (h / 6.0) * (k1 + 2.0 * (k2 + k3) + k4)
+        return flow.configuration(y), y[flow.nq :], k1[flow.nq :]
