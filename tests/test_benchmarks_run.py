@@ -37,6 +37,23 @@ def test_simulators_are_right_and_timed() -> None:
     assert all(each["step"] > 0.0 and each["checks"] for each in results)
 
 
+def test_two_checkouts_are_timed_side_by_side(tmp_path: Path) -> None:
+    file = tmp_path / "rows.json"
+    names = ["call compiled inverse_dynamics", "quantity ur5 mass_matrix 128", "rollouts compiled"]
+    only = [word for name in names for word in ("--only", name)]
+    both = ["--before", sys.executable, "--after", sys.executable]
+    finished = run(
+        "benchmarks.side_by_side", *both, *only, "--rounds", "3", "--bar", "0", "--json", str(file)
+    )
+    assert finished.returncode == 0, finished.stdout + finished.stderr
+    rows = json.loads(file.read_text())
+    assert [row["case"] for row in rows] == names
+    for row in rows:
+        assert row["difference"] == 0.0
+        assert 0.0 < row["low"] <= row["ratio"] <= row["high"]
+        assert row["rounds"] == 3
+
+
 def test_poses_are_solved_in_kernels() -> None:
     finished = run("benchmarks.inverse_kinematics", "z1", "--poses", "200")
     assert finished.returncode == 0, finished.stdout + finished.stderr
