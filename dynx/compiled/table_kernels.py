@@ -24,7 +24,7 @@ import dynx.spatial
 from dynx.backends.quantities import QUANTITIES
 from dynx.compiled.defect import quaternion_defect, result_defect, sum_by_pairs
 from dynx.compiled.model_coordinates import argument_shapes
-from dynx.compiled.table_loops import MASSLESS, Row, StepRoutines, TableLoops
+from dynx.compiled.table_loops import MASSLESS, ArgumentRow, StepRoutines, TableLoops
 from dynx.model.mechanism import ROOT, Body, BodyFrame, Mechanism
 from dynx.rbd import aba, coriolis, crba, derivatives, regressor, rnea
 from dynx.simd.cache import load_routines, source_version
@@ -178,9 +178,9 @@ def _reading(n_inputs: int) -> dict[str, Routine]:
     }
 
 
-def _read_row(loops: TableLoops, array: int, size: int) -> Row:
+def _read_row(loops: TableLoops, array: int, size: int) -> ArgumentRow:
     """Copy a row of an input to the workspace."""
-    row = Row(loops.table.reserve(size), size)
+    row = ArgumentRow(loops.table.reserve(size), size)
     for column, width in _runs(size):
         loops.call(f"read {width} of {array}", column, row.place + column)
     return row
@@ -215,7 +215,7 @@ def _checking(defect: int) -> dict[str, Routine]:
     return found
 
 
-def _check(loops: TableLoops, rows: Sequence[Row]) -> None:
+def _check(loops: TableLoops, rows: Sequence[ArgumentRow]) -> None:
     """Compute the defect of the arguments, q first, and of the solution of an equation."""
     total = loops.table.reserve(1)
     loops.call("zero", total)

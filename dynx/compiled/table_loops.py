@@ -277,7 +277,7 @@ class Held:
             place += part.size
 
 
-class Row:
+class ArgumentRow:
     """An argument of the algorithm, q (nq,) or v, a, tau (nv,), in the workspace."""
 
     def __init__(self, place: int, size: int) -> None:
@@ -461,7 +461,7 @@ class TableLoops(Loops):
 
     def _operand(self, value: Any, entry: int | None = None) -> Operand:
         """Return an operand for a value; of an argument of the algorithm, the entry counted from its end."""
-        if isinstance(value, Row):
+        if isinstance(value, ArgumentRow):
             size = value.shape[0]
             if entry is not None:
                 return Operand(Kept(Structure()), (value.place + size + entry,))
@@ -481,7 +481,7 @@ class TableLoops(Loops):
         entry = index - len(self.mechanism.bodies)
         return [
             self._operand(column, entry)
-            if isinstance(column, (Row, np.ndarray))
+            if isinstance(column, (ArgumentRow, np.ndarray))
             else self._operand(column[entry])
             for column in columns
         ]
@@ -520,6 +520,14 @@ class TableLoops(Loops):
             _, result = self._call(step, [self._bodies[k], *own, *self._values(columns, k)], parent, None)
             results.append(result)
         return totals, results[::-1]
+
+    def subtrees(self, step: Step, totals: Sequence[Any], *columns: Any) -> Sequence[Any]:
+        for k in reversed(range(len(self._bodies))):
+            parent = self.mechanism.bodies[k].parent
+            if parent != ROOT or self.mechanism.floating:
+                own = self._operand(totals[k + 1]), self._operand(totals[parent + 1])
+                self._call(step, [self._bodies[k], *own, *self._values(columns, k)], totals[parent + 1])
+        return totals
 
     # -- results ----------------------------------------------------------------------------------
 

@@ -8,6 +8,7 @@ symmetric blocks is computed.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -79,6 +80,18 @@ class ArticulatedInertia:
         return np.concatenate([top, bottom], axis=-2)
 
 
+@dataclass(frozen=True)
+class AngularVelocity:
+    """Angular velocity of a body (..., 3), in its axes."""
+
+    omega: Array
+
+    @cached_property
+    def motion(self) -> Motion:
+        """Motion with this angular velocity and zero accelerations."""
+        return Motion(self.omega, 0 * self.omega, 0 * self.omega)
+
+
 class ArticulatedBody(NamedTuple):
     """Apparent inertia of a body and its bias wrench: the one that keeps it from accelerating."""
 
@@ -111,8 +124,8 @@ def forward_dynamics(
     """
     loops = loops or PythonLoops(mechanism)
     root = loops.root(_root_motion, q, v)
-    omegas, passed = loops.outward(_pass_joint, root.omega, q, v)
-    bodies = [loops.root(_root_body, root.omega), *loops.each(_rigid_body, omegas)]
+    velocities, passed = loops.outward(_pass_joint, loops.root(_velocity, root), q, v)
+    bodies = [loops.root(_root_body, velocities[0]), *loops.each(_rigid_body, velocities)]
     articulated, eliminated = loops.inward(_add_articulated, bodies, passed, tau)
     if mechanism.floating:
         base = loops.root(_base_acceleration, articulated[0], tau)
@@ -128,22 +141,28 @@ def _root_motion(mechanism: Mechanism, q: Array, v: Array) -> Motion:
     return root_motion(mechanism, q, v, 0 * v)
 
 
-def _pass_joint(body: Body, omega: Array, q: Array, v: Array) -> tuple[Array, JointPassed]:
+def _velocity(mechanism: Mechanism, root: Motion) -> AngularVelocity:
+    return AngularVelocity(root.omega)
+
+
+def _pass_joint(
+    body: Body, parent: AngularVelocity, q: Array, v: Array
+) -> tuple[AngularVelocity, JointPassed]:
     placement = Placement.of(body, q)
-    motion = child_motion(body, placement, Motion(omega, 0 * omega, 0 * omega), v, 0 * v)
-    return motion.omega, JointPassed(placement, (motion.proper_acceleration, motion.alpha))
+    motion = child_motion(body, placement, parent.motion, v, 0 * v)
+    return AngularVelocity(motion.omega), JointPassed(placement, (motion.proper_acceleration, motion.alpha))
 
 
-def _root_body(mechanism: Mechanism, omega: Array) -> ArticulatedBody:
-    return _rotating_body(mechanism.root, omega)
+def _root_body(mechanism: Mechanism, velocity: AngularVelocity) -> ArticulatedBody:
+    return _rotating_body(mechanism.root, velocity)
 
 
-def _rigid_body(body: Body, omega: Array) -> ArticulatedBody:
-    return _rotating_body(body.inertia, omega)
+def _rigid_body(body: Body, velocity: AngularVelocity) -> ArticulatedBody:
+    return _rotating_body(body.inertia, velocity)
 
 
-def _rotating_body(inertia: RigidInertia, omega: Array) -> ArticulatedBody:
-    bias = body_wrench(inertia, Motion(omega, 0 * omega, 0 * omega))
+def _rotating_body(inertia: RigidInertia, velocity: AngularVelocity) -> ArticulatedBody:
+    bias = body_wrench(inertia, velocity.motion)
     return ArticulatedBody(ArticulatedInertia.of_rigid_body(inertia), bias)
 
 

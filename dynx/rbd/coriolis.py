@@ -94,7 +94,7 @@ class Subspace:
 
 
 @dataclass(frozen=True)
-class Response:
+class SubtreeResponse:
     """Momenta and forces of a subtree moved by a motion subspace: columns (..., 3, d).
 
     For the velocity field u of a column, they are the integrals over the mass of u (`momentum`), r x u
@@ -107,10 +107,10 @@ class Response:
     moment: Array
     couple: Array
 
-    def to_parent(self, step: ToParent) -> Response:
+    def to_parent(self, step: ToParent) -> SubtreeResponse:
         """Return the response about the origin of the parent and relative to its velocity."""
         momentum, force = step.R @ self.momentum, step.R @ self.force
-        return Response(
+        return SubtreeResponse(
             momentum=momentum,
             angular_momentum=step.R @ self.angular_momentum + step.lever @ momentum,
             force=force,
@@ -152,12 +152,12 @@ class Composite:
         E = E - skew(inertia.first_moment) @ step.lever_rate
         return Composite(inertia, f + step.dp * inertia.mass, np.asarray(E))
 
-    def response(self, subspace: Subspace) -> Response:
+    def response(self, subspace: Subspace) -> SubtreeResponse:
         """Return the response of the subtree to the motion of its own body."""
         mass, J = self.inertia.mass, self.inertia.rotational_inertia
         H, F = skew(self.inertia.first_moment), skew(self.f)
         u, e, du, de = subspace.linear, subspace.angular, subspace.linear_rate, subspace.angular_rate
-        return Response(
+        return SubtreeResponse(
             momentum=u * mass - H @ e,
             angular_momentum=H @ u + J @ e,
             force=du * mass - H @ de - F @ e,
@@ -169,7 +169,7 @@ class Composite:
 def _matrix(loops: Loops, placements: Sequence[Placement], v: Array) -> Array:
     omegas, steps = loops.outward(_step_to_child, loops.root(_root_omega, v), placements, v)
     rigid = [loops.root(_root_composite, omegas[0]), *loops.each(_rigid_composite, omegas)]
-    composites, _ = loops.inward(_add_composite, rigid, steps)
+    composites = loops.subtrees(_add_composite, rigid, steps)
     base = loops.root(_base_subspace, omegas[0], stored=False)
     subspaces = loops.each(_joint_subspace, omegas, stored=False)
     C = loops.matrices(1, like=v)
@@ -211,28 +211,26 @@ def _rigid_composite(body: Body, omega: Array) -> Composite:
     return Composite.of_rigid_body(body.inertia, omega)
 
 
-def _add_composite(
-    body: Body, composite: Composite, parent: Composite, step: ToParent
-) -> tuple[Composite, None]:
-    return parent + composite.to_parent(step), None
+def _add_composite(body: Body, composite: Composite, parent: Composite, step: ToParent) -> Composite:
+    return parent + composite.to_parent(step)
 
 
-def _respond(body: Body, composite: Composite, subspace: Subspace) -> tuple[Response, tuple[Array]]:
+def _respond(body: Body, composite: Composite, subspace: Subspace) -> tuple[SubtreeResponse, tuple[Array]]:
     response = composite.response(subspace)
     block, _ = response.entries(subspace)
     return response, (block[..., 0, 0],)
 
 
 def _entries(
-    body: Body, response: Response, step: ToParent, subspace: Subspace
-) -> tuple[Response, tuple[Array], tuple[Array]]:
+    body: Body, response: SubtreeResponse, step: ToParent, subspace: Subspace
+) -> tuple[SubtreeResponse, tuple[Array], tuple[Array]]:
     moved = response.to_parent(step)
     block, mirror_block = moved.entries(subspace)
     return moved, (mirror_block[..., 0, 0],), (block[..., 0, 0],)
 
 
 def _base_entries(
-    response: Response, step: ToParent, base: Subspace
+    response: SubtreeResponse, step: ToParent, base: Subspace
 ) -> tuple[tuple[Array], tuple[list[Array]]]:
     block, mirror_block = response.to_parent(step).entries(base)
     return (mirror_block[..., 0, :],), ([block[..., k, 0] for k in range(6)],)

@@ -17,7 +17,7 @@ def mass_matrix(mechanism: Mechanism, q: Array, *, loops: Loops | None = None) -
     loops = loops or PythonLoops(mechanism)
     placements = loops.each(Placement.of, q)
     inertias = [loops.root(root_inertia), *loops.each(body_inertia)]
-    composites, _ = loops.inward(_add_composite, inertias, placements)
+    composites = loops.subtrees(_add_composite, inertias, placements)
     M = loops.matrices(1, like=q)
     loops.to_root(M, _momentum, _entry, _base_entries, own=(composites,), below=(placements,))
     loops.base_block(M, _base_block, composites[0])
@@ -36,8 +36,8 @@ def body_inertia(body: Body) -> RigidInertia:
 
 def _add_composite(
     body: Body, composite: RigidInertia, parent: RigidInertia, placement: Placement
-) -> tuple[RigidInertia, None]:
-    return parent + placement.inertia_to_parent(composite), None
+) -> RigidInertia:
+    return parent + placement.inertia_to_parent(composite)
 
 
 def _momentum(body: Body, composite: RigidInertia) -> tuple[SpatialVector, tuple[Array]]:

@@ -103,7 +103,14 @@ class Subtree:
         )
 
 
-class Response(NamedTuple):
+class MovedSubtree(NamedTuple):
+    """Motion of a joint, and the body that it moves."""
+
+    joint: JointMotion
+    subtree: Subtree
+
+
+class JointResponse(NamedTuple):
     """Spatial vectors of a joint whose products with the motions of its ancestors are derivatives."""
 
     IS: SpatialVector
@@ -134,9 +141,10 @@ def inverse_dynamics_derivatives(
         root = loops.root(_floating_root, base, a)
     else:
         base, root = None, loops.root(_fixed_root)
-    motions, joints = loops.outward(move_child, root, q, v, a)
-    bodies = [loops.root(_root_subtree, root), *loops.each(_body_subtree, motions)]
-    subtrees, _ = loops.inward(_add_subtree, bodies)
+    _, moved = loops.outward(_move, root, q, v, a)
+    joints = [body.joint for body in moved]
+    bodies = [loops.root(_root_subtree, root), *(body.subtree for body in moved)]
+    subtrees = loops.subtrees(_add_subtree, bodies)
     matrices = loops.matrices(3, like=v)
     loops.to_root(
         matrices, _respond, _entries, _base_entries, own=(subtrees, joints), here=(joints,), at_base=(base,)
@@ -160,25 +168,29 @@ def _root_subtree(mechanism: Mechanism, motion: BodyMotion) -> Subtree:
     return Subtree.of_body(mechanism.root, motion)
 
 
-def _body_subtree(body: Body, motion: BodyMotion) -> Subtree:
-    return Subtree.of_body(body.inertia, motion)
+def _move(body: Body, parent: BodyMotion, q: Array, v: Array, a: Array) -> tuple[BodyMotion, MovedSubtree]:
+    # Compiled code keeps few values in memory if a body's subtree is computed together with its motion.
+    motion, joint = move_child(body, parent, q, v, a)
+    return motion, MovedSubtree(joint, Subtree.of_body(body.inertia, motion))
 
 
-def _add_subtree(body: Body, subtree: Subtree, parent: Subtree) -> tuple[Subtree, None]:
-    return parent + subtree, None
+def _add_subtree(body: Body, subtree: Subtree, parent: Subtree) -> Subtree:
+    return parent + subtree
 
 
-def _respond(body: Body, subtree: Subtree, joint: JointMotion) -> tuple[Response, Entries]:
+def _respond(body: Body, subtree: Subtree, joint: JointMotion) -> tuple[JointResponse, Entries]:
     response = respond(subtree, joint)
     return response, by_ancestor(response, joint)
 
 
-def _entries(body: Body, response: Response, joint: JointMotion) -> tuple[Response, Entries, Entries]:
+def _entries(
+    body: Body, response: JointResponse, joint: JointMotion
+) -> tuple[JointResponse, Entries, Entries]:
     # All vectors are in the axes of the root: the response is the same at every ancestor.
     return response, by_ancestor(response, joint), of_ancestor(response, joint)
 
 
-def _base_entries(response: Response, base: Base) -> tuple[Entries, tuple[list[Array], ...]]:
+def _base_entries(response: JointResponse, base: Base) -> tuple[Entries, tuple[list[Array], ...]]:
     """Return the derivatives of the torque of the joint by the coordinates of a floating base, and those of
     the base's wrench by the coordinate of the joint."""
     columns = by_base(response.IS, response.BS, base)
@@ -201,7 +213,7 @@ def move_child(
     return BodyMotion(np.asarray(R), p, velocity, total), JointMotion(S, first, second)
 
 
-def respond(subtree: Subtree, joint: JointMotion) -> Response:
+def respond(subtree: Subtree, joint: JointMotion) -> JointResponse:
     """Return the response of the subtree of a joint."""
     inertia, f, E = subtree.inertia, subtree.momentum, subtree.E
     (linear, angular), first, second = joint
@@ -213,10 +225,12 @@ def respond(subtree: Subtree, joint: JointMotion) -> Response:
     turned = cross(angular, force), cross(angular, moment) + cross(linear, force)
     by_q = add_spatial(_twice(coriolis(first[1])), add_spatial(inertia.momentum(*second), turned))
     by_v = _twice(add_spatial(coriolis(angular), inertia.momentum(*first)))
-    return Response(inertia.momentum(linear, angular), cross(f, linear) + rotate_back(E, angular), by_q, by_v)
+    return JointResponse(
+        inertia.momentum(linear, angular), cross(f, linear) + rotate_back(E, angular), by_q, by_v
+    )
 
 
-def by_ancestor(response: Response, joint: JointMotion) -> Entries:
+def by_ancestor(response: JointResponse, joint: JointMotion) -> Entries:
     """Return the derivatives of the torque of the responding joint by the coordinate of an ancestor."""
     IS, BS = response.IS, response.BS
     return Entries(
@@ -226,7 +240,7 @@ def by_ancestor(response: Response, joint: JointMotion) -> Entries:
     )
 
 
-def of_ancestor(response: Response, joint: JointMotion) -> Entries:
+def of_ancestor(response: JointResponse, joint: JointMotion) -> Entries:
     """Return the derivatives of the torque of an ancestor by the coordinate of the responding joint."""
     return Entries(*(_dot(joint.S, x) for x in (response.by_q, response.by_v, response.IS)))
 
@@ -234,7 +248,7 @@ def of_ancestor(response: Response, joint: JointMotion) -> Entries:
 def by_base(IS: SpatialVector, BS: Array, base: Base) -> Entries:
     """Return the derivatives (..., 6) of a torque by the coordinates of a floating base.
 
-    `IS` and `BS` are those of the joint (`Response`).
+    `IS` and `BS` are those of the joint (`JointResponse`).
     """
     force, moment = IS
     by_rotation = cross(base.gravity, force)

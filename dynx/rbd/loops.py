@@ -70,6 +70,13 @@ class Loops(ABC):
         """
 
     @abstractmethod
+    def subtrees(self, step: Callable[..., Total], totals: Sequence[Total], *columns: Any) -> Sequence[Total]:
+        """Sum as `inward` does, by a step that returns the parent's new total alone.
+
+        On a fixed base nothing is added to the root, of which no algorithm needs the total.
+        """
+
+    @abstractmethod
     def matrices(self, n: int, like: Array, *, blocks: int | None = None, width: int = 1) -> Any:
         """Return `n` matrices of zeros with nv rows, for `to_root`, `base_block` and `assembled`.
 
@@ -144,14 +151,17 @@ class PythonLoops(Loops):
         return step(self.mechanism, *arguments)
 
     def each(self, step: Callable[..., Result], *columns: Any, stored: bool = True) -> Sequence[Result]:
-        return [step(body, *self._values(columns, k)) for k, body in enumerate(self.mechanism.bodies)]
+        return [
+            step(body, *values)
+            for body, values in zip(self.mechanism.bodies, self._rows(columns), strict=True)
+        ]
 
     def outward(
         self, step: Callable[..., tuple[State, Result]], root: State, *columns: Any
     ) -> tuple[Sequence[State], Sequence[Result]]:
         states, results = [root], list[Result]()
-        for k, body in enumerate(self.mechanism.bodies):
-            state, result = step(body, states[body.parent + 1], *self._values(columns, k))
+        for body, values in zip(self.mechanism.bodies, self._rows(columns), strict=True):
+            state, result = step(body, states[body.parent + 1], *values)
             states.append(state)
             results.append(result)
         return states, results
@@ -159,13 +169,22 @@ class PythonLoops(Loops):
     def inward(
         self, step: Callable[..., tuple[Total, Result]], totals: Sequence[Total], *columns: Any
     ) -> tuple[Sequence[Total], Sequence[Result]]:
+        bodies, rows = self.mechanism.bodies, self._rows(columns)
         sums, results = list(totals), list[Result]()
-        for k in reversed(range(len(self.mechanism.bodies))):
-            body = self.mechanism.bodies[k]
-            parent = body.parent + 1
-            sums[parent], result = step(body, sums[k + 1], sums[parent], *self._values(columns, k))
+        for k in reversed(range(len(bodies))):
+            parent = bodies[k].parent + 1
+            sums[parent], result = step(bodies[k], sums[k + 1], sums[parent], *rows[k])
             results.append(result)
         return sums, results[::-1]
+
+    def subtrees(self, step: Callable[..., Total], totals: Sequence[Total], *columns: Any) -> Sequence[Total]:
+        bodies, rows = self.mechanism.bodies, self._rows(columns)
+        sums = list(totals)
+        for k in reversed(range(len(bodies))):
+            parent = bodies[k].parent + 1
+            if parent or self.mechanism.floating:
+                sums[parent] = step(bodies[k], sums[k + 1], sums[parent], *rows[k])
+        return sums
 
     def matrices(self, n: int, like: Array, *, blocks: int | None = None, width: int = 1) -> _Matrices:
         zero = 0 * np.sum(like, axis=-1)
@@ -186,19 +205,19 @@ class PythonLoops(Loops):
     ) -> None:
         bodies = self.mechanism.bodies
         first = self.mechanism.nv - len(bodies)
+        own, below, here = (self._rows(columns) for columns in (own, below, here))
         for index, body in enumerate(bodies):
             column = first + index
-            response, entries = start(body, *self._values(own, index))
+            response, entries = start(body, *own[index])
             matrices.put(column, column, entries)
             last, row = index, body.parent
             while row != ROOT:
-                values = *self._values(below, last), *self._values(here, row)
-                response, by, of = pair(bodies[row], response, *values)
+                response, by, of = pair(bodies[row], response, *below[last], *here[row])
                 matrices.put(column, first + row, by)
                 matrices.put(first + row, column, of)
                 last, row = row, bodies[row].parent
             if self.mechanism.floating:
-                by, of = base(response, *self._values(below, last), *at_base)
+                by, of = base(response, *below[last], *at_base)
                 for k in range(6):
                     matrices.put(column, k, [row_entries[..., k] for row_entries in by])
                     matrices.put(k, column, [entries[k] for entries in of])
@@ -216,12 +235,12 @@ class PythonLoops(Loops):
         at_base: Columns,
     ) -> None:
         bodies = self.mechanism.bodies
-        first = self.mechanism.nv - len(bodies)
+        first, rows = self.mechanism.nv - len(bodies), self._rows(here)
         for column, frame in moving_frames(self.mechanism, frames):
             row = frame.body
-            response = start(frame, *self._values(own, row))
+            response = start(frame, *(column[row - len(bodies)] for column in own))
             while row != ROOT:
-                entries = entry(bodies[row], response, *self._values(here, row))
+                entries = entry(bodies[row], response, *rows[row])
                 matrices.put(first + row, column, entries)
                 row = bodies[row].parent
             if self.mechanism.floating:
@@ -243,15 +262,19 @@ class PythonLoops(Loops):
             return np.concatenate([*base, *(append_axis(joint) for joint in joints)], axis=-1)
         return np.stack(joints, axis=-1) if joints else np.zeros(like.shape)
 
-    def _values(self, columns: Columns, index: int) -> list[Any]:
-        """Return the values of columns for a body; the last entries of arrays are those of the joints."""
-        place = index - len(self.mechanism.bodies)
-        return [
-            np.asarray(column[..., column.shape[-1] + place])
-            if isinstance(column, np.ndarray)
-            else column[place]
-            for column in columns
-        ]
+    def _rows(self, columns: Columns) -> Sequence[Sequence[Any]]:
+        """Return the values of columns for every body; the last entries of arrays are those of the joints."""
+        n = len(self.mechanism.bodies)
+        if not columns:
+            return [()] * n
+        values = []
+        for column in columns:
+            if isinstance(column, np.ndarray):
+                end = column.shape[-1]
+                values.append([np.asarray(column[..., k]) for k in range(end - n, end)])
+            else:
+                values.append(column[len(column) - n :])
+        return list(zip(*values, strict=True))
 
 
 class _Matrices:
@@ -277,7 +300,7 @@ class _Matrices:
         return tuple(self._assembled(table) for table in self._tables)
 
     def _assembled(self, table: list[list[Array]]) -> Array:
-        shapes = {np.shape(entry) for row in table for entry in row}
+        shapes = {getattr(entry, "shape", ()) for row in table for entry in row}
         if len(shapes) > 1:
             shape = np.broadcast_shapes(*shapes)
             table = [[np.broadcast_to(entry, shape) for entry in row] for row in table]

@@ -55,7 +55,7 @@ def inertial_regressor_at(
 
 
 @dataclass(frozen=True)
-class BodyState:
+class BodyKinematics:
     """Rotation R and position p of a body, its angular velocity, the proper acceleration of its origin
     (acceleration minus gravity) and its angular acceleration, in world axes."""
 
@@ -104,17 +104,19 @@ def _regressor(loops: Loops, poses: Sequence[BodyPose], v: Array, a: Array, fram
     return loops.assembled(Y)[0]
 
 
-def _root_state(mechanism: Mechanism, pose: BodyPose, v: Array, a: Array) -> BodyState:
+def _root_state(mechanism: Mechanism, pose: BodyPose, v: Array, a: Array) -> BodyKinematics:
     R, p = pose
     if not mechanism.floating:
-        return BodyState(R, p, 0 * p, 0 * p - mechanism.gravity, 0 * p)
+        return BodyKinematics(R, p, 0 * p, 0 * p - mechanism.gravity, 0 * p)
     # v is expressed in axes that rotate with the base: the acceleration in the world includes omega x v.
     omega = rotate(R, v[..., 3:6])
     acceleration = rotate(R, a[..., :3]) + cross(omega, rotate(R, v[..., :3])) - mechanism.gravity
-    return BodyState(R, p, omega, acceleration, rotate(R, a[..., 3:6]))
+    return BodyKinematics(R, p, omega, acceleration, rotate(R, a[..., 3:6]))
 
 
-def _move(body: Body, parent: BodyState, pose: BodyPose, v: Array, a: Array) -> tuple[BodyState, Array]:
+def _move(
+    body: Body, parent: BodyKinematics, pose: BodyPose, v: Array, a: Array
+) -> tuple[BodyKinematics, Array]:
     """Return the state of a body, and the axis of its joint in world axes."""
     R, p = pose
     axis = rotate(R, body.axis)
@@ -123,16 +125,18 @@ def _move(body: Body, parent: BodyState, pose: BodyPose, v: Array, a: Array) -> 
     across = cross(parent.omega, speed)
     if body.revolute:
         alpha = parent.alpha + joint_acceleration + across
-        return BodyState(R, p, parent.omega + speed, acceleration, alpha), axis
-    return BodyState(R, p, parent.omega, acceleration + joint_acceleration + 2 * across, parent.alpha), axis
+        return BodyKinematics(R, p, parent.omega + speed, acceleration, alpha), axis
+    return BodyKinematics(
+        R, p, parent.omega, acceleration + joint_acceleration + 2 * across, parent.alpha
+    ), axis
 
 
-def _fixed_point_acceleration(body: BodyState, lever: Array) -> Array:
+def _fixed_point_acceleration(body: BodyKinematics, lever: Array) -> Array:
     """Return the acceleration of a point of a body relative to its origin, from which it is `lever` away."""
     return cross(body.alpha, lever) + cross(body.omega, cross(body.omega, lever))
 
 
-def _frame_motion(frame: BodyFrame, body: BodyState) -> FrameMotion:
+def _frame_motion(frame: BodyFrame, body: BodyKinematics) -> FrameMotion:
     R, p = body.R @ frame.R, body.p + rotate(body.R, frame.p)
     d = rotate_back(R, body.acceleration + _fixed_point_acceleration(body, p - body.p))
     d, omega, alpha = np.broadcast_arrays(d, rotate_back(R, body.omega), rotate_back(R, body.alpha))
@@ -141,14 +145,14 @@ def _frame_motion(frame: BodyFrame, body: BodyState) -> FrameMotion:
     return FrameMotion(R, p, d, skew(alpha) + W @ W, moments)
 
 
-def _row(body: Body, frame: FrameMotion, state: BodyState, axis: Array) -> tuple[Array]:
+def _row(body: Body, frame: FrameMotion, state: BodyKinematics, axis: Array) -> tuple[Array]:
     """Return the row of the regressor for the joint of a body that moves the frame."""
     if body.revolute:
         return (_rotation_row(frame, axis, state.p),)
     return (_translation_row(frame, axis),)
 
 
-def _base_rows(frame: FrameMotion, root: BodyState) -> tuple[list[Array]]:
+def _base_rows(frame: FrameMotion, root: BodyKinematics) -> tuple[list[Array]]:
     axes = [root.R[..., k] for k in range(3)]
     translations = [_translation_row(frame, axis) for axis in axes]
     return ([*translations, *(_rotation_row(frame, axis, root.p) for axis in axes)],)

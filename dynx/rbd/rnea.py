@@ -68,7 +68,7 @@ class Motion:
         return np.asarray(self.proper_acceleration + rotate(self.acceleration_matrix, p))
 
 
-class Moved(NamedTuple):
+class LoadedBody(NamedTuple):
     """Placement of a body whose joint moves, and the wrench that moves the body."""
 
     placement: Placement
@@ -95,16 +95,16 @@ def _root_wrench(mechanism: Mechanism, motion: Motion) -> SpatialVector:
     return body_wrench(mechanism.root, motion)
 
 
-def _move(body: Body, parent: Motion, q: Array, v: Array, a: Array) -> tuple[Motion, Moved]:
+def _move(body: Body, parent: Motion, q: Array, v: Array, a: Array) -> tuple[Motion, LoadedBody]:
     # A body's wrench is computed together with its motion, most of which nothing else needs: compiled code
     # then keeps few values in memory, which makes that of a humanoid a quarter faster.
     placement = Placement.of(body, q)
     motion = child_motion(body, placement, parent, v, a)
-    return motion, Moved(placement, body_wrench(body.inertia, motion))
+    return motion, LoadedBody(placement, body_wrench(body.inertia, motion))
 
 
 def _react(
-    body: Body, wrench: SpatialVector, parent: SpatialVector, moved: Moved
+    body: Body, wrench: SpatialVector, parent: SpatialVector, moved: LoadedBody
 ) -> tuple[SpatialVector, Array]:
     """Add the wrench on a body to that on its parent; return also the torque of its joint."""
     force, moment = wrench

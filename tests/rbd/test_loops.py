@@ -140,6 +140,15 @@ def test_totals_are_summed_inward() -> None:
 
 
 @pytest.mark.parametrize("base", ["fixed", "floating"])
+def test_subtrees_are_summed_without_the_root_of_a_fixed_base(base: str) -> None:
+    totals = _numbered_tree(base).subtrees(
+        lambda body, total, parent, name: f"{parent}{total}{name}", ["r", "0", "1", "2", "3", "4"], "abcde"
+    )
+    assert totals[1:] == ["034ed12cb", "12c", "2", "34e", "4"]
+    assert totals[0] == ("r" + totals[1] + "a" if base == "floating" else "r")
+
+
+@pytest.mark.parametrize("base", ["fixed", "floating"])
 def test_responses_are_carried_to_the_root(base: str) -> None:
     """The entry of joint i and ancestor j is 100 i + 10 j, plus 1 in the row of i, plus a path's length."""
     loops = _numbered_tree(base)
