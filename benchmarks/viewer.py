@@ -28,7 +28,7 @@ from typing import Any, NamedTuple
 import dynx
 from dynx.viewer.library import CLIENT, serve, silent
 from dynx.viewer.page import DEFAULT_HOST, _free_port
-from dynx.viewer.surfaces.reduction import TRIANGLE_BUDGET
+from dynx.viewer.triangles import TRIANGLE_BUDGET
 from tests.viewer.conftest import BROWSERS, SOFTWARE
 
 PATIENCE = 120.0

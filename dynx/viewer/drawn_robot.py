@@ -17,9 +17,15 @@ from dynx.rbd.link_poses import link_poses
 from dynx.spatial.scalar import Floats
 from dynx.viewer.colours import GREY, ORANGE, RGB
 from dynx.viewer.drawn_parts import DrawnParts, wxyz
-from dynx.viewer.surfaces.orientation import turned_outwards
-from dynx.viewer.surfaces.reduction import TRIANGLE_BUDGET, budgets, reduced
-from dynx.viewer.surfaces.triangles import Triangles, hull_of, resized
+from dynx.viewer.triangles import (
+    TRIANGLE_BUDGET,
+    Triangles,
+    budgets,
+    hull_of,
+    reduced,
+    resized,
+    turned_outwards,
+)
 
 COLLISION_OPACITY = 0.4
 GHOST_OPACITY = 0.3

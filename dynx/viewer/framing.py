@@ -14,7 +14,7 @@ from dynx.model import Model
 from dynx.model.geometry import HeightField, Plane, Shape
 from dynx.model.geometry.visible_shapes import link_shapes
 from dynx.spatial.scalar import Floats
-from dynx.viewer.surfaces.triangles import triangles_of
+from dynx.viewer.triangles import triangles_of
 
 if TYPE_CHECKING:
     from dynx.world.scene import SceneBody

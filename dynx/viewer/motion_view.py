@@ -10,16 +10,14 @@ import numpy as np
 
 from dynx.spatial.scalar import Floats
 from dynx.viewer.colours import BLUE, SKY_BLUE, css
-from dynx.viewer.contact_arrows import ContactArrows
-from dynx.viewer.curves import Curves
 from dynx.viewer.drawn_robot import AS_DESCRIBED, GHOST_OPACITY, GHOST_SIZE, Look
-from dynx.viewer.drawn_scene import DrawnScene
+from dynx.viewer.drawn_scene import ContactArrows, DrawnScene
 from dynx.viewer.following_camera import FollowingCamera
 from dynx.viewer.framing import box_around, has_ground
 from dynx.viewer.marks import NamedParts
 from dynx.viewer.motion import PARTED, Motion, motion_separation
 from dynx.viewer.page import Page
-from dynx.viewer.timeline import Timeline
+from dynx.viewer.timeline import Curves, Timeline
 
 _NO_PART = "none"
 

@@ -19,7 +19,7 @@ from dynx.viewer.controls import Controls
 from dynx.viewer.drawn_robot import Look
 from dynx.viewer.page import DEFAULT_HOST, DEFAULT_PORT, Page
 from dynx.viewer.subjects import check_options, check_switches, is_world, open_subject, title_of, view_of
-from dynx.viewer.surfaces.reduction import TRIANGLE_BUDGET, has_graphics_processor
+from dynx.viewer.triangles import TRIANGLE_BUDGET, has_graphics_processor
 
 PICTURE_SIZE = (960, 720)
 """Width and height of an exported picture [pixels]."""
@@ -171,8 +171,7 @@ class Viewer(Controls):
         number of pictures drawn). Raises ArgumentError for a live world, whose motion is not known before it
         has happened, for another suffix, and for a file that cannot be written.
         """
-        from dynx.viewer.export.film import camera_for, picture_of, write_film, write_picture
-        from dynx.viewer.export.recording import write_recording
+        from dynx.viewer.export import camera_for, picture_of, write_film, write_picture, write_recording
 
         self.page.check_open()
         view = self.view

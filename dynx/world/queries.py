@@ -2,25 +2,123 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from dynx.distance import Distance
+from dynx.distance.solids import Solid, distance_of_solids
 from dynx.errors import ArgumentError, ShapeError, UnknownNameError, shown
+from dynx.model.geometry import HeightField, Plane, Shape
+from dynx.model.geometry.ray_casting import cast_on_shape
 from dynx.model.numbers import MAX_MAGNITUDE, checked_array, checked_vector, is_real
 from dynx.spatial.scalar import Floats
 from dynx.steppers.layout import Layout
-from dynx.steppers.native_queries import NativeQueries, native_queries_of
+from dynx.steppers.native_queries import NativeQueries, RayHit, native_queries_of
 from dynx.steppers.state import WorldState
 from dynx.steppers.stepper import Stepper, TouchingPoint
 from dynx.world.contacts import ClosestPoints, Contact, RayHits
-from dynx.world.geometry.boxes import collider_box
-from dynx.world.geometry.distances import Distances
-from dynx.world.geometry.first_hits import first_hits
+from dynx.world.geometry.boxes import collider_box, shape_box
 from dynx.world.geometry.owner_poses import OwnerPoses
 from dynx.world.scene import Scene
+
+
+class Distances:
+    """Distances of the colliders of one layout."""
+
+    def __init__(self, layout: Layout) -> None:
+        self._layout = layout
+        self._solids: dict[int, list[Solid]] = {}
+
+    def closest(
+        self, state: WorldState, first: list[int], second: list[int], within: float
+    ) -> Iterator[tuple[int, int, Distance]]:
+        """Yield the distance of each pair of colliders that are at most `within` [m] apart.
+
+        Of colliders with several shapes it is the pair of shapes with the least signed distance.
+        """
+        poses = OwnerPoses(self._layout, state)
+        placed = {number: self._placed(number, poses) for number in {*first, *second}}
+        for i in first:
+            for j in second:
+                if i == j:
+                    continue
+                best: Distance | None = None
+                for solid_a, T_a, ball_a in placed[i]:
+                    for solid_b, T_b, ball_b in placed[j]:
+                        limit = within if best is None else best.distance
+                        if math.dist(ball_a[:3], ball_b[:3]) - ball_a[3] - ball_b[3] > limit:
+                            continue
+                        found = distance_of_solids(solid_a, T_a, solid_b, T_b, limit)
+                        if found is not None and found.distance <= limit:
+                            best = found
+                if best is not None:
+                    yield i, j, best
+
+    def _placed(self, number: int, poses: OwnerPoses) -> list[tuple[Solid, Floats, list[float]]]:
+        """Return the solids of a collider, each with its pose and the ball around it."""
+        collider = self._layout.colliders[number]
+        if number not in self._solids:
+            self._solids[number] = [Solid(placed.shape, placed.T) for placed in collider.shapes]
+        pose = poses[collider.owner]
+        return [solid.place(pose) for solid in self._solids[number]]
+
+
+_ROUNDING = 1.0 + 1e-9
+"""Factor by which a ball around a shape is enlarged, so that rounding loses no hit on its surface."""
+
+
+def first_hits(
+    layout: Layout, poses: OwnerPoses, origins: Floats, directions: Floats, length: float
+) -> list[RayHit]:
+    """Return what rays from `origins` (n, 3) along unit `directions` (n, 3) hit first within `length` [m].
+
+    Only rays that pass the ball around a shape are intersected with it.
+    """
+    n = len(origins)
+    first, nearest, normals = np.full(n, -1), np.full(n, np.inf), np.full((n, 3), np.nan)
+    for number, collider in enumerate(layout.colliders):
+        T_world_owner = poses[collider.owner]
+        for placed in collider.shapes:
+            T = T_world_owner @ placed.T
+            rays = np.flatnonzero(_near(placed.shape, T, origins, directions))
+            if not rays.size:
+                continue
+            distance, normal = cast_on_shape(placed.shape, T, origins[rays], directions[rays])
+            nearer = (distance < nearest[rays]) & (distance <= length)
+            rays = rays[nearer]
+            first[rays] = number
+            nearest[rays], normals[rays] = distance[nearer], normal[nearer]
+    return [
+        RayHit(None if number < 0 else number, distance, normal)
+        for number, distance, normal in zip(first.tolist(), nearest.tolist(), normals, strict=True)
+    ]
+
+
+def _near(shape: Shape, T: Floats, origins: Floats, directions: Floats) -> NDArray[np.bool_]:
+    """Return which rays (n,) pass the ball around a shape at the pose T (4, 4), and begin before its end."""
+    middle, radius = _ball(shape)
+    if not math.isfinite(radius):
+        return np.ones(len(origins), dtype=bool)
+    away = origins - (T[:3, :3] @ middle + T[:3, 3])
+    along = np.einsum("ij,ij->i", away, directions)
+    beside = away - along[:, None] * directions
+    near: NDArray[np.bool_] = (np.einsum("ij,ij->i", beside, beside) <= radius * radius) & (along <= radius)
+    return near
+
+
+@lru_cache(maxsize=1024)
+def _ball(shape: Shape) -> tuple[Floats, float]:
+    """Return the middle (3,) and the radius of a ball around a shape; infinite for a ground."""
+    if isinstance(shape, Plane | HeightField):
+        return np.zeros(3), math.inf
+    low, high = shape_box(shape, np.eye(4))
+    return 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low)) * _ROUNDING
+
 
 MAX_RAY_LENGTH = 1e4
 """Length of rays without a given one [m]."""

@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+import hashlib
+import math
 import os
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.distance.avoidance import Avoidance
-from dynx.errors import ArgumentError
-from dynx.model import Model
+from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
+from dynx.model import Model, Pose
+from dynx.model.geometry import Mesh
 from dynx.model.numbers import positive_seconds, whole_number
 from dynx.model.package_paths import StrPath
 from dynx.option_names import checks_option_names
 from dynx.registry import door
 from dynx.spatial.scalar import Floats
 from dynx.steppers.forces import ExternalForce
+from dynx.steppers.layout import Layout
 from dynx.steppers.materials import InexactMaterial, inexact_materials, open_engine
 from dynx.steppers.registry import renderer_of, world_class
 from dynx.steppers.settings import changed_settings, checked_settings, checked_switches
@@ -25,20 +32,99 @@ from dynx.steppers.stepper import Stepper
 from dynx.world.camera import Camera, Picture, cast_rays, draw_picture
 from dynx.world.commands import Commands, MotorsOf, with_scene_motors
 from dynx.world.contacts import ClosestPoints, Contact, RayHits
-from dynx.world.identity import identity
-from dynx.world.motion import Motion
+from dynx.world.motion import Motion, apply_state, checked_state
 from dynx.world.notes.overlaps import Overlap, overlaps_of
 from dynx.world.notes.start_notes import notes_on_engine, notes_on_start
 from dynx.world.preparation import prepare
-from dynx.world.present import scene_at
 from dynx.world.queries import MAX_RAY_LENGTH, Queries
-from dynx.world.running import run_for
 from dynx.world.scene import Scene
 from dynx.world.scene.avoidance import MARGIN
 from dynx.world.scene.documents import scene_document, scene_from_document
 from dynx.world.scene.paths import ScenePaths
 from dynx.world.snapshot import Snapshot, read_snapshot, write_snapshot
-from dynx.world.state_checks import apply_state, checked_state
+
+
+def scene_at(scene: Scene, state: WorldState) -> Scene:
+    """Return the scene with its robots and bodies where they are at a state, at rest."""
+    robots = [replace(robot, q=tuple(state.robots[robot.name].q.tolist()), v=None) for robot in scene.robots]
+    bodies = [
+        body
+        if body.fixed
+        else replace(body, pose=Pose.from_matrix(state.bodies[body.name].T_world_body), twist=(0.0,) * 6)
+        for body in scene.bodies
+    ]
+    return replace(scene, robots=tuple(robots), bodies=tuple(bodies))
+
+
+TIME_ROUNDING = 1e-9
+"""Tolerance within which the ratio of two times counts as a whole number."""
+
+
+def run_for(
+    duration: float,
+    dt: float,
+    step: Callable[..., None],
+    fixed: Mapping[str, Any],
+    loads: Callable[[], object] | None,
+    *,
+    real_time: bool,
+) -> None:
+    """Take steps for `duration` [s], rounded up to a multiple of `dt`, with the loads of a function or fixed
+    ones."""
+    n = max(1, math.ceil(positive_seconds("duration", duration) / dt - TIME_ROUNDING))
+    if loads is None and not real_time:
+        step(n, **fixed)
+        return
+    began = time.perf_counter()
+    for k in range(n):
+        step(1, **(fixed if loads is None else _loads_of(loads, fixed)))
+        if real_time:
+            time.sleep(max(0.0, began + (k + 1) * dt - time.perf_counter()))
+
+
+def _loads_of(loads: Callable[[], object], fixed: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the arguments of the next step: those that `loads` gives, or else the fixed ones.
+
+    Raises ArgumentError unless it gives a dict of torques, motors and forces.
+    """
+    given = loads()
+    if not isinstance(given, Mapping):
+        raise ArgumentError(f"loads returned {shown(given)}; wanted a dict of {', '.join(fixed)}")
+    for name in given:
+        if name not in fixed:
+            raise UnknownNameError(f"loads returned {shown(name)}{nearest(str(name), fixed)}")
+    return {**fixed, **given}
+
+
+def identity(layout: Layout, options: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of a layout and of the options of its world."""
+    digest = hashlib.sha256()
+    _feed(digest, layout)
+    _feed(digest, sorted(options.items()))
+    return digest.hexdigest()
+
+
+def _feed(digest: Any, value: Any) -> None:
+    digest.update(type(value).__name__.encode())
+    if isinstance(value, np.ndarray):
+        digest.update(repr(value.shape).encode() + np.ascontiguousarray(value).tobytes())
+    elif isinstance(value, Model):
+        for part in (value.name, value.base, value.base_pose, value.gravity, value.links, value.joints):
+            _feed(digest, part)
+    elif isinstance(value, Mesh):
+        # The content of the file, not its place.
+        _feed(digest, value.hull)
+    elif is_dataclass(value):
+        for field in fields(value):
+            if field.compare:
+                _feed(digest, getattr(value, field.name))
+    elif isinstance(value, tuple | list):
+        digest.update(repr(len(value)).encode())
+        for each in value:
+            _feed(digest, each)
+    else:
+        digest.update(repr(value).encode())
+
 
 SHORTEST_STEP = 1e-9
 """Shortest step of an engine [s]."""

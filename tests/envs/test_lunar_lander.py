@@ -25,11 +25,13 @@ from dynx.envs.tasks.lunar_lander.craft import (
     LEG_LIMITS,
     LEG_MASS,
     clearance,
+    force_at_center,
     ground_heights,
     lander_model,
+    main_thrust,
+    side_thrust,
 )
 from dynx.envs.tasks.lunar_lander.task import LunarLander
-from dynx.envs.tasks.lunar_lander.thrust import force_at_center, main_thrust, side_thrust
 from dynx.errors import ArgumentError
 from dynx.steppers.registry import installed_worlds
 

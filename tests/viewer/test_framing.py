@@ -15,7 +15,7 @@ from dynx.spatial.scalar import Floats
 from dynx.viewer import view
 from dynx.viewer.drawn_robot import GHOST_SIZE
 from dynx.viewer.framing import VIEW_DIRECTION, box_around, fitting_distance, has_ground, round_length
-from dynx.viewer.surfaces.triangles import resized, triangles_of
+from dynx.viewer.triangles import resized, triangles_of
 from dynx.world import World
 from dynx.world.camera import Camera
 from dynx.world.scene import box, ground, read_scene

@@ -12,9 +12,8 @@ from dynx.model import Inertial, Pose
 from dynx.model.geometry.visible_shapes import link_shapes
 from dynx.spatial.so3 import rotation_from_rpy
 from dynx.viewer.controls import slider_step
-from dynx.viewer.marks import equivalent_solid
-from dynx.viewer.name_labels import centre_of
-from dynx.viewer.surfaces.triangles import triangles_of
+from dynx.viewer.marks import centre_of, equivalent_solid
+from dynx.viewer.triangles import triangles_of
 from dynx.world import World
 from dynx.world.scene import read_scene
 

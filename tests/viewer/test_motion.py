@@ -11,8 +11,7 @@ import dynx
 from dynx.errors import ArgumentError
 from dynx.sim import ScenePlant
 from dynx.spatial.scalar import Floats
-from dynx.viewer.curves import Curves, _power
-from dynx.viewer.export.film import camera_for, film_length, picture_of
+from dynx.viewer.export import camera_for, film_length, picture_of
 from dynx.viewer.motion import (
     MAX_FRAMES,
     Motion,
@@ -23,6 +22,7 @@ from dynx.viewer.motion import (
 )
 from dynx.viewer.motion_view import MotionView
 from dynx.viewer.page import Page
+from dynx.viewer.timeline import Curves, _power
 from dynx.world import Scene, SceneRobot, box, ground
 from dynx.world.comparison import compare_engines
 from dynx.world.scene import read_scene

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import dynx
-from dynx.viewer.name_labels import CORNERS, arranged, overlap, rectangle, seen_by
+from dynx.viewer.marks import CORNERS, arranged, overlap, rectangle, seen_by
 
 pixels = st.floats(0.0, 300.0)
 

@@ -13,11 +13,19 @@ from hypothesis import strategies as st
 
 import dynx
 from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Shape, Sphere, solid_properties
+from dynx.viewer import triangles as meshes_module
 from dynx.viewer.library import simplify
-from dynx.viewer.surfaces import reduction
-from dynx.viewer.surfaces.orientation import turned_outwards
-from dynx.viewer.surfaces.reduction import FEWEST_TRIANGLES, TRIANGLE_BUDGET, budgets, reduced
-from dynx.viewer.surfaces.triangles import Triangles, distinct_rows, hull_of, triangles_of
+from dynx.viewer.triangles import (
+    FEWEST_TRIANGLES,
+    TRIANGLE_BUDGET,
+    Triangles,
+    budgets,
+    distinct_rows,
+    hull_of,
+    reduced,
+    triangles_of,
+    turned_outwards,
+)
 from tests.conftest import needs_examples
 
 SOLIDS: list[Shape] = [Box((0.1, 0.2, 0.3)), Sphere(0.4), Cylinder(0.2, 0.5), Capsule(0.1, 0.3)]
@@ -112,11 +120,11 @@ def test_reduced_meshes_are_kept_on_disk(tmp_path: Path, monkeypatch: pytest.Mon
         counts.append(target_count)
         return simplify(*given, target_count=target_count)
 
-    monkeypatch.setattr(reduction, "simplify", counted)
+    monkeypatch.setattr(meshes_module, "simplify", counted)
     mesh = ball(tmp_path)
 
     def again(mesh: Mesh, budget: int) -> Triangles:
-        reduction._reduced.cache_clear()
+        meshes_module._reduced.cache_clear()
         return reduced(mesh, budget)
 
     first = again(mesh, 200)
@@ -138,7 +146,7 @@ def test_reduced_meshes_are_kept_on_disk(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setenv("DYNX_CACHE", "0")
     assert all(map(np.array_equal, again(mesh, 200), first))
     assert counts[4:] == [200, 200]
-    reduction._reduced.cache_clear()
+    meshes_module._reduced.cache_clear()
 
 
 @needs_examples

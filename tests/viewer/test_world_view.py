@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from dynx.errors import ArgumentError, DynxError
-from dynx.viewer.spring import Pull
-from dynx.viewer.world_view import _NO_PART_CHOSEN
+from dynx.viewer.world_view import _NO_PART_CHOSEN, Pull
 from dynx.world import ExternalForce, Scene, World, box, ground
 from dynx.world.scene import read_scene
 from tests.viewer.conftest import until

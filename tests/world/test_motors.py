@@ -19,7 +19,7 @@ from dynx.world import (
     World,
     ground,
 )
-from dynx.world.loads import RobotLoads
+from dynx.world.commands import RobotLoads
 from dynx.world.preparation import prepare
 from tests.world.engines import FAST_WORLDS, WORLDS
 from tests.world.standing import measure

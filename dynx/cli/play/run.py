@@ -22,7 +22,7 @@ from dynx.errors import ArgumentError
 from dynx.training import Evaluation, Policy, TaskSpec, judge, load_policy, make
 from dynx.training.file_tasks import task_of_file
 from dynx.training.policy import read_policy_document
-from dynx.viewer.export.gif import write_gif
+from dynx.viewer.export import write_gif
 
 DEFAULT_EPISODES = 10
 

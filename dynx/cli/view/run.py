@@ -94,7 +94,7 @@ def view(
 
 def _export(viewer: Viewer, path: str) -> None:
     from dynx.cli.shell.progress import progress_bar
-    from dynx.viewer.export.film import film_length
+    from dynx.viewer.export import film_length
 
     film = path.lower().endswith(".gif") and viewer.view.duration
     total = film_length(viewer.view.motions) if film else 0

@@ -16,8 +16,7 @@ from dynx.envs.robot.array_task import ArrayTask
 from dynx.envs.robot.pictures import draw_robot
 from dynx.envs.robot.state import State
 from dynx.envs.robot.step import ForwardDynamics, control_step
-from dynx.envs.robot.variation import RobotVariation
-from dynx.envs.robot.varied_robot import VariedRobot
+from dynx.envs.robot.varied_robot import RobotVariation, VariedRobot
 from dynx.envs.task import Episodes, Outcome
 from dynx.errors import DivergedError, ShapeError
 from dynx.model.numbers import DIVERGENCE_SPEED

@@ -5,17 +5,154 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dynx.errors import ArgumentError
+from dynx.model.geometry import HeightField, Mesh, Shape
+from dynx.model.geometry.ray_casting import cast_on_shape
 from dynx.model.geometry.visible_shapes import link_shapes
 from dynx.rbd.link_poses import link_poses
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import inverse
 from dynx.steppers.camera import Camera, Draw, Drawing, DrawnShape
 from dynx.steppers.state import WorldState
-from dynx.world.camera.buffer import DepthBuffer
 from dynx.world.camera.picture import Picture
+from dynx.world.geometry.boxes import shape_box
 from dynx.world.scene import Scene
+
+MAX_PAIRS = 1_000_000
+"""Largest number of pairs of a triangle and a pixel that are computed at once."""
+
+PIXEL_MARGIN = 1e-6
+"""Distance [pixels] from a triangle in the picture within which rounding may place a pixel's centre."""
+
+Whole = NDArray[np.intp]
+
+
+class DepthBuffer:
+    """Depth, normal and number of the shape seen in each pixel; all in the axes of the camera.
+
+    A ray has z = 1, so that its parameter is the depth. Primitives are intersected in closed form, triangles
+    by the signs of the volumes that a ray spans with their edges: two triangles share these bits for a common
+    edge, so that no ray passes between them. Surfaces are seen from both sides.
+    """
+
+    def __init__(self, camera: Camera) -> None:
+        self._camera = camera
+        self._x, self._y = camera.rays()
+        count = camera.size[0] * camera.size[1]
+        self.depth = np.full(count, np.inf)
+        self.normal = np.zeros((count, 3))
+        self.number = np.full(count, -1, np.intp)
+
+    def draw(self, number: int, shape: Shape, T: Floats) -> None:
+        """Draw a shape at the pose T (4, 4) in the frame of the camera, scale excluded."""
+        if isinstance(shape, Mesh | HeightField):
+            vertices, faces = shape.triangles if isinstance(shape, Mesh) else shape.triangles()
+            self._draw_triangles(number, vertices @ T[:3, :3].T + T[:3, 3], faces)
+            return
+        low, high = shape_box(shape, T)
+        first, last = self._window(low[None], high[None])
+        columns, rows = (np.arange(first[0, k], last[0, k] + 1) for k in range(2))
+        if not len(columns) or not len(rows):
+            return
+        pixels = (rows[:, None] * self._camera.size[0] + columns).ravel()
+        rays = self._rays(pixels)
+        start = self._camera.near * rays
+        distance, normal = cast_on_shape(shape, T, start, rays)
+        self._keep(number, pixels, distance + self._camera.near, normal)
+
+    def _rays(self, pixels: Whole) -> Floats:
+        width = self._camera.size[0]
+        return np.stack([self._x[pixels % width], self._y[pixels // width], np.ones(len(pixels))], axis=1)
+
+    def _window(self, low: Floats, high: Floats) -> tuple[Whole, Whole]:
+        """Return the first and last column and row (m, 2) of the pixels that boxes from `low` to `high`
+        (m, 3) can cover; the last is before the first for a box that is not seen."""
+        far = np.maximum(high[:, 2:], self._camera.near)
+        near = np.maximum(low[:, 2:], self._camera.near)
+        side = np.array(self._camera.size)
+        scale, middle = self._camera.focal_length, 0.5 * side - 0.5
+        with np.errstate(invalid="ignore", over="ignore"):
+            # An infinite box covers the picture: infinity divided by infinity is as good as no bound.
+            least = scale * np.fmin(low[:, :2] / near, low[:, :2] / far) + middle
+            most = scale * np.fmax(high[:, :2] / near, high[:, :2] / far) + middle
+        least, most = np.where(np.isnan(least), -np.inf, least), np.where(np.isnan(most), np.inf, most)
+        # One pixel of margin, because the bounds are rounded.
+        first = np.clip(np.floor(least), 0, side).astype(np.intp)
+        last = np.clip(np.ceil(most), -1, side - 1).astype(np.intp)
+        last[(high[:, 2] < self._camera.near) | (low[:, 2] > self._camera.far)] = -1
+        return first, last
+
+    def _draw_triangles(self, number: int, vertices: Floats, faces: Whole) -> None:
+        first, last = self._triangle_windows(vertices, faces)
+        seen = np.flatnonzero((last >= first).all(axis=1))
+        faces, first, sides = faces[seen], first[seen], (last - first + 1)[seen]
+        total = np.cumsum(sides[:, 0] * sides[:, 1])
+        begin = 0
+        while begin < len(faces):
+            done = total[begin - 1] if begin else 0
+            end = max(begin + 1, int(np.searchsorted(total, done + MAX_PAIRS, side="right")))
+            part = slice(begin, end)
+            self._draw_some(number, vertices[faces[part]], first[part], sides[part])
+            begin = end
+
+    def _triangle_windows(self, vertices: Floats, faces: Whole) -> tuple[Whole, Whole]:
+        """Return the first and last column and row (m, 2) of the pixels whose centres triangles can cover;
+        the last is before the first for a triangle that is not seen."""
+        corners = np.ascontiguousarray(faces.T)
+        z = vertices[:, 2]
+        behind = z < self._camera.near
+        side = np.array(self._camera.size)
+        first, last = np.empty((2, len(faces), 2), np.intp)
+        for axis in range(2):
+            with np.errstate(divide="ignore", invalid="ignore"):
+                image = self._camera.focal_length * vertices[:, axis] / z + (0.5 * side[axis] - 0.5)
+            a, b, c = image[corners]
+            least, most = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+            with np.errstate(invalid="ignore"):
+                first[:, axis] = np.ceil(np.clip(least - PIXEL_MARGIN, 0, side[axis]))
+                last[:, axis] = np.floor(np.clip(most + PIXEL_MARGIN, -1, side[axis] - 1))
+        hidden = behind[corners]
+        crossing = np.flatnonzero(hidden.any(axis=0))
+        if len(crossing):
+            points = vertices[faces[crossing]]
+            first[crossing], last[crossing] = self._window(points.min(axis=1), points.max(axis=1))
+        return first, last
+
+    def _draw_some(self, number: int, corners: Floats, first: Whole, sides: Whole) -> None:
+        a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+        edges = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+        normal = np.cross(b - a, c - a)
+        height = np.einsum("ij,ij->i", normal, a)
+        count = sides[:, 0] * sides[:, 1]
+        triangle = np.repeat(np.arange(len(corners)), count)
+        within = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count, count)
+        column = first[triangle, 0] + within % sides[triangle, 0]
+        row = first[triangle, 1] + within // sides[triangle, 0]
+        pixels = row * self._camera.size[0] + column
+        x, y = self._x[column], self._y[row]
+        signs = [
+            edges[triangle, k, 0] * x + edges[triangle, k, 1] * y + edges[triangle, k, 2] for k in range(3)
+        ]
+        inside = (np.minimum.reduce(signs) >= 0.0) | (np.maximum.reduce(signs) <= 0.0)
+        triangle, pixels, x, y = triangle[inside], pixels[inside], x[inside], y[inside]
+        slope = normal[triangle, 0] * x + normal[triangle, 1] * y + normal[triangle, 2]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            depth = np.where(slope != 0.0, height[triangle] / slope, np.inf)
+        order = np.lexsort((depth, pixels))
+        ahead = order[depth[order] >= self._camera.near]
+        nearest = ahead[np.unique(pixels[ahead], return_index=True)[1]]
+        self._keep(number, pixels[nearest], depth[nearest], normal[triangle[nearest]])
+
+    def _keep(self, number: int, pixels: Whole, depth: Floats, normal: Floats) -> None:
+        """Store what is nearer than all before; each pixel occurs once."""
+        better = (depth < self.depth[pixels]) & (depth <= self._camera.far)
+        chosen = pixels[better]
+        self.depth[chosen] = depth[better]
+        self.normal[chosen] = normal[better]
+        self.number[chosen] = number
+
 
 BACKGROUND = (0.85, 0.9, 0.95)
 """Colour of pixels in which nothing is seen."""

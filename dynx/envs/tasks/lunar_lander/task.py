@@ -29,20 +29,18 @@ from dynx.envs.tasks.lunar_lander.craft import (
     LEG_MOTOR,
     LEG_MOTORS,
     LEGS,
+    NO_FORCE,
     SCALE,
     WIDTH,
-    clearance,
-    ground_heights,
-    lander_scene,
-    velocity_after_push,
-)
-from dynx.envs.tasks.lunar_lander.thrust import (
-    NO_FORCE,
     added,
+    clearance,
     force_at_center,
+    ground_heights,
     gust,
+    lander_scene,
     main_thrust,
     side_thrust,
+    velocity_after_push,
 )
 from dynx.envs.world.scene_task import Episode
 from dynx.envs.world.task import WorldTask

@@ -1,15 +1,17 @@
-"""Pictures and films without a browser and without a display, drawn by the camera of `dynx.world`."""
+"""Pictures, films and pages of what the viewer shows, without a browser and without a display."""
 
 from __future__ import annotations
 
 import io
 import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.errors import ArgumentError, shown
+from dynx.files.reading import checked_path
 from dynx.files.writing import write_bytes
 from dynx.model import Model
 from dynx.model.geometry import Cylinder, Shape
@@ -19,11 +21,13 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_rpy
 from dynx.steppers.camera import DrawnShape
+from dynx.viewer.browser.client import standalone
 from dynx.viewer.colours import GREY, SKY_BLUE
 from dynx.viewer.drawn_robot import size_of
 from dynx.viewer.framing import VIEW_DIRECTION, box_around, fitting_distance
 from dynx.viewer.library import Image
 from dynx.viewer.motion import Motion
+from dynx.viewer.page import Page
 from dynx.world.camera import Camera, cast_rays
 from dynx.world.camera.picture import png_bytes
 
@@ -147,3 +151,66 @@ def _sticks(model: Model) -> Iterator[tuple[str, Shape, Colour, Floats]]:
             rpy = np.array([0.0, math.acos(end[2] / length), math.atan2(end[1], end[0])])
             T = np.asarray(homogeneous(rotation_from_rpy(rpy), 0.5 * end))
             yield joint.parent, Cylinder(_STICK_RADIUS * size_of(model), length), _OPAQUE_GREY, T
+
+
+COLOURS = 128
+"""Number of colours of a picture of a film."""
+
+SHORTEST = 20
+"""Shortest time between two pictures that browsers keep to [ms]."""
+
+
+def write_gif(path: str | os.PathLike[str], pictures: Iterable[NDArray[np.uint8]], period: float) -> None:
+    """Write pictures (height, width, 3) as a GIF file that shows one every `period` [s], again and again.
+
+    Raises ArgumentError without a picture, and for a file that cannot be written.
+    """
+    # One table of colours for all pictures would lose the shades of the later ones.
+    drawn = [Image.fromarray(each).quantize(COLOURS) for each in pictures]
+    if not drawn:
+        raise ArgumentError("a film needs a picture; there is none")
+    stream = io.BytesIO()
+    drawn[0].save(
+        stream,
+        format="GIF",
+        save_all=True,
+        append_images=drawn[1:],
+        duration=max(SHORTEST, round(1e3 * period)),
+        loop=0,
+    )
+    write_bytes(path, stream.getvalue())
+
+
+UPDATES_PER_SECOND = 30.0
+"""Rate at which the recorded page moves."""
+
+
+def write_recording(
+    path: str | os.PathLike[str],
+    page: Page,
+    show: Callable[[float], None],
+    duration: float,
+    *,
+    title: str,
+    legend: str = "",
+) -> None:
+    """Write an HTML file in which the scene of the page plays as `show(time)` places it, for `duration` [s].
+
+    A duration of 0 gives a still scene; `legend` is HTML over the corner of the picture. Raises
+    ArgumentError for a file that cannot be written.
+    """
+    if not checked_path(path).lower().endswith((".html", ".htm")):
+        wanted = "wanted .html (a page), .gif (a film) or .png (a picture)"
+        raise ArgumentError(f"{shown(os.path.basename(path))} has no suffix of a page; {wanted}")
+    with page.lock:
+        show(0.0)
+        recorder = page.server.get_scene_serializer()
+        count = round(duration * UPDATES_PER_SECOND)
+        for k in range(1, count + 1):
+            recorder.insert_sleep(duration / count)
+            show(duration * k / count)
+        # The last picture stays for a moment before the recording begins again.
+        recorder.insert_sleep(1.0 if count else 0.0)
+        text = recorder.as_html(page.dark)
+    text = standalone(text, title, page.part_names, legend=legend, software=page.plain)
+    write_bytes(path, text.encode())

@@ -1,1 +1,0 @@
-"""Surfaces of shapes as triangles for the page."""

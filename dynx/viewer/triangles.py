@@ -1,0 +1,272 @@
+"""Triangles of shapes for the page: orientation of surfaces, and reduction to a budget of triangles."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Mapping
+from functools import cache, lru_cache
+from glob import glob
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dynx.files.cache import keep, read_cached, source_hash
+from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
+from dynx.spatial.scalar import Floats
+from dynx.viewer.library import SIMPLIFY_VERSION, simplify
+
+
+def turned_outwards(triangles: Triangles) -> Triangles | None:
+    """Return triangles that form closed surfaces turned outwards, so that nobody sees one from behind; None
+    where a surface is open.
+
+    Each edge of a closed surface is passed as often in one direction as in the other, and a surface that is
+    turned inwards encloses a negative volume (divergence theorem). That of a cavity, which nobody sees, is
+    turned, too.
+    """
+    if not len(triangles.faces):
+        return None
+    places = [np.unique(column, return_inverse=True)[1].reshape(-1) for column in triangles.vertices.T]
+    _, number = distinct_rows(np.stack(places, axis=1))
+    faces = number[triangles.faces]
+    count = int(faces.max()) + 1
+    first, second = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
+    if not np.array_equal(np.sort(first * count + second), np.sort(second * count + first)):
+        return None
+    surface = np.arange(count)
+    while True:
+        # Each vertex takes the smallest number among its neighbours', and then that one's.
+        smaller = surface.copy()
+        np.minimum.at(smaller, first, surface[second])
+        smaller = smaller[smaller]
+        if np.array_equal(smaller, surface):
+            break
+        surface = smaller
+    a, b, c = np.moveaxis(triangles.vertices[triangles.faces].astype(np.float64), 1, 0)
+    surface_of_face = surface[faces[:, 0]]
+    volumes = np.bincount(surface_of_face, np.einsum("ij,ij->i", a, np.cross(b, c)), minlength=count)
+    inwards = volumes[surface_of_face] < 0.0
+    return Triangles(
+        triangles.vertices, np.where(inwards[:, None], triangles.faces[:, ::-1], triangles.faces)
+    )
+
+
+TRIANGLE_BUDGET = 15_000
+"""Largest number of triangles of all visual meshes together where they are reduced."""
+
+FEWEST_TRIANGLES = 100
+"""Number of triangles below which a mesh is not reduced."""
+
+_JOINED = 1e-3
+"""Distance within which vertices of a reduced mesh are joined, as a share of its size."""
+
+
+def budgets(meshes: Mapping[Mesh, int], total: int = TRIANGLE_BUDGET) -> dict[Mesh, int]:
+    """Divide `total` triangles between meshes that occur so many times each, in proportion to what each has.
+
+    A mesh with few triangles keeps them. Meshes that together have fewer than `total` keep all.
+    """
+    sizes = {mesh: len(mesh.triangles[1]) for mesh in meshes}
+    everything = sum(sizes[mesh] * count for mesh, count in meshes.items())
+    share = min(1.0, total / max(everything, 1))
+    return {mesh: max(math.floor(size * share), min(size, FEWEST_TRIANGLES)) for mesh, size in sizes.items()}
+
+
+def has_graphics_processor() -> bool:
+    """Check whether this machine has a graphics processor that a browser on it can use; True if unknown."""
+    if not sys.platform.startswith("linux"):
+        return True
+    return bool(glob("/dev/dri/renderD*") or glob("/dev/nvidia[0-9]*"))
+
+
+def reduced(shape: Shape, budget: int | None) -> Triangles:
+    """Return a shape as triangles: a mesh with at most `budget`, or four, unless that is None.
+
+    Raises DescriptionError for a mesh that cannot be read.
+    """
+    if not isinstance(shape, Mesh) or budget is None or len(shape.triangles[1]) <= budget:
+        return triangles_of(shape)
+    return _reduced(shape, budget)
+
+
+@lru_cache(maxsize=256)
+def _reduced(mesh: Mesh, budget: int) -> Triangles:
+    vertices, faces = mesh.triangles
+    name = _name(vertices, faces, budget)
+    found = _unpacked(read_cached(name))
+    if found is None:
+        found = _simplified(vertices, faces, budget)
+        keep(name, _packed(found))
+    return found
+
+
+def _simplified(vertices: Floats, faces: NDArray[np.intp], budget: int) -> Triangles:
+    # Files repeat vertices, not always to the last digit, and only edges that are shared can be collapsed.
+    grid = _JOINED * float(np.ptp(vertices, axis=0).max()) or 1.0
+    cells = np.rint(vertices / grid).astype(np.int64)
+    first, number = distinct_rows(cells - cells.min(axis=0))
+    points = vertices[first]
+    joined = number[faces]
+    distinct = (
+        (joined[:, 0] != joined[:, 1]) & (joined[:, 1] != joined[:, 2]) & (joined[:, 0] != joined[:, 2])
+    )
+    remaining = joined[distinct]
+    if len(remaining) <= budget:
+        return Triangles.of(points, remaining)
+    found, kept = simplify(points.astype(np.float32), remaining.astype(np.int32), target_count=max(budget, 4))
+    return Triangles.of(found, kept) if len(kept) else Triangles.of(vertices, faces)
+
+
+def _name(vertices: Floats, faces: NDArray[np.intp], budget: int) -> str:
+    """Return the name in the cache of what a mesh is reduced to: a hash of all that determines it."""
+    digest = sha256(f"{_version()} {vertices.dtype} {faces.dtype} {len(vertices)} {budget}".encode())
+    digest.update(vertices.tobytes())
+    digest.update(faces.tobytes())
+    return f"{digest.hexdigest()}.triangles"
+
+
+@cache
+def _version() -> str:
+    return f"{np.__version__} {SIMPLIFY_VERSION} {source_hash(Path(__file__).parent)}"
+
+
+def _packed(triangles: Triangles) -> bytes:
+    vertices, faces = triangles
+    return (
+        len(vertices).to_bytes(8, "little") + vertices.astype("<f4").tobytes() + faces.astype("<u4").tobytes()
+    )
+
+
+def _unpacked(content: bytes | None) -> Triangles | None:
+    """Return the triangles in a content of the cache, whose checksum was right; None for None."""
+    if content is None:
+        return None
+    count = int.from_bytes(content[:8], "little")
+    vertices = np.frombuffer(content, "<f4", 3 * count, 8).reshape(-1, 3)
+    return Triangles.of(vertices, np.frombuffer(content, "<u4", offset=8 + vertices.nbytes).reshape(-1, 3))
+
+
+_SEGMENTS = 32
+"""Number of sides of round shapes."""
+
+_GROUND_SIDE = 40.0
+"""Length [m] of the sides of the square that stands for a plane without end."""
+
+
+class Triangles(NamedTuple):
+    """Vertices (n, 3) [m] and the vertices of each triangle (m, 3), counter-clockwise from outside."""
+
+    vertices: NDArray[np.float32]
+    faces: NDArray[np.uint32]
+
+    @classmethod
+    def of(cls, vertices: NDArray[np.generic], faces: NDArray[np.generic]) -> Triangles:
+        """Return vertices and faces of any type of number as triangles."""
+        return cls(np.asarray(vertices, dtype=np.float32), np.asarray(faces, dtype=np.uint32))
+
+
+def triangles_of(shape: Shape) -> Triangles:
+    """Return a shape as triangles.
+
+    Raises DescriptionError for a mesh that cannot be read.
+    """
+    if isinstance(shape, Mesh):
+        return Triangles.of(*shape.triangles)
+    if isinstance(shape, HeightField):
+        return Triangles.of(*shape.triangles())
+    return _primitive(shape)
+
+
+def hull_of(shape: Shape) -> Triangles:
+    """Return a shape as engines collide it: a mesh as its convex hull.
+
+    Raises DescriptionError for a mesh that cannot be read.
+    """
+    return Triangles.of(*shape.hull) if isinstance(shape, Mesh) else triangles_of(shape)
+
+
+def resized(triangles: Triangles, factor: float) -> Triangles:
+    """Return triangles of another size, about the middle of the box around them."""
+    if factor == 1.0:
+        return triangles
+    vertices = triangles.vertices
+    middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
+    return Triangles.of(middle + factor * (vertices - middle), triangles.faces)
+
+
+def distinct_rows(rows: NDArray[np.integer[Any]]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return where each distinct row of non-negative integers (n, 3) occurs first, and the number of each row
+    among these.
+
+    The three numbers are joined to one where it can hold them: numbers are sorted ten times faster than rows.
+    """
+    sizes = [int(column.max(initial=0)) + 1 for column in rows.T]
+    if math.prod(sizes) < 2**63:
+        joined = (rows[:, 0].astype(np.int64) * sizes[1] + rows[:, 1]) * sizes[2] + rows[:, 2]
+        _, first, number = np.unique(joined, return_index=True, return_inverse=True)
+    else:
+        _, first, number = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    return first, number.reshape(-1)
+
+
+@lru_cache(maxsize=256)
+def _primitive(shape: Shape) -> Triangles:
+    if isinstance(shape, Box):
+        return _box(np.array(shape.size))
+    if isinstance(shape, Sphere):
+        return _revolved(*_arc(shape.radius, 0.0))
+    if isinstance(shape, Capsule):
+        return _revolved(*_arc(shape.radius, 0.5 * shape.length))
+    if isinstance(shape, Cylinder):
+        r, h = shape.radius, 0.5 * shape.length
+        # Rows of vertices at the edges stand twice, so that the edges stay sharp when normals are averaged.
+        return _revolved(np.array([0.0, r, r, r, r, 0.0]), np.array([-h, -h, -h, h, h, h]))
+    if isinstance(shape, Plane):
+        half = 0.5 * _GROUND_SIDE
+        corners = [[-half, -half, 0.0], [half, -half, 0.0], [half, half, 0.0], [-half, half, 0.0]]
+        return Triangles.of(np.array(corners), np.array([[0, 1, 2], [0, 2, 3]]))
+    raise TypeError(f"no triangles of a {type(shape).__name__}")
+
+
+def _box(size: Floats) -> Triangles:
+    signs = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+    quads = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
+    # Each face has vertices of its own, so that its edges stay sharp when normals are averaged.
+    vertices = (signs * size)[quads].reshape(-1, 3)
+    first = np.arange(0, 24, 4)[:, None]
+    return Triangles.of(vertices, np.concatenate([first + np.array([0, 1, 2]), first + np.array([0, 2, 3])]))
+
+
+def _arc(radius: float, half_length: float) -> tuple[Floats, Floats]:
+    """Return radius and height along the profile of a ball that is cut in two, from its lowest point up."""
+    angle = np.linspace(-0.5 * math.pi, 0.5 * math.pi, _SEGMENTS // 2 + 1)
+    apart = np.where(angle < 0.0, -half_length, half_length)
+    middle = len(angle) // 2
+    r, z = radius * np.cos(angle), radius * np.sin(angle) + apart
+    r[0] = r[-1] = 0.0
+    if half_length:
+        r = np.insert(r, middle, radius)
+        z = np.insert(z, middle, -half_length)
+    return r, z
+
+
+def _revolved(radius: Floats, height: Floats) -> Triangles:
+    """Return the surface that a profile from the axis back to the axis sweeps around z."""
+    angle = np.linspace(0.0, 2.0 * math.pi, _SEGMENTS, endpoint=False)
+    x, y = np.outer(radius, np.cos(angle)), np.outer(radius, np.sin(angle))
+    vertices = np.stack([x, y, np.repeat(height[:, None], _SEGMENTS, axis=1)], axis=-1).reshape(-1, 3)
+    row = np.arange(len(radius) - 1)[:, None] * _SEGMENTS
+    here, along = row + np.arange(_SEGMENTS), row + (np.arange(_SEGMENTS) + 1) % _SEGMENTS
+    faces = np.concatenate(
+        [
+            np.stack([here, along, along + _SEGMENTS], axis=-1).reshape(-1, 3),
+            np.stack([here, along + _SEGMENTS, here + _SEGMENTS], axis=-1).reshape(-1, 3),
+        ]
+    )
+    corners = vertices[faces]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return Triangles.of(vertices, faces[area > 1e-9 * area.max()])
