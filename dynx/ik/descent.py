@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.backends.base import Backend
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.step import (
     SETTINGS,
@@ -86,18 +87,15 @@ class Target(NamedTuple):
 def descend_by_kernel(
     descent: Descent,
     target: Target,
-    pose_at: Callable[[Floats], Floats],
-    jacobian_at: Callable[[Floats], Floats],
+    backend: Backend,
+    frame: str,
     coordinates: FrameCoordinates,
     q: Floats,
     settings: Sequence[float],
     bounds: tuple[Sequence[float], Sequence[float]],
 ) -> Descended:
-    """Descend from q (nq,) by a kernel.
-
-    `pose_at` returns T_world_frame (4, 4), and `jacobian_at` the Jacobian (6, n) of the coordinates, of which
-    there are 1 to `MAX_COORDINATES`.
-    """
+    """Descend from q (nq,) by a kernel, with the poses and Jacobians of a frame by a backend; there are 1 to
+    `MAX_COORDINATES` coordinates."""
     n = coordinates.count
     free = _workspaces(descent, target.kind, n)
     try:
@@ -111,32 +109,68 @@ def descend_by_kernel(
     space.lower[...], space.upper[...] = bounds
     space.xs[0][...] = coordinates.values(q)
     space.memories[0][...] = space.initial
-    pose, jacobian, status, runs, xs = space.pose, space.jacobian, space.status, space.runs, space.xs
-    is_whole, floating, now = coordinates.is_all, coordinates.floating, 0
-    start = best = q
-    least = np.inf
+    run = _run_whole if coordinates.is_all else _run_part
+    best, now = run(space, descent, backend, frame, coordinates, q)
+    found = space.memories[now][: n + 4].tolist()
+    free.append(space)
+    q = coordinates.with_values(q, found[:n]) if best is None else best
+    return Descended(q, found[n], found[n + 1], found[n + 2] != 0.0, int(found[n + 3]))
+
+
+def _run_whole(
+    space: _StepSpace,
+    descent: Descent,
+    backend: Backend,
+    frame: str,
+    coordinates: FrameCoordinates,
+    q: Floats,
+) -> tuple[None, int]:
+    """Descend where the coordinates are all of q; return the number of the last state."""
+    pose_at, jacobian_at = backend.forward_kinematics, backend.jacobian
+    pose, jacobian, status, xs, (first, second) = (
+        space.pose, space.jacobian, space.status, space.xs, space.runs
+    )  # fmt: skip
     while True:
-        pose[...] = pose_at(q)
-        jacobian[...] = jacobian_at(q)
-        runs[now]()
+        pose[...] = pose_at(q, frame)
+        jacobian[...] = jacobian_at(q, frame)
+        first()
+        if status[0] != RUNNING:
+            return None, 1
+        q = xs[1]
+        pose[...] = pose_at(q, frame)
+        jacobian[...] = jacobian_at(q, frame)
+        second()
+        if status[0] != RUNNING:
+            return None, 0
+        q = xs[0]
+
+
+def _run_part(
+    space: _StepSpace,
+    descent: Descent,
+    backend: Backend,
+    frame: str,
+    coordinates: FrameCoordinates,
+    q: Floats,
+) -> tuple[Floats | None, int]:
+    """Descend in some coordinates of q; return the best configuration of a floating robot, and the number of
+    the last state."""
+    n, columns, floating, now = coordinates.count, coordinates.columns, coordinates.floating, 0
+    best, least = q, np.inf
+    while True:
+        space.pose[...] = backend.forward_kinematics(q, frame)
+        space.jacobian[...] = backend.jacobian(q, frame)[:, columns]
+        space.runs[now]()
         now = 1 - now
-        if is_whole:
-            if status[0] != RUNNING:
-                break
-            q = xs[now]
-            continue
         if floating:
             # The coordinates of the base count from where it is, so that the best configuration is kept here.
             after = space.memories[now][n + descent.least]
             if after < least or space.memories[now][n + 2]:
                 best, least = q, after
-        if status[0] != RUNNING:
-            break
-        q = coordinates.with_values(best if floating and descent is not SEARCH else q, xs[now].tolist())
-    found = space.memories[now][: n + 4].tolist()
-    free.append(space)
-    q = best if floating else coordinates.with_values(start, found[:n])
-    return Descended(q, found[n], found[n + 1], found[n + 2] != 0.0, int(found[n + 3]))
+        if space.status[0] != RUNNING:
+            return best if floating else None, now
+        start = best if floating and descent is not SEARCH else q
+        q = coordinates.with_values(start, space.xs[now].tolist())
 
 
 def descend_on_floats(

@@ -67,7 +67,7 @@ class FrameTask:
     """Pose, position or rotation of one frame, also with requirements per axis."""
 
     __slots__ = (
-        "_coordinates", "_error", "_forward_kinematics", "_frame", "_jacobian", "_part", "_point", "_target"
+        "_backend", "_coordinates", "_error", "_frame", "_part", "_point", "_target"
     )  # fmt: skip
 
     def __init__(
@@ -81,8 +81,7 @@ class FrameTask:
         axes: AxisRequirement | None,
     ) -> None:
         """`targets` is one target, without leading axes."""
-        self._forward_kinematics, self._jacobian = backend.forward_kinematics, backend.jacobian
-        self._frame, self._point, self._coordinates = frame, point, coordinates
+        self._backend, self._frame, self._point, self._coordinates = backend, frame, point, coordinates
         kind = TargetKind.of(targets, point, axes)
         self._target = Target(kind, kind.rows(targets, ())[0], tuple(kind.optional_values(point, axes)))
         self._error = ErrorCall(self._target, (tolerances.position_tolerance, tolerances.rotation_tolerance))
@@ -91,13 +90,11 @@ class FrameTask:
 
     def error(self, q: Floats) -> TaskError:
         """Return the error at q (nq,)."""
-        return TaskError(*self._error(self._forward_kinematics(q, self._frame)))
+        return TaskError(*self._error(self._backend.forward_kinematics(q, self._frame)))
 
     def jacobian(self, q: Floats, error: TaskError) -> Floats:
         """Return the Jacobian rows at q, weighted and along the axes if there are requirements on these."""
-        point = self._point
-        J = self._jacobian(q, self._frame) if point is None else self._jacobian(q, self._frame, point=point)
-        part: Floats = J[self._part]
+        part: Floats = self._backend.jacobian(q, self._frame, point=self._point)[self._part]
         return part if error.rows is None else np.asarray(error.rows @ part)
 
     def descend(self, descent: Descent, q: Floats, settings: Sequence[float], bounds: Bounds) -> Descended:
@@ -105,16 +102,8 @@ class FrameTask:
         coordinates, frame = self._coordinates, self._frame
         if coordinates.count > MAX_COORDINATES:
             return descend_on_floats(descent, self._measured, coordinates, q, settings, bounds)
-        pose_at, jacobian_at, columns = self._forward_kinematics, self._jacobian, coordinates.columns
         return descend_by_kernel(
-            descent,
-            self._target,
-            lambda q: pose_at(q, frame),
-            lambda q: jacobian_at(q, frame)[:, columns],
-            coordinates,
-            q,
-            settings,
-            bounds,
+            descent, self._target, self._backend, frame, coordinates, q, settings, bounds
         )
 
     def _measured(self, q: Floats) -> tuple[FrameError, Floats]:
