@@ -18,9 +18,8 @@ from dynx.rbd import derivatives, kinematics, rnea
 from dynx.rbd.base_parameters import regroup_inertias
 from dynx.rbd.elimination import factorize_mass_matrix, filled_entries, solve_with_factors
 from dynx.simd.differentiate import differentiate
-from dynx.simd.inlining import inline
 from dynx.simd.program import Program
-from dynx.simd.trace import trace
+from dynx.simd.trace import inline, trace
 from dynx.spatial.branchless import displace
 from dynx.spatial.scalar import Array
 from dynx.spatial.se3 import homogeneous

@@ -109,7 +109,7 @@ def test_the_source_of_a_package_includes_the_packages_inside_it(tmp_path: Path,
 
 
 def test_the_version_of_a_source_names_modules_and_packages() -> None:
-    package, module = import_module("dynx.simd"), import_module("dynx.simd.iteration.kernel")
+    package, module = import_module("dynx.simd"), import_module("dynx.simd.user_code.arrays")
     assert package.__file__
     assert module.__file__
     folder, file = Path(package.__file__).parent, Path(module.__file__)

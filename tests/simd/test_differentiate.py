@@ -14,10 +14,9 @@ from hypothesis import strategies as st
 from dynx.errors import CompileError
 from dynx.simd.differentiate import Order, differentiate
 from dynx.simd.expr import Graph, Op
-from dynx.simd.inlining import inline
 from dynx.simd.interp import interpret
 from dynx.simd.program import Port, Program, extract_program
-from dynx.simd.trace import trace
+from dynx.simd.trace import inline, trace
 from dynx.spatial.scalar import Array, Floats, arctan, cos, exp, sin, sqrt, tanh
 from tests.simd.programs import RANDOM, SPECIAL, doubles
 

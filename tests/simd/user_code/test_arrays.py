@@ -14,8 +14,7 @@ from dynx.errors import TraceError
 from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.interp import interpret
 from dynx.simd.trace import trace
-from dynx.simd.user_code.arrays import symbol_array, traced_array
-from dynx.simd.user_code.elimination import MAX_SOLVED_SIZE
+from dynx.simd.user_code.arrays import MAX_SOLVED_SIZE, symbol_array, traced_array
 from dynx.spatial.scalar import Floats
 
 N = 4

@@ -11,8 +11,7 @@ from dynx.errors import ArgumentError, CompileError
 from dynx.simd.emit import Settings
 from dynx.simd.target import host
 from dynx.simd.trace import trace
-from dynx.simd.variants import VariantKernel, Variants, emit_variants
-from dynx.simd.variants.kernel import Bytes, compile_variants
+from dynx.simd.variants import Bytes, VariantKernel, Variants, compile_variants, emit_variants
 from dynx.spatial.scalar import Array, Floats, less, sqrt, where_less
 
 TABLE = ((1.0, 2.0), (-1.0, 2.0), (1.0, 3.0), (-1.0, 3.0))
