@@ -171,6 +171,8 @@ def _run_part(
             return best if floating else None, now
         start = best if floating and descent is not SEARCH else q
         q = coordinates.with_values(start, space.xs[now].tolist())
+        if floating:
+            space.xs[now][...] = coordinates.values(q)
 
 
 def descend_on_floats(
