@@ -47,6 +47,11 @@ Document = Any
 FINGERPRINT, CLASS, MODEL, ARRAY, CONTROLLER = "fingerprint", "class", "model", "array", "controller"
 SCENE = "scene"
 
+_ROOMS_ABOVE = frozenset(
+    ("__main__", "agreement", "bench", "cli", "contacts", "doctor", "rules", "testing", "training", "viewer")
+)
+"""Rooms of dynx that no part of a scenario is from, and which a file does not import."""
+
 REGISTRATION = (
     "a controller of your own is rebuilt if its class is a frozen dataclass with a name, which an entry "
     "point in the group dynx.controllers or dynx.control.register_controller gives it"
@@ -155,7 +160,8 @@ def encode(value: Any, model: Model | None = None) -> Document:
 def decode(document: Document, model: Model | None = None) -> Any:
     """Return the value of a document that `encode` made; `Unknown` for an object that cannot be rebuilt here.
 
-    Classes are looked up in dynx and in modules that are already imported; a file cannot cause an import.
+    Classes are looked up in modules that are already imported and in the rooms of dynx whose objects a
+    scenario has; a file imports nothing else.
     Raises ArgumentError for a document of another form.
     """
     try:
@@ -327,15 +333,23 @@ def _name_of(kind: type) -> str:
 
 
 def _class_of(name: str) -> Any:
-    """Return the class of that name in dynx or a module that is already imported; None without one."""
+    """Return the class of that name in dynx or a module that is already imported; None without one.
+
+    Only the module that defines a class has it, not one that imports it.
+    """
     module, _, path = present_name(name).partition(":")
-    if module.partition(".")[0] == "dynx":
+    package, *rooms = module.split(".")
+    if package == "dynx" and not _ROOMS_ABOVE & {*rooms[:1]}:
         importlib.import_module(module)
     found: Any = sys.modules.get(module)
     for part in path.split("."):
         found = getattr(found, part, None)
-    allowed = isinstance(found, type) and (
-        "__dataclass_fields__" in vars(found) or (issubclass(found, tuple) and hasattr(found, "_fields"))
+    allowed = (
+        isinstance(found, type)
+        and found.__module__ == module
+        and (
+            "__dataclass_fields__" in vars(found) or (issubclass(found, tuple) and hasattr(found, "_fields"))
+        )
     )
     return found if allowed else None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+import sys
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -155,10 +156,27 @@ def test_a_document_of_another_form_is_refused(change: dict[str, Any], hint: str
             Scenario.from_json(text)
 
 
-def test_a_file_imports_nothing() -> None:
+@pytest.mark.parametrize(
+    "name",
+    [
+        "this:Zen",
+        "dynx.training.library:Monitor",
+        "dynx.viewer.page:Page",
+        "dynx.__main__:main",
+        "dynx.testing.plugin:Any",
+        "dynx.cli.shell.main:LazyCommand",
+        "dynx.sim.scenario.documents:json.decoder.JSONDecoder",
+        "dynx.sim.scenario.scenario:Rollout",
+        "sys:flags.__class__",
+        "os:stat_result",
+    ],
+)
+def test_a_file_imports_nothing(name: str) -> None:
     document = json.loads(Scenario(ARM).to_json())
-    document["reference"] = {"class": "this:Zen", "fields": {}}
+    document["reference"] = {"class": name, "fields": {}}
+    before = set(sys.modules)
     assert isinstance(Scenario.from_dict(document).reference, Unknown)
+    assert set(sys.modules) == before
 
 
 def test_a_controller_that_is_not_registered_is_named() -> None:
