@@ -23,7 +23,7 @@ from dynx.control.dynamics import EngineDynamics
 from dynx.errors import ArgumentError, CompileError, TraceError, UnsupportedFeatureError
 from dynx.sim.loop.own_controllers import refuse_irreproducible
 from dynx.sim.loop.plain import Loop, LoopState
-from dynx.sim.loop.record import Record
+from dynx.sim.loop.record import StateBuffers
 from dynx.sim.loop_step import CONTROLLER, SETPOINT, ArrayDisturbances, LoopStep, cut_step
 from dynx.sim.plants.integrated import IntegratedPlant
 from dynx.sim.step import is_diverged
@@ -165,11 +165,11 @@ class CompiledLoop(ABC):
         self._times = loop.clock.control_times(0)[:, None]
         # The setpoints of a reference may be stored column by column.
         self._setpoints = [x if x[:1].flags.c_contiguous else np.ascontiguousarray(x) for x in loop.setpoints]
-        self._record: Record | None = None
+        self._record: StateBuffers | None = None
         self._first = self._end = 0
         self._given: Floats | None = None
 
-    def run(self, record: Record, loop_state: LoopState, end: int, given: Floats | None = None) -> None:
+    def run(self, record: StateBuffers, loop_state: LoopState, end: int, given: Floats | None = None) -> None:
         """Step from the last state of `record` to step `end`.
 
         The torque `given` (nv,) replaces that of the controller, which is then not evaluated. Raises
@@ -192,7 +192,7 @@ class CompiledLoop(ABC):
                 chunk = min(max(int(PROGRESS_INTERVAL / each), 1), self.chunk_steps)
         self._loop.plant.reset(loop_state.q, loop_state.v)
 
-    def _set_state(self, loop_state: LoopState, record: Record) -> None:
+    def _set_state(self, loop_state: LoopState, record: StateBuffers) -> None:
         """Set the state of the loop to that after the last step of the record."""
         k = record.steps
         loop_state.q, loop_state.v = record.q[k].copy(), record.v[k].copy()
@@ -201,7 +201,7 @@ class CompiledLoop(ABC):
             if self._step.controller_state:
                 loop_state.controller_state = self._arrays["state"][k - self._first].copy()
 
-    def _prepare(self, record: Record, loop_state: LoopState, given: Floats | None) -> None:
+    def _prepare(self, record: StateBuffers, loop_state: LoopState, given: Floats | None) -> None:
         """Prepare the calls of the next steps, unless they are prepared."""
         k, limit = record.steps, self._loop.limit
         ready = self._record is record and self._first <= k < self._end
@@ -220,14 +220,14 @@ class CompiledLoop(ABC):
         self._bind(record, steps)
 
     @abstractmethod
-    def _bind(self, record: Record, steps: Integers) -> None:
+    def _bind(self, record: StateBuffers, steps: Integers) -> None:
         """Prepare the calls of `steps`."""
 
     @abstractmethod
-    def _take(self, record: Record, end: int) -> None:
+    def _take(self, record: StateBuffers, end: int) -> None:
         """Take prepared steps to `end`, and count them in the record."""
 
-    def _arrays_of(self, record: Record, steps: Integers) -> dict[str, Floats]:
+    def _arrays_of(self, record: StateBuffers, steps: Integers) -> dict[str, Floats]:
         """Return the inputs and outputs of the steps by name: arrays with one row for each step or control
         step, or with one row."""
         loop, step = self._loop, self._step
@@ -262,7 +262,7 @@ class CompiledLoop(ABC):
         written = {name: (rows[name][0], row) for name, row in following.items() if name in rows}
         return rows, {**written, "tau": (self._record.tau, steps)}
 
-    def _ended(self, record: Record, status: Status) -> None:
+    def _ended(self, record: StateBuffers, status: Status) -> None:
         """Raise the error of a status, unless it is none."""
         if status & (Status.TORQUE | Status.DIVERGED):
             limited = self._loop.limit is not None or isinstance(self, CutLoop)
@@ -283,7 +283,7 @@ class LaneLoop(CompiledLoop):
         self._lanes = self._compiled.kernel((True, step.always_pushed)).image.lanes
         self._stops = LaneStops.of(step) if step.stops else None
 
-    def _arrays_of(self, record: Record, steps: Integers) -> dict[str, Floats]:
+    def _arrays_of(self, record: StateBuffers, steps: Integers) -> dict[str, Floats]:
         arrays = super()._arrays_of(record, steps)
         step, nv = self._step, self._step.model.nv
         arrays |= {name: np.zeros((2, 1 if name == "sound_steps" else nv)) for name in TOTALS}
@@ -295,7 +295,7 @@ class LaneLoop(CompiledLoop):
             arrays["wrenches"] = step.disturbances.wrenches(self._loop.clock.dt, steps)
         return arrays
 
-    def _bind(self, record: Record, steps: Integers) -> None:
+    def _bind(self, record: StateBuffers, steps: Integers) -> None:
         rows, written = self._rows(steps)
         wrenches = self._arrays.get("wrenches", np.zeros((len(steps), 0)))
         rows["wrenches"] = wrenches, steps - self._first
@@ -308,7 +308,7 @@ class LaneLoop(CompiledLoop):
         kernels = [self._compiled.kernel((kind >= 2, kind % 2 == 1)) for kind in kinds.tolist()]
         self._bound = BoundSteps(kernels, chosen, rows, written, first=self._first)
 
-    def _take(self, record: Record, end: int) -> None:
+    def _take(self, record: StateBuffers, end: int) -> None:
         while record.steps < end:
             stop = self._bound.run(record.steps, end)
             if stop is None:
@@ -319,7 +319,7 @@ class LaneLoop(CompiledLoop):
             self._ended(record, status)
             record.steps = stop.step + 1
 
-    def _finished(self, record: Record, stop: Stop) -> Status:
+    def _finished(self, record: StateBuffers, stop: Stop) -> Status:
         """Complete a step in which modes of dry friction are not settled, or joints are beyond limits."""
         k = stop.step
         self._settling(self._bound, k, self._lanes)
@@ -352,7 +352,7 @@ class CutLoop(CompiledLoop):
         always = loop.clock.steps_per_control == 1
         self._holding = None if always else cut_step(step, plant, controlled=False)
 
-    def _bind(self, record: Record, steps: Integers) -> None:
+    def _bind(self, record: StateBuffers, steps: Integers) -> None:
         assert self._given is None, "torques of the caller are not cut"
         inputs, outputs = (
             {name: StridedRows(array, row) for name, (array, row) in found.items()}
@@ -365,7 +365,7 @@ class CutLoop(CompiledLoop):
         self._steps = {True: bound(self._controlled)}
         self._steps[False] = self._steps[True] if self._holding is None else bound(self._holding)
 
-    def _take(self, record: Record, end: int) -> None:
+    def _take(self, record: StateBuffers, end: int) -> None:
         clock = self._loop.clock
         while (k := record.steps) < end:
             controlled = self._holding is None or bool(clock.is_control_step(k))
@@ -391,7 +391,7 @@ class CutLoop(CompiledLoop):
                 self._ended(record, status)
                 record.steps += 1
 
-    def _stopped(self, record: Record, row: int) -> Status:
+    def _stopped(self, record: StateBuffers, row: int) -> Status:
         """Stop the joints that are beyond their limits in a row of the record; return the status after it."""
         assert self._loop.stops is not None
         stopped = self._loop.stops(record.q[row], record.v[row])

@@ -18,7 +18,7 @@ from dynx.model.numbers import checked_array
 from dynx.sim.compiled_loop import LaneLoop, cut_loop, lane_loop
 from dynx.sim.loop.controller_checks import ControllerWatch
 from dynx.sim.loop.plain import Loop, LoopState
-from dynx.sim.loop.record import Record
+from dynx.sim.loop.record import StateBuffers
 from dynx.sim.loop.references import setpoints_of
 from dynx.sim.loop.sensors import Sensors
 from dynx.sim.loop.stops import Stops
@@ -50,7 +50,7 @@ class Snapshot:
     """State and record of a simulation at one moment, to which `Simulation.restore` returns."""
 
     scenario: Scenario
-    record: Record
+    record: StateBuffers
     loop_state: LoopState
     executor: tuple[str, ...]
     departures: tuple[str, ...]
@@ -99,7 +99,7 @@ class Simulation:
         self.n_steps = setup.clock.n_steps if bounded else None
         """Steps to the end of the scenario; None for one without a duration."""
         clock = setup.clock if bounded else replace(setup.clock, n_steps=MIN_BUFFER_STEPS)
-        self._record = Record.begin(*setup.start, clock.n_steps)
+        self._record = StateBuffers.begin(*setup.start, clock.n_steps)
         self._progress = progress
         setpoints = setpoints_of(setup.setpoint_of, clock, setup.controller)
         sensors = Sensors(scenario.model, clock, scenario.noise, setup.controller)
@@ -250,7 +250,7 @@ class Simulation:
             self._lane, self._lane_known = found if isinstance(found, LaneLoop) else None, True
         return self._lane
 
-    def _advance_in_pieces(self, record: Record, loop_state: LoopState, end: int) -> None:
+    def _advance_in_pieces(self, record: StateBuffers, loop_state: LoopState, end: int) -> None:
         """Take all steps to `end` in pieces between engine calls if possible, and note how they are taken."""
         pieces = cut_loop(self._loop, end - record.steps)
         if isinstance(pieces, str):
@@ -393,7 +393,7 @@ class Simulation:
             raise ArgumentError(
                 f"step is {shown(step)}; the rollout to resume has {len(rollout)} steps and this one {wanted}"
             )
-        theirs = Record(rollout.q, rollout.v, rollout.a, rollout.tau)
+        theirs = StateBuffers(rollout.q, rollout.v, rollout.a, rollout.tau)
         if step:
             self._loop.refuse_self_changing(self._record)
         refuse_other_scenario(rollout, self.scenario)

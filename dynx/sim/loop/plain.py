@@ -21,7 +21,7 @@ from dynx.control.bullet import BulletMotor
 from dynx.errors import ControlError, DivergedError, DynxError, SimulationError, shown
 from dynx.model.numbers import DIVERGENCE_SPEED, refuse_mask
 from dynx.sim.loop.controller_checks import ControllerWatch, defect_of_outcome, defect_of_torque
-from dynx.sim.loop.record import Record
+from dynx.sim.loop.record import StateBuffers
 from dynx.sim.loop.sensors import Sensors
 from dynx.sim.loop.stops import Stops
 from dynx.sim.overshoot import largest_overshoot, overcompensated_friction
@@ -78,7 +78,7 @@ class Loop:
         nv = self.plant.model.nv
         return self.clock.steps_per_control, self.clock.dt, sensors, motors, setpoints, (nv,)
 
-    def start(self, record: Record) -> LoopState:
+    def start(self, record: StateBuffers) -> LoopState:
         """Reset the plant to the last state of `record`, and recompute the state of the loop there."""
         begin = record.steps
         q, v = record.q[begin].copy(), record.v[begin].copy()
@@ -96,7 +96,9 @@ class Loop:
         with plant_errors(type(self.plant), "cannot be reset"):
             self.plant.recover(loop_state.q, loop_state.v)
 
-    def advance(self, record: Record, loop_state: LoopState, end: int, given: Floats | None = None) -> None:
+    def advance(
+        self, record: StateBuffers, loop_state: LoopState, end: int, given: Floats | None = None
+    ) -> None:
         """Step from the last state of `record`, which the plant must be in, to step `end`.
 
         The torque `given` (nv,) replaces that of the controller, which is then not evaluated. Raises
@@ -168,7 +170,7 @@ class Loop:
                 next_call = k + PROGRESS_STEPS
                 progress(k + 1)
 
-    def _as_torque(self, k: int, record: Record, given: Any) -> Floats:
+    def _as_torque(self, k: int, record: StateBuffers, given: Any) -> Floats:
         """Return the torque of a controller as a float64 array (nv,). Raises ControlError."""
         wanted = (self.plant.model.nv,)
         try:
@@ -188,7 +190,7 @@ class Loop:
             raise self._control_failed(k, record, defect)
         return np.array(array, dtype=np.float64)
 
-    def refuse_self_changing(self, record: Record) -> None:
+    def refuse_self_changing(self, record: StateBuffers) -> None:
         """Raise ArgumentError for a controller that changes itself when its torque is evaluated.
 
         It is evaluated at the start and at a displaced state, where the tracking error is not zero.
@@ -207,7 +209,7 @@ class Loop:
                 controller.torque(each, self._setpoint(0), controller.initial_state())
         watch.refuse_changed()
 
-    def recovered_state(self, record: Record) -> Any:
+    def recovered_state(self, record: StateBuffers) -> Any:
         """Return the controller's state after the last step of `record`.
 
         It depends only on the measurements until then, so it is recomputed instead of recorded.
@@ -229,7 +231,7 @@ class Loop:
     def _setpoint(self, number: int) -> Setpoint:
         return Setpoint(*(array[number] for array in self.setpoints))
 
-    def _last_command(self, record: Record) -> tuple[Floats, Any]:
+    def _last_command(self, record: StateBuffers) -> tuple[Floats, Any]:
         """Return the torque and motor command of the last control step before the last state of `record`."""
         begin = record.steps
         none = np.zeros(self.plant.model.nv)
@@ -241,7 +243,7 @@ class Loop:
             return none, self.controller.command(measurement, self._setpoint(number))
         return record.tau[begin - 1].copy(), None
 
-    def error_of(self, status: Status, k: int, record: Record, tau: Floats) -> SimulationError:
+    def error_of(self, status: Status, k: int, record: StateBuffers, tau: Floats) -> SimulationError:
         """Return the error of the status of step `k`, in which the controller commanded `tau`."""
         if status & Status.TORQUE:
             return self._control_failed(k, record, f"its torque is not finite: {shown(tau)}")
@@ -250,7 +252,7 @@ class Loop:
         )
 
     def engine_failed(
-        self, k: int, record: Record, error: Exception, *, in_controller: bool
+        self, k: int, record: StateBuffers, error: Exception, *, in_controller: bool
     ) -> SimulationError:
         """Return the error of step `k` in which the controller or the plant raised an exception: a failure
         for a controller or a plant of the user, divergence for a plant of dynx."""
@@ -261,7 +263,7 @@ class Loop:
             return self._diverged(k, record, why)
         return self._ended(SimulationError, k, record, f"plant {kind.__name__} failed", why)
 
-    def _diverged(self, k: int, record: Record, why: str) -> SimulationError:
+    def _diverged(self, k: int, record: StateBuffers, why: str) -> SimulationError:
         """Return the error of divergence, with the joint whose damping is too large for the control step."""
         overshoot = beyond = None
         # The message of the failure itself matters more than its explanation, for which the mass matrix or
@@ -279,12 +281,12 @@ class Loop:
             error.overshoot = overshoot
         return error
 
-    def _control_failed(self, k: int, record: Record, why: str) -> SimulationError:
+    def _control_failed(self, k: int, record: StateBuffers, why: str) -> SimulationError:
         name = "" if self.controller is None else self.controller.name
         return self._ended(ControlError, k, record, f"controller {name} failed", why)
 
     def _ended(
-        self, kind: type[SimulationError], k: int, record: Record, event: str, why: str
+        self, kind: type[SimulationError], k: int, record: StateBuffers, event: str, why: str
     ) -> SimulationError:
         t, state = k * self.clock.dt, (record.q[k].copy(), record.v[k].copy())
         return kind(f"{event} in step {k}, at {t:.6g} s: {why}", time=t, step=k, state=state)

@@ -10,7 +10,7 @@ from dynx.spatial.scalar import Floats
 
 
 @dataclass
-class Record:
+class StateBuffers:
     """States at n + 1 times, torques and accelerations of the n steps between, and the count of steps."""
 
     q: Floats
@@ -20,7 +20,7 @@ class Record:
     steps: int = 0
 
     @classmethod
-    def begin(cls, q: Floats, v: Floats, n: int) -> Record:
+    def begin(cls, q: Floats, v: Floats, n: int) -> StateBuffers:
         """Make buffers for n steps from the state (q, v)."""
         nv = len(v)
         record = cls(
@@ -32,22 +32,22 @@ class Record:
         record.q[0], record.v[0] = q, v
         return record
 
-    def copy(self) -> Record:
+    def copy(self) -> StateBuffers:
         """Return a copy of the steps taken."""
         n = self.steps
-        return Record(
+        return StateBuffers(
             self.q[: n + 1].copy(), self.v[: n + 1].copy(), self.a[:n].copy(), self.tau[:n].copy(), n
         )
 
-    def take(self, other: Record, n: int) -> None:
+    def take(self, other: StateBuffers, n: int) -> None:
         """Replace all steps by the first n of another record."""
         self.q[: n + 1], self.v[: n + 1] = other.q[: n + 1], other.v[: n + 1]
         self.a[:n], self.tau[:n] = other.a[:n], other.tau[:n]
         self.steps = n
 
-    def extended(self, n: int) -> Record:
+    def extended(self, n: int) -> StateBuffers:
         """Return a copy of the steps taken, in buffers for n steps."""
-        larger = Record.begin(self.q[0], self.v[0], n)
+        larger = StateBuffers.begin(self.q[0], self.v[0], n)
         larger.take(self, self.steps)
         return larger
 

@@ -1,0 +1,37 @@
+"""Ideas that stand once: docs/architecture.md names the module of each, and no other module has it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+IDEAS = {
+    "random numbers": r"random\.(Philox|SeedSequence)\(",
+    "recorded motion": r"^class Record\b",
+    "distance of two motions": r"^class Separation\b",
+    "force from outside": r"def share\(self, t: float",
+    "joint friction": r"^class FrictionLaw\b",
+}
+"""Text that only the module of an idea contains, by the name of the idea."""
+
+
+def test_the_table_names_each_idea() -> None:
+    assert set(_table()) == set(IDEAS)
+
+
+@pytest.mark.parametrize("idea", IDEAS)
+def test_an_idea_stands_in_one_module(idea: str) -> None:
+    pattern = re.compile(IDEAS[idea], re.MULTILINE)
+    found = [path for path in (ROOT / "dynx").rglob("*.py") if pattern.search(path.read_text("utf-8"))]
+    assert [path.relative_to(ROOT / "dynx").as_posix() for path in found] == [_table()[idea]]
+
+
+def _table() -> dict[str, str]:
+    """Return the module of each idea in the table of docs/architecture.md."""
+    text = (ROOT / "docs/architecture.md").read_text("utf-8").partition("## Ideas that stand once")[2]
+    rows = re.findall(r"^\| ([^|`]+) \| `([\w/]+\.py)` \|", text.partition("\n## ")[0], re.MULTILINE)
+    return dict(rows)
