@@ -22,8 +22,7 @@ from dynx.backends.base import Backend
 from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.backends.quantity_calls import Forces, Key
 from dynx.compiled.arguments import BatchArguments
-from dynx.compiled.call import KernelCall, NumericCall, write_into
-from dynx.compiled.coupled_call import CoupledCall
+from dynx.compiled.call import CoupledCall, KernelCall, NumericCall, write_into
 from dynx.compiled.frames import chain_of, place_of
 from dynx.compiled.kernels import (
     ON_CHAINS,

@@ -16,8 +16,7 @@ from dynx.backends.derived import native_quantities
 from dynx.backends.quantities import QUANTITIES
 from dynx.compiled import kernels
 from dynx.compiled.backend import CompiledBackend
-from dynx.compiled.call import MAX_COPIED_SAMPLES, KernelCall, NumericCall
-from dynx.compiled.coupled_call import CoupledCall
+from dynx.compiled.call import MAX_COPIED_SAMPLES, CoupledCall, KernelCall, NumericCall
 from dynx.compiled.table_kernels import TABLE_QUANTITIES
 from dynx.errors import ArgumentError, ClosedError
 from dynx.model import Inertial, Link, Mechanism, Model

@@ -93,8 +93,8 @@ def test_long_batches_with_mimic_joints_are_evaluated_in_blocks(
     model = ROBOTS["floating mimic"]
     rows = _arguments(model, quantity, (7, 5))
     whole = getattr(made(model, threads=1), quantity)(*rows)
-    monkeypatch.setattr("dynx.compiled.coupled_call.MIN_BLOCK", 4)
-    monkeypatch.setattr("dynx.compiled.coupled_call.BLOCK_NUMBERS", 0)
+    monkeypatch.setattr("dynx.compiled.call.MIN_BLOCK", 4)
+    monkeypatch.setattr("dynx.compiled.call.BLOCK_NUMBERS", 0)
     np.testing.assert_array_equal(getattr(made(model, threads=1), quantity)(*rows), whole)
 
 
