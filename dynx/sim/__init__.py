@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from dynx.registry import moved_names
 
 if TYPE_CHECKING:
-    from dynx.sim.batch.batch import BatchInterrupted, simulate_batch
-    from dynx.sim.batch.rollouts import BatchRollouts
+    from dynx.sim.batch import BatchInterrupted, simulate_batch
+    from dynx.sim.batch_rollouts import BatchRollouts
     from dynx.sim.comparison.comparison import RolloutComparison, compare
     from dynx.sim.loop.noise import Noise
     from dynx.sim.one_rollout import RolloutInterrupted, simulate
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from dynx.sim.simulation import Simulation, Snapshot, State
 
 _HOME = {
-    "BatchInterrupted": "batch.batch",
-    "BatchRollouts": "batch.rollouts",
+    "BatchInterrupted": "batch",
+    "BatchRollouts": "batch_rollouts",
     "Noise": "loop.noise",
     "Payload": "plants.model_error",
     "Plant": "plants.plant",
@@ -45,7 +45,7 @@ _HOME = {
     "plant_model": "plants.model_error",
     "register_plant": "plants.registry",
     "simulate": "one_rollout",
-    "simulate_batch": "batch.batch",
+    "simulate_batch": "batch",
 }
 
 __all__ = [

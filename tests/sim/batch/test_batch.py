@@ -26,10 +26,9 @@ from dynx.control.saturation import Saturated
 from dynx.errors import ArgumentError, DivergedError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.sim import Noise, Payload, simulate
-from dynx.sim.batch import batch as batch_module
-from dynx.sim.batch.batch import BatchInterrupted, simulate_batch
-from dynx.sim.batch.part import Part, PartOutcome
-from dynx.sim.batch.rollouts import BatchRollouts
+from dynx.sim import batch as batch_module
+from dynx.sim.batch import BatchInterrupted, Part, PartOutcome, simulate_batch
+from dynx.sim.batch_rollouts import BatchRollouts
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint, Trajectory
 from tests.sim.bars import EXACT_ON_DYNX, apart
@@ -174,7 +173,7 @@ KILLED = """
 import os, signal, sys, numpy as np, dynx
 from dynx import trajectory
 from dynx.control.pd import PD
-from dynx.sim.batch import batch
+from dynx.sim import batch
 batch.PART = 4
 arm = dynx.load("ur5")
 reference = trajectory.cycloidal(np.zeros(6), np.full(6, 0.05), duration=0.06)

@@ -14,8 +14,7 @@ from dynx.errors import ArgumentError
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.rbd import joint_friction
-from dynx.sim import simulate, simulate_batch
-from dynx.sim.batch import batch
+from dynx.sim import batch, simulate, simulate_batch
 from tests.backends.robots import mixed_robot
 from tests.oracles.closed_form import MODELS
 from tests.sim.batch.batches import assert_same, batch_and_one

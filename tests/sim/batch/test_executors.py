@@ -20,7 +20,7 @@ import dynx
 from dynx import trajectory
 from dynx.control.computed_torque import ComputedTorque
 from dynx.sim import BatchRollouts, Noise, simulate_batch
-from dynx.sim.batch import batch as batch_module
+from dynx.sim import batch as batch_module
 
 ROLLOUTS = 23
 

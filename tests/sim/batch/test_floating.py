@@ -21,8 +21,8 @@ from dynx.errors import DivergedError
 from dynx.model import Model
 from dynx.rbd.integration import floating_step
 from dynx.sim import BatchRollouts, Noise, Payload, simulate, simulate_batch
-from dynx.sim.batch import batch as batch_module
-from dynx.sim.batch.part import Part, PartOutcome
+from dynx.sim import batch as batch_module
+from dynx.sim.batch import Part, PartOutcome
 from dynx.spatial import so3
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models

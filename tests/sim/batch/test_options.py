@@ -20,7 +20,7 @@ from dynx.errors import (
 )
 from dynx.model import Link, Model
 from dynx.sim import Payload, plant_model, simulate, simulate_batch
-from dynx.sim.batch.rollouts import BatchRollouts
+from dynx.sim.batch_rollouts import BatchRollouts
 from dynx.sim.loop_step import LoopStep
 from tests.backends.robots import mixed_robot
 from tests.sim.bars import apart
@@ -278,7 +278,7 @@ def test_the_memory_that_a_batch_needs_is_compared_with_the_machine(
     arm: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[float] = []
-    monkeypatch.setattr("dynx.sim.batch.batch.require_memory", lambda what, size: asked.append(size))
+    monkeypatch.setattr("dynx.sim.batch.require_memory", lambda what, size: asked.append(size))
     law, goal = GravityCompensatedPD(arm, kp=1.0, kd=1.0), arm.neutral()
     simulate_batch(arm, law, goal, rollouts=64, record_every=1, duration=0.02)
     # 20 recorded states of q, v and torque, of 8 bytes each.

@@ -19,7 +19,7 @@ from dynx.control import PID, FrictionCompensation
 from dynx.errors import ArgumentError
 from dynx.model.loading import load
 from dynx.sim import BatchRollouts, Noise, simulate, simulate_batch
-from dynx.sim.batch import batch as batch_module
+from dynx.sim import batch as batch_module
 from dynx.sim.loop.sensors import Sensors
 from dynx.simd.cache import load_kernel
 from dynx.simd.emit import Settings

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from dynx.model.loading import load
 from dynx.sim import Scenario
-from dynx.sim.batch.store import Store
+from dynx.sim.batch import Store
 
 
 def test_unfinished_files_of_killed_runs_are_cleared(tmp_path: Path) -> None:

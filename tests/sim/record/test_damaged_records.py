@@ -21,8 +21,8 @@ from dynx.errors import ArgumentError, DynxError
 from dynx.files.arrays import read_arrays, write_arrays
 from dynx.model.loading import load
 from dynx.sim import Noise, Payload, Rollout, Scenario, simulate, simulate_batch
-from dynx.sim.batch.rollouts import BatchRollouts
-from dynx.sim.batch.store import Store
+from dynx.sim.batch import Store
+from dynx.sim.batch_rollouts import BatchRollouts
 
 ARM = load("planar_2r")
 SCENARIO = Scenario(
@@ -205,7 +205,7 @@ def test_a_part_that_cannot_be_stored_is_in_the_result(
     def full(path: Path, arrays: Any) -> None:
         raise ArgumentError(f"{path} cannot be written: no space left")
 
-    monkeypatch.setattr("dynx.sim.batch.store.write_arrays", full)
+    monkeypatch.setattr("dynx.sim.batch.write_arrays", full)
     with pytest.warns(RuntimeWarning, match="1 parts of the batch could not be stored.*no space left"):
         found = simulate_batch(SCENARIO, rollouts=3, keep=tmp_path)
     assert found.done.all()

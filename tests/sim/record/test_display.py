@@ -11,7 +11,7 @@ import pytest
 import dynx
 from dynx import control, ik
 from dynx.sim import Rollout, Scenario, simulate, simulate_batch
-from dynx.sim.batch.rollouts import BatchRollouts
+from dynx.sim.batch_rollouts import BatchRollouts
 from tests.sim.bars import tutorial_robot
 
 ARM = tutorial_robot()
