@@ -17,9 +17,8 @@ from benchmarks.libraries.casadi_peers import CasadiCode, CasadiMap
 from benchmarks.libraries.compiling_peer import CompilingPeer
 from benchmarks.libraries.jax_peers import AdamJax, Frax
 from benchmarks.libraries.mujoco_peers import MujocoInverse, MujocoRollout
-from dynx.bench.backend_implementations import backend_implementation
 from dynx.bench.cases import BENCHMARK_QUANTITIES, Batch, BenchmarkCase, draw_batch
-from dynx.bench.implementations import Implementation, PreparedCall
+from dynx.bench.implementations import Implementation, PreparedCall, backend_implementation
 from dynx.bench.measurement import Preparation
 from dynx.bench.pinocchio_implementations import BATCH, LOOP, PinocchioBatch, PinocchioLoop
 from dynx.model import Inertial, Joint, Link, Model, Pose

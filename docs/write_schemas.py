@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from dynx.agreement.report import AgreementDocument
-from dynx.bench.document import BenchDocument
+from dynx.bench.report import BenchDocument
 from dynx.cli.compare.document import CompareDocument
 from dynx.cli.contacts.document import ContactsDocument
 from dynx.cli.env.document import EnvDistanceDocument, TasksDocument
@@ -23,7 +23,7 @@ from dynx.cli.sim.tutorial import TutorialDocument
 from dynx.cli.train.document import TrainDocument
 from dynx.cli.world.document import WorldDocument
 from dynx.doctor.formats.baseline import BaselineDocument
-from dynx.doctor.report_document import DoctorDocument
+from dynx.doctor.report import DoctorDocument
 from dynx.files.documents import json_schema
 from dynx.sim.scenario.scenario import ScenarioDocument
 from dynx.world.scene.documents import SceneDocument

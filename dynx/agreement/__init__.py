@@ -6,8 +6,7 @@ from dynx.agreement.agreement import agree
 from dynx.agreement.comparison import Comparison, WorstSample
 from dynx.agreement.identities import IdentityCheck
 from dynx.agreement.referee import Referee
-from dynx.agreement.report import AgreementReport, Failure, refused_report, results_document
-from dynx.agreement.suspects import Suspect
+from dynx.agreement.report import AgreementReport, Failure, Suspect, refused_report, results_document
 
 __all__ = [
     "AgreementReport",

@@ -5,21 +5,28 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from dynx.agreement.compared_quantities import compared_quantities
-from dynx.agreement.comparison import Comparison, compare
+from dynx.agreement.comparison import (
+    DERIVED,
+    REFEREE,
+    BackendResults,
+    Comparison,
+    compare,
+    compare_forward_dynamics,
+    compare_inverse_kinematics,
+)
 from dynx.agreement.identities import IdentityCheck, check_identities
 from dynx.agreement.magnitudes import Magnitudes
 from dynx.agreement.referee import Referee
-from dynx.agreement.report import AgreementReport, refused_report
-from dynx.agreement.results import DERIVED, REFEREE, BackendResults
+from dynx.agreement.report import AgreementReport, find_suspects, refused_report
 from dynx.agreement.sampling import Samples, draw_samples
-from dynx.agreement.solutions import compare_forward_dynamics, compare_inverse_kinematics
-from dynx.agreement.suspects import find_suspects
 from dynx.backends import (
     Backend,
     DerivedBackend,
@@ -30,9 +37,10 @@ from dynx.backends import (
 )
 from dynx.backends.solvability import singular_coordinates
 from dynx.errors import ArgumentError, DynxError
-from dynx.model import Model
+from dynx.model import Model, Pose
 from dynx.model.loading import load
 from dynx.model.numbers import whole_number
+from dynx.model.tree import Base
 from dynx.option_names import checks_option_names
 
 DEFAULT_SAMPLES = 16
@@ -237,3 +245,37 @@ def _distinct_names(engines: list[Backend]) -> list[str]:
 def _label(model: object) -> str:
     text = str(model)
     return text if len(text) <= 200 and "\n" not in text else "<string>"
+
+
+# Agreement of one robot that the user named, as a task of a worker process.
+
+
+@dataclass(frozen=True)
+class AgreementTask:
+    """A robot and the options of its comparison; None stands for the default of `dynx.agree`."""
+
+    robot: str
+    base: Base
+    lock: tuple[tuple[str, float], ...]
+    backends: tuple[str, ...] | None
+    samples: int | None
+    seed: int
+    base_pose: Pose | None = None
+
+
+def measure(task: AgreementTask) -> AgreementReport:
+    """Report the agreement of one robot, or the error where it cannot be used."""
+    chosen: dict[str, Any] = {"seed": task.seed}
+    if task.samples is not None:
+        chosen["samples"] = task.samples
+    try:
+        model = load(task.robot, base=task.base, lock=dict(task.lock), base_pose=task.base_pose)
+        report = agree(model, backends=task.backends, **chosen)
+    except DynxError as error:
+        return refused(task, error)
+    return replace(report, robot=task.robot)
+
+
+def refused(task: AgreementTask, error: DynxError) -> AgreementReport:
+    """Report a robot that could not be compared."""
+    return refused_report(task.robot, error, base=task.base, backends=task.backends or ())

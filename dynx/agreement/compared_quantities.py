@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from dynx.agreement import tolerances
-from dynx.agreement.magnitudes import EPS, Magnitudes
-from dynx.agreement.natural_magnitudes import (
+from dynx.agreement.magnitudes import (
+    EPS,
     NATURAL_MAGNITUDES,
     Layout,
+    Magnitudes,
     NaturalMagnitude,
     Scale,
     frame_samples,
@@ -53,7 +54,7 @@ class ComparedQuantity:
 
 def compared_quantities() -> tuple[ComparedQuantity, ...]:
     """Return all compared quantities except those that solve equations, whose errors are not differences
-    (`dynx.agreement.solutions`)."""
+    (`dynx.agreement.comparison`)."""
     lines: list[ComparedQuantity] = []
     for quantity in QUANTITIES.values():
         if not quantity.solves:

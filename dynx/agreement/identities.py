@@ -2,7 +2,7 @@
 
 Each identity is an equation between quantities of a single backend. When two backends differ, the
 one that breaks an identity is wrong. Time derivatives are numerical
-(`dynx.agreement.differentiation`) and do not depend on derivatives of the engine.
+(`dynx.agreement.identities`) and do not depend on derivatives of the engine.
 """
 
 from __future__ import annotations
@@ -13,20 +13,72 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynx.agreement import tolerances
-from dynx.agreement.comparison import WorstSample, judge, state
-from dynx.agreement.differentiation import time_derivative
-from dynx.agreement.magnitudes import Magnitudes
-from dynx.agreement.natural_magnitudes import coriolis_scale, largest, mass_scale
-from dynx.agreement.results import BackendResults
+from dynx.agreement.comparison import BackendResults, WorstSample, compare_forward_dynamics, judge, state
+from dynx.agreement.magnitudes import Magnitudes, coriolis_scale, largest, mass_scale
 from dynx.agreement.sampling import Samples
-from dynx.agreement.solutions import compare_forward_dynamics
-from dynx.agreement.symmetry import rotate_world
+from dynx.agreement.tolerances import STEP
 from dynx.backends import Backend
 from dynx.backends.hooks import apply_matrix
 from dynx.errors import shown
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
-from dynx.spatial.so3 import cross, rotate, skew
+from dynx.spatial.se3 import homogeneous
+from dynx.spatial.so3 import cross, quat_exp, quat_product, rotate, rotation_from_quat, skew
+
+# Numerical derivatives along a motion, accurate to a dozen digits.
+#
+# A pose, and anything made of poses, is band-limited along a motion at constant velocity: a sum of
+# sines and cosines whose frequency is at most W. Bernstein's inequality then bounds every derivative
+# by the largest value times a power of W, so the central difference of order 8 with step ``STEP / W`` has a
+# known error (`tolerances.derivative`).
+
+
+WEIGHTS = {1: 4.0 / 5.0, 2: -1.0 / 5.0, 3: 4.0 / 105.0, 4: -1.0 / 280.0}
+"""Weight of f(k h) - f(-k h), to be divided by h."""
+
+MAX_REST_FREQUENCY = 1e-100
+"""Frequency [rad/s] below which a robot counts as at rest, because the step ``STEP / W`` would overflow."""
+
+
+def time_derivative(function: Callable[[Floats], Floats], frequency: Floats) -> Floats:
+    """Return the time derivative of ``function(t)`` at t = 0 for n motions at once.
+
+    `frequency` (n,) is each motion's highest angular frequency [rad/s]. `function` takes m times for each
+    motion as an array (m, n), and returns (m, n, ...); the derivative is (n, ...).
+    """
+    step = STEP / np.where(frequency > MAX_REST_FREQUENCY, frequency, 1.0)
+    multiples = [k for order in WEIGHTS for k in (order, -order)]
+    values = function(np.array(multiples)[:, None] * step)
+    total = sum(
+        weight * (values[2 * row] - values[2 * row + 1]) for row, weight in enumerate(WEIGHTS.values())
+    )
+    return np.asarray(total / step.reshape(-1, *([1] * (values.ndim - 2))))
+
+
+# A robot in a world that is rotated together with gravity.
+
+
+ROTATION_VECTOR = (0.7, -1.1, 0.4)
+"""Rotation of the world [rad], about an oblique axis, so that exchanged axes show."""
+
+
+def rotate_world(model: Model) -> tuple[Model, Callable[[Floats], Floats]]:
+    """Return a model in the rotated world, and the map from configurations (..., nq) of `model` to its own.
+
+    A floating base is rotated by its configuration, a fixed one by its pose in the world.
+    """
+    quat = quat_exp(np.array(ROTATION_VECTOR))
+    R = rotation_from_quat(quat)
+    x, y, z = rotate(R, np.array(model.gravity)).tolist()
+    if model.floating:
+
+        def rotate_base(q: Floats) -> Floats:
+            attitude = quat_product(np.broadcast_to(quat, (*q.shape[:-1], 4)), q[..., 3:7])
+            return np.concatenate([rotate(R, q[..., :3]), attitude, q[..., 7:]], axis=-1)
+
+        return model.with_gravity((x, y, z)), rotate_base
+    T = homogeneous(R, np.zeros(3)) @ model.base_pose.matrix
+    return model.with_base_pose(T).with_gravity((x, y, z)), lambda q: q
 
 
 @dataclass(frozen=True)

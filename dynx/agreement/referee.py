@@ -18,7 +18,7 @@ import mpmath
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.agreement.results import REFEREE
+from dynx.agreement.comparison import REFEREE
 from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.model import Model
 from dynx.model.mechanism import Mechanism, build_mechanism

@@ -1,6 +1,6 @@
 """Every tolerance of the project, and its derivation.
 
-Errors are relative to the natural magnitude of a quantity (`dynx.agreement.natural_magnitudes`), so a
+Errors are relative to the natural magnitude of a quantity (`dynx.agreement.magnitudes`), so a
 tolerance is a pure number. Each is derived from the unit roundoff and the number of joints through which
 rounding errors accumulate, and is at most the error that dynx promises.
 """
@@ -31,7 +31,7 @@ FIXED_JOINTS = 4
 
 STEP = 1.0 / 16.0
 """Step of a numerical derivative times the highest angular frequency in the function (see
-`dynx.agreement.differentiation`): it balances truncation against rounding."""
+`dynx.agreement.identities`): it balances truncation against rounding."""
 
 ORDER = 8
 """Order of the central difference."""

@@ -61,7 +61,7 @@ class Quantity:
     details: further arguments, such as the number of a frame."""
 
     natural_magnitude: str
-    """Name of the bound in `dynx.agreement.natural_magnitudes` by which errors are divided."""
+    """Name of the bound in `dynx.agreement.magnitudes` by which errors are divided."""
 
     source: str
     """Book or paper with the equation."""

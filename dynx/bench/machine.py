@@ -11,18 +11,143 @@ import platform
 import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from dynx.bench.cost import cost_of
-from dynx.bench.roofline import Peak
+from dynx.backends.quantities import QUANTITIES
 from dynx.bench.timing import once
+from dynx.compiled.kernels import compiles, evaluate_quantity
+from dynx.compiled.simplification import simplify_mechanism
+from dynx.model import Model
+from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
 from dynx.simd.expr import Node
 from dynx.simd.kernel import Kernel
 from dynx.simd.program import Port, Program
 from dynx.simd.target import host
 from dynx.simd.trace import trace
+from dynx.simd.trigonometry import COS, HALF_PI, SIN
 from dynx.spatial.scalar import Floats
+
+# Least cost of one sample of a program: bytes moved and operations.
+
+
+SINE_COSINE_PAIRS = 1 + len(HALF_PI) + (len(SIN) - 1) + 1 + (len(COS) + 1)
+"""Number of multiply-adds in the sine and cosine of one angle: the nearest multiple of pi/2, the
+reduction, and the two polynomials (`dynx.simd.trigonometry`)."""
+
+SINE_COSINE_SINGLES = 3
+"""Number of sums and products besides those multiply-adds: the multiple of pi/2 as a number, r^2, and r^3."""
+
+_SUMS = frozenset({"add", "sub"})
+_NOT_COUNTED = frozenset({"input", "constant", "sin", "cos", "neg", "abs"})
+
+
+@dataclass(frozen=True)
+class Cost:
+    """The cost of one sample.
+
+    `bytes` are those of the inputs and outputs, each moved once. `operations` are sums, products, quotients
+    and roots. `multiply_adds` counts instructions, where a product that only one sum uses is fused with that
+    sum, and any other sum or product counts as one.
+    """
+
+    bytes: int
+    operations: int
+    multiply_adds: int
+
+
+def cost_of(program: Program) -> Cost:
+    """Return the cost of a traced program; the sine and cosine of one angle are computed together."""
+    nodes = program.nodes
+    uses = [0] * len(nodes)
+    for index in (*(arg for node in nodes for arg in node.args), *program.results):
+        uses[index] += 1
+    single = sum(node.op not in _NOT_COUNTED for node in nodes)
+    pairs = sum(
+        node.op in _SUMS and any(nodes[arg].op == "mul" and uses[arg] == 1 for arg in node.args)
+        for node in nodes
+    )
+    angles = len({node.args[0] for node in nodes if node.op in ("sin", "cos")})
+    doubles = program.n_inputs + len(program.results)
+    return Cost(
+        bytes=8 * doubles,
+        operations=single + angles * (2 * SINE_COSINE_PAIRS + SINE_COSINE_SINGLES),
+        multiply_adds=single - pairs + angles * (SINE_COSINE_PAIRS + SINE_COSINE_SINGLES),
+    )
+
+
+def program_of(model: Model, quantity: str, frame: str) -> Program | None:
+    """Return the program that the backend `compiled` compiles for a quantity, without checks of arguments.
+
+    Return None if that backend evaluates the quantity with NumPy because its code would be too long.
+    """
+    mechanism, number = simplify_mechanism(model.mechanism), model.frame_index(frame)
+    described = QUANTITIES[quantity]
+    name, details = quantity, described.implied_details(model)
+    if described.of_frame:
+        details = (number, LOCAL_WORLD_ALIGNED)
+    if quantity == "forward_kinematics":
+        name, details = "frame_placement", (number,)
+    if not compiles(mechanism, name):
+        return None
+    inputs: dict[str, tuple[int, ...]] = {
+        argument: (model.nq if argument == "q" else model.nv,) for argument in described.arguments
+    }
+    return trace(lambda **arguments: evaluate_quantity(mechanism, name, details, *arguments.values()), inputs)
+
+
+# The roofline model: the shares of memory bandwidth and arithmetic rate that a kernel reaches.
+#
+# A kernel cannot be faster than its bytes over the memory bandwidth, nor than its operations over the
+# peak rate of arithmetic (Williams, Waterman and Patterson, Roofline, CACM 52(4), 2009).
+
+
+Bound = Literal["memory", "arithmetic"]
+
+
+@dataclass(frozen=True)
+class Peak:
+    """Measured peaks of the machine on a number of threads.
+
+    `copy_bandwidth` [B/s] counts bytes read and bytes written; `multiply_adds` [1/s] counts a product
+    with a sum as one.
+    """
+
+    threads: int
+    copy_bandwidth: float
+    multiply_adds: float
+
+
+@dataclass(frozen=True)
+class Roofline:
+    """The shares of both peaks that a kernel reaches, and the one that limits it.
+
+    The share of memory may exceed 1 where a batch fits into the caches, which are faster.
+    """
+
+    memory_share: float
+    arithmetic_share: float
+
+    @property
+    def binds(self) -> Bound:
+        """The bound with the larger share, which limits the kernel."""
+        return "memory" if self.memory_share > self.arithmetic_share else "arithmetic"
+
+    @property
+    def share(self) -> float:
+        """The larger of the two shares."""
+        return max(self.memory_share, self.arithmetic_share)
+
+
+def roofline(cost: Cost, seconds: float, peak: Peak) -> Roofline:
+    """Return the roofline of a kernel that takes `seconds` for a sample of this cost."""
+    return Roofline(
+        memory_share=cost.bytes / peak.copy_bandwidth / seconds,
+        arithmetic_share=cost.multiply_adds / peak.multiply_adds / seconds,
+    )
+
 
 COPIED_BYTES = 128 * 2**20
 """Size of the array that is copied: more than the caches hold."""

@@ -7,13 +7,10 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 
 from dynx.backends.registry import installed_backends
-from dynx.bench.backend_implementations import backend_implementation
 from dynx.bench.cases import BENCHMARK_QUANTITIES, Batch, BenchmarkCase, draw_batch, require_memory
-from dynx.bench.cost import Cost, cost_of, program_of
-from dynx.bench.implementations import Implementation, PreparedCall, Role
-from dynx.bench.machine import load, measure_peak
+from dynx.bench.implementations import Implementation, PreparedCall, Role, backend_implementation
+from dynx.bench.machine import Cost, Peak, cost_of, load, measure_peak, program_of
 from dynx.bench.measurement import BenchmarkMeasurement, measure
-from dynx.bench.roofline import Peak
 from dynx.errors import ArgumentError, DynxError, NotInstalledError
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
@@ -27,7 +24,7 @@ MIN_BATCH_FOR_THREADS = 1024
 """Smallest batch that is timed on several threads by default."""
 
 COMPILED = "compiled"
-"""Name of the backend whose operations `dynx.bench.cost` counts."""
+"""Name of the backend whose operations `dynx.bench.machine` counts."""
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 file."""
 
 from dynx.doctor.diagnosis import compare_as_loaded, diagnose
-from dynx.doctor.report import DoctorReport, Finding
-from dynx.doctor.report_document import results_document
+from dynx.doctor.report import DoctorReport, Finding, results_document
 
 __all__ = ["DoctorReport", "Finding", "compare_as_loaded", "diagnose", "results_document"]

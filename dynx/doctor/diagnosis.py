@@ -10,13 +10,11 @@ from dataclasses import replace
 
 from dynx.agreement.report import Failure
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.counterexample.search import smallest_counterexample
-from dynx.doctor.counterexample.trials import difference_of
-from dynx.doctor.examine.bounds import require_bounded
+from dynx.doctor.counterexample.search import difference_of, smallest_counterexample
 from dynx.doctor.examine.contacts import deepest_contact, describe_contacts
-from dynx.doctor.examine.examination import TORQUE, Examination, Examiner
-from dynx.doctor.examine.line_map import with_original_lines
-from dynx.doctor.examine.reference_values import ReferenceValues
+from dynx.doctor.examine.engine_input import with_original_lines
+from dynx.doctor.examine.examination import TORQUE, Examination, Examiner, ReferenceValues, require_bounded
+from dynx.doctor.prove.attribution import SelectedPlaces, smallest_mending
 from dynx.doctor.prove.mending import (
     Mending,
     all_except,
@@ -27,9 +25,7 @@ from dynx.doctor.prove.mending import (
     refusal,
     remedy_of,
 )
-from dynx.doctor.prove.proofs import Proofs
-from dynx.doctor.prove.refusals import with_refusals
-from dynx.doctor.prove.selection import SelectedPlaces, smallest_mending
+from dynx.doctor.prove.proofs import Proofs, with_refusals
 from dynx.doctor.report import (
     DoctorReport,
     Unexplained,
@@ -37,12 +33,13 @@ from dynx.doctor.report import (
 from dynx.doctor.report_assembly import (
     all_findings,
     changes_of,
+    diagnosed_variants,
     first_report,
     run_time_calls,
+    variants_as_loaded,
     with_after,
     with_meshes,
 )
-from dynx.doctor.variants import diagnosed_variants, variants_as_loaded
 from dynx.errors import ArgumentError, DescriptionError, DynxError, UnknownNameError, nearest, shown
 from dynx.loaded import COMMON_VARIANTS, ENGINES, VARIANTS, engine_of, installed_engines
 from dynx.model import Model

@@ -14,7 +14,7 @@ from dynx.files.reading import printable, read_file
 from dynx.model.elements import IDENTITY, Pose
 from dynx.model.library import find, robots
 from dynx.model.model import Model
-from dynx.model.package_paths import StrPath, data_folders, environment_folders, resolve_package
+from dynx.model.package_search import StrPath, data_folders, environment_folders, resolve_package
 from dynx.model.tree import STANDARD_GRAVITY, Base
 from dynx.model.urdf.geometry import urdf_geometry
 from dynx.model.urdf.reader import read_urdf

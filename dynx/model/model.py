@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, shown
 from dynx.files.notebook import html_grid
-from dynx.model import configuration, locking, topology
+from dynx.model import configuration, topology
 from dynx.model.elements import IDENTITY, Frame, Joint, Link, Note, Pose, checked_pose
 from dynx.model.geometry.links import Geometry
 from dynx.model.mechanism import Mechanism, build_mechanism
-from dynx.model.number_bounds import refuse_unbounded_numbers
 from dynx.model.numbers import checked_gravity
+from dynx.model.topology import refuse_unbounded_numbers
 from dynx.model.tree import NO_GEOMETRY, STANDARD_GRAVITY, Base, Tree, checked_base
 from dynx.model.urdf.writer import write_urdf
 from dynx.registry import door
@@ -61,7 +61,7 @@ class Model(Tree):
         """
         notes = list(notes)
         ordered_links, ordered_joints = topology.depth_first(list(links), list(joints), source)
-        ordered_joints = locking.lock_joints(ordered_joints, lock or {})
+        ordered_joints = topology.lock_joints(ordered_joints, lock or {})
         ordered_joints = topology.resolve_mimics(ordered_joints, notes, source)
         refuse_unbounded_numbers(ordered_links, ordered_joints, source)
         notes += _missing_inertial_notes(ordered_links, ordered_joints)

@@ -3,12 +3,107 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import SupportsFloat
 
-from dynx.errors import DescriptionError, nearest, shown
-from dynx.model.elements import Joint, Link, Mimic, Note
-from dynx.model.locking import lock_joint
+import numpy as np
+
+from dynx.errors import DescriptionError, DTypeError, NotFiniteError, UnknownNameError, nearest, shown
+from dynx.model.elements import Inertial, Joint, Link, Mimic, Note, Pose
+from dynx.model.numbers import MAX_MAGNITUDE
+from dynx.spatial.so3 import rotation_about, rpy_from_rotation
+
+# Bound on the numbers of a description, whether a file or a program states them.
+
+
+_MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+
+def refuse_unbounded_numbers(links: Iterable[Link], joints: Iterable[Joint], source: str) -> None:
+    """Raise DescriptionError for a number that is not finite or not below `MAX_MAGNITUDE`.
+
+    Limits may be infinite, and are not part of any product.
+    """
+    for link in links:
+        if link.inertial is not None:
+            _require_bounded(f"link {shown(link.name)}", _of_inertial(link.inertial), source, link.line)
+    for joint in joints:
+        _require_bounded(f"joint {shown(joint.name)}", _of_joint(joint), source, joint.line)
+
+
+def _of_inertial(inertial: Inertial) -> Iterator[tuple[str, float]]:
+    yield "mass", inertial.mass
+    yield from ((name, getattr(inertial, name)) for name in _MOMENTS)
+    yield from _of_pose("origin of the inertia", inertial.origin)
+
+
+def _of_joint(joint: Joint) -> Iterator[tuple[str, float]]:
+    yield from _of_pose("origin", joint.origin)
+    yield from (("axis", value) for value in joint.axis)
+    dynamics = joint.dynamics
+    yield "damping", dynamics.damping
+    yield "friction", dynamics.friction
+    yield "armature", dynamics.armature
+    if joint.mimic is not None:
+        yield "multiplier", joint.mimic.multiplier
+        yield "offset", joint.mimic.offset
+    if joint.locked_at is not None:
+        yield "locked position", joint.locked_at
+
+
+def _of_pose(name: str, pose: Pose) -> Iterator[tuple[str, float]]:
+    yield from ((name, value) for value in (*pose.xyz, *pose.rpy))
+
+
+def _require_bounded(what: str, numbers: Iterable[tuple[str, float]], source: str, line: int | None) -> None:
+    for name, value in numbers:
+        # The comparison is false for NaN.
+        if not abs(value) < MAX_MAGNITUDE:
+            raise DescriptionError(
+                f"the {name} of {what} is {value}; wanted a number below {MAX_MAGNITUDE:g} in magnitude, "
+                "since products of larger numbers overflow",
+                source=source,
+                line=line,
+            )
+
+
+# Locking of joints at a position: the joint becomes fixed and is removed from q.
+
+
+def lock_joints(joints: list[Joint], lock: Mapping[str, float]) -> list[Joint]:
+    """Return `joints` with those named in `lock` fixed at the given positions [rad or m].
+
+    Joints that follow a locked one are fixed by `topology.resolve_mimics`. Raises UnknownNameError for an
+    unknown or fixed joint; DTypeError or NotFiniteError for a position that is not a finite number.
+    """
+    by_name = {joint.name: joint for joint in joints}
+    for name, value in lock.items():
+        if name not in by_name:
+            raise UnknownNameError(f"cannot lock {shown(name)}: no such joint{nearest(str(name), by_name)}")
+        if not by_name[name].moves:
+            raise UnknownNameError(f"cannot lock {shown(name)}: it is a fixed joint already")
+        if isinstance(value, bool | str) or not isinstance(value, SupportsFloat):
+            raise DTypeError(f"cannot lock {shown(name)} at {shown(value)}; wanted a number")
+        if not math.isfinite(value):
+            raise NotFiniteError(f"cannot lock {shown(name)} at {value}: wanted a finite number")
+    return [lock_joint(joint, float(lock[joint.name])) if joint.name in lock else joint for joint in joints]
+
+
+def lock_joint(joint: Joint, value: float) -> Joint:
+    """Return the joint fixed at position `value`, which is included in its origin."""
+    axis, T = np.array(joint.axis), joint.origin.matrix
+    if joint.type == "prismatic":
+        x, y, z = (T[:3, 3] + T[:3, :3] @ (axis * value)).tolist()
+        origin = Pose((x, y, z), joint.origin.rpy)
+    elif value == 0.0:
+        origin = joint.origin
+    else:
+        R = T[:3, :3] @ rotation_about(axis, np.array(value))
+        roll, pitch, yaw = rpy_from_rotation(R).tolist()
+        origin = Pose(joint.origin.xyz, (roll, pitch, yaw))
+    return replace(joint, type="fixed", origin=origin, mimic=None, locked_at=value)
+
 
 MAX_LINKS = 10_000
 """Largest number of links, more than any robot has; larger files would overflow the stack of an engine."""

@@ -26,8 +26,7 @@ from pathlib import Path
 
 from dynx.errors import ArgumentError, DescriptionError, NotInstalledError, escaped, nearest, shown
 from dynx.files.reading import MAX_BYTES, printable, read_file
-from dynx.model.package_paths import StrPath, environment_folders, find_package
-from dynx.model.package_search import package_of
+from dynx.model.package_search import StrPath, environment_folders, find_package, package_of
 
 TIMEOUT = 60.0
 """Longest duration of an expansion [s]."""

@@ -18,7 +18,7 @@ from dynx.errors import DescriptionError, DynxError, shown
 from dynx.files.reading import read_file
 from dynx.model import Link
 from dynx.model.geometry.formats.collada import collada_points
-from dynx.model.geometry.formats.stl import STL_FACET, STL_HEAD, STL_VERTEX
+from dynx.model.geometry.formats.facets import STL_FACET, STL_HEAD, STL_VERTEX
 from dynx.model.geometry.mesh_files import (
     MeshNotFoundError,
     find_by_bullet,

@@ -46,7 +46,7 @@ applied first and must not use `Case.model`. ``model``: the cause is in the robo
 
 Level = Literal["safe", "rounding", "physics"]
 """Largest change that a remedy makes: none that a reader notices, rounding of the equations of motion, or
-more (`dynx.doctor.prove.levels`)."""
+more (`dynx.doctor.prove.mending`)."""
 
 LEVELS: tuple[Level, ...] = get_args(Level)
 

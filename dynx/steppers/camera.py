@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from dynx.errors import ArgumentError, shown
 from dynx.model import Pose
 from dynx.model.elements import IDENTITY, checked_pose
-from dynx.model.geometry.sizes import positive_number
 from dynx.model.geometry.solids import Shape
-from dynx.model.numbers import checked_vector, is_real, whole_number
+from dynx.model.numbers import checked_vector, is_real, positive_number, whole_number
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 

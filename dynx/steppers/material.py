@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.errors import ArgumentError, shown
-from dynx.model.geometry.sizes import colour
-from dynx.model.numbers import MAX_MAGNITUDE, is_real
+from dynx.model.numbers import MAX_MAGNITUDE, colour, is_real
 from dynx.spatial.scalar import Floats
 
 COEFFICIENTS = ("friction", "torsional_friction", "rolling_friction", "restitution")

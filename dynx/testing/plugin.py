@@ -102,7 +102,7 @@ def pytest_make_collect_report(
     if isinstance(collector, pytest.Session) and report.passed:
         plan = collector.config.stash.get(_PLAN, None)
         if plan is not None:
-            from dynx.testing.robot_nodes import robot_nodes
+            from dynx.testing.robot_checks import robot_nodes
 
             report.result = [*report.result, *robot_nodes(collector, plan)]
     return report

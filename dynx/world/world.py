@@ -18,7 +18,7 @@ from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model import Model, Pose
 from dynx.model.geometry import Mesh
 from dynx.model.numbers import positive_seconds, whole_number
-from dynx.model.package_paths import StrPath
+from dynx.model.package_search import StrPath
 from dynx.option_names import checks_option_names
 from dynx.registry import door
 from dynx.spatial.scalar import Floats

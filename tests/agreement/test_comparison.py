@@ -4,9 +4,8 @@ import mpmath
 import numpy as np
 
 from dynx.agreement.compared_quantities import compared_quantities
-from dynx.agreement.comparison import compare, judge
+from dynx.agreement.comparison import BackendResults, compare, judge
 from dynx.agreement.magnitudes import Magnitudes
-from dynx.agreement.results import BackendResults
 from dynx.agreement.sampling import draw_samples
 from dynx.errors import EngineError
 from dynx.reference.backend import ReferenceBackend

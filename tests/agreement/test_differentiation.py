@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.agreement import tolerances
-from dynx.agreement.differentiation import MAX_REST_FREQUENCY, WEIGHTS, time_derivative
+from dynx.agreement.identities import MAX_REST_FREQUENCY, WEIGHTS, time_derivative
 from dynx.agreement.magnitudes import EPS
 
 

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from dynx.agreement.comparison import Comparison
 from dynx.agreement.identities import IdentityCheck
-from dynx.agreement.suspects import find_suspects
+from dynx.agreement.report import find_suspects
 
 
 def row(pair: str, agree: bool) -> Comparison:

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynx.agreement.symmetry import rotate_world
+from dynx.agreement.identities import rotate_world
 from dynx.model import Pose
 from tests.agreement.robots import arm
 

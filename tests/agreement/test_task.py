@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dynx.agreement import agree
-from dynx.agreement.task import AgreementTask, measure
+from dynx.agreement.agreement import AgreementTask, measure
 from dynx.model.loading import load
 
 

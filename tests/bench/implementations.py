@@ -5,7 +5,7 @@ from __future__ import annotations
 from dynx.backends.quantities import QUANTITIES
 from dynx.bench.cases import Batch, BenchmarkCase
 from dynx.bench.implementations import Implementation, PreparedCall, Role
-from dynx.bench.roofline import Peak
+from dynx.bench.machine import Peak
 from dynx.bench.session import Plan, Session
 from dynx.errors import EngineError
 from dynx.model import Model

@@ -6,8 +6,8 @@ import pytest
 
 import dynx
 from dynx.backends.registry import installed_backends
-from dynx.bench.backend_implementations import backend_implementation
 from dynx.bench.cases import BENCHMARK_QUANTITIES, BenchmarkCase, draw_batch
+from dynx.bench.implementations import backend_implementation
 from dynx.bench.measurement import measure
 from dynx.errors import UnknownBackendError
 from dynx.model.tree import Base

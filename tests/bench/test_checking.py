@@ -8,7 +8,7 @@ import pytest
 import dynx
 from dynx.backends.quantities import QUANTITIES
 from dynx.bench.cases import BENCHMARK_QUANTITIES, draw_batch
-from dynx.bench.checking import CHECKED_AT_ENDS, Judge, checked_rows
+from dynx.bench.measurement import CHECKED_AT_ENDS, Judge, checked_rows
 from dynx.errors import SingularMassMatrixError
 from dynx.model import Joint, Link, Model
 from dynx.model.tree import Base

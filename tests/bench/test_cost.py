@@ -9,7 +9,7 @@ import pytest
 
 import dynx
 from dynx.backends.quantities import QUANTITIES
-from dynx.bench.cost import SINE_COSINE_PAIRS, SINE_COSINE_SINGLES, Cost, cost_of, program_of
+from dynx.bench.machine import SINE_COSINE_PAIRS, SINE_COSINE_SINGLES, Cost, cost_of, program_of
 from dynx.simd.ir_writer import Writer
 from dynx.simd.trace import trace
 from dynx.simd.trigonometry import sines_and_cosines
@@ -77,6 +77,6 @@ def test_bytes_are_those_of_arguments_and_result(robot: str, quantity: str) -> N
 
 
 def test_a_quantity_that_is_not_compiled_has_no_cost(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("dynx.bench.cost.compiles", lambda mechanism, name: False)
+    monkeypatch.setattr("dynx.bench.machine.compiles", lambda mechanism, name: False)
     model = dynx.load("double_pendulum")
     assert program_of(model, "inverse_dynamics", model.frame_names[-1]) is None

@@ -5,8 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dynx.bench.cost import cost_of
-from dynx.bench.machine import CHAIN_LENGTH, CHAINS, chains_program, measure_peak, processor_description
+from dynx.bench.machine import (
+    CHAIN_LENGTH,
+    CHAINS,
+    chains_program,
+    cost_of,
+    measure_peak,
+    processor_description,
+)
 from dynx.simd.kernel import Kernel
 
 

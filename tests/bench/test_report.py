@@ -8,7 +8,7 @@ import pytest
 
 import dynx
 from dynx.bench.cases import BenchmarkCase
-from dynx.bench.cost import Cost
+from dynx.bench.machine import Cost
 from dynx.bench.measurement import BenchmarkMeasurement
 from dynx.bench.report import SCHEMA, document, is_wrong, result, wrong
 from dynx.bench.session import benchmark_cases

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dynx.bench.cost import Cost
-from dynx.bench.roofline import Peak, roofline
+from dynx.bench.machine import Cost, Peak, roofline
 
 PEAK = Peak(threads=1, copy_bandwidth=10e9, multiply_adds=20e9)
 

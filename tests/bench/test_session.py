@@ -7,7 +7,7 @@ import pytest
 import dynx
 from dynx.backends.registry import installed_backends
 from dynx.bench.cases import BenchmarkCase
-from dynx.bench.cost import cost_of, program_of
+from dynx.bench.machine import cost_of, program_of
 from dynx.bench.measurement import BenchmarkMeasurement
 from dynx.bench.session import (
     BATCHES,

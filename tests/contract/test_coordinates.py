@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given
 from scipy.spatial.transform import Rotation
 
-from dynx.agreement.differentiation import time_derivative
+from dynx.agreement.identities import time_derivative
 from dynx.errors import UnknownNameError
 from dynx.model import Model, Pose
 from dynx.model.loading import load

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from dynx.agreement.differentiation import time_derivative
+from dynx.agreement.identities import time_derivative
 from dynx.backends import Backend
 from dynx.model import Model, Pose
 from dynx.rbd.jacobians import REFERENCES

@@ -9,8 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from dynx.doctor.examine.examination import Examination, Examiner
-from dynx.doctor.examine.reference_values import model_without_mimics
+from dynx.doctor.examine.examination import Examination, Examiner, model_without_mimics
 from dynx.errors import EngineError
 from dynx.loaded import LoadedModel, LoadedRobot
 from dynx.model import Inertial, Model

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.doctor import lines
-from dynx.doctor.formats.text_changes import _difference
+from dynx.doctor.formats.html import _difference
 from dynx.doctor.lines import line_opcodes
 
 texts = st.lists(st.sampled_from(["a", "b", "c", "", "link 1", "link 2", "link 3"]), max_size=40)

@@ -9,8 +9,7 @@ from dataclasses import replace
 import pytest
 
 from dynx.doctor import diagnose
-from dynx.doctor.report import Change, DoctorReport, EngineResult
-from dynx.doctor.report_document import results_document
+from dynx.doctor.report import Change, DoctorReport, EngineResult, results_document
 from dynx.rules.registry import find_trap
 from tests.doctor.formats.reports import alike, differing, refused
 

@@ -18,7 +18,7 @@ from dynx.engines.silence import silence
 from dynx.errors import EngineError
 from dynx.loaded import ENGINES, installed_engines, loader_class
 from dynx.model.geometry import Mesh
-from dynx.model.geometry.formats.stl import STL_FACET
+from dynx.model.geometry.formats.facets import STL_FACET
 from tests.doctor.formats.test_sarif import require_valid
 from tests.model.geometry.mesh_files import stl
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from dynx.errors import DescriptionError
-from dynx.model.package_paths import find_package, resolve_package
+from dynx.model.package_search import find_package, resolve_package
 
 
 @pytest.fixture

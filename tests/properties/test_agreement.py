@@ -13,11 +13,9 @@ from hypothesis import given, note, settings
 from hypothesis import strategies as st
 
 from dynx.agreement.compared_quantities import compared_quantities
-from dynx.agreement.comparison import Comparison, compare
+from dynx.agreement.comparison import BackendResults, Comparison, compare, compare_forward_dynamics
 from dynx.agreement.magnitudes import Magnitudes
-from dynx.agreement.results import BackendResults
 from dynx.agreement.sampling import Samples, draw_samples
-from dynx.agreement.solutions import compare_forward_dynamics
 from dynx.backends import Backend, backend, installed_backends
 from dynx.backends.derived import DerivedBackend, native_quantities
 from dynx.model import Model

@@ -14,8 +14,7 @@ import pytest
 from packaging.specifiers import SpecifierSet
 
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.examine.examination import Examination, Examiner
-from dynx.doctor.examine.reference_values import ReferenceValues
+from dynx.doctor.examine.examination import Examination, Examiner, ReferenceValues
 from dynx.doctor.prove.mending import mend
 from dynx.errors import ModelError
 from dynx.loaded import VARIANTS, engine_of, installed_engines, loader_class

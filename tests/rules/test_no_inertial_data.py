@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import pytest
 
 from dynx.doctor import DoctorReport, diagnose
-from dynx.doctor.report_document import results_document
+from dynx.doctor.report import results_document
 from dynx.loaded import installed_engines
 from dynx.model.tree import Base
 from tests.rules.documents import case_of, joint, link

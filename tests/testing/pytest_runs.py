@@ -27,8 +27,8 @@ TIMEOUT = 300
 OPTIONS = ("-p", "no:cacheprovider")
 IMPORTED_BEFORE = (
     *("pytest", "hypothesis", "xdist", "numpy", "pinocchio"),
-    *("dynx.testing.plugin", "dynx.testing.agreement_class", "dynx.testing.robot_nodes"),
-    *("dynx.testing.loaded_check", "dynx.engines.pinocchio.backend", "dynx.engines.pinocchio.as_loaded"),
+    *("dynx.testing.plugin", "dynx.testing.agreement_class", "dynx.testing.robot_checks"),
+    *("dynx.testing.robot_checks", "dynx.engines.pinocchio.backend", "dynx.engines.pinocchio.as_loaded"),
 )
 # Assertions of what was imported before cannot be rewritten; none of it has any.
 NOT_REWRITTEN = ("-W", "ignore::pytest.PytestAssertRewriteWarning")

@@ -8,7 +8,7 @@ import time
 from typing import Any
 
 from dynx.agreement import AgreementReport
-from dynx.agreement.task import AgreementTask, measure
+from dynx.agreement.agreement import AgreementTask, measure
 from dynx.doctor.report import DoctorReport
 from dynx.doctor.task import DoctorTask
 from tests.doctor.formats.reports import differing

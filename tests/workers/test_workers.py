@@ -7,7 +7,7 @@ import time
 import pytest
 
 from dynx.agreement import results_document
-from dynx.agreement.task import AgreementTask
+from dynx.agreement.agreement import AgreementTask
 from dynx.cli.agree.run import agreement_run
 from dynx.workers import Failure, Workers
 from tests.workers.targets import act, crash_on_panda

@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
+from dynx.agreement.agreement import AgreementTask, measure, refused
 from dynx.agreement.report import AgreementReport, results_document, summarized
-from dynx.agreement.task import AgreementTask, measure, refused
 from dynx.backends.registry import backend_class
 from dynx.cli.agree.tables import label, show_many, show_one, show_summary, verdict
 from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, failure_of

@@ -21,8 +21,7 @@ from dynx.doctor.formats import (
     wording,
 )
 from dynx.doctor.formats.baseline import Baseline
-from dynx.doctor.report import Counterexample, DoctorReport, Unexplained
-from dynx.doctor.report_document import results_document
+from dynx.doctor.report import Counterexample, DoctorReport, Unexplained, results_document
 from dynx.errors import ArgumentError, DynxError, shown
 from dynx.files.documents import json_text
 from dynx.files.writing import write_text

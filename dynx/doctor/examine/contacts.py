@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dynx.doctor.examine.engine_input import temporary_urdf, without_meshes
-from dynx.doctor.examine.reference_values import draw_states, model_without_mimics
+from dynx.doctor.examine.examination import draw_states, model_without_mimics
 from dynx.engines.silence import silence
 from dynx.errors import DynxError
 from dynx.loaded import loader_class

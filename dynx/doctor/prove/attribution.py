@@ -16,18 +16,65 @@ reference once all causes are removed.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from math import inf, isfinite
 
-from dynx.doctor.examine.examination import QUANTITIES, Examination, Examiner, max_change
-from dynx.doctor.examine.reference_values import ReferenceValues
+from dynx.doctor.examine.examination import QUANTITIES, Examination, Examiner, ReferenceValues, max_change
+from dynx.doctor.lines import line_opcodes
 from dynx.doctor.prove.mending import Mending, Place, all_except, mend, place_of, readable, remedy_of
-from dynx.doctor.prove.reinsertion import reinserted_text
 from dynx.doctor.report import Effect
+from dynx.errors import DescriptionError
 from dynx.loaded import engine_of
+from dynx.model.xml.source import XmlSource
 from dynx.rules import CallingRule, Case, Detection, Remedy, Rule
 from dynx.spatial.extended import FLOAT64_EPS
+
+# Reinsertion of one cause into a mended file that dynx cannot read with that cause.
+#
+# Remedies about the robot need a file that dynx reads. Where one cause prevents that, all causes are
+# removed from the file, and then the lines of that cause are restored.
+
+
+Lines = tuple[int, int, int, int]
+"""Range of equal lines: first and end in one text, first and end in the other."""
+
+
+def reinserted_text(given: XmlSource, without: XmlSource, mended: XmlSource) -> XmlSource | None:
+    """Return the `mended` text with the lines of one cause as they are `given`.
+
+    `without` is the given text with the cause alone removed. None where other remedies changed the same
+    lines, the cause changes no line, or the changes overlap.
+    """
+    texts = (given.text, without.text, mended.text)
+    old, base, new = ([*text.splitlines(keepends=True)] for text in texts)
+    kept = [each[1:] for each in line_opcodes(base, new) if each[0] == "equal"]
+    parts: list[str] = []
+    done = 0
+    for tag, first, last, start, end in line_opcodes(base, old):
+        if tag == "equal":
+            continue
+        at = _counterpart(kept, first, last)
+        if at is None or at < done:
+            return None
+        parts += [*new[done:at], *old[start:end]]
+        done = at + (last - first)
+    if not parts:
+        return None
+    try:
+        return XmlSource("".join([*parts, *new[done:]]), given.source)
+    except DescriptionError:
+        # Where lines repeat, the matches of the two changes can overlap.
+        return None
+
+
+def _counterpart(kept: Sequence[Lines], first: int, last: int) -> int | None:
+    """Find where lines of one text start in the other, if they are there unchanged."""
+    for begin, end, start, _ in kept:
+        if begin <= first and last <= end:
+            return start + first - begin
+    return None
+
 
 NO_EFFECT = Effect("", 0.0)
 
@@ -277,3 +324,81 @@ def _coordinates(case: Case) -> tuple[object, ...]:
         tuple(link.attributes.get("name") for link in links),
         tuple((joint.attributes.get("name"), joint.attributes.get("type")) for joint in joints),
     )
+
+
+# Selection of what is mended: places where the cause has an effect, and no more of them than needed.
+
+
+NEGLIGIBLE_SHARE = 0.1
+"""Largest error of a mended file from places left as they are, as a share of the tolerance: their sum may be
+larger at other states."""
+
+_SHARES = (0.3, 0.1, 0.03, 0.01, 0.003, 0.0)
+"""Effects, as shares of the tolerance, up to which places are left as they are, one after the other."""
+
+MeasureMinor = Callable[[Rule], Sequence[AttributedCause]]
+"""Measurement of a rule place by place, with the effects that are smaller than the tolerance."""
+
+
+@dataclass(frozen=True)
+class SelectedPlaces:
+    """A mending, its examination, the proofs of causes, and the places that it leaves as they are."""
+
+    mending: Mending
+    examination: Examination
+    proofs: Sequence[AttributedCause]
+    omitted: frozenset[Place] = frozenset()
+
+
+def smallest_mending(
+    case: Case,
+    rules: Sequence[Rule],
+    full: SelectedPlaces,
+    examiner: Examiner,
+    tolerance: float,
+    measure: MeasureMinor,
+) -> SelectedPlaces:
+    """Leave the places without effect as they are, if that reduces the errors as far as `full` does.
+
+    Effects below the tolerance can add up to more than that. Then the largest of them count as effects.
+    """
+
+    def allowed(engine: str) -> float:
+        return max(NEGLIGIBLE_SHARE * tolerance, full.examination.max_error(engine))
+
+    def attempt(omitted: set[Place]) -> tuple[Mending, Examination, set[str]]:
+        least = mend(case, rules, all_except(omitted))
+        result = examiner.examine(least.case)
+        return least, result, {name for name in examiner.engines if result.max_error(name) > allowed(name)}
+
+    right = {name for name in examiner.engines if full.examination.max_error(name) <= tolerance}
+    proofs = full.proofs
+    if not (idle := _idle_places(proofs)):
+        return full
+    least, result, wrong = attempt(idle)
+    if not wrong:
+        return SelectedPlaces(least, result, proofs, frozenset(idle))
+    unknown = {each.rule.id: each.rule for each in proofs if each.minor is None and each.rule.named_of(wrong)}
+    measured = {name: list(measure(rule)) for name, rule in unknown.items()}
+    proofs = [measured[each.rule.id].pop(0) if each.rule.id in measured else each for each in proofs]
+    for share in _SHARES:
+        grown = [_with_minor(each, share * tolerance, right) for each in proofs]
+        least, result, wrong = attempt(_idle_places(grown))
+        if not wrong:
+            return SelectedPlaces(least, result, grown, frozenset(_idle_places(grown)))
+    return replace(full, proofs=grown)
+
+
+def _idle_places(proofs: Sequence[AttributedCause]) -> set[Place]:
+    """Find the places without effect. Calls that change no file are made on the whole robot or not at all."""
+    places = {place_of(each.rule, each.detection) for each in proofs}
+    effective = {place_of(each.rule, each.detection) for each in proofs if each.effects}
+    called = {each.rule.id for each in proofs if each.effects and isinstance(each.rule, CallingRule)}
+    return {place for place in places - effective if place[0] not in called}
+
+
+def _with_minor(each: AttributedCause, bound: float, right: Collection[str]) -> AttributedCause:
+    """Count the minor effects above the bound as effects, proved if all their engines end up `right`."""
+    larger = {name: minor for name, minor in (each.minor or {}).items() if minor.relative_error > bound}
+    effects = {**each.effects, **larger}
+    return replace(each, effects=effects, proved=effects.keys() <= set(right)) if larger else each

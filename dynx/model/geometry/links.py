@@ -10,8 +10,8 @@ from dynx.errors import ArgumentError, DescriptionError, UnknownNameError, neare
 from dynx.model.elements import IDENTITY, Pose, checked_pose
 from dynx.model.geometry.mesh import Mesh
 from dynx.model.geometry.shapes import Box, Capsule, Cylinder, HeightField, Plane, Sphere
-from dynx.model.geometry.sizes import colour
 from dynx.model.geometry.solids import Shape
+from dynx.model.numbers import colour
 
 _SHAPES = (Box, Sphere, Cylinder, Capsule, Mesh, Plane, HeightField)
 

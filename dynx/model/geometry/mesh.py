@@ -4,18 +4,146 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.errors import ArgumentError, DescriptionError, shown
-from dynx.files.reading import checked_path
+from dynx.errors import ArgumentError, DescriptionError, DynxError, shown
+from dynx.files.reading import checked_path, printable, read_file
 from dynx.model.elements import Vector
-from dynx.model.geometry.hull import convex_hull
-from dynx.model.geometry.mesh_reading import Triangles, read_triangles
-from dynx.model.geometry.sizes import finite_vector
+from dynx.model.geometry.formats.collada import collada_triangles
+from dynx.model.geometry.formats.facets import obj_triangles, stl_triangles
+from dynx.model.geometry.formats.gltf import gltf_triangles
+from dynx.model.numbers import MAX_MAGNITUDE, finite_vector
 from dynx.spatial.scalar import Floats
+
+# Convex hulls of points. No other module of geometry imports SciPy.
+
+
+FLATNESS = 1e-4
+"""Thickness of the hull of flat points, relative to its diagonal."""
+
+
+def convex_hull(points: Floats) -> tuple[Floats, NDArray[np.intp]]:
+    """Return the vertices (n, 3) of the hull of `points` and its triangles (m, 3), counter-clockwise from
+    outside.
+
+    Flat points, which bound no volume, get a thickness of `FLATNESS` times the diagonal of their box, half of
+    it on each side, because engines refuse a flat solid. Raises ArgumentError for points on one line.
+    """
+    center = points.mean(axis=0)
+    _, extents, axes = np.linalg.svd(points - center, full_matrices=False)
+    rounding = 1e-9 * np.sqrt(len(points))
+    if len(points) < 3 or extents[1] <= rounding * extents[0]:
+        raise ArgumentError("all points of the mesh lie on one line, so that it has no hull")
+    thickness = float(np.ptp((points - center) @ axes[2]))
+    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    if thickness < FLATNESS * diagonal:
+        offset = 0.5 * (FLATNESS * diagonal - thickness) * axes[2]
+        points = np.concatenate([points - offset, points + offset])
+    return _hull_of_solid(points)
+
+
+def _hull_of_solid(points: Floats) -> tuple[Floats, NDArray[np.intp]]:
+    from scipy.spatial import ConvexHull, QhullError
+
+    # Qhull's tolerances are absolute, so points are scaled to a box of size 1.
+    low = points.min(axis=0)
+    scale = float(np.max(np.ptp(points, axis=0)))
+    try:
+        hull = ConvexHull((points - low) / scale)
+    except QhullError:
+        raise ArgumentError("the points of the mesh are too close to a plane to have a hull") from None
+    used, faces = np.unique(hull.simplices, return_inverse=True)
+    faces = faces.reshape(-1, 3)
+    vertices = points[used]
+    corners = vertices[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward = np.einsum("ij,ij->i", normals, hull.equations[:, :3]) < 0.0
+    faces[inward] = faces[inward][:, ::-1]
+    return vertices, faces.astype(np.intp)
+
+
+# Triangles of mesh files, checked before any engine sees them.
+
+
+Triangles = tuple[Floats, NDArray[np.intp]]
+
+MAX_TRIANGLES = 2_000_000
+"""Largest number of triangles of a mesh."""
+
+FORMATS = (".stl", ".obj", ".dae", ".gltf", ".glb")
+"""Suffixes of the files that are read."""
+
+
+def read_triangles(path: str) -> Triangles:
+    """Return the vertices (n, 3) [m] and triangles (m, 3) of a mesh file, unscaled.
+
+    The result is shared between calls until the file changes. Raises RobotNotFoundError for a missing file,
+    DescriptionError for one that is too large, damaged, empty or of another format, NotInstalledError for
+    glTF without trimesh.
+    """
+    try:
+        status = os.stat(path)
+    except (OSError, ValueError):
+        return _checked(path)
+    return _cached(path, status.st_mtime_ns, status.st_size)
+
+
+# A robot names its meshes twice, and is often loaded into several engines.
+@lru_cache(maxsize=64)
+def _cached(path: str, changed: int, size: int) -> Triangles:
+    return _checked(path)
+
+
+def _checked(path: str) -> Triangles:
+    suffix = os.path.splitext(path)[1].lower()
+    if suffix not in FORMATS:
+        raise _fault(path, f"has the suffix {shown(suffix)}; meshes are read from {', '.join(FORMATS)}")
+    data = read_file(path)
+    vertices, faces = _parsed(path, data, suffix)
+    if len(faces) == 0:
+        raise _fault(path, "holds no triangle")
+    if len(faces) > MAX_TRIANGLES:
+        raise _fault(path, f"holds {len(faces)} triangles; at most {MAX_TRIANGLES} are read")
+    if not np.abs(vertices).max() < MAX_MAGNITUDE:
+        raise _fault(path, f"holds a vertex that is not finite or not below {MAX_MAGNITUDE:g}")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise _fault(path, f"holds a triangle of a vertex that is not among its {len(vertices)}")
+    vertices.flags.writeable = faces.flags.writeable = False
+    return vertices, faces
+
+
+def _parsed(path: str, data: bytes, suffix: str) -> Triangles:
+    try:
+        if suffix == ".stl":
+            return stl_triangles(data)
+        if suffix == ".obj":
+            return obj_triangles(data)
+        if suffix == ".dae":
+            return collada_triangles(data)
+        return gltf_triangles(data, partial(_read_beside, path))
+    except DynxError:
+        raise
+    # trimesh raises whatever exception damaged data lead to, as do lookups in the tree of such a file.
+    except Exception as error:
+        reason = str(error) if type(error) is ValueError else f"{type(error).__name__}: {error}"
+        raise _fault(path, f"cannot be read as {suffix}: {reason}") from error
+
+
+def _read_beside(path: str, name: str) -> bytes:
+    """Return the bytes of a file in the folder of a mesh; ValueError for one outside."""
+    folder = os.path.realpath(os.path.dirname(path))
+    found = os.path.realpath(os.path.join(folder, name))
+    if not found.startswith(os.path.join(folder, "")):
+        raise ValueError(f"{shown(name, 200)} is outside the folder of the mesh")
+    return read_file(found)
+
+
+def _fault(path: str, message: str) -> DescriptionError:
+    return DescriptionError(message, source=printable(path))
+
 
 Faces = NDArray[np.intp]
 

@@ -11,8 +11,14 @@ from urllib.parse import unquote, urlsplit
 
 from dynx.errors import DescriptionError, nearest, shown
 from dynx.files.reading import irregularity
-from dynx.model.package_paths import StrPath, environment_folders, resolve_package
-from dynx.model.package_search import MANIFESTS, enclosing_folder, package_of
+from dynx.model.package_search import (
+    MANIFESTS,
+    StrPath,
+    enclosing_folder,
+    environment_folders,
+    package_of,
+    resolve_package,
+)
 
 _BULLET_SCHEMES = re.compile("^(file|package|model)://")
 

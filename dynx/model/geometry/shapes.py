@@ -9,8 +9,7 @@ import numpy as np
 
 from dynx.errors import ArgumentError, ShapeError
 from dynx.model.elements import Vector
-from dynx.model.geometry.sizes import positive_number, positive_numbers
-from dynx.model.numbers import checked_entries, real_array
+from dynx.model.numbers import checked_entries, positive_number, positive_numbers, real_array
 
 
 @dataclass(frozen=True)

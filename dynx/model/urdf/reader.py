@@ -12,9 +12,7 @@ from dataclasses import dataclass
 from dynx.errors import escaped, nearest
 from dynx.model.elements import Frame, Joint, Link, Note
 from dynx.model.topology import MAX_LINKS
-from dynx.model.urdf.joints import FRAME_TAG, read_joint
-from dynx.model.urdf.links import read_link
-from dynx.model.urdf.origins import reads_quaternions
+from dynx.model.urdf.elements import FRAME_TAG, read_joint, read_link, reads_quaternions
 from dynx.model.urdf.values import Reading, name_fault
 from dynx.model.xml.reading import Element, read_xml
 

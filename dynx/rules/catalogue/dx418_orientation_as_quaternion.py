@@ -17,7 +17,7 @@ every engine ignores the quaternion, see DX530.
 
 from collections.abc import Iterable
 
-from dynx.model.urdf.origins import QUATERNION
+from dynx.model.urdf.elements import QUATERNION
 from dynx.rules import Case, Correction, EditingRule, correction, measured_on
 from dynx.rules.attributes import orientation_edits, quaternions_count
 from dynx.rules.numbers_in_text import decimal, is_plain, origins_with_quaternion, quaternion_rpy

@@ -18,7 +18,7 @@ any other text, so that the origin has no rotation, as three engines read it.
 from collections.abc import Iterable
 
 from dynx.errors import shown
-from dynx.model.urdf.origins import QUATERNION
+from dynx.model.urdf.elements import QUATERNION
 from dynx.rules import EVERY_ENGINE, Case, Correction, EditingRule, correction
 from dynx.rules.attributes import orientation_edits, quaternions_count
 from dynx.rules.numbers_in_text import is_plain, origins_with_quaternion, quaternion_rpy

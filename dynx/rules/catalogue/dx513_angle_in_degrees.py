@@ -15,7 +15,7 @@ import math
 from collections.abc import Iterable, Iterator
 
 from dynx.errors import DescriptionError
-from dynx.model.urdf.origins import FULL_TURN
+from dynx.model.urdf.elements import FULL_TURN
 from dynx.model.xml.source import SourceElement
 from dynx.rules import Case, Detection, Rule, found_at
 from dynx.rules.attributes import origin_of

@@ -13,7 +13,7 @@ as it is. Adding the version alone would help in Pinocchio only, see DX418.
 from collections.abc import Iterable
 
 from dynx.errors import shown
-from dynx.model.urdf.origins import QUATERNION
+from dynx.model.urdf.elements import QUATERNION
 from dynx.rules import Case, Correction, OptionalEditingRule, correction
 from dynx.rules.attributes import orientation_edits, quaternions_count
 from dynx.rules.numbers_in_text import origins_with_quaternion, quaternion_rpy

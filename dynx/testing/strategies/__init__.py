@@ -36,8 +36,7 @@ from dynx.testing.strategies.configurations import (
     velocities,
 )
 from dynx.testing.strategies.geometry import poses, quaternions, unit_vectors, vectors, wrenches
-from dynx.testing.strategies.inertials import inertials
-from dynx.testing.strategies.models import models
+from dynx.testing.strategies.models import inertials, models
 from dynx.testing.strategies.scenes import materials, scenes, shapes
 from dynx.testing.strategies.urdf_text import urdf_text
 

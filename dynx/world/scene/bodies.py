@@ -29,9 +29,8 @@ from dynx.model.geometry import (
     Visual,
     solid_properties,
 )
-from dynx.model.geometry.sizes import finite_numbers, finite_vector, positive_number
-from dynx.model.numbers import checked_array
-from dynx.model.urdf.links import inertia_fault
+from dynx.model.numbers import checked_array, finite_numbers, finite_vector, positive_number
+from dynx.model.urdf.elements import inertia_fault
 from dynx.spatial.scalar import Floats
 from dynx.steppers.material import DEFAULT_MATERIAL, Material, checked_material
 from dynx.world.scene.names import checked_name

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from dynx.errors import ArgumentError, shown
 from dynx.model import Pose
 from dynx.model.elements import ZERO, Vector, checked_pose
-from dynx.model.geometry.sizes import finite_vector
+from dynx.model.numbers import finite_vector
 
 
 @dataclass(frozen=True)

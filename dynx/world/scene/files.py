@@ -14,7 +14,7 @@ from dynx.errors import ArgumentError, DescriptionError, NotInstalledError, Robo
 from dynx.files.reading import checked_path, printable, read_file
 from dynx.files.writing import write_bytes
 from dynx.model.library import SCENES, own_roots, robots, scene_names
-from dynx.model.package_paths import StrPath
+from dynx.model.package_search import StrPath
 from dynx.world.scene.documents import scene_document, scene_from_document
 from dynx.world.scene.paths import ScenePaths
 from dynx.world.scene.scene import Scene

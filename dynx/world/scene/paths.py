@@ -9,8 +9,7 @@ from pathlib import Path
 from dynx.errors import DescriptionError, nearest, shown
 from dynx.files.reading import irregularity
 from dynx.model.library import example_roots, own_roots
-from dynx.model.package_paths import StrPath, data_folders, resolve_package
-from dynx.model.package_search import enclosing_folder
+from dynx.model.package_search import StrPath, data_folders, enclosing_folder, resolve_package
 
 
 class ScenePaths:

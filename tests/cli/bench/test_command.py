@@ -17,10 +17,9 @@ from rich.console import Console
 import dynx
 from dynx.backends.quantities import QUANTITIES
 from dynx.bench.cases import BenchmarkCase
-from dynx.bench.document import BenchWay
 from dynx.bench.implementations import Implementation
-from dynx.bench.report import document
-from dynx.bench.roofline import Peak
+from dynx.bench.machine import Peak
+from dynx.bench.report import BenchWay, document
 from dynx.bench.session import BATCHES, QUICK_REPETITIONS, REPETITIONS
 from dynx.cli.bench.run import run_bench
 from dynx.cli.bench.tables import show

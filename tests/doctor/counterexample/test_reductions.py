@@ -9,21 +9,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx import load
-from dynx.doctor.counterexample.detail_reductions import (
+from dynx.doctor.counterexample.reductions import (
+    Reductions,
     complexity,
     fewer_extras,
+    fewer_links,
+    fewer_moving_joints,
     format_document,
     frame_axes,
+    higher_links,
     plain_numbers,
     round_numbers,
     shortest,
     unit_numbers,
-)
-from dynx.doctor.counterexample.tree_reductions import (
-    Reductions,
-    fewer_links,
-    fewer_moving_joints,
-    higher_links,
 )
 from dynx.model import Model
 from dynx.model.library import find

@@ -5,15 +5,15 @@ from __future__ import annotations
 import pytest
 
 from dynx.doctor import diagnose
-from dynx.doctor.examine import bounds
+from dynx.doctor.examine import examination
 from tests.rules.documents import case_of, joint, link
 
 PAIR = case_of(link("base"), link("arm"), joint("elbow", "base", "arm")).source.text
 
 
-ELEMENTS = "<a/>" * bounds.MAX_ELEMENTS
+ELEMENTS = "<a/>" * examination.MAX_ELEMENTS
 
-LINKS = '\n<link name="l"/>' * (bounds.MAX_LINKS + 5)
+LINKS = '\n<link name="l"/>' * (examination.MAX_LINKS + 5)
 
 
 def chain(length: int) -> str:
@@ -30,9 +30,9 @@ def chain(length: int) -> str:
 @pytest.mark.parametrize(
     ("text", "message", "line"),
     [
-        (PAIR + " " * bounds.MAX_BYTES, "bytes; at most", None),
+        (PAIR + " " * examination.MAX_BYTES, "bytes; at most", None),
         (PAIR.replace("</robot>", f"{ELEMENTS}</robot>"), "more than 100000 elements", None),
-        (chain(bounds.MAX_CHAIN + 3), "a chain of more than 500 links", 503),
+        (chain(examination.MAX_CHAIN + 3), "a chain of more than 500 links", 503),
         (f"<robot>{LINKS}</robot>", "has 1005 links", 1002),
     ],
     ids=["bytes", "elements", "chain", "links"],
@@ -47,7 +47,7 @@ def test_a_document_beyond_the_bounds_is_refused(text: str, message: str, line: 
 
 
 def test_what_is_within_the_bounds_is_examined() -> None:
-    report = diagnose(chain(bounds.MAX_CHAIN), samples=1, engines=["pinocchio"])
+    report = diagnose(chain(examination.MAX_CHAIN), samples=1, engines=["pinocchio"])
     assert report.error is None
 
 

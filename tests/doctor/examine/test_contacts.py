@@ -14,8 +14,7 @@ from dynx.doctor.examine.contacts import (
     following_positions,
     links_in_contact,
 )
-from dynx.doctor.examine.examination import Examiner
-from dynx.doctor.examine.reference_values import model_without_mimics
+from dynx.doctor.examine.examination import Examiner, model_without_mimics
 from dynx.doctor.formats import wording
 from dynx.loaded import installed_engines
 from dynx.rules import Case

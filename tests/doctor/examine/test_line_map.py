@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dynx.doctor.examine.line_map import with_original_lines
+from dynx.doctor.examine.engine_input import with_original_lines
 from dynx.doctor.prove.mending import detections, readable
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, find_rule

@@ -11,9 +11,7 @@ from hypothesis import strategies as st
 
 from dynx.doctor.diagnosis import compare_as_loaded
 from dynx.doctor.formats import html_page, read_baseline
-from dynx.doctor.formats.heat import ALL_STEPS, SAME, Step, step_of
-from dynx.doctor.formats.html import template_environment
-from dynx.doctor.formats.text_changes import excerpt
+from dynx.doctor.formats.html import ALL_STEPS, SAME, Step, excerpt, step_of, template_environment
 from dynx.doctor.lines import lines_of
 from dynx.doctor.report import DoctorReport
 from dynx.rules.registry import all_rules

@@ -10,7 +10,7 @@ import pytest
 from dynx.errors import DescriptionError
 from dynx.model import package_search
 from dynx.model.geometry.mesh_files import MeshNotFoundError, find_mesh, reason_unknown
-from dynx.model.package_paths import resolve_package
+from dynx.model.package_search import resolve_package
 from dynx.rules.geometry import mesh_box
 
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from dynx.errors import DescriptionError, ModelError
-from dynx.model.geometry import Mesh, mesh_reading
+from dynx.model.geometry import Mesh
+from dynx.model.geometry import mesh as mesh_module
 from dynx.spatial.scalar import Floats
 from tests.model.geometry.mesh_files import accessor, dae, gltf, obj, stl, text_stl
 
@@ -127,7 +128,7 @@ def test_a_file_above_the_limit_is_not_read(tmp_path: Path) -> None:
 
 
 def test_too_many_triangles_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mesh_reading, "MAX_TRIANGLES", 3)
+    monkeypatch.setattr(mesh_module, "MAX_TRIANGLES", 3)
     with pytest.raises(DescriptionError, match="holds 4 triangles; at most 3"):
         _ = written(tmp_path, "a.stl", stl()).triangles
 
