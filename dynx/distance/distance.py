@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 
 from dynx.distance.cores import ConvexShape, Core, core_of
 from dynx.distance.gjk import CorePair
-from dynx.distance.parallel_axes import penetration_of_parallel
-from dynx.distance.penetration import Penetration, penetration
+from dynx.distance.penetration import Penetration, penetration, penetration_of_parallel
 from dynx.errors import ArgumentError
 from dynx.model import Pose
 from dynx.model.elements import checked_pose, rigid_matrix
