@@ -48,13 +48,13 @@ def test_a_single_push_and_a_name_are_accepted() -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ((WRENCH, "1"), "push on 'tool0' starts at '1'"),
+        ((WRENCH, "1"), "external force on 'tool0' starts at '1'"),
         ((WRENCH, np.nan), "starts at nan"),
         ((WRENCH, np.inf), "starts at inf"),
         ((WRENCH, 0.0, -1.0), "lasts -1"),
         ((WRENCH, 0.0, 1.0, "here"), "'here'; wanted"),
-        ((np.zeros(3),), r"push on 'tool0' has a wrench of shape \(3,\)"),
-        (([0.0, 0.0, np.nan, 0.0, 0.0, 0.0],), r"wrench of a push on 'tool0'\[2\] is nan"),
+        ((np.zeros(3),), r"external force on 'tool0' has a wrench of shape \(3,\)"),
+        (([0.0, 0.0, np.nan, 0.0, 0.0, 0.0],), r"wrench of an external force on 'tool0'\[2\] is nan"),
     ],
 )
 def test_a_push_is_checked_when_it_is_made(values: tuple[Any, ...], message: str) -> None:

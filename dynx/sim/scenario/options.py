@@ -147,6 +147,8 @@ class Parts(Kind):
     source: str = ""
     """The class, as ``module:Class``."""
     several: bool = True
+    optional: bool = False
+    """True if None stands for no object."""
 
     @property
     def part_class(self) -> type[Any]:
@@ -167,6 +169,8 @@ class Parts(Kind):
             if value is None or isinstance(value, known):
                 return value
             raise ArgumentError(f"{name} is {shown(value)}; wanted {self.values}")
+        if value is None and not self.optional:
+            raise ArgumentError(f"{name} is None; wanted {self.values}")
         given = () if value is None else value
         parts = tuple(given) if isinstance(given, Iterable) else (given,)
         if not all(isinstance(each, known) for each in parts):
@@ -216,7 +220,9 @@ COEFFICIENTS = JointNumbers(_JOINT_VALUES, NumberOrArray)
 LIMITS = JointNumbers(_JOINT_VALUES, NumberOrArray, others=math.inf)
 FACTORS = Factors("a factor, or factors by link", float | dict[str, Any])
 NOISE = Parts("a dynx.Noise, as in Noise(v=1e-3)", dict[str, Any], "dynx.sim.loop.noise:Noise", several=False)
-PAYLOADS = Parts("a Payload, or a list of them", list[dict[str, Any]], "dynx.sim.plants.model_error:Payload")
+PAYLOADS = Parts(
+    "a Payload, or a list of them", list[dict[str, Any]], "dynx.sim.plants.model_error:Payload", optional=True
+)
 PUSHES = Parts(
     "an ExternalForce, or a list of them", list[dict[str, Any]], "dynx.steppers.forces:ExternalForce"
 )
