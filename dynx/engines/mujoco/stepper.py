@@ -155,10 +155,11 @@ class MujocoStepper(Stepper):
     @engine_errors
     def step(self, n: int, forces: Forces = NO_FORCES) -> None:
         model, data, warnings = self.model, self.data, self._warnings
-        if forces.torques or self._loaded:
-            self._apply(forces.torques)
-        if forces.wrenches is not None:
-            data.xfrc_applied[self._body_numbers] = forces.wrenches
+        torques, wrenches, _ = forces
+        if torques or self._loaded:
+            self._apply(torques)
+        if wrenches is not None:
+            data.xfrc_applied[self._body_numbers] = wrenches
             self._pushed = True
         elif self._pushed:
             data.xfrc_applied[self._body_numbers] = 0.0
