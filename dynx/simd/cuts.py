@@ -93,7 +93,7 @@ class BoundCuts:
         def prepare(kernel: Kernel) -> CallSequence:
             return CallSequence([kernel], zeros, every, outputs=outputs)
 
-        self._pieces: list[tuple[Callable[[int], None], range, EngineCall, list[Floats], Any]] = []
+        self._pieces: list[tuple[Callable[[int], None], range, EngineCall, list[Floats], Any, str]] = []
         self._kept = []
         for piece in step.pieces:
             calls = prepare(piece.kernel)
@@ -103,8 +103,8 @@ class BoundCuts:
             found = places[name].reshape(shape)
             # Assigning to a memory view takes a third of the time of assigning to an array.
             memory = found.data if found.ndim == 1 else found
-            self._pieces.append((piece.kernel.locked_entry, calls.addresses, piece.call, arguments, memory))
-        self._origins = [piece.origin for piece in step.pieces]
+            run = piece.kernel.locked_entry
+            self._pieces.append((run, calls.addresses, piece.call, arguments, memory, piece.origin))
         last = prepare(step.last)
         self._kept.append(last)
         self._last, self._addresses = step.last.locked_entry, last.addresses
@@ -119,23 +119,21 @@ class BoundCuts:
         Raises EngineCallFailed for an exception of the engine.
         """
         pieces, finish, finishing, status = self._pieces, self._last, self._addresses, self._status
-        k, number = begin, 0
+        k, _origin = begin, ""
         status[0] = 0.0
         try:
             for k in range(begin, end):
-                number = 0
-                for run, addresses, call, arguments, result in pieces:
+                for run, addresses, call, arguments, result, _origin in pieces:
                     run(addresses[k])
                     if status[0] != 0.0:
                         return k, status[0]
                     result[:] = call(*arguments)
-                    number += 1
                 finish(finishing[k])
                 if status[0] != 0.0:
                     return k, status[0]
             k = end
         except Exception as error:
-            raise EngineCallFailed(k, self._origins[min(number, len(pieces) - 1)]) from error
+            raise EngineCallFailed(k, _origin) from error
         finally:
             self.taken = k
         return None
