@@ -25,7 +25,7 @@ def modules() -> dict[str, Path]:
 
 @cache
 def imports() -> dict[str, set[str]]:
-    """Return the modules that the text of each module imports, without the packages that contain them."""
+    """Return the modules that the text of each module imports, without itself, whose source it may hash."""
     known = modules()
     found: dict[str, set[str]] = {module: set() for module in known}
     for module, path in known.items():
@@ -37,6 +37,7 @@ def imports() -> dict[str, set[str]]:
                 found[module] |= submodules
                 if len(submodules) < len(node.names):
                     found[module].add(node.module)
+        found[module].discard(module)
     return found
 
 

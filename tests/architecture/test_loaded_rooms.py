@@ -53,14 +53,14 @@ FLOWS = {
             "viewer",
         ),
         (),
-        95,
-        12000,
+        80,
+        11500,
     ),
     "inverse kinematics": Flow(
         ENGINE + "engine.inverse_kinematics(engine.forward_kinematics(q, 'tool0'), 'tool0', q)",
         ("world", "sim", "ik.closed_forms"),
         (),
-        140,
+        125,
         20500,
     ),
     "simulate": Flow(
@@ -69,7 +69,7 @@ FLOWS = {
         "dynx.simulate(robot, law, robot.neutral(), duration=0.01, plant='pinocchio')",
         ("world.camera", "steppers.camera", "world.queries", "distance", "ik", "envs"),
         ("distance", "steppers.camera", "world.camera", "world.queries"),
-        320,
+        290,
         42500,
     ),
     "step of a box": Flow(
@@ -77,7 +77,7 @@ FLOWS = {
         "World(Scene('box', bodies=(box('box', (0.1, 0.1, 0.1), mass=1.0),)), 'mujoco').step()",
         ("ik", "sim", "envs", "doctor"),
         (),
-        190,
+        155,
         22000,
     ),
     "step of the cart-pole": Flow(
@@ -87,7 +87,7 @@ FLOWS = {
         "environment.step(environment.action_space.sample())",
         ("distance", "ik", "world.camera", "steppers.camera"),
         ("distance", "steppers.camera", "world.camera"),
-        310,
+        280,
         38000,
     ),
 }
