@@ -64,7 +64,7 @@ def test_rollouts_and_batches_measure_with_the_numbers_of_their_stream() -> None
 
 
 def test_noise_and_parameters_of_environments_are_those_of_their_streams() -> None:
-    drawn: dict[str, Any] = {"observation_noise": 0.5, "joint_damping": {"normal": (0.3, 0.01)}}
+    drawn: dict[str, Any] = {"observation_noise": 0.05, "joint_damping": {"normal": (0.3, 0.01)}}
     envs, plain = (
         RobotVectorEnvironment(CartPole(), 3, randomize=drawn),
         RobotVectorEnvironment(CartPole(), 3),
@@ -73,13 +73,13 @@ def test_noise_and_parameters_of_environments_are_those_of_their_streams() -> No
     assert not np.array_equal(noisy, clean)
     for k in range(3):
         numbers = generator(11 + k, 0, Purpose.OBSERVATION, 0).standard_normal((BLOCK_STEPS, 4))
-        assert noisy[k] == pytest.approx(clean[k] + 0.5 * numbers[0], abs=1e-6)
+        assert noisy[k] == pytest.approx(clean[k] + 0.05 * numbers[0], abs=1e-6)
         # The start of a single environment is that of its own seed, as in Gymnasium; its noise is the same.
         with TaskEnvironment(CartPole(), "reference") as alone:
             start, _ = alone.reset(seed=11 + k)
         with TaskEnvironment(CartPole(), "reference", randomize=drawn) as env:
             observation, info = env.reset(seed=11 + k)
-            assert observation == pytest.approx(start + 0.5 * numbers[0], abs=1e-6)
+            assert observation == pytest.approx(start + 0.05 * numbers[0], abs=1e-6)
             assert info["parameters"] == {name: values[k] for name, values in infos["parameters"].items()}
     damping = infos["parameters"]["joint_damping"]
     assert np.abs(damping - 0.3).max() <= 0.03
