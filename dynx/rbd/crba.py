@@ -56,7 +56,8 @@ def _entry(
 
 
 def _base_entries(momentum: SpatialVector, placement: Placement) -> tuple[tuple[Array], tuple[list[Array]]]:
-    entries = np.concatenate(placement.wrench_to_parent(*momentum), axis=-1)
+    # A force that depends on no joint position has no batch axes yet.
+    entries = np.concatenate(np.broadcast_arrays(*placement.wrench_to_parent(*momentum)), axis=-1)
     return (entries,), ([entries[..., k] for k in range(6)],)
 
 

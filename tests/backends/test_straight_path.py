@@ -22,7 +22,6 @@ from dynx.errors import (
     EngineError,
     NotFiniteError,
     ShapeError,
-    SingularMassMatrixError,
     UnknownNameError,
 )
 from dynx.model import Model
@@ -138,8 +137,9 @@ def test_an_acceleration_of_the_straight_path_is_finite(
     engine.forward_dynamics(*sample)
     for entry in (np.nan, np.inf, -np.inf):
         found[-1] = entry
-        with pytest.raises(SingularMassMatrixError):
-            engine.forward_dynamics(*sample)
+        # The mass matrix is regular, so the acceleration is solved for by it.
+        a = engine.forward_dynamics(*sample)
+        np.testing.assert_allclose(engine.inverse_dynamics(*sample[:2], a), sample[2], rtol=1e-9, atol=1e-9)
     # A sum that overflows is one of finite entries.
     found[:] = 1e308
     np.testing.assert_array_equal(engine.forward_dynamics(*sample), found)
