@@ -42,7 +42,7 @@ def raw_step(world: World, tau: Floats | None, *, motors: bool = False) -> Calla
     if world.engine == "pybullet":
         import pybullet
 
-        robot, client = engine._robots[0].object, engine._client.number
+        robot, client = engine.robots[0].object, engine.client.number
 
         def step() -> None:
             forces = None
@@ -66,7 +66,7 @@ def raw_step(world: World, tau: Floats | None, *, motors: bool = False) -> Calla
         return step
     import mujoco
 
-    model, data = engine._model, engine._data
+    model, data = engine.model, engine.data
     dofs = slice(model.nv - 12, model.nv)
 
     def advance() -> None:
