@@ -30,7 +30,7 @@ BUILT_IN = {
 """Engines of dynx itself."""
 
 _engines = ClassRegistry(
-    "stepper", GROUP, BUILT_IN, lambda: Stepper, error=BackendError, unknown=UnknownBackendError
+    "world engine", GROUP, BUILT_IN, lambda: Stepper, error=BackendError, unknown=UnknownBackendError
 )
 world_names = _engines.names
 register = _engines.register
