@@ -9,6 +9,7 @@ of the time.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
@@ -282,6 +283,25 @@ class LaneLoop(CompiledLoop):
         self._compiled = CompiledStep(step.text)
         self._lanes = self._compiled.kernel((True, step.always_pushed)).image.lanes
         self._stops = LaneStops.of(step) if step.stops else None
+
+    def recover_controller_state(self, record: StateBuffers, loop_state: LoopState) -> None:
+        """Set the controller's state to that after the last step of `record`.
+
+        The kernel computes it again from the measurements in the record: on floats its last bits would be
+        others.
+        """
+        controller = self._loop.controller
+        if controller is None or not self._step.controller_state:
+            return
+        again = record.extended(max(record.steps, 1))
+        again.steps = 0
+        replay = replace(loop_state, controller_state=controller.initial_state())
+        for k in range(record.steps):
+            self._prepare(again, replay, None)
+            self._take(again, k + 1)
+            again.q[k + 1], again.v[k + 1] = record.q[k + 1], record.v[k + 1]
+            self._set_state(replay, again)
+        loop_state.controller_state = replay.controller_state
 
     def _arrays_of(self, record: StateBuffers, steps: Integers) -> dict[str, Floats]:
         arrays = super()._arrays_of(record, steps)

@@ -214,7 +214,7 @@ class Simulation:
         loop_state = self._loop_state
         try:
             if loop_state is None:
-                loop_state = self._loop_state = self._loop.start(record)
+                loop_state = self._loop_state = self._loop_state_of_record()
             elif self._plant_needs_reset:
                 self._loop.recover(loop_state)
             self._plant_needs_reset = False
@@ -241,6 +241,14 @@ class Simulation:
             if isinstance(error, SimulationError):
                 error.rollout = self.rollout
             raise
+        return loop_state
+
+    def _loop_state_of_record(self) -> LoopState:
+        """Reset the plant to the last state of the record, and return the state of the loop there."""
+        loop_state = self._loop.start(self._record)
+        lane = self._one_lane()
+        if lane is not None:
+            lane.recover_controller_state(self._record, loop_state)
         return loop_state
 
     def _one_lane(self) -> LaneLoop | None:
@@ -334,7 +342,7 @@ class Simulation:
         """
         self._refuse_closed()
         self._refuse_changed_controller()
-        self._loop_state = self._loop_state or self._loop.start(self._record)
+        self._loop_state = self._loop_state or self._loop_state_of_record()
         record, state = self._record.copy(), replace(self._loop_state)
         memory = self._plant.save()
         return Snapshot(self.scenario, record, state, self._executor, self._departures, memory)
