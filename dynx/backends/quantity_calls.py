@@ -8,6 +8,7 @@ arguments, quantities that dynx derives) is checked argument by argument and eva
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from functools import cached_property, partial
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
@@ -22,6 +23,7 @@ from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.backends.quantities import QUANTITIES
 from dynx.backends.solvability import Solvability
 from dynx.backends.straight import BindingCall, StraightCall, straight_call
+from dynx.errors import NotFiniteError
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
@@ -197,15 +199,19 @@ class QuantityCalls(Lifecycle, EngineHooks):
             return result
         found = np.isfinite(result).all(axis=-1, keepdims=True)
         if not found.all():
-            # An engine may divide by a pivot of zero, although the mass matrix is regular.
-            result = np.where(found, result, self._solved_acceleration(q, *rates))
+            # An engine may divide by a pivot of zero, although the mass matrix is regular. Where the torque
+            # of the velocities overflows, there is no acceleration.
+            with suppress(NotFiniteError):
+                result = np.where(found, result, self._solved_acceleration(q, *rates))
         return self._arguments.finite_acceleration(result)
 
     def _solved_acceleration(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        """Solve for the acceleration by the reduced mass matrix; NaN where it is singular."""
-        return solution_or_nan(
-            self._evaluate("mass_matrix", (q,)), tau - self._evaluate("bias_torque", (q, v))
-        )
+        """Solve for the acceleration by the reduced mass matrix; NaN where it is singular, or where a torque
+        overflows."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return solution_or_nan(
+                self._evaluate("mass_matrix", (q,)), tau - self._evaluate("bias_torque", (q, v))
+            )
 
     def _store_solution(self) -> None:
         """Store the function that solves for the acceleration of one sample."""

@@ -1,6 +1,6 @@
 """Controllers, one per file: frozen dataclasses that compute torques from measurement, setpoint, state."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dynx.control.base import Controller, Measurement, ModelBased, model_dynamics
 from dynx.control.bullet import (
@@ -28,6 +28,7 @@ from dynx.control.registry import to_document as controller_to_document
 from dynx.control.registry import unregister as unregister_controller
 from dynx.control.saturation import Saturated
 from dynx.control.velocity import Velocity
+from dynx.registry import moved_names
 
 __all__ = [
     "PD",
@@ -60,18 +61,14 @@ __all__ = [
     "unregister_controller",
 ]
 
-_FORMER_NAMES = {
-    "EngineMotor": "BulletMotor",
-    "PDMotor": "BulletPDMotor",
-    "PositionMotor": "BulletPositionMotor",
-    "TorqueMotor": "BulletTorqueMotor",
-    "VelocityMotor": "BulletVelocityMotor",
-}
-
 if not TYPE_CHECKING:
-
-    def __getattr__(name: str) -> Any:
-        if name in _FORMER_NAMES:
-            also = "" if name == "EngineMotor" else f" (the motor of any engine is dynx.world.{name})"
-            raise AttributeError(f"dynx.control.{name} is now dynx.control.{_FORMER_NAMES[name]}{also}")
-        raise AttributeError(f"module 'dynx.control' has no attribute {name!r}")
+    __getattr__ = moved_names(
+        "dynx.control",
+        {
+            "EngineMotor": "dynx.control.BulletMotor",
+            **{
+                name: f"dynx.control.Bullet{name} (the motor of any engine is dynx.world.{name})"
+                for name in ("PDMotor", "PositionMotor", "TorqueMotor", "VelocityMotor")
+            },
+        },
+    )

@@ -36,8 +36,11 @@ _CLOSED_FORMS = {"ClosedForm": "solver", "IKSolutions": "solutions", "closed_for
 if not TYPE_CHECKING:
 
     def __getattr__(name: str) -> Any:
+        if name in _MOVED:
+            # The text of an ImportError reaches the user of ``from dynx.ik import name`` too.
+            raise ImportError(f"dynx.ik.{name} is now {_MOVED[name]}", name="dynx.ik")
         if name not in _CLOSED_FORMS:
-            raise AttributeError(f"module 'dynx.ik' has no attribute {name!r}{_advice(name)}")
+            raise AttributeError(f"module 'dynx.ik' has no attribute {name!r}{nearest(name, __all__)}")
         return getattr(import_module(f"dynx.ik.closed_forms.{_CLOSED_FORMS[name]}"), name)
 
 
@@ -51,8 +54,3 @@ _MOVED = {
     "is_rigid": "dynx.model.targets.is_rigid",
     "spells_options": "dynx.ik.options.spells_options",
 }
-
-
-def _advice(name: str) -> str:
-    """Return the clause of an error that says where a name is now, or which is nearest."""
-    return f"; it is {_MOVED[name]}" if name in _MOVED else nearest(name, __all__)

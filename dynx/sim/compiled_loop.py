@@ -212,13 +212,15 @@ class CompiledLoop(ABC):
             if self._given is not None:
                 self._given[:] = given
             return
+        # No step counts as prepared until all is done: Ctrl-C may come at any time.
+        self._first = self._end = k
         self._record, self._given = record, given
-        self._first, self._end = k, min(k + self.chunk_steps, len(record))
-        steps = np.arange(k, self._end)
+        steps = np.arange(k, min(k + self.chunk_steps, len(record)))
         self._arrays = self._arrays_of(record, steps)
         if self._step.controller_state:
             self._arrays["state"][0] = loop_state.controller_state
         self._bind(record, steps)
+        self._end = k + len(steps)
 
     @abstractmethod
     def _bind(self, record: StateBuffers, steps: Integers) -> None:
@@ -236,7 +238,7 @@ class CompiledLoop(ABC):
         arrays |= {
             "tau": record.tau if self._given is None else self._given,
             "a": record.a,
-            "t": loop.clock.control_times(0)[:, None],
+            "t": self._times,
         }
         arrays |= dict(zip(SETPOINT, self._setpoints, strict=True))
         if loop.sensors.noise is not None:

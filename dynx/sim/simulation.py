@@ -220,8 +220,8 @@ class Simulation:
             self._plant_needs_reset = False
             lane = self._one_lane()
             if lane is not None:
-                lane.run(record, loop_state, end, given)
                 self._note(lane.executor)
+                lane.run(record, loop_state, end, given)
                 return loop_state
             if not compiled:
                 self._note("plain: stepped by the caller")
@@ -254,7 +254,9 @@ class Simulation:
     def _one_lane(self) -> LaneLoop | None:
         """Return the loop as one lane of a batch's kernel, if its steps are computed so."""
         if not self._lane_known:
-            found = lane_loop(self._loop)
+            # A controller is evaluated on numbers too, where its own defects may warn before they are found.
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+                found = lane_loop(self._loop)
             self._lane, self._lane_known = found if isinstance(found, LaneLoop) else None, True
         return self._lane
 

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections import Counter
 from functools import cache
+from importlib import import_module
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).parents[2]
 
@@ -90,3 +94,26 @@ def test_no_more_of_them_are_exported_by_two_rooms() -> None:
     exported = exporting_rooms()
     repeated = {name for name, count in class_names().items() if count > 1 and exported[name] > 1}
     assert repeated <= EXPORTED_BY_TWO_ROOMS
+
+
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / "dynx").glob("**/__init__.py")), ids=lambda path: path.parent.name
+)
+def test_every_exported_name_is_there(path: Path) -> None:
+    package = import_module(".".join(path.parent.relative_to(ROOT).parts))
+    for name in getattr(package, "__all__", ()):
+        assert getattr(package, name) is not None
+
+
+@pytest.mark.parametrize(
+    ("package", "name", "new"),
+    [
+        ("dynx.control", "PositionMotor", "dynx.control.BulletPositionMotor"),
+        ("dynx.ik", "Targets", "dynx.model.targets.Targets"),
+        ("dynx", "Push", "ExternalForce"),
+        ("dynx.world", "Wrench", "ExternalForce"),
+    ],
+)
+def test_the_import_of_an_old_name_names_the_new_one(package: str, name: str, new: str) -> None:
+    with pytest.raises(ImportError, match=re.escape(new)):
+        exec(f"from {package} import {name}")

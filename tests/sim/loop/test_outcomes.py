@@ -92,7 +92,7 @@ def test_compiled_steps_never_lose_a_state(controller: Controller[Any], words: s
         for _ in range(len(found)):
             simulation.step()
         np.testing.assert_array_equal(simulation.state.q, found.q[-1])
-    with pytest.raises(UnsupportedFeatureError, match=f"cannot be part of a batch: {words}"):
+    with pytest.raises(UnsupportedFeatureError, match=f"cannot be compiled together with the plant: {words}"):
         simulate_batch(ROBOT, controller, GOAL, rollouts=2, duration=DURATION)
 
 
