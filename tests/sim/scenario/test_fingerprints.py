@@ -136,4 +136,4 @@ def test_copying_a_controller_does_not_change_its_code() -> None:
     copy(law)
     assert digest_of_code(Damper) == before
     # The first simulation traces the controller, of which it makes copies.
-    assert simulate(ARM, law, ARM.neutral(), duration=0.3).executor == "compiled pieces"
+    assert simulate(ARM, law, ARM.neutral(), duration=0.3).executor in ("compiled", "compiled pieces")
