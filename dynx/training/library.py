@@ -9,6 +9,7 @@ from __future__ import annotations
 import inspect
 import io
 import os
+import sys
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from itertools import pairwise
@@ -148,8 +149,7 @@ def new_algorithm(
 
 def _memory() -> int:
     """Return the memory of this machine [bytes]; where it is not known, the largest number of bytes."""
-    names = getattr(os, "sysconf_names", {})
-    if "SC_PHYS_PAGES" not in names:
+    if sys.platform == "win32" or "SC_PHYS_PAGES" not in os.sysconf_names:
         return 2**63
     return int(os.sysconf("SC_PAGE_SIZE")) * int(os.sysconf("SC_PHYS_PAGES"))
 
