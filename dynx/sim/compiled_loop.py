@@ -11,7 +11,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import replace
 from time import perf_counter
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -27,7 +27,6 @@ from dynx.sim.loop.plain import Loop, LoopState
 from dynx.sim.loop.record import StateBuffers
 from dynx.sim.loop_step import CONTROLLER, SETPOINT, ArrayDisturbances, LoopStep, cut_step
 from dynx.sim.plants.integrated import IntegratedPlant
-from dynx.sim.step import is_diverged
 from dynx.sim.step_completion import LaneStops, Settling
 from dynx.simd.call_sequence import Integers, StridedRows
 from dynx.simd.cuts import BoundCuts, CutStep, EngineCallFailed
@@ -40,7 +39,11 @@ MAX_CHUNK_STEPS = 4096
 """Largest number of steps whose kernel calls are prepared together."""
 
 CHUNK_OF_LANE = 1024
-"""Number of steps whose calls of one kernel are prepared together."""
+"""Largest number of steps whose calls of one kernel are prepared together."""
+
+FIRST_CHUNK = 16
+"""Number of steps that are prepared at first, and again where the caller changes what is next, because
+preparing takes longer than a step. It doubles from chunk to chunk."""
 
 PROGRESS_INTERVAL = 0.1
 """Time between two calls of `progress` [s]."""
@@ -151,11 +154,13 @@ def _refuse_impure(controller: Controller[Any]) -> None:
             )
 
 
+C = TypeVar("C")
+
 ArrayRows = dict[str, tuple[Floats, Integers]]
 """Arrays by name, with the row of each step (n,)."""
 
 
-class CompiledLoop(ABC):
+class CompiledLoop(ABC, Generic[C]):
     """A loop in compiled steps. The arrays of the record are inputs and outputs of the steps."""
 
     executor: str
@@ -163,12 +168,14 @@ class CompiledLoop(ABC):
 
     def __init__(self, loop: Loop, step: LoopStep) -> None:
         self._loop, self._step = loop, step
+        self._chunk = 0
         self._times = loop.clock.control_times(0)[:, None]
         # The setpoints of a reference may be stored column by column.
         self._setpoints = [x if x[:1].flags.c_contiguous else np.ascontiguousarray(x) for x in loop.setpoints]
         self._record: StateBuffers | None = None
         self._first = self._end = 0
-        self._given: Floats | None = None
+        self._given = np.zeros((1, step.model.nv))
+        self._prepared: dict[bool, C] = {}
 
     def run(self, record: StateBuffers, loop_state: LoopState, end: int, given: Floats | None = None) -> None:
         """Step from the last state of `record` to step `end`.
@@ -183,7 +190,7 @@ class CompiledLoop(ABC):
         while record.steps < end:
             first, started = record.steps, perf_counter()
             try:
-                self._prepare(record, loop_state, given)
+                self._prepare(record, loop_state, min(end, first + chunk), given)
                 self._take(record, min(end, first + chunk, self._end))
             finally:
                 self._set_state(loop_state, record)
@@ -202,29 +209,30 @@ class CompiledLoop(ABC):
             if self._step.controller_state:
                 loop_state.controller_state = self._arrays["state"][k - self._first].copy()
 
-    def _prepare(self, record: StateBuffers, loop_state: LoopState, given: Floats | None) -> None:
-        """Prepare the calls of the next steps, unless they are prepared."""
-        k, limit = record.steps, self._loop.limit
-        ready = self._record is record and self._first <= k < self._end
+    def _prepare(self, record: StateBuffers, loop_state: LoopState, end: int, given: Floats | None) -> None:
+        """Prepare the calls of the next steps, to `end` and beyond, unless they are prepared."""
+        k, limit, is_given = record.steps, self._loop.limit, given is not None
+        if not (self._record is record and self._first <= k < self._end):
+            continued = self._record is record and self._first < self._end == k
+            self._chunk = 2 * self._chunk if continued else FIRST_CHUNK
+            # No step counts as prepared until all is done: Ctrl-C may come at any time.
+            self._first = self._end = k
+            self._record, self._prepared = record, {}
+            count = min(max(self._chunk, end - k), self.chunk_steps, len(record) - k)
+            self._arrays = self._arrays_of(record, np.arange(k, k + count))
+            self._end = k + count
+        if is_given not in self._prepared:
+            self._prepared[is_given] = self._bound_calls(np.arange(self._first, self._end), given=is_given)
+        self._calls = self._prepared[is_given]
         if given is not None:
-            given = (given if limit is None else clamp(given, limit))[None]
-        if ready and (given is None) == (self._given is None):
-            if self._given is not None:
-                self._given[:] = given
-            return
-        # No step counts as prepared until all is done: Ctrl-C may come at any time.
-        self._first = self._end = k
-        self._record, self._given = record, given
-        steps = np.arange(k, min(k + self.chunk_steps, len(record)))
-        self._arrays = self._arrays_of(record, steps)
+            self._given[:] = given if limit is None else clamp(given, limit)
         if self._step.controller_state:
-            self._arrays["state"][0] = loop_state.controller_state
-        self._bind(record, steps)
-        self._end = k + len(steps)
+            # The caller may have gone back to another state.
+            self._arrays["state"][k - self._first] = loop_state.controller_state
 
     @abstractmethod
-    def _bind(self, record: StateBuffers, steps: Integers) -> None:
-        """Prepare the calls of `steps`."""
+    def _bound_calls(self, steps: Integers, *, given: bool) -> C:
+        """Prepare the calls of `steps`, in which the torque is `given` by the caller or not."""
 
     @abstractmethod
     def _take(self, record: StateBuffers, end: int) -> None:
@@ -236,7 +244,7 @@ class CompiledLoop(ABC):
         loop, step = self._loop, self._step
         arrays = {"q": record.q, "v": record.v, "q_measured": record.q, "v_measured": record.v}
         arrays |= {
-            "tau": record.tau if self._given is None else self._given,
+            "tau": record.tau,
             "a": record.a,
             "t": self._times,
         }
@@ -250,17 +258,19 @@ class CompiledLoop(ABC):
         arrays["status"], arrays["commanded"] = np.zeros((1, 1)), np.zeros((1, step.model.nv))
         return arrays
 
-    def _rows(self, steps: Integers) -> tuple[ArrayRows, ArrayRows]:
+    def _rows(self, steps: Integers, *, given: bool) -> tuple[ArrayRows, ArrayRows]:
         """Return the arrays with the rows that `steps` use, and those that they write where they are
         others."""
         assert self._record is not None
         clock, zeros = self._loop.clock, np.broadcast_to(np.int64(0), steps.shape)
         own = {"q": steps, "v": steps, "a": steps, "state": steps - self._first}
-        own["tau"] = np.maximum(steps - 1, 0) if self._given is None else zeros
+        own["tau"] = np.maximum(steps - 1, 0)
         own |= dict.fromkeys(("q_measured", "v_measured"), clock.measured_step(steps))
         control = clock.control_number(steps)
         own |= dict.fromkeys((*SETPOINT, "t", "noise_q", "noise_v", "random"), control)
         rows = {name: (array, own.get(name, zeros)) for name, array in self._arrays.items()}
+        if given:
+            rows["tau"] = self._given, zeros
         following = {"q": steps + 1, "v": steps + 1, "state": steps - self._first + 1}
         written = {name: (rows[name][0], row) for name, row in following.items() if name in rows}
         return rows, {**written, "tau": (self._record.tau, steps)}
@@ -273,7 +283,7 @@ class CompiledLoop(ABC):
             raise self._loop.error_of(status, record.steps, record, tau)
 
 
-class LaneLoop(CompiledLoop):
+class LaneLoop(CompiledLoop[BoundSteps]):
     """A loop as one lane of the kernel of a batch."""
 
     executor = ONE_KERNEL
@@ -299,7 +309,7 @@ class LaneLoop(CompiledLoop):
         again.steps = 0
         replay = replace(loop_state, controller_state=controller.initial_state())
         for k in range(record.steps):
-            self._prepare(again, replay, None)
+            self._prepare(again, replay, record.steps, None)
             self._take(again, k + 1)
             again.q[k + 1], again.v[k + 1] = record.q[k + 1], record.v[k + 1]
             self._set_state(replay, again)
@@ -317,22 +327,22 @@ class LaneLoop(CompiledLoop):
             arrays["wrenches"] = step.disturbances.wrenches(self._loop.clock.dt, steps)
         return arrays
 
-    def _bind(self, record: StateBuffers, steps: Integers) -> None:
-        rows, written = self._rows(steps)
+    def _bound_calls(self, steps: Integers, *, given: bool) -> BoundSteps:
+        rows, written = self._rows(steps, given=given)
         wrenches = self._arrays.get("wrenches", np.zeros((len(steps), 0)))
         rows["wrenches"] = wrenches, steps - self._first
         for name in TOTALS:
             rows[name] = self._arrays[name], steps % 2
             written[name] = self._arrays[name], (steps + 1) % 2
-        controlled = self._loop.clock.is_control_step(steps) & (self._given is None)
+        controlled = self._loop.clock.is_control_step(steps) & (not given)
         pushed = self._step.pushed_steps(wrenches)
         kinds, chosen = np.unique(2 * controlled + pushed, return_inverse=True)
         kernels = [self._compiled.kernel((kind >= 2, kind % 2 == 1)) for kind in kinds.tolist()]
-        self._bound = BoundSteps(kernels, chosen, rows, written, first=self._first)
+        return BoundSteps(kernels, chosen, rows, written, first=self._first)
 
     def _take(self, record: StateBuffers, end: int) -> None:
         while record.steps < end:
-            stop = self._bound.run(record.steps, end)
+            stop = self._calls.run(record.steps, end)
             if stop is None:
                 record.steps = end
                 return
@@ -344,7 +354,7 @@ class LaneLoop(CompiledLoop):
     def _finished(self, record: StateBuffers, stop: Stop) -> Status:
         """Complete a step in which modes of dry friction are not settled, or joints are beyond limits."""
         k = stop.step
-        self._settling(self._bound, k, self._lanes)
+        self._settling(self._calls, k, self._lanes)
         status = Status(int(self._settling.arrays["status"][0, 0, 0]))
         if status & Status.AT_LIMIT and self._stops is not None:
             before, now = (
@@ -358,7 +368,7 @@ class LaneLoop(CompiledLoop):
         return status
 
 
-class CutLoop(CompiledLoop):
+class CutLoop(CompiledLoop[dict[bool, BoundCuts]]):
     """A loop in pieces between engine calls: one step evaluates the controller, another holds its torque."""
 
     executor = PIECES
@@ -374,18 +384,18 @@ class CutLoop(CompiledLoop):
         always = loop.clock.steps_per_control == 1
         self._holding = None if always else cut_step(step, plant, controlled=False)
 
-    def _bind(self, record: StateBuffers, steps: Integers) -> None:
-        assert self._given is None, "torques of the caller are not cut"
+    def _bound_calls(self, steps: Integers, *, given: bool) -> dict[bool, BoundCuts]:
+        assert not given, "torques of the caller are not cut"
         inputs, outputs = (
             {name: StridedRows(array, row) for name, (array, row) in found.items()}
-            for found in self._rows(steps)
+            for found in self._rows(steps, given=given)
         )
 
         def bound(step: CutStep) -> BoundCuts:
             return BoundCuts(step, inputs, outputs)
 
-        self._steps = {True: bound(self._controlled)}
-        self._steps[False] = self._steps[True] if self._holding is None else bound(self._holding)
+        controlled = bound(self._controlled)
+        return {True: controlled, False: controlled if self._holding is None else bound(self._holding)}
 
     def _take(self, record: StateBuffers, end: int) -> None:
         clock = self._loop.clock
@@ -394,7 +404,7 @@ class CutLoop(CompiledLoop):
             last = end
             if self._holding is not None:
                 last = k + 1 if controlled else min(end, clock.next_control_step(k))
-            bound = self._steps[controlled]
+            bound = self._calls[controlled]
             try:
                 stopped = bound.run(k - self._first, last - self._first)
             except EngineCallFailed as failed:
@@ -408,15 +418,14 @@ class CutLoop(CompiledLoop):
                 record.steps = self._first + bound.taken
             if stopped is not None:
                 status = Status(int(stopped[1]))
-                if status & Status.AT_LIMIT:
-                    status = self._stopped(record, record.steps + 1)
                 self._ended(record, status)
+                if status & Status.AT_LIMIT:
+                    self._stop(record, record.steps + 1)
                 record.steps += 1
 
-    def _stopped(self, record: StateBuffers, row: int) -> Status:
-        """Stop the joints that are beyond their limits in a row of the record; return the status after it."""
+    def _stop(self, record: StateBuffers, row: int) -> None:
+        """Stop the joints that are beyond their limits in a row of the record."""
         assert self._loop.stops is not None
         stopped = self._loop.stops(record.q[row], record.v[row])
         if stopped is not None:
             record.q[row], record.v[row] = stopped
-        return Status.DIVERGED if is_diverged(record.v[row]) else Status.DONE

@@ -333,7 +333,6 @@ class Simulation:
         """Return to the start and discard the record. Raises ArgumentError for a controller that changed."""
         self._refuse_changed_controller()
         self._record.steps = 0
-        self._lane_known = False
         self._loop_state, self._executor, self._departures = None, (), ()
         return self.state
 
@@ -373,7 +372,6 @@ class Simulation:
         self._loop.refuse_self_changing(self._record)
         changed = [] if theirs is ours else changed_parts(theirs, ours)
         self._record.take(snapshot.record, n)
-        self._lane_known = False
         self._executor, self._departures = snapshot.executor, snapshot.departures
         loop_state = replace(snapshot.loop_state)
         self._loop.place(loop_state.q, loop_state.v)
@@ -410,7 +408,6 @@ class Simulation:
         if step > len(self._record):
             self._extend(step)
         self._record.take(theirs, step)
-        self._lane_known = False
         self._loop_state, self._executor, self._departures = None, (), ()
 
     # -- end ----------------------------------------------------------------------------------

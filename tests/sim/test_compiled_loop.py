@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import signal
+import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import FrozenInstanceError
+from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -43,6 +45,7 @@ from dynx.sim import (
     simulate,
     simulate_batch,
 )
+from dynx.sim.compiled_loop import CompiledLoop, LaneLoop
 from dynx.sim.plants import registry
 from dynx.simd import cuts
 from dynx.spatial.scalar import Floats
@@ -273,9 +276,11 @@ def test_a_rollout_of_a_batch_is_that_of_simulate_with_its_noise() -> None:
         np.testing.assert_array_equal(many.tau_record[row], one.tau)
 
 
-def test_torques_of_the_caller_are_held_in_one_lane() -> None:
-    """Also between control steps, after torques of the controller and before them."""
-    law, tau = PD(ARM, kp=100, kd=10), np.linspace(-3.0, 3.0, 6)
+@pytest.mark.parametrize("law", [PD(ARM, kp=100, kd=10), None])
+def test_torques_of_the_caller_are_held_in_one_lane(law: Controller[Any] | None) -> None:
+    """Also between control steps, after torques of the controller and before them; without a controller a
+    control step ends them."""
+    tau = np.linspace(-3.0, 3.0, 6)
     records = []
     for plant in ("compiled", "reference"):
         with Simulation(Scenario(ARM, law, np.zeros(6), plant=plant, control_dt=3e-3, duration=0.1)) as run:
@@ -285,7 +290,8 @@ def test_torques_of_the_caller_are_held_in_one_lane() -> None:
     assert records[0].executor == "compiled"
     np.testing.assert_allclose(records[0].tau, records[1].tau, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(records[0].q, records[1].q, rtol=1e-9, atol=1e-12)
-    np.testing.assert_array_equal(records[0].tau[4:6], [tau, 2.0 * tau])
+    np.testing.assert_array_equal(records[0].tau[4:9], [tau, *4 * [2.0 * tau]])
+    assert records[0].tau[9:12].any() == (law is not None)
 
 
 def test_an_engine_of_one_s_own_is_believed_on_the_compiled_plant() -> None:
@@ -418,6 +424,67 @@ def test_no_plant_is_given_what_is_no_number(on: bool, monkeypatch: pytest.Monke
     assert caught.value.step == 2
     assert len(plant.given) == 2
     assert np.isfinite(plant.given).all()
+
+
+def test_going_back_and_forth_prepares_no_step_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither torques of the caller between the controller's, nor a return to a state a few steps ago."""
+    made: list[int] = []
+    prepare = LaneLoop._bound_calls
+
+    def counted(loop: LaneLoop, steps: Any, *, given: bool) -> Any:
+        made.append(len(steps))
+        return prepare(loop, steps, given=given)
+
+    monkeypatch.setattr(LaneLoop, "_bound_calls", counted)
+    law = PID(ARM, kp=100, ki=50, kd=10, control_dt=1e-3, limit=50.0)
+    with Simulation(Scenario(ARM, law, np.zeros(6), plant="compiled", q0=np.full(6, 0.3))) as simulation:
+        states = []
+        for _ in range(3):
+            saved = simulation.save()
+            for given in (None, np.ones(6), None):
+                simulation.step(tau=given)
+            states.append(simulation.state)
+            simulation.restore(saved)
+    assert len(made) == 2
+    for each in states[1:]:
+        np.testing.assert_array_equal(each.q, states[0].q)
+        np.testing.assert_array_equal(each.v, states[0].v)
+
+
+def test_ctrl_c_while_steps_are_prepared() -> None:
+    """At any line, and the next steps are those that they would have been."""
+    scenario = Scenario(ARM, PD(ARM, kp=100, kd=10), np.zeros(6), plant="compiled", q0=np.full(6, 0.3))
+    with Simulation(scenario) as simulation:
+        simulation.step(40)
+        whole = simulation.rollout
+    preparing = {LaneLoop._prepare, CompiledLoop._arrays_of, LaneLoop._arrays_of, CompiledLoop._rows}
+    codes = {each.__code__ for each in (*preparing, LaneLoop._bound_calls)}
+    line = 0
+    while True:
+        left = line
+
+        def interrupt(frame: FrameType, event: str, _: object) -> Any:
+            nonlocal left
+            if frame.f_code in codes and event == "line":
+                left -= 1
+                if left < 0:
+                    sys.settrace(None)
+                    raise KeyboardInterrupt
+            return interrupt
+
+        with Simulation(scenario) as simulation:
+            simulation.step(16)
+            sys.settrace(interrupt)
+            try:
+                simulation.step(24)
+                break
+            except KeyboardInterrupt:
+                simulation.step(40 - len(simulation.rollout))
+            finally:
+                sys.settrace(None)
+            the_same(simulation.rollout, whole)
+        line += 1
+    assert line > 20
 
 
 def test_ctrl_c_in_the_middle_of_a_stage() -> None:

@@ -113,14 +113,17 @@ class Loop:
         tau, command, state = loop_state.tau, loop_state.command, loop_state.controller_state
         limit, stops = self.limit, self.stops
         step, progress, next_call = plant.step, self.progress, begin
-        # Number of the step at which the controller is evaluated next; -1 if it never is.
-        due = -1 if controller is None or given is not None else self.clock.next_control_step(begin)
+        # Number of the next control step; -1 if the torque is held through all of them.
+        due = -1 if given is not None else self.clock.next_control_step(begin)
         if given is not None:
             tau, command = given if limit is None else clamp(given, limit), None
             loop_state.tau, loop_state.command = tau, None
         for k in range(begin, end):
             t = k * dt
-            if k == due and controller is not None:
+            if k == due and controller is None:
+                # A torque of the caller ends at the control step. Without one it is zero already.
+                due, tau = -1, np.zeros(shape)
+            elif k == due and controller is not None:
                 due += per_control
                 measurement = Measurement(t, q, v) if sensors is None else sensors(k, Q, V)
                 setpoint = setpoints[k // per_control]
@@ -146,7 +149,8 @@ class Loop:
                     q, v, a, _, _ = step(t, tau)
                 else:
                     q, v, a, tau, _ = plant.step_motors(t, command)
-                if stops is not None:
+                diverged = is_diverged(v)
+                if stops is not None and not diverged:
                     stopped = stops(q, v)
                     if stopped is not None:
                         q, v = stopped
@@ -155,7 +159,7 @@ class Loop:
                 # This includes the engine's own exceptions, because its hooks are called directly
                 # (`dynx.control.dynamics`).
                 raise self.engine_failed(k, record, error, in_controller=False) from error
-            if is_diverged(v):
+            if diverged:
                 raise self.error_of(Status.DIVERGED, k, record, tau)
             applied[k], A[k], Q[k + 1], V[k + 1] = tau, a, q, v
             record.steps = k + 1

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 
 from dynx.backends import backend
 from dynx.control import PD
+from dynx.errors import DivergedError
 from dynx.model import Model
 from dynx.model.loading import load
-from dynx.sim import Rollout, simulate
+from dynx.sim import Rollout, Scenario, Simulation, simulate
 from dynx.sim.loop.stops import Stops
 from dynx.spatial.scalar import Floats
 from tests.sim.bars import tutorial_robot
@@ -113,3 +114,14 @@ def test_mimic_joints_and_floating_bases_stop_alike_in_both_loops(robot: str) ->
     assert reached[:, joints].any()
     resumed = simulate(model, v0=v0, duration=0.3, position_limits=True, resume=pieces, step=40)
     the_same(pieces, resumed)
+
+
+@pytest.mark.parametrize("plant", ["compiled", "reference"])
+def test_a_stop_hides_no_divergence(plant: str) -> None:
+    """A velocity beyond all meaning ends the simulation, also where a stop would have taken it away."""
+    scenario = Scenario(ARM, plant=plant, q0=ARM.clip(ARM.upper), position_limits=True)
+    with Simulation(scenario) as simulation:
+        simulation.step()
+        with pytest.raises(DivergedError) as caught:
+            simulation.step(tau=np.array([1e15, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    assert caught.value.step == 1
