@@ -12,11 +12,7 @@ of your own. Needs the extra ``envs``.
 from dynx.envs.environment import TaskEnvironment
 from dynx.envs.randomization import Randomization
 from dynx.envs.registration import make_environment, register_task, register_tasks
-from dynx.envs.robot.state import State
-from dynx.envs.robot.task import RobotTask
-from dynx.envs.task import Episodes, Outcome, Task
-from dynx.envs.world.scene_task import Episode
-from dynx.envs.world.task import WorldTask
+from dynx.envs.task import Episode, Episodes, Outcome, RobotTask, State, Task, WorldTask
 
 __all__ = [
     "Episode",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from importlib import import_module
 from types import FunctionType
@@ -10,10 +11,9 @@ from typing import Any
 from dynx.envs.environment import TaskEnvironment
 from dynx.envs.library import AutoresetMode, register, registry
 from dynx.envs.randomization import Randomization
-from dynx.envs.robot.array_task import ArrayTask
-from dynx.envs.task import Task
+from dynx.envs.task import RobotTask, Task
 from dynx.envs.vector import RobotVectorEnvironment
-from dynx.errors import ArgumentError, shown
+from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 
 COMPILED = "compiled"
 """The engine of vector environments, whose kernels are compiled."""
@@ -86,11 +86,11 @@ def make_vector_environment(
 ) -> RobotVectorEnvironment:
     """Return environments of a task that step in one compiled kernel; `gymnasium.make_vec` calls this.
 
-    Raises ArgumentError for another engine or a task that is no `ArrayTask`: those step one by one or in
+    Raises ArgumentError for another engine or a task that is no `RobotTask`: those step one by one or in
     processes, by ``vectorization_mode="sync"`` or ``"async"``.
     """
     made = task_class(task).with_options(options)
-    if engine != COMPILED or not isinstance(made, ArrayTask):
+    if engine != COMPILED or not isinstance(made, RobotTask):
         subject = type(made).__name__ if engine == COMPILED else f"engine {shown(engine)}"
         raise ArgumentError(
             f"{subject} does not step in a compiled kernel; wanted vectorization_mode='sync' or 'async', or "
@@ -119,7 +119,7 @@ def register_task(env_id: str, task: str | type[Task]) -> None:
     register(
         env_id,
         entry_point=ENTRY_POINT,
-        vector_entry_point=VECTOR_ENTRY_POINT if issubclass(kind, ArrayTask) else None,
+        vector_entry_point=VECTOR_ENTRY_POINT if issubclass(kind, RobotTask) else None,
         max_episode_steps=kind.max_episode_steps,
         reward_threshold=kind.reward_threshold,
         kwargs={"task": task},
@@ -130,3 +130,47 @@ def register_tasks() -> None:
     """Register the tasks of dynx."""
     for name, task in TASKS.items():
         register_task(f"{NAMESPACE}/{name}", task)
+
+
+def task_id(name: str) -> str:
+    """Return the Gymnasium id of a task named as ``CartPole``, ``dynx/CartPole-v0`` or ``LunarLander-v3``.
+
+    A bare name is a task of dynx, in its newest version. Of ``module:Env-v0`` the module is imported, which
+    registers the task: the name must be the caller's, never that of a file. Raises UnknownNameError with the
+    nearest name.
+    """
+    module, colon, own = name.rpartition(":")
+    if colon:
+        _import(module)
+        if own not in registry:
+            raise UnknownNameError(
+                f"module {shown(module)} registers no task {shown(own)}{nearest(own, registry)}"
+            )
+    if name in registry or colon:
+        return name
+    versions = [each for each in registry if each.rpartition("-v")[0] == f"{NAMESPACE}/{name}"]
+    if versions:
+        return max(versions, key=lambda each: int(each.rpartition("-v")[2]))
+    bare = [bare_name(each) for each in registry if is_of_dynx(each)]
+    near = nearest(name, dict.fromkeys(bare))
+    raise UnknownNameError(
+        f"no task {shown(name)}{near if '?' in near else nearest(name, [*bare, *registry])}"
+    )
+
+
+def _import(module: str) -> None:
+    try:
+        import_module(module)
+    except (ImportError, ValueError) as error:
+        raise UnknownNameError(f"module {shown(module)} cannot be imported: {error}") from error
+
+
+def is_of_dynx(env_id: str) -> bool:
+    """Check whether an id is that of a task of dynx, which takes an engine."""
+    return env_id.startswith(f"{NAMESPACE}/")
+
+
+def bare_name(env_id: str) -> str:
+    """Return the name of a task without namespace and version: CartPole of ``dynx/CartPole-v0``."""
+    name = re.split("[/:]", env_id)[-1]
+    return name.rpartition("-v")[0] or name

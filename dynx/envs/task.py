@@ -1,24 +1,46 @@
-"""`Task`: what is observed, done and rewarded, without an engine; `Episodes`: a task on one engine.
+"""Tasks: what is observed, done and rewarded, without an engine; `Episodes`: a task on one engine.
 
 An environment (`dynx.envs.environment`) is made of a task and the name of an engine: it checks actions and
-the order of calls, and leaves the motion to the `Episodes` that the task opens on the engine.
+the order of calls, and leaves the motion to the `Episodes` that the task opens on the engine
+(`dynx.envs.runner`).
 """
 
 from __future__ import annotations
 
+import inspect
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from dataclasses import fields, is_dataclass
-from typing import Any, ClassVar, NamedTuple, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cached_property, partial
+from importlib import import_module
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from dynx.backends.registry import backend_names
+from dynx.control.dynamics import Dynamics
 from dynx.envs.library import Space
 from dynx.envs.randomization import Parameter, Randomization
 from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError, nearest, shown
+from dynx.model import Model
+from dynx.model.numbers import MAX_MAGNITUDE, is_real
+from dynx.rbd.integration import Accelerate, ExplicitEuler, RungeKutta4
+from dynx.registry import DEFAULT_ENGINE
+from dynx.sim.plants.integrators import CompiledBaseEuler
+from dynx.spatial.scalar import Array
+from dynx.steppers.registry import world_names
+
+if TYPE_CHECKING:
+    from dynx.world.camera import Camera
+    from dynx.world.scene import Scene
+    from dynx.world.world import World
 
 Kind = TypeVar("Kind", bound="Task")
+
+DEFAULT_WORLD_ENGINE = "pybullet"
+"""Engine that runs a task in a world unless another is named."""
 
 XYZ = ("x", "y", "z")
 """Names of the components of a vector."""
@@ -87,6 +109,16 @@ class Task(ABC):
                 raise UnknownNameError(f"{cls.__name__} has no option {shown(name)}{nearest(name, names)}")
         return cls(**options)
 
+    def require_start_options(self, options: Mapping[str, Any]) -> None:
+        """Raise UnknownNameError for an option of `reset` that `start` does not take."""
+        start: Any = getattr(self, "start", None)
+        known = list(inspect.signature(start).parameters)[1:]
+        for name in options:
+            if name not in known:
+                raise UnknownNameError(
+                    f"{type(self).__name__} has no option {shown(name)} of reset{nearest(str(name), known)}"
+                )
+
 
 class Episodes(ABC):
     """Episodes of a task on one engine, one after another. Arguments were checked by the environment."""
@@ -127,6 +159,228 @@ class Episodes(ABC):
         """Release engine and viewer. Closing twice is harmless."""
 
 
+NO_MEMORY: Array = np.zeros(0)
+NO_MEMORY.setflags(write=False)
+
+
+class State(NamedTuple):
+    """Configuration and velocity of the robot, and what else the task keeps during an episode.
+
+    The arrays hold floats, or in a compiled kernel symbols.
+    """
+
+    q: Array
+    """Configuration (nq,) [rad or m]."""
+    v: Array
+    """Velocity (nv,) [rad/s or m/s]."""
+    memory: Array = NO_MEMORY
+    """Numbers of the task's own (k,), such as the goal of the episode."""
+
+
+SCHEMES: dict[str, Callable[[Model, float], Any]] = {
+    "euler": ExplicitEuler,
+    "semi_implicit": CompiledBaseEuler,
+    "rk4": RungeKutta4,
+}
+"""Integration schemes by name, made of a model and a step [s]."""
+
+
+class RobotTask(Task):
+    """A task of one robot without contacts, whose dynamics a backend of dynx evaluates.
+
+    All methods are array code for one environment: they compute with NumPy's functions on arrays of floats,
+    and in a vector environment on symbols, from which one kernel is compiled. So they must not branch on a
+    value (write ``np.where``) and must return the same for the same arguments. `robot` evaluates quantities
+    of the robot at a configuration: ``robot.forward_kinematics(q, frame)``, ``robot.bias_torque(q, v)`` and
+    the others of `dynx.control.dynamics.Dynamics`.
+    """
+
+    substeps: ClassVar[int] = 1
+    """Steps of the integrator in a control step; the torque is evaluated at the start of each."""
+    integrator: ClassVar[str] = "semi_implicit"
+    """Name of the integration scheme: ``semi_implicit``, ``rk4`` or ``euler`` (explicit)."""
+    random_size: ClassVar[int] = 0
+    """Number of random numbers that `start` takes."""
+
+    @property
+    @abstractmethod
+    def model(self) -> Model:
+        """The robot; write it as a `functools.cached_property`."""
+
+    @abstractmethod
+    def start(self, random: Array) -> State:
+        """Return the state at the start of an episode, from numbers (random_size,) uniform in [0, 1).
+
+        Keyword arguments after `random` are the options of `reset`; they need defaults.
+        """
+
+    @abstractmethod
+    def torque(self, robot: Dynamics, state: State, action: Array) -> Array:
+        """Return the torque (nv,) [N m or N] of an action: an array of the action space's shape, or for a
+        `Discrete` space one number, as a float."""
+
+    @abstractmethod
+    def observation(self, robot: Dynamics, state: State) -> Array:
+        """Return the observation, an array of the observation space's shape."""
+
+    @abstractmethod
+    def reward(self, robot: Dynamics, before: State, action: Array, after: State) -> Any:
+        """Return the reward of a control step, one number."""
+
+    def terminated(self, robot: Dynamics, state: State) -> Any:
+        """Check whether the episode is over in a state; by default it never is."""
+        return False
+
+    def settle(self, state: State) -> State:
+        """Return the state with which the task goes on after a control step: clamped, or with angles wrapped.
+
+        By default it is unchanged.
+        """
+        return state
+
+    def advance(self, accelerate: Accelerate, q: Array, v: Array) -> tuple[Array, Array]:
+        """Return q and v after one step of the integrator; by default by the scheme `integrator`."""
+        q, v, _ = self._scheme(accelerate, q, v)
+        return q, v
+
+    def info(self, robot: Dynamics, state: State) -> dict[str, Any]:
+        """Return the info of a step; by default it is empty. Only single environments have it."""
+        return {}
+
+    @cached_property
+    def camera(self) -> Camera:
+        """Camera of the pictures; its size is replaced by that of the environment."""
+        return camera_at((0.0, -3.0, 0.6), (0.0, 0.0, 0.4))
+
+    @property
+    def step_dt(self) -> float:
+        """Step of the integrator [s]."""
+        return self.control_dt / self.substeps
+
+    @cached_property
+    def _scheme(self) -> Any:
+        if self.integrator not in SCHEMES:
+            raise ArgumentError(f"integrator is {shown(self.integrator)}{nearest(self.integrator, SCHEMES)}")
+        return SCHEMES[self.integrator](self.model, self.step_dt)
+
+    @classmethod
+    def engines(cls) -> tuple[str, ...]:
+        """Return the names of all backends, the default first."""
+        return tuple(dict.fromkeys((DEFAULT_ENGINE, *backend_names())))
+
+    def open(self, engine: str) -> Episodes:
+        """Return the episodes of this task on a backend."""
+        return _opened("RobotEpisodes", self, engine)
+
+
+ForwardDynamics = Callable[..., Any]
+"""Acceleration (nv,) of q, v and tau."""
+
+
+def control_step(
+    task: RobotTask,
+    robot: Dynamics,
+    forward_dynamics: ForwardDynamics,
+    before: State,
+    actions: Sequence[Array],
+) -> State:
+    """Return the state after ``task.control_dt``, before the task settles it.
+
+    `actions` has the one that acts in each step of the integrator.
+    """
+    q, v, memory = before
+    for action in actions:
+        tau = task.torque(robot, State(q, v, memory), action)
+        q, v = task.advance(partial(_acceleration, forward_dynamics, tau), q, v)
+    return State(q, v, memory)
+
+
+def _acceleration(forward_dynamics: ForwardDynamics, tau: Array, q: Array, v: Array) -> Any:
+    return forward_dynamics(q, v, tau)
+
+
+@dataclass
+class Episode:
+    """One episode: a world, its random numbers, and what else the task keeps between two steps."""
+
+    world: World
+    rng: np.random.Generator
+    memory: SimpleNamespace
+    """Values of the task's own, as attributes, such as the goal of the episode."""
+
+
+class WorldTask(Task):
+    """A task in a scene with contacts, which an engine steps through `dynx.world.World`.
+
+    The order of calls: `start` sets the state of an episode and its memory. Then for each action `loads`
+    says what acts, the world takes a step of `control_dt`, `settle` updates the memory, and `observation`,
+    `reward`, `terminated` and `info` read the world and the memory.
+    """
+
+    substeps: ClassVar[int] = 1
+    """Steps of the engine in a control step."""
+    settings: ClassVar[Mapping[str, Mapping[str, Any]]] = {}
+    """Options of `World` by engine, such as ``{"pybullet": {"solver_iterations": 50}}``."""
+
+    @abstractmethod
+    def scene(self) -> Scene:
+        """Return the scene in which episodes start."""
+
+    def scene_of_episode(self, rng: np.random.Generator, memory: SimpleNamespace) -> Scene | None:
+        """Return the scene of an episode that differs from the others in more than the state, or None.
+
+        `memory` is that of the episode. A scene is opened in the engine anew, which takes milliseconds;
+        without one the world returns to its start.
+        """
+        return None
+
+    @abstractmethod
+    def start(self, episode: Episode) -> None:
+        """Set the state of the world, which is at the start of the scene, and the memory.
+
+        Keyword arguments after `episode` are the options of `reset`; they need defaults.
+        """
+
+    @abstractmethod
+    def loads(self, episode: Episode, action: Any) -> Mapping[str, Any]:
+        """Return what acts during a control step, as arguments of `World.step`: ``torques``, ``motors``,
+        ``forces``."""
+
+    def settle(self, episode: Episode, action: Any) -> None:
+        """Update the memory after a control step; by default it is unchanged."""
+        return
+
+    @abstractmethod
+    def observation(self, episode: Episode) -> NDArray[Any]:
+        """Return the observation, of the observation space's shape and dtype."""
+
+    @abstractmethod
+    def reward(self, episode: Episode, action: Any) -> float:
+        """Return the reward of a control step."""
+
+    def terminated(self, episode: Episode) -> bool:
+        """Check whether the task ended the episode; by default it never does."""
+        return False
+
+    def info(self, episode: Episode) -> dict[str, Any]:
+        """Return the info of a step; by default it is empty."""
+        return {}
+
+    @cached_property
+    def camera(self) -> Camera:
+        """Camera of the pictures; its size is replaced by that of the environment."""
+        return camera_at((1.5, -1.5, 1.0), (0.0, 0.0, 0.2))
+
+    @classmethod
+    def engines(cls) -> tuple[str, ...]:
+        """Return the names of the engines that run worlds, the default first."""
+        return tuple(dict.fromkeys((DEFAULT_WORLD_ENGINE, *world_names())))
+
+    def open(self, engine: str) -> Episodes:
+        """Return the episodes of this task in a world of an engine."""
+        return _opened("WorldEpisodes", self, engine)
+
+
 def checked_engine(kind: type[Task], engine: str | None) -> str:
     """Return the name of an engine on which a task runs, its default for None.
 
@@ -145,3 +399,32 @@ def checked_engine(kind: type[Task], engine: str | None) -> str:
 def component_names(vector: str, components: Sequence[str] = XYZ) -> tuple[str, ...]:
     """Return the names of the components of a vector in an observation, such as ``goal x``."""
     return tuple(f"{vector} {component}" for component in components)
+
+
+def refuse_unknown_choice(name: str, value: object, known: Sequence[str]) -> None:
+    """Raise ArgumentError for an option that is not one of the `known` words."""
+    if value not in known:
+        raise ArgumentError(f"{name} is {shown(value)}{nearest(str(value), known)}")
+
+
+def refuse_unphysical(name: str, value: object, unit: str, *, zero: bool = False) -> None:
+    """Raise ArgumentError for an option that is no number above 0, or with `zero` of at least 0."""
+    if not is_real(value) or not (value >= 0.0 if zero else value > 0.0) or not value < MAX_MAGNITUDE:
+        wanted = "of at least 0" if zero else "above 0"
+        raise ArgumentError(f"{name} is {shown(value)}; wanted a number {wanted} [{unit}]")
+
+
+def _opened(kind: str, task: Task, engine: str) -> Episodes:
+    """Return the episodes of a task, of a class of `dynx.envs.runner`, which imports this module."""
+    episodes: Episodes = getattr(import_module("dynx.envs.runner"), kind)(task, engine)
+    return episodes
+
+
+def camera_at(position: ArrayLike, target: ArrayLike, **options: Any) -> Camera:
+    """Return the camera at a position [m] that looks at a target [m], with options of `Camera.look_at`.
+
+    Cameras are imported here, because most environments draw no picture.
+    """
+    from dynx.world.camera import Camera
+
+    return Camera.look_at(position, target, **options)

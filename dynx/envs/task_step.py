@@ -17,10 +17,8 @@ import numpy as np
 from dynx.compiled.step import StepText
 from dynx.control.array_dynamics import ArrayDynamics
 from dynx.envs.library import AutoresetMode, spaces
-from dynx.envs.robot.array_task import ArrayTask
-from dynx.envs.robot.state import State
-from dynx.envs.robot.step import control_step
-from dynx.envs.robot.varied_robot import VariedRobot
+from dynx.envs.task import RobotTask, State, control_step
+from dynx.envs.variation import VariedRobot
 from dynx.errors import ArgumentError, ShapeError, UnsupportedFeatureError
 from dynx.model.numbers import DIVERGENCE_SPEED
 from dynx.simd.user_code.arrays import symbol_array, traced_array
@@ -43,7 +41,7 @@ class Layout(NamedTuple):
     memory: int
 
     @classmethod
-    def of(cls, task: ArrayTask) -> Layout:
+    def of(cls, task: RobotTask) -> Layout:
         """Return the layout for a task."""
         state = task.start(np.zeros(task.random_size))
         return cls(len(state.q), len(state.v), len(state.memory))
@@ -68,7 +66,7 @@ class TaskStep:
 
     def __init__(
         self,
-        task: ArrayTask,
+        task: RobotTask,
         mode: AutoresetMode,
         max_episode_steps: int | None,
         varied: VariedRobot | None = None,

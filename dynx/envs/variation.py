@@ -1,158 +1,305 @@
-"""`Variation`: the parameters and the noise of some environments, with one row for each of them."""
+"""Drawn parameters of a robot or a scene, and what they change.
+
+`VariedRobot`: masses, payload and friction of the joints of a task of one robot, and the delay of actions.
+`VariedScene`: masses, payload, friction of joints and of contacts in a world.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from dynx.envs.library import Space, spaces
-from dynx.envs.randomization import Draws, Parameter, Randomization, parameters_of
-from dynx.errors import ArgumentError, UnsupportedFeatureError
-from dynx.spatial.scalar import Floats
-from dynx.steppers.random import BLOCK_STEPS, Purpose, StepNumbers, Streams
+from dynx.compiled.scaled_links import ScaledLinks
+from dynx.control.array_dynamics import ArrayDynamics
+from dynx.envs.randomization import Parameter, Randomization, parameters_of, require_name
+from dynx.envs.task import RobotTask
+from dynx.errors import UnknownNameError, UnsupportedFeatureError, nearest, shown
+from dynx.model import Inertial, Model, Pose
+from dynx.model.elements import Joint
+from dynx.sim.plants.model_error import Payload, plant_model
+from dynx.spatial.scalar import Array, Floats
+from dynx.steppers.material import Material
+from dynx.world.scene import Scene, SceneBody, SceneRobot
+
+MASS_FIELDS = ("mass_scale", "payload")
+ROBOT_FIELDS = (*MASS_FIELDS, "joint_damping", "joint_friction", "delay")
+
+SLIP_SPEED = 0.01
+"""Least speed [rad/s or m/s] from which dry friction has its full torque."""
+
+STEPS_TO_STOP = 2.0
+"""Least number of steps in which dry friction stops a joint that moves alone: with fewer the joint would
+change its direction from step to step."""
+
+JOINT_FIELDS = ("joint_damping", "joint_friction")
+SCENE_FIELDS = ("mass_scale", "payload", *JOINT_FIELDS, "friction_scale")
 
 
-class Variation:
-    """Drawn values and noise of `count` environments.
+class VariedRobot:
+    """The parameters of one task that episodes draw, and what they change; on floats or on symbols.
 
-    Environment k has the seed of the first plus k. Its values depend on that seed, the number of the episode
-    since the seed was set, and the name of the parameter; its noise also on the step of the episode.
+    `values` (k,) has the values of `parameters`, in order. Dry friction is proportional to the velocity below
+    a small speed, so a loaded joint creeps where a real one sticks.
     """
 
-    def __init__(
-        self,
-        randomization: Randomization,
-        motion: Sequence[Parameter],
-        observation_space: Space[Any],
-        action_space: Space[Any],
-        count: int = 1,
-    ) -> None:
-        """`motion` are the parameters other than noise. Raises UnsupportedFeatureError and ArgumentError for
-        noise that the spaces cannot have."""
-        on_observations = noise_parameters(randomization, "observation_noise", observation_space)
-        on_actions = noise_parameters(randomization, "action_noise", action_space)
-        first, second = len(motion), len(motion) + len(on_observations)
-        self._draws = Draws((*motion, *on_observations, *on_actions))
-        self.observation_noise = make_noise(
-            Purpose.OBSERVATION, observation_space, on_observations, first, count
-        )
-        self.action_noise = make_noise(Purpose.ACTION, action_space, on_actions, second, count)
-        self.motion_size = len(motion)
-        self.values: Floats = np.zeros((count, len(self._draws.names)))
-        """Values (count, k) of the present episodes; the first `motion_size` are those of the motion."""
-        self._streams = Streams(*[0] * count)
-        self._episodes = np.full(count, -1)
-        self._steps = np.zeros(count, dtype=np.int64)
-        self._everywhere = np.arange(count)
-        self._ahead: Floats = np.zeros((count, BLOCK_STEPS, len(self._draws.names)))
-
-    def seed(self, seed: int | None, rng: np.random.Generator) -> None:
-        """Set the seeds of the environments, from `rng` where its seed is unknown (None or below 0); the next
-        episode of each is its first."""
-        known = int(rng.integers(2**63)) if seed is None or seed < 0 else seed
-        self._streams = Streams(*(known + k for k in range(len(self.values))))
-        self._episodes[:] = -1
-        for noise in (self.observation_noise, self.action_noise):
-            if noise is not None:
-                noise.numbers.forget()
-
-    def start(self, rows: NDArray[np.intp] | None = None) -> None:
-        """Draw the values of the next episodes of some environments, by default of all."""
-        chosen = self._everywhere if rows is None else rows
-        self._episodes[chosen] += 1
-        self._steps[chosen] = 0
-        place = self._episodes[chosen] % BLOCK_STEPS
-        for row in chosen[place == 0].tolist():
-            block = int(self._episodes[row]) // BLOCK_STEPS
-            self._ahead[row] = self._draws.values(self._streams, row, block)
-        self.values[chosen] = self._ahead[chosen, place]
-
-    def restart(self) -> None:
-        """Count the steps of all episodes from 0 again."""
-        self._steps[:] = 0
-
-    def count_step(self) -> None:
-        """Note that a step was taken."""
-        self._steps += 1
-
-    def noisy_observations(self, observations: Floats, rows: NDArray[np.intp] | None = None) -> Floats:
-        """Return observations (n, size) with the noise of the present steps of some environments."""
-        noise = self.observation_noise
-        if noise is None:
-            return observations
-        return noise.added(observations, self._numbers(noise, self._everywhere if rows is None else rows))
-
-    def noise_on_actions(self) -> Floats:
-        """Return the noise (count, size) of the actions of the next steps; no entries without any."""
-        if self.action_noise is None:
-            return np.zeros((len(self.values), 0))
-        return self._numbers(self.action_noise, self._everywhere)
-
-    def _numbers(self, noise: SpaceNoise, rows: NDArray[np.intp]) -> Floats:
-        drawn = noise.numbers.at(self._streams, rows, self._episodes[rows], self._steps[rows])
-        return noise.scaled(drawn, self.values[rows])
-
-    def by_name(self, rows: NDArray[np.intp] | None = None) -> dict[str, Floats]:
-        """Return the values of some environments (n,) by the names of the parameters."""
-        found = self.values if rows is None else self.values[rows]
-        return {name: found[:, k].copy() for k, name in enumerate(self._draws.names)}
-
-
-class SpaceNoise:
-    """Noise on the entries of a `Box` space, by parameters in some columns of the drawn values."""
-
-    def __init__(
-        self, purpose: Purpose, space: spaces.Box, parameters: Sequence[Parameter], first: int, count: int
-    ) -> None:
-        size = int(np.prod(space.shape))
-        self._columns = {
-            None if each.part is None else int(each.part): first + k for k, each in enumerate(parameters)
-        }
-        self.numbers = StepNumbers(purpose, count, size)
-        """Standard normal numbers of `count` environments."""
-        self._low, self._high = (each.ravel().astype(np.float64) for each in (space.low, space.high))
-
-    def scaled(self, noise: Floats, values: Floats) -> Floats:
-        """Return the noise (n, size) from standard normal numbers and the drawn values (n, k)."""
-        if None in self._columns:
-            return noise * values[:, self._columns[None], None]
-        deviations = np.zeros_like(noise)
-        for entry, column in self._columns.items():
-            deviations[:, entry] = values[:, column]
-        return noise * deviations
-
-    def added(self, numbers: Floats, noise: Floats) -> Floats:
-        """Return numbers (n, size) with noise, clamped to the space."""
-        return np.asarray(np.clip(numbers + noise, self._low, self._high))
-
-
-def noise_parameters(randomization: Randomization, name: str, space: Space[Any]) -> tuple[Parameter, ...]:
-    """Return the parameters of the noise on a space: of observations or of actions.
-
-    Raises UnsupportedFeatureError for choices, ArgumentError for an entry that the space does not have.
-    """
-    size = int(np.prod(space.shape)) if isinstance(space, spaces.Box) else 0
-
-    def require(_: str, part: str) -> str:
-        if not part.isdecimal() or int(part) >= size:
-            raise ArgumentError(
-                f"{name} names entry {part}; wanted the number of an entry from 0 to {size - 1}"
+    def __init__(self, task: RobotTask, randomization: Randomization) -> None:
+        """Raises UnknownNameError for a link, frame or joint that the robot does not have,
+        UnsupportedFeatureError for a parameter of contacts."""
+        if randomization.friction_scale is not None:
+            raise UnsupportedFeatureError(
+                f"{type(task).__name__} has no contacts, so friction_scale changes nothing; the friction of "
+                "its joints is joint_friction"
             )
-        return str(int(part))
+        self._task, model = task, task.model
+        self._model = model
+        self._payload = randomization.payload_frame
+        if self._payload is not None:
+            model.frame_index(self._payload)
+        self.parameters: tuple[Parameter, ...] = parameters_of(
+            randomization, ROBOT_FIELDS, self._required, task.step_dt
+        )
+        """Parameters that change the motion."""
+        scales = self._columns("mass_scale")
+        massive = [
+            link.name for link in model.links if link.inertial is not None and link.inertial.mass > 0.0
+        ]
+        self._links: dict[str, int] = (
+            dict.fromkeys(massive, scales[None]) if None in scales else {str(k): c for k, c in scales.items()}
+        )
+        self._array_code = ScaledLinks(model, tuple(self._links), self._payload)
+        bounds = {each.field: each.distribution.bounds for each in self.parameters}
+        self.delayed_actions = math.ceil(
+            np.round(bounds.get("delay", (0.0, 0.0))[1] / task.step_dt) / task.substeps
+        )
+        """Number of actions before the present one that may still act."""
+        self._stopping = (
+            STEPS_TO_STOP * task.step_dt * _mobilities(model) if "joint_friction" in bounds else 0.0
+        )
 
-    if randomization.distributions(name) and not isinstance(space, spaces.Box):
-        raise UnsupportedFeatureError(f"{name} needs a Box space of numbers; that of this task is {space}")
-    return parameters_of(randomization, (name,), require)
+    @property
+    def changes_masses(self) -> bool:
+        """True if masses or a payload are drawn."""
+        return any(each.field in MASS_FIELDS for each in self.parameters)
+
+    def model(self, values: Array) -> Model:
+        """Return the robot with the drawn masses and payload."""
+        scale = {link: float(values[column]) for link, column in self._links.items()}
+        payload = None
+        if self._payload is not None:
+            mass, *center = self._payload_values(values)
+            payload = Payload(self._payload, float(mass), tuple(map(float, center)))
+        return plant_model(self._model, payload, scale)
+
+    def forward_dynamics(self, values: Array, q: Array, v: Array, tau: Array) -> Array:
+        """Return the acceleration (nv,) of the robot with the drawn masses and payload, on plain symbols."""
+        factors = [values[column] for column in self._links.values()]
+        return self._array_code.forward_dynamics(factors, self._payload_values(values), q, v, tau)
+
+    def parametric_values(self, values: Array, defaults: Array) -> Array:
+        """Return the parameters of `dynx.compiled.parametric` for `link_names` and `payload_frame`."""
+        scaled = np.array(defaults)
+        for number, column in enumerate(self._links.values()):
+            scaled[10 * number : 10 * (number + 1)] *= values[column]
+        if self._payload is not None:
+            scaled[-4:] = self._payload_values(values)
+        return scaled
+
+    @property
+    def link_names(self) -> tuple[str, ...]:
+        """Links whose masses are drawn."""
+        return tuple(self._links)
+
+    @property
+    def payload_frame(self) -> str | None:
+        """Frame that carries the payload."""
+        return self._payload
+
+    def joint_torque(self, values: Array, v: Array) -> Any:
+        """Return the torque (nv,) of damping and dry friction of the joints, to be added to the task's."""
+        damping, friction = (
+            self._of_joints("joint_damping", values),
+            self._of_joints("joint_friction", values),
+        )
+        if friction is None:
+            return 0.0 if damping is None else -damping * v
+        speed = np.maximum(SLIP_SPEED, self._stopping * friction)
+        torque = -friction * np.clip(v / speed, -1.0, 1.0)
+        return torque if damping is None else torque - damping * v
+
+    def acting_actions(self, values: Array, action: Array, earlier: Sequence[Array]) -> list[Array]:
+        """Return the action that acts in each step of the integrator, from the present one and from those
+        before (`delayed_actions`, ...), the latest first."""
+        task, column = self._task, self._columns("delay").get(None)
+        acting = []
+        for step in range(task.substeps):
+            chosen = action
+            for age in range(len(earlier) if column is not None else 0):
+                passed = (step + age * task.substeps + 0.5) * task.step_dt
+                chosen = np.where(values[column] > passed, earlier[age], chosen)
+            acting.append(chosen)
+        return acting
+
+    def _required(self, field: str, part: str) -> str:
+        if field == "mass_scale":
+            self._model.link(part)
+        elif field in ("joint_damping", "joint_friction"):
+            require_name("joint that moves", part, self._model.joint_names)
+        return part
+
+    def _columns(self, field: str) -> dict[str | None, int]:
+        return {each.part: k for k, each in enumerate(self.parameters) if each.field == field}
+
+    def _payload_values(self, values: Array) -> list[Any]:
+        return [values[column] for column in self._columns("payload").values()]
+
+    def _of_joints(self, field: str, values: Array) -> Any:
+        """Return a parameter of the joints (nv,), or None if it is not drawn."""
+        columns, names = self._columns(field), self._model.joint_names
+        if not columns:
+            return None
+        base = [0.0] * (6 if self._model.floating else 0)
+        shared = columns.get(None)
+        found = [columns.get(name, shared) for name in names]
+        return np.stack([*base, *(0.0 * values[0] if column is None else values[column] for column in found)])
 
 
-def make_noise(
-    purpose: Purpose, space: Space[Any], parameters: Sequence[Parameter], first: int, count: int
-) -> SpaceNoise | None:
-    """Return the noise of `count` environments with these parameters, whose columns begin at `first`; None
-    without any."""
-    if not parameters or not isinstance(space, spaces.Box):
-        return None
-    return SpaceNoise(purpose, space, parameters, first, count)
+def _mobilities(model: Model) -> Array:
+    """Return the acceleration of each coordinate (nv,) by a unit torque, in the neutral configuration."""
+    M = np.asarray(ArrayDynamics(model).mass_matrix(model.neutral()), dtype=np.float64)
+    return np.array(np.diag(np.linalg.pinv(M)))
+
+
+class VariedScene:
+    """The parameters of a scene that episodes draw, and the scene with their values.
+
+    Parts are named as in the scene, ``robot/link`` or a body; in a scene with one robot the link alone will
+    do, and likewise joints and frames.
+    """
+
+    def __init__(self, scene: Scene, randomization: Randomization, control_dt: float) -> None:
+        """Raises UnknownNameError for a part that the scene does not have."""
+        self._scene = scene
+        self._robots = {robot.name: robot.model for robot in scene.robots}
+        frame = randomization.payload_frame
+        self._payload = None if frame is None else self._full_name("frame", frame)
+        self.parameters: tuple[Parameter, ...] = parameters_of(
+            randomization, (*SCENE_FIELDS, "delay"), self._required, control_dt
+        )
+        """Parameters that change the motion; a delay is rounded to whole control steps."""
+        self.changes_scene = any(each.field in SCENE_FIELDS for each in self.parameters)
+        """True if episodes differ in more than noise and delay."""
+        self.joint_friction = any(each.field == "joint_friction" for each in self.parameters)
+        """True if the joints have dry friction."""
+
+    def delayed_actions(self, values: Floats, control_dt: float) -> int:
+        """Return the number of control steps by which actions act later."""
+        delays = [x for each, x in zip(self.parameters, values, strict=True) if each.field == "delay"]
+        return round(float(delays[0]) / control_dt) if delays else 0
+
+    def scene(self, scene: Scene, values: Floats) -> Scene:
+        """Return a scene of the task with drawn values (k,) of the parameters."""
+        drawn = {(each.field, each.part): float(x) for each, x in zip(self.parameters, values, strict=True)}
+
+        def value(field: str, part: str) -> float | None:
+            return drawn.get((field, part), drawn.get((field, None)))
+
+        def painted(material: Material, part: str) -> Material:
+            factor = value("friction_scale", part)
+            return material if factor is None else replace(material, friction=factor * material.friction)
+
+        def of_robot(robot: SceneRobot) -> SceneRobot:
+            links = [link.name for link in robot.model.links]
+            scales = {name: value("mass_scale", f"{robot.name}/{name}") or 1.0 for name in links}
+            model = plant_model(robot.model, None, scales)
+            if self._payload is not None and self._payload.startswith(f"{robot.name}/"):
+                numbers = [drawn["payload", name] for name in ("mass", "x", "y", "z")]
+                model = with_point_mass(model, self._payload.partition("/")[2], numbers[0], numbers[1:])
+            joints = [
+                _with_friction(joint, *(value(field, f"{robot.name}/{joint.name}") for field in JOINT_FIELDS))
+                for joint in robot.model.joints
+            ]
+            model = replace(model, joints=tuple(joints))
+            materials = {name: painted(robot.material_of(name), f"{robot.name}/{name}") for name in links}
+            return replace(robot, model=model, materials=tuple(materials.items()))
+
+        def of_body(body: SceneBody) -> SceneBody:
+            material, factor = painted(body.material, body.name), value("mass_scale", body.name)
+            if body.mass is None or factor is None:
+                return replace(body, material=material)
+            inertia = None if body.inertia is None else (factor * np.array(body.inertia)).tolist()
+            return replace(body, material=material, mass=factor * body.mass, inertia=inertia)
+
+        return replace(
+            scene,
+            robots=tuple(map(of_robot, scene.robots)),
+            bodies=tuple(map(of_body, scene.bodies)),
+        )
+
+    def _required(self, field: str, part: str) -> str:
+        if field == "payload":
+            return part
+        if field in JOINT_FIELDS:
+            return self._full_name("joint that moves", part)
+        bodies = [body.name for body in self._scene.bodies if field != "mass_scale" or not body.fixed]
+        return part if part in bodies else self._full_name("link", part, bodies)
+
+    def _full_name(self, kind: str, name: str, bodies: Sequence[str] = ()) -> str:
+        """Return ``robot/part`` for a name with or without its robot."""
+        owner, separator, part = name.partition("/")
+        if not separator and len(self._robots) == 1:
+            ((owner, model),) = self._robots.items()
+            return f"{owner}/{require_name(kind, name, [*_parts(kind, model), *bodies])}"
+        known = [f"{each}/{part}" for each, model in self._robots.items() for part in _parts(kind, model)]
+        if not part or name not in known:
+            raise UnknownNameError(f"no {kind} {shown(name)}{nearest(name, [*known, *bodies])}")
+        return name
+
+
+def _parts(kind: str, model: Model) -> Sequence[str]:
+    if kind == "frame":
+        return model.frame_names
+    return model.joint_names if kind == "joint that moves" else [link.name for link in model.links]
+
+
+def _with_friction(joint: Joint, damping: float | None, friction: float | None) -> Joint:
+    if not joint.moves or (damping is None and friction is None):
+        return joint
+    own = joint.dynamics
+    dynamics = replace(
+        own,
+        damping=own.damping if damping is None else damping,
+        friction=own.friction if friction is None else friction,
+    )
+    return replace(joint, dynamics=dynamics)
+
+
+def with_point_mass(model: Model, frame: str, mass: float, center: Sequence[float]) -> Model:
+    """Return the robot with a point mass [kg] at a place (3,) [m] of a frame, in the inertia of its link.
+
+    The total has the centre of mass and the tensor of both (Steiner's theorem).
+    """
+    if mass == 0.0:
+        return model
+    place = model.frames[model.frame_index(frame)]
+    T_link_frame = place.placement.matrix
+    point = T_link_frame[:3, :3] @ np.asarray(center, dtype=np.float64) + T_link_frame[:3, 3]
+    own = model.inertial(place.link)
+    T_link_center = own.origin.matrix
+    R, own_center = T_link_center[:3, :3], T_link_center[:3, 3]
+    total = own.mass + mass
+    common = (own.mass * own_center + mass * point) / total
+    tensor = R @ own.tensor @ R.T + own.mass * _steiner(own_center - common) + mass * _steiner(point - common)
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = tensor.tolist()
+    x, y, z = common.tolist()
+    inertial = Inertial(total, Pose((x, y, z)), xx, xy, xz, yy, yz, zz)
+    links = [replace(each, inertial=inertial) if each.name == place.link else each for each in model.links]
+    return replace(model, links=tuple(links))
+
+
+def _steiner(offset: Floats) -> Floats:
+    """Return the tensor (3, 3) of a unit point mass at an offset (3,)."""
+    return np.asarray(offset @ offset * np.eye(3) - np.outer(offset, offset))

@@ -9,14 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dynx.compiled.step import BoundSteps, compiled
-from dynx.envs.actions import checked_action
+from dynx.envs.environment import checked_action
 from dynx.envs.library import AutoresetMode, Space, VectorEnv, batch_space, spaces
-from dynx.envs.randomization import Randomization
-from dynx.envs.robot.array_task import ArrayTask
-from dynx.envs.robot.pictures import draw_robot
-from dynx.envs.robot.varied_robot import VariedRobot
+from dynx.envs.randomization import Randomization, Variation
+from dynx.envs.runner import draw_robot
+from dynx.envs.task import RobotTask
 from dynx.envs.task_step import INVALID, TaskStep
-from dynx.envs.variation import Variation
+from dynx.envs.variation import VariedRobot
 from dynx.errors import (
     ArgumentError,
     ClosedError,
@@ -54,7 +53,7 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
 
     def __init__(
         self,
-        task: ArrayTask,
+        task: RobotTask,
         num_envs: int = 1,
         *,
         max_episode_steps: int | None = None,

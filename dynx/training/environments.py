@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from dynx.envs.ids import is_of_dynx
 from dynx.envs.library import AutoresetMode, Env, GymnasiumError, make_env, make_vec_env, registry
+from dynx.envs.registration import is_of_dynx
 from dynx.errors import ArgumentError, DynxError
 from dynx.training.library import DummyVecEnv, Monitor, SubprocVecEnv, VecEnv, VecMonitor, VecNormalize
 from dynx.training.specification import TaskSpec, TrainingSpec

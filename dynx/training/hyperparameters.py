@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-from dynx.envs.ids import bare_name
+from dynx.envs.registration import bare_name
 
 NO_VALUES: Mapping[str, Any] = MappingProxyType({})
 

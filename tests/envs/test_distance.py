@@ -15,8 +15,7 @@ import dynx.envs  # noqa: F401  (registers the environments)
 from dynx.cli.env.document import document
 from dynx.cli.env.tables import show
 from dynx.envs.distance import engine_distance
-from dynx.envs.ids import bare_name, task_id
-from dynx.envs.registration import task_class
+from dynx.envs.registration import bare_name, task_class, task_id
 from dynx.errors import ArgumentError, UnknownNameError
 
 

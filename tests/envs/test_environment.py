@@ -13,9 +13,8 @@ import pytest
 from gymnasium import spaces
 
 import dynx.envs  # noqa: F401  (registers the environments)
-from dynx.envs.actions import checked_action
-from dynx.envs.environment import TaskEnvironment
-from dynx.envs.robot.state import State
+from dynx.envs.environment import TaskEnvironment, checked_action
+from dynx.envs.task import State
 from dynx.envs.tasks.cart_pole import CartPole
 from dynx.errors import (
     ArgumentError,

@@ -15,15 +15,14 @@ import dynx.envs
 from dynx.backends import backend, installed_backends
 from dynx.envs import Randomization
 from dynx.envs.environment import TaskEnvironment
-from dynx.envs.robot.state import State
-from dynx.envs.robot.varied_robot import VariedRobot
+from dynx.envs.task import State
 from dynx.envs.tasks.cart_pole import CartPole
 from dynx.envs.tasks.pendulum import Pendulum
 from dynx.envs.tasks.push import Push
 from dynx.envs.tasks.reach import Reach
 from dynx.envs.tasks.stand import Stand
+from dynx.envs.variation import VariedRobot, with_point_mass
 from dynx.envs.vector import RobotVectorEnvironment
-from dynx.envs.world.varied_scene import with_point_mass
 from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError
 from dynx.sim.plants.model_error import Payload, plant_model
 

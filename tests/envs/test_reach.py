@@ -13,7 +13,7 @@ import dynx
 from dynx.backends import installed_backends
 from dynx.control.array_dynamics import ArrayDynamics
 from dynx.envs.environment import TaskEnvironment
-from dynx.envs.robot.state import State
+from dynx.envs.task import State
 from dynx.envs.tasks.reach import ROTATION_WEIGHT, SERVO_RATE, Reach
 from dynx.envs.vector import RobotVectorEnvironment
 from dynx.errors import ArgumentError, UnknownNameError

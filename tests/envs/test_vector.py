@@ -10,7 +10,7 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 from dynx.envs.environment import TaskEnvironment
-from dynx.envs.robot.state import State
+from dynx.envs.task import State
 from dynx.envs.tasks.acrobot import Acrobot
 from dynx.envs.tasks.cart_pole import CartPole
 from dynx.envs.tasks.pendulum import Pendulum

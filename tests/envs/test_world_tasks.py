@@ -11,11 +11,11 @@ import pytest
 import dynx.envs  # noqa: F401  (registers the environments)
 from dynx.envs import register_task
 from dynx.envs.environment import TaskEnvironment
+from dynx.envs.task import WorldTask
 from dynx.envs.tasks.push import FINGER_WEIGHT, NEAR, TIP_START, Push
 from dynx.envs.tasks.quadruped import POSTURE
 from dynx.envs.tasks.stand import Stand
 from dynx.envs.tasks.walk import Walk
-from dynx.envs.world.task import WorldTask
 from dynx.errors import ArgumentError, UnknownNameError
 from dynx.steppers.registry import installed_worlds
 from tests.envs.scripted import Controller, posture, pushing, run, trot

@@ -12,9 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import t
 
-from dynx.envs.statistics import confidence_interval, mean_of_runs
 from dynx.errors import ArgumentError
-from dynx.training.evaluation import Evaluation, evaluate
+from dynx.training.evaluation import Evaluation, confidence_interval, evaluate, mean_of_runs
 
 
 class Countdown(gymnasium.Env[Any, Any]):

@@ -13,9 +13,8 @@ from dynx.cli.shell.output_file import check_json
 from dynx.cli.shell.progress import progress_bar
 from dynx.cli.shell.terminal import present
 from dynx.envs.distance import Act, engine_distance
-from dynx.envs.ids import is_of_dynx, task_id
 from dynx.envs.library import make_env, registry
-from dynx.envs.registration import task_class
+from dynx.envs.registration import is_of_dynx, task_class, task_id
 from dynx.errors import ArgumentError, shown
 
 

@@ -17,7 +17,7 @@ from dynx.cli.shell.options import json_value
 from dynx.cli.shell.output_file import check_json, check_writable
 from dynx.cli.shell.progress import progress_bar
 from dynx.cli.shell.terminal import console, present
-from dynx.envs.ids import is_of_dynx, task_id
+from dynx.envs.registration import is_of_dynx, task_id
 from dynx.errors import ArgumentError
 from dynx.training import Evaluation, Policy, TaskSpec, judge, load_policy, make
 from dynx.training.file_tasks import task_of_file

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
-from dynx.envs.statistics import mean_of_runs
+from dynx.training.evaluation import mean_of_runs
 
 if TYPE_CHECKING:
     from dynx.training import Trained, TrainingSpec

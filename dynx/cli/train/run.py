@@ -15,7 +15,7 @@ from dynx.cli.shell.terminal import present
 from dynx.cli.train.document import document
 from dynx.cli.train.plot import plot
 from dynx.cli.train.tables import show
-from dynx.envs.ids import bare_name, task_id
+from dynx.envs.registration import bare_name, task_id
 from dynx.errors import DynxError
 from dynx.files.figures import picture_format
 from dynx.training import Progress, Schedule, TaskSpec, Trained, TrainingSpec, recipe_of

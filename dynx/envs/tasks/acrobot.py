@@ -10,19 +10,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dynx.control.dynamics import Dynamics
 from dynx.envs.library import spaces
-from dynx.envs.robot.state import State
-from dynx.envs.robot.task import RobotTask
-from dynx.envs.task_options import refuse_unphysical
+from dynx.envs.task import RobotTask, State, camera_at, refuse_unphysical
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.spatial.scalar import Array
-from dynx.world import Camera
+
+if TYPE_CHECKING:
+    from dynx.world.camera import Camera
 
 MAX_SPEEDS = np.array([4.0 * math.pi, 9.0 * math.pi])
 """Bounds to which the velocities are clamped [rad/s]."""
@@ -141,4 +141,4 @@ class Acrobot(RobotTask):
     @cached_property
     def camera(self) -> Camera:
         """A camera in front of the bar."""
-        return Camera.look_at((0.0, -5.0, 0.0), (0.0, 0.0, 0.0))
+        return camera_at((0.0, -5.0, 0.0), (0.0, 0.0, 0.0))

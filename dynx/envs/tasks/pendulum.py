@@ -9,20 +9,20 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dynx.control.dynamics import Dynamics
 from dynx.envs.library import spaces
-from dynx.envs.robot.state import State
-from dynx.envs.robot.task import RobotTask
-from dynx.envs.task_options import refuse_unknown_choice, refuse_unphysical
+from dynx.envs.task import RobotTask, State, camera_at, refuse_unknown_choice, refuse_unphysical
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.rbd.integration import Accelerate
 from dynx.spatial.scalar import Array
-from dynx.world import Camera
+
+if TYPE_CHECKING:
+    from dynx.world.camera import Camera
 
 MAX_SPEED = 8.0
 """Bound to which the velocity is clamped [rad/s]."""
@@ -136,4 +136,4 @@ class Pendulum(RobotTask):
     @cached_property
     def camera(self) -> Camera:
         """A camera in front of the hinge."""
-        return Camera.look_at((0.0, -4.0, 0.0), (0.0, 0.0, 0.0))
+        return camera_at((0.0, -4.0, 0.0), (0.0, 0.0, 0.0))

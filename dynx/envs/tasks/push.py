@@ -9,16 +9,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dynx.backends import Backend, backend
 from dynx.envs.library import spaces
-from dynx.envs.task import component_names
-from dynx.envs.world.scene_task import Episode
-from dynx.envs.world.task import WorldTask
+from dynx.envs.task import Episode, WorldTask, camera_at, component_names
 from dynx.errors import ArgumentError, nearest, shown
 from dynx.model import Model, Pose
 from dynx.model.loading import load
@@ -26,7 +24,10 @@ from dynx.model.numbers import checked_array
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross
-from dynx.world import Camera, Material, Scene, SceneRobot, VelocityMotor, box, ground
+from dynx.world import Material, Scene, SceneRobot, VelocityMotor, box, ground
+
+if TYPE_CHECKING:
+    from dynx.world.camera import Camera
 
 ARM, CUBE, TABLE = "arm", "cube", "table"
 HAND, TIP = ("panda_hand", "panda_leftfinger", "panda_rightfinger"), "panda_hand_tcp"
@@ -209,7 +210,7 @@ class Push(WorldTask):
     @cached_property
     def camera(self) -> Camera:
         """A camera in front of the table."""
-        return Camera.look_at((1.1, -0.7, 0.6), (0.4, 0.0, 0.15))
+        return camera_at((1.1, -0.7, 0.6), (0.4, 0.0, 0.15))
 
 
 def checked_place(name: str, place: ArrayLike) -> Floats:

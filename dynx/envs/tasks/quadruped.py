@@ -10,15 +10,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dynx.envs.library import spaces
-from dynx.envs.task import component_names
-from dynx.envs.world.scene_task import Episode
-from dynx.envs.world.task import WorldTask
+from dynx.envs.task import Episode, WorldTask, camera_at, component_names
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
 from dynx.model.loading import load
@@ -26,7 +24,10 @@ from dynx.model.numbers import is_real
 from dynx.model.rotations import quat_from_rpy
 from dynx.spatial.plain import Vector3, rotation_rows
 from dynx.spatial.scalar import Floats
-from dynx.world import Camera, Material, PositionMotor, Scene, SceneRobot, ground
+from dynx.world import Material, PositionMotor, Scene, SceneRobot, ground
+
+if TYPE_CHECKING:
+    from dynx.world.camera import Camera
 
 DOG, GROUND = "dog", "ground"
 START_HEIGHT, STAND_HEIGHT = 0.3, 0.29
@@ -155,7 +156,7 @@ class Quadruped(WorldTask):
     @cached_property
     def camera(self) -> Camera:
         """A camera beside the robot."""
-        return Camera.look_at((1.2, -1.6, 0.8), (0.0, 0.0, 0.25))
+        return camera_at((1.2, -1.6, 0.8), (0.0, 0.0, 0.25))
 
 
 def vertical_axis(q: Floats) -> Vector3:

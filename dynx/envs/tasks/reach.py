@@ -9,17 +9,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dynx.control.array_dynamics import ArrayDynamics
 from dynx.control.dynamics import Dynamics
 from dynx.envs.library import spaces
-from dynx.envs.robot.state import State
-from dynx.envs.robot.task import RobotTask
-from dynx.envs.task import component_names
-from dynx.envs.task_options import refuse_unknown_choice
+from dynx.envs.task import RobotTask, State, camera_at, component_names, refuse_unknown_choice
 from dynx.errors import UnsupportedFeatureError
 from dynx.model import Model
 from dynx.model.configuration import sampling_range
@@ -27,7 +24,9 @@ from dynx.model.loading import load
 from dynx.rbd.kinematics import ancestry
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import homogeneous, pose_error
-from dynx.world import Camera
+
+if TYPE_CHECKING:
+    from dynx.world.camera import Camera
 
 ACTIONS = ("torque", "velocity")
 
@@ -192,4 +191,4 @@ class Reach(RobotTask):
         """A camera that sees the reach of the arm."""
         T = np.asarray(self._arrays.forward_kinematics(0.5 * sum(self._range), self.tool), dtype=np.float64)
         far = 1.0 + float(np.linalg.norm(T[:3, 3]))
-        return Camera.look_at((far, -1.6 * far, far), 0.5 * T[:3, 3])
+        return camera_at((far, -1.6 * far, far), 0.5 * T[:3, 3])

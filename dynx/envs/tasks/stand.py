@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from dynx.envs.task import Episode
 from dynx.envs.tasks.quadruped import DOG, SPEED_WIDTH, STAND_HEIGHT, Quadruped, vertical_axis
-from dynx.envs.world.scene_task import Episode
 
 
 @dataclass(frozen=True)

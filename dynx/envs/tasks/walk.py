@@ -8,9 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.envs.task import component_names
+from dynx.envs.task import Episode, component_names
 from dynx.envs.tasks.quadruped import DOG, SPEED_WIDTH, Quadruped, vertical_axis
-from dynx.envs.world.scene_task import Episode
 from dynx.errors import ArgumentError, shown
 from dynx.model.numbers import MAX_MAGNITUDE, is_real
 from dynx.spatial.scalar import Floats

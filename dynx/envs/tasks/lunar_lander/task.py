@@ -11,12 +11,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dynx.envs.library import Space, spaces
+from dynx.envs.task import Episode, WorldTask, camera_at
 from dynx.envs.tasks.lunar_lander.craft import (
     BODY,
     CENTER,
@@ -42,11 +43,12 @@ from dynx.envs.tasks.lunar_lander.craft import (
     side_thrust,
     velocity_after_push,
 )
-from dynx.envs.world.scene_task import Episode
-from dynx.envs.world.task import WorldTask
 from dynx.errors import ArgumentError, shown
 from dynx.model.numbers import MAX_MAGNITUDE, is_real
-from dynx.world import Camera, Scene
+from dynx.world import Scene
+
+if TYPE_CHECKING:
+    from dynx.world.camera import Camera
 
 FPS = 50
 """Control steps a second."""
@@ -239,7 +241,7 @@ class LunarLander(WorldTask):
     def camera(self) -> Camera:
         """A camera that sees what Gymnasium's picture shows."""
         middle = HEIGHT / 4
-        return Camera.look_at(
+        return camera_at(
             (0.0, -30.0, middle), (0.0, 0.0, middle), field_of_view=2.0 * math.atan(HEIGHT / 60.0)
         )
 
