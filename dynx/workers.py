@@ -50,7 +50,7 @@ _ERRORS = {"crash": EngineCrash, "timeout": EngineTimeout, "defect": InternalErr
 
 
 @dataclass(frozen=True)
-class Failure:
+class WorkerFailure:
     """Reason why a task has no value: its process died, took too long, or raised (a defect of dynx)."""
 
     kind: FailureKind
@@ -63,12 +63,12 @@ class Failure:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class WorkerResult:
     """The outcome of task number `index`: its `value`, or its `failure`."""
 
     index: int
     value: Any = None
-    failure: Failure | None = None
+    failure: WorkerFailure | None = None
 
 
 class Workers:
@@ -95,12 +95,12 @@ class Workers:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def run(self, tasks: Sequence[Any]) -> Iterator[Outcome]:
+    def run(self, tasks: Sequence[Any]) -> Iterator[WorkerResult]:
         """Yield the outcome of every task, in the order of completion."""
         waiting: queue.SimpleQueue[tuple[int, Any]] = queue.SimpleQueue()
         for numbered in enumerate(tasks):
             waiting.put(numbered)
-        outcomes: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
+        outcomes: queue.SimpleQueue[WorkerResult] = queue.SimpleQueue()
         threads = [
             threading.Thread(target=self._drive, args=(waiting, outcomes), daemon=True)
             for _ in range(min(self._size, len(tasks)))
@@ -127,7 +127,7 @@ class Workers:
         self._idle.clear()
 
     def _drive(
-        self, waiting: queue.SimpleQueue[tuple[int, Any]], outcomes: queue.SimpleQueue[Outcome]
+        self, waiting: queue.SimpleQueue[tuple[int, Any]], outcomes: queue.SimpleQueue[WorkerResult]
     ) -> None:
         worker: _Worker | None = None
         try:
@@ -144,10 +144,10 @@ class Workers:
                 if worker is None:
                     return
                 reply = worker.compute(task, self._timeout)
-                if isinstance(reply, Failure):
-                    outcomes.put(Outcome(index, failure=reply))
+                if isinstance(reply, WorkerFailure):
+                    outcomes.put(WorkerResult(index, failure=reply))
                 else:
-                    outcomes.put(Outcome(index, value=reply[0]))
+                    outcomes.put(WorkerResult(index, value=reply[0]))
         finally:
             if worker is not None:
                 self._forget(worker)
@@ -202,16 +202,16 @@ class _Worker:
         """True if the process has ended or is being ended."""
         return self._expired or self._process.poll() is not None
 
-    def compute(self, task: Any, timeout: float | None) -> tuple[Any] | Failure:
+    def compute(self, task: Any, timeout: float | None) -> tuple[Any] | WorkerFailure:
         """Return the value of one task in a tuple of one, or the failure."""
         if not self._has_target:
             started = self._exchange(self._target, None if timeout is None else max(timeout, MAX_START_TIME))
-            if isinstance(started, Failure):
+            if isinstance(started, WorkerFailure):
                 return started
             self._has_target = True
         return self._exchange(task, timeout)
 
-    def _exchange(self, request: Any, timeout: float | None) -> tuple[Any] | Failure:
+    def _exchange(self, request: Any, timeout: float | None) -> tuple[Any] | WorkerFailure:
         """Send a request and return the reply, which is a failure if it takes more than `timeout` [s]."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
@@ -222,12 +222,12 @@ class _Worker:
         try:
             pickle.dump(request, self._process.stdin)
             self._process.stdin.flush()
-            reply: tuple[Any] | Failure = pickle.load(self._process.stdout)
+            reply: tuple[Any] | WorkerFailure = pickle.load(self._process.stdout)
         except (EOFError, OSError, pickle.UnpicklingError):
             code = self._process.wait()
             if self._expired:
-                return Failure("timeout", f"took more than {timeout:g} s and was ended")
-            return Failure("crash", _describe_exit(code))
+                return WorkerFailure("timeout", f"took more than {timeout:g} s and was ended")
+            return WorkerFailure("crash", _describe_exit(code))
         finally:
             if timer is not None:
                 timer.cancel()
@@ -264,7 +264,7 @@ def serve() -> None:
     _silence()
     requests = sys.stdin.buffer
 
-    def send(reply: tuple[Any] | Failure) -> None:
+    def send(reply: tuple[Any] | WorkerFailure) -> None:
         pickle.dump(reply, replies)
         replies.flush()
 
@@ -278,7 +278,7 @@ def serve() -> None:
         send(_reply(target, task))
 
 
-def _reply(target: Callable[[Any], Any], task: Any) -> tuple[Any] | Failure:
+def _reply(target: Callable[[Any], Any], task: Any) -> tuple[Any] | WorkerFailure:
     try:
         return (target(task),)
     except Exception as error:  # Every exception becomes a reply, because it cannot leave the process.
@@ -286,7 +286,7 @@ def _reply(target: Callable[[Any], Any], task: Any) -> tuple[Any] | Failure:
 
         if traceback_wanted():
             traceback.print_exc()
-        return Failure("defect", f"{type(error).__name__}: {error}")
+        return WorkerFailure("defect", f"{type(error).__name__}: {error}")
 
 
 def _silence() -> None:

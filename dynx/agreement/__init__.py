@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from dynx.agreement.agreement import agree
 from dynx.agreement.comparison import Comparison, WorstSample
 from dynx.agreement.identities import IdentityCheck
 from dynx.agreement.referee import Referee
-from dynx.agreement.report import AgreementReport, Failure, Suspect, refused_report, results_document
+from dynx.agreement.report import AgreementReport, LoadFailure, Suspect, refused_report, results_document
+from dynx.registry import moved_names
 
 __all__ = [
     "AgreementReport",
     "Comparison",
-    "Failure",
     "IdentityCheck",
+    "LoadFailure",
     "Referee",
     "Suspect",
     "WorstSample",
@@ -20,3 +23,6 @@ __all__ = [
     "refused_report",
     "results_document",
 ]
+
+if not TYPE_CHECKING:
+    __getattr__ = moved_names(__name__, {"Failure": "dynx.agreement.LoadFailure"})

@@ -125,7 +125,7 @@ SCHEMA = 1
 
 
 @dataclass(frozen=True)
-class Failure:
+class LoadFailure:
     """The error for which a robot, or a backend for it, could not be used."""
 
     type: str
@@ -153,7 +153,7 @@ class AgreementReport:
     identities: tuple[IdentityCheck, ...] = ()
     suspects: tuple[Suspect, ...] = ()
     notes: tuple[str, ...] = ()
-    error: Failure | None = None
+    error: LoadFailure | None = None
     seconds: float = field(default=0.0, compare=False)
 
     @property
@@ -226,7 +226,7 @@ class AgreementEntry:
     samples: int | None
     seed: int | None
     agree: bool
-    error: Failure | None
+    error: LoadFailure | None
     seconds: float
     quantities: tuple[Comparison, ...]
     identities: tuple[IdentityCheck, ...]
@@ -274,7 +274,7 @@ def refused_report(
         source=source,
         base=base,
         backends=tuple(backends),
-        error=Failure(type(error).__name__, str(error)),
+        error=LoadFailure(type(error).__name__, str(error)),
         seconds=seconds,
     )
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from dynx.ik.options import FrameTarget, IKOptions
     from dynx.ik.result import IKResult
     from dynx.ik.tracking.path import TrackResult
-    from dynx.ik.tracking.tracker import Motion
+    from dynx.ik.tracking.tracker import TimedMotion
     from dynx.ik.velocity import VelocityResult, VelocityTask
 
 
@@ -204,7 +204,7 @@ class Backend(QuantityCalls):
     @door("dynx.ik.tracking.tracker:track")
     def track(
         self,
-        targets: ArrayLike | Motion,
+        targets: ArrayLike | TimedMotion,
         frame: str,
         q0: ArrayLike | None = None,
         *,

@@ -23,7 +23,7 @@ _MAX_ACCELERATION = 1e300
 """Magnitude above which accelerations are checked one by one."""
 
 
-class BatchArguments(Arguments):
+class FastArguments(Arguments):
     """`Arguments` with fast checks of batches."""
 
     def q(self, q: Any) -> Floats:

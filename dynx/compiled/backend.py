@@ -21,7 +21,7 @@ from dynx._version import __version__
 from dynx.backends.base import Backend
 from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.backends.quantity_calls import Forces, Key
-from dynx.compiled.arguments import BatchArguments
+from dynx.compiled.arguments import FastArguments
 from dynx.compiled.call import CoupledCall, KernelCall, NumericCall, write_into
 from dynx.compiled.frames import chain_of, place_of
 from dynx.compiled.kernels import (
@@ -61,14 +61,14 @@ class CompiledBackend(Backend):
     vectorized: ClassVar[bool] = True
     compiles: ClassVar[bool] = True
 
-    _arguments: BatchArguments
+    _arguments: FastArguments
 
     def __init__(self, model: Model, *, threads: int | None = None, validate: bool = True) -> None:
         """Raises ArgumentError for an invalid number of threads."""
         super().__init__(model, validate=validate)
         self._options["threads"] = threads
         self._threads = checked_threads(threads)
-        self._arguments = BatchArguments(model)
+        self._arguments = FastArguments(model)
         self._simplified = simplify_mechanism(self._mechanism)
         self._all_frames = tuple(range(len(self._frame_index)))
         self._calls: dict[object, KernelCall | NumericCall | CoupledCall] = {}

@@ -37,7 +37,7 @@ _WITH_OWN_KERNELS = frozenset({"jacobian", "jacobian_derivative"})
 
 
 @dataclass(frozen=True)
-class Chain:
+class BodyChain:
     """Bodies from the root outwards, each the child of the one before it.
 
     With `shared`, the kernel serves frames on all of these bodies and on the root, in every reference.
@@ -53,7 +53,7 @@ class Chain:
         return _WEIGHTS.start + (len(self.bodies) + 1 if self.shared else 0)
 
 
-def chain_of(mechanism: Mechanism, quantity: str, frame: int, reference: Reference) -> Chain:
+def chain_of(mechanism: Mechanism, quantity: str, frame: int, reference: Reference) -> BodyChain:
     """Return the chain whose kernel computes a quantity of frame number `frame`."""
     body = mechanism.frames[frame].body
     shared = quantity not in _WITH_OWN_KERNELS or reference != LOCAL_WORLD_ALIGNED
@@ -61,10 +61,10 @@ def chain_of(mechanism: Mechanism, quantity: str, frame: int, reference: Referen
         # Bodies are in depth-first order: the first child of a body follows it.
         while body + 1 < len(mechanism.bodies) and mechanism.bodies[body + 1].parent == body:
             body += 1
-    return Chain(tuple(reversed(ancestry(mechanism, body))), shared)
+    return BodyChain(tuple(reversed(ancestry(mechanism, body))), shared)
 
 
-def place_of(mechanism: Mechanism, chain: Chain, frame: int, reference: Reference) -> Floats:
+def place_of(mechanism: Mechanism, chain: BodyChain, frame: int, reference: Reference) -> Floats:
     """Return the place (place_size,) of frame number `frame` in `reference`."""
     fixed = mechanism.frames[frame]
     place = np.zeros(chain.place_size)
@@ -76,7 +76,7 @@ def place_of(mechanism: Mechanism, chain: Chain, frame: int, reference: Referenc
 
 
 def on_chain(
-    mechanism: Mechanism, quantity: str, chain: Chain, place: Array, q: Array, *rates: Array
+    mechanism: Mechanism, quantity: str, chain: BodyChain, place: Array, q: Array, *rates: Array
 ) -> Array:
     """Evaluate a quantity of the frame at `place` for one sample, in tree coordinates.
 
@@ -108,7 +108,7 @@ def on_chain(
     J = frame_jacobian(carrier, poses, 0, LOCAL_WORLD_ALIGNED)
     if quantity == "jacobian":
         return all_columns(J[:, :-1])
-    axes = _Axes.of(place, *frame_pose(carrier, poses, 0))
+    axes = _ReferenceAxes.of(place, *frame_pose(carrier, poses, 0))
     twist = J @ v
     if quantity == "frame_velocity":
         return axes.motion(twist)
@@ -141,11 +141,11 @@ def _jacobian(mechanism: Mechanism, poses: Poses, place: Array, v: Array | None 
             linear = cross(relative, linear) + cross(at_origin, angular)
             angular = cross(relative, angular)
         columns[:3, column], columns[3:, column] = linear, angular
-    axes = _Axes.of(place, R, p).R
+    axes = _ReferenceAxes.of(place, R, p).R
     return np.concatenate([axes @ columns[:3], axes @ columns[3:]])
 
 
-def _carrier(mechanism: Mechanism, chain: Chain, place: Array, q: Array) -> tuple[Mechanism, Poses]:
+def _carrier(mechanism: Mechanism, chain: BodyChain, place: Array, q: Array) -> tuple[Mechanism, Poses]:
     """Return the bodies of the chain and one more, the carrier, to which the only frame is fixed.
 
     The carrier has the pose of the body that the frame is fixed to. Its parent is the last body; its joint
@@ -170,7 +170,7 @@ def _weighted_sum(weights: Array, terms: tuple[Array, ...]) -> Array:
 
 
 @dataclass(frozen=True)
-class _Axes:
+class _ReferenceAxes:
     """The axes and the origin of the reference of a place (Featherstone 2008, section 2.8).
 
     `R` maps vectors from the world's axes to those of the reference; `p` is the position of the frame
@@ -184,7 +184,7 @@ class _Axes:
     fixed: Array
 
     @classmethod
-    def of(cls, place: Array, R: Array, p: Array) -> _Axes:
+    def of(cls, place: Array, R: Array, p: Array) -> _ReferenceAxes:
         """Make the axes for a frame at (R, p) in the world."""
         local, world = place[_LOCAL], place[_WORLD]
         return cls(local * R.T + (1.0 - local) * np.eye(3), world * p, local, world)

@@ -35,7 +35,7 @@ import dynx.spatial
 from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.compiled import frames as compiled_frames
 from dynx.compiled.defect import argument_defect, result_defect
-from dynx.compiled.frames import Chain, on_chain
+from dynx.compiled.frames import BodyChain, on_chain
 from dynx.compiled.model_coordinates import (
     argument_shapes,
     reduce_columns,
@@ -203,7 +203,7 @@ def quantity_kernel(mechanism: Mechanism, name: str, details: tuple[Any, ...]) -
     return load_kernel(recipe, lambda: _program(mechanism, name, result), settings=settings)
 
 
-def chain_kernel(mechanism: Mechanism, name: str, chain: Chain) -> Kernel:
+def chain_kernel(mechanism: Mechanism, name: str, chain: BodyChain) -> Kernel:
     """Return the kernel of a quantity for the frames of a chain; its last input is the place of one."""
 
     def result(q: Array, *rates_and_place: Array) -> Array:

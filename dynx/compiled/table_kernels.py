@@ -109,7 +109,7 @@ def _kernel(
     return TableKernel(table, inputs, outputs, code.machine_code)
 
 
-class _Code(NamedTuple):
+class _AlgorithmCode(NamedTuple):
     """Routines of an algorithm and their machine code, which all robots of the process share."""
 
     steps: StepRoutines
@@ -118,7 +118,7 @@ class _Code(NamedTuple):
 
 
 @cache
-def _code(name: str) -> _Code:
+def _code(name: str) -> _AlgorithmCode:
     algorithm = _ALGORITHMS[name]
     n = len(algorithm.arguments)
     steps = StepRoutines(_reading(n) | (_checking(algorithm.n_arrays - 1) if algorithm.checks else {}))
@@ -128,7 +128,7 @@ def _code(name: str) -> _Code:
         _run(algorithm, mechanism, steps, None, details)
     steps.complete = True
     routines = RoutineSet(steps.routines, algorithm.n_arrays, algorithm.matrices)
-    return _Code(steps, routines, load_routines(f"{name} {_sources()}".encode(), routines))
+    return _AlgorithmCode(steps, routines, load_routines(f"{name} {_sources()}".encode(), routines))
 
 
 @cache

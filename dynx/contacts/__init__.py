@@ -1,9 +1,9 @@
 """Contact conformance: errors of each engine where bodies touch, against closed forms of mechanics.
 
-A `Case` is a scene with a closed form. `conform` runs every case in every engine at several steps and gives
-each measured `Figure` a verdict: it is within the tolerance, its error falls with the step, the error is
-attributed to a setting of the engine (proved by running again with the setting changed), the engine lacks the
-coefficient, or the error is unexplained::
+A `ContactCase` is a scene with a closed form. `conform` runs every case in every engine at several steps and
+gives each measured `Figure` a verdict: it is within the tolerance, its error falls with the step, the error
+is attributed to a setting of the engine (proved by running again with the setting changed), the engine lacks
+the coefficient, or the error is unexplained::
 
     from dynx.contacts import conform
 
@@ -11,7 +11,7 @@ coefficient, or the error is unexplained::
     for result in found.results:
         print(result.case, result.trial, result.figure, result.errors, result.verdict.kind)
 
-A case is a module in `dynx.contacts.cases` with a subclass of `Case`, and a line in
+A case is a module in `dynx.contacts.cases` with a subclass of `ContactCase`, and a line in
 `dynx.contacts.case.BUILT_IN`; a package offers its cases by entry points in the group
 ``dynx.contact_cases``. Its `trials` are independent scenes, which `measure` steps in a world of any engine,
 with the help of `dynx.contacts.motion`. A case names no engine and contains no verdict. It states for each
@@ -24,26 +24,29 @@ therefore has several bodies, which touch at different moments, and its figure i
 error, which then falls with the step.
 """
 
-from dynx.contacts.candidates import CANDIDATES, Candidate
-from dynx.contacts.case import Case, Figure, case_names, find_case, find_cases
+from typing import TYPE_CHECKING
+
+from dynx.contacts.candidates import CANDIDATES, SettingsChange
+from dynx.contacts.case import ContactCase, Figure, case_names, find_case, find_cases
 from dynx.contacts.case import register as register_case
 from dynx.contacts.case import unregister as unregister_case
 from dynx.contacts.conformance import STEPS, Conformance, FigureResult, NoResult, conform
-from dynx.contacts.verdict import VERDICTS, Attribution, Outcome, Price, Verdict, VerdictKind
+from dynx.contacts.verdict import VERDICTS, Attribution, AttributionOutcome, Price, Verdict, VerdictKind
+from dynx.registry import moved_names
 
 __all__ = [
     "CANDIDATES",
     "STEPS",
     "VERDICTS",
     "Attribution",
-    "Candidate",
-    "Case",
+    "AttributionOutcome",
     "Conformance",
+    "ContactCase",
     "Figure",
     "FigureResult",
     "NoResult",
-    "Outcome",
     "Price",
+    "SettingsChange",
     "Verdict",
     "VerdictKind",
     "case_names",
@@ -53,3 +56,13 @@ __all__ = [
     "register_case",
     "unregister_case",
 ]
+
+if not TYPE_CHECKING:
+    __getattr__ = moved_names(
+        __name__,
+        {
+            "Candidate": "dynx.contacts.SettingsChange",
+            "Case": "dynx.contacts.ContactCase",
+            "Outcome": "dynx.contacts.AttributionOutcome",
+        },
+    )

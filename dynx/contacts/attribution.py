@@ -18,10 +18,10 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
-from dynx.contacts.candidates import SUBSTEPS, Candidate
+from dynx.contacts.candidates import SUBSTEPS, SettingsChange
 from dynx.contacts.run import Measured, Runner, Unmeasured
 from dynx.contacts.series import FigureSeries, TrialOfEngine, judge
-from dynx.contacts.verdict import Attribution, Outcome, Price, Verdict
+from dynx.contacts.verdict import Attribution, AttributionOutcome, Price, Verdict
 from dynx.steppers.registry import world_class
 
 Change = Mapping[str, Any]
@@ -99,7 +99,7 @@ class Attributor:
         self,
         steps: tuple[float, ...],
         settings: Mapping[str, Mapping[str, Any]],
-        candidates: Mapping[str, Sequence[Candidate]],
+        candidates: Mapping[str, Sequence[SettingsChange]],
         runner: Runner,
     ) -> None:
         self._steps = steps
@@ -132,7 +132,7 @@ class Attributor:
             {} if self._runner.interrupted else {each: Verdict("unexplained") for each in left}
         )
 
-    def _round(self, tried: Mapping[FigureSeries, Candidate]) -> dict[FigureSeries, Attribution]:
+    def _round(self, tried: Mapping[FigureSeries, SettingsChange]) -> dict[FigureSeries, Attribution]:
         """Return the causes among one candidate for each series."""
         causes: dict[FigureSeries, Attribution] = {}
         left = dict(tried)
@@ -185,7 +185,7 @@ class Attributor:
         trend = judge(self._steps, errors, series.tolerance)
         if trend.kind == "stays":
             return None
-        outcome: Outcome = "removed" if trend.kind == "within" else "falls"
+        outcome: AttributionOutcome = "removed" if trend.kind == "within" else "falls"
         acting = self._acting(series, change)
         return Attribution(acting, reason, (series.errors, errors), outcome, trend.order)
 
@@ -209,7 +209,7 @@ class Attributor:
                     causes = causes | {each: alone}
         return causes
 
-    def _along(self, series: FigureSeries, candidate: Candidate) -> float | None:
+    def _along(self, series: FigureSeries, candidate: SettingsChange) -> float | None:
         """Return the order at which an error at the smallest step falls along the values of the first setting
         of a candidate, if that is numeric, or None."""
         last = self._steps[-1:]
@@ -228,7 +228,7 @@ class Attributor:
             return None
         return judge(sizes, found, series.tolerance).order
 
-    def _proportion(self, series: FigureSeries, candidate: Candidate) -> Attribution | None:
+    def _proportion(self, series: FigureSeries, candidate: SettingsChange) -> Attribution | None:
         """Return the candidate as the cause of an error that falls in proportion to it, or None."""
         order = self._along(series, candidate)
         rows = [

@@ -52,7 +52,7 @@ class Figure:
         return abs(self.measured - self.exact) / self.scale
 
 
-class Case(ABC):
+class ContactCase(ABC):
     """A closed form of mechanics that an engine is measured against.
 
     Each entry of `trials` is a scene of its own: its name, and the parameters that `scene` and `measure` get.
@@ -111,18 +111,18 @@ BUILT_IN = {
 """Cases of dynx itself, in the order of reports."""
 
 _cases = ClassRegistry(
-    "contact case", GROUP, BUILT_IN, lambda: Case, error=ArgumentError, unknown=UnknownNameError
+    "contact case", GROUP, BUILT_IN, lambda: ContactCase, error=ArgumentError, unknown=UnknownNameError
 )
 case_names = _cases.names
 register = _cases.register
 unregister = _cases.unregister
 
 
-def find_case(name: str) -> Case:
+def find_case(name: str) -> ContactCase:
     """Return the case of that name; UnknownNameError where nobody provides it."""
     return _cases.find(name)()
 
 
-def find_cases(names: Sequence[str] | None = None) -> tuple[Case, ...]:
+def find_cases(names: Sequence[str] | None = None) -> tuple[ContactCase, ...]:
     """Return the cases of these names, or all."""
     return tuple(find_case(name) for name in (case_names() if names is None else names))

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from dynx.contacts.attribution import Attributor
-from dynx.contacts.candidates import CANDIDATES, SUBSTEPS, Candidate
-from dynx.contacts.case import BUILT_IN, Case, find_case, find_cases
+from dynx.contacts.candidates import CANDIDATES, SUBSTEPS, SettingsChange
+from dynx.contacts.case import BUILT_IN, ContactCase, find_case, find_cases
 from dynx.contacts.run import CaseRun, Measured, Runner, Unmeasured
 from dynx.contacts.series import FigureSeries, TrialOfEngine, collect, judge
 from dynx.contacts.verdict import VERDICTS, Verdict, VerdictKind
@@ -76,7 +76,7 @@ class Conformance:
     steps: tuple[float, ...]
     """Steps [s], largest first."""
     engines: tuple[str, ...]
-    cases: tuple[Case, ...]
+    cases: tuple[ContactCase, ...]
     settings: Mapping[str, Mapping[str, Any]]
     """Settings given, by engine."""
     results: tuple[FigureResult, ...]
@@ -115,10 +115,10 @@ class Conformance:
 def conform(
     engines: Sequence[str] | None = None,
     steps: Sequence[float] = STEPS,
-    cases: Sequence[str | Case] | None = None,
+    cases: Sequence[str | ContactCase] | None = None,
     *,
     settings: Mapping[str, Mapping[str, Any]] | None = None,
-    candidates: Mapping[str, Sequence[Candidate]] = CANDIDATES,
+    candidates: Mapping[str, Sequence[SettingsChange]] = CANDIDATES,
     jobs: int | None = None,
     timeout: float | None = TIMEOUT,
     progress: Callable[[int, int], object] | None = None,
@@ -284,7 +284,7 @@ def checked_steps(steps: Sequence[float]) -> tuple[float, ...]:
     return tuple(sizes)
 
 
-def checked_cases(cases: Sequence[str | Case] | None) -> tuple[Case, ...]:
+def checked_cases(cases: Sequence[str | ContactCase] | None) -> tuple[ContactCase, ...]:
     """Return the cases, found by name where they are names; all where none are given."""
     if cases is None:
         found = find_cases()
@@ -305,15 +305,15 @@ def _check_is_list(name: str, value: object, what: str) -> None:
         raise ArgumentError(f"{name} is {text}; wanted a list of {what}")
 
 
-def _checked_case(case: object) -> Case:
-    if isinstance(case, type) and issubclass(case, Case):
+def _checked_case(case: object) -> ContactCase:
+    if isinstance(case, type) and issubclass(case, ContactCase):
         raise ArgumentError(f"a case is the class {case.__name__}; wanted an instance, {case.__name__}()")
-    if not isinstance(case, Case):
+    if not isinstance(case, ContactCase):
         raise ArgumentError(f"a case is of type {type(case).__name__}; wanted a Case or the name of one")
     return case
 
 
-def _check_attributes(case: Case) -> None:
+def _check_attributes(case: ContactCase) -> None:
     """Raise ArgumentError for a case whose attributes cannot be used."""
     kind = type(case)
     where = f"{kind.__module__}.{kind.__qualname__}"

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import ContactCase, Figure
 from dynx.errors import (
     ArgumentError,
     DynxError,
@@ -21,7 +21,7 @@ from dynx.errors import (
 )
 from dynx.steppers.registry import register, world_names
 from dynx.steppers.stepper import Stepper
-from dynx.workers import Outcome, Workers
+from dynx.workers import WorkerResult, Workers
 from dynx.world import World
 
 
@@ -30,7 +30,7 @@ class CaseRun:
     """A trial of a case in one engine at the step `dt` [s], with settings that differ from the defaults."""
 
     engine: str
-    case: Case
+    case: ContactCase
     trial: str
     dt: float
     settings: Mapping[str, Any]
@@ -96,7 +96,7 @@ def checked_figures(figures: object) -> tuple[Figure, ...]:
     return found
 
 
-def line_in_case(case: Case, error: BaseException) -> str | None:
+def line_in_case(case: ContactCase, error: BaseException) -> str | None:
     """Return file and line of the last call in the module of a case that led to an error; None for a case of
     dynx itself."""
     module = sys.modules[type(case).__module__]
@@ -162,7 +162,7 @@ class Runner:
             if self._progress is not None:
                 self._progress(self.done, total)
 
-    def _outcomes(self, runs: Sequence[CaseRun]) -> Iterator[Outcome]:
+    def _outcomes(self, runs: Sequence[CaseRun]) -> Iterator[WorkerResult]:
         if self._workers is not None:
             return self._workers.run(runs)
-        return (Outcome(number, carry_out(run)) for number, run in enumerate(runs))
+        return (WorkerResult(number, carry_out(run)) for number, run in enumerate(runs))

@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import ContactCase, Figure
 from dynx.contacts.run import CaseRun, Measured, Unmeasured
 from dynx.errors import ArgumentError, shown
 from dynx.steppers.registry import world_class
@@ -20,7 +20,7 @@ class TrialOfEngine(NamedTuple):
     """A trial of a case in one engine."""
 
     engine: str
-    case: Case
+    case: ContactCase
     trial: str
 
     def run(self, dt: float, settings: Mapping[str, Any]) -> CaseRun:

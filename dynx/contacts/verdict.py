@@ -17,7 +17,7 @@ on which the exact value rests. ``unexplained``: none of these.
 VERDICTS: tuple[VerdictKind, ...] = ("within", "falls", "setting", "cannot", "unexplained")
 
 
-Outcome = Literal["removed", "falls", "proportion"]
+AttributionOutcome = Literal["removed", "falls", "proportion"]
 """Effect of the last change on the error it is the cause of.
 
 ``removed``: within the tolerance at every step. ``falls``: falls with the step. ``proportion``: falls at the
@@ -47,7 +47,7 @@ class Attribution:
     """Part that the setting plays in the engine."""
     errors: tuple[tuple[float, ...], ...]
     """Relative errors at every step, for each of the values in turn."""
-    outcome: Outcome
+    outcome: AttributionOutcome
     order: float | None
     """Order at which the error then falls with the step, under ``falls``, or with the setting, under
     ``proportion``."""

@@ -30,13 +30,13 @@ ControllerState = TypeVar("ControllerState")
 Self = TypeVar("Self", bound="Controller[Any]")
 
 
-class _State(NamedTuple):
+class _TimedState(NamedTuple):
     t: float
     q: Floats
     v: Floats
 
 
-class Measurement(_State):
+class Measurement(_TimedState):
     """Configuration `q` (nq,) and velocity `v` (nv,) as measured at time `t` [s]."""
 
     random: Floats = np.zeros(0)

@@ -21,7 +21,7 @@ MAX_DELAY_STEPS = 10_000
 
 
 @dataclass(frozen=True)
-class _Between(Wrapper[Floats]):
+class _StatefulWrapper(Wrapper[Floats]):
     """A wrapper with a state of its own, which precedes that of the inner controller."""
 
     def _with_step(self, inner: Controller[Any], control_dt: float) -> float:
@@ -55,7 +55,7 @@ class _Between(Wrapper[Floats]):
 
 
 @dataclass(frozen=True)
-class MotorLag(_Between, pure=True):
+class MotorLag(_StatefulWrapper, pure=True):
     """Another controller's torque as a motor follows it: `delay` later, with a lag of first order.
 
     The torque y of the motor obeys dy/dt = (u - y) / time_constant, where u is the delayed torque of the
@@ -130,7 +130,7 @@ class MotorLag(_Between, pure=True):
 
 
 @dataclass(frozen=True)
-class Encoders(_Between, pure=True):
+class Encoders(_StatefulWrapper, pure=True):
     """Another controller that measures by encoders: positions are whole multiples of `resolution`.
 
     Velocities are differences of two such positions, over `control_dt`; in the first step the velocity is 0.

@@ -15,7 +15,7 @@ from dynx.spatial.se3 import pose_error
 from dynx.trajectory.base import Setpoint
 
 
-class TaskError(NamedTuple):
+class FrameMotionError(NamedTuple):
     """Setpoint of a frame minus its measured motion: linear, then angular, along the world's axes."""
 
     pose: Floats
@@ -41,10 +41,10 @@ class TaskSpace(ModelBased[ControllerState]):
         model.frame_index(frame)
         self._set(frame=frame)
 
-    def _error(self, measurement: Measurement, setpoint: Setpoint) -> TaskError:
+    def _error(self, measurement: Measurement, setpoint: Setpoint) -> FrameMotionError:
         dynamics, frame = self.dynamics, self.frame
         J = dynamics.jacobian(measurement.q, frame)
         wanted = dynamics.forward_kinematics(setpoint.q, frame)
         linear, angular = pose_error(wanted, dynamics.forward_kinematics(measurement.q, frame))
         wanted_twist = dynamics.jacobian(setpoint.q, frame) @ setpoint.v
-        return TaskError(np.concatenate([linear, angular]), wanted_twist - J @ measurement.v, J)
+        return FrameMotionError(np.concatenate([linear, angular]), wanted_twist - J @ measurement.v, J)

@@ -42,7 +42,7 @@ PlacedSolid = tuple[Solid, Floats, list[float]]
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class AvoidingPart:
     """A rigid body: a link of the robot, a body that it carries, or an obstacle."""
 
     name: str
@@ -106,7 +106,7 @@ def place(solids: Iterable[Solid], T: Floats | None) -> list[PlacedSolid]:
 
 
 def adapted_pairs(
-    model: Model, parts: Sequence[Part], solids: Sequence[list[Solid]], pairs: Iterable[Pair]
+    model: Model, parts: Sequence[AvoidingPart], solids: Sequence[list[Solid]], pairs: Iterable[Pair]
 ) -> tuple[tuple[Pair, ...], dict[tuple[str, str], str]]:
     """Return the pairs with margins that the robot can keep, and a sentence for each that differs.
 
@@ -168,7 +168,7 @@ def _from_obstacle(margin: float, neutral: float, distances: Sequence[float]) ->
 
 
 def _placed(
-    model: Model, parts: Sequence[Part], solids: Sequence[list[Solid]], q: Floats
+    model: Model, parts: Sequence[AvoidingPart], solids: Sequence[list[Solid]], q: Floats
 ) -> dict[int, list[PlacedSolid]]:
     """Return the solids of the parts at a configuration (nq,)."""
     poses = frame_poses(model, q)
@@ -218,7 +218,7 @@ class Avoidance:
     def __init__(
         self,
         model: Model,
-        parts: Sequence[Part],
+        parts: Sequence[AvoidingPart],
         pairs: Iterable[tuple[int, int, float]],
         without_shapes: Sequence[str] = (),
     ) -> None:

@@ -68,7 +68,7 @@ class Penetration:
     point_b: Floats
 
 
-class _Candidate(NamedTuple):
+class _SeparatingDirection(NamedTuple):
     """A direction, and the facet whose normal it is; None for a direction that is not of a facet."""
 
     normal: Floats
@@ -110,7 +110,7 @@ class Polytope:
         directions = np.concatenate([a.R.T, b.R.T, -a.R.T, -b.R.T])
         heights = np.einsum("ij,ij->i", self._add(directions), directions)
         best = int(np.argmin(heights))
-        self._upper, self._best = float(heights[best]), _Candidate(directions[best], None)
+        self._upper, self._best = float(heights[best]), _SeparatingDirection(directions[best], None)
 
     def _add(self, directions: Floats) -> Floats:
         """Add the support points along directions (m, 3); return them."""
@@ -158,7 +158,7 @@ class Polytope:
         best = int(np.argmin(heights))
         if heights[best] < self._upper:
             self._upper = float(heights[best])
-            self._best = _Candidate(normals[best], self._facets[open_facets[best]])
+            self._best = _SeparatingDirection(normals[best], self._facets[open_facets[best]])
         gained = heights - self._offsets[open_facets] > margin
         keep = np.concatenate([np.ones(before, dtype=bool), gained])
         self.on_a, self.on_b, self._points = self.on_a[keep], self.on_b[keep], self._points[keep]
@@ -169,7 +169,7 @@ class Polytope:
         margin = TOLERANCE * abs(self._upper) + ROUNDING * self._size
         near = np.flatnonzero(self._offsets <= self._lower + margin)
         near = near[np.argsort(self._offsets[near])[:NEW_VERTICES]]
-        candidates = [self._best, *(_Candidate(self._normals[k], self._facets[k]) for k in near)]
+        candidates = [self._best, *(_SeparatingDirection(self._normals[k], self._facets[k]) for k in near)]
         chosen, least = None, np.inf
         for candidate in candidates:
             normal = candidate.normal

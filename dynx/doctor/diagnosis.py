@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 
-from dynx.agreement.report import Failure
+from dynx.agreement.report import LoadFailure
 from dynx.agreement.tolerances import BAR
 from dynx.doctor.counterexample.search import difference_of, smallest_counterexample
 from dynx.doctor.examine.contacts import deepest_contact, describe_contacts
@@ -147,7 +147,7 @@ def open_case(robot: Robot, base: Base, choices: Mapping[str, str]) -> Case:
 
 def refused_report(robot: str, error: DynxError, *, base: str | None = None) -> DoctorReport:
     """Make the report of a robot that could not be examined."""
-    failure = Failure(type(error).__name__, str(error))
+    failure = LoadFailure(type(error).__name__, str(error))
     place = error if isinstance(error, DescriptionError) else None
     source, line = (None, None) if place is None else (place.source, place.line)
     return DoctorReport(

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
 from dynx._version import __version__
-from dynx.agreement.report import Failure
+from dynx.agreement.report import LoadFailure
 from dynx.files.documents import document_of, to_json_values
 from dynx.files.notebook import html_grid
 from dynx.loaded import engine_of
@@ -229,7 +229,7 @@ class DoctorReport:
     """Number of mesh files that the description names."""
     unread_meshes: tuple[UnreadMesh, ...] = ()
     """Those of them that were not read."""
-    error: Failure | None = None
+    error: LoadFailure | None = None
     error_line: int | None = field(default=None, compare=False)
     """Line of the text at which the `error` is, where it is known."""
     mended: str | None = field(default=None, compare=False)
@@ -397,7 +397,7 @@ class DoctorEntry:
     variants: tuple[VariantResult, ...]
     meshes: int
     unread_meshes: tuple[UnreadMesh, ...]
-    error: Failure | None
+    error: LoadFailure | None
     seconds: float
 
 

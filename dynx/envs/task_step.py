@@ -33,7 +33,7 @@ ENDED = -1.0
 """Number of steps of an episode that ended, in mode NEXT_STEP: the step that starts the next makes it 0."""
 
 
-class Layout(NamedTuple):
+class RowLayout(NamedTuple):
     """Sizes of the parts of a row of numbers that keeps the state of one environment: q, v and memory."""
 
     nq: int
@@ -41,7 +41,7 @@ class Layout(NamedTuple):
     memory: int
 
     @classmethod
-    def of(cls, task: RobotTask) -> Layout:
+    def of(cls, task: RobotTask) -> RowLayout:
         """Return the layout for a task."""
         state = task.start(np.zeros(task.random_size))
         return cls(len(state.q), len(state.v), len(state.memory))
@@ -82,7 +82,7 @@ class TaskStep:
         self._task, self._mode = task, mode
         self._varied, self._noisy_actions = varied, noisy_actions
         self._limit = math.inf if max_episode_steps is None else float(max_episode_steps)
-        self.layout = Layout.of(task)
+        self.layout = RowLayout.of(task)
         self._robot = ArrayDynamics(task.model)
         shape = task.observation_space.shape
         if shape is None or len(shape) != 1:

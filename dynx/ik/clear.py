@@ -38,7 +38,7 @@ from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.problem import Problem
 from dynx.ik.refine import Target, from_closed_form, from_kernel
 from dynx.ik.result import IKResult
-from dynx.ik.search import Candidate, Search, Task, TaskError
+from dynx.ik.search import Candidate, Search, SearchTask, TaskError
 from dynx.ik.step import ACCEPTED_FACTOR, DAMPING, MIN_DAMPING, REJECTED_FACTOR, bounded_step
 from dynx.spatial.scalar import Floats
 
@@ -62,7 +62,7 @@ ROUNDS = 6
 
 
 @dataclass(eq=False)
-class _State:
+class _ClearStep:
     """A configuration, its errors, and the pairs that are near."""
 
     q: Floats
@@ -79,7 +79,7 @@ class AvoidingDescent:
 
     def __init__(
         self,
-        task: Task,
+        task: SearchTask,
         avoidance: Avoidance,
         backend: Backend,
         coordinates: FrameCoordinates,
@@ -111,16 +111,16 @@ class AvoidingDescent:
                 break
         return best.q, steps, best.done
 
-    def _state(self, q: Floats) -> _State:
+    def _state(self, q: Floats) -> _ClearStep:
         error = self._task.error(q)
         every = self._avoidance.near(self._backend, q, REACH)
         near = [each for each in every if each.pair not in self._fixed]
         lacks = np.array([each.pair.margin + BUFFER - each.separation.distance for each in near])
         squared = 0.5 * sum([x * x for x in error.vector]) + 0.5 * float((np.maximum(lacks, 0.0) ** 2).sum())
         done = error.reached and all(each.is_clear for each in every)
-        return _State(q, error, near, lacks, squared, done)
+        return _ClearStep(q, error, near, lacks, squared, done)
 
-    def _moved(self, state: _State, damping: float) -> Floats:
+    def _moved(self, state: _ClearStep, damping: float) -> Floats:
         """Return the configuration after one step."""
         coordinates = self._coordinates
         J, x = self._task.jacobian(state.q, state.error), coordinates.values(state.q)
@@ -270,7 +270,7 @@ class _Finder:
         self._slack = 2.0 * (limits.position_tolerance + FRAME_REACH * limits.rotation_tolerance)
 
     def find(
-        self, task: Task, target: Target, start: Floats, solution: Floats
+        self, task: SearchTask, target: Target, start: Floats, solution: Floats
     ) -> tuple[Candidate | None, _Tally]:
         """Return a configuration that reaches the target and keeps the margins, or None; and what failed."""
         tally = _Tally()
@@ -308,7 +308,7 @@ class _Finder:
         return None, tally
 
     def _rounds(
-        self, task: Task, target: Target, start: Floats, solution: Floats
+        self, task: SearchTask, target: Target, start: Floats, solution: Floats
     ) -> Iterator[tuple[list[Floats], int, bool]]:
         """Yield solutions with the number of starts that they took, and whether there are no others."""
         problem, coordinates = self._problem, self._problem.coordinates
@@ -341,7 +341,7 @@ class _Finder:
             yield new, count, False
 
     def _improved(
-        self, task: Task, descent: AvoidingDescent, candidate: Candidate, tally: _Tally
+        self, task: SearchTask, descent: AvoidingDescent, candidate: Candidate, tally: _Tally
     ) -> Candidate | None:
         """Return a configuration near a solution that reaches the target and keeps the margins, or None."""
         q, steps, _ = descent.run(candidate.q)
@@ -361,7 +361,7 @@ class _Finder:
             return near.separation.upper < near.pair.margin
         return near.pair in self._of_target and near.separation.upper + self._slack < near.pair.margin
 
-    def _is_redundant(self, task: Task, q: Floats) -> bool:
+    def _is_redundant(self, task: SearchTask, q: Floats) -> bool:
         """Return whether the joints can move without moving what the target fixes."""
         J = task.jacobian(q, task.error(q))
         rank = int(np.linalg.matrix_rank(J, tol=1e-6))

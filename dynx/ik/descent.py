@@ -19,8 +19,8 @@ from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.step import (
     SETTINGS,
     TRACKING_SETTINGS,
+    DescentLayout,
     FrameError,
-    Memory,
     RefinementMemory,
     TargetKind,
     TrackingMemory,
@@ -54,13 +54,13 @@ class Descent:
     """A text of a step, with the layout of its memory and the number of its settings."""
 
     step: StepText
-    memory: Callable[[int], Memory | RefinementMemory | TrackingMemory]
+    memory: Callable[[int], DescentLayout | RefinementMemory | TrackingMemory]
     n_settings: int
     least: int
     """Place of the least squared error in the memory, after the coordinates."""
 
 
-SEARCH = Descent(search_step, Memory, len(SETTINGS), 5)
+SEARCH = Descent(search_step, DescentLayout, len(SETTINGS), 5)
 REFINEMENT = Descent(refinement_step, RefinementMemory, len(SETTINGS), 4)
 TRACKING = Descent(tracking_step, TrackingMemory, len(TRACKING_SETTINGS), 4)
 
@@ -75,7 +75,7 @@ class Descended(NamedTuple):
     steps: int
 
 
-class Target(NamedTuple):
+class KernelTarget(NamedTuple):
     """One target of one frame, as a kernel takes it."""
 
     kind: TargetKind
@@ -86,7 +86,7 @@ class Target(NamedTuple):
 
 def descend_by_kernel(
     descent: Descent,
-    target: Target,
+    target: KernelTarget,
     backend: Backend,
     frame: str,
     coordinates: FrameCoordinates,
@@ -206,7 +206,7 @@ class ErrorCall:
 
     __slots__ = ("_free", "_kind", "_target", "_tolerances")
 
-    def __init__(self, target: Target, tolerances: tuple[float, float]) -> None:
+    def __init__(self, target: KernelTarget, tolerances: tuple[float, float]) -> None:
         self._target, self._tolerances, self._kind = target, tolerances, target.kind
         self._free = _error_spaces(target.kind)
 

@@ -25,7 +25,7 @@ from dynx.ik.step import (
     SETTINGS,
     TRACKING_SETTINGS,
     WINDOW,
-    Memory,
+    DescentLayout,
     RefinementMemory,
     TargetKind,
     TrackingMemory,
@@ -99,11 +99,11 @@ def solver_iteration(
 ) -> Iteration:
     """Return the iteration that solves for the coordinates that move frame number `frame`.
 
-    Tasks have the arrays ``x``, the first start (n,); ``memory`` (`Memory`); ``target``, the first three rows
-    of a pose (12,), a position (3,) or a rotation (9,); ``near`` (n,), to which periodic angles are shifted;
-    ``cell``, the first row of starts near the target; ``point`` (3,) if there is one; and ``axes`` (12,),
-    weights and bounds per axis, if there are such. The constants are those of `SETTINGS`, then the numbers
-    that the rows of starts follow from (`dynx.ik.starts`).
+    Tasks have the arrays ``x``, the first start (n,); ``memory`` (`DescentLayout`); ``target``, the first
+    three rows of a pose (12,), a position (3,) or a rotation (9,); ``near`` (n,), to which periodic angles
+    are shifted; ``cell``, the first row of starts near the target; ``point`` (3,) if there is one; and
+    ``axes`` (12,), weights and bounds per axis, if there are such. The constants are those of `SETTINGS`,
+    then the numbers that the rows of starts follow from (`dynx.ik.starts`).
     """
     n = coordinates.count
     path = FramePath.of(mechanism, frame, coordinates)
@@ -125,10 +125,10 @@ def solver_iteration(
         found["restart"] = select(found.pop("again"), _row(memory, cell, starts), NO_RESTART)
         return found
 
-    sizes = {"x": n, "memory": len(Memory(n).initial), "target": kind.size, "near": n}
+    sizes = {"x": n, "memory": len(DescentLayout(n).initial), "target": kind.size, "near": n}
     sizes |= {"cell": 1, "settings": len(SETTINGS), "starts": 3} | kind.optional_sizes
     shapes = {name: (size,) for name, size in sizes.items()}
-    return Iteration(trace(step, shapes), ("settings", "starts"), Memory(n).n_results)
+    return Iteration(trace(step, shapes), ("settings", "starts"), DescentLayout(n).n_results)
 
 
 def _row(memory: Array, cell: Array, starts: Array) -> Any:

@@ -44,7 +44,7 @@ from dynx.ik.problem import Posture, Problem, Requirement
 from dynx.ik.reach import proofs
 from dynx.ik.result import IKResult, ReachedTarget
 from dynx.ik.starts import STARTS_OF_CELL, Starts, StartTable
-from dynx.ik.step import POSES, SETTINGS, Memory, RefinementMemory, TargetKind
+from dynx.ik.step import POSES, SETTINGS, DescentLayout, RefinementMemory, TargetKind
 from dynx.model.mechanism import Mechanism
 from dynx.model.model import Model
 from dynx.model.targets import checked_targets, is_rigid
@@ -58,7 +58,9 @@ from dynx.spatial.scalar import Floats
 class Race:
     """Workspace for one target at a time, whose tasks are the starts; not safe for several threads."""
 
-    def __init__(self, kernel: IterationKernel, kind: TargetKind, memory: Memory, starts: Starts) -> None:
+    def __init__(
+        self, kernel: IterationKernel, kind: TargetKind, memory: DescentLayout, starts: Starts
+    ) -> None:
         count, n = starts.random.shape
         self.starts = starts
         self._n, self._kind = n, kind
@@ -113,7 +115,7 @@ class PoseCall:
     """Solver of single poses for fixed options; safe to use from several threads."""
 
     def __init__(
-        self, kernel: IterationKernel, memory: Memory, starts: Starts, problem: Problem, model: Model
+        self, kernel: IterationKernel, memory: DescentLayout, starts: Starts, problem: Problem, model: Model
     ) -> None:
         """`problem` has the options, any pose as target, and the configuration without q0."""
         self._kernel, self._memory, self._starts, self._problem = kernel, memory, starts, problem
@@ -198,7 +200,7 @@ class FrameSolver:
         are not reached, and for solutions that are to be near to a posture."""
         self._kernel, self._coordinates, self._kind, self._threads = kernel, coordinates, kind, threads
         self._refinement, self._posture = refinement, posture
-        self._memory, self._table = Memory(coordinates.count), table
+        self._memory, self._table = DescentLayout(coordinates.count), table
         self._seeded: tuple[object, Starts | None] = (None, None)
         # Workspaces of single targets that no call uses at the moment.
         self._free: list[Race] = []

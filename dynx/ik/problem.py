@@ -15,7 +15,7 @@ from dynx.backends.base import Backend
 from dynx.errors import ArgumentError, ShapeError, nearest, shown
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.options import AxisRequirement, Options, SearchLimits, checked_axes, frame_targets
-from dynx.ik.search import FrameTask, SeveralTasks, Task
+from dynx.ik.search import FrameTask, SearchTask, SeveralTasks
 from dynx.ik.step import TargetKind
 from dynx.model import Model
 from dynx.model.configuration import checked_q
@@ -71,7 +71,7 @@ class Secondary:
         half = np.where(bounded, 0.5 * (np.where(bounded, high, 0.0) - np.where(bounded, low, 0.0)), np.inf)
         return Posture(middle, np.where(bounded, 1.0 / np.maximum(half, 1e-12) ** 2, 0.0))
 
-    def objective(self, coordinates: FrameCoordinates, task: Task) -> Objective:
+    def objective(self, coordinates: FrameCoordinates, task: SearchTask) -> Objective:
         """Return the objective of one sample."""
         posture = self.posture(coordinates)
         if posture is None:
@@ -80,7 +80,7 @@ class Secondary:
         return lambda q: float(weights @ (coordinates.joint_values(q) - goal) ** 2)
 
 
-def _log_manipulability(task: Task, q: Floats) -> float:
+def _log_manipulability(task: SearchTask, q: Floats) -> float:
     """Return the logarithm of Yoshikawa's measure sqrt(det(J J')) of the task at q."""
     values = np.linalg.svd(task.jacobian(q, task.error(q)), compute_uv=False)
     return float(np.log(np.maximum(values, 1e-12)).sum())
@@ -175,7 +175,7 @@ class Problem:
             return q0[None]
         return np.broadcast_to(q0, (*self.batch, q0.shape[-1])).reshape(self.count, q0.shape[-1])
 
-    def tasks(self, backend: Backend) -> Iterator[tuple[int, Task]]:
+    def tasks(self, backend: Backend) -> Iterator[tuple[int, SearchTask]]:
         """Yield the index of each sample, and what it has to reach."""
         rows: list[Iterable[tuple[Floats | None, Floats | None]]]
         if self.batch:

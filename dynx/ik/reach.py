@@ -33,7 +33,7 @@ _Slide = tuple[Floats, float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Reach:
+class MaxReach:
     """The greatest distance [m] of a point of a frame from a fixed point (3,), and the name of that."""
 
     start: Floats
@@ -98,7 +98,7 @@ def _position_slack(requirement: Requirement) -> float:
 
 
 @lru_cache(maxsize=64)
-def frame_reach(model: Model, frame: str, point: tuple[float, float, float]) -> Reach:
+def frame_reach(model: Model, frame: str, point: tuple[float, float, float]) -> MaxReach:
     """Return the reach of a point (3,) [m] of a frame, in its axes, of a model with a fixed base."""
     mechanism = model.mechanism
     placed = mechanism.frames[model.frame_index(frame)]
@@ -122,11 +122,11 @@ def frame_reach(model: Model, frame: str, point: tuple[float, float, float]) -> 
         R, p = R @ R_joint, p + rotate(R, p_joint)
     end = p + rotate(R, placed.p) + R @ placed.R @ np.array(point)
     if not joints:
-        return Reach(end, f"the point {_shown(end)} m", _length(np.zeros(3), slides[0]))
+        return MaxReach(end, f"the point {_shown(end)} m", _length(np.zeros(3), slides[0]))
     chain = [*_points_of_least_length(np.array(axes), np.array(points), slides, end), end]
     most = sum(_length(chain[k + 1] - chain[k], slides[k + 1]) for k in range(len(joints)))
     name = f"the point {_shown(chain[0])} m" + ("" if slides[0] else f" on the axis of {joints[0]}")
-    return Reach(chain[0], name, most + _length(np.zeros(3), slides[0]))
+    return MaxReach(chain[0], name, most + _length(np.zeros(3), slides[0]))
 
 
 def _travel(model: Model, name: str) -> tuple[float, float]:

@@ -19,7 +19,7 @@ from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.kernels import kernel_applies, kernel_solution, nearest_solutions
 from dynx.ik.problem import Objective, Problem, Secondary
 from dynx.ik.result import IKResult
-from dynx.ik.search import Candidate, Search, Task
+from dynx.ik.search import Candidate, Search, SearchTask
 from dynx.model.targets import Targets
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
@@ -49,7 +49,7 @@ Admissible = Callable[[Floats], bool]
 def best_solution(
     search: Search,
     coordinates: FrameCoordinates,
-    task: Task,
+    task: SearchTask,
     starts: list[Floats],
     secondary: Secondary,
     is_admissible: Admissible | None = None,
@@ -83,7 +83,7 @@ def best_solution(
 def _improved(
     search: Search,
     coordinates: FrameCoordinates,
-    task: Task,
+    task: SearchTask,
     begin: Candidate,
     value: float,
     objective: Objective,
@@ -113,7 +113,7 @@ def _improved(
 
 
 def _descent_direction(
-    coordinates: FrameCoordinates, task: Task, q: Floats, objective: Objective
+    coordinates: FrameCoordinates, task: SearchTask, q: Floats, objective: Objective
 ) -> Floats | None:
     """Return the unit direction (n,) of steepest descent among those that keep the task; None if there is
     none."""

@@ -21,7 +21,7 @@ from dynx.ik.descent import (
     Descended,
     Descent,
     ErrorCall,
-    Target,
+    KernelTarget,
     descend_by_kernel,
     descend_on_floats,
 )
@@ -50,7 +50,7 @@ Bounds = tuple[Sequence[float], Sequence[float]]
 """Lower and upper bounds (n,) of the coordinates."""
 
 
-class Task(Protocol):
+class SearchTask(Protocol):
     """Errors to reduce."""
 
     def error(self, q: Floats) -> TaskError:
@@ -83,7 +83,7 @@ class FrameTask:
         """`targets` is one target, without leading axes."""
         self._backend, self._frame, self._point, self._coordinates = backend, frame, point, coordinates
         kind = TargetKind.of(targets, point, axes)
-        self._target = Target(kind, kind.rows(targets, ())[0], tuple(kind.optional_values(point, axes)))
+        self._target = KernelTarget(kind, kind.rows(targets, ())[0], tuple(kind.optional_values(point, axes)))
         self._error = ErrorCall(self._target, (tolerances.position_tolerance, tolerances.rotation_tolerance))
         rows = slice(0 if kind.position else 3, 6 if kind.rotation else 3)
         self._part = (rows if axes is None else slice(None), coordinates.columns)
@@ -139,7 +139,7 @@ class SeveralTasks:
         )
 
 
-def _measured(task: Task, q: Floats) -> tuple[FrameError, Floats]:
+def _measured(task: SearchTask, q: Floats) -> tuple[FrameError, Floats]:
     """Return the error of a task, whose tolerances decided whether it is reached, and its Jacobian."""
     error = task.error(q)
     within = float(error.reached)
@@ -171,7 +171,7 @@ class Search:
         self._bounds = (coordinates.lower, coordinates.upper)
 
     def run(
-        self, task: Task, q0: Floats, rng: np.random.Generator | int | None, *, begin_at_q0: bool
+        self, task: SearchTask, q0: Floats, rng: np.random.Generator | int | None, *, begin_at_q0: bool
     ) -> Candidate:
         """Reach the target from q0 (nq,) within limits, or from a random start; return the best result."""
         if self._coordinates.count == 0:
@@ -193,7 +193,7 @@ class Search:
         assert best is not None
         return self.improve(best, q0, task)
 
-    def improve(self, best: Candidate, q0: Floats, task: Task) -> Candidate:
+    def improve(self, best: Candidate, q0: Floats, task: SearchTask) -> Candidate:
         """Return the local minimum near the best configuration of all starts, or that if it is no better."""
         found = task.descend(REFINEMENT, best.q, self._settings, self._bounds)
         q, steps = found.q, found.steps
@@ -208,12 +208,12 @@ class Search:
         """Return q with angles shifted by full turns to be near q0, then clipped to the limits."""
         return self._coordinates.clipped(self._model.clip(self._coordinates.nearest(q, q0)))
 
-    def evaluate(self, q: Floats, task: Task) -> Candidate:
+    def evaluate(self, q: Floats, task: SearchTask) -> Candidate:
         """Measure the errors at q by forward kinematics."""
         error = task.error(q)
         return Candidate(q, error.position, error.rotation, _half_square(error.vector), error.reached)
 
-    def descend(self, q: Floats, task: Task) -> tuple[Floats, int]:
+    def descend(self, q: Floats, task: SearchTask) -> tuple[Floats, int]:
         """Descend from one start; return (the best configuration found, the number of steps)."""
         found = task.descend(SEARCH, q, self._settings, self._bounds)
         return found.q, found.steps

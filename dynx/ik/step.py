@@ -378,7 +378,7 @@ def _solved(A: Array, b: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Memory:
+class DescentLayout:
     """Layout of the variables of a task: result, then what the next steps need."""
 
     n: int
@@ -412,7 +412,7 @@ def search_step(
     lower: Sequence[Any],
     upper: Sequence[Any],
 ) -> dict[str, Any]:
-    """Return x (n,) after a step of a search, the memory (`Memory`), the status, and 1 where it restarts."""
+    """Return x (n,) after a step of a search, its `DescentLayout`, the status, and 1 where it restarts."""
     n, squared = len(x), error.squared
     new = bounded_step(J, error.vector, x, lower, upper, DAMPING * squared + MIN_DAMPING)
     position_tolerance, rotation_tolerance, max_iterations, max_restarts = settings

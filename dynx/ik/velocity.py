@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dynx.backends.base import Backend
 from dynx.errors import ArgumentError, NotInstalledError, ShapeError, shown
-from dynx.ik.descent import ErrorCall, Target
+from dynx.ik.descent import ErrorCall, KernelTarget
 from dynx.ik.problem import checked_avoidance
 from dynx.ik.step import TargetKind
 from dynx.model import Model
@@ -85,7 +85,7 @@ class VelocityTask:
             if targets.batch:
                 raise ShapeError(f"target has shape {np.shape(self.target)}; wanted (4, 4) or (3,)")
             kind = TargetKind.of(targets, point, None)
-            target = Target(kind, kind.rows(targets, ())[0], tuple(kind.optional_values(point, None)))
+            target = KernelTarget(kind, kind.rows(targets, ())[0], tuple(kind.optional_values(point, None)))
             error, *_ = ErrorCall(target, (0.0, 0.0))(backend.forward_kinematics(q, self.frame))
             velocity[: len(error)] += self.gain * np.array(error)
             if targets.rotations is None and self.velocity is None:

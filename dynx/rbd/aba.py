@@ -17,7 +17,7 @@ from dynx.model.mechanism import Body, Mechanism
 from dynx.rbd.linear import solve_positive_definite
 from dynx.rbd.loops import Loops, PythonLoops
 from dynx.rbd.placement import Placement, SpatialVector
-from dynx.rbd.rnea import Motion, add_spatial, body_wrench, child_motion, root_motion
+from dynx.rbd.rnea import LocalMotion, add_spatial, body_wrench, child_motion, root_motion
 from dynx.spatial.inertia import RigidInertia, symmetric_from_upper
 from dynx.spatial.scalar import Array, append_axis
 from dynx.spatial.so3 import rotate, rotate_back, skew
@@ -87,9 +87,9 @@ class AngularVelocity:
     omega: Array
 
     @cached_property
-    def motion(self) -> Motion:
+    def motion(self) -> LocalMotion:
         """Motion with this angular velocity and zero accelerations."""
-        return Motion(self.omega, 0 * self.omega, 0 * self.omega)
+        return LocalMotion(self.omega, 0 * self.omega, 0 * self.omega)
 
 
 class ArticulatedBody(NamedTuple):
@@ -137,11 +137,11 @@ def forward_dynamics(
     return loops.vector(base, a, like=v)
 
 
-def _root_motion(mechanism: Mechanism, q: Array, v: Array) -> Motion:
+def _root_motion(mechanism: Mechanism, q: Array, v: Array) -> LocalMotion:
     return root_motion(mechanism, q, v, 0 * v)
 
 
-def _velocity(mechanism: Mechanism, root: Motion) -> AngularVelocity:
+def _velocity(mechanism: Mechanism, root: LocalMotion) -> AngularVelocity:
     return AngularVelocity(root.omega)
 
 
@@ -181,7 +181,7 @@ def _base_acceleration(mechanism: Mechanism, body: ArticulatedBody, tau: Array) 
     return acceleration[..., :3], acceleration[..., 3:]
 
 
-def _fixed_acceleration(mechanism: Mechanism, root: Motion) -> SpatialVector:
+def _fixed_acceleration(mechanism: Mechanism, root: LocalMotion) -> SpatialVector:
     return root.proper_acceleration, root.alpha
 
 
@@ -192,7 +192,7 @@ def _accelerate(
     return accelerate_joint(body, joint.K, joint.u_over_D, moved, passed.velocity_product)
 
 
-def _without_gravity(mechanism: Mechanism, root: Motion, acceleration: SpatialVector) -> SpatialVector:
+def _without_gravity(mechanism: Mechanism, root: LocalMotion, acceleration: SpatialVector) -> SpatialVector:
     # `root` was computed with a = 0: its proper acceleration is omega x v minus gravity.
     return acceleration[0] - root.proper_acceleration, acceleration[1]
 

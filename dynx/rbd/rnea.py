@@ -28,7 +28,7 @@ from dynx.spatial.so3 import cross, rotate, rotate_back, rotation_from_quat
 
 
 @dataclass(frozen=True)
-class Motion:
+class LocalMotion:
     """Motion of a body, in its own axes: all arrays (..., 3).
 
     `omega` is the angular velocity, `alpha` the angular acceleration, and `proper_acceleration` the
@@ -59,9 +59,9 @@ class Motion:
         ]
         return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
-    def without_acceleration(self) -> Motion:
+    def without_acceleration(self) -> LocalMotion:
         """Return the motion with the same angular velocity and zero accelerations."""
-        return Motion(self.omega, 0 * self.alpha, 0 * self.proper_acceleration)
+        return LocalMotion(self.omega, 0 * self.alpha, 0 * self.proper_acceleration)
 
     def proper_acceleration_at(self, p: Array) -> Array:
         """Return the proper acceleration (..., 3) of the point `p` of the body."""
@@ -91,11 +91,11 @@ def inverse_dynamics(
     return loops.vector(wrenches[0], tau, like=v)
 
 
-def _root_wrench(mechanism: Mechanism, motion: Motion) -> SpatialVector:
+def _root_wrench(mechanism: Mechanism, motion: LocalMotion) -> SpatialVector:
     return body_wrench(mechanism.root, motion)
 
 
-def _move(body: Body, parent: Motion, q: Array, v: Array, a: Array) -> tuple[Motion, LoadedBody]:
+def _move(body: Body, parent: LocalMotion, q: Array, v: Array, a: Array) -> tuple[LocalMotion, LoadedBody]:
     # A body's wrench is computed together with its motion, most of which nothing else needs: compiled code
     # then keeps few values in memory, which makes that of a humanoid a quarter faster.
     placement = Placement.of(body, q)
@@ -123,7 +123,7 @@ def gravity_torque(mechanism: Mechanism, q: Array, *, loops: Loops | None = None
     return inverse_dynamics(mechanism, q, rest, rest, loops=loops)
 
 
-def root_motion(mechanism: Mechanism, q: Array, v: Array, a: Array) -> Motion:
+def root_motion(mechanism: Mechanism, q: Array, v: Array, a: Array) -> LocalMotion:
     """Return the motion of the root body; gravity g enters as the proper acceleration -g.
 
     `v` and `a` of a floating base are components in axes that rotate with it, so the acceleration of its
@@ -131,15 +131,15 @@ def root_motion(mechanism: Mechanism, q: Array, v: Array, a: Array) -> Motion:
     """
     if not mechanism.floating:
         zero = 0 * mechanism.gravity
-        return Motion(zero, zero, -mechanism.gravity)
+        return LocalMotion(zero, zero, -mechanism.gravity)
     minus_gravity = rotate_back(rotation_from_quat(q[..., 3:7]), -mechanism.gravity)
     omega = v[..., 3:6]
-    return Motion(omega, a[..., 3:6], a[..., :3] + cross(omega, v[..., :3]) + minus_gravity)
+    return LocalMotion(omega, a[..., 3:6], a[..., :3] + cross(omega, v[..., :3]) + minus_gravity)
 
 
 def child_motion(
-    body: Body, placement: Placement, parent: Motion, speed: Array, acceleration: Array
-) -> Motion:
+    body: Body, placement: Placement, parent: LocalMotion, speed: Array, acceleration: Array
+) -> LocalMotion:
     """Return the motion of a body from that of its parent and its joint's speed and acceleration (...,)."""
     R, p = placement.R, placement.p
     axis_speed = body.axis * append_axis(speed)
@@ -147,11 +147,11 @@ def child_motion(
     omega, alpha = rotate_back(R, parent.omega), rotate_back(R, parent.alpha)
     proper = rotate_back(R, parent.proper_acceleration_at(p))
     if body.revolute:
-        return Motion(omega + axis_speed, alpha + axis_acceleration + cross(omega, axis_speed), proper)
-    return Motion(omega, alpha, proper + axis_acceleration + 2 * cross(omega, axis_speed))
+        return LocalMotion(omega + axis_speed, alpha + axis_acceleration + cross(omega, axis_speed), proper)
+    return LocalMotion(omega, alpha, proper + axis_acceleration + 2 * cross(omega, axis_speed))
 
 
-def body_wrench(inertia: RigidInertia, motion: Motion) -> SpatialVector:
+def body_wrench(inertia: RigidInertia, motion: LocalMotion) -> SpatialVector:
     """Return the force and the moment about the body's origin that produce its motion (Newton and Euler)."""
     U, d, h = motion.acceleration_matrix, motion.proper_acceleration, inertia.first_moment
     force = d * inertia.mass + rotate(U, h)
@@ -163,7 +163,7 @@ def add_spatial(a: SpatialVector, b: SpatialVector) -> SpatialVector:
     return a[0] + b[0], a[1] + b[1]
 
 
-def _rotation_moment(sigma: Array, motion: Motion) -> Array:
+def _rotation_moment(sigma: Array, motion: LocalMotion) -> Array:
     """Return the integral of r x U r over the mass of a body, where `sigma` is the integral of r r'."""
     U, (xx, yy, zz) = motion.acceleration_matrix, motion.omega_squares
 

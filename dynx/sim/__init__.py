@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from dynx.sim.record.rollout import Rollout
     from dynx.sim.record.rollout_data import Summary
     from dynx.sim.scenario.scenario import Scenario
-    from dynx.sim.simulation import Simulation, Snapshot, State
+    from dynx.sim.simulation import Simulation, SimulationState
 
 _HOME = {
     "BatchInterrupted": "batch",
@@ -37,8 +37,7 @@ _HOME = {
     "Scenario": "scenario.scenario",
     "ScenePlant": "plants.scene_plant",
     "Simulation": "simulation",
-    "Snapshot": "simulation",
-    "State": "simulation",
+    "SimulationState": "simulation",
     "StepResult": "plants.plant",
     "Summary": "record.rollout_data",
     "compare": "comparison.comparison",
@@ -60,8 +59,7 @@ __all__ = [
     "Scenario",
     "ScenePlant",
     "Simulation",
-    "Snapshot",
-    "State",
+    "SimulationState",
     "StepResult",
     "Summary",
     "compare",
@@ -74,7 +72,15 @@ __all__ = [
 
 # Hidden from type checkers, which would take any name for an attribute: they know the imports above.
 if not TYPE_CHECKING:
-    _moved = moved_names(__name__, {"compare_rollouts": "dynx.compare", "Push": "dynx.ExternalForce"})
+    _moved = moved_names(
+        __name__,
+        {
+            "compare_rollouts": "dynx.compare",
+            "Push": "dynx.ExternalForce",
+            "Snapshot": "dynx.world.Snapshot",
+            "State": "dynx.sim.SimulationState",
+        },
+    )
 
     def __getattr__(name: str) -> Any:
         if name not in _HOME:

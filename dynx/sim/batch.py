@@ -90,7 +90,7 @@ StepKernels = dict[tuple[bool, bool], Kernel]
 
 
 @dataclass(frozen=True)
-class Part:
+class BatchPart:
     """Inputs of a part as arrays and machine code, so that it can be sent to another process."""
 
     kernels: StepKernels
@@ -115,7 +115,7 @@ class Part:
 
     def __call__(self) -> PartOutcome:
         """Simulate the rollouts of the part."""
-        return _Run(self).run()
+        return _RunBuffers(self).run()
 
     @cached_property
     def count(self) -> int:
@@ -123,14 +123,14 @@ class Part:
         return len(self.start["q"])
 
 
-class _Run:
+class _RunBuffers:
     """Buffers of a part while it runs: the state is read from one set and written to the next.
 
     There are enough sets for the delay, so that delayed measurements need no copies. All sets start with the
     initial state, which is what the controller measures until the delay has passed.
     """
 
-    def __init__(self, part: Part) -> None:
+    def __init__(self, part: BatchPart) -> None:
         self._part = part
         self._kernels = list(part.kernels.values())
         self._variants = {variant: number for number, variant in enumerate(part.kernels)}
@@ -279,7 +279,7 @@ class _Run:
         return np.ascontiguousarray(array[rows], dtype=np.float64)
 
 
-class Store:
+class OutcomeStore:
     """Folder of outcomes; runs with different arguments may share it."""
 
     def __init__(self, folder: str | os.PathLike[str], scenario: Scenario) -> None:
@@ -295,7 +295,7 @@ class Store:
             raise ArgumentError(f"keep is {shown(folder)}, a folder that may not be written")
         clear_unfinished(self._folder)
 
-    def read(self, part: Part) -> PartOutcome | None:
+    def read(self, part: BatchPart) -> PartOutcome | None:
         """Return the outcome of a part, or None if it is not stored, incomplete or damaged."""
         count, nq, nv = part.count, part.start["q"].shape[1], part.start["v"].shape[1]
         kept = part.clock.n_steps // part.record_every if part.record_every else 0
@@ -309,7 +309,7 @@ class Store:
         except ArgumentError:
             return None
 
-    def write(self, part: Part, outcome: PartOutcome) -> None:
+    def write(self, part: BatchPart, outcome: PartOutcome) -> None:
         """Store the outcome on the disk. Where it cannot be written, that is noted, because the outcome is
         still valid."""
         try:
@@ -326,7 +326,7 @@ class Store:
             )
             warnings.warn(message, RuntimeWarning, stacklevel=3)
 
-    def _path(self, part: Part) -> Path:
+    def _path(self, part: BatchPart) -> Path:
         digest = sha256(self._scenario.encode())
         # The key has what a kernel computes and not its machine code, which differs between processors.
         arrays = (part.start, part.fixed, tuple(part.setpoints), part.references, part.wrenches, part.noise)
@@ -669,7 +669,7 @@ def simulate_batch(given: BatchArguments) -> BatchRollouts:
     references = setup.setpoint_of(clock.times()[1:]).q
     setpoints = Setpoint(*setup.setpoint_of(clock.control_times(controller.lead)))
     parts = [
-        Part(
+        BatchPart(
             kernels,
             clock,
             {name: array[first : first + PART] for name, array in start.items()},
@@ -689,7 +689,7 @@ def simulate_batch(given: BatchArguments) -> BatchRollouts:
         )
         for first in range(0, n, PART)
     ]
-    store = None if keep is None else Store(keep, scenario)
+    store = None if keep is None else OutcomeStore(keep, scenario)
     done: dict[int, PartOutcome] = {}
 
     def outcome() -> BatchRollouts:
@@ -733,11 +733,11 @@ def _step_kernels(step: LoopStep, clock: Clock, pushed: list[bool]) -> StepKerne
 
 
 def _run_parts(
-    parts: list[Part],
+    parts: list[BatchPart],
     done: dict[int, PartOutcome],
     threads: int,
     executor: Executor | None,
-    store: Store | None,
+    store: OutcomeStore | None,
     progress: Progress | None,
     n: int,
 ) -> None:
@@ -778,7 +778,7 @@ def _run_parts(
 
 
 def _batch_rollouts(
-    scenario: Scenario, clock: Clock, parts: list[Part], done: dict[int, PartOutcome], record_every: int
+    scenario: Scenario, clock: Clock, parts: list[BatchPart], done: dict[int, PartOutcome], record_every: int
 ) -> BatchRollouts:
     kept = clock.n_steps // record_every if record_every else 0
     nq, nv = scenario.model.nq, scenario.model.nv

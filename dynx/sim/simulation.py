@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import time
 from collections.abc import Callable
@@ -35,9 +36,10 @@ from dynx.simd.machine import require_memory
 from dynx.spatial.scalar import Floats
 from dynx.steppers.clock import multiple, refuse_too_many_steps
 from dynx.trajectory.base import Trajectory
+from dynx.world.snapshot import Snapshot
 
 
-class State(NamedTuple):
+class SimulationState(NamedTuple):
     """The state of a robot at time `t` [s]: configuration `q` (nq,) and velocity `v` (nv,)."""
 
     t: float
@@ -46,21 +48,18 @@ class State(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Snapshot:
-    """State and record of a simulation at one moment, to which `Simulation.restore` returns."""
+class SimulationRecord:
+    """What a simulation adds to its `Snapshot`: the record until then, and the state of its controller."""
 
     scenario: Scenario
-    record: StateBuffers
-    loop_state: LoopState
+    states: StateBuffers
+    command: Any
+    """Motor command of the last control step, for an engine's own motors."""
+    controller_state: Any
     executor: tuple[str, ...]
     departures: tuple[str, ...]
     plant_memory: Any = None
     """All that the plant needs besides the state, such as the world around the robot."""
-
-    @property
-    def time(self) -> float:
-        """Simulated time [s]."""
-        return self.record.steps * self.scenario.dt
 
 
 Progress = Callable[[int, int], object]
@@ -132,7 +131,7 @@ class Simulation:
 
     # -- stepping -----------------------------------------------------------------------------
 
-    def step(self, n: int = 1, tau: ArrayLike | None = None) -> State:
+    def step(self, n: int = 1, tau: ArrayLike | None = None) -> SimulationState:
         """Take `n` steps of `dt`, and return the state after them.
 
         `tau` (nv,) [N m or N] replaces the torque of the controller, which is not evaluated in these steps;
@@ -149,7 +148,7 @@ class Simulation:
             self._note_departure("torques of the caller")
         end = self._record.steps + int(n)
         loop_state = self._advance(end, given)
-        return State(end * self._dt, loop_state.q.copy(), loop_state.v.copy())
+        return SimulationState(end * self._dt, loop_state.q.copy(), loop_state.v.copy())
 
     def run(self, until: float | None = None, *, real_time: bool = False) -> Rollout:
         """Step to the time `until` [s], by default the end of the scenario, and return the record.
@@ -299,10 +298,10 @@ class Simulation:
         return self._record.steps * self._dt
 
     @property
-    def state(self) -> State:
+    def state(self) -> SimulationState:
         """Time, configuration (nq,) and velocity (nv,) after the last step."""
         k = self._record.steps
-        return State(k * self._dt, self._record.q[k].copy(), self._record.v[k].copy())
+        return SimulationState(k * self._dt, self._record.q[k].copy(), self._record.v[k].copy())
 
     @property
     def rollout(self) -> Rollout:
@@ -329,7 +328,7 @@ class Simulation:
             self._plant.surroundings(n),
         )
 
-    def reset(self) -> State:
+    def reset(self) -> SimulationState:
         """Return to the start and discard the record. Raises ArgumentError for a controller that changed."""
         self._refuse_changed_controller()
         self._record.steps = 0
@@ -344,11 +343,29 @@ class Simulation:
         self._refuse_closed()
         self._refuse_changed_controller()
         self._loop_state = self._loop_state or self._loop_state_of_record()
-        record, state = self._record.copy(), replace(self._loop_state)
-        memory = self._plant.save()
-        return Snapshot(self.scenario, record, state, self._executor, self._departures, memory)
+        state, plant = self._loop_state, self.scenario.plant
+        record = SimulationRecord(
+            self.scenario,
+            self._record.copy(),
+            state.command,
+            state.controller_state,
+            self._executor,
+            self._departures,
+            self._plant.save(),
+        )
+        return Snapshot(
+            plant.engine if isinstance(plant, ScenePlant) else plant,
+            "",
+            _identity(self.scenario),
+            self.time,
+            0.0,
+            self._record.steps,
+            {"q": state.q, "v": state.v, "tau": state.tau},
+            b"",
+            record,
+        )
 
-    def restore(self, snapshot: Snapshot) -> State:
+    def restore(self, snapshot: Snapshot) -> SimulationState:
         """Continue from a snapshot of this simulation or of another of the same robot and `dt`.
 
         If this simulation has another controller than the snapshot, the controller starts from its initial
@@ -358,25 +375,29 @@ class Simulation:
         self._refuse_closed()
         if not isinstance(snapshot, Snapshot):
             raise ArgumentError(f"snapshot is of type {type(snapshot).__name__}; wanted what `save` returned")
+        record, ours = snapshot.record, self.scenario
+        if not isinstance(record, SimulationRecord):
+            raise ArgumentError("the snapshot is of a world; wanted one of Simulation.save")
         self._refuse_changed_controller()
-        theirs, ours = snapshot.scenario, self.scenario
-        robots = [(each.model.joint_names, each.model.base) for each in (theirs, ours)]
-        if robots[0] != robots[1] or theirs.dt != ours.dt:
+        theirs = record.scenario
+        if snapshot.identity != _identity(ours):
             raise ArgumentError(
                 f"the snapshot is of {shown(theirs.model)} with dt = {theirs.dt:g} s; this simulation is of "
                 f"{shown(ours.model)} with dt = {ours.dt:g} s"
             )
-        n = snapshot.record.steps
+        n = snapshot.steps
         if n > len(self._record):
             self._extend(n)
         self._loop.refuse_self_changing(self._record)
         changed = [] if theirs is ours else changed_parts(theirs, ours)
-        self._record.take(snapshot.record, n)
-        self._executor, self._departures = snapshot.executor, snapshot.departures
-        loop_state = replace(snapshot.loop_state)
+        self._record.take(record.states, n)
+        self._executor, self._departures = record.executor, record.departures
+        loop_state = LoopState(
+            **snapshot.arrays, command=record.command, controller_state=record.controller_state
+        )
         self._loop.place(loop_state.q, loop_state.v)
-        if snapshot.plant_memory is not None:
-            self._plant.restore(snapshot.plant_memory)
+        if record.plant_memory is not None:
+            self._plant.restore(record.plant_memory)
         if "controller" in changed:
             controller = self._setup.controller
             loop_state.controller_state = None if controller is None else controller.initial_state()
@@ -428,6 +449,12 @@ class Simulation:
     def __repr__(self) -> str:
         model, plant = self.scenario.model.name, self.scenario.plant
         return f"<Simulation of {model} on {plant}, at {self.time:.6g} s>"
+
+
+def _identity(scenario: Scenario) -> str:
+    """Return the hash of the coordinates, the base and the step of a scenario."""
+    model = scenario.model
+    return hashlib.sha256(repr((model.joint_names, model.base, scenario.dt)).encode()).hexdigest()
 
 
 def require_rollout(rollout: object) -> None:

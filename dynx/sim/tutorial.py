@@ -47,7 +47,7 @@ MODES = tuple(name for name, law in BUILT_IN.items() if law.controls == "joints"
 
 
 @dataclass(frozen=True)
-class Outcome:
+class TutorialResult:
     """One mode on one plant: its record, and the error that prevented or ended it."""
 
     rollout: Rollout | None = None
@@ -77,7 +77,7 @@ class Row:
 
     mode: str
     what: str
-    outcomes: Mapping[str, Outcome] = field(default_factory=dict)
+    outcomes: Mapping[str, TutorialResult] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -98,21 +98,21 @@ class Tutorial:
                 mode,
                 BUILT_IN[mode].what,
                 {
-                    plant: self._outcome(mode, plant) if problem is None else Outcome(problem=problem)
+                    plant: self._outcome(mode, plant) if problem is None else TutorialResult(problem=problem)
                     for plant, problem in missing.items()
                 },
             )
 
-    def _outcome(self, mode: str, plant: str) -> Outcome:
+    def _outcome(self, mode: str, plant: str) -> TutorialResult:
         try:
             law = self._law(mode)
             if isinstance(law, BulletMotor) and plant != BULLET:
-                return Outcome(problem="a motor inside PyBullet")
-            return Outcome(simulate(self.model, law, self.motion, plant=plant, dt=self.dt))
+                return TutorialResult(problem="a motor inside PyBullet")
+            return TutorialResult(simulate(self.model, law, self.motion, plant=plant, dt=self.dt))
         except SimulationError as error:
-            return Outcome(error.rollout, str(error))
+            return TutorialResult(error.rollout, str(error))
         except DynxError as error:
-            return Outcome(problem=str(error))
+            return TutorialResult(problem=str(error))
 
     def _law(self, mode: str) -> Controller[object]:
         return named_controller(

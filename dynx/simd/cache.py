@@ -28,7 +28,7 @@ from dynx.simd.image import Code, Image, compile_image, compile_routines
 from dynx.simd.kernel import Kernel
 from dynx.simd.program import Port, Program
 from dynx.simd.routines import RoutineSet
-from dynx.simd.target import Target, compiler_version, host
+from dynx.simd.target import Processor, compiler_version, host
 
 T = TypeVar("T")
 
@@ -37,7 +37,7 @@ def load_kernel(
     recipe: bytes,
     program: Callable[[], Program],
     *,
-    target: Target | None = None,
+    target: Processor | None = None,
     settings: Settings | None = None,
 ) -> Kernel:
     """Load the kernel of `recipe` from the cache, or compile `program()` and store it there."""
@@ -67,7 +67,7 @@ def load_routines(recipe: bytes, routines: RoutineSet) -> RoutineCode:
 def load_code(
     recipe: bytes,
     compiled: Callable[[], Image],
-    target: Target,
+    target: Processor,
     settings: Settings,
     link: Callable[[Image], T],
 ) -> T:
@@ -88,7 +88,7 @@ def program_recipe(program: Program) -> bytes:
     return repr((nodes, program.inputs, program.outputs, program.results)).encode()
 
 
-def _key(recipe: bytes, target: Target, settings: Settings) -> str:
+def _key(recipe: bytes, target: Processor, settings: Settings) -> str:
     digest = sha256()
     for part in (recipe, repr(target), repr(settings), compiler_version(), _emitter_version()):
         text = part if isinstance(part, bytes) else part.encode()
@@ -114,7 +114,7 @@ def source_version(*modules: ModuleType) -> str:
     return f"{__version__} {np.__version__} {source_hash(*sources)}"
 
 
-def _image_of(content: bytes, target: Target) -> Image:
+def _image_of(content: bytes, target: Processor) -> Image:
     """Return the image in a content of the cache."""
     size = int.from_bytes(content[:4], "little")
     head = json.loads(content[4 : 4 + size])

@@ -31,7 +31,7 @@ from dynx.simd.rows import (
     scratch_functions,
 )
 from dynx.simd.schedule import ELEMENTARY, Segment, TrigGroup, schedule, spill_slots
-from dynx.simd.target import Target
+from dynx.simd.target import Processor
 from dynx.simd.trigonometry import declarations, replacements, sines_and_cosines
 from dynx.simd.verify import check_schedule
 
@@ -102,13 +102,13 @@ class Settings:
         return "contract nsz " if self.fast and not self.quick else ""
 
 
-def emit(program: Program, target: Target, settings: Settings) -> str:
+def emit(program: Program, target: Processor, settings: Settings) -> str:
     """Return the text of one LLVM module that evaluates a program."""
     bodies, rows, loop = _functions(program, target, settings, "internal")
     return _module([*bodies, *rows, loop], target, settings)
 
 
-def emit_modules(program: Program, target: Target, settings: Settings) -> list[ModuleText]:
+def emit_modules(program: Program, target: Processor, settings: Settings) -> list[ModuleText]:
     """Return the LLVM modules that evaluate a program together: segments, each in a module of its own if they
     are optimised, and the loop over the samples. Each is compiled in a fraction of a second."""
     bodies, rows, loop = _functions(program, target, settings, "")
@@ -132,7 +132,7 @@ def emit_modules(program: Program, target: Target, settings: Settings) -> list[M
 
 
 def _functions(
-    program: Program, target: Target, settings: Settings, linkage: str
+    program: Program, target: Processor, settings: Settings, linkage: str
 ) -> tuple[list[str], list[str], str]:
     """Return the texts of the segments, whose symbols have this linkage, of the functions for the scratch
     memory, if there is one, and of the entry function."""
@@ -161,7 +161,7 @@ def _called(segments: int, settings: Settings) -> list[str]:
     return [LOAD, *names, STORE] if settings.quick else names
 
 
-def _module(functions: Sequence[str], target: Target, settings: Settings) -> str:
+def _module(functions: Sequence[str], target: Processor, settings: Settings) -> str:
     parts = [f'target triple = "{target.triple}"', *functions, *replacements(functions, settings.lanes)]
     parts += [*declarations(settings.lanes), "declare void @llvm.prefetch.p0(ptr, i32, i32, i32)"]
     return "\n".join(parts) + "\n"
@@ -249,7 +249,7 @@ class SegmentBody:
     def __init__(
         self,
         program: Program,
-        target: Target,
+        target: Processor,
         settings: Settings,
         segment: Segment,
         slots: dict[int, int],

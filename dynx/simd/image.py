@@ -18,7 +18,7 @@ from dynx.simd.emit import ENTRY, Settings, emit_modules
 from dynx.simd.program import Port, Program, collection_paused
 from dynx.simd.routines import RoutineSet, emit_routines
 from dynx.simd.schedule import program_length
-from dynx.simd.target import Target, host
+from dynx.simd.target import Processor, host
 
 COMPILE_LOCK = threading.RLock()
 """Lock held while LLVM compiles or links, and by callers while they obtain a kernel."""
@@ -38,7 +38,7 @@ class Image:
     inputs: tuple[Port, ...]
     outputs: tuple[Port, ...]
     lanes: int
-    target: Target
+    target: Processor
     objects: tuple[bytes, ...]
     """Object files, whose symbols refer to each other."""
 
@@ -51,7 +51,9 @@ class Image:
         return f"<Image of {self.size} bytes, {self.lanes} lanes, for {self.target.cpu}>"
 
 
-def compile_image(program: Program, target: Target | None = None, settings: Settings | None = None) -> Image:
+def compile_image(
+    program: Program, target: Processor | None = None, settings: Settings | None = None
+) -> Image:
     """Compile a program to an image, by default for this machine and all lanes of its vectors.
 
     Raises CompileError if LLVM rejects the emitted code, which would be a defect of dynx.
@@ -65,13 +67,13 @@ def compile_image(program: Program, target: Target | None = None, settings: Sett
     return Image(program.inputs, program.outputs, settings.lanes, target, objects)
 
 
-def compile_routines(routines: RoutineSet, target: Target, settings: Settings) -> Image:
+def compile_routines(routines: RoutineSet, target: Processor, settings: Settings) -> Image:
     """Compile a set of routines to an image, whose ports are those of the tables that call them."""
     code = compile_text(emit_routines(routines, target, settings), target)
     return Image((), (), settings.lanes, target, (code,))
 
 
-def compile_text(text: str, target: Target, *, quick: bool = False) -> bytes:
+def compile_text(text: str, target: Processor, *, quick: bool = False) -> bytes:
     """Compile the text of an LLVM module to an object file, without optimisation if `quick`.
 
     Raises CompileError if LLVM rejects it.

@@ -37,7 +37,7 @@ from dynx.simd.image import Code, Image, compile_text
 from dynx.simd.kernel import arguments_of_parts
 from dynx.simd.program import Port, Program, collection_paused
 from dynx.simd.routines import Place, Routine, RoutineBody, argument_word
-from dynx.simd.target import Target, host
+from dynx.simd.target import Processor, host
 from dynx.simd.threads import run_parts
 from dynx.simd.trigonometry import declarations, replacements
 from dynx.spatial.scalar import Floats
@@ -78,9 +78,9 @@ class Iteration:
         return Port("result", (self.n_results,))
 
 
-def emit_iteration(iteration: Iteration, target: Target, settings: Settings) -> str:
+def emit_iteration(iteration: Iteration, target: Processor, settings: Settings) -> str:
     """Return the text of the LLVM module of an iteration."""
-    layout = _Layout(iteration, settings.lanes)
+    layout = _PortLayout(iteration, settings.lanes)
     routine = Routine(iteration.step, layout.places)
     bodies = [RoutineBody(routine, target, settings, 0).text()]
     operands = ", ".join(f"i32 {place}" for place in (0, *layout.operands))
@@ -98,7 +98,7 @@ def emit_iteration(iteration: Iteration, target: Target, settings: Settings) -> 
     return "\n".join(parts) + "\n"
 
 
-class _Layout:
+class _PortLayout:
     """Places of the ports of a step among the vectors of the lanes and among the constants."""
 
     def __init__(self, iteration: Iteration, lanes: int) -> None:
@@ -133,7 +133,7 @@ class _Layout:
         ]
 
 
-def _copied(layout: _Layout, vector: int, row: str, column: int) -> list[str]:
+def _copied(layout: _PortLayout, vector: int, row: str, column: int) -> list[str]:
     """Return the code that copies an entry of a row to the lane %lane of a vector."""
     return [
         f"  %at{vector} = getelementptr double, ptr {row}, i64 {column}",
@@ -153,7 +153,7 @@ def _row(array: int) -> list[str]:
     ]
 
 
-def _take(iteration: Iteration, layout: _Layout) -> str:
+def _take(iteration: Iteration, layout: _PortLayout) -> str:
     """Return the function that loads a task into a lane."""
     lines = [
         "define internal void @take(ptr %arguments, ptr %vectors, i64 %lane, i64 %task) noinline {",
@@ -166,7 +166,7 @@ def _take(iteration: Iteration, layout: _Layout) -> str:
     return "\n".join([*lines, "  ret void", "}"])
 
 
-def _store(iteration: Iteration, layout: _Layout) -> str:
+def _store(iteration: Iteration, layout: _PortLayout) -> str:
     """Return the function that stores the result of the task in a lane."""
     lines = [
         "define internal void @store(ptr %arguments, ptr %vectors, i64 %lane, i64 %task) noinline {",
@@ -185,7 +185,7 @@ def _store(iteration: Iteration, layout: _Layout) -> str:
     return "\n".join([*lines, "  ret void", "}"])
 
 
-def _start(layout: _Layout) -> str:
+def _start(layout: _PortLayout) -> str:
     """Return the function that loads a row of the table of starts into a lane."""
     lines = [
         "define internal void @start(ptr %starts, ptr %vectors, i64 %lane, i64 %number) noinline {",
@@ -198,7 +198,7 @@ def _start(layout: _Layout) -> str:
     return "\n".join([*lines, "  ret void", "}"])
 
 
-def _loop(iteration: Iteration, layout: _Layout) -> str:
+def _loop(iteration: Iteration, layout: _PortLayout) -> str:
     """Return the entry function.
 
     `task` holds the number of the task of each lane, at least `end` if it has none; `end` is the number of
@@ -391,7 +391,7 @@ class IterationKernel:
         return [*words, constants.ctypes.data, 0, starts.ctypes.data, 0, int(stop), 0]
 
 
-def compile_iteration(iteration: Iteration, target: Target, settings: Settings) -> Image:
+def compile_iteration(iteration: Iteration, target: Processor, settings: Settings) -> Image:
     """Compile an iteration to an image, whose ports have a row for each task."""
     with collection_paused():
         code = compile_text(emit_iteration(iteration, target, settings), target)

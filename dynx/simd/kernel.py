@@ -22,7 +22,7 @@ from dynx.simd.arrays import (
 from dynx.simd.emit import Settings
 from dynx.simd.image import Code, Image, compile_image
 from dynx.simd.program import Port, Program
-from dynx.simd.target import Target, host
+from dynx.simd.target import Processor, host
 from dynx.simd.threads import run_parts
 from dynx.spatial.scalar import Floats
 
@@ -51,7 +51,11 @@ class Kernel:
     """Largest number of samples, below the number of lanes, for which the lanes are not filled."""
 
     def __init__(
-        self, source: Program | Image, *, target: Target | None = None, settings: Settings | None = None
+        self,
+        source: Program | Image,
+        *,
+        target: Processor | None = None,
+        settings: Settings | None = None,
     ) -> None:
         """Compile a program for `target` (by default this machine), or link an existing image."""
         self.image = source if isinstance(source, Image) else compile_image(source, target, settings)

@@ -28,7 +28,7 @@ from dynx.simd.emit import ENTRY, SegmentBody, Settings
 from dynx.simd.program import Port, Program, scalar_ranges
 from dynx.simd.rows import Rows, tiles
 from dynx.simd.schedule import Segment, schedule
-from dynx.simd.target import Target
+from dynx.simd.target import Processor
 from dynx.simd.trace import trace
 from dynx.simd.trigonometry import declarations, replacements
 
@@ -85,7 +85,7 @@ class RoutineSet:
         return 1 + max(len(routine.places) for routine in self.routines.values())
 
 
-def emit_routines(routines: RoutineSet, target: Target, settings: Settings) -> str:
+def emit_routines(routines: RoutineSet, target: Processor, settings: Settings) -> str:
     """Return the text of the LLVM module of a set of routines."""
     bodies = [
         RoutineBody(routine, target, settings, number).text()
@@ -173,7 +173,7 @@ def _loop(routines: RoutineSet, lanes: int) -> str:
 class RoutineBody(SegmentBody):
     """One routine as a function of its operands."""
 
-    def __init__(self, routine: Routine, target: Target, settings: Settings, number: int) -> None:
+    def __init__(self, routine: Routine, target: Processor, settings: Settings, number: int) -> None:
         # Other segments only store; here the results are stored at their places.
         first, *_ = schedule(routine.program, settings.lanes, len(routine.program.nodes) * 100)
         exact = Settings(settings.lanes, fast=False, segment=settings.segment)

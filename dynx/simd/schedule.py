@@ -41,7 +41,7 @@ Step = int | TrigGroup
 """A node to compute, or a group of sines and cosines."""
 
 
-class Store(NamedTuple):
+class TileStore(NamedTuple):
     """A tile of neighbouring columns of output number `output`, and the node of each."""
 
     output: int
@@ -54,7 +54,7 @@ class Segment:
     """Steps in order, then stores. `spilled` are the values that later segments need."""
 
     steps: list[Step] = field(default_factory=list)
-    stores: list[Store] = field(default_factory=list)
+    stores: list[TileStore] = field(default_factory=list)
 
     spilled: set[int] = field(default_factory=set)
 
@@ -166,10 +166,10 @@ def _ancestors(program: Program, indices: Iterable[int], done: set[int]) -> list
     return sorted(found)
 
 
-def _stores(program: Program, lanes: int) -> Iterator[Store]:
+def _stores(program: Program, lanes: int) -> Iterator[TileStore]:
     for output, (port, scalars) in enumerate(scalar_ranges(program.outputs)):
         for columns in tiles(port.size, lanes):
-            yield Store(output, columns, tuple(program.results[scalars[c]] for c in columns))
+            yield TileStore(output, columns, tuple(program.results[scalars[c]] for c in columns))
 
 
 def _computed_nodes(step: Step) -> list[int]:

@@ -38,7 +38,7 @@ def _multiple_of_product(arguments: Kinds) -> bool:
 
 
 @dataclass(frozen=True)
-class Rule:
+class RewriteRule:
     """A simplification of the operations `ops`, valid under its precondition.
 
     It applies only if `condition` holds for the kinds of the arguments.
@@ -51,7 +51,7 @@ class Rule:
     condition: Callable[[Kinds], bool] = lambda arguments: True
 
 
-def simplifier(rules: Iterable[Rule]) -> Simplify:
+def simplifier(rules: Iterable[RewriteRule]) -> Simplify:
     """Combine rules into one function that applies the first rule that matches.
 
     Candidates are looked up by the operation and the kinds of its arguments.
@@ -318,34 +318,36 @@ def _reciprocal(graph: Graph, op: Op, args: Args) -> int | None:
     return graph.apply("mul", args[0], graph.apply("div", graph.constant(1.0), args[1]))
 
 
-EXACT: tuple[Rule, ...] = (
-    Rule("constants", tuple(_FOLD), "exact", _fold, _every(*CONSTANT_KINDS)),
-    Rule("factor-one", ("mul", "div"), "exact", _factor_one, _some("one")),
-    Rule("factor-minus-one", ("mul", "div"), "exact", _minus_one, _some("minus one")),
-    Rule("neutral-zero", ("add", "sub"), "exact", _neutral_zero, _some("zero")),
-    Rule("double-negation", ("neg",), "exact", _double_negation, _some("neg")),
-    Rule("negated-factor", ("mul", "div"), "exact", _negated_factor, _some("neg")),
-    Rule("negated-multiple", ("neg",), "exact", _negated_multiple, _some("mul", "div")),
-    Rule("negated-term", ("add", "sub"), "exact", _negated_term, _some("neg")),
-    Rule("odd-and-even", ("sin", "cos", "tanh", "arctan", "abs"), "exact", _odd_and_even, _some("neg")),
-    Rule("power-of-two", ("div",), "exact", _power_of_two, _some(*CONSTANT_KINDS)),
-    Rule("decided", ("select",), "exact", _decided),
+EXACT: tuple[RewriteRule, ...] = (
+    RewriteRule("constants", tuple(_FOLD), "exact", _fold, _every(*CONSTANT_KINDS)),
+    RewriteRule("factor-one", ("mul", "div"), "exact", _factor_one, _some("one")),
+    RewriteRule("factor-minus-one", ("mul", "div"), "exact", _minus_one, _some("minus one")),
+    RewriteRule("neutral-zero", ("add", "sub"), "exact", _neutral_zero, _some("zero")),
+    RewriteRule("double-negation", ("neg",), "exact", _double_negation, _some("neg")),
+    RewriteRule("negated-factor", ("mul", "div"), "exact", _negated_factor, _some("neg")),
+    RewriteRule("negated-multiple", ("neg",), "exact", _negated_multiple, _some("mul", "div")),
+    RewriteRule("negated-term", ("add", "sub"), "exact", _negated_term, _some("neg")),
+    RewriteRule(
+        "odd-and-even", ("sin", "cos", "tanh", "arctan", "abs"), "exact", _odd_and_even, _some("neg")
+    ),
+    RewriteRule("power-of-two", ("div",), "exact", _power_of_two, _some(*CONSTANT_KINDS)),
+    RewriteRule("decided", ("select",), "exact", _decided),
 )
 
-FINITE: tuple[Rule, ...] = (
-    Rule("zero-factor", ("mul", "div"), "finite", _zero_factor, _some("zero")),
-    Rule("zero-term", ("add", "sub"), "finite", _zero_term, _some("zero")),
-    Rule("same-terms", ("sub",), "finite", _same_terms),
-    Rule("negated-sum", ("sub",), "finite", _negated_sum, _some("neg")),
-    Rule("negated-difference", ("neg",), "finite", _negated_difference, _some("sub")),
+FINITE: tuple[RewriteRule, ...] = (
+    RewriteRule("zero-factor", ("mul", "div"), "finite", _zero_factor, _some("zero")),
+    RewriteRule("zero-term", ("add", "sub"), "finite", _zero_term, _some("zero")),
+    RewriteRule("same-terms", ("sub",), "finite", _same_terms),
+    RewriteRule("negated-sum", ("sub",), "finite", _negated_sum, _some("neg")),
+    RewriteRule("negated-difference", ("neg",), "finite", _negated_difference, _some("sub")),
 )
 
-ROUNDED: tuple[Rule, ...] = (
-    Rule("scaled-twice", ("mul",), "rounded", _scaled_twice, _multiple_of_product),
-    Rule("common-factor", ("add", "sub"), "rounded", _common_factor, _every("mul")),
-    Rule("division-by-constant", ("div",), "rounded", _division_by_constant, _some(*CONSTANT_KINDS)),
-    Rule("quotient-of-product", ("div",), "rounded", _quotient_of_product, _some("mul")),
-    Rule("reciprocal", ("div",), "rounded", _reciprocal),
+ROUNDED: tuple[RewriteRule, ...] = (
+    RewriteRule("scaled-twice", ("mul",), "rounded", _scaled_twice, _multiple_of_product),
+    RewriteRule("common-factor", ("add", "sub"), "rounded", _common_factor, _every("mul")),
+    RewriteRule("division-by-constant", ("div",), "rounded", _division_by_constant, _some(*CONSTANT_KINDS)),
+    RewriteRule("quotient-of-product", ("div",), "rounded", _quotient_of_product, _some("mul")),
+    RewriteRule("reciprocal", ("div",), "rounded", _reciprocal),
 )
 
 STRICT: Simplify = simplifier(EXACT)

@@ -10,7 +10,7 @@ from llvmlite import binding
 
 
 @dataclass(frozen=True)
-class Target:
+class Processor:
     """Processor description of LLVM: target triple, name, features."""
 
     triple: str
@@ -55,10 +55,10 @@ class Target:
 
 
 @cache
-def host() -> Target:
+def host() -> Processor:
     """Return the processor of this machine."""
     _initialise()
-    return Target(
+    return Processor(
         binding.get_process_triple(), binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
     )
 

@@ -34,7 +34,7 @@ from dynx.simd.ir_writer import hex_double
 from dynx.simd.kernel import part_count
 from dynx.simd.program import Port, Program, collection_paused
 from dynx.simd.routines import Place, Routine, RoutineBody, argument_word
-from dynx.simd.target import Target, host
+from dynx.simd.target import Processor, host
 from dynx.simd.threads import run_parts
 from dynx.simd.trigonometry import declarations, replacements
 from dynx.spatial.scalar import Floats
@@ -80,12 +80,12 @@ class Variants:
         return self.program.outputs[: len(self.program.outputs) - len(self.masks)]
 
 
-def emit_variants(variants: Variants, target: Target, settings: Settings) -> str:
+def emit_variants(variants: Variants, target: Processor, settings: Settings) -> str:
     """Return the text of the LLVM module; CompileError unless there are as many lanes as variants."""
     if len(variants.table) != settings.lanes:
         raise CompileError(f"{len(variants.table)} variants and {settings.lanes} lanes")
     programs = enumerate((variants.program, variants.second))
-    bodies = [_Body(variants, program, number, target, settings) for number, program in programs]
+    bodies = [_VariantProgram(variants, program, number, target, settings) for number, program in programs]
     texts = [body.text() for body in bodies]
     places = bodies[0].operands
     operands = ", ".join(f"i32 {place}" for place in (0, *places))
@@ -100,14 +100,14 @@ def emit_variants(variants: Variants, target: Target, settings: Settings) -> str
     return "\n".join(parts) + "\n"
 
 
-class _Body(RoutineBody):
+class _VariantProgram(RoutineBody):
     """A program as a function of the number of the first variant, counted over all samples.
 
     The vectors hold the rows of the table, then the masks.
     """
 
     def __init__(
-        self, variants: Variants, program: Program, number: int, target: Target, settings: Settings
+        self, variants: Variants, program: Program, number: int, target: Processor, settings: Settings
     ) -> None:
         self._samples, width = len(variants.samples), variants.program.inputs[-1].size
         places: list[Place] = ["constants"] * self._samples
@@ -285,7 +285,7 @@ class VariantKernel:
         return words
 
 
-def compile_variants(variants: Variants, target: Target, settings: Settings) -> Image:
+def compile_variants(variants: Variants, target: Processor, settings: Settings) -> Image:
     """Compile variants to an image, whose ports are the inputs of a sample and the outputs of a variant."""
     with collection_paused():
         code = compile_text(emit_variants(variants, target, settings), target)

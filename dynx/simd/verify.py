@@ -13,7 +13,7 @@ from dynx.errors import CompileError
 from dynx.simd.expr import ARITY, COMMUTATIVE, Node, constant_key
 from dynx.simd.program import Program, scalar_ranges
 from dynx.simd.rows import tiles
-from dynx.simd.schedule import LEAVES, Segment, Store, TrigGroup
+from dynx.simd.schedule import LEAVES, Segment, TileStore, TrigGroup
 
 
 def check_nodes(nodes: Sequence[Node], n_inputs: int) -> None:
@@ -85,7 +85,7 @@ def check_schedule(program: Program, segments: Sequence[Segment], lanes: int) ->
     Inputs and constants are read where they are used; they are neither computed nor spilled.
     """
     segment_of: dict[int, int] = {}
-    stores: list[Store] = []
+    stores: list[TileStore] = []
     for number, segment in enumerate(segments):
 
         def use(node: int, user: str, number: int = number) -> None:
@@ -133,7 +133,7 @@ def _computed_nodes(program: Program, step: int | TrigGroup) -> Iterator[tuple[i
                 yield index, (angle,)
 
 
-def _check_stores(program: Program, stores: Sequence[Store], lanes: int) -> None:
+def _check_stores(program: Program, stores: Sequence[TileStore], lanes: int) -> None:
     for number, (port, scalars) in enumerate(scalar_ranges(program.outputs)):
         own = sorted((store for store in stores if store.output == number), key=lambda s: s.columns.start)
         if [store.columns for store in own] != tiles(port.size, lanes):

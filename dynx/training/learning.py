@@ -13,7 +13,7 @@ from dynx.training.evaluation import Evaluation, evaluate
 from dynx.training.library import log_to
 from dynx.training.observer import Observer
 from dynx.training.policy import Policy, Scaling
-from dynx.training.records import Lines, read_lines
+from dynx.training.records import JsonLines, read_lines
 from dynx.training.specification import TrainingSpec
 
 BEST, FINAL = "best.zip", "final.zip"
@@ -82,7 +82,7 @@ class Learning:
         self._algorithm, self._vector, self._judged = algorithm, vector, judged
         self._checkpoints, self._progress = checkpoints, progress
         done = int(algorithm.num_timesteps)
-        self._evaluations, self._curve = Lines(place / EVALUATIONS, done), Lines(place / CURVE, done)
+        self._evaluations, self._curve = JsonLines(place / EVALUATIONS, done), JsonLines(place / CURVE, done)
         means = (line.get("mean") for line in read_lines(place / EVALUATIONS))
         self._best = max((float(each) for each in means if is_real(each)), default=-float("inf"))
         self._last: Evaluation | None = None

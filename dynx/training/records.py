@@ -14,7 +14,7 @@ from dynx.files.reading import read_file
 from dynx.files.writing import write_text
 
 
-class Lines:
+class JsonLines:
     """JSON documents, one a line, each with its number of `steps`.
 
     Lines of more steps than `until`, and a last line that was cut off, are removed first: a run that goes on

@@ -86,7 +86,7 @@ def line(
     found near the previous one, or the bounds are not met: there the arm is near a singularity, or has to
     change its posture. Raises ArgumentError for invalid arguments.
     """
-    path = _Line(model, frame, q0, target, backend)
+    path = _StraightLine(model, frame, q0, target, backend)
     if law is not None and duration is None:
         motion_law = checked_law(law)
     elif law is None and duration is not None:
@@ -104,7 +104,7 @@ def line(
 
 
 def _refine(
-    path: _Line, engine: Backend, deviation: float, rotation_deviation: float
+    path: _StraightLine, engine: Backend, deviation: float, rotation_deviation: float
 ) -> tuple[PiecewisePolynomial, int, float, float]:
     """Return the spline within the bounds, its number of intervals, and its distance and angle errors."""
     n = MIN_INTERVALS
@@ -133,7 +133,7 @@ def _refine(
             )
 
 
-class _Line:
+class _StraightLine:
     """The straight line, and the configurations that follow it."""
 
     def __init__(

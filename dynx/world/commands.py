@@ -24,7 +24,6 @@ from dynx.steppers.layout import Layout, RobotLayout
 from dynx.steppers.stepper import Stepper
 from dynx.world.motors import JointLaw, Motor, combine
 from dynx.world.notes.divergence import LastLoads, RobotLoad
-from dynx.world.snapshot import Memory
 
 _FLOAT64 = np.dtype(np.float64)
 
@@ -235,15 +234,17 @@ class Commands:
             {k: self._wrenches[k] for k in pushed},
         )
 
-    def memory(self) -> Memory:
-        """Return what the motors keep from one step to the next."""
-        kept = (loads.memory for loads in self._loads)
-        return tuple(None if m is None else (tuple(m[0].tolist()), tuple(m[1].tolist())) for m in kept)
+    def memory(self) -> dict[str, Floats]:
+        """Return velocity and generalised force (2, nv) of the step before, by the robots whose motors depend
+        on them."""
+        kept = {name: self._loads[k].memory for name, k in self._robots.items()}
+        return {name: np.array(rows) for name, rows in kept.items() if rows is not None}
 
-    def remember(self, memory: Memory) -> None:
+    def remember(self, memory: Mapping[str, Floats]) -> None:
         """Restore what `memory` returned."""
-        for loads, m in zip(self._loads, memory, strict=True):
-            loads.memory = None if m is None else (np.array(m[0]), np.array(m[1]))
+        for name, k in self._robots.items():
+            rows = memory.get(name)
+            self._loads[k].memory = None if rows is None else (rows[0].copy(), rows[1].copy())
         self._more_than_torques = True
 
     def hold(self, torques: Mapping[str, ArrayLike] | None, count: int) -> Forces | None:

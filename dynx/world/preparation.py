@@ -43,7 +43,7 @@ def prepare(
     robots = tuple(
         _robot(robot, scene.gravity, joint_limits, joint_damping, joint_friction) for robot in scene.robots
     )
-    parts = _Parts(scene, robots)
+    parts = _PartLookup(scene, robots)
     colliders = parts.colliders() if collisions else ()
     return Layout(
         name=scene.name,
@@ -91,7 +91,7 @@ def _body(body: SceneBody) -> BodyLayout:
     )
 
 
-class _Parts:
+class _PartLookup:
     """Colliders and anchors of a scene, from the names of its parts."""
 
     def __init__(self, scene: Scene, robots: tuple[RobotLayout, ...]) -> None:

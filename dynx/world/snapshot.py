@@ -1,4 +1,4 @@
-"""Saved states of a world, in memory and in files.
+"""Saved states of a world or of a simulation; those of a world also in files.
 
 A file begins with `MAGIC`, then the SHA-256 of all that follows, the length of the header (8 bytes, least
 significant first), the header in JSON and the engine's own bytes. Everything is checked before the engine
@@ -10,13 +10,17 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from dynx.errors import ArgumentError, shown
 from dynx.files.arrays import WORLD_FILE
 from dynx.files.reading import checked_path, open_regular, printable
 from dynx.files.writing import write_bytes
+from dynx.spatial.scalar import Floats
 
 MAGIC = WORLD_FILE + b"1\n"
 SUFFIX = ".world"
@@ -28,30 +32,35 @@ _OTHER_SUFFIXES: dict[tuple[str, ...], str] = {
 MAX_BYTES = 1 << 30
 """Largest file that is read."""
 
-Memory = tuple[tuple[tuple[float, ...], tuple[float, ...]] | None, ...]
-"""Memory of each robot's motors from one step to the next (see `RobotLoads.memory`)."""
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Snapshot:
-    """The state of a world at one time: everything that determines its later steps."""
+    """State of a world or of a simulation at one time: everything that determines its later steps."""
 
     engine: str
+    """Name of the engine; of a simulation, that of its plant."""
     version: str
-    """Version of the engine."""
+    """Version of the engine; empty for a simulation without a world."""
     identity: str
-    """Hash of the scene, the step and the settings of the world."""
+    """Hash of what later steps depend on besides the state: of a world its scene, step and settings, of a
+    simulation its coordinates, base and step."""
     time: float
     """Time [s]."""
     start: float
     """Time [s] at which `steps` was 0."""
     steps: int
-    memory: Memory
+    arrays: Mapping[str, Floats]
+    """Numbers that are kept between steps beside the engine, by name. Of a world: velocity and generalised
+    force (2, nv) of the step before, by the robots whose motors depend on it. Of a simulation: ``q``, ``v``
+    and the torque ``tau`` of the last control step."""
     data: bytes
-    """State of the engine, in the engine's own format."""
+    """State of the engine, in the engine's own format; empty for an engine that keeps none."""
+    record: Any = None
+    """What a simulation recorded until then, and the state of its controller; None for a world."""
 
     def __repr__(self) -> str:
-        return f"<Snapshot of a {self.engine} world at {self.time:.6g} s, {len(self.data)} bytes>"
+        what = "world" if self.record is None else "simulation"
+        return f"<Snapshot of a {self.engine} {what} at {self.time:.6g} s, {len(self.data)} bytes>"
 
     def require(self, engine: str, version: str, identity: str) -> None:
         """Raise ArgumentError unless it is one of a world with the same engine, scene and options."""
@@ -95,8 +104,10 @@ def write_snapshot(path: str | os.PathLike[str], snapshot: Snapshot, world: dict
         "start": snapshot.start.hex(),
         "time": snapshot.time.hex(),
         "memory": [
-            None if pair is None else [[x.hex() for x in numbers] for numbers in pair]
-            for pair in snapshot.memory
+            [[x.hex() for x in row] for row in snapshot.arrays[name].tolist()]
+            if name in snapshot.arrays
+            else None
+            for name in _robots(world)
         ],
     }
     text = json.dumps(header, ensure_ascii=True, allow_nan=False).encode("ascii")
@@ -124,7 +135,8 @@ def read_snapshot(path: str | os.PathLike[str]) -> tuple[Snapshot, dict[str, Any
     length = int.from_bytes(content[:8], "little")
     try:
         header = json.loads(content[8 : 8 + length])
-        return _snapshot(header, content[8 + length :]), _world(header["world"])
+        world = _world(header["world"])
+        return _snapshot(header, _robots(world), content[8 + length :]), world
     # The header of a file that was not written by dynx may have any form.
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise ArgumentError(f"{name} cannot be read as a world: {error}") from error
@@ -141,13 +153,20 @@ def _other_kind(data: bytes, name: str) -> str:
     return ""
 
 
-def _snapshot(header: dict[str, Any], data: bytes) -> Snapshot:
-    memory = tuple(
-        None if pair is None else (_numbers(pair[0]), _numbers(pair[1])) for pair in header["memory"]
-    )
+def _snapshot(header: dict[str, Any], robots: Sequence[str], data: bytes) -> Snapshot:
+    arrays = {
+        name: np.array([[float.fromhex(x) for x in row] for row in rows])
+        for name, rows in zip(robots, header["memory"], strict=True)
+        if rows is not None
+    }
     engine, version, identity = (str(header[name]) for name in ("engine", "version", "identity"))
     time, start = (float.fromhex(header[name]) for name in ("time", "start"))
-    return Snapshot(engine, version, identity, time, start, int(header["steps"]), memory, data)
+    return Snapshot(engine, version, identity, time, start, int(header["steps"]), arrays, data)
+
+
+def _robots(world: Mapping[str, Any]) -> list[str]:
+    """Return the names of the robots in the document of a world, in order."""
+    return [each["name"] for each in world["scene"].get("robots") or ()]
 
 
 def _world(given: dict[str, Any]) -> dict[str, Any]:
@@ -159,7 +178,3 @@ def _world(given: dict[str, Any]) -> dict[str, Any]:
     if given["options"].keys() & given["settings"].keys():
         raise ValueError("options and settings have the same names")
     return given
-
-
-def _numbers(texts: list[str]) -> tuple[float, ...]:
-    return tuple(map(float.fromhex, texts))

@@ -325,7 +325,7 @@ class World:
 
         def load(engine: Stepper) -> None:
             engine.load(snapshot.data)
-            self._commands.remember(snapshot.memory)
+            self._commands.remember(snapshot.arrays)
 
         self._motion.change(load, (snapshot.start, snapshot.steps))
 

@@ -107,7 +107,7 @@ def test_a_flow_loads_no_room_that_it_does_not_need(name: str) -> None:
     needless = {
         room for room in flow.not_needed for module in modules if f"{module}.".startswith(f"dynx.{room}.")
     }
-    assert needless <= set(flow.loaded_now)
+    assert needless == set(flow.loaded_now)
 
 
 @pytest.mark.parametrize("name", FLOWS)

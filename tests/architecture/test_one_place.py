@@ -12,6 +12,7 @@ ROOT = Path(__file__).parents[2]
 IDEAS = {
     "random numbers": r"random\.(Philox|SeedSequence)\(",
     "recorded motion": r"^class Record\b",
+    "snapshot": r"^class Snapshot\b",
     "distance of two motions": r"^class Separation\b",
     "force from outside": r"def share\(self, t: float",
     "joint friction": r"^class FrictionLaw\b",

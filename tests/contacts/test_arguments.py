@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from dynx.contacts import Case, Figure, conform
+from dynx.contacts import ContactCase, Figure, conform
 from dynx.contacts.cases.slope import Slope
 from dynx.errors import ArgumentError
 from dynx.model import Pose
@@ -24,7 +24,7 @@ def exact() -> Iterator[None]:
     unregister_world("exact")
 
 
-class Resting(Case):
+class Resting(ContactCase):
     """A box at rest, of which a function gives the figures."""
 
     name = "resting"

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import pytest
 
-from dynx.contacts import Attribution, Candidate, Case, Figure, FigureResult, conform
+from dynx.contacts import Attribution, ContactCase, Figure, FigureResult, SettingsChange, conform
 from dynx.world import Scene, World, register_world, unregister_world
 from tests.contacts.exact_world import ExactWorld
 
@@ -23,7 +23,7 @@ def exact() -> Iterator[None]:
     unregister_world("exact")
 
 
-class Planned(Case):
+class Planned(ContactCase):
     """Two trials, whose figures have errors that follow from the settings alone."""
 
     name: ClassVar[str] = "planned"
@@ -59,7 +59,7 @@ class OneFigure(Planned):
         return [Figure("removed", 0.1 if world.settings[FRICTION] == 2.0 else 1e-5, 0.0, "", 1.0)]
 
 
-def results(*candidates: Candidate) -> dict[str, FigureResult]:
+def results(*candidates: SettingsChange) -> dict[str, FigureResult]:
     """Return the results by figure, of a world with the friction doubled."""
     given, tried = {"exact": {FRICTION: 2.0}}, {"exact": candidates}
     found = conform(["exact"], STEPS, [Planned()], settings=given, candidates=tried, jobs=0)
@@ -74,25 +74,25 @@ def cause(result: FigureResult) -> Attribution:
 
 def test_only_the_settings_that_act_are_the_cause() -> None:
     for change in ({FRICTION: (1.0,), INERTIA: (0.5,)}, {INERTIA: (0.5,), FRICTION: (1.0,)}):
-        found = results(Candidate(change, REASON))
+        found = results(SettingsChange(change, REASON))
         assert cause(found["removed"]).values == {FRICTION: (2.0, 1.0)}
         assert cause(found["both"]).values == {FRICTION: (2.0, 1.0), INERTIA: (1.0, 0.5)}
 
 
 def test_a_change_that_is_worse_at_some_step_is_no_cause() -> None:
-    trades = results(Candidate({FRICTION: (1.0,)}, REASON))["trades"]
+    trades = results(SettingsChange({FRICTION: (1.0,)}, REASON))["trades"]
     assert trades.errors[0] < 0.4
     assert trades.verdict.kind == "unexplained"
 
 
 def test_a_difference_within_the_tolerance_is_not_worse() -> None:
-    hardly = results(Candidate({FRICTION: (1.0,)}, REASON))["hardly"]
+    hardly = results(SettingsChange({FRICTION: (1.0,)}, REASON))["hardly"]
     assert 0.0 < cause(hardly).errors[-1][0] - hardly.errors[0] < hardly.tolerance
     assert cause(hardly).outcome == "falls"
 
 
 def test_an_error_that_then_falls_is_told_from_one_that_is_removed() -> None:
-    found = results(Candidate({FRICTION: (1.0,)}, REASON))
+    found = results(SettingsChange({FRICTION: (1.0,)}, REASON))
     assert (cause(found["removed"]).outcome, cause(found["removed"]).order) == ("removed", None)
     falls = cause(found["falls"])
     assert falls.outcome == "falls"
@@ -101,12 +101,12 @@ def test_an_error_that_then_falls_is_told_from_one_that_is_removed() -> None:
 
 
 def test_other_errors_that_a_change_makes_worse_are_its_price() -> None:
-    found = results(Candidate({FRICTION: (1.0,)}, REASON))
+    found = results(SettingsChange({FRICTION: (1.0,)}, REASON))
     (price,) = cause(found["removed"]).price
     assert (price.trial, price.figure, price.before, price.after) == ("other", "victim", 0.01, 0.5)
 
 
-def runs_and_cause(*candidates: Candidate) -> tuple[int, Attribution | None]:
+def runs_and_cause(*candidates: SettingsChange) -> tuple[int, Attribution | None]:
     """Return the number of runs that find the cause of one error, and the cause."""
     given, tried = {"exact": {FRICTION: 2.0}}, {"exact": candidates}
     found = conform(["exact"], STEPS, [OneFigure()], settings=given, candidates=tried, jobs=0)
@@ -115,19 +115,19 @@ def runs_and_cause(*candidates: Candidate) -> tuple[int, Attribution | None]:
 
 def test_values_beyond_the_first_that_is_a_cause_are_not_run() -> None:
     for values in ((1.0,), (1.0, 0.5)):
-        runs, found = runs_and_cause(Candidate({FRICTION: values}, REASON))
+        runs, found = runs_and_cause(SettingsChange({FRICTION: values}, REASON))
         assert runs == 2 * len(STEPS)
         assert found is not None
         assert found.values == {FRICTION: (2.0, 1.0)}
 
 
 def test_values_beyond_one_without_effect_are_not_run() -> None:
-    runs, found = runs_and_cause(Candidate({INERTIA: (0.5, 0.25)}, REASON))
+    runs, found = runs_and_cause(SettingsChange({INERTIA: (0.5, 0.25)}, REASON))
     assert (runs, found) == (len(STEPS) + 1, None)
 
 
 def test_values_beyond_the_one_in_use_are_run() -> None:
-    runs, found = runs_and_cause(Candidate({FRICTION: (2.0, 1.0)}, REASON))
+    runs, found = runs_and_cause(SettingsChange({FRICTION: (2.0, 1.0)}, REASON))
     assert runs == 2 * len(STEPS)
     assert found is not None
     assert found.values == {FRICTION: (2.0, 1.0)}

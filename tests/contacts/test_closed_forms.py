@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from dynx.contacts import Case, Figure, find_case
+from dynx.contacts import ContactCase, Figure, find_case
 from dynx.world import World, register_world, unregister_world
 from tests.contacts.exact_world import ExactWorld
 
@@ -49,7 +49,7 @@ def exact() -> Iterator[None]:
     unregister_world("exact")
 
 
-def figures(case: Case, trial: str, dt: float, **settings: Any) -> list[Figure]:
+def figures(case: ContactCase, trial: str, dt: float, **settings: Any) -> list[Figure]:
     """Return the figures of a trial in the exact world."""
     parameters = case.trials[trial]
     with World(case.scene(parameters), "exact", dt, **settings) as world:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import pytest
 
-from dynx.contacts import Candidate, Case, Conformance, Figure, FigureResult, conform
+from dynx.contacts import Conformance, ContactCase, Figure, FigureResult, SettingsChange, conform
 from dynx.contacts.run import Measured
 from dynx.contacts.series import TrialOfEngine, collect
 from dynx.errors import ArgumentError, UnknownBackendError, UnknownNameError
@@ -27,9 +27,9 @@ def exact() -> Iterator[None]:
 
 
 def conformance(
-    cases: Sequence[str | Case],
+    cases: Sequence[str | ContactCase],
     settings: Mapping[str, Any] | None = None,
-    candidates: Sequence[Candidate] = (),
+    candidates: Sequence[SettingsChange] = (),
     jobs: int = 0,
     **options: Any,
 ) -> Conformance:
@@ -55,8 +55,8 @@ def test_exact_mechanics_is_exact() -> None:
 
 def test_an_error_is_attributed_to_the_setting_that_removes_it() -> None:
     candidates = [
-        Candidate({"restitution_factor": (0.5, 0.0)}, "It plays no part."),
-        Candidate({"friction_factor": (1.4, 1.0)}, REASON),
+        SettingsChange({"restitution_factor": (0.5, 0.0)}, "It plays no part."),
+        SettingsChange({"friction_factor": (1.4, 1.0)}, REASON),
     ]
     found = conformance(["sliding_to_rolling"], {"friction_factor": 2.0}, candidates)
     result = figure(found, "distance")
@@ -69,7 +69,7 @@ def test_an_error_is_attributed_to_the_setting_that_removes_it() -> None:
 
 
 def test_an_error_without_a_cause_is_unexplained() -> None:
-    candidates = [Candidate({"restitution_factor": (0.5, 0.0)}, "It plays no part.")]
+    candidates = [SettingsChange({"restitution_factor": (0.5, 0.0)}, "It plays no part.")]
     found = conformance(["sliding_to_rolling"], {"friction_factor": 2.0}, candidates)
     assert figure(found, "distance").verdict.kind == "unexplained"
     assert found.unexplained == (figure(found, "distance"),)
@@ -78,13 +78,13 @@ def test_an_error_without_a_cause_is_unexplained() -> None:
 
 
 def test_an_error_that_a_change_reduces_and_does_not_remove_is_unexplained() -> None:
-    candidates = [Candidate({"friction_factor": (1.2,)}, REASON)]
+    candidates = [SettingsChange({"friction_factor": (1.2,)}, REASON)]
     found = conformance(["sliding_to_rolling"], {"friction_factor": 2.0}, candidates)
     assert figure(found, "distance").verdict.kind == "unexplained"
 
 
 def test_an_error_in_proportion_to_a_setting_is_attributed_to_it() -> None:
-    candidates = [Candidate({"depth": (5e-3, 2.5e-3)}, REASON)]
+    candidates = [SettingsChange({"depth": (5e-3, 2.5e-3)}, REASON)]
     found = conformance(["resting_depth"], {"depth": 1e-2}, candidates)
     attribution = figure(found, "depth of the ball").verdict.attribution
     assert attribution is not None
@@ -94,16 +94,16 @@ def test_an_error_in_proportion_to_a_setting_is_attributed_to_it() -> None:
 
 
 def test_a_setting_that_is_beyond_the_values_tried_is_no_cause_in_proportion() -> None:
-    candidates = [Candidate({"depth": (1e-2, 2e-2)}, REASON)]
+    candidates = [SettingsChange({"depth": (1e-2, 2e-2)}, REASON)]
     found = conformance(["resting_depth"], {"depth": 1e-2}, candidates)
     assert figure(found, "depth of the ball").verdict.kind == "unexplained"
 
 
 def test_two_settings_are_a_cause_together_where_neither_is_alone() -> None:
     candidates = [
-        Candidate({"friction_factor": (1.0,)}, "Friction."),
-        Candidate({"inertia_factor": (1.0,)}, "Inertia."),
-        Candidate({"friction_factor": (1.0,), "inertia_factor": (1.0,)}, REASON),
+        SettingsChange({"friction_factor": (1.0,)}, "Friction."),
+        SettingsChange({"inertia_factor": (1.0,)}, "Inertia."),
+        SettingsChange({"friction_factor": (1.0,), "inertia_factor": (1.0,)}, REASON),
     ]
     given = {"friction_factor": 1.5, "inertia_factor": 0.2}
     found = conformance(["sliding_to_rolling"], given, candidates)
@@ -113,7 +113,7 @@ def test_two_settings_are_a_cause_together_where_neither_is_alone() -> None:
     assert attribution.values == {"friction_factor": (1.5, 1.0), "inertia_factor": (0.2, 1.0)}
 
 
-class Euler(Case):
+class Euler(ContactCase):
     """A ball in free fall, whose figures have known errors."""
 
     name: ClassVar[str] = "euler"

@@ -167,6 +167,8 @@ def test_a_snapshot_of_another_robot_or_step_is_refused() -> None:
             saved = slow.save()
         with pytest.raises(ArgumentError, match="dt"):
             arm.restore(saved)
+        with pytest.raises(ArgumentError, match="of a world"):
+            arm.restore(replace(saved, record=None))
 
 
 def test_a_simulation_without_a_duration_goes_on() -> None:

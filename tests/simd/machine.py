@@ -11,14 +11,14 @@ from llvmlite import binding
 
 from dynx.simd.emit import ENTRY, Settings, emit
 from dynx.simd.program import Program
-from dynx.simd.target import Target, host
+from dynx.simd.target import Processor, host
 from dynx.spatial.scalar import Floats
 
 X86 = platform.machine().lower() in ("x86_64", "amd64")
-SSE2 = Target(host().triple, "x86-64", "")
+SSE2 = Processor(host().triple, "x86-64", "")
 """The baseline of x86-64: vectors of two doubles, no fused multiply-add."""
 
-TARGETS: tuple[Target, ...] = (host(), SSE2) if X86 else (host(),)
+TARGETS: tuple[Processor, ...] = (host(), SSE2) if X86 else (host(),)
 """This processor and, if it is an x86-64 one, the baseline of that family."""
 
 LANES = (2, 4, 8)
@@ -27,7 +27,7 @@ LANES = (2, 4, 8)
 class Machine:
     """A program compiled for `target`."""
 
-    def __init__(self, program: Program, target: Target, settings: Settings) -> None:
+    def __init__(self, program: Program, target: Processor, settings: Settings) -> None:
         self._program = program
         module = binding.parse_assembly(emit(program, target, settings))
         module.verify()

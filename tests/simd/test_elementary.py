@@ -26,7 +26,7 @@ from dynx.simd.elementary import (
 )
 from dynx.simd.emit import Settings
 from dynx.simd.interp import interpret
-from dynx.simd.target import Target
+from dynx.simd.target import Processor
 from dynx.simd.trace import trace
 from dynx.spatial.scalar import Array, Floats, arctan, exp, tanh
 from tests.simd.machine import LANES, TARGETS, Machine, same_bits
@@ -42,11 +42,11 @@ each_function = pytest.mark.parametrize("name", FUNCTIONS)
 
 
 @functools.cache
-def machine(name: str, target: Target, lanes: int, fast: bool) -> Machine:
+def machine(name: str, target: Processor, lanes: int, fast: bool) -> Machine:
     return Machine(trace(FUNCTIONS[name], {"x": (1,)}), target, Settings(lanes, fast=fast))
 
 
-def evaluated(name: str, target: Target, x: Floats, *, lanes: int = 4, fast: bool = True) -> Floats:
+def evaluated(name: str, target: Processor, x: Floats, *, lanes: int = 4, fast: bool = True) -> Floats:
     return np.asarray(machine(name, target, lanes, fast)([np.ascontiguousarray(x)[:, None]])[0][:, 0])
 
 
@@ -96,7 +96,7 @@ POINTS: dict[str, Floats] = {
 @each_target
 @each_function
 @pytest.mark.parametrize("points", POINTS)
-def test_within_two_units_everywhere(name: str, target: Target, points: str) -> None:
+def test_within_two_units_everywhere(name: str, target: Processor, points: str) -> None:
     x = POINTS[points]
     assert errors(name, x, evaluated(name, target, x)).max() <= MAX_ERROR
 
@@ -110,14 +110,14 @@ def test_within_two_units_everywhere(name: str, target: Target, points: str) -> 
         ("arctan", [math.pi / 2, -math.pi / 2, np.nan, 0.0, -0.0, math.pi / 2, -math.pi / 2]),
     ],
 )
-def test_limits_zeros_and_nan(name: str, target: Target, wanted: list[float]) -> None:
+def test_limits_zeros_and_nan(name: str, target: Processor, wanted: list[float]) -> None:
     x = np.array([np.inf, -np.inf, np.nan, 0.0, -0.0, 1e300, -1e300])
     assert same_bits(evaluated(name, target, x), np.array(wanted))
 
 
 @each_target
 @each_function
-def test_the_same_in_every_lane_and_mode_and_odd_where_it_should_be(name: str, target: Target) -> None:
+def test_the_same_in_every_lane_and_mode_and_odd_where_it_should_be(name: str, target: Processor) -> None:
     """Bit for bit: the simplification that moves the sign out of an odd function is exact."""
     x = np.concatenate([RNG.uniform(-30.0, 30.0, 400), [0.0, 5e-324, 1e300, np.inf, np.nan]])
     one = evaluated(name, target, x)
@@ -131,7 +131,7 @@ def test_the_same_in_every_lane_and_mode_and_odd_where_it_should_be(name: str, t
 
 @each_target
 @each_function
-def test_lanes_do_not_affect_each_other(name: str, target: Target) -> None:
+def test_lanes_do_not_affect_each_other(name: str, target: Processor) -> None:
     x = RNG.uniform(-10.0, 10.0, 8)
     clean = evaluated(name, target, x, lanes=8)
     for lane in range(8):

@@ -16,7 +16,7 @@ from dynx.simd.expr import ARITY, Graph, Op, Simplify
 from dynx.simd.interp import Function, interpret
 from dynx.simd.program import Port, Program, extract_program
 from dynx.simd.simplify import FAST, STRICT
-from dynx.simd.target import Target
+from dynx.simd.target import Processor
 from dynx.spatial.scalar import Floats
 from tests.simd.machine import LANES, TARGETS, X86, Machine, same_bits
 from tests.simd.programs import (
@@ -40,7 +40,7 @@ LAYOUTS = ("rows", "padded", "every second", "backwards", "one row")
 
 
 @functools.cache
-def kernel_functions(target: Target) -> dict[Op, Function]:
+def kernel_functions(target: Processor) -> dict[Op, Function]:
     """Elementary functions as the kernels of `target` compute them; `test_trigonometry` and
     `test_elementary` judge these."""
     functions: dict[Op, Function] = {}
@@ -83,7 +83,7 @@ def draw_inputs(program: Program, rng: np.random.Generator, n: int, *, special: 
 @given(programs(), TARGET, LANE, BATCH, SEGMENT, st.booleans(), RANDOM)
 def test_strict_code_is_the_interpreter_bit_for_bit(
     program: Program,
-    target: Target,
+    target: Processor,
     lanes: int,
     more: int,
     segment: int,
@@ -111,7 +111,7 @@ def test_strict_code_is_the_interpreter_bit_for_bit(
 def test_fast_code_is_the_interpreter_to_rounding(
     program: Program,
     simplify: Simplify | None,
-    target: Target,
+    target: Processor,
     lanes: int,
     more: int,
     segment: int,
@@ -158,7 +158,7 @@ def all_operations() -> Program:
 @pytest.mark.parametrize("lanes", LANES)
 @pytest.mark.parametrize("fast", [False, True], ids=["strict", "fast"])
 @pytest.mark.parametrize("poison", [np.nan, np.inf, -np.inf, 1e300, 2.0**-1074])
-def test_lanes_are_independent(target: Target, lanes: int, fast: bool, poison: float) -> None:
+def test_lanes_are_independent(target: Processor, lanes: int, fast: bool, poison: float) -> None:
     machine = Machine(all_operations(), target, Settings(lanes, fast=fast))
     x = ordinary(np.random.default_rng(lanes), (lanes, 2))
     (clean,) = machine([x])
@@ -174,7 +174,7 @@ def test_lanes_are_independent(target: Target, lanes: int, fast: bool, poison: f
 
 @given(programs(), TARGET, LANE, BATCH, st.sampled_from(("padded", "every second")), RANDOM)
 def test_no_memory_outside_the_rows_is_written(
-    program: Program, target: Target, lanes: int, more: int, layout: str, rng: np.random.Generator
+    program: Program, target: Processor, lanes: int, more: int, layout: str, rng: np.random.Generator
 ) -> None:
     n = lanes + min(more, 2 * lanes + 1)
     inputs = draw_inputs(program, rng, n, special=True)
@@ -224,14 +224,14 @@ def test_inputs_are_copied_to_outputs_of_every_width() -> None:
 
 
 CROSS = (
-    Target("x86_64-unknown-linux-gnu", "skylake-avx512", "+avx,+avx2,+fma,+avx512f,+avx512vl"),
-    Target("x86_64-unknown-linux-gnu", "x86-64", ""),
+    Processor("x86_64-unknown-linux-gnu", "skylake-avx512", "+avx,+avx2,+fma,+avx512f,+avx512vl"),
+    Processor("x86_64-unknown-linux-gnu", "x86-64", ""),
 )
 
 
 @pytest.mark.skipif(not X86, reason="LLVM is built for this machine's family")
 @pytest.mark.parametrize("target", CROSS, ids=lambda target: target.cpu)
-def test_code_for_other_processors_of_the_family(target: Target) -> None:
+def test_code_for_other_processors_of_the_family(target: Processor) -> None:
     """The code cannot run here, but LLVM accepts it and uses that processor's widest vectors."""
     program = all_operations()
     machine = target.machine()

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from dynx.simd.emit import Settings, emit
-from dynx.simd.target import Target
+from dynx.simd.target import Processor
 from dynx.simd.trace import trace
 from dynx.spatial.scalar import Array, sin
 
@@ -24,7 +24,7 @@ def text() -> str:
     def function(x: Array) -> Array:
         return np.asarray(x[0] * x[1] + sin(x[0]))
 
-    target = Target("x86_64-unknown-linux-gnu", "haswell", "+avx,+avx2,+fma")
+    target = Processor("x86_64-unknown-linux-gnu", "haswell", "+avx,+avx2,+fma")
     return emit(trace(function, {"x": (2,)}), target, Settings(2, fast=False))
 
 

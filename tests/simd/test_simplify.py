@@ -13,7 +13,7 @@ from dynx.simd import simplify
 from dynx.simd.expr import ARITY, Graph, Op
 from dynx.simd.interp import interpret
 from dynx.simd.program import Port, Program, extract_program
-from dynx.simd.simplify import EXACT, FAST, FINITE, ROUNDED, STRICT, Args, Rule, simplifier
+from dynx.simd.simplify import EXACT, FAST, FINITE, ROUNDED, STRICT, Args, RewriteRule, simplifier
 from dynx.spatial.scalar import Floats
 from tests.simd.machine import same_bits
 from tests.simd.programs import (
@@ -100,11 +100,11 @@ def test_every_rule_has_a_case() -> None:
     assert len(RULES) == len(EXACT) + len(FINITE) + len(ROUNDED)
 
 
-def _rules(value: object) -> Iterator[Rule]:
-    if isinstance(value, Rule):
+def _rules(value: object) -> Iterator[RewriteRule]:
+    if isinstance(value, RewriteRule):
         yield value
     elif isinstance(value, tuple | list | set):
-        yield from (rule for rule in value if isinstance(rule, Rule))
+        yield from (rule for rule in value if isinstance(rule, RewriteRule))
 
 
 def test_the_rule_sets_match_the_preconditions() -> None:
@@ -115,7 +115,7 @@ def test_the_rule_sets_match_the_preconditions() -> None:
 class Both:
     """A shape with and without one rule; `fired`: the rule applied."""
 
-    def __init__(self, rule: Rule, shape: Shape, constants: dict[str, float]) -> None:
+    def __init__(self, rule: RewriteRule, shape: Shape, constants: dict[str, float]) -> None:
         self._constants = constants
         graph = Graph()
         for slot in range(3):
@@ -173,7 +173,7 @@ def test_the_rule_applies(name: str, shape: Shape) -> None:
     assert Both(RULES[name], shape, _constants(3.0, 7.0)).fired
 
 
-def _of(rules: Sequence[Rule]) -> Callable[..., object]:
+def _of(rules: Sequence[RewriteRule]) -> Callable[..., object]:
     names = {rule.name for rule in rules}
     return pytest.mark.parametrize(("name", "shape"), [case for case in SHAPES if case[0] in names], ids=str)
 

@@ -11,7 +11,7 @@ import pytest
 
 from dynx.simd.emit import Settings
 from dynx.simd.interp import cosine, sine
-from dynx.simd.target import Target
+from dynx.simd.target import Processor
 from dynx.simd.trace import trace
 from dynx.simd.trigonometry import COS, HALF_PI, HALF_PI_SHORT, LIMIT, SIN
 from dynx.spatial.scalar import Array, Floats, cos, sin
@@ -25,14 +25,14 @@ MAX_ERROR_BEYOND_LIMIT = 1.0
 
 
 @functools.cache
-def machine(target: Target, lanes: int, fast: bool) -> Machine:
+def machine(target: Processor, lanes: int, fast: bool) -> Machine:
     def both(x: Array) -> dict[str, Array]:
         return {"sin": sin(x), "cos": cos(x)}
 
     return Machine(trace(both, {"x": (1,)}), target, Settings(lanes, fast=fast))
 
 
-def evaluated(target: Target, x: Floats, *, lanes: int = 4, fast: bool = True) -> tuple[Floats, Floats]:
+def evaluated(target: Processor, x: Floats, *, lanes: int = 4, fast: bool = True) -> tuple[Floats, Floats]:
     s, c = machine(target, lanes, fast)([np.ascontiguousarray(x)[:, None]])
     return s[:, 0], c[:, 0]
 
@@ -70,14 +70,14 @@ POINTS["worst known"] = np.array(
 
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.cpu)
 @pytest.mark.parametrize("points", POINTS)
-def test_within_two_units_up_to_the_limit(target: Target, points: str) -> None:
+def test_within_two_units_up_to_the_limit(target: Processor, points: str) -> None:
     x = POINTS[points]
     worst = max(error.max() for error in errors(x, *evaluated(target, x)))
     assert worst <= MAX_ERROR
 
 
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.cpu)
-def test_within_one_unit_beyond_it(target: Target) -> None:
+def test_within_one_unit_beyond_it(target: Processor) -> None:
     x = np.array([1e6, 1e15, 1e22, 1e300, np.nextafter(LIMIT, np.inf), np.finfo(float).max])
     x = np.concatenate([x, -x, 10.0 ** RNG.uniform(5.0, 308.0, 1000)])
     worst = max(error.max() for error in errors(x, *evaluated(target, x)))
@@ -85,14 +85,14 @@ def test_within_one_unit_beyond_it(target: Target) -> None:
 
 
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.cpu)
-def test_infinity_and_nan_give_nan_and_zero_keeps_its_sign(target: Target) -> None:
+def test_infinity_and_nan_give_nan_and_zero_keeps_its_sign(target: Processor) -> None:
     s, c = evaluated(target, np.array([np.inf, -np.inf, np.nan, 0.0, -0.0]))
     assert same_bits(s, np.array([np.nan, np.nan, np.nan, 0.0, -0.0]))
     assert same_bits(c, np.array([np.nan, np.nan, np.nan, 1.0, 1.0]))
 
 
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.cpu)
-def test_odd_and_even_and_the_same_in_every_lane_and_mode(target: Target) -> None:
+def test_odd_and_even_and_the_same_in_every_lane_and_mode(target: Processor) -> None:
     """Bit for bit: the simplification that moves the sign out of sine and cosine is exact."""
     x = np.concatenate(
         [RNG.uniform(0.0, 10.0, 500), RNG.uniform(0.0, 2.0 * LIMIT, 500), [0.0, 5e-324, 1e300]]
@@ -106,7 +106,7 @@ def test_odd_and_even_and_the_same_in_every_lane_and_mode(target: Target) -> Non
 
 
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.cpu)
-def test_a_large_angle_in_one_lane_does_not_affect_the_others(target: Target) -> None:
+def test_a_large_angle_in_one_lane_does_not_affect_the_others(target: Processor) -> None:
     """All lanes take the branch, but only that lane uses the result of the C library."""
     x = RNG.uniform(-10.0, 10.0, 8)
     clean = evaluated(target, x, lanes=8)

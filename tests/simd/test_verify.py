@@ -15,7 +15,7 @@ from dynx.errors import CompileError
 from dynx.simd.emit import Settings, emit
 from dynx.simd.expr import Graph, Node
 from dynx.simd.program import Port, Program, extract_program
-from dynx.simd.schedule import Segment, Store, TrigGroup, schedule
+from dynx.simd.schedule import Segment, TileStore, TrigGroup, schedule
 from dynx.simd.verify import check_nodes, check_program, check_schedule
 from tests.simd.machine import LANES, TARGETS
 from tests.simd.programs import programs
@@ -166,7 +166,7 @@ def _sine_alone(segments: list[Segment]) -> None:
     segments[0].steps[0] = NUMBER["sin"]
 
 
-def _stores(segments: list[Segment]) -> tuple[Segment, Store]:
+def _stores(segments: list[Segment]) -> tuple[Segment, TileStore]:
     (found,) = ((segment, store) for segment in segments for store in segment.stores if store.output == 0)
     return found
 

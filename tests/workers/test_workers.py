@@ -9,7 +9,7 @@ import pytest
 from dynx.agreement import results_document
 from dynx.agreement.agreement import AgreementTask
 from dynx.cli.agree.run import agreement_run
-from dynx.workers import Failure, Workers
+from dynx.workers import WorkerFailure, Workers
 from tests.workers.targets import act, crash_on_panda
 
 
@@ -28,7 +28,7 @@ def test_only_the_culprit_of_a_crash_is_marked(deadly: str, message: str) -> Non
     assert [found[k] for k in (0, 2, 3, 5)] == ["a", "b", "c", "d"]
     for k in (1, 4):
         failure = found[k]
-        assert isinstance(failure, Failure)
+        assert isinstance(failure, WorkerFailure)
         assert failure.kind == "crash"
         assert message in failure.message
 
@@ -37,7 +37,7 @@ def test_a_hang_is_ended_and_the_rest_is_done() -> None:
     found = outcomes(["a", "hang", "b"], size=1, timeout=3.0)
     assert found[0] == "a"
     assert found[2] == "b"
-    assert isinstance(found[1], Failure)
+    assert isinstance(found[1], WorkerFailure)
     assert found[1].kind == "timeout"
 
 
@@ -51,7 +51,7 @@ def test_the_import_of_the_target_is_not_part_of_the_first_task() -> None:
 def test_an_exception_and_printing_are_survived_by_the_process() -> None:
     with Workers(act, 1) as workers:
         values = list(workers.run(["a", "raise", "print", "b"]))
-    assert values[1].failure == Failure("defect", "ZeroDivisionError: no reason")
+    assert values[1].failure == WorkerFailure("defect", "ZeroDivisionError: no reason")
     assert values[0].value[1] == values[2].value[1] == values[3].value[1]
 
 

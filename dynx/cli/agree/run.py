@@ -15,13 +15,13 @@ from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, fai
 from dynx.cli.shell.inputs import Locks, pose_of
 from dynx.cli.shell.lazy import import_object
 from dynx.cli.shell.output_file import check_json, require_apart
-from dynx.cli.shell.run import Run, carry_out
+from dynx.cli.shell.run import TaskRun, carry_out
 from dynx.cli.shell.terminal import console, write_json
 from dynx.errors import DynxError
 from dynx.model.expansion import expand, refusals
 from dynx.model.tree import Base
 
-AgreementRun = Run[AgreementTask, AgreementReport]
+AgreementRun = TaskRun[AgreementTask, AgreementReport]
 
 
 def agree(
@@ -77,7 +77,7 @@ def agreement_run(
     left_out: Sequence[str] = (),
 ) -> AgreementRun:
     """Prepare the run of ``dynx agree``."""
-    return Run(tasks, target, refused, _problem, _verdict, "comparing", refusals, left_out)
+    return TaskRun(tasks, target, refused, _problem, _verdict, "comparing", refusals, left_out)
 
 
 def _verdict(report: AgreementReport) -> str:

@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Literal, TypedDict
 
-from dynx.contacts import Attribution, Case, Conformance, FigureResult, NoResult, Outcome, VerdictKind
+from dynx.contacts import (
+    Attribution,
+    AttributionOutcome,
+    Conformance,
+    ContactCase,
+    FigureResult,
+    NoResult,
+    VerdictKind,
+)
 
 SCHEMA: Literal["dynx.contacts/1"] = "dynx.contacts/1"
 
@@ -44,7 +52,7 @@ class AttributionEntry(TypedDict):
     settings: dict[str, list[Any]]
     reason: str
     errors: list[list[float]]
-    outcome: Outcome
+    outcome: AttributionOutcome
     order: float | None
     price: list[PriceEntry]
 
@@ -129,7 +137,7 @@ def document(found: Conformance, seconds: float) -> ContactsDocument:
     }
 
 
-def _case(found: Conformance, case: Case) -> CaseEntry:
+def _case(found: Conformance, case: ContactCase) -> CaseEntry:
     return {
         "name": case.name,
         "title": case.title,

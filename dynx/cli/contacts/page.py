@@ -42,7 +42,7 @@ class CausedErrors(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Cause:
+class SettingCause:
     """A change of an engine's settings, and the errors that it removes or makes fall, by case."""
 
     engine: str
@@ -70,7 +70,7 @@ def contacts_page(report: Entry, *, command: str | None = None) -> str:
     )
 
 
-def causes(cases: Sequence[Entry]) -> list[Cause]:
+def causes(cases: Sequence[Entry]) -> list[SettingCause]:
     """Return the changes of settings to which errors are attributed."""
     found: dict[tuple[str, str, str], dict[str, list[Entry]]] = defaultdict(lambda: defaultdict(list))
     for case in cases:
@@ -80,7 +80,7 @@ def causes(cases: Sequence[Entry]) -> list[Cause]:
                 change = wording.change_text(cause["settings"], arrow="\N{RIGHTWARDS ARROW}")
                 found[figure["engine"], change, cause["reason"]][case["name"]].append(figure)
     return [
-        Cause(
+        SettingCause(
             *key,
             tuple(each for name, figures in by_case.items() for each in _caused_errors(name, figures)),
         )

@@ -18,7 +18,7 @@ from dynx.cli.shell.output_file import check_json, check_writable
 from dynx.cli.shell.progress import progress_bar
 from dynx.cli.shell.settings import settings_by_engine
 from dynx.cli.shell.terminal import command_line, console, counted, present
-from dynx.contacts import STEPS, Case, Conformance, conform, find_cases
+from dynx.contacts import STEPS, Conformance, ContactCase, conform, find_cases
 from dynx.contacts.candidates import SUBSTEPS
 from dynx.errors import ArgumentError
 from dynx.files.writing import write_text
@@ -101,7 +101,7 @@ def _conclude(
     return NEGATIVE_RESULT if found.unexplained or found.failures else DONE
 
 
-def _list_cases(cases: Sequence[Case]) -> None:
+def _list_cases(cases: Sequence[ContactCase]) -> None:
     """Print name and title of each case, and its law below."""
     out = console()
     for case in cases:

@@ -53,7 +53,7 @@ def show(out: Console, report: Entry, *, every_figure: bool = False) -> None:
     ends = " .. ".join(step_text(each) for each in dict.fromkeys((report["steps"][0], report["steps"][-1])))
     out.print(f"relative errors at {ends}")
     rows = [each for found in shown.values() for each in found]
-    layout = _Layout(out, report["steps"], rows, tolerances=every_figure)
+    layout = _FigureColumns(out, report["steps"], rows, tolerances=every_figure)
     for case in report["cases"]:
         if case["name"] not in shown:
             continue
@@ -87,7 +87,7 @@ def _by_name(case: Entry) -> list[Entry]:
     return [each for found in figures_by_name(case).values() for each in found.values()]
 
 
-class _Layout:
+class _FigureColumns:
     """Columns of the lines of figures: engine, errors, name of the figure, verdict."""
 
     def __init__(

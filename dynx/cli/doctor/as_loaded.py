@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.text import Text
 
 from dynx.cli.doctor.conclusion import DoctorRun, refusal
-from dynx.cli.doctor.outputs import Outputs
+from dynx.cli.doctor.outputs import ReportFiles
 from dynx.cli.doctor.repetition import doctor_command
 from dynx.cli.doctor.run import doctor_run
 from dynx.cli.doctor.tables import error_text, show_engines, show_errors
@@ -39,7 +39,7 @@ def compare(
     quiet: bool,
 ) -> int:
     """Compare the engines on each robot; return the exit code of ``dynx agree``."""
-    outputs = Outputs(json=json_path)
+    outputs = ReportFiles(json=json_path)
     outputs.check()
     check_engines(engines)
     found = expand(robots)
@@ -50,7 +50,7 @@ def compare(
     return carry_out(run, jobs, timeout, quiet, lambda: _conclude(run, outputs, engines, quiet))
 
 
-def _conclude(run: DoctorRun, outputs: Outputs, engines: tuple[str, ...] | None, quiet: bool) -> int:
+def _conclude(run: DoctorRun, outputs: ReportFiles, engines: tuple[str, ...] | None, quiet: bool) -> int:
     reports = run.results
     errors = outputs.write(reports, run.not_done, run.left_out)
     outputs.echo(reports, run.not_done, run.left_out)

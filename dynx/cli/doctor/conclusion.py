@@ -8,19 +8,19 @@ from collections.abc import Mapping, Sequence
 from rich.console import Console
 
 from dynx.cli.doctor.mending import write_mended
-from dynx.cli.doctor.outputs import Outputs, save_counterexamples
+from dynx.cli.doctor.outputs import ReportFiles, save_counterexamples
 from dynx.cli.doctor.overview import show_many, show_summary
 from dynx.cli.doctor.repetition import doctor_command
 from dynx.cli.doctor.tables import show_one
 from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, one_line, short_line
-from dynx.cli.shell.run import Run
+from dynx.cli.shell.run import TaskRun
 from dynx.cli.shell.terminal import command_line, console, counted
 from dynx.doctor.formats.baseline import Baseline
 from dynx.doctor.report import DoctorReport
 from dynx.doctor.task import DoctorTask, missing_engines
 from dynx.errors import DynxError
 
-DoctorRun = Run[DoctorTask, DoctorReport]
+DoctorRun = TaskRun[DoctorTask, DoctorReport]
 
 _MAX_DIFFERENCES = 6
 """Number of differences listed for each robot against a baseline."""
@@ -37,7 +37,7 @@ class Conclusion:
     def __init__(
         self,
         run: DoctorRun,
-        outputs: Outputs,
+        outputs: ReportFiles,
         baseline: Baseline | None,
         targets: Sequence[str | None],
         in_place: bool,

@@ -30,7 +30,7 @@ STDOUT = "-"
 
 
 @dataclass(frozen=True)
-class Outputs:
+class ReportFiles:
     """The file of each format, or None; JSON can go to `STDOUT`."""
 
     json: str | None = None

@@ -7,8 +7,8 @@ from typing import Literal
 
 from dynx.cli.doctor.conclusion import Conclusion, DoctorRun
 from dynx.cli.doctor.mending import planned_targets
-from dynx.cli.doctor.outputs import Outputs
-from dynx.cli.shell.run import Run, carry_out
+from dynx.cli.doctor.outputs import ReportFiles
+from dynx.cli.shell.run import TaskRun, carry_out
 from dynx.doctor.formats.baseline import load_baseline
 from dynx.doctor.report import DoctorReport
 from dynx.doctor.task import DoctorTask, check_engines, examine, refused
@@ -43,7 +43,7 @@ def doctor(
     quiet: bool,
 ) -> int:
     """Examine each robot; return the exit code."""
-    outputs = Outputs(json_path, html, junit, sarif, write_baseline, github)
+    outputs = ReportFiles(json_path, html, junit, sarif, write_baseline, github)
     outputs.check()
     choices = tuple(checked_choices(choose).items())
     check_engines(engines)
@@ -73,7 +73,7 @@ def doctor_run(
     left_out: Sequence[str] = (),
 ) -> DoctorRun:
     """Prepare the run of ``dynx doctor`` or of ``dynx agree --as-loaded``."""
-    return Run(tasks, target, refused, _problem, _verdict, "examining", refusals, left_out)
+    return TaskRun(tasks, target, refused, _problem, _verdict, "examining", refusals, left_out)
 
 
 def _verdict(report: DoctorReport) -> str:

@@ -17,7 +17,7 @@ from dynx.simd.machine import core_count
 from dynx.workers import Workers
 
 
-class RobotTask(Protocol):
+class CommandTask(Protocol):
     """A task for one robot."""
 
     @property
@@ -29,11 +29,11 @@ class RobotTask(Protocol):
         """The base of the robot, where it is chosen."""
 
 
-Task = TypeVar("Task", bound=RobotTask)
+Task = TypeVar("Task", bound=CommandTask)
 Result = TypeVar("Result")
 
 
-class Run(Generic[Task, Result]):
+class TaskRun(Generic[Task, Result]):
     """The tasks of one command, one robot each, and the results that exist so far.
 
     ``target(task)`` runs in a worker process. ``refused(task, error)`` makes the result of a task whose
@@ -125,7 +125,7 @@ class Run(Generic[Task, Result]):
 
 
 def carry_out(
-    run: Run[Any, Any], jobs: int | None, timeout: float, quiet: bool, conclude: Callable[[], int]
+    run: TaskRun[Any, Any], jobs: int | None, timeout: float, quiet: bool, conclude: Callable[[], int]
 ) -> int:
     """Run the tasks, then call ``conclude()``, also after Ctrl-C; return its exit code.
 

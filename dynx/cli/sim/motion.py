@@ -72,7 +72,7 @@ class MotionInput:
 
 
 @dataclass(frozen=True)
-class Motion:
+class ReferenceMotion:
     """Reference or None, configuration at its start, duration of the simulation [s], and frame or None."""
 
     reference: Trajectory | Floats | None
@@ -83,7 +83,7 @@ class Motion:
     """Entry ``motion`` of the JSON document."""
 
 
-def plan_motion(model: Model, options: MotionInput) -> Motion:
+def plan_motion(model: Model, options: MotionInput) -> ReferenceMotion:
     """Plan the motion that the options describe. Raises ArgumentError where they contradict each other."""
     _refuse_contradictions(options)
     frame = chosen_frame(model, options.frame) if options.needs_frame else None
@@ -99,13 +99,13 @@ def plan_motion(model: Model, options: MotionInput) -> Motion:
         held = start if options.to is None else configuration(model, options.to, "--to", start)
         reference = None if options.controller == "none" and options.to is None else held
         description |= {"to": None if reference is None else held.tolist(), "duration": options.seconds}
-        return Motion(reference, start, options.seconds + options.settle, frame, description)
+        return ReferenceMotion(reference, start, options.seconds + options.settle, frame, description)
     if options.to is None:
         motion = _line_motion(model, options, frame, start)
     else:
         motion = _joint_motion(model, options, profile, start)
     description |= {"to": motion.end.q.tolist(), "duration": motion.duration}
-    return Motion(motion, start, motion.duration + options.settle, frame, description)
+    return ReferenceMotion(motion, start, motion.duration + options.settle, frame, description)
 
 
 def _joint_motion(model: Model, options: MotionInput, profile: str, start: Floats) -> Trajectory:

@@ -11,7 +11,7 @@ import numpy as np
 from dynx.backends.registry import backend_class
 from dynx.cli.shell.inputs import configuration, load_robot, velocity
 from dynx.cli.shell.kinds import Coefficients, command_flag, is_command_option
-from dynx.cli.sim.motion import Motion, MotionInput, plan_motion
+from dynx.cli.sim.motion import MotionInput, ReferenceMotion, plan_motion
 from dynx.control import BulletMotor, FrictionCompensation, ModelBased
 from dynx.control.base import Controller
 from dynx.control.saturation import checked_limit
@@ -38,7 +38,7 @@ class SimulationRequest:
 
     scenario: Scenario
     controller: Controller[Any] | None
-    motion: Motion
+    motion: ReferenceMotion
     clock: Clock
     options: dict[str, Any]
     """Options of `dynx.simulate` besides the scenario: the record to resume, and its step."""
@@ -84,7 +84,7 @@ def prepare(given: dict[str, Any]) -> SimulationRequest:
 
 
 def _controller(
-    model: Model, given: dict[str, Any], motion: Motion, clock: Clock, chosen: SimulationOptions
+    model: Model, given: dict[str, Any], motion: ReferenceMotion, clock: Clock, chosen: SimulationOptions
 ) -> Controller[Any] | None:
     gains = Gains(**{name: given[name] for name in GAINS})
     if given["controller"] == "none":

@@ -22,7 +22,17 @@ from dynx.errors import ArgumentError, LimitError
 from dynx.model.loading import load
 from dynx.sim.named_controllers import NATURAL_FREQUENCY
 from dynx.sim.scenario.options import OPTIONS
-from dynx.sim.tutorial import DURATION, GRAVITY, MODES, ROBOT, Outcome, Row, Tutorial, plot_rows, tutorial
+from dynx.sim.tutorial import (
+    DURATION,
+    GRAVITY,
+    MODES,
+    ROBOT,
+    Row,
+    Tutorial,
+    TutorialResult,
+    plot_rows,
+    tutorial,
+)
 from dynx.steppers.clock import Clock
 
 
@@ -138,7 +148,7 @@ def document(experiments: Tutorial, rows: Sequence[Row]) -> dict[str, Any]:
     }
 
 
-def _entry(outcome: Outcome) -> dict[str, Any]:
+def _entry(outcome: TutorialResult) -> dict[str, Any]:
     rollout = outcome.rollout
     error = None if rollout is None or outcome.failed else np.abs(rollout.error)
     return {

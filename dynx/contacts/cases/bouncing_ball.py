@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import ContactCase, Figure
 from dynx.contacts.impacts import rms_deviation
 from dynx.contacts.motion import record
 from dynx.contacts.scenes import G, ball_name, balls_above
@@ -27,7 +27,7 @@ MIN_HEIGHT = 0.007
 """Height relative to that of the fall below which a ball is not counted as flying."""
 
 
-class BouncingBall(Case):
+class BouncingBall(ContactCase):
     """Balls of restitution 0.5 that fall from about 0.3 m and bounce until they rest."""
 
     name: ClassVar[str] = "bouncing_ball"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import ContactCase, Figure
 from dynx.contacts.impacts import CONTACT_DELAYS, farthest, speeds_after_collision
 from dynx.model import Pose
 from dynx.world import Material, Scene, World, sphere
@@ -24,7 +24,7 @@ MASSES = {"equal masses": 1.0, "a third of the mass": 1.0 / 3.0, "thrice the mas
 """Masses of the moving ball [kg]."""
 
 
-class CentralCollision(Case):
+class CentralCollision(ContactCase):
     """Balls that meet balls at rest, without gravity and friction."""
 
     name: ClassVar[str] = "collision"

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import ContactCase, Figure
 from dynx.contacts.motion import acceleration, record
 from dynx.contacts.scenes import G
 from dynx.model import Pose
@@ -37,7 +37,7 @@ RAIL = f"""<robot name="rail">
 """URDF of a platform with its top at z = 0 that moves along x."""
 
 
-class DrivenPlatform(Case):
+class DrivenPlatform(ContactCase):
     """A block on a platform, which is a robot with one prismatic joint under a constant force."""
 
     name: ClassVar[str] = "driven_platform"

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import ContactCase, Figure
 from dynx.contacts.motion import record
 from dynx.model import Pose
 from dynx.model.geometry import Box, Capsule, Collision, Cylinder, Shape, Sphere
@@ -75,7 +75,7 @@ BODIES: tuple[tuple[str, Shape, float, tuple[float, float, float], tuple[float, 
 """Name, shape, mass [kg], position [m] and twist of each body."""
 
 
-class FreeMomentum(Case):
+class FreeMomentum(ContactCase):
     """Four rotating bodies that collide with one another, with friction, and with nothing else."""
 
     name: ClassVar[str] = "free_momentum"

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import ContactCase, Figure
 from dynx.contacts.impacts import farthest
 from dynx.contacts.motion import acceleration, record
 from dynx.contacts.scenes import G
@@ -30,7 +30,7 @@ DURATION = 0.2
 """Time [s] of the measurement, at the end of which the plates still slide."""
 
 
-class FrictionIsotropy(Case):
+class FrictionIsotropy(ContactCase):
     """Equal plates that slide along a plane in five directions."""
 
     name: ClassVar[str] = "friction_isotropy"

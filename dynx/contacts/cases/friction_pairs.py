@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations_with_replacement
 from typing import ClassVar
 
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import ContactCase, Figure
 from dynx.contacts.scenes import G
 from dynx.model import Pose
 from dynx.world import Material, Scene, World, box
@@ -22,7 +22,7 @@ SPEED = 3.0
 DURATION = 0.2
 
 
-class FrictionPairs(Case):
+class FrictionPairs(ContactCase):
     """Boxes that slide on slabs, one for every pair of four materials."""
 
     name: ClassVar[str] = "friction_pairs"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import ContactCase, Figure
 from dynx.contacts.impacts import CONTACT_DELAYS, farthest
 from dynx.model import Pose
 from dynx.world import Material, Scene, World, sphere
@@ -28,7 +28,7 @@ DURATION = 0.5
 """Time [s] by which the last ball has been hit and has left its neighbour."""
 
 
-class NewtonsCradle(Case):
+class NewtonsCradle(ContactCase):
     """Rows of five balls in free flight, of which the first moves, with restitution 1."""
 
     name: ClassVar[str] = "newtons_cradle"

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
 
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import ContactCase, Figure
 from dynx.contacts.motion import acceleration, rate_at, record, tilts
 from dynx.contacts.scenes import G
 from dynx.model import Pose
@@ -33,7 +33,7 @@ class BoxPush(NamedTuple):
     friction: float
 
 
-class PushedBox(Case):
+class PushedBox(ContactCase):
     """A cube on level ground, pushed at half its height or at the top."""
 
     name: ClassVar[str] = "pushed_box"

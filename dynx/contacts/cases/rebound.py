@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import ContactCase, Figure
 from dynx.contacts.impacts import farthest
 from dynx.contacts.motion import RecordedMotion, record
 from dynx.contacts.scenes import G, ball_name, balls_above
@@ -19,7 +19,7 @@ HEIGHTS = tuple(0.5 + 0.01 * k for k in range(5))
 """Heights of fall [m], so that the balls touch the ground at different moments within a step."""
 
 
-class Rebound(Case):
+class Rebound(ContactCase):
     """Balls dropped from about half a metre, on ground of the same restitution."""
 
     name: ClassVar[str] = "rebound"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import ContactCase, Figure
 from dynx.contacts.cases.resting_force import SETTLING
 from dynx.contacts.scenes import resting_bodies
 from dynx.world import Scene, World
@@ -14,7 +14,7 @@ HEIGHT = 0.2
 """Height of the bodies [m]."""
 
 
-class RestingDepth(Case):
+class RestingDepth(ContactCase):
     """Bodies of three shapes on a plane, which rigid bodies do not penetrate."""
 
     name: ClassVar[str] = "resting_depth"

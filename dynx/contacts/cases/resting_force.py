@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import ContactCase, Figure
 from dynx.contacts.motion import mean_contact_forces
 from dynx.contacts.scenes import G, resting_bodies
 from dynx.world import Scene, World
@@ -17,7 +17,7 @@ AVERAGING = 0.2
 """Time [s] over which forces are averaged."""
 
 
-class RestingForce(Case):
+class RestingForce(ContactCase):
     """Bodies of three shapes on a plane, each of whose weight the ground carries."""
 
     name: ClassVar[str] = "resting_force"

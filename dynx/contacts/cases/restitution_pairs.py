@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from itertools import combinations_with_replacement
 from typing import ClassVar, NamedTuple
 
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import ContactCase, Figure
 from dynx.contacts.impacts import CONTACT_DELAYS, farthest
 from dynx.contacts.scenes import ball_name, balls_above
 from dynx.model import Pose
@@ -31,7 +31,7 @@ class RestitutionPair(NamedTuple):
     ball: float
 
 
-class RestitutionPairs(Case):
+class RestitutionPairs(ContactCase):
     """Balls that meet a slab of another material, without gravity, for pairs of four materials."""
 
     name: ClassVar[str] = "restitution_pairs"

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import ClassVar
 
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import ContactCase, Figure
 from dynx.contacts.motion import acceleration, record
 from dynx.contacts.scenes import G, inclined, slope_axes
 from dynx.model import Pose
@@ -26,7 +26,7 @@ INERTIA_FACTORS = {"sphere": 0.4, "cylinder": 0.5, "hoop": 1.0}
 """Moment of inertia about the axis of rolling, divided by mass and squared radius."""
 
 
-class Rolling(Case):
+class Rolling(ContactCase):
     """A sphere, a cylinder and a hoop of friction 1 on a slope of tangent 0.3."""
 
     name: ClassVar[str] = "rolling"

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import ContactCase, Figure
 from dynx.contacts.motion import acceleration, record
 from dynx.contacts.scenes import G
 from dynx.model import Pose
@@ -28,7 +28,7 @@ SETTLING = 0.1
 DURATION = 0.4
 
 
-class RollingResistance(Case):
+class RollingResistance(ContactCase):
     """Homogeneous balls that roll without slipping, in three directions."""
 
     name: ClassVar[str] = "rolling_resistance"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import ContactCase, Figure
 from dynx.contacts.motion import step_count
 from dynx.contacts.scenes import G
 from dynx.model import Pose
@@ -20,7 +20,7 @@ DURATION = 0.4
 """Time [s], more than three times that of the slide."""
 
 
-class SlidingToRolling(Case):
+class SlidingToRolling(ContactCase):
     """A bowling ball: it slides along a plane until friction has made it roll."""
 
     name: ClassVar[str] = "sliding_to_rolling"

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import ContactCase, Figure
 from dynx.contacts.motion import acceleration, record
 from dynx.contacts.scenes import G, inclined, slope_axes
 from dynx.world import Material, Scene, World, box, ground
@@ -24,7 +24,7 @@ DURATION = 0.7
 """Time [s] over which the motion is measured."""
 
 
-class Slope(Case):
+class Slope(ContactCase):
     """A box of friction 0.5 on slopes of several tangents, with its edges along the slope."""
 
     name: ClassVar[str] = "slope"

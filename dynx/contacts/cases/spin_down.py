@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import ContactCase, Figure
 from dynx.contacts.motion import acceleration, record
 from dynx.contacts.scenes import G
 from dynx.model import Pose
@@ -19,7 +19,7 @@ SPIN = 5.0
 """Angular velocity at the start [rad/s]."""
 
 
-class SpinDown(Case):
+class SpinDown(ContactCase):
     """A homogeneous ball with a vertical axis of rotation."""
 
     name: ClassVar[str] = "spin_down"

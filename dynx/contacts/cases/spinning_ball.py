@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import ContactCase, Figure
 from dynx.contacts.impacts import CONTACT_DELAYS, Throw, after_bounce, farthest
 from dynx.contacts.scenes import ball_name, balls_above
 from dynx.world import Material, Scene, World, ground
@@ -17,7 +17,7 @@ TIME = 0.1
 DURATION = 0.25
 
 
-class SpinningBall(Case):
+class SpinningBall(ContactCase):
     """Homogeneous balls with backspin, which meet the ground at an angle, without gravity."""
 
     name: ClassVar[str] = "spinning_ball"

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import ContactCase, Figure
 from dynx.contacts.impacts import farthest
 from dynx.contacts.motion import step_count
 from dynx.contacts.scenes import G
@@ -23,7 +23,7 @@ FORCES = 10
 """Number of last steps over which the forces are averaged."""
 
 
-class Stack(Case):
+class Stack(ContactCase):
     """Ten cubes on top of each other, which touch at the start."""
 
     name: ClassVar[str] = "stack"

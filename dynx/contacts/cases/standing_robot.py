@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import ContactCase, Figure
 from dynx.contacts.motion import mean_contact_forces
 from dynx.contacts.scenes import G
 from dynx.model.loading import load
@@ -33,7 +33,7 @@ SETTLING = 0.6
 AVERAGING = 0.1
 
 
-class StandingRobot(Case):
+class StandingRobot(ContactCase):
     """A trunk on four legs of one prismatic joint each, which motors hold."""
 
     name: ClassVar[str] = "standing_robot"

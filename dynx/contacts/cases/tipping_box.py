@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from dynx.contacts.case import Case, Figure
+from dynx.contacts.case import ContactCase, Figure
 from dynx.contacts.motion import acceleration, rate_at, record, tilts
 from dynx.contacts.scenes import G
 from dynx.model import Pose
@@ -35,7 +35,7 @@ class Incline(NamedTuple):
     friction: float
 
 
-class TippingBox(Case):
+class TippingBox(ContactCase):
     """A box twice as tall as wide, released on slopes; gravity is inclined, and the ground is level."""
 
     name: ClassVar[str] = "tipping_box"

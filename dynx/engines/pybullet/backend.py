@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.backends.base import Backend
-from dynx.engines.pybullet.canonical_urdf import Ballast, PrincipalInertia, ballast_for, bullet_tree
+from dynx.engines.pybullet.canonical_urdf import Ballast, PrincipalBody, ballast_for, bullet_tree
 from dynx.engines.pybullet.client import CanonicalClient
 from dynx.engines.pybullet.library import bullet, bullet_version
 from dynx.errors import ArgumentError, ClosedError, EngineError
@@ -232,7 +232,7 @@ class BulletQuantities:
             T = homogeneous(R, inertia.axes.T @ (frame.p - inertia.center))
         return float64(T)
 
-    def _point(self, frame: BodyFrame, root: PrincipalInertia) -> list[float]:
+    def _point(self, frame: BodyFrame, root: PrincipalBody) -> list[float]:
         """Return the frame's origin relative to its body's (for the root: to C), along the principal axes."""
         if frame.body == ROOT:
             point = root.axes.T @ (frame.p - root.center)

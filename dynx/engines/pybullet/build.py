@@ -25,7 +25,7 @@ from dynx.engines.pybullet.canonical_urdf import (
     Attachments,
     Ballast,
     BulletTree,
-    PrincipalInertia,
+    PrincipalBody,
     body_name,
     bullet_tree,
     fixed_link,
@@ -60,7 +60,7 @@ class BaseState(NamedTuple):
 class RootFrame:
     """Conversion between the state of C and the coordinates of a floating base."""
 
-    def __init__(self, root: PrincipalInertia) -> None:
+    def __init__(self, root: PrincipalBody) -> None:
         self.center: Floats = np.asarray(root.center, dtype=np.float64)
         """Centre of mass of the root (3,) in the base frame [m]."""
         self.axes: Floats = np.asarray(root.axes, dtype=np.float64)

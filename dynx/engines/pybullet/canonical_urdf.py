@@ -35,7 +35,7 @@ from dynx.spatial.so3 import rotate_back, rpy_from_rotation, skew
 
 
 @dataclass(frozen=True)
-class PrincipalInertia:
+class PrincipalBody:
     """A rigid body by its centre of mass and principal axes, in long double.
 
     `axes` (3, 3) has the principal axes as columns, in the axes of the body frame (right-handed); `moments`
@@ -66,7 +66,7 @@ class Ballast:
         )
 
 
-def principal_inertia(inertia: RigidInertia, *, about_center: bool = False) -> PrincipalInertia:
+def principal_inertia(inertia: RigidInertia, *, about_center: bool = False) -> PrincipalBody:
     """Return the centre of mass, principal axes and moments of a body; about its origin if it has no mass.
 
     The axes are in an order that Bullet accepts, where there is one. With `about_center` Bullet has the
@@ -89,7 +89,7 @@ def principal_inertia(inertia: RigidInertia, *, about_center: bool = False) -> P
     # Cyclic orders keep the axes right-handed; the first one leaves an aligned body unchanged.
     orders = [order for order in _CYCLIC if _accepts(mass, lever[order], moments[order])]
     order = (orders or _CYCLIC)[0]
-    return PrincipalInertia(mass, center, axes[:, order], moments[order], accepted=bool(orders))
+    return PrincipalBody(mass, center, axes[:, order], moments[order], accepted=bool(orders))
 
 
 _CYCLIC = ([0, 1, 2], [1, 2, 0], [2, 0, 1])
@@ -150,7 +150,7 @@ class BulletLink:
     R: Array
     p: Array
     axis: Array
-    inertia: PrincipalInertia
+    inertia: PrincipalBody
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ class BulletTree:
     """
 
     floating: bool
-    root: PrincipalInertia
+    root: PrincipalBody
     links: tuple[BulletLink, ...]
     unit: float
 
@@ -259,7 +259,7 @@ def locale_free(number: float) -> str:
     return f"{'-' if sign else ''}{''.join(map(str, digits))}e{exponent}"
 
 
-def _in_units(inertia: PrincipalInertia, unit: float) -> PrincipalInertia:
+def _in_units(inertia: PrincipalBody, unit: float) -> PrincipalBody:
     return replace(inertia, mass=inertia.mass / unit, moments=inertia.moments / unit)
 
 

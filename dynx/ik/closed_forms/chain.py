@@ -136,18 +136,18 @@ def checked_given(model: Model, given: Mapping[str, float]) -> dict[str, float]:
 
 
 @dataclass(frozen=True, eq=False)
-class Lines:
+class SpatialLines:
     """Lines in space: unit directions (n, 3) and a point on each (n, 3)."""
 
     axes: Floats
     points: Floats
 
-    def reversed(self) -> Lines:
+    def reversed(self) -> SpatialLines:
         """Return the lines of the inverse motion: in the opposite order and direction.
 
         (E_1 ... E_n)^-1 = E_n^-1 ... E_1^-1, and E_i^-1 turns by the same angle about the opposite axis.
         """
-        return Lines(-self.axes[::-1], self.points[::-1])
+        return SpatialLines(-self.axes[::-1], self.points[::-1])
 
 
 def angle_between(a: Floats, b: Floats) -> float:
@@ -160,7 +160,7 @@ def along(a: Floats, b: Floats) -> Floats:
     return a if a @ b >= 0.0 else -a
 
 
-def common_point(lines: Lines) -> tuple[Floats, float]:
+def common_point(lines: SpatialLines) -> tuple[Floats, float]:
     """Return the point nearest to all lines in the least-squares sense, and its largest distance."""
     across = np.eye(3) - lines.axes[:, :, None] * lines.axes[:, None, :]
     A, b = across.sum(axis=0), (across @ lines.points[:, :, None])[..., 0].sum(axis=0)

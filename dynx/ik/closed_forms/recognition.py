@@ -18,7 +18,7 @@ from dynx.errors import NoClosedFormError
 from dynx.ik.closed_forms.chain import (
     MAX_JOINTS,
     Chain,
-    Lines,
+    SpatialLines,
     along,
     angle_between,
     common_point,
@@ -60,7 +60,7 @@ def recognise(chain: Chain, preferred: Floats) -> Recognised:
 
     Raises NoClosedFormError, which says how far the chain is from each family.
     """
-    lines = Lines(chain.axes, chain.points)
+    lines = SpatialLines(chain.axes, chain.points)
     for tolerance in TOLERANCES:
         for inverted in (False, True):
             here, angles, kinds = lines, preferred, chain.revolute
@@ -75,7 +75,7 @@ def recognise(chain: Chain, preferred: Floats) -> Recognised:
 
 
 def _revolute_family(
-    lines: Lines, kinds: Kinds, preferred: Floats, tolerance: float, inverted: bool
+    lines: SpatialLines, kinds: Kinds, preferred: Floats, tolerance: float, inverted: bool
 ) -> tuple[Geometry, str] | None:
     """Return the geometry of six revolute joints, and the property of their axes, or None."""
     wrist = _spherical_wrist(lines, preferred, tolerance)
@@ -91,7 +91,7 @@ def _revolute_family(
 
 
 def _sliding_family(
-    lines: Lines, kinds: Kinds, preferred: Floats, tolerance: float, inverted: bool
+    lines: SpatialLines, kinds: Kinds, preferred: Floats, tolerance: float, inverted: bool
 ) -> tuple[Geometry, str] | None:
     """Return the geometry of joints of which some are prismatic, and what it is, or None."""
     near = max(tolerance, NEGLIGIBLE)
@@ -110,7 +110,7 @@ def _sliding_family(
     return None
 
 
-def _deviation(lines: Lines, geometry: Geometry) -> float:
+def _deviation(lines: SpatialLines, geometry: Geometry) -> float:
     """Return the largest distance, at its point, or angle of a line from that of the geometry."""
     angles = [angle_between(a, b) for a, b in zip(lines.axes, geometry.axes, strict=True)]
     return float(
@@ -118,9 +118,9 @@ def _deviation(lines: Lines, geometry: Geometry) -> float:
     )
 
 
-def _spherical_wrist(lines: Lines, preferred: Floats, tolerance: float) -> SphericalWrist | None:
+def _spherical_wrist(lines: SpatialLines, preferred: Floats, tolerance: float) -> SphericalWrist | None:
     h = lines.axes
-    centre, distance = common_point(Lines(h[3:], lines.points[3:]))
+    centre, distance = common_point(SpatialLines(h[3:], lines.points[3:]))
     near = max(tolerance, NEGLIGIBLE)
     if distance > tolerance or angle_between(h[3], h[4]) < near or angle_between(h[4], h[5]) < near:
         return None
@@ -154,7 +154,7 @@ def _spherical_wrist(lines: Lines, preferred: Floats, tolerance: float) -> Spher
     return found if found.reaches(near) else None
 
 
-def _parallel_axes(lines: Lines, preferred: Floats, tolerance: float) -> ParallelAxes | None:
+def _parallel_axes(lines: SpatialLines, preferred: Floats, tolerance: float) -> ParallelAxes | None:
     h, points = lines.axes.copy(), lines.points.copy()
     near = max(tolerance, NEGLIGIBLE)
     if max(angle_between(h[1], h[2]), angle_between(h[1], h[3])) > tolerance:
@@ -185,7 +185,9 @@ def _parallel_axes(lines: Lines, preferred: Floats, tolerance: float) -> Paralle
     return found if found.reaches(near) else None
 
 
-def _outer_parallel_axes(lines: Lines, preferred: Floats, tolerance: float) -> OuterParallelAxes | None:
+def _outer_parallel_axes(
+    lines: SpatialLines, preferred: Floats, tolerance: float
+) -> OuterParallelAxes | None:
     h, points = lines.axes.copy(), lines.points.copy()
     near = max(tolerance, NEGLIGIBLE)
     if max(angle_between(h[0], h[1]), angle_between(h[0], h[2])) > tolerance:
@@ -227,10 +229,10 @@ def _why_none(chain: Chain) -> str:
             "most three revolute joints, or one or two and a spherical wrist, or three parallel revolute "
             "joints and one along them"
         )
-    lines = Lines(chain.axes, chain.points)
+    lines = SpatialLines(chain.axes, chain.points)
     parts = []
     for end, three in (("first", slice(0, 3)), ("last", slice(3, 6))):
-        _, distance = common_point(Lines(lines.axes[three], lines.points[three]))
+        _, distance = common_point(SpatialLines(lines.axes[three], lines.points[three]))
         parts.append(
             f"the axes of the {end} three joints miss a common point by {distance * chain.length:.2g} m"
         )
@@ -245,7 +247,7 @@ Kinds = tuple[bool, ...]
 """Whether each joint turns; the others slide."""
 
 
-def three_slides(lines: Lines, revolute: Kinds, preferred: Floats, near: float) -> ThreeSlides | None:
+def three_slides(lines: SpatialLines, revolute: Kinds, preferred: Floats, near: float) -> ThreeSlides | None:
     """Return the geometry of three prismatic and up to three revolute joints, or None."""
     turning = [k for k, turns in enumerate(revolute) if turns]
     if revolute.count(False) != 3:
@@ -258,7 +260,7 @@ def three_slides(lines: Lines, revolute: Kinds, preferred: Floats, near: float) 
 
 
 def parallel_arm(
-    lines: Lines, revolute: Kinds, preferred: Floats, near: float, tolerance: float
+    lines: SpatialLines, revolute: Kinds, preferred: Floats, near: float, tolerance: float
 ) -> ParallelArm | None:
     """Return the geometry of three parallel revolute joints with at most one slide along them, or None."""
     if revolute.count(True) != 3 or revolute.count(False) > 1:
@@ -273,14 +275,14 @@ def parallel_arm(
 
 
 def sliding_arm(
-    lines: Lines, revolute: Kinds, preferred: Floats, near: float, tolerance: float
+    lines: SpatialLines, revolute: Kinds, preferred: Floats, near: float, tolerance: float
 ) -> SlidingArm | None:
     """Return the geometry of a spherical wrist on an arm with one or two prismatic joints, or None."""
     kinds = "".join("R" if turns else "P" for turns in revolute)
     if kinds[3:] != "RRR" or kinds[:3] in ("RRR", "PPP"):
         return None
     h, points = lines.axes.copy(), lines.points.copy()
-    centre, distance = common_point(Lines(h[3:], points[3:]))
+    centre, distance = common_point(SpatialLines(h[3:], points[3:]))
     if distance > tolerance or min(angle_between(h[3], h[4]), angle_between(h[4], h[5])) < near:
         return None
     points[3:] = centre

@@ -26,7 +26,7 @@ from dynx.ik.iterations import tracking_iteration
 from dynx.ik.kernels import MAX_JOINTS, algorithms
 from dynx.ik.options import SearchLimits
 from dynx.ik.problem import Requirement
-from dynx.ik.search import Task
+from dynx.ik.search import SearchTask
 from dynx.ik.step import TargetKind, TrackingMemory
 from dynx.model.model import Model
 from dynx.model.targets import Targets
@@ -128,10 +128,10 @@ class SampleFollower:
         found = [self._solve(q, self._task(p, R), bounds, abandons=True) for q, (p, R) in rows]
         return _followed(found, starts.shape[-1])
 
-    def _task(self, position: Floats | None, rotation: Floats | None) -> Task:
+    def _task(self, position: Floats | None, rotation: Floats | None) -> SearchTask:
         return self._requirement.task(self._backend, self._coordinates, position, rotation)
 
-    def _solve(self, q: Floats, task: Task, bounds: StepBounds, *, abandons: bool) -> Descended:
+    def _solve(self, q: Floats, task: SearchTask, bounds: StepBounds, *, abandons: bool) -> Descended:
         coordinates, limits = self._coordinates, self._requirement.tolerances
         if not coordinates.count:
             error = task.error(q)

@@ -131,7 +131,7 @@ MAX_STEPS = 60
 
 
 @runtime_checkable
-class Motion(Protocol):
+class TimedMotion(Protocol):
     """A motion of all coordinates over time, such as a `dynx.trajectory.Trajectory`."""
 
     @property
@@ -145,7 +145,7 @@ class Motion(Protocol):
 @checks_option_names
 def track(
     backend: Backend,
-    targets: ArrayLike | Motion,
+    targets: ArrayLike | TimedMotion,
     frame: str,
     q0: ArrayLike | None = None,
     *,
@@ -313,10 +313,10 @@ def _from_best_start(
 
 
 def _checked_path(
-    backend: Backend, targets: ArrayLike | Motion, frame: str, free: str | None, dt: float | None
+    backend: Backend, targets: ArrayLike | TimedMotion, frame: str, free: str | None, dt: float | None
 ) -> Targets:
     """Return targets (..., n), n at least 1."""
-    if isinstance(targets, Motion):
+    if isinstance(targets, TimedMotion):
         if dt is None:
             raise ArgumentError("targets are a motion over time; give dt, the time between two samples [s]")
         count = math.floor(targets.duration / dt * (1.0 + 1e-12)) + 1

@@ -138,7 +138,7 @@ def load_csv(path: str | os.PathLike[str], model: Model) -> dict[str, Any]:
         raise ArgumentError(f"{name} is empty; wanted a line of names of columns")
     header = [each.strip() for each in rows[0]]
     body = [(number, row) for number, row in enumerate(rows[1:], start=2) if any(map(str.strip, row))]
-    table = _Table(name, header, body)
+    table = _TextColumns(name, header, body)
     t = table.column(TIMES)
     if len(t) < 2:
         raise ArgumentError(f"{name} has too few rows of numbers ({len(t)}); wanted 2 or more")
@@ -175,7 +175,7 @@ def load_csv(path: str | os.PathLike[str], model: Model) -> dict[str, Any]:
     }
 
 
-class _Table:
+class _TextColumns:
     """Columns of text by name, converted to numbers where they are read."""
 
     def __init__(self, path: str, header: Sequence[str], rows: Sequence[tuple[int, Sequence[str]]]) -> None:

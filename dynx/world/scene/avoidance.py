@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from dynx.distance.avoidance import Avoidance, Part, same_kinematics
+from dynx.distance.avoidance import Avoidance, AvoidingPart, same_kinematics
 from dynx.errors import ArgumentError, DescriptionError, shown
 from dynx.model import Link, Model
 from dynx.model.geometry import Collision
@@ -73,11 +73,11 @@ def robot_avoidance(
     all_robots = [replace(robot, self_collision=True), *(each for each in robots if each.name != robot.name)]
     movable = list(bodies)
     may_collide = CollisionFilter(all_robots, movable, ignored).may_collide
-    starts = _Starts(all_robots, movable)
+    starts = _StartPoses(all_robots, movable)
     carried = _carried(robot, movable, constraints, starts)
     heads = merged_links(robot.model)
-    own: list[Part] = []
-    others: list[Part] = []
+    own: list[AvoidingPart] = []
+    others: list[AvoidingPart] = []
     for link in robot.model.links:
         shapes = robot.model.geometry.collisions(link.name)
         if shapes:
@@ -111,11 +111,11 @@ def robot_avoidance(
     return Avoidance(robot.model, parts, pairs, without)
 
 
-def _part(name: str, frame: str | None, T: Floats, shapes: Iterable[Collision]) -> Part:
-    return Part(name, frame, tuple((each.shape, T @ each.origin.matrix) for each in shapes))
+def _part(name: str, frame: str | None, T: Floats, shapes: Iterable[Collision]) -> AvoidingPart:
+    return AvoidingPart(name, frame, tuple((each.shape, T @ each.origin.matrix) for each in shapes))
 
 
-def _moves(model: Model, heads: Mapping[str, str], part: Part) -> bool:
+def _moves(model: Model, heads: Mapping[str, str], part: AvoidingPart) -> bool:
     return part.frame is not None and _link_moves(model, heads, part.frame)
 
 
@@ -123,7 +123,7 @@ def _link_moves(model: Model, heads: Mapping[str, str], link: str) -> bool:
     return model.floating or heads[link] != heads[model.root]
 
 
-def _links_without_shapes(model: Model, heads: Mapping[str, str], own: Iterable[Part]) -> list[str]:
+def _links_without_shapes(model: Model, heads: Mapping[str, str], own: Iterable[AvoidingPart]) -> list[str]:
     """Return the moving links that have a mass or a visual shape, but no collision shape.
 
     Raises ArgumentError if no body that moves with the robot has a collision shape.
@@ -157,7 +157,7 @@ def _is_elsewhere(one: Model, other: Model) -> bool:
     return same_kinematics(one, other.with_base_pose(one.base_pose))
 
 
-class _Starts:
+class _StartPoses:
     """Poses in the world (4, 4) of bodies and links at the start of a scene, by name."""
 
     def __init__(self, robots: Iterable[SceneRobot], bodies: Iterable[SceneBody]) -> None:

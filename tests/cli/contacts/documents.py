@@ -7,14 +7,23 @@ from dataclasses import replace
 from typing import Any
 
 from dynx.cli.contacts.document import ContactsDocument, document
-from dynx.contacts import Attribution, Case, Conformance, Figure, FigureResult, NoResult, Price, Verdict
+from dynx.contacts import (
+    Attribution,
+    Conformance,
+    ContactCase,
+    Figure,
+    FigureResult,
+    NoResult,
+    Price,
+    Verdict,
+)
 from dynx.world import Scene, World
 
 STEPS = (4e-3, 2e-3, 1e-3)
 ENGINES = ("one", "two", "three")
 
 
-class Sliding(Case):
+class Sliding(ContactCase):
     """A case that is never run."""
 
     name = "sliding"

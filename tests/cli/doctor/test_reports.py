@@ -19,7 +19,7 @@ from rich.console import Console
 from dynx.cli.doctor.as_loaded import vote_lines
 from dynx.cli.doctor.conclusion import Conclusion
 from dynx.cli.doctor.mending import planned_targets, write_mended
-from dynx.cli.doctor.outputs import Outputs, save_counterexamples
+from dynx.cli.doctor.outputs import ReportFiles, save_counterexamples
 from dynx.cli.doctor.overview import show_many
 from dynx.cli.doctor.repetition import doctor_command
 from dynx.cli.doctor.run import doctor_run
@@ -44,7 +44,7 @@ def conclude(
     baseline: Baseline | None = None,
     *,
     targets: Sequence[str | None] = (),
-    outputs: Outputs | None = None,
+    outputs: ReportFiles | None = None,
     left: int = 0,
     engines: Sequence[str] | None = ("pinocchio",),
 ) -> int:
@@ -54,7 +54,7 @@ def conclude(
     for number, report in enumerate(reports):
         run.record(number, report)
     files = [*targets, *[None] * (len(names) - len(targets))]
-    conclusion = Conclusion(run, outputs or Outputs(), baseline, files, False, str(folder), engines)
+    conclusion = Conclusion(run, outputs or ReportFiles(), baseline, files, False, str(folder), engines)
     return conclusion.reach(quiet=False)
 
 
@@ -75,7 +75,7 @@ def test_the_exit_code_is_the_largest_one(reports: list[DoctorReport], code: int
 
 def test_a_baseline_just_written_accepts_everything(tmp_path: Path) -> None:
     path = tmp_path / "known.json"
-    assert conclude([differing()], tmp_path, outputs=Outputs(baseline=str(path))) == 0
+    assert conclude([differing()], tmp_path, outputs=ReportFiles(baseline=str(path))) == 0
     known = read_baseline(path.read_text(), str(path))
     assert conclude([differing()], tmp_path, known) == 0
     assert conclude([differing(link="another")], tmp_path, known) == 1
@@ -83,7 +83,7 @@ def test_a_baseline_just_written_accepts_everything(tmp_path: Path) -> None:
 
 def test_the_document_names_what_was_not_done(tmp_path: Path) -> None:
     path = tmp_path / "x.json"
-    conclude([alike()], tmp_path, outputs=Outputs(json=str(path)), left=2)
+    conclude([alike()], tmp_path, outputs=ReportFiles(json=str(path)), left=2)
     document = json.loads(path.read_text())
     assert document["summary"]["not_done"] == 2
     assert document["not_done"] == ["later", "later"]
@@ -95,7 +95,7 @@ def test_an_output_that_cannot_be_written_does_not_lose_the_others(
     lost, html, junit = tmp_path / "lost.json", tmp_path / "x.html", tmp_path / "x.xml"
     lost.mkdir()
     mended = str(tmp_path / "mended.urdf")
-    outputs = Outputs(json=str(lost), html=str(html), junit=str(junit))
+    outputs = ReportFiles(json=str(lost), html=str(html), junit=str(junit))
     assert conclude([differing()], tmp_path, outputs=outputs, targets=[mended]) == 2
     assert html.stat().st_size > 0
     assert junit.stat().st_size > 0
@@ -253,7 +253,7 @@ def test_an_interrupted_run_writes_what_is_done(
         Path(pipe).write_text("the first is recorded")
 
     monkeypatch.setattr(run, "record", record_and_signal)
-    outputs = Outputs(json=str(tmp_path / "x.json"))
+    outputs = ReportFiles(json=str(tmp_path / "x.json"))
     conclusion = Conclusion(run, outputs, None, [None] * 3, False, str(tmp_path), None)
     assert carry_out(run, 1, 0.0, True, lambda: conclusion.reach(quiet=True)) == 130
     document = json.loads((tmp_path / "x.json").read_text())
@@ -354,9 +354,9 @@ def test_every_engine_is_in_one_group(errors: list[float]) -> None:
 
 
 def test_annotations_go_to_standard_output(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert conclude([differing()], tmp_path, outputs=Outputs(github=True)) == 1
+    assert conclude([differing()], tmp_path, outputs=ReportFiles(github=True)) == 1
     out = capsys.readouterr().out
     assert out.splitlines()[0].startswith("::error file=")
     with pytest.raises(ArgumentError, match="--github and --json - both write to standard output"):
-        Outputs(json="-", github=True).check()
-    Outputs(json=str(tmp_path / "out.json"), github=True).check()
+        ReportFiles(json="-", github=True).check()
+    ReportFiles(json=str(tmp_path / "out.json"), github=True).check()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from dynx.agreement.report import Failure
+from dynx.agreement.report import LoadFailure
 from dynx.doctor.report import (
     Counterexample,
     DoctorReport,
@@ -131,7 +131,7 @@ def alike(robot: str = "arm") -> DoctorReport:
 
 def refused(robot: str = "broken") -> DoctorReport:
     """Return a robot that could not be read."""
-    return DoctorReport(robot, base="fixed", error=Failure("DescriptionError", f"{robot}: no XML"))
+    return DoctorReport(robot, base="fixed", error=LoadFailure("DescriptionError", f"{robot}: no XML"))
 
 
 def hostile() -> DoctorReport:

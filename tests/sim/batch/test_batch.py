@@ -27,7 +27,7 @@ from dynx.errors import ArgumentError, DivergedError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.sim import Noise, Payload, simulate
 from dynx.sim import batch as batch_module
-from dynx.sim.batch import BatchInterrupted, Part, PartOutcome, simulate_batch
+from dynx.sim.batch import BatchInterrupted, BatchPart, PartOutcome, simulate_batch
 from dynx.sim.batch_rollouts import BatchRollouts
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint, Trajectory
@@ -157,13 +157,13 @@ def test_ctrl_c_keeps_what_is_done(
     kept = len(list(tmp_path.glob("*.npz")))
     assert kept >= 1
     computed: list[int] = []
-    does = Part.__call__
+    does = BatchPart.__call__
 
-    def counted(part: Part) -> PartOutcome:
+    def counted(part: BatchPart) -> PartOutcome:
         computed.append(part.count)
         return does(part)
 
-    monkeypatch.setattr(Part, "__call__", counted)
+    monkeypatch.setattr(BatchPart, "__call__", counted)
     again = simulate_batch(arm, law, reference, q0=starts, dt=DT, keep=tmp_path)
     assert equal(again, whole)
     assert len(computed) == 4 - kept

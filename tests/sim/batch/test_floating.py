@@ -22,7 +22,7 @@ from dynx.model import Model
 from dynx.rbd.integration import floating_step
 from dynx.sim import BatchRollouts, Noise, Payload, simulate, simulate_batch
 from dynx.sim import batch as batch_module
-from dynx.sim.batch import Part, PartOutcome
+from dynx.sim.batch import BatchPart, PartOutcome
 from dynx.spatial import so3
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models
@@ -180,13 +180,13 @@ def test_who_computes_it_and_a_stop_on_the_way_change_nothing(
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         assert same(one, run(executor=pool))
     computed: list[int] = []
-    does = Part.__call__
+    does = BatchPart.__call__
 
-    def counted(part: Part) -> PartOutcome:
+    def counted(part: BatchPart) -> PartOutcome:
         computed.append(part.count)
         return does(part)
 
-    monkeypatch.setattr(Part, "__call__", counted)
+    monkeypatch.setattr(BatchPart, "__call__", counted)
     assert same(one, run(keep=tmp_path))
     assert computed == []
     for other in ({"delay": 2e-3}, {"pushes": [ExternalForce("base_link", np.full(6, 2.0), 0.01, 0.01)]}):

@@ -21,7 +21,7 @@ from dynx.errors import ArgumentError, DynxError
 from dynx.files.arrays import read_arrays, write_arrays
 from dynx.model.loading import load
 from dynx.sim import Noise, Payload, Rollout, Scenario, simulate, simulate_batch
-from dynx.sim.batch import Store
+from dynx.sim.batch import OutcomeStore
 from dynx.sim.batch_rollouts import BatchRollouts
 
 ARM = load("planar_2r")
@@ -229,4 +229,4 @@ def test_a_folder_that_cannot_hold_parts(tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(b"")
     for folder in (tmp_path / "file", tmp_path / "a\0b"):
         with pytest.raises(ArgumentError, match="keep is"):
-            Store(folder, SCENARIO)
+            OutcomeStore(folder, SCENARIO)
