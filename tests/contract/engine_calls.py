@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import wraps
+from inspect import Signature, signature
 from typing import Any
 
 import numpy as np
@@ -98,6 +100,20 @@ def engine_calls() -> tuple[EngineCall, ...]:
 
 
 ENGINE_CALLS = engine_calls()
+
+
+def each_call(test: Callable[..., None]) -> Callable[..., None]:
+    """Run a test for every call, which it takes as `engine_call`; a test for each would be 9,000 of them."""
+
+    @wraps(test)
+    def run(*instance: Any, **given: Any) -> None:
+        for engine_call in ENGINE_CALLS:
+            test(*instance, engine_call=engine_call, **given)
+
+    parameters = signature(test).parameters
+    others = [each for name, each in parameters.items() if name != "engine_call"]
+    run.__signature__ = Signature(others)  # type: ignore[attr-defined]
+    return run
 
 
 def random_state(model: Model, seed: int, size: tuple[int, ...] = ()) -> State:

@@ -10,11 +10,10 @@ import pytest
 
 from dynx.spatial.scalar import Floats
 from tests.contract.conftest import Make
-from tests.contract.engine_calls import ENGINE_CALLS, EngineCall, State, random_state
+from tests.contract.engine_calls import EngineCall, State, each_call, random_state
 from tests.contract.robots import branched
 
 FLOATING = branched().with_base("floating")
-each_call = pytest.mark.parametrize("engine_call", ENGINE_CALLS, ids=str)
 
 
 def every_other(x: Floats) -> Floats:

@@ -26,13 +26,12 @@ from dynx.errors import (
 from dynx.model.loading import load
 from dynx.model.numbers import MAX_MAGNITUDE
 from tests.contract.conftest import Make
-from tests.contract.engine_calls import ENGINE_CALLS, EngineCall, State, random_state
+from tests.contract.engine_calls import ENGINE_CALLS, EngineCall, State, each_call, random_state
 from tests.contract.robots import branched
 
 FIXED = branched()
 FLOATING = FIXED.with_base("floating")
 GOOD = random_state(FLOATING, 61)
-each_call = pytest.mark.parametrize("engine_call", ENGINE_CALLS, ids=str)
 
 BAD_ARRAYS: dict[str, tuple[Callable[[np.ndarray], Any], type[DynxError], str]] = {
     "too short": (lambda x: x[:-1], ShapeError, r"shape \(1?\d,\); wanted \(\.\.\., 1[01]\)"),

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from dynx.agreement import agree
 from dynx.model import Joint, Link, Model, Pose
 from tests.contract.conftest import Make
-from tests.contract.engine_calls import ENGINE_CALLS, EngineCall, random_state
+from tests.contract.engine_calls import EngineCall, each_call, random_state
 from tests.contract.robots import mimicking
 from tests.error_bounds import ErrorBounds, samples_at
 
@@ -22,7 +21,7 @@ MOUNTED = Model.build(
 )
 
 
-@pytest.mark.parametrize("engine_call", ENGINE_CALLS, ids=str)
+@each_call
 def test_every_quantity_is_that_of_the_mounted_robot(make: Make, engine_call: EngineCall) -> None:
     assert ROBOT.frame_names[-1] == MOUNTED.frame_names[-1]
     state = random_state(ROBOT, 61, (3,))

@@ -14,7 +14,7 @@ from dynx.model.loading import load
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import Sample, samples
 from tests.contract.conftest import Make
-from tests.contract.engine_calls import ENGINE_CALLS, EngineCall, State, random_state
+from tests.contract.engine_calls import ENGINE_CALLS, EngineCall, State, each_call, random_state
 from tests.contract.robots import JOINT_ORDER, LINK_ORDER, LINKS, branched, followed_elbow, mimicking
 from tests.error_bounds import ErrorBounds, samples_at
 from tests.examples import generic_sample, one_robot
@@ -26,7 +26,6 @@ BELOW = {
     "b_elbow": {"beta"},
 }
 each_base = pytest.mark.parametrize("base", ["fixed", "floating"])
-each_call = pytest.mark.parametrize("engine_call", ENGINE_CALLS, ids=str)
 
 
 def is_projected(engine_call: EngineCall) -> bool:

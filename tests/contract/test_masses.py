@@ -8,7 +8,7 @@ import pytest
 from dynx.errors import SingularMassMatrixError
 from dynx.model import Inertial, Joint, Link, Model, Pose
 from tests.contract.conftest import Make
-from tests.contract.engine_calls import ENGINE_CALLS, EngineCall, random_state
+from tests.contract.engine_calls import EngineCall, each_call, random_state
 from tests.contract.robots import JOINTS, LINKS, body, branched, hinge
 from tests.error_bounds import ErrorBounds, samples_at
 
@@ -17,8 +17,8 @@ each_massless = pytest.mark.parametrize("inertial", MASSLESS.values(), ids=MASSL
 
 
 @each_massless
-@pytest.mark.parametrize("engine_call", ENGINE_CALLS, ids=str)
 @pytest.mark.parametrize("base", ["fixed", "floating"])
+@each_call
 def test_a_link_without_inertial_has_no_mass(
     make: Make, base: str, engine_call: EngineCall, inertial: Inertial | None
 ) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from dynx.model import Link, Model
 from tests.contract.conftest import Make
-from tests.contract.engine_calls import ENGINE_CALLS, EngineCall, State, random_state
+from tests.contract.engine_calls import ENGINE_CALLS, EngineCall, State, each_call, random_state
 from tests.contract.robots import body, branched, mimicking
 
 MODELS = {
@@ -19,7 +19,6 @@ MODELS = {
 SIZES = ((), (1,), (3,), (2, 3), (0,), (2, 0))
 
 each_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS.keys())
-each_call = pytest.mark.parametrize("engine_call", ENGINE_CALLS, ids=str)
 
 
 @each_model
