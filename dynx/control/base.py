@@ -15,7 +15,6 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from dynx.backends import Backend, backend
-from dynx.control.code_content import digest_of_code, is_foreign
 from dynx.control.content import attributes_of, content_of, fields_of
 from dynx.control.dynamics import Dynamics, EngineDynamics
 from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
@@ -134,15 +133,13 @@ class Controller(ABC, Generic[ControllerState]):
         return type(self).__name__
 
     def content_key(self) -> tuple[Any, ...]:
-        """Return the key that is equal for equal controllers: their attributes, and the code of a class
-        outside dynx.
+        """Return the key that is equal for equal controllers of one class: their attributes.
 
         Raises TypeError for attributes that cannot be compared.
         """
         ignored = {name for name, each in fields_of(self).items() if not each.compare}
         kept = ((name, value) for name, value in attributes_of(self).items() if name not in ignored)
-        code = digest_of_code(type(self)) if is_foreign(type(self)) else ""
-        return (code, *((name, content_of(value)) for name, value in kept))
+        return tuple((name, content_of(value)) for name, value in kept)
 
     def _wrap(self, inner: Controller[ControllerState]) -> None:
         """Take robot and timing from an inner controller. Raises ArgumentError for anything else."""

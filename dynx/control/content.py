@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -13,8 +14,22 @@ import numpy as np
 
 from dynx.model import Model
 
+LIBRARIES = frozenset({"dynx", "numpy", "scipy"})
+"""Packages, besides the standard library, whose code is known by the name of a class or function."""
+
 _entered: ContextVar[tuple[Any, ...]] = ContextVar("entered", default=())
 """Objects whose content is being read, the outermost first."""
+
+
+def is_foreign(kind: type) -> bool:
+    """Check whether a class belongs neither to dynx nor to one of `LIBRARIES`."""
+    return is_foreign_module(kind.__module__)
+
+
+def is_foreign_module(module: str | None) -> bool:
+    """Check whether a module belongs neither to dynx nor to one of `LIBRARIES`."""
+    root = (module or "").partition(".")[0]
+    return root not in LIBRARIES and root not in sys.stdlib_module_names
 
 
 @contextmanager

@@ -22,8 +22,7 @@ from dynx.compiled.simplification import simplify_mechanism
 from dynx.compiled.step import Status, StepText
 from dynx.control.array_dynamics import ArrayDynamics
 from dynx.control.base import Controller, chain_of, gains_of, rebind
-from dynx.control.code_content import is_foreign
-from dynx.control.content import attributes_of, content_of, fields_of
+from dynx.control.content import attributes_of, content_of, fields_of, is_foreign
 from dynx.control.dynamics import QUANTITIES, Dynamics, EngineDynamics, Evaluation
 from dynx.control.friction import JointFriction
 from dynx.errors import ArgumentError, TraceError, UnsupportedFeatureError, shown

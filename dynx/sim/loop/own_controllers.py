@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from types import FrameType, FunctionType
+from types import FrameType
 from typing import Any
 
 import numpy as np
 
 from dynx.control.base import Controller, Measurement, chain_of, rebind
-from dynx.control.code_content import digest_of_code, digest_of_function, is_foreign, is_foreign_module
-from dynx.control.content import attributes_of
+from dynx.control.content import is_foreign, is_foreign_module
 from dynx.control.dynamics import Dynamics, Evaluation
 from dynx.errors import TraceError
 from dynx.sim.loop.controller_checks import ControllerWatch, defect_of_outcome
@@ -71,7 +70,6 @@ def refuse_irreproducible(controller: Controller[Any], repetitions: int = REPETI
     if isinstance(one, np.ndarray) and not np.array_equal(one, other, equal_nan=True):
         raise TraceError(f"{controller.name}.initial_state() returns another state in each call")
     watch = ControllerWatch(controller)
-    codes = _codes(controller)
     first = _Trace(controller)
     for _ in range(repetitions):
         again = _Trace(controller)
@@ -80,11 +78,6 @@ def refuse_irreproducible(controller: Controller[Any], repetitions: int = REPETI
             raise TraceError(_difference(controller, *found))
     if watch.changed:
         raise TraceError(f"{watch.changed}: let torque return what changes as its state")
-    if _codes(controller) != codes:
-        file, line = _definition(controller)
-        raise TraceError(
-            f"{controller.name}.torque() changes a variable of its module ({Path(file).name}, line {line})"
-        )
 
 
 class _Trace:
@@ -153,13 +146,6 @@ class _SymbolicResults(Dynamics):
             return traced_array(self._trace.symbols(*shape))
 
         return evaluate
-
-
-def _codes(controller: Controller[Any]) -> list[str]:
-    """Return the content of the user's code, with the variables of its module."""
-    own = [each for each in chain_of(controller) if is_foreign(type(each))]
-    functions = [x for each in own for x in attributes_of(each).values() if isinstance(x, FunctionType)]
-    return [*(digest_of_code(type(each)) for each in own), *map(digest_of_function, functions)]
 
 
 def _difference(controller: Controller[Any], place: str, values: tuple[float, float] | None) -> str:

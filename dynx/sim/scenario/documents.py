@@ -3,8 +3,8 @@
 Numbers, text, lists and arrays are written as they are; an array that is not float64 also has its dtype. A
 registered controller is written as its name and the arguments of its constructor, a dataclass or named tuple
 as its class and its fields. An object of any other class is written as a fingerprint alone: it can be
-compared but not rebuilt. A class that is not part of dynx also has a checksum of its code; if the code has
-changed, it counts as another class.
+compared but not rebuilt. The code of a class that is not part of dynx is not compared, which its document
+states: whoever changes the class changes what the scenario does.
 """
 
 from __future__ import annotations
@@ -16,16 +16,15 @@ import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from hashlib import sha256
-from types import FunctionType
+from types import CellType, FunctionType
 from typing import Any
 
 import numpy as np
 
 from dynx.backends import Backend
 from dynx.control.base import Controller, chain_of
-from dynx.control.code_content import digest_of_code, digest_of_function, is_foreign
-from dynx.control.content import attributes_of, entered
-from dynx.control.registry import controller_class, from_document, to_document
+from dynx.control.content import attributes_of, entered, is_foreign
+from dynx.control.registry import from_document, to_document
 from dynx.errors import ArgumentError, UnknownNameError, shown
 from dynx.model import Model
 from dynx.model.documents import robot_document, robot_from_document
@@ -62,7 +61,10 @@ NUMBERS = "numbers"
 """Entry for the public numbers of a controller that is written as a fingerprint."""
 
 CODE, DURATION = "code", "duration"
-"""Entries for a class that is not of dynx: the checksum of its code, and the duration of a trajectory."""
+"""Entries for a class that is not of dynx: that its code is not checked, and the duration of a trajectory."""
+
+NOT_CHECKED = "not checked"
+"""Value of `CODE`; files of dynx's first versions have a checksum of bytecode, which is ignored."""
 
 SAME_MODEL = {MODEL: "of the scenario"}
 """Value that represents the scenario's model inside its controller or reference."""
@@ -103,8 +105,6 @@ class Unknown:
     def why(self) -> str:
         """Reason why it cannot be rebuilt, and what the class lacks."""
         document = json.loads(self.text)
-        if FINGERPRINT not in document and _has_other_code(document):
-            return "the code of its class here is not that of the file (or the file is of another Python)"
         if CONTROLLER in document:
             return f"no controller {shown(self.name)} is registered here: {REGISTRATION}"
         if FINGERPRINT in document and NUMBERS in document:
@@ -219,10 +219,10 @@ def _decoded(document: Document, model: Model | None) -> Any:
         return array
     if "mapping" in document:
         return {_decoded(key, model): _decoded(each, model) for key, each in document["mapping"]}
+    if CODE in document:
+        document = document | {CODE: NOT_CHECKED}
     if CONTROLLER in document:
         name = str(document[CONTROLLER]["controller"])
-        if _has_other_code(document):
-            return Unknown(name, json.dumps(document))
         try:
             return from_document(_decoded(document[MODEL], model), document[CONTROLLER])
         except UnknownNameError:
@@ -238,7 +238,7 @@ def _decoded(document: Document, model: Model | None) -> Any:
     kind = _class_of(document[CLASS])
     if kind is Model:
         raise TypeError("a model is written as URDF text")
-    if kind is None or _has_other_code(document):
+    if kind is None:
         return Unknown(document[CLASS].rpartition(":")[2], json.dumps(document))
     given = present_fields(document[CLASS], document["fields"])
     return kind(**{name: _decoded(each, model) for name, each in given.items()})
@@ -265,28 +265,11 @@ def _object(value: Any, given: Mapping[str, Any], model: Model | None) -> Docume
 
 
 def _code_of(value: Any) -> dict[str, Document]:
-    """Return the code's checksum for an object's class, and a trajectory's duration; empty for dynx's own."""
+    """Return the note on the code of a foreign class, and a trajectory's duration; empty for dynx's own."""
     if not is_foreign(type(value)):
         return {}
     duration = {DURATION: float(value.duration)} if isinstance(value, Trajectory) else {}
-    return {CODE: digest_of_code(type(value)), **duration}
-
-
-def _present_class(document: Document) -> type | None:
-    """Return the class of a document in this program; None if it does not exist here."""
-    if CLASS in document:
-        found: type | None = _class_of(document[CLASS])
-        return found
-    try:
-        return controller_class(document[CONTROLLER]["controller"])
-    except (ArgumentError, UnknownNameError):
-        return None
-
-
-def _has_other_code(document: Document) -> bool:
-    """Check whether the code of a document's class differs between this program and the file."""
-    kind = _present_class(document) if CODE in document else None
-    return kind is not None and digest_of_code(kind) != document[CODE]
+    return {CODE: NOT_CHECKED, **duration}
 
 
 def _array(array: np.ndarray[Any, Any]) -> Document:
@@ -366,7 +349,8 @@ def _fingerprint(value: Any, model: Model | None) -> str:
 
 
 def _parts(value: Any) -> Iterable[Any]:
-    """Return the code and closure of a function; for any other object, everything that a copy of it gets."""
+    """Return the name, defaults and closure of a function; for any other object, all that a copy of it
+    gets."""
     if isinstance(value, set | frozenset):
         return value
     if isinstance(value, bytes):
@@ -376,7 +360,10 @@ def _parts(value: Any) -> Iterable[Any]:
     if isinstance(value, Backend):
         return [value.name, value.model]
     if isinstance(value, FunctionType):
-        return [digest_of_function(value)]
+        name = f"{value.__module__}:{value.__qualname__}"
+        # A cell is empty until the enclosing function assigns its variable.
+        enclosed = [cell.cell_contents for cell in value.__closure__ or () if cell != CellType()]
+        return [name, value.__defaults__, value.__kwdefaults__, enclosed]
     try:
         attributes = attributes_of(value)
         reduced = value.__reduce_ex__(2)

@@ -24,7 +24,6 @@ from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.scenario.documents import (
     ARRAY,
     CLASS,
-    CODE,
     CONTROLLER,
     FINGERPRINT,
     MODEL,
@@ -284,17 +283,16 @@ def _parts_of(document: Document) -> dict[str, Document] | None:
     None for a document that is not of an object."""
     if not isinstance(document, dict):
         return None
-    code = {"code of the class": document[CODE]} if CODE in document else {}
     if CLASS in document:
-        return {f"class {document[CLASS]}": True, **document["fields"], **code}
+        return {f"class {document[CLASS]}": True, **document["fields"]}
     if isinstance(document.get(CONTROLLER), str):
         # A controller inside another one has its model, and no entry for it.
         return {f"class {document[CONTROLLER]}": True, **arguments_of(document)}
     if CONTROLLER in document:
         kind = document[CONTROLLER][CONTROLLER]
-        return {f"class {kind}": True, MODEL: document.get(MODEL), **arguments_of(document), **code}
+        return {f"class {kind}": True, MODEL: document.get(MODEL), **arguments_of(document)}
     if FINGERPRINT in document:
-        return {f"class {document[FINGERPRINT]}": True, **document.get(CONTROLLER_NUMBERS, {}), **code}
+        return {f"class {document[FINGERPRINT]}": True, **document.get(CONTROLLER_NUMBERS, {})}
     return None
 
 

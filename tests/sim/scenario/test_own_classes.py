@@ -1,8 +1,9 @@
-"""Classes of a user's own in a scenario: their code is compared; a fingerprint in a file is named as one."""
+"""Classes of a user's own in a scenario: their code is not compared; a file may have a fingerprint alone."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import json
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,74 +23,39 @@ PENDULUM = load("pendulum")
 REST = Setpoint(np.zeros(1), np.zeros(1), np.zeros(1))
 
 
-def damper(gain: Any, code: str = "-gain * measurement.v", head: str = "", scale: float = 1.0) -> Any:
-    """Return a class of a controller with a text for its torque and an enclosed constant."""
-    text = (
-        "def made(Controller, gain):\n"
-        "    class Damper(Controller):\n"
-        "        def __init__(self, model, number):\n"
-        "            self.model, self.number = model, number\n"
-        f"{head}"
-        "        def torque(self, measurement, setpoint, state):\n"
-        f"            return (lambda: SCALE * ({code}))(), None\n"
-        "    return Damper\n"
+def damper(gain: float) -> Any:
+    """Return a new class of a controller with its own code."""
+
+    class Damper(Controller[None]):
+        def __init__(self, model: Any, number: float) -> None:
+            self.model, self.number = model, number
+
+        def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> Any:
+            return -gain * measurement.v, None
+
+    return Damper
+
+
+def test_the_code_of_a_class_is_not_compared_and_the_document_says_so() -> None:
+    one, other = (
+        Scenario(PENDULUM, damper(gain)(PENDULUM, 1.0), [0.0], q0=[0.3], duration=0.02) for gain in (2.0, 3.0)
     )
-    space: dict[str, Any] = {"__name__": "notebook", "SCALE": scale}
-    exec(text, space)
-    return space["made"](Controller, gain)
-
-
-SAME: dict[str, Callable[[], Any]] = {
-    "again": lambda: damper(2.0),
-    "other lines": lambda: damper(2.0, head="\n\n        # a comment\n\n"),
-}
-OTHERS: dict[str, Callable[[], Any]] = {
-    "closure": lambda: damper(2.5),
-    "closure type": lambda: damper(2),
-    "array closure": lambda: damper(np.array([2.0])),
-    "constant": lambda: damper(2.0, "-1.5 * gain * measurement.v"),
-    "operator": lambda: damper(2.0, "gain * measurement.v"),
-    "attribute": lambda: damper(2.0, "-gain * measurement.q"),
-    "class attribute": lambda: damper(2.0, head="        lead = 1\n"),
-    "method": lambda: damper(2.0, head="        def name(self): return 1\n"),
-    "number of the module": lambda: damper(2.0, scale=2.0),
-    "not comparable": lambda: damper(iter([2.0]), "-2.0 * measurement.v if gain else 0"),
-}
-
-
-def scenario_with(kind: Any) -> Scenario:
-    return Scenario(PENDULUM, kind(PENDULUM, 1.0), [0.0], q0=[0.3], duration=0.02)
-
-
-@pytest.mark.parametrize("name", SAME)
-def test_equal_code_is_equal_and_resumes(name: str) -> None:
-    one, other = scenario_with(damper(2.0)), scenario_with(SAME[name]())
     assert one == other == Scenario.from_json(one.to_json())
+    assert json.loads(one.to_json())["controller"]["code"] == "not checked"
+    assert one != replace(one, controller=damper(2.0)(PENDULUM, 1.5))
     whole = simulate(one)
-    assert np.array_equal(simulate(other, resume=whole.first(5)).q, whole.q)
+    resumed = simulate(other, resume=whole.first(5))
+    assert np.array_equal(resumed.q[:6], whole.q[:6])
+    assert not np.array_equal(resumed.q, whole.q)
 
 
-@pytest.mark.parametrize("name", OTHERS)
-def test_other_code_is_unequal_and_is_not_resumed(name: str) -> None:
-    one, other = scenario_with(damper(2.0)), scenario_with(OTHERS[name]())
-    assert one != other
-    assert Scenario.from_json(one.to_json()) != other
-    with pytest.raises(
-        ArgumentError, match=r"had controller\.code of the class .*now it is|had controller\."
-    ):
-        simulate(other, resume=simulate(one).first(5))
-
-
-def test_what_cannot_be_compared_equals_itself_alone() -> None:
-    code = "-2.0 * measurement.v if gain else 0"
-    one, other = (scenario_with(damper(iter([2.0]), code)) for _ in range(2))
-    assert one == replace(one, duration=0.02)
-    assert one != other
-
-
-def test_the_content_key_of_a_controller_has_the_code_of_its_class() -> None:
-    keys = [kind(PENDULUM, 1.0).content_key() for kind in (damper(2.0), damper(2.0), damper(3.0))]
-    assert keys[0] == keys[1] != keys[2]
+def test_a_checksum_of_code_in_an_older_file_is_ignored(registered: None) -> None:
+    scenario = Scenario(PENDULUM, Registered(PENDULUM), Sloped(0.02, REST, REST))
+    older = Scenario.from_json(scenario.to_json().replace("not checked", "0" * 64))
+    assert older == scenario
+    assert isinstance(older.controller, Registered)
+    own = Scenario(PENDULUM, damper(2.0)(PENDULUM, 1.0), [0.0], duration=0.02)
+    assert Scenario.from_json(own.to_json().replace("not checked", "0" * 64)) == own
 
 
 class Waving(Trajectory):
@@ -135,24 +101,6 @@ def registered() -> Iterator[None]:
     control.register_controller("registered", lambda: Registered)
     yield
     registry.unregister("registered")
-
-
-def test_a_class_whose_code_changed_since_is_not_rebuilt(
-    registered: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    scenario = Scenario(PENDULUM, Registered(PENDULUM), Sloped(0.02, REST, REST))
-    read = Scenario.from_json(scenario.to_json())
-    assert isinstance(read.controller, Registered)
-    assert isinstance(read.reference, Sloped)
-    assert read == scenario
-    text = scenario.to_json()
-    for kind, name in ((Registered, "torque"), (Sloped, "inside")):
-        with monkeypatch.context() as patch:
-            patch.setattr(kind, name, lambda *given: given)
-            changed = Scenario.from_json(text)
-            assert changed != Scenario(PENDULUM, Registered(PENDULUM), Sloped(0.02, REST, REST))
-            with pytest.raises(ArgumentError, match=f"(?i){kind.__name__} was read.*code of its class"):
-                simulate(changed)
 
 
 def test_a_controller_that_is_not_registered_is_told_to_be(registered: None) -> None:
