@@ -14,14 +14,12 @@ from typing import Any
 
 from dynx.agreement.report import AgreementDocument
 from dynx.bench.report import BenchDocument
-from dynx.cli.compare.document import CompareDocument
-from dynx.cli.contacts.document import ContactsDocument
-from dynx.cli.env.document import EnvDistanceDocument, TasksDocument
-from dynx.cli.play.document import PlayDocument
-from dynx.cli.sim.document import SimDocument
+from dynx.cli.compare import CompareDocument
+from dynx.cli.contacts.run import ContactsDocument
+from dynx.cli.learning.documents import EnvDistanceDocument, PlayDocument, TasksDocument, TrainDocument
+from dynx.cli.sim.report import SimDocument
 from dynx.cli.sim.tutorial import TutorialDocument
-from dynx.cli.train.document import TrainDocument
-from dynx.cli.world.document import WorldDocument
+from dynx.cli.world import WorldDocument
 from dynx.doctor.formats.baseline import BaselineDocument
 from dynx.doctor.report import DoctorDocument
 from dynx.files.documents import json_schema

@@ -15,7 +15,7 @@ from jsonschema import Draft202012Validator
 
 from dynx import ExternalForce, agree, diagnose, load
 from dynx.agreement import refused_report, results_document
-from dynx.cli.compare.document import document as compare_document
+from dynx.cli.compare import document as compare_document
 from dynx.cli.shell.main import cli
 from dynx.control import PD
 from dynx.doctor import results_document as doctor_document

@@ -26,7 +26,7 @@ SCRIPT = """
 import inspect, json, runpy, sys
 import dynx
 from click.testing import CliRunner
-from dynx.cli.sim.command import sim
+from dynx.cli.commands.sim import sim
 
 docs = sys.argv[1]
 arm = dynx.load("pendulum")

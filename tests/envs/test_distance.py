@@ -12,8 +12,8 @@ from gymnasium import spaces
 from rich.console import Console
 
 import dynx.envs  # noqa: F401  (registers the environments)
-from dynx.cli.env.document import document
-from dynx.cli.env.tables import show
+from dynx.cli.learning.documents import distance_document as document
+from dynx.cli.learning.env import show
 from dynx.envs.distance import engine_distance
 from dynx.envs.registration import bare_name, task_class, task_id
 from dynx.errors import ArgumentError, UnknownNameError

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from dynx.cli.doctor.mending import write_mended
+from dynx.cli.doctor.files import write_mended
 from dynx.doctor import diagnose
 from dynx.doctor.task import DoctorTask, examine
 from tests.rules.documents import case_of, joint, link

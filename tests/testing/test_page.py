@@ -9,7 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from dynx.cli.doctor.command import doctor
+from dynx.cli.commands.comparison import doctor
 from dynx.testing import plugin
 from tests.test_readme import ROOT, blocks
 

@@ -8,7 +8,7 @@ import pytest
 
 from dynx.agreement import results_document
 from dynx.agreement.agreement import AgreementTask
-from dynx.cli.agree.run import agreement_run
+from dynx.cli.agree import agreement_run
 from dynx.workers import WorkerFailure, Workers
 from tests.workers.targets import act, crash_on_panda
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-Entry = Mapping[str, Any]
+from dynx.cli.shell.output import Entry
 
 RANKS = ("within", "falls", "cannot", "setting", "unexplained")
 """Verdicts in ascending order of how much they deserve a look."""

@@ -8,16 +8,13 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.text import Text
 
-from dynx.cli.doctor.conclusion import DoctorRun, refusal
-from dynx.cli.doctor.outputs import ReportFiles
-from dynx.cli.doctor.repetition import doctor_command
-from dynx.cli.doctor.run import doctor_run
-from dynx.cli.doctor.tables import error_text, show_engines, show_errors
-from dynx.cli.doctor.text import heading, sentence
+from dynx.cli.doctor.files import ReportFiles
+from dynx.cli.doctor.run import DoctorRun, doctor_command, doctor_run, refusal
+from dynx.cli.doctor.tables import error_text, heading, sentence, show_engines, show_errors
 from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, one_line, short_line
+from dynx.cli.shell.output import console, counted, summary_line
 from dynx.cli.shell.run import carry_out
 from dynx.cli.shell.tables import Table
-from dynx.cli.shell.terminal import console, counted, summary_line
 from dynx.doctor.formats import wording
 from dynx.doctor.formats.vote import Vote, largest_error, largest_quantity_error, vote
 from dynx.doctor.report import DoctorReport, EngineResult

@@ -1,26 +1,23 @@
-"""Reports of `dynx doctor` on a terminal."""
+"""Reports of ``dynx doctor`` on a terminal: one robot in full, several with a line each."""
 
 from __future__ import annotations
 
 import shlex
+import textwrap
 from collections.abc import Mapping, Sequence
 from io import StringIO
+from typing import get_args
 
 from rich.console import Console
 from rich.text import Text
 
-from dynx.cli.doctor.text import STYLES, block, heading, sentence
 from dynx.cli.shell.exits import one_line, short_line
+from dynx.cli.shell.output import counted, summary_line
 from dynx.cli.shell.tables import Table
-from dynx.cli.shell.terminal import counted
 from dynx.doctor.formats import wording
-from dynx.doctor.formats.causes import (
-    ROUNDING,
-    RuleFindings,
-    catalogue_entry,
-    causes,
-)
-from dynx.doctor.report import DoctorReport, EngineResult, Finding
+from dynx.doctor.formats.causes import ROUNDING, RuleFindings, catalogue_entry, causes, severity
+from dynx.doctor.formats.vote import largest_error
+from dynx.doctor.report import DoctorReport, EngineResult, Finding, Status
 
 _PLACES = (4, 3, 2, 1)
 """Numbers of places listed for one rule; ``--json`` and ``--html`` have all."""
@@ -326,3 +323,138 @@ def error_text(error: float, tolerance: float) -> Text:
     if error <= tolerance:
         return Text(wording.relative(error), "green")
     return Text(wording.relative(error), STYLES["warning" if error <= ROUNDING else "error"])
+
+
+_CAPTION = (
+    "largest relative error of any engine, as loaded (refused: an engine refuses it;",
+    "not used: an engine would crash on it, or its results mean nothing),",
+    "and the error that remains when mended{level}",
+)
+
+_MAX_RULES = 3
+"""Number of rules listed for one of several robots."""
+
+
+def show_many(out: Console, reports: Sequence[DoctorReport]) -> None:
+    """Print one line for each robot and base."""
+    bases = len({report.base for report in reports}) > 1
+    columns = ["robot", *(["base"] if bases else []), "verdict", "error", "mended", "causes"]
+    table = Table(*columns, right=["error", "mended"], keys=1)
+    for report in reports:
+        table.add_row(
+            short_line(report.robot),
+            *([report.base or ""] if bases else []),
+            _verdict_text(report),
+            _largest(report),
+            _remaining(report),
+            _rules(report),
+        )
+    levels = "".join(sorted({level_clause(report) for report in reports}))
+    for line in _CAPTION:
+        out.print(line.format(level=levels), style="bold")
+    out.print(table)
+    _count_variants(out, reports)
+    unread = sum(bool(report.unread_meshes) for report in reports)
+    if unread:
+        share = f"{unread} of {counted(len(reports), 'robot')}"
+        checked = f"their links are not checked against the size of shapes ({wording.SHAPE_RULES})"
+        refusing = dict.fromkeys(name for report in reports for name in report.refused_without_meshes)
+        without = wording.refused_without_mesh([*refusing])
+        out.print(f"meshes could not be read: {share}; {checked}{without}", style="yellow")
+    out.print()
+
+
+def _count_variants(out: Console, reports: Sequence[DoctorReport]) -> None:
+    """Print for each variant the number of robots that it loads otherwise."""
+    off = [each for report in reports for each in report.variants_off]
+    for name in dict.fromkeys(each.engine for each in off):
+        mine = [each for each in off if each.engine == name]
+        rules = ", ".join(sorted({finding.rule for each in mine for finding in each.findings}))
+        share = f"{len(mine)} of {counted(len(reports), 'robot')}"
+        out.print(f"{name}: {share} loaded otherwise by this call{f' ({rules})' if rules else ''}")
+
+
+def show_summary(out: Console, reports: Sequence[DoctorReport], seconds: float, not_done: int) -> None:
+    """Print the last line: the number of robots with each verdict, and of those not done."""
+    verdicts = [report.status for report in reports]
+    counts = {word: verdicts.count(word) for word in get_args(Status)}
+    if not counts["massless"]:
+        del counts["massless"]
+    bases = len({report.base for report in reports}) > 1
+    what = counted(len(reports), "examination" if bases else "robot")
+    out.print(summary_line(what, counts, not_done, seconds))
+
+
+def _largest(report: DoctorReport) -> Text:
+    if report.error is not None:
+        return Text("")
+    without = [each for each in report.engines if each.no_results is not None]
+    if without:
+        word = "not used" if all(each.refused is None for each in without) else "refused"
+        return Text(word, STYLES["error"])
+    return error_text(largest_error(report), report.tolerance)
+
+
+def _remaining(report: DoctorReport) -> Text:
+    """Write the error after mending."""
+    if report.error is not None:
+        return Text("")
+    without = [each for each in report.engines if each.no_results_after is not None]
+    if without:
+        word = "not used" if all(each.refused_after is None for each in without) else "refused"
+        return Text(word, STYLES["error"])
+    return error_text(report.remaining, report.tolerance)
+
+
+def _rules(report: DoctorReport) -> Text:
+    found = [cause for cause in causes(report) if cause.largest_effect is not None]
+    parts = [Text(wording.name(cause.rule), STYLES[cause.severity]) for cause in found[:_MAX_RULES]]
+    if len(found) > _MAX_RULES:
+        parts.append(Text(f"+{len(found) - _MAX_RULES}"))
+    return Text(" ").join(parts)
+
+
+def _verdict_text(report: DoctorReport) -> Text:
+    word = report.status
+    if word == "refused":  # the reason is on standard error
+        return Text("refused", "yellow")
+    if word == "alike":
+        return Text("alike, parts skipped", "yellow") if report.skipped else Text("alike", "green")
+    if word == "unexplained":
+        return Text("UNEXPLAINED", "bold red")
+    if word == "massless":
+        return Text("no inertial data", "yellow")
+    alarming = any(severity(finding) == "error" for finding in report.differences)
+    return Text("explained", "" if alarming else "dim")
+
+
+STYLES = {"error": "bold red", "warning": "yellow", "note": "dim"}
+"""Style of each severity."""
+
+
+def heading(out: Console, text: str, style: str = "bold") -> None:
+    """Print a blank line and a title."""
+    out.print()
+    out.print(text, style=style)
+
+
+def sentence(out: Console, text: str, indent: int, style: str = "") -> None:
+    """Print text wrapped to the terminal's width, each line indented; words are not broken."""
+    blanks = " " * indent
+    lines = textwrap.wrap(
+        text,
+        max(out.width, indent + 20),
+        initial_indent=blanks,
+        subsequent_indent=blanks,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    for line in lines:
+        out.print(line, style=style)
+
+
+def block(out: Console, code: str, indent: int) -> None:
+    """Print lines of code without wrapping, so that they can be copied."""
+    for line in code.splitlines():
+        blanks = " " * (indent + len(line) - len(line.lstrip(" ")))
+        out.print(f"{blanks}{one_line(line)}")

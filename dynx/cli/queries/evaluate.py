@@ -16,12 +16,10 @@ from dynx.cli.shell.inputs import (
     velocity,
     velocity_names,
 )
+from dynx.cli.shell.output import Entry, console, number, write_json
 from dynx.cli.shell.tables import Table, listing
-from dynx.cli.shell.terminal import console, number, write_json
 from dynx.model import Model
 from dynx.spatial.so3 import quat_from_rotation, rpy_from_rotation
-
-Entry = dict[str, Any]
 
 
 def fk(q: Numbers, frame: str | None, json_path: str | None, **robot: Any) -> None:
@@ -102,7 +100,7 @@ def mass_matrix(q: Numbers, joint_dynamics: bool, json_path: str | None, **robot
         _print_matrix(f"{title(result)}: mass matrix", names, names, result["mass_matrix"])
 
 
-def document_head(engine: Backend) -> Entry:
+def document_head(engine: Backend) -> dict[str, Any]:
     """Make the first entries of the JSON document of a query."""
     model: Model = engine.model
     return {"schema": 1, "robot": model.name, "base": model.base, "backend": engine.name}
@@ -113,7 +111,7 @@ def title(result: Entry) -> str:
     return f"{one_line(result['robot'])}, {result['base']} base, {result['backend']}"
 
 
-def _sample(engine: Backend, q: Numbers, **vectors: Numbers) -> tuple[list[Any], Entry]:
+def _sample(engine: Backend, q: Numbers, **vectors: Numbers) -> tuple[list[Any], dict[str, Any]]:
     """Return the arguments of an engine call, and the document that contains them."""
     model = engine.model
     sample = {"q": configuration(model, q)}

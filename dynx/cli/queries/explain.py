@@ -9,7 +9,7 @@ from typing import Any
 
 from rich.markdown import Markdown
 
-from dynx.cli.shell.terminal import console, counted, write_json
+from dynx.cli.shell.output import console, counted, write_json
 from dynx.rules import Rule, all_rules, find_rule
 
 _MAX_WIDTH = 100

@@ -14,10 +14,13 @@ from __future__ import annotations
 import errno
 import io
 import os
+import signal
 import sys
+import threading
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from types import FrameType
 
 import click
 
@@ -122,3 +125,38 @@ def _discard_output() -> None:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())
         os.close(nowhere)
+
+
+class Interruption:
+    """Request to end the run.
+
+    `code` is None until a signal arrives; then it is the exit code, 128 + signal. Set `finishing` to have
+    later signals ignored while the results are written.
+    """
+
+    def __init__(self) -> None:
+        self.code: int | None = None
+        self.finishing = False
+
+    def handle(self, number: int, frame: FrameType | None) -> None:
+        """Handle a signal: the first ends the work, later ones are ignored so that no results are lost."""
+        if self.finishing or self.code is not None:
+            return
+        self.code = 128 + number
+        raise KeyboardInterrupt
+
+
+@contextmanager
+def interruptible() -> Iterator[Interruption]:
+    """Raise KeyboardInterrupt in the block at the first SIGINT or SIGTERM, unless `finishing` is set."""
+    interruption = Interruption()
+    if threading.current_thread() is not threading.main_thread():
+        yield interruption  # only the main thread can set handlers and receives signals
+        return
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, interruption.handle) for number in numbers]
+    try:
+        yield interruption
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)

@@ -17,48 +17,30 @@ from dynx.errors import TRACEBACK_VARIABLE
 from dynx.safe_path import isolate_children
 
 COMMANDS = {
-    "agree": LazyCommand("dynx.cli.agree.command:agree", "Compare the results of all engines on robots."),
-    "doctor": LazyCommand(
-        "dynx.cli.doctor.command:doctor", "Find, prove and mend the causes of differences between engines."
-    ),
-    "sim": LazyCommand("dynx.cli.sim.command:sim", "Simulate a robot under a controller."),
-    "world": LazyCommand(
-        "dynx.cli.world.command:world", "Run a scene with contacts on several engines, and compare them."
-    ),
-    "compare": LazyCommand(
-        "dynx.cli.compare.command:compare", "Compare two rollouts, and find out why they part."
-    ),
-    "view": LazyCommand("dynx.cli.view.command:view", "Show a robot, a rollout or a scene in the browser."),
-    "env": LazyCommand(
-        "dynx.cli.env.command:env", "List tasks of reinforcement learning; compare the engines on one."
-    ),
-    "train": LazyCommand("dynx.cli.train.command:train", "Train a policy on a task, with checkpoints."),
-    "play": LazyCommand("dynx.cli.play.command:play", "Judge, show or film a trained policy."),
-    "contacts": LazyCommand(
-        "dynx.cli.contacts.command:contacts",
-        "Measure errors of contacts against closed forms; find causes.",
-    ),
-    "bench": LazyCommand("dynx.cli.bench.command:bench", "Time the engines on a robot and this machine."),
-    "explain": LazyCommand(
-        "dynx.cli.queries.commands:explain", "Explain a rule of the doctor, such as DX101."
-    ),
-    "info": LazyCommand(
-        "dynx.cli.queries.commands:info", "Show the links, joints, masses and frames of a robot."
-    ),
-    "robots": LazyCommand("dynx.cli.queries.commands:robots", "List the robots that have a name."),
-    "backends": LazyCommand("dynx.cli.queries.commands:backends", "List the backends and their versions."),
-    "fk": LazyCommand("dynx.cli.queries.commands:fk", "Forward kinematics: the pose of a frame."),
-    "jacobian": LazyCommand("dynx.cli.queries.commands:jacobian", "The Jacobian of a frame."),
-    "id": LazyCommand(
-        "dynx.cli.queries.commands:id_", "Inverse dynamics: the torque that gives an acceleration."
-    ),
-    "fd": LazyCommand(
-        "dynx.cli.queries.commands:fd", "Forward dynamics: the acceleration that a torque gives."
-    ),
-    "mass": LazyCommand("dynx.cli.queries.commands:mass", "The mass matrix."),
-    "ik": LazyCommand(
-        "dynx.cli.queries.commands:ik", "Inverse kinematics: a configuration that reaches a target."
-    ),
+    name: LazyCommand(f"dynx.cli.commands.{target}", line)
+    for name, target, line in (
+        ("agree", "comparison:agree", "Compare the results of all engines on robots."),
+        ("doctor", "comparison:doctor", "Find, prove and mend the causes of differences between engines."),
+        ("sim", "sim:sim", "Simulate a robot under a controller."),
+        ("world", "motion:world", "Run a scene with contacts on several engines, and compare them."),
+        ("compare", "motion:compare", "Compare two rollouts, and find out why they part."),
+        ("view", "motion:view", "Show a robot, a rollout or a scene in the browser."),
+        ("env", "learning:env", "List tasks of reinforcement learning; compare the engines on one."),
+        ("train", "learning:train", "Train a policy on a task, with checkpoints."),
+        ("play", "learning:play", "Judge, show or film a trained policy."),
+        ("contacts", "motion:contacts", "Measure errors of contacts against closed forms; find causes."),
+        ("bench", "comparison:bench", "Time the engines on a robot and this machine."),
+        ("explain", "queries:explain", "Explain a rule of the doctor, such as DX101."),
+        ("info", "queries:info", "Show the links, joints, masses and frames of a robot."),
+        ("robots", "queries:robots", "List the robots that have a name."),
+        ("backends", "queries:backends", "List the backends and their versions."),
+        ("fk", "queries:fk", "Forward kinematics: the pose of a frame."),
+        ("jacobian", "queries:jacobian", "The Jacobian of a frame."),
+        ("id", "queries:id_", "Inverse dynamics: the torque that gives an acceleration."),
+        ("fd", "queries:fd", "Forward dynamics: the acceleration that a torque gives."),
+        ("mass", "queries:mass", "The mass matrix."),
+        ("ik", "queries:ik", "Inverse kinematics: a configuration that reaches a target."),
+    )
 }
 """The commands of dynx in the order of the list, each with its line there."""
 

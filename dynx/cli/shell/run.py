@@ -7,10 +7,8 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Generic, Protocol, TypeVar
 
-from dynx.cli.shell.exits import complain, remark, short_line
-from dynx.cli.shell.interruption import interruptible
-from dynx.cli.shell.progress import log, progress_bar
-from dynx.cli.shell.terminal import counted
+from dynx.cli.shell.exits import complain, interruptible, remark, short_line
+from dynx.cli.shell.output import counted, log, progress_bar
 from dynx.errors import DynxError
 from dynx.model.xacro_robots import left_out_note
 from dynx.simd.machine import core_count

@@ -13,6 +13,9 @@ Cell = str | Text
 _GAP, _NARROW_GAP = 3, 2
 """Number of blanks between columns in a table that fits and in one that does not; one precedes them."""
 
+MAX_ROWS = 30
+"""Largest number of rows of a table; the JSON document has them all."""
+
 _MAX_KEY_FRACTION = 0.4
 """Largest width of a key, as a fraction of the width of a table that does not fit; wider keys are wrapped."""
 
@@ -94,6 +97,13 @@ class Table:
                 line.append_text(Text.assemble(blanks, cell) if self._right[column] else cell + blanks)
             line.rstrip()
             yield line
+
+
+def print_rest(out: Console, rest: int, noun: str = "", plural: str = "") -> None:
+    """Print how many rows are left out after the first `MAX_ROWS`; nothing where there are none."""
+    if rest > 0:
+        words = filter(None, (f"... and {rest} more", noun if rest == 1 else plural))
+        out.print(f"{' '.join(words)} (--json has all)")
 
 
 def listing(heading: str, items: Iterable[str], width: int) -> str:

@@ -11,15 +11,18 @@ from typing import Any
 
 import click
 
-from dynx.cli.shell.exits import BAD_INPUT, DONE, INTERRUPTED, NEGATIVE_RESULT, complain, failure_of
-from dynx.cli.shell.interruption import interruptible
-from dynx.cli.shell.output_file import check_json, check_writable
-from dynx.cli.shell.progress import progress_bar
-from dynx.cli.shell.terminal import present
-from dynx.cli.sim.document import EarlyEnd, document
-from dynx.cli.sim.motion import limit_message
-from dynx.cli.sim.request import SimulationRequest, prepare
-from dynx.cli.sim.tables import show
+from dynx.cli.shell.exits import (
+    BAD_INPUT,
+    DONE,
+    INTERRUPTED,
+    NEGATIVE_RESULT,
+    complain,
+    failure_of,
+    interruptible,
+)
+from dynx.cli.shell.output import check_json, check_writable, present, progress_bar
+from dynx.cli.sim.report import EarlyEnd, document, show
+from dynx.cli.sim.request import SimulationRequest, limit_message, prepare
 from dynx.cli.sim.tutorial import run_tutorial
 from dynx.errors import ArgumentError, DynxError, LimitError, NotInstalledError, SimulationError, shown
 from dynx.files.figures import picture_format

@@ -10,14 +10,20 @@ import numpy as np
 from rich.console import Console
 
 from dynx._version import __version__
-from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, failure_of, one_line
+from dynx.cli.shell.exits import (
+    BAD_INPUT,
+    DONE,
+    NEGATIVE_RESULT,
+    complain,
+    failure_of,
+    interruptible,
+    one_line,
+)
 from dynx.cli.shell.inputs import configuration
-from dynx.cli.shell.interruption import interruptible
-from dynx.cli.shell.progress import progress_bar
+from dynx.cli.shell.output import Entry, counted, number, present, progress_bar
 from dynx.cli.shell.tables import Table
-from dynx.cli.shell.terminal import counted, number, present
-from dynx.cli.sim.motion import limit_message
-from dynx.cli.sim.tables import error_text
+from dynx.cli.sim.report import error_text
+from dynx.cli.sim.request import limit_message
 from dynx.errors import ArgumentError, LimitError
 from dynx.model.loading import load
 from dynx.sim.named_controllers import NATURAL_FREQUENCY
@@ -174,8 +180,6 @@ def _experiments(robot: str | None, given: dict[str, Any]) -> Tutorial:
     except LimitError as error:
         raise ArgumentError(limit_message(error, model.name, ignorable=False)) from error
 
-
-Entry = dict[str, Any]
 
 _NAMES = {"pybullet": "PyBullet"}
 """Plants with a stepper of their own, by their title; all others use the stepper of dynx."""

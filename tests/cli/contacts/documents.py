@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from dynx.cli.contacts.document import ContactsDocument, document
+from dynx.cli.contacts.run import ContactsDocument, document
 from dynx.contacts import (
     Attribution,
     Conformance,

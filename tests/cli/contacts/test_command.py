@@ -16,8 +16,7 @@ from jsonschema import Draft202012Validator
 from rich.console import Console
 
 from dynx.cli.contacts import run as contacts_run
-from dynx.cli.contacts.document import ContactsDocument
-from dynx.cli.contacts.tables import show
+from dynx.cli.contacts.run import ContactsDocument, show
 from dynx.cli.shell.main import cli
 from dynx.contacts import NoResult
 from dynx.files.documents import json_schema, json_text

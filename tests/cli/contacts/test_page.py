@@ -9,9 +9,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.cli.contacts.document import document
-from dynx.cli.contacts.page import ENGINE_STYLES, contacts_page
-from dynx.cli.contacts.plots import BOTTOM, HEIGHT, LEFT, RIGHT, TOP, WIDTH, plots
+from dynx.cli.contacts.page import (
+    BOTTOM,
+    ENGINE_STYLES,
+    HEIGHT,
+    LEFT,
+    RIGHT,
+    TOP,
+    WIDTH,
+    contacts_page,
+    plots,
+)
+from dynx.cli.contacts.run import document
 from dynx.cli.contacts.wording import headline
 from dynx.files.documents import json_text
 from tests.cli.contacts.documents import ENGINES, STEPS, at_one_step, conformance, example

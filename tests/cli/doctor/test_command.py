@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from dynx.agreement.tolerances import BAR
-from dynx.cli.doctor.mending import write_mended
+from dynx.cli.doctor.files import write_mended
 from dynx.cli.shell.main import cli
 from dynx.doctor.diagnosis import DEFAULT_SAMPLES, diagnose
 from dynx.errors import ArgumentError

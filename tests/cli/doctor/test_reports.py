@@ -17,13 +17,9 @@ from hypothesis import strategies as st
 from rich.console import Console
 
 from dynx.cli.doctor.as_loaded import vote_lines
-from dynx.cli.doctor.conclusion import Conclusion
-from dynx.cli.doctor.mending import planned_targets, write_mended
-from dynx.cli.doctor.outputs import ReportFiles, save_counterexamples
-from dynx.cli.doctor.overview import show_many
-from dynx.cli.doctor.repetition import doctor_command
-from dynx.cli.doctor.run import doctor_run
-from dynx.cli.doctor.tables import show_one
+from dynx.cli.doctor.files import ReportFiles, planned_targets, save_counterexamples, write_mended
+from dynx.cli.doctor.run import Conclusion, doctor_command, doctor_run
+from dynx.cli.doctor.tables import show_many, show_one
 from dynx.cli.shell.main import cli
 from dynx.cli.shell.run import carry_out
 from dynx.doctor.formats import read_baseline
@@ -113,8 +109,8 @@ def test_a_document_of_agree_that_cannot_be_written_leaves_the_table(
     def full(path: str, text: str) -> None:
         raise ArgumentError(f"{path} cannot be written: no space left")
 
-    monkeypatch.setattr("dynx.cli.shell.terminal.write_text", full)
-    monkeypatch.setattr("dynx.cli.doctor.outputs.write_text", full)
+    monkeypatch.setattr("dynx.cli.shell.output.write_text", full)
+    monkeypatch.setattr("dynx.cli.doctor.files.write_text", full)
     engines = ["--backends", "pinocchio"] if as_loaded else ["--backends", "reference"]
     command = ["agree", "pendulum", *engines, "--samples", "1", "--json", str(tmp_path / "x.json")]
     result = CliRunner().invoke(cli, [*command, *["--as-loaded"] * as_loaded])

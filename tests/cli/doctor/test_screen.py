@@ -8,7 +8,7 @@ from io import StringIO
 import pytest
 from rich.console import Console
 
-from dynx.cli.doctor.repetition import doctor_command
+from dynx.cli.doctor.run import doctor_command
 from dynx.cli.doctor.tables import SCREEN, show_one
 from dynx.doctor import diagnose
 from dynx.doctor.report import DoctorReport

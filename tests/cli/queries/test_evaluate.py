@@ -16,7 +16,7 @@ from dynx.backends import backend
 from dynx.cli.shell.inputs import default_frame
 from dynx.cli.shell.main import COMMANDS, cli
 from dynx.cli.shell.options import number_list
-from dynx.cli.shell.terminal import counted
+from dynx.cli.shell.output import counted
 from dynx.ik import IKSolutions
 from dynx.model.loading import load
 from dynx.model.numbers import MAX_MAGNITUDE

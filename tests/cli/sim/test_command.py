@@ -11,8 +11,8 @@ import pytest
 import dynx
 from dynx import control, trajectory
 from dynx.backends import installed_backends
+from dynx.cli.commands.sim import sim as command
 from dynx.cli.shell.inputs import default_frame
-from dynx.cli.sim.command import sim as command
 from dynx.sim import Rollout, simulate
 from dynx.sim.named_controllers import CONTROLLERS
 from tests.cli.sim.command import SHORT, document, sim

@@ -12,9 +12,9 @@ import pytest
 from click.testing import CliRunner, Result
 
 from dynx.backends import installed_backends
+from dynx.cli.commands.sim import sim as command
 from dynx.cli.shell.main import cli
 from dynx.cli.sim import run as sim_run
-from dynx.cli.sim.command import sim as command
 from dynx.engines.pybullet.backend import PyBulletBackend
 from dynx.errors import ArgumentError, NotInstalledError
 from dynx.sim.tutorial import MODES, Row, Tutorial

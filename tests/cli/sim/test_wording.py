@@ -11,7 +11,7 @@ import pytest
 
 import dynx
 from dynx import control
-from dynx.cli.sim.tables import column_text, percent_text
+from dynx.cli.sim.report import column_text, percent_text
 from dynx.sim import simulate
 from dynx.sim.named_controllers import CONTROLLERS
 from dynx.sim.overshoot import largest_overshoot

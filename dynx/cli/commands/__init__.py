@@ -1,0 +1,1 @@
+"""Declarations of the commands: their options and help, which import nothing heavy."""

@@ -1,0 +1,229 @@
+"""Declarations of ``dynx agree``, ``doctor`` and ``bench``: engines compared on robots."""
+
+from __future__ import annotations
+
+import click
+
+from dynx.cli.shell.lazy import runs
+from dynx.cli.shell.options import (
+    FiniteRange,
+    choice_pair,
+    frame_option,
+    json_option,
+    model_options,
+    name_list,
+    one_of,
+    run_options,
+)
+
+
+@click.command
+@click.argument("robots", nargs=-1, required=True, metavar="ROBOT...")
+@click.option(
+    "--backends",
+    type=name_list,
+    metavar="A,B,C",
+    help="Backends to compare; with --as-loaded, engines (default: all that are installed).",
+)
+@click.option(
+    "--as-loaded",
+    is_flag=True,
+    help="Compare the engines as each loads the file itself.",
+)
+@model_options
+@click.option(
+    "--samples",
+    type=click.IntRange(min=1),
+    help="Number of random configurations per robot (default: 16; with --as-loaded 5).",
+)
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the configurations."
+)
+@json_option
+@click.option(
+    "--json-samples",
+    is_flag=True,
+    help="Every pair of engines with its worst sample in the JSON, instead of the largest error of each "
+    "quantity and what differs.",
+)
+@run_options
+@runs("dynx.cli.agree:agree")
+def agree() -> None:
+    """Compare the results of all engines for every quantity, in pairs and with a 50-digit referee.
+
+    ROBOT is a name (see `dynx robots`), a URDF file, a directory (every .urdf below it), or `all`:
+    every robot of example-robot-data. For one robot the full table is printed, for several a line each.
+
+    With --as-loaded each engine loads the file itself by the call that its documentation recommends,
+    and that call is printed; `dynx doctor` explains the differences. The JSON document is then that of
+    `dynx doctor`, without findings.
+
+    Exit code 0 if all engines agree, 1 if some differ, 2 if some robot cannot be used (the others are
+    compared nevertheless). Ctrl-C ends the run with the results so far and exit code 130. A robot that
+    crashes an engine or takes too long is reported as refused.
+
+    \b
+    Examples:
+      dynx agree ur5
+      dynx agree ur5 panda --base floating --samples 100
+      dynx agree all --backends pinocchio,pybullet,reference --json all.json
+      dynx agree path/to/urdfs --lock gripper_joint=0.02
+      dynx agree my.urdf --as-loaded
+    """
+
+
+@click.command
+@click.argument("robots", nargs=-1, required=True, metavar="ROBOT...")
+@click.option(
+    "--base",
+    type=click.Choice(["fixed", "floating", "both"]),
+    default="fixed",
+    show_default=True,
+    help="Mount of the root link: fixed to the world, floating (free to move), or each in turn with `both`.",
+)
+@click.option(
+    "--engines",
+    type=name_list,
+    metavar="A,B,C",
+    help="Engines and loading variants to examine (default: all installed engines; beside them, not counted, "
+    "pybullet:plain).",
+)
+@click.option("--samples", type=click.IntRange(min=1), help="Number of random states per robot (default: 5).")
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the random states."
+)
+@click.option(
+    "--tolerance",
+    type=FiniteRange(min=0.0),
+    default=1e-12,
+    show_default=True,
+    help="Relative error above which engines differ; 1e-6 ignores rounding.",
+)
+@click.option(
+    "--choose",
+    type=choice_pair,
+    multiple=True,
+    metavar="RULE=CHOICE",
+    help="Choice for a rule that can mend a file in two ways, such as DX103=keep (see `dynx explain`); "
+    "may be given several times.",
+)
+@click.option(
+    "--fix",
+    "fix",
+    metavar="OUT",
+    help="File for the mended URDF; for several robots a directory. A file of that name is replaced, unless "
+    "it is one of the robots that are read.",
+)
+@click.option(
+    "--level",
+    type=click.Choice(["safe", "rounding", "physics"]),
+    default="physics",
+    show_default=True,
+    help="Largest change of the mended URDF: `safe` changes nothing that a reader notices, `rounding` the "
+    "equations of motion by rounding only, `physics` whatever the causes require.",
+)
+@click.option(
+    "--in-place", is_flag=True, help="Overwrite the files that were read with the mended descriptions."
+)
+@json_option
+@click.option("--html", metavar="FILE", help="File for the reports as one self-contained HTML page.")
+@click.option("--junit", metavar="FILE", help="File for the reports as JUnit XML.")
+@click.option("--sarif", metavar="FILE", help="File for the reports as SARIF 2.1.0.")
+@click.option(
+    "--github",
+    is_flag=True,
+    help="Findings as annotations of GitHub Actions on standard output, without those in the baseline.",
+)
+@click.option(
+    "--baseline",
+    "baseline_path",
+    metavar="FILE",
+    help="File of known differences, as --write-baseline writes it: only other differences fail.",
+)
+@click.option("--write-baseline", metavar="FILE", help="File for all present differences, as a baseline.")
+@click.option(
+    "--counterexamples",
+    metavar="DIR",
+    default=".",
+    show_default=True,
+    help="Directory for the smallest robot that shows a difference no rule explains.",
+)
+@run_options
+@runs("dynx.cli.doctor.run:doctor")
+def doctor() -> None:
+    """Find out why engines differ on a file: load it with each, prove every cause, and mend the file.
+
+    ROBOT is a name (see `dynx robots`), a URDF file, a directory (every .urdf below it), or `all`:
+    every robot of example-robot-data. For one robot the full report is printed, for several a line each.
+
+    Each cause is proved by removing it alone from the file and measuring the engines again. The file
+    that was read is changed only with --in-place. Other files named as outputs are replaced where they exist.
+
+    Exit code 0 if no engine differs (or only as the baseline allows, or a baseline was written), 1 if
+    some differ, 2 if some robot cannot be used (the others are examined nevertheless). Ctrl-C ends the
+    run with the results so far and exit code 130.
+
+    \b
+    Examples:
+      dynx doctor ur5
+      dynx doctor my.urdf --fix mended.urdf
+      dynx doctor robots/ --base both --html report.html --jobs 4
+      dynx doctor robots/ --tolerance 1e-6 --baseline known.json --sarif out.sarif
+    """
+
+
+@click.command
+@click.argument("robot")
+@click.option(
+    "--quantity",
+    "quantities",
+    type=one_of(source="dynx.backends.quantities:QUANTITIES"),
+    multiple=True,
+    metavar="NAME",
+    help="Quantity to time, such as inverse-dynamics or mass-matrix; may be given several times "
+    "(default: poses, Jacobian, inverse and forward dynamics, mass matrix; a wrong name prints a list).",
+)
+@click.option(
+    "--batch",
+    "batches",
+    type=click.IntRange(min=1),
+    multiple=True,
+    metavar="N",
+    help="Number of samples in one call; may be given several times (default: 1, 8 and 65536).",
+)
+@click.option(
+    "--threads",
+    type=click.IntRange(min=1),
+    multiple=True,
+    metavar="N",
+    help="Number of threads of implementations that can use several; may be given several times "
+    "(default: 1, and one per processor).",
+)
+@click.option(
+    "--backends", type=name_list, metavar="A,B,C", help="Backends to time (default: all installed)."
+)
+@frame_option
+@model_options
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the random samples."
+)
+@click.option("--quick", is_flag=True, help="Run with 5 repetitions instead of 20.")
+@json_option
+@runs("dynx.cli.bench:bench")
+def bench() -> None:
+    """Time all backends, and other libraries for comparison, on this machine and this robot.
+
+    Each implementation is checked before it is timed; one with a wrong result is reported and not
+    timed. All are then called in turn, so that other load on the machine affects them alike. The table
+    shows the median time per sample, the interquartile range, the speed relative to each other library,
+    and for compiled kernels the share of the machine's memory bandwidth and arithmetic peak.
+
+    Exit code 0 if every result was right, 1 if one was wrong, 2 if the robot cannot be used. Ctrl-C
+    ends the run with the measurements so far and exit code 130.
+
+    \b
+    Examples:
+      dynx bench ur5
+      dynx bench panda --quantity inverse-dynamics --batch 1000000 --threads 1
+      dynx bench path/to/my.urdf --base floating --quick --json
+    """

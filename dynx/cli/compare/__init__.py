@@ -1,1 +1,0 @@
-"""``dynx compare``: two rollouts, how far apart they are, and why."""

@@ -1,0 +1,261 @@
+"""Files of ``dynx doctor``: reports, counterexamples, mended descriptions; none replaces an input unasked."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import PurePath
+
+import click
+
+from dynx.cli.shell.exits import failure_of
+from dynx.cli.shell.output import check_writable, echo_json, make_folder, require_apart
+from dynx.doctor.formats import (
+    baseline_document,
+    github_annotations,
+    html_page,
+    junit_xml,
+    sarif_document,
+    wording,
+)
+from dynx.doctor.formats.baseline import Baseline
+from dynx.doctor.report import Counterexample, DoctorReport, Unexplained, results_document
+from dynx.errors import ArgumentError, DynxError, shown
+from dynx.files.documents import json_text
+from dynx.files.reading import read_file
+from dynx.files.writing import write_bytes, write_text
+from dynx.model.expansion import RobotInput, is_library_name
+from dynx.model.xacro_reading import split_arguments
+from dynx.model.xml.source import XmlSource
+
+STDOUT = "-"
+
+
+@dataclass(frozen=True)
+class ReportFiles:
+    """The file of each format, or None; JSON can go to `STDOUT`."""
+
+    json: str | None = None
+    html: str | None = None
+    junit: str | None = None
+    sarif: str | None = None
+    baseline: str | None = None
+    github: bool = False
+    """Whether standard output has the findings as annotations of GitHub Actions, too."""
+
+    def check(self) -> None:
+        """Raise ArgumentError for a path that cannot be written, or that is given twice."""
+        if self.github and self.on_stdout:
+            raise ArgumentError("--github and --json - both write to standard output; give --json a file")
+        paths = [path for path in vars(self).values() if isinstance(path, str)]
+        for path in paths:
+            if path != STDOUT or path is not self.json:
+                check_writable(path)
+            if paths.count(path) > 1:
+                raise ArgumentError(f"two formats would be written to {path!r}")
+
+    def keep_apart(self, read: Iterable[str], mended: Iterable[str | None], baseline: str | None) -> None:
+        """Raise ArgumentError for a path that is also a robot, a mended file, or the baseline.
+
+        Only a new baseline can replace the baseline that was read, which accepts all new differences.
+        """
+        paths = [
+            path for path in (self.json, self.html, self.junit, self.sarif) if path not in (None, STDOUT)
+        ]
+        known = [] if baseline is None else [baseline]
+        every = paths if self.baseline is None else [*paths, self.baseline]
+        require_apart(every, read, "a robot that is read")
+        require_apart(paths, known, "the baseline")
+        targets = {os.path.realpath(path) for path in mended if path is not None}
+        for path in every:
+            if os.path.realpath(path) in targets:
+                raise ArgumentError(f"{shown(path, 300)} is also the file of a mended description")
+
+    @property
+    def on_stdout(self) -> bool:
+        """True if standard output carries JSON, so that tables go elsewhere."""
+        return self.json == STDOUT
+
+    def write(
+        self,
+        reports: Sequence[DoctorReport],
+        not_done: Sequence[str],
+        left_out: Sequence[str] = (),
+        baseline: Baseline | None = None,
+        command: str | None = None,
+    ) -> list[DynxError]:
+        """Write all files; return the errors of those that cannot be written.
+
+        `not_done` and `left_out` are the robots without a report: of an interrupted run, and those in xacro
+        below a directory. `command` is the command line that the HTML page shows.
+        """
+        texts: dict[str | None, Callable[[], str]] = {
+            None if self.on_stdout else self.json: lambda: (
+                json_text(results_document(reports, not_done, left_out)) + "\n"
+            ),
+            self.html: lambda: html_page(reports, command=command, baseline=baseline, left_out=left_out),
+            self.junit: lambda: junit_xml(reports, baseline, left_out),
+            self.sarif: lambda: json_text(sarif_document(reports, baseline, not_done, left_out)) + "\n",
+            self.baseline: lambda: self._baseline_text(reports),
+        }
+
+        def write(path: str) -> None:
+            write_text(path, texts[path]())
+
+        errors = [failure_of(write, path) for path in texts if path is not None]
+        return [error for error in errors if error is not None]
+
+    def echo(
+        self,
+        reports: Sequence[DoctorReport],
+        not_done: Sequence[str],
+        left_out: Sequence[str] = (),
+        baseline: Baseline | None = None,
+    ) -> None:
+        """Write annotations and the JSON document to standard output where they go there."""
+        if self.github:
+            for line in github_annotations(sarif_document(reports, baseline)):
+                click.echo(line)
+        if self.on_stdout:
+            echo_json(results_document(reports, not_done, left_out))
+
+    def _baseline_text(self, reports: Sequence[DoctorReport]) -> str:
+        return json_text(baseline_document(reports, os.path.dirname(self.baseline or ""))) + "\n"
+
+
+def save_counterexamples(folder: str, report: DoctorReport) -> Mapping[int, str]:
+    """Write the counterexamples of a report into a directory; return their files by number."""
+    saved: dict[int, str] = {}
+    written: dict[str, str] = {}
+    for number, each in enumerate(report.unexplained):
+        found = each.counterexample
+        if found is None:
+            continue
+        if found.urdf not in written:
+            stem = os.path.basename(report.robot).removesuffix(".urdf")
+            name = _file_name(f"{stem}-{report.base}-{each.engine}-{each.quantity}")
+            path = os.path.normpath(os.path.join(folder, f"{name}.counterexample.urdf"))
+            make_folder(path)
+            write_text(path, _with_state(found, each))
+            written[found.urdf] = path
+        saved[number] = written[found.urdf]
+    return saved
+
+
+def _with_state(found: Counterexample, each: Unexplained) -> str:
+    """Return the URDF in ASCII, followed by a comment with the state at which the difference occurs."""
+    lines = [
+        f"{symbol} = {list(values)}" for symbol, values in (("q", found.q), ("v", found.v), ("a", found.a))
+    ]
+    what = wording.difference(each.quantity, found.relative_error)
+    clean = re.sub(r"[^\w %+.-]|--+", "_", f"{each.engine}: {what}", flags=re.ASCII)
+    comment = "\n".join([f"{clean} at", *lines])
+    text = re.sub(r"""encoding\s*=\s*("[^"]*"|'[^']*')""", 'encoding="UTF-8"', found.urdf, count=1)
+    return f"{text.rstrip()}\n<!-- {comment} -->\n".encode("ascii", "xmlcharrefreplace").decode("ascii")
+
+
+def _file_name(text: str) -> str:
+    return re.sub(r"[^A-Za-z0-9._-]+", "_", text)[:100].lstrip(".-") or "robot"
+
+
+def planned_targets(
+    inputs: Sequence[RobotInput], out: str | None, *, in_place: bool, bases: int
+) -> list[str | None]:
+    """Return the file for each input's mended description, or None."""
+    if out is not None and in_place:
+        raise ArgumentError("--fix and --in-place exclude each other")
+    if (out is not None or in_place) and bases > 1:
+        raise ArgumentError("a file is mended for one base; choose --base fixed or --base floating")
+    if in_place:
+        return [*in_place_targets(inputs)]
+    return [None] * len(inputs) if out is None else [*targets(inputs, out)]
+
+
+def targets(inputs: Sequence[RobotInput], out: str) -> list[str]:
+    """Return the file in `out` for each input; ArgumentError where it is an input or not writable.
+
+    A single robot goes to the file `out`, or into it where it is a directory; several go into the
+    directory `out`, those found below a directory under the same relative path.
+    """
+    several = len(inputs) > 1 or any(each.folder is not None for each in inputs)
+    if several or os.path.isdir(out) or out.endswith(("/", os.sep)):
+        if os.path.lexists(out) and not os.path.isdir(out):
+            raise ArgumentError(f"--fix {shown(out, 300)} is a file; several robots need a directory")
+        paths = [os.path.join(out, _name(each)) for each in inputs]
+    else:
+        paths = [out]
+        check_writable(out)
+    taken: dict[str, str] = {}
+    for path, each in zip(paths, inputs, strict=True):
+        other = taken.setdefault(os.path.normcase(path), each.robot)
+        if other != each.robot:
+            both = f"{shown(other, 200)} and {shown(each.robot, 200)}"
+            raise ArgumentError(f"{both} would both be written to {shown(path, 300)}")
+    try:
+        require_apart(paths, (each.robot for each in inputs), "the file that is read")
+    except ArgumentError as error:
+        raise ArgumentError(f"--fix: {error}; --in-place overwrites it") from None
+    return paths
+
+
+def in_place_targets(inputs: Sequence[RobotInput]) -> list[str]:
+    """Return the inputs as the files to write; ArgumentError for an input that is no file of the user."""
+    for each in inputs:
+        if split_arguments(each.robot)[0].endswith(".xacro"):
+            raise ArgumentError(
+                f"{shown(each.robot, 200)} is xacro source; --fix writes the URDF that it expands to"
+            )
+        if each.refusal is None and (not os.path.isfile(each.robot) or is_library_name(each.robot)):
+            raise ArgumentError(
+                f"--in-place needs files, and {shown(each.robot, 200)} is none (--fix writes a new one)"
+            )
+        if each.refusal is None:
+            check_writable(each.robot)
+    return [each.robot for each in inputs]
+
+
+def require_other_file(path: str, read: str) -> None:
+    """Raise ArgumentError where `path` is the file that was read."""
+    try:
+        same = os.path.samefile(path, read)
+    except (OSError, ValueError):  # one of them is not there
+        same = False
+    if same:
+        raise ArgumentError(f"--fix {shown(path, 300)} is the file that is read; --in-place overwrites it")
+
+
+def write_mended(path: str, report: DoctorReport, *, over_input: bool) -> bool:
+    """Write the mended description of a report; return False where there is none.
+
+    A description that needs no change is written as it was read, unless it is the input. Encoding,
+    byte-order mark and line ends are preserved. Raises ArgumentError for an input that changed meanwhile.
+    """
+    text = report.mended
+    if text is None and not over_input:
+        text = report.text
+    if text is None or report.error is not None:
+        return False
+    if not over_input and report.source is not None:
+        require_other_file(path, report.source)
+    if over_input:
+        _require_unchanged(path, report)
+    make_folder(path)
+    write_bytes(path, (report.form or XmlSource(text, path).form).encode(text))
+    return True
+
+
+def _require_unchanged(path: str, report: DoctorReport) -> None:
+    if XmlSource(read_file(path), path).text != report.text:
+        raise ArgumentError(
+            f"{shown(path, 300)} was changed by another program during the examination and is not overwritten"
+        )
+
+
+def _name(each: RobotInput) -> str:
+    if each.folder is not None:
+        return os.path.relpath(each.robot, each.folder)
+    name = PurePath(split_arguments(each.robot)[0]).name
+    stem = name.removesuffix(".xacro").removesuffix(".urdf")
+    return f"{stem or 'robot'}.urdf"

@@ -1,1 +1,0 @@
-"""``dynx env``: the tasks, and how far apart the engines are on one."""

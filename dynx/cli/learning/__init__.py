@@ -1,0 +1,1 @@
+"""``dynx env``, ``dynx train`` and ``dynx play``."""

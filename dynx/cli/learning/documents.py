@@ -1,0 +1,285 @@
+"""JSON documents of ``dynx env``, ``dynx train`` and ``dynx play``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import TYPE_CHECKING, Any, Literal, TypedDict
+
+import numpy as np
+
+from dynx.cli.shell.output import entry_of
+from dynx.envs.distance import EngineDistance, EpisodeDifference
+from dynx.training.evaluation import mean_of_runs
+
+if TYPE_CHECKING:
+    from dynx.training import Evaluation, Policy, TaskSpec, Trained, TrainingSpec
+
+
+DISTANCE_SCHEMA: Literal["dynx.env-distance/1"] = "dynx.env-distance/1"
+
+
+class TaskEntry(TypedDict):
+    """A task of dynx: its Gymnasium id, what is learned, and the engines on which it runs, the default first.
+
+    `max_episode_steps` is null without a time limit, `reward_threshold` where no return counts as solved.
+    """
+
+    id: str
+    summary: str
+    max_episode_steps: int | None
+    reward_threshold: float | None
+    engines: list[str]
+
+
+class TasksDocument(TypedDict):
+    """The tasks of dynx."""
+
+    schema: Literal["dynx.tasks/1"]
+    tasks: list[TaskEntry]
+
+
+class EpisodeEntry(TypedDict):
+    """One episode on two engines: the step at which they part (null: never), and the entry of the observation
+    that differs most there, with its name (null where an engine only ends the episode earlier).
+
+    `largest` is the largest difference of an entry over the steps that both have. `returns` and `lengths` are
+    those of the two engines.
+    """
+
+    seed: int
+    step: int | None
+    entry: int | None
+    entry_name: str | None
+    largest: float
+    returns: list[float]
+    lengths: list[int]
+
+
+class PairEntry(TypedDict):
+    """Two engines: how many episodes part, the first and the median step of those, and each episode.
+
+    `first_entry` names the entry of the observation that differs most at the first step.
+    """
+
+    engines: list[str]
+    parted: int
+    first_step: int | None
+    first_entry: str | None
+    median_step: float | None
+    largest: float
+    mean_returns: list[float]
+    episodes: list[EpisodeEntry]
+
+
+class ReturnEntry(TypedDict):
+    """Returns of a policy on one engine; the mean lies between `low` and `high` with 95 % confidence."""
+
+    engine: str
+    mean: float
+    deviation: float
+    low: float
+    high: float
+
+
+class PolicyEntry(TypedDict):
+    """A policy, the engine on which it was trained, and what it is worth on each engine."""
+
+    file: str
+    trained_on: str | None
+    episodes: int
+    engines: list[ReturnEntry]
+
+
+class EnvDistanceDocument(TypedDict):
+    """How far apart engines are on one task, with the same seeds and the same actions."""
+
+    schema: Literal["dynx.env-distance/1"]
+    task: str
+    options: dict[str, Any]
+    engines: list[str]
+    tolerance: float
+    pairs: list[PairEntry]
+    policies: list[PolicyEntry]
+
+
+def distance_document(
+    task: str, options: dict[str, Any], found: EngineDistance, policies: list[PolicyEntry]
+) -> EnvDistanceDocument:
+    """Return the distance_document of a measurement."""
+    return {
+        "schema": DISTANCE_SCHEMA,
+        "task": task,
+        "options": options,
+        "engines": list(found.engines),
+        "tolerance": found.tolerance,
+        "pairs": [_pair(found, found.of(a, b)) for a, b in combinations(found.engines, 2)],
+        "policies": policies,
+    }
+
+
+def _pair(found: EngineDistance, episodes: Sequence[EpisodeDifference]) -> PairEntry:
+    steps = [each.step for each in episodes if each.step is not None]
+    first = min((each.step, k) for k, each in enumerate(episodes) if each.step is not None)[1] if steps else 0
+    returns = np.array([each.returns for each in episodes])
+    return {
+        "engines": list(episodes[0].engines),
+        "parted": len(steps),
+        "first_step": min(steps, default=None),
+        "first_entry": found.entry_name(episodes[first].entry),
+        "median_step": float(np.median(steps)) if steps else None,
+        "largest": max(each.largest for each in episodes),
+        "mean_returns": returns.mean(axis=0).tolist(),
+        "episodes": [
+            entry_of(EpisodeEntry, each, entry_name=found.entry_name(each.entry)) for each in episodes
+        ],
+    }
+
+
+def policy_entry(path: str, engines: Sequence[str], options: dict[str, Any], episodes: int) -> PolicyEntry:
+    """Judge a policy on each engine."""
+    # Imports PyTorch.
+    from dynx.training import TaskSpec, load_policy
+    from dynx.training.file_tasks import task_of_file
+    from dynx.training.judging import judge
+    from dynx.training.policy import read_policy_document
+
+    rows: list[ReturnEntry] = []
+    trained_on = None
+    for engine in engines:
+        task = task_of_file(read_policy_document(path).spec.task, path, options)
+        trained_on = task.engine
+        task = TaskSpec(task.id, engine, task.options)
+        policy = load_policy(path, task)
+        found = judge(policy, task, episodes)
+        low, high = found.interval
+        rows.append(entry_of(ReturnEntry, found, engine=engine, low=low, high=high))
+    return {"file": path, "trained_on": trained_on, "episodes": episodes, "engines": rows}
+
+
+class RunEntry(TypedDict):
+    """One run: its seed and folder, and the returns of its policy at the end.
+
+    `mean` and `deviation` are over the episodes; the mean lies between `low` and `high` with 95 % confidence.
+    `resumed_at` is the number of steps that were done before this call.
+    """
+
+    seed: int
+    folder: str
+    steps: int
+    resumed_at: int
+    episodes: int
+    mean: float
+    deviation: float
+    low: float
+    high: float
+    least: float
+    seconds: float
+
+
+class TrainDocument(TypedDict):
+    """Runs of one task with several seeds.
+
+    `mean` is that of the runs, each counted once; it lies between `low` and `high` with 95 % confidence,
+    which are null for a single run.
+    """
+
+    schema: Literal["dynx.train/1"]
+    task: str
+    engine: str | None
+    options: dict[str, Any]
+    algorithm: str
+    envs: int
+    normalize: bool
+    hyperparameters: dict[str, Any]
+    runs: list[RunEntry]
+    mean: float
+    low: float
+    high: float
+
+
+def run_entry(trained: Trained, seconds: float) -> RunEntry:
+    """Return the entry of a finished run."""
+    found = trained.evaluation
+    low, high = found.interval
+    return entry_of(
+        RunEntry,
+        found,
+        seed=trained.policy.spec.seed,
+        folder=str(trained.folder),
+        steps=trained.policy.steps_done,
+        resumed_at=trained.resumed_at,
+        episodes=len(found.returns),
+        low=low,
+        high=high,
+        least=found.returns.min(),
+        seconds=seconds,
+    )
+
+
+def train_document(spec: TrainingSpec, trained: list[Trained], seconds: list[float]) -> TrainDocument:
+    """Return the train_document of the runs of a specification, which differ in the seed."""
+    mean, (low, high) = mean_of_runs([each.evaluation.mean for each in trained])
+    return entry_of(
+        TrainDocument,
+        spec,
+        schema="dynx.train/1",
+        task=spec.task.id,
+        engine=spec.task.engine,
+        options=spec.task.options,
+        runs=[run_entry(each, time) for each, time in zip(trained, seconds, strict=True)],
+        mean=mean,
+        low=low,
+        high=high,
+    )
+
+
+class JudgementEntry(TypedDict):
+    """Returns of a policy on one engine.
+
+    `mean` and `deviation` are over the episodes; the mean lies between `low` and `high` with 95 % confidence.
+    """
+
+    engine: str | None
+    mean: float
+    deviation: float
+    low: float
+    high: float
+    mean_length: float
+    returns: list[float]
+    lengths: list[int]
+
+
+class PlayDocument(TypedDict):
+    """A policy, what it was trained on, and what it is worth on each engine; episode k has seed ``seed +
+    k``."""
+
+    schema: Literal["dynx.play/1"]
+    file: str
+    task: str
+    trained_on: str | None
+    algorithm: str
+    steps: int
+    seed: int
+    engines: list[JudgementEntry]
+
+
+def play_document(path: str, policy: Policy, found: Sequence[tuple[TaskSpec, Evaluation]]) -> PlayDocument:
+    """Return the play_document of the judgements of a policy."""
+    return {
+        "schema": "dynx.play/1",
+        "file": path,
+        "task": policy.spec.task.id,
+        "trained_on": policy.spec.task.engine,
+        "algorithm": policy.spec.algorithm,
+        "steps": policy.steps_done,
+        "seed": found[0][1].seed,
+        "engines": [_judgement_entry(task, each) for task, each in found],
+    }
+
+
+def _judgement_entry(task: TaskSpec, found: Evaluation) -> JudgementEntry:
+    low, high = found.interval
+    return entry_of(
+        JudgementEntry, found, engine=task.engine, low=low, high=high, mean_length=found.lengths.mean()
+    )

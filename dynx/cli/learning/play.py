@@ -1,0 +1,161 @@
+"""Run of ``dynx play``: episodes of a policy, judged, shown or filmed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import closing, suppress
+from itertools import count
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from dynx.cli.learning.documents import play_document
+from dynx.cli.shell.exits import BAD_INPUT, DONE, complain, interruptible, one_line
+from dynx.cli.shell.options import json_value
+from dynx.cli.shell.output import Entry, check_json, check_writable, console, counted, present, progress_bar
+from dynx.cli.shell.tables import Table
+from dynx.envs.registration import is_of_dynx, task_id
+from dynx.errors import ArgumentError
+from dynx.training import Evaluation, Policy, TaskSpec, judge, load_policy, make
+from dynx.training.file_tasks import task_of_file
+from dynx.training.policy import read_policy_document
+from dynx.viewer.export import write_gif
+
+DEFAULT_EPISODES = 10
+
+PICTURES_PER_SECOND = 25.0
+"""Largest rate of the pictures of a film."""
+
+
+def play(
+    policy: str,
+    own_task: str | None,
+    engines: tuple[str, ...] | None,
+    options: Sequence[tuple[str, str]],
+    episodes: int | None,
+    seed: int,
+    stochastic: bool,
+    view: bool,
+    export_path: str | None,
+    json_path: str | None,
+    quiet: bool,
+) -> int:
+    """Judge, show or film a policy; return the exit code."""
+    check_json(json_path)
+    if view and export_path is not None:
+        raise ArgumentError("--view and --export are given together; wanted one of them")
+    shown_only = "--view" if view else "--export"
+    if (view or export_path is not None) and (json_path is not None or len(engines or ()) > 1):
+        raise ArgumentError(f"{shown_only} shows episodes of one engine; --json and more engines judge them")
+    task = _task_of(policy, options, own_task)
+    if engines is not None and not is_of_dynx(task.id):
+        raise ArgumentError(f"--engine chooses the engine of a task of dynx; {task.id} has its own")
+    first = task.on(engines[0] if engines else None)
+    if view or export_path is not None:
+        trained = load_policy(policy, first)
+        if export_path is not None:
+            return _film(trained, first, episodes or 1, seed, not stochastic, export_path, quiet)
+        return _show(trained, first, episodes, seed, not stochastic)
+    tasks = [task.on(engine) for engine in engines or (None,)]
+    found: list[tuple[TaskSpec, Evaluation]] = []
+    with interruptible() as interruption:
+        per_engine = episodes or DEFAULT_EPISODES
+        with progress_bar(per_engine * len(tasks), words="episodes", enabled=not quiet) as advance:
+            for each in tasks:
+                trained = load_policy(policy, each)
+
+                def progress(done: int) -> None:
+                    advance(len(found) * per_engine + done, "episodes")
+
+                judged = judge(
+                    trained, each, per_engine, seed, deterministic=not stochastic, progress=progress
+                )
+                found.append((each, judged))
+        interruption.finishing = True
+        made = play_document(policy, trained, found)
+        error = present(made, show, json_path, quiet=quiet)
+    if error is not None:
+        complain(str(error))
+        return BAD_INPUT
+    return DONE
+
+
+def _task_of(policy: str, options: Sequence[tuple[str, str]], own_task: str | None) -> TaskSpec:
+    """Return the task of a policy with the options and the name that the command gives."""
+    task = read_policy_document(policy).spec.task
+    given = {name: json_value(word) for name, word in options}
+    return task_of_file(task, policy, given, None if own_task is None else task_id(own_task))
+
+
+def _show(policy: Policy, task: TaskSpec, episodes: int | None, seed: int, deterministic: bool) -> int:
+    out = console()
+    with suppress(KeyboardInterrupt), interruptible(), closing(make(task, "human")) as env:
+        out.print(f"{one_line(repr(policy)[1:-1])}; Ctrl-C ends it")
+        for k in count() if episodes is None else range(episodes):
+            total, length = _episode(policy, env, seed + k, deterministic)
+            out.print(f"seed {seed + k}: return {total:.5g} in {length} steps")
+    return DONE
+
+
+def _episode(
+    policy: Policy, env: Any, seed: int, deterministic: bool, each: Any = lambda: None
+) -> tuple[float, int]:
+    """Run one episode; `each` is called at its start and after each step. Return its return and length."""
+    observation, _ = env.reset(seed=seed)
+    each()
+    total, length, ended = 0.0, 0, False
+    while not ended:
+        action = policy(np.asarray(observation)[None], deterministic)[0]
+        observation, reward, terminated, truncated, _ = env.step(action)
+        each()
+        total, length, ended = total + float(reward), length + 1, terminated or truncated
+    return total, length
+
+
+def _film(
+    policy: Policy, task: TaskSpec, episodes: int, seed: int, deterministic: bool, path: str, quiet: bool
+) -> int:
+    check_writable(path)
+    if not path.lower().endswith(".gif"):
+        raise ArgumentError(f"{one_line(path)}: a film is written as .gif")
+    pictures: list[Any] = []
+    with interruptible(), closing(make(task, "rgb_array")) as env:
+        rate = float(env.metadata.get("render_fps") or PICTURES_PER_SECOND)
+        skip = max(1, int(np.ceil(rate / PICTURES_PER_SECOND)))
+        steps = count()
+
+        def draw() -> None:
+            if next(steps) % skip == 0:
+                pictures.append(env.render())
+
+        for k in range(episodes):
+            _episode(policy, env, seed + k, deterministic, draw)
+    write_gif(path, pictures, skip / rate)
+    if not quiet:
+        console().print(f"wrote {one_line(path)}")
+    return DONE
+
+
+def show(out: Console, report: Entry) -> None:
+    """Print what the policy is worth on each engine."""
+    engine = f" on {one_line(report['trained_on'])}" if report["trained_on"] else ""
+    out.print(
+        f"{one_line(report['task'])}: {report['algorithm']}, {report['steps']:,} steps{engine}", style="bold"
+    )
+    right = ("return", "deviation", "mean between", "least", "mean length")
+    table = Table("engine", *right, right=right)
+    for each in report["engines"]:
+        table.add_row(
+            one_line(each["engine"] or "its own"),
+            f"{each['mean']:.5g}",
+            f"{each['deviation']:.3g}",
+            f"{each['low']:.5g} and {each['high']:.5g}",
+            f"{min(each['returns']):.5g}",
+            f"{each['mean_length']:.4g}",
+        )
+    out.print(table)
+    episodes = counted(len(report["engines"][0]["returns"]), "episode")
+    out.print(
+        f"{episodes}, the first with seed {report['seed']}; the true mean lies between the two with 95 %"
+    )

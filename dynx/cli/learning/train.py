@@ -1,0 +1,211 @@
+"""Run of ``dynx train``: a run for each seed, with progress, a table, a plot and the exit code."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from dynx.cli.learning.documents import train_document
+from dynx.cli.shell.exits import BAD_INPUT, DONE, complain, failure_of, interruptible, one_line
+from dynx.cli.shell.options import json_value
+from dynx.cli.shell.output import Advance, Entry, check_json, check_writable, log, present, progress_bar
+from dynx.cli.shell.tables import Table
+from dynx.envs.registration import bare_name, task_id
+from dynx.errors import DynxError
+from dynx.files.figures import new_figure, picture_format, save_figure
+from dynx.training import Progress, Schedule, TaskSpec, Trained, TrainingSpec, recipe_of
+from dynx.training import train as train_run
+from dynx.training.hyperparameters import Recipe
+from dynx.training.learning import CURVE, EVALUATIONS
+from dynx.training.records import read_lines
+
+DEFAULT_STEPS = 100_000
+"""Steps of a task without a published number."""
+
+SECONDS_BETWEEN_LINES = 30.0
+"""Shortest time between two lines of progress where standard error is no terminal."""
+
+
+def train(
+    task: str,
+    engine: str | None,
+    options: Sequence[tuple[str, str]],
+    randomize: Sequence[tuple[str, str]],
+    algorithm: str,
+    steps: int | None,
+    seeds: tuple[int, ...],
+    envs: int | None,
+    processes: bool,
+    normalize: bool | None,
+    values: Sequence[tuple[str, str]],
+    out: str | None,
+    resume: bool,
+    checkpoint_every: int | None,
+    evaluate_every: int | None,
+    episodes: int,
+    threads: int,
+    tensorboard: bool,
+    json_path: str | None,
+    plot_path: str | None,
+    quiet: bool,
+) -> int:
+    """Train with each seed; return the exit code."""
+    check_json(json_path)
+    if plot_path is not None:
+        check_writable(plot_path)
+        picture_format(plot_path)
+    chosen = {name: json_value(word) for name, word in options}
+    if randomize:
+        chosen["randomize"] = {name: json_value(word) for name, word in randomize}
+    spec = TaskSpec(task_id(task), engine, chosen)
+    recipe = recipe_of(algorithm, spec.id)
+    given = {name: json_value(word) for name, word in values}
+    schedule = Schedule(checkpoint_every, evaluate_every, threads=threads, tensorboard=tensorboard)
+    base = Path(out if out is not None else _folder_of(spec, algorithm))
+    runs: list[Trained] = []
+    times: list[float] = []
+    with interruptible() as interruption:
+        for seed in seeds:
+            run = _specification(spec, algorithm, recipe, steps, envs, seed, normalize, processes, given)
+            folder = base / f"seed-{seed}" if len(seeds) > 1 else base
+            started = time.perf_counter()
+            with progress_bar(run.steps, words="steps", enabled=not quiet) as advance:
+                reporter = _Reporter(advance, seed if len(seeds) > 1 else None, quiet)
+                try:
+                    trained = train_run(
+                        run,
+                        folder,
+                        # A seed that has not begun is begun: the run was ended in an earlier one.
+                        resume=resume and (len(seeds) == 1 or (folder / "run.json").exists()),
+                        schedule=schedule,
+                        final_episodes=episodes,
+                        progress=reporter,
+                    )
+                except KeyboardInterrupt:
+                    if any((folder / "checkpoints").glob("*.zip")):
+                        log(f"{folder} has a checkpoint; the same command with --resume goes on from there")
+                    raise
+            runs.append(trained)
+            times.append(time.perf_counter() - started)
+        interruption.finishing = True
+        made = train_document(run, runs, times)
+        errors = [present(made, show, json_path, quiet=quiet)]
+        if plot_path is not None:
+            errors.append(failure_of(plot, runs, plot_path))
+    failed: list[DynxError] = [each for each in errors if each is not None]
+    for each in failed:
+        complain(str(each))
+    return BAD_INPUT if failed else DONE
+
+
+class _Reporter:
+    """Shows progress: in the bar, or as a line from time to time."""
+
+    def __init__(self, advance: Advance, seed: int | None, quiet: bool) -> None:
+        self._advance = advance
+        self._prefix = "" if seed is None else f"seed {seed}: "
+        self._quiet = quiet
+        self._last = time.perf_counter()
+
+    def __call__(self, progress: Progress) -> None:
+        now = time.perf_counter()
+        words = f"{self._prefix}steps"
+        if progress.mean_return is not None:
+            words = f"{words}, mean return {progress.mean_return:.4g}"
+        self._advance(progress.steps, words)
+        if not self._quiet and now - self._last >= SECONDS_BETWEEN_LINES:
+            self._last = now
+            log(f"{self._prefix}{progress.steps:,} of {progress.total:,} {words[len(self._prefix) :]}")
+
+
+def _specification(
+    task: TaskSpec,
+    algorithm: str,
+    recipe: Recipe,
+    steps: int | None,
+    envs: int | None,
+    seed: int,
+    normalize: bool | None,
+    processes: bool,
+    given: dict[str, object],
+) -> TrainingSpec:
+    return TrainingSpec(
+        task,
+        algorithm,
+        steps or recipe.steps or DEFAULT_STEPS,
+        envs or recipe.envs,
+        seed,
+        recipe.normalize if normalize is None else normalize,
+        processes,
+        {**recipe.hyperparameters, **given},
+    )
+
+
+def _folder_of(task: TaskSpec, algorithm: str) -> Path:
+    return Path("runs") / "-".join(each for each in (bare_name(task.id), task.engine, algorithm) if each)
+
+
+def show(out: Console, report: Entry) -> None:
+    """Print the return of each run, their mean, and where the policies are."""
+    engine = f" on {one_line(report['engine'])}" if report["engine"] else ""
+    out.print(f"{one_line(report['task'])}{engine}, {report['algorithm']}", style="bold")
+    right = ("seed", "steps", "episodes", "return", "deviation", "least", "time [s]")
+    table = Table(
+        "seed", "steps", "episodes", "return", "deviation", "least", "time [s]", "policy", right=right
+    )
+    for run in report["runs"]:
+        table.add_row(
+            str(run["seed"]),
+            f"{run['steps']:,}",
+            str(run["episodes"]),
+            f"{run['mean']:.5g}",
+            f"{run['deviation']:.3g}",
+            f"{run['least']:.5g}",
+            f"{run['seconds']:.0f}",
+            f"{one_line(run['folder'])}/final.zip",
+        )
+    out.print(table)
+    if len(report["runs"]) > 1:
+        out.print(
+            f"mean of the runs {report['mean']:.5g}, with 95 % confidence between {report['low']:.5g} and "
+            f"{report['high']:.5g}"
+        )
+    out.print(f"to see it: dynx play {one_line(report['runs'][0]['folder'])}/final.zip --view")
+
+
+_STYLES, _MARKS = ("-", "--", ":", "-."), "os^v"
+
+
+def plot(runs: Sequence[Trained], path: str) -> None:
+    """Plot the mean return of the last episodes, and each evaluation with its interval, over the steps."""
+    figure = new_figure(7.0, 4.0)
+    axes = figure.subplots()
+    for k, run in enumerate(runs):
+        colour, seed = f"C{k}", run.policy.spec.seed
+        curve = read_lines(run.folder / CURVE)
+        axes.plot(
+            [each["steps"] for each in curve],
+            [each["mean_return"] for each in curve],
+            _STYLES[k % len(_STYLES)],
+            color=colour,
+            label=f"seed {seed}",
+        )
+        judged = read_lines(run.folder / EVALUATIONS)
+        axes.plot(
+            [each["steps"] for each in judged],
+            [each["mean"] for each in judged],
+            _MARKS[k % len(_MARKS)],
+            color=colour,
+            ms=5,
+            mfc="none",
+        )
+    spec = runs[0].policy.spec
+    axes.set_xlabel("steps")
+    axes.set_ylabel("return: last 100 episodes (line), evaluation (mark)")
+    axes.set_title(f"{spec.task.name}, {spec.algorithm}")
+    axes.grid(True, alpha=0.3)
+    axes.legend()
+    save_figure(figure, path)

@@ -1,1 +1,0 @@
-"""``dynx play``: a trained policy, shown or judged."""

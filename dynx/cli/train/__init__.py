@@ -1,1 +1,0 @@
-"""``dynx train``: reinforcement learning on a task, with checkpoints."""

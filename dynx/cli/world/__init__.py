@@ -1,1 +1,0 @@
-"""``dynx world``: a scene run by one engine or several."""
