@@ -2,7 +2,7 @@
 
     python docs/write_rules.py
 
-The text comes from the docstrings of the rules' modules, which ``dynx explain`` prints; tests/test_docs.py
+The text comes from the docstrings of the rules' classes, which ``dynx explain`` prints; tests/test_docs.py
 checks that the page is current. ``docs/rules.md#dx101`` is the address of a rule in reports.
 """
 
@@ -15,7 +15,7 @@ from dynx.rules import Rule, all_rules
 
 PAGE = Path(__file__).with_name("rules.md")
 
-HEAD = """<!-- Written by docs/write_rules.py from the modules of dynx/rules/catalogue; edit those. -->
+HEAD = """<!-- Written by docs/write_rules.py from the classes in dynx/rules/catalogue; edit those. -->
 
 # Why engines differ on a file
 

@@ -1,9 +1,12 @@
 """Catalogue of the causes for which engines differ on a file, each with its detection and its remedy.
 
-One module of `dynx.rules.catalogue` is one rule; its docstring is the page that ``dynx explain`` prints.
+One class in `dynx.rules.catalogue` is one rule; its docstring is the page that ``dynx explain`` prints.
 Other packages offer rules of their own in the entry-point group ``dynx.rules``.
 """
 
+from typing import TYPE_CHECKING
+
+from dynx.registry import moved_names
 from dynx.rules.case import Case
 from dynx.rules.registry import all_rules, find_rule
 from dynx.rules.rule import (
@@ -14,7 +17,6 @@ from dynx.rules.rule import (
     Detection,
     EditingRule,
     Level,
-    OptionalEditingRule,
     Remedy,
     Rule,
     correction,
@@ -32,7 +34,6 @@ __all__ = [
     "Detection",
     "EditingRule",
     "Level",
-    "OptionalEditingRule",
     "Remedy",
     "Rule",
     "all_rules",
@@ -42,3 +43,8 @@ __all__ = [
     "links_of",
     "measured_on",
 ]
+
+if not TYPE_CHECKING:
+    __getattr__ = moved_names(
+        __name__, {"OptionalEditingRule": 'dynx.rules.EditingRule with kind = "practice" and a choice "keep"'}
+    )

@@ -143,6 +143,12 @@ def completion(
     return Correction(detection, tuple(edits), tuple(meant), whole=len(meant) == len(missing))
 
 
+def positive_edit(case: Case, element: SourceElement, attribute: str, *, zero: bool) -> tuple[Edit, str]:
+    """Return the edit that removes the sign of a negative number, or writes 0; also the number as written."""
+    written = element.attributes[attribute].strip()
+    return case.source.attribute_edit(element, attribute, "0" if zero else written[1:]), written
+
+
 def renaming(case: Case, element: SourceElement, wrong: str, right: str) -> tuple[Edit, ...]:
     """Return the edits that move the text of one attribute to another."""
     return (

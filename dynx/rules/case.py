@@ -59,6 +59,13 @@ class Case:
         """The ``<joint>`` elements by name, in document order; the first of several with one name."""
         return _by_name(self.source.root.all("joint"))
 
+    def elements(self, *tags: str) -> list[SourceElement]:
+        """List the elements below the root by their tags, such as "link", "collision", in document order."""
+        found = [self.source.root]
+        for tag in tags:
+            found = [child for element in found for child in element.all(tag)]
+        return found
+
     @cached_property
     def inertials(self) -> Mapping[str, Inertial | None]:
         """The inertial of each link as dynx reads it, by the link's name, in depth-first order."""

@@ -39,7 +39,9 @@ def all_rules() -> tuple[Rule, ...]:
     for name in OTHERS.names():
         kind = OTHERS.find(name)
         if not hasattr(kind, "id"):
-            raise DynxError(f'the rule {shown(name)}: its module does not begin with """ID name: Title."""')
+            raise DynxError(
+                f'the rule {shown(name)}: the docstring of its class does not begin with "ID name: Title."'
+            )
         others.append(kind())
     rules = (*_own_rules(), *sorted(others, key=lambda rule: rule.id))
     taken: set[str] = set()

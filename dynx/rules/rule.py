@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import inspect
 import re
-import sys
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -95,7 +94,7 @@ class Remedy:
 
 
 class Rule(ABC):
-    """A cause. The docstring of the module that defines the rule is its page.
+    """A cause. The docstring of the class that defines a rule is its page.
 
     The page begins with a heading, ``DX101 link-without-inertial: A link without ...``, which gives the `id`,
     the `name` and the `title`. The body describes the cause, its effect in each engine, and the remedy.
@@ -150,7 +149,7 @@ class Rule(ABC):
     """True if the difference shows at some states only, so that its absence at others proves nothing."""
 
     def __init_subclass__(cls) -> None:
-        """Take `id`, `name` and `title` from the heading of the page, where the module has one."""
+        """Take `id`, `name` and `title` from the heading of the page, where the class has one."""
         super().__init_subclass__()
         if heading := _HEADING.fullmatch(cls.page().partition("\n\n")[0]):
             cls.id, cls.name, title = heading.groups()
@@ -200,8 +199,8 @@ class Rule(ABC):
 
     @classmethod
     def page(cls) -> str:
-        """Return the page of the rule: the docstring of its module."""
-        return inspect.cleandoc(getattr(sys.modules.get(cls.__module__), "__doc__", None) or "")
+        """Return the page of the rule: the docstring of its class."""
+        return inspect.cleandoc(cls.__doc__ or "")
 
     @classmethod
     def trap(cls) -> str:
@@ -276,7 +275,10 @@ def correction(element: SourceElement, message: str, *edits: Edit) -> Correction
 
 
 class EditingRule(Rule):
-    """A rule whose corrections both find the places and correct them."""
+    """A rule whose corrections both find the places and correct them.
+
+    The text stays as it is where the user chose ``keep`` among `choices`.
+    """
 
     changed: ClassVar[str]
     """Description of the change, stated once for all places; see `Remedy.changed`."""
@@ -292,7 +294,9 @@ class EditingRule(Rule):
         return (each.detection for each in self.corrections(case))
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
-        """Return the edits of these places."""
+        """Return the edits of these places; None where there are none, or where the user chose ``keep``."""
+        if "keep" in self.choices and self.chosen(case) == "keep":
+            return None
         wanted = set(detections)
         made = [each for each in self.corrections(case) if each.detection in wanted and each.edits]
         if not made:
@@ -303,14 +307,3 @@ class EditingRule(Rule):
         parts += [f"corrected the misspelled name of {' and of '.join(renamed)}"] if renamed else []
         physics = self.changes_physics or bool(renamed)
         return Remedy(mended, " and ".join(parts), self.decision(case), physics)
-
-
-class OptionalEditingRule(EditingRule):
-    """An editing rule about practice: the text stays as it is unless the user chose another
-    of `choices` than the first, ``keep``."""
-
-    kind: ClassVar[Kind] = "practice"
-
-    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
-        """Return the edits of these places, if they were chosen."""
-        return None if self.chosen(case) == "keep" else super().remedy(case, detections)

@@ -48,7 +48,8 @@ def test_numbers_and_names_are_unique() -> None:
 def test_a_rule_is_well_formed(rule: Rule) -> None:
     assert re.fullmatch(r"DX[1-5][0-9]{2}", rule.id)
     assert re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)+", rule.name)
-    assert type(rule).__module__.endswith(rule.trap().removesuffix(".urdf"))
+    assert rule.trap() == f"{rule.id.lower()}_{rule.name.replace('-', '_')}.urdf"
+    assert type(rule).__name__.lower() == rule.name.replace("-", "")
     assert (rule.id[2] == "5") == (rule.kind == "practice")
     assert rule.kind == "practice" or rule.engines
     assert find_rule(rule.id.lower()) is find_rule(rule.name) is rule

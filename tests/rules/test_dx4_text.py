@@ -13,7 +13,7 @@ from dynx.model.library import find
 from dynx.model.loading import load
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, all_rules, find_rule
-from dynx.rules.catalogue.dx413_line_too_long import MAX_LINE_BYTES
+from dynx.rules.catalogue.document import MAX_LINE_BYTES
 from dynx.rules.numbers_in_text import MisspelledNumberRule, NumericAttribute, numeric_attributes
 from dynx.testing.strategies import urdf_text
 from tests.rules.documents import case_of, joint

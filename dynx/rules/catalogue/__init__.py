@@ -1,1 +1,1 @@
-"""One rule a module, named for its id and its name: ``dx123_words_of_the_name.py``."""
+"""The rules, a module for each subject; the docstring of a rule is its page."""

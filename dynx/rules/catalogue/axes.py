@@ -1,0 +1,272 @@
+"""Axes of joints: length, direction and spelling."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from dynx.errors import escaped, shown
+from dynx.model.elements import Joint
+from dynx.model.xml.source import SourceElement
+from dynx.rules import (
+    EVERY_ENGINE,
+    Case,
+    Correction,
+    EditingRule,
+    correction,
+    found_at,
+    measured_on,
+)
+from dynx.rules.attributes import vector_of
+from dynx.rules.joints import (
+    SINGLE,
+    axis_edit,
+    elements_in_joints,
+    misspelled_axes,
+    misspelled_direction,
+    mujoco_reads,
+)
+from dynx.rules.numbers_in_text import decimal, is_number
+
+_ROUNDING_OF_LENGTH = 1e-15
+"""Distance from 1 of the length of a rounded unit vector; dynx does not change such an axis."""
+
+
+class AxisNotUnit(EditingRule):
+    """DX201 axis-not-unit: The axis of a joint is not a unit vector.
+
+    URDF says that ``<axis xyz="..."/>`` should have length 1. A wrong length does not change the direction,
+    and most readers normalise the axis. Typical are axes such as ``0 0 -2`` or ``1 1 0``, and axes that were
+    rounded to six digits, ``0.577350 0.577350 0.577350``, whose length is off by 1e-6.
+
+    - PyBullet 3.2.7 keeps the length. A prismatic joint then moves by length times its coordinate, and the
+      positions of all links behind it are wrong in proportion. The simulation (``stepSimulation``) uses the
+      long axis for every type of joint: accelerations are wrong in proportion. ``calculateInverseDynamics``,
+      ``calculateMassMatrix`` and ``calculateJacobian`` scale it to 1, with a warning on stdout, so PyBullet
+      contradicts itself.
+    - Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 scale it to 1. So does dynx.
+    - An axis shorter than about 1e-6 counts as zero in MuJoCo and Drake, which refuse the file.
+
+    The effect is the deviation of the length from 1: 1e-7 for a rounded axis, 1 for an axis of length 2.
+
+    What to do: write unit axes with 17 digits. ``dynx doctor --fix`` writes the axis that dynx uses.
+    """
+
+    advice = "Scale the axis to length 1 and write 17 digits."
+    engines = measured_on("pybullet", "mujoco", "drake")
+    changed = "scaled the axes of joints to length 1"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield the axes of revolute, continuous and prismatic joints."""
+        for joint, axis in elements_in_joints(case, "axis", SINGLE):
+            written = vector_of(axis, "xyz")
+            if written is None:
+                continue
+            largest = max(map(abs, written))
+            length = largest * float(np.linalg.norm(np.array(written) / largest))
+            if abs(length - 1.0) > _ROUNDING_OF_LENGTH:
+                message = f"the axis {axis.attributes['xyz']} has length {length:.9g}"
+                unit = case.model.joint(joint.attributes["name"]).axis
+                edit = case.source.attribute_edit(axis, "xyz", " ".join(map(decimal, unit)))
+                yield correction(axis, message, edit)
+
+
+_COORDINATES = frozenset("xyz")
+
+
+class AxisWithoutDirection(EditingRule):
+    """DX202 axis-without-direction: The axis of a joint that moves is zero or empty.
+
+    ``<axis xyz="0 0 0"/>`` and ``<axis/>`` define no direction of motion. Exporters write the first for fixed
+    joints, where it is ignored; once the type is changed to ``revolute`` it matters. A joint without any
+    ``<axis>`` is fine: URDF's default (1, 0, 0) is used by all engines alike. A direction in an attribute
+    that is not ``xyz`` is DX218.
+
+    - Pinocchio 4.1 loads it. The joint has a coordinate that moves nothing: its row and column of the mass
+      matrix are zero, and forward dynamics gives NaN.
+    - PyBullet 3.2.7 loads it. With the zero axis, positions behind the joint are NaN, inverse dynamics and
+      mass matrix fail. For ``<axis/>`` the axis is whatever its memory held, another at each load: the result
+      is undefined. Reports say "not used" there, not "refused".
+    - MuJoCo 4.0 refuses the file.
+    - Drake 1.51 refuses the zero axis, and reads ``<axis/>`` as (1, 0, 0).
+
+    What to do: write the direction. ``<axis x="0" y="0" z="1"/>`` contains it, and ``dynx doctor --fix``
+    writes ``xyz="0 0 1"``. Otherwise the file does not contain it, so ``dynx doctor --fix`` writes URDF's
+    default, (1, 0, 0). If the joint should not move, ``--choose DX202=fixed`` makes it a fixed joint.
+    """
+
+    stage = "reading"
+    advice = "Write the direction of the axis, or make the joint fixed."
+    engines = EVERY_ENGINE
+    choices = {
+        "x": "make an axis without direction (1, 0, 0), URDF's default",
+        "fixed": "make a joint whose axis has no direction fixed",
+    }
+    changed = "gave joints without a direction to move in one, or fixed them"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield axes of revolute, continuous and prismatic joints."""
+        for joint, axis in elements_in_joints(case, "axis", SINGLE):
+            if misspelled_direction(axis) is not None:
+                continue
+            words = axis.attributes.get("xyz", "").split()
+            if any(not is_number(word) or float(word) != 0.0 for word in words):
+                continue
+            what = "is zero" if words else "has no numbers"
+            message = f"the axis of a {joint.attributes['type']} joint {what}"
+            written = _direction_in_parts(axis)
+            if written is not None:
+                removals = (
+                    case.source.attribute_removal(axis, name)
+                    for name in _COORDINATES & axis.attributes.keys()
+                )
+                edits = (*removals, case.source.attribute_edit(axis, "xyz", written))
+                place = found_at(axis, f"{message}; xyz is {written} in attributes of their own")
+                yield Correction(place, edits, ("xyz",), whole=True)
+                continue
+            if self.chosen(case) == "fixed":
+                edit = case.source.attribute_edit(joint, "type", "fixed")
+            else:
+                edit = case.source.attribute_edit(axis, "xyz", "1 0 0")
+            yield correction(axis, message, edit)
+
+
+def _direction_in_parts(axis: SourceElement) -> str | None:
+    """Return the direction of an axis without ``xyz`` whose x, y and z are attributes of their own."""
+    words = [axis.attributes.get(name, "0").strip() for name in sorted(_COORDINATES)]
+    if "xyz" in axis.attributes or not all(map(is_number, words)) or not any(map(float, words)):
+        return None
+    return " ".join(words)
+
+
+class AxisAttributeMisspelled(EditingRule):
+    """DX218 axis-attribute-misspelled: The direction of an axis stands in an attribute that is not ``xyz``.
+
+    ``<axis xzy="0 0 1"/>``, ``<axis XYZ="0 0 1"/>`` or ``<axis rpy="0 0 1"/>``: the numbers are there, and no
+    engine looks for them under that name.
+
+    - Pinocchio 4.1 loads it with a zero axis. The joint has a coordinate that moves nothing: its row and
+      column of the mass matrix are zero.
+    - PyBullet 3.2.7 loads it, and the axis is whatever its memory held: zero at first, another at each load
+      of a longer program. dynx does not use such results and reports the file as refused.
+    - MuJoCo 4.0 refuses the file ("required attribute missing: 'xyz'"), also where the joint is fixed.
+    - Drake 1.51 reads (1, 0, 0), URDF's default for a joint without ``<axis>``.
+
+    The other engines ignore the axis of a fixed joint. dynx refuses the axis of a joint that moves, and names
+    the attribute.
+
+    What to do: correct the name. ``dynx doctor --fix`` does so where the attribute holds three numbers that
+    are not all zero. An axis without any numbers is DX202, or DX219 on a fixed joint.
+    """
+
+    stage = "reading"
+    advice = "Write the direction as xyz."
+    engines = EVERY_ENGINE
+    changed = "named the attribute of axes xyz"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield axes of joints of every type."""
+        for _, axis, written in misspelled_axes(case):
+            text = axis.attributes[written]
+            edits = (
+                case.source.attribute_removal(axis, written),
+                case.source.attribute_edit(axis, "xyz", text),
+            )
+            message = f"<axis> has its direction {text} in {escaped(written)} instead of xyz"
+            yield correction(axis, message, *edits)
+
+
+class UnreadableAxisOfFixedJoint(EditingRule):
+    """DX219 unreadable-axis-of-fixed-joint: The axis of a joint that does not turn is not three numbers.
+
+    A fixed joint has no use for ``<axis>``, and exporters write ``<axis/>``, ``<axis xyz=""/>`` or what is
+    left of a template. A floating joint has none either.
+
+    - MuJoCo 4.0 reads the axis of every joint and refuses the file ("required attribute missing: 'xyz'", "bad
+      format in attribute 'xyz'").
+    - Pinocchio 4.1, PyBullet 3.2.7 and Drake 1.51 ignore it. So does dynx.
+
+    A direction under another name, ``<axis xzy="0 0 1"/>``, is DX218.
+
+    What to do: remove the ``<axis>``. ``dynx doctor --fix`` does so.
+    """
+
+    stage = "reading"
+    advice = "Remove the <axis> of the joint."
+    engines = measured_on("mujoco")
+    changed = "removed unreadable axes of joints that have none"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield axes of fixed and floating joints that MuJoCo cannot read."""
+        for joint, axis in elements_in_joints(case, "axis", ("fixed", "floating")):
+            if mujoco_reads(axis) or misspelled_direction(axis) is not None:
+                continue
+            text = axis.attributes.get("xyz")
+            what = "no xyz" if text is None else f"xyz={shown(text)}"
+            message = f"the <axis> of a {joint.attributes['type']} joint has {what}"
+            yield correction(axis, message, case.source.removal(axis))
+
+
+AXES = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
+
+DRAKE_DEVIATION = 1.825e-8
+"""Deviation [rad] from a coordinate axis below which Drake takes that axis."""
+
+PINOCCHIO_DEVIATION = 1e-12
+"""Deviation [rad] from a coordinate axis up to which Pinocchio takes that axis."""
+
+_NEGLIGIBLE_DEVIATION = 1e-14
+"""Deviation [rad] that is not reported: rounding of a unit vector, with no effect."""
+
+
+class AxisNearlyAligned(EditingRule):
+    """DX226 axis-nearly-aligned: A joint axis is off a coordinate axis by less than 2e-8 rad, which some
+    engines drop.
+
+    CAD programs export axes with noise, such as ``0 1 1.2e-12`` or ``1.6e-10 0 1``. Engines have faster
+    joints for axes along x, y and z, and choose them by comparing the axis with a tolerance.
+
+    - Drake 1.51.1 takes the coordinate axis where a component of the unit axis rounds to more than 1 -
+      2.2e-16, that is, where the deviation is below about 1.8e-8 rad; for revolute, continuous and prismatic
+      joints.
+    - Pinocchio 4.1.0 takes it up to a deviation of 1e-12.
+    - Both compare with the positive directions only: ``1.6e-10 0 -1`` is used as it stands.
+    - PyBullet 3.2.7 and MuJoCo 4.0.0 use all numbers. So does dynx.
+
+    The effect is the angle: poses, and with them torques, are off by up to twice that angle at every joint.
+
+    What to do: write the coordinate axis, which is meant. ``dynx doctor --fix`` writes it, and the report
+    says that the physics changed, by less than 2e-8; ``--choose DX226=keep`` leaves the axis.
+    """
+
+    engines = measured_on("pinocchio", "drake")
+    advice = "Write the coordinate axis."
+    choices = {
+        "align": "write the coordinate axis for axes off it by less than 2e-8 rad; this changes the physics",
+        "keep": "leave such axes as they are",
+    }
+    changed = "wrote the coordinate axis for joint axes that were off it by less than 2e-8 rad"
+    changes_physics = True
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield the axes of revolute, continuous and prismatic joints."""
+        for element, axis in elements_in_joints(case, "axis", SINGLE):
+            joint = case.model.joint(element.attributes["name"])
+            name, deviation = nearest_axis(joint)
+            if not _NEGLIGIBLE_DEVIATION < deviation < DRAKE_DEVIATION:
+                continue
+            message = f"the axis is {deviation:.2g} rad off {name}"
+            engines = ["Drake"] if deviation > PINOCCHIO_DEVIATION else ["Pinocchio", "Drake"]
+            clauses = tuple((engine.lower(), f"exactly {name} in {engine}") for engine in engines)
+            found = replace(found_at(axis, message), engine_clauses=clauses)
+            yield Correction(found, (axis_edit(case.source, element, AXES[name]),))
+
+
+def nearest_axis(joint: Joint) -> tuple[str, float]:
+    """Find the coordinate axis nearest to the axis of a joint, and the deviation [rad] from it."""
+    name, largest = max(zip(AXES, joint.axis, strict=True), key=lambda pair: pair[1])
+    others = [value for each, value in zip(AXES, joint.axis, strict=True) if each != name]
+    return name, math.atan2(math.hypot(*others), largest)

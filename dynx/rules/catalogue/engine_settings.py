@@ -1,0 +1,195 @@
+"""Elements and flags that make one engine read another robot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from dynx.rules import (
+    CallingRule,
+    Case,
+    Correction,
+    Detection,
+    EditingRule,
+    correction,
+    found_at,
+    measured_on,
+)
+from dynx.rules.attributes import number_or_none
+from dynx.rules.geometry import bullet_box, collision_meshes
+from dynx.rules.inertia import rigid_groups
+
+
+class InertiaScaledForContact(EditingRule):
+    """DX114 inertia-scaled-for-contact: A link has inertia_scaling, by which PyBullet alone multiplies its
+    inertia.
+
+    ``<contact><inertia_scaling value="3.0"/></contact>`` is an extension of PyBullet's, intended to stabilise
+    contacts of light links. Many files that come with PyBullet, and files copied from them, have it.
+
+    - PyBullet 3.2.7 multiplies the moments of inertia of the link by the value, also with
+      ``URDF_USE_INERTIA_FROM_FILE``, and in ``calculateInverseDynamics`` and ``calculateMassMatrix`` too. The
+      mass stays.
+    - Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 do not know the tag. Neither does dynx: the value is no
+      property of the robot.
+
+    The effect is that of a wrong tensor: a few per cent of the mass matrix at a scale of 3, more for light
+    links with reflected inertia.
+
+    What to do: remove the tag wherever the dynamics matters. ``dynx doctor --fix`` does so and leaves the
+    rest of ``<contact>`` in place.
+    """
+
+    advice = "Remove <inertia_scaling>."
+    engines = measured_on("pybullet")
+    changed = "removed <inertia_scaling>"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield the scales other than 1."""
+        for scaling in case.elements("link", "contact", "inertia_scaling"):
+            # PyBullet reads 0 where the value is no number.
+            scale = number_or_none(scaling, "value") or 0.0
+            if scale != 1.0:
+                message = f"PyBullet multiplies the moments of inertia of the link by {scale:g}"
+                yield correction(scaling, message, case.source.removal(scaling))
+
+
+class InertiaFromShapes(CallingRule):
+    """DX115 inertia-from-shapes: PyBullet's plain call computes every inertia from collision shapes, not from
+    the file.
+
+    ``p.loadURDF(path, useFixedBase=True)`` reads the mass and the origin of an ``<inertial>``, and leaves out
+    its tensor. The moments of inertia are those of a cuboid with the mass of the file: the bounding box of
+    the link's collision shapes along the axes of the inertial.
+
+    Measured with PyBullet 3.2.7:
+
+    - The cuboid is about the centre of mass of the file, wherever the shapes are. Several shapes give one
+      box, round ones their bounding box, a mesh the box about its vertices in its own frame, turned with it.
+      Margins of 1 to 3 mm are added on each side.
+    - A link without collision shapes has the inertia of a cuboid of 2 mm, almost zero; one without
+      ``<inertial>`` has mass 1 and the inertia of its shapes. A text STL counts as no shape.
+    - A link of mass zero has no inertia.
+    - With the flag ``URDF_USE_INERTIA_FROM_FILE`` PyBullet reads the tensor, as Pinocchio, MuJoCo and Drake
+      do.
+
+    On 64 of 65 robots of example-robot-data that PyBullet loads and that have joints, inverse dynamics moves
+    by more than 1e-6 of the largest torque, in the median by 0.8 %; on UR5 by up to 2.8 N m.
+
+    What to do: write ``p.loadURDF(path, useFixedBase=True, flags=p.URDF_USE_INERTIA_FROM_FILE)``.
+
+    The file is correct, and no file mends the call. ``dynx doctor`` examines the plain call beside the
+    engines, as ``pybullet:plain``; its difference counts only where ``--engines`` names it.
+    """
+
+    advice = "Write flags=p.URDF_USE_INERTIA_FROM_FILE in the call of loadURDF."
+    engines = {"pybullet:plain": ">=3.2.7"}
+    calls = ("pybullet.use_file_inertia",)
+    changed = "loaded with flags=p.URDF_USE_INERTIA_FROM_FILE"
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the robot, where a link that can move has mass or moments, or no inertial."""
+        groups = rigid_groups(case)
+        links = [
+            case.links[name]
+            for name, inertial in case.inertials.items()
+            if not groups[name].static and (inertial is None or inertial.mass or inertial.tensor.any())
+        ]
+        if not links:
+            return
+        bare = sum(link.first("collision") is None for link in links)
+        files = {mesh.attributes.get("filename", "") for link in links for _, mesh in collision_meshes(link)}
+        unread = sum(bullet_box(name, case.source.source) is None for name in files)
+        of_all = "the link that moves" if len(links) == 1 else f"the {len(links)} links that move"
+        parts = [f"the inertia of {of_all} is computed from collision shapes"]
+        parts += [f"without any: {bare}"] if bare else []
+        parts += [f"meshes that are not read here and left out: {unread} of {len(files)}"] if unread else []
+        yield found_at(case.source.root, "; ".join(parts))
+
+
+class LinksMergedWrongly(CallingRule):
+    """DX116 links-merged-wrongly: PyBullet's flag that merges links on fixed joints adds their inertias in
+    wrong frames.
+
+    With ``flags=p.URDF_USE_INERTIA_FROM_FILE | p.URDF_MERGE_FIXED_LINKS``, ``p.loadURDF`` makes one body of
+    links that fixed joints connect, which is faster to step.
+
+    - PyBullet 3.2.7 leaves out the rotation of the fixed joint and those of the inertials, and the centre of
+      mass of the parent. The mass is right: the sum of both.
+    - Pinocchio 4.1, MuJoCo 4.0 (``fusestatic``) and Drake 1.51 merge links rightly.
+
+    On more than 40 of 65 robots of example-robot-data the mass matrix is off, by 0.2 to 54 %. A robot without
+    such links, for example UR5, is loaded as without the flag.
+
+    What to do: leave the flag out, or merge the links in the file.
+
+    The file is correct, and no file mends the call. ``dynx doctor`` examines this call where ``--engines``
+    names it, as ``pybullet:merge``.
+    """
+
+    advice = "Leave p.URDF_MERGE_FIXED_LINKS out of the call of loadURDF."
+    engines = {"pybullet:merge": ">=3.2.7"}
+    calls = ("pybullet.keep_fixed_links",)
+    changed = "loaded without flags=p.URDF_MERGE_FIXED_LINKS"
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the robot, where links on fixed joints can move."""
+        groups = rigid_groups(case)
+        merged = sum(name in group.parents and not group.static for name, group in groups.items())
+        if merged:
+            links = "1 link" if merged == 1 else f"{merged} links"
+            yield found_at(case.source.root, f"{links} on fixed joints can move with their parents")
+
+
+_MUJOCO_SETTINGS = {
+    "compiler": (
+        *("boundmass", "boundinertia", "settotalmass", "balanceinertia", "inertiafromgeom"),
+        *("inertiagrouprange", "autolimits"),
+    ),
+    "option": ("density", "viscosity", "wind"),
+    "flag": (
+        *("constraint", "equality", "frictionloss", "limit", "contact", "gravity"),
+        *("passive", "spring", "damper"),
+    ),
+}
+"""Attributes that change masses or forces, by element."""
+
+
+class MujocoSettings(EditingRule):
+    """DX224 mujoco-settings: The file has settings of MuJoCo's compiler that change the masses or forces of
+    the robot.
+
+    MuJoCo reads an element ``<mujoco>`` in a URDF, which authors add for the folder of the meshes. Other
+    attributes of its ``<compiler>`` change the robot: ``boundmass`` and ``boundinertia`` raise small masses
+    and moments, ``settotalmass`` scales all masses, ``balanceinertia`` and ``inertiafromgeom`` replace
+    tensors, and ``autolimits="false"`` makes MuJoCo refuse the limits of a URDF. In ``<option>`` the
+    attributes ``density``, ``viscosity`` and ``wind`` add the drag of a fluid, and ``<flag>`` switches
+    gravity or constraints off.
+
+    - MuJoCo 4.0 obeys them.
+    - Pinocchio 4.1, PyBullet 3.2.7 and Drake 1.51 ignore ``<mujoco>``. So does dynx.
+
+    The effect on MuJoCo is of any size: masses scaled to another total scale all torques.
+
+    What to do: state the masses and tensors that you mean, and set options in the program.
+    ``dynx doctor --fix`` removes these attributes and leaves the others, such as ``meshdir`` and
+    ``fusestatic``. ``--choose DX224=keep`` keeps them, and MuJoCo reads another robot.
+    """
+
+    stage = "reading"
+    advice = "Remove these settings from <mujoco>."
+    engines = measured_on("mujoco")
+    choices = {
+        "remove": "remove settings of MuJoCo that change masses or forces",
+        "keep": "keep them; MuJoCo then reads another robot",
+    }
+    changed = "removed settings of MuJoCo that change masses or forces"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield the elements with such an attribute."""
+        for mujoco in case.source.root.all("mujoco"):
+            for element in mujoco.walk():
+                names = [name for name in _MUJOCO_SETTINGS.get(element.tag, ()) if name in element.attributes]
+                if names:
+                    edits = [case.source.attribute_removal(element, name) for name in names]
+                    message = f"<{element.tag}> of <mujoco> sets {' and '.join(names)}"
+                    yield correction(element, message, *edits)

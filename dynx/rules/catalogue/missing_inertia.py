@@ -1,0 +1,548 @@
+"""Links without mass or without a complete inertial."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from dynx.errors import escaped
+from dynx.model.elements import Inertial
+from dynx.model.xml.source import Edit, SourceElement
+from dynx.rules import (
+    EVERY_ENGINE,
+    Case,
+    Correction,
+    Detection,
+    EditingRule,
+    Remedy,
+    Rule,
+    correction,
+    found_at,
+    links_of,
+    measured_on,
+)
+from dynx.rules.attributes import completion, misspelled_numbers, number_or_none, positive_edit, renaming
+from dynx.rules.inertia import (
+    MIN_MASS,
+    ZERO_TENSOR,
+    has_inertial_data,
+    heaviest_in_root_group,
+    inertials_in_groups,
+    massless_links,
+    merged_inertials,
+    rigid_groups,
+    static_links,
+    tensor_fault,
+    with_inertials,
+    with_least_inertia,
+    zero_inertial,
+)
+from dynx.rules.joints import text_in
+from dynx.rules.numbers_in_text import is_number
+
+_WORLD = "world"
+"""Name of a link without ``<inertial>`` that PyBullet gives no mass."""
+
+
+_READINGS = (
+    ("pinocchio", "no mass in Pinocchio"),
+    ("pybullet", "1 kg and 1 kg m^2 in PyBullet"),
+    ("mujoco", "the weight of its shapes in MuJoCo"),
+    ("drake", "no mass in Drake"),
+)
+
+
+class LinkWithoutInertial(Rule):
+    """DX101 link-without-inertial: A link has no <inertial>: some engines give it a mass, others none.
+
+    A link that only marks a place, such as a tool flange or a camera frame, is often written without an
+    ``<inertial>`` element. URDF does not define the mass of such a link.
+
+    - Pinocchio 4.1.0 and Drake 1.51.1: no mass, as in dynx.
+    - PyBullet 3.2.7: 1 kg, with 1 kg m^2 about every axis, unless the link is named exactly ``world``. It
+      prints "No inertial data for link, using mass=1" among other output.
+    - MuJoCo 4.0.0: the mass of the primitive collision shapes of the link at 1000 kg/m^3; without such shapes
+      no mass.
+
+    The effect is large: torques, mass matrices and accelerations are off by 10 % to many times their size
+    wherever such a link moves. With a floating base, the root counts too; with a fixed base, the root and the
+    links rigidly connected to it cannot move, so their mass has no effect.
+
+    What to do: write the mass and the inertia of the link. If it is only a frame, write zeros explicitly.
+
+    ``dynx doctor --fix`` puts an ``<inertial>`` with mass 0 and moments 0 into each such link. All four
+    engines then read the link as a frame, as Pinocchio does. On the floating base a root without
+    ``<inertial>`` gets that of the heaviest link rigidly connected to it instead, because PyBullet fixes a
+    root without mass to the world (DX107). This changes no equation of motion.
+    """
+
+    engines = measured_on("pybullet", "mujoco")
+    advice = "Write an <inertial>: the true one, or one of zero where the link is a mere frame."
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the links that can move and have no ``<inertial>``."""
+        if not has_inertial_data(case):
+            return  # DX118
+        static = static_links(case)
+        for name, element in case.links.items():
+            if element.first("inertial") is None and name not in static and name != _WORLD:
+                yield Detection(name, None, element.line, "no <inertial>", _READINGS)
+
+    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy:
+        """Write an inertial of zero into each link.
+
+        A floating root gets that of the heaviest link rigidly connected to it instead, since PyBullet fixes a
+        root without mass to the world (DX107).
+        """
+        names = links_of(detections)
+        many = f"{len(names)} links" if len(names) > 1 else "the link"
+        done = f"gave {many} without <inertial> one with mass 0 and moments 0"
+        body = heaviest_in_root_group(case) if case.base == "floating" and case.readable else None
+        if body is not None and case.model.root in names:
+            root = case.model.root
+            merged = merged_inertials(case, rigid_groups(case)[root], (root, body), root)
+            case = with_inertials(case, merged)
+            names.remove(root)
+            done = f"gave the root {root} the <inertial> of {body}, which is rigidly connected to it"
+            done += f", and {len(names)} other links without <inertial> one of zero" if names else ""
+        source = case.source
+        edits = [source.insertion(case.links[name], zero_inertial(), first=True) for name in names]
+        return Remedy(case.with_source(source.apply(*edits)), done)
+
+
+class MasslessRoot(Rule):
+    """DX107 massless-root: With a floating base PyBullet fixes a robot to the world if its root link has no
+    mass.
+
+    Many robots begin with an empty link, such as ``base_link``, which carries the body by a fixed joint. With
+    a fixed base this is harmless. With a floating base, the root is the body that moves:
+
+    - PyBullet 3.2.7 reads mass 0 as "fixed to the world", also with ``useFixedBase=False``: the robot hangs
+      in the air, and its base has no coordinates.
+    - MuJoCo 4.0.0 merges links rigidly connected to the root into it and is not affected; without such links
+      it refuses the file ("mass and inertia of moving bodies must be larger than mjMINVAL").
+    - Pinocchio 4.1.0 and Drake 1.51.1 are not affected.
+
+    The effect: in PyBullet there is no floating robot at all.
+
+    What to do: give the root the mass of the body that it represents.
+
+    ``dynx doctor --fix`` merges the heaviest link that is rigidly connected to the root (directly or by a
+    chain of fixed joints) into it; that link gets a zero inertial and keeps its name and its place. It is the
+    same rigid body. Where no link rigidly connected to the root has mass, the root gets 2e-15 kg and 1.5e-14
+    kg m^2, which all engines accept and which is too little to show in any result; ``--choose DX107=keep``
+    leaves it. A robot without any mass has no inertial data (DX118).
+    """
+
+    engines = measured_on("pybullet")
+    advice = "Give the root link the mass of the body that it represents."
+    choices = {
+        "lump": "merge the heaviest link rigidly connected to the root into it; else give it the least mass",
+        "keep": "keep the file; PyBullet then fixes the robot to the world",
+    }
+    trap_base = "floating"
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the root, on the floating base, where the file says that its mass is zero."""
+        model = case.model
+        inertial = case.inertials[model.root]
+        # Without an <inertial> PyBullet gives the root 1 kg (DX101), unless it is named world.
+        weightless = model.root == "world" if inertial is None else inertial.mass == 0.0
+        if case.base != "floating" or not weightless or not has_inertial_data(case):
+            return []
+        element = case.links[model.root]
+        line = element.line if inertial is None else inertial.line
+        body = heaviest_in_root_group(case)
+        where = "nor has any link rigidly connected to it" if body is None else f"the body is the link {body}"
+        return [Detection(model.root, None, line, f"the root has no mass; {where}")]
+
+    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
+        """Return the case with the heaviest link rigidly connected to the root merged into it."""
+        root, body = case.model.root, heaviest_in_root_group(case)
+        if self.chosen(case) == "keep":
+            return None
+        if body is None:
+            return Remedy(*with_least_inertia(case, [root]), self.decision(case))
+        bodies = merged_inertials(case, rigid_groups(case)[root], (root, body), root)
+        return Remedy(with_inertials(case, bodies), f"merged the mass of {body} into the root {root}")
+
+
+_READINGS_OF_TENSOR = (("mujoco", "dropped or refused by MuJoCo"), ("drake", "1 kg in Drake"))
+
+
+class MasslessLinkWithInertia(Rule):
+    """DX108 massless-link-with-inertia: A link of mass zero has moments of inertia, which no body has.
+
+    A body with moments of inertia has mass. A file can contradict this: the mass of a foot or a sensor was
+    set to zero and its tensor was kept.
+
+    - Drake 1.51.1 makes the link weigh 1 kg, with a warning ("condition 'mass > 0' failed").
+    - MuJoCo 4.0.0 drops the tensor where the link is rigidly connected to another (its default
+      ``fusestatic``), and refuses the file where a joint carries the link. Where the link cannot move, such
+      as the root of a fixed robot, it refuses a tensor that no body can have ("inertia must satisfy A + B >=
+      C").
+    - Pinocchio 4.1.0 and PyBullet 3.2.7 use the numbers unchanged, as dynx does.
+
+    The effect: in Drake torques up to 23 times too large (bolt, whose feet these are), in MuJoCo as much as
+    the tensor contributes (1e-4 on bolt).
+
+    What to do: give the link its mass.
+
+    ``dynx doctor --fix`` adds the tensor to that of a link with mass that is rigidly connected to it, its
+    parent first; the massless link gets a zero tensor. That is the same rigid body. Where there is no such
+    link, the link gets a mass of 2e-15 kg, which every engine accepts as mass and which is too little to show
+    in any result. The tensor of a link that cannot move becomes zero.
+    """
+
+    engines = measured_on("drake", "mujoco")
+    advice = "Give the link its mass, or move the tensor into the link that it is rigidly connected to."
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the links of mass zero with a tensor that is not zero; of those that cannot move, the links
+        whose tensor no body can have."""
+        for name, inertial, group in inertials_in_groups(case):
+            largest = float(np.max(np.abs(inertial.tensor)))
+            if inertial.mass != 0.0 or largest == 0.0:
+                continue
+            message = f"the mass is zero, and the largest entry of the tensor {largest:.6g}"
+            if not group.static:
+                yield Detection(name, None, inertial.line, message, _READINGS_OF_TENSOR)
+            elif tensor_fault(inertial) == "triangle":
+                message += ", in a tensor that no body can have, held still by the world"
+                yield Detection(name, None, inertial.line, message, (("mujoco", "refused by MuJoCo"),))
+
+    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy:
+        """Return the case with each tensor moved to a link with mass, or with the least mass added."""
+        for name in links_of(detections):
+            inertial, group = case.model.inertial(name), rigid_groups(case)[name]
+            if group.static:
+                case = with_inertials(case, {name: Inertial(0.0, inertial.origin)})
+                continue
+            parent = group.parents.get(name)
+            near = [*([parent] if parent else []), *group.children(name), *group.links]
+            heavy = [each for each in near if (body := case.inertials[each]) is not None and body.mass > 0.0]
+            if heavy:
+                case = with_inertials(case, merged_inertials(case, group, (heavy[0], name), heavy[0]))
+            else:
+                case = with_inertials(case, {name: replace(inertial, mass=2.0 * MIN_MASS)})
+        return Remedy(
+            case, "added tensors of links without mass to links with mass rigidly connected to them"
+        )
+
+
+class MasslessMovingLink(Rule):
+    """DX110 massless-moving-link: A joint carries a link without mass, which MuJoCo refuses although the link
+    carries others.
+
+    Links without mass between two joints are common: a shoulder of three axes is mostly written as three
+    joints with two empty links between them. The motion is well defined, because they carry a link with mass.
+
+    - MuJoCo 4.0.0 refuses the file ("mass and inertia of moving bodies must be larger than mjMINVAL"). Links
+      rigidly connected to the link count with it.
+    - Pinocchio 4.1.0, PyBullet 3.2.7 and Drake 1.51.1 accept such links.
+
+    The effect: the file does not load in MuJoCo.
+
+    What to do: the robot is correct. For MuJoCo, give the link a mass that is too small to measure.
+
+    ``dynx doctor --fix`` gives the link 2e-15 kg and 1.5e-14 kg m^2 about every axis, just above the smallest
+    that MuJoCo accepts. In a robot of kilograms and metres that is below rounding. Choose
+    ``--choose DX110=keep`` to keep the file. Where nothing beyond the joint has mass, see DX113.
+    """
+
+    engines = measured_on("mujoco")
+    advice = "For MuJoCo, give the link a mass and moments just above 1e-15 and 1e-14."
+    choices = {
+        "least": "give the link the least mass and moments that MuJoCo accepts",
+        "keep": "keep the file; MuJoCo refuses it",
+    }
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the moving links without mass and tensor that carry a link with mass or tensor."""
+        message = "a joint carries the link, which has neither mass nor inertia"
+        for name, bare in massless_links(case).items():
+            if not bare:
+                yield Detection(name, None, case.links[name].line, message)
+
+    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
+        """Return the case with the least mass and moments that MuJoCo accepts."""
+        if self.chosen(case) == "keep":
+            return None
+        return Remedy(*with_least_inertia(case, links_of(detections)), self.decision(case))
+
+
+class MassMatrixSingular(Rule):
+    """DX113 mass-matrix-singular: Nothing beyond a joint has mass, so the mass matrix is singular.
+
+    At the end of some chains there are links whose inertia was never entered: fingers, wheels, rotating
+    sensors. They move without any torque, so their acceleration is undefined: the mass matrix is singular,
+    and forward dynamics has no solution.
+
+    - Pinocchio 4.1.0 gives NaN for all joints.
+    - PyBullet 3.2.7 gives that joint an acceleration of zero, and the others the right one.
+    - Drake 1.51.1 raises an error ("mass matrix ... is not positive-definite").
+    - MuJoCo 4.0.0 refuses the file ("mass and inertia of moving bodies must be larger than mjMINVAL").
+    - Kinematics, mass matrix and inverse dynamics are right in the first three.
+
+    The effect: no forward dynamics, which each engine reports in a different way. 24 joints of romeo are like
+    this.
+
+    What to do: enter the inertia. If the joint does not matter, make it fixed.
+
+    ``dynx doctor --fix`` gives such links 2e-15 kg and 1.5e-14 kg m^2 about every axis, the least that all
+    engines accept; then all give the same accelerations, to rounding. The report says that the physics
+    changed: the inertia is invented, and the smallest torque accelerates it strongly. ``--choose DX113=keep``
+    keeps the file.
+    """
+
+    # The others show it in forward dynamics, which has no right value to compare with.
+    engines = measured_on("mujoco")
+    advice = "Enter the inertia of the link, or make the joint fixed if it does not matter."
+    choices = {
+        "least": "give the links the least mass and moments that engines accept; this changes the physics",
+        "keep": "keep the file; forward dynamics has no solution",
+    }
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the moving links where neither they nor any link beyond them has mass or a tensor."""
+        message = "neither the link nor anything beyond its joint has mass: the mass matrix is singular"
+        for name, bare in massless_links(case).items():
+            if bare:
+                yield Detection(name, None, case.links[name].line, message)
+
+    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
+        """Give the links the least inertia that all engines accept, unless the user keeps the file."""
+        if self.chosen(case) == "keep":
+            return None
+        return Remedy(
+            *with_least_inertia(case, links_of(detections)), self.decision(case), changes_physics=True
+        )
+
+
+class NoInertialData(Rule):
+    """DX118 no-inertial-data: Nothing that moves has mass or inertia, so there is no dynamics to compare.
+
+    Descriptions for display, for motion planning or from a CAD export without materials often have no
+    ``<inertial>`` at all, or zeros in all of them. Such a file states the kinematics of a robot and nothing
+    about its dynamics:
+
+    - Pinocchio 4.1.0 and Drake 1.51.1 load it with a mass matrix of zero; the one then gives NaN for
+      accelerations, and the other an error.
+    - PyBullet 3.2.7 gives 1 kg and 1 kg m^2 about every axis to each link without ``<inertial>``, and fixes a
+      floating robot to the world if its root has an ``<inertial>`` of zero.
+    - MuJoCo 4.0.0 refuses the file ("mass and inertia of moving bodies must be larger than mjMINVAL"), unless
+      collision shapes other than meshes give the links a mass.
+
+    The effect: no torque, mass matrix or acceleration of this robot means anything in any engine. Poses and
+    Jacobians do, and they are compared.
+
+    What to do: enter the masses and inertias, from the data sheet or the CAD model.
+
+    ``dynx doctor --fix`` invents no inertia, and the file is not called alike. ``--choose DX118=least`` gives
+    every moving body 2e-15 kg and 1.5e-14 kg m^2, with which all engines load the file; do not simulate the
+    result, in which a torque of 1e-6 N m turns a joint at millions of rad/s. A single moving part without
+    mass is DX110 or DX113.
+    """
+
+    engines = measured_on("pybullet", "mujoco")
+    undefined = "dynamics"
+    advice = "Enter the masses and inertias; until then use the file for kinematics only."
+    choices = {
+        "keep": "invent no inertia, and compare the kinematics",
+        "least": "give every moving body the least mass and moments that engines accept, which changes the "
+        "physics",
+    }
+    trap_base = "floating"
+
+    @classmethod
+    def holds_for(cls, versions: Mapping[str, str]) -> bool:
+        """Return True: what the file does not state is missing in every engine."""
+        return True
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the robot, where nothing that moves has mass or moments."""
+        if has_inertial_data(case):
+            return
+        missing = sum(element.first("inertial") is None for element in case.links.values())
+        count = len(case.links)
+        message = (
+            f"of {count} links {missing} have no <inertial>, and no other that moves has mass or moments"
+        )
+        yield Detection(None, None, case.source.root.line, message)
+
+    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
+        """Return the least inertia for each moving body, if that was chosen."""
+        if self.chosen(case) == "keep":
+            return None
+        groups = dict.fromkeys(rigid_groups(case).values())
+        moving = [group.head for group in groups if not group.static]
+        least = with_least_inertia(case, moving)
+        return Remedy(*least, self.decision(case), changes_physics=True)
+
+
+class NegativeMass(EditingRule):
+    """DX120 negative-mass: The mass of a link is negative.
+
+    No body has a negative mass. It comes from an edit by hand, from an exporter that subtracts a hole, or
+    from a "correction" that makes the sum of several links right.
+
+    For a link that moves, measured:
+
+    - Pinocchio 4.1 adds inertias and divides their first moment by the larger of the mass and 2e-16 kg. The
+      centre of mass of the link is then 1e20 m away or more, and torques are beyond 1e40 N m.
+    - PyBullet 3.2.7 loads the file, and inverse dynamics and the mass matrix fail ("invalid mass").
+    - MuJoCo 4.0 refuses the file ("mass and inertia of moving bodies must be larger than mjMINVAL").
+    - Drake 1.51 replaces the inertia by that of a ball of water of 1 kg, with a warning.
+
+    dynx refuses the file, with the line.
+
+    What to do: enter the mass of the body. ``dynx doctor --fix`` removes the sign, which is a guess that the
+    report names. ``--choose DX120=zero`` writes 0 instead.
+    """
+
+    stage = "reading"
+    advice = "Enter the mass of the body, in kilograms."
+    engines = EVERY_ENGINE
+    choices = {
+        "absolute": "remove the sign of a negative mass",
+        "zero": "make a negative mass zero",
+    }
+    changed = "made the mass of links positive or zero"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield the mass that engines read in each link."""
+        for link in case.source.root.all("link"):
+            inertial = link.first("inertial")
+            mass = None if inertial is None else inertial.first("mass")
+            if mass is not None and (number_or_none(mass, "value") or 0.0) < 0.0:
+                edit, written = positive_edit(case, mass, "value", zero=self.chosen(case) == "zero")
+                yield correction(mass, f"the link has a mass of {written} kg", edit)
+
+
+_MOMENTS = ("ixx", "iyy", "izz")
+_PRODUCTS = ("ixy", "ixz", "iyz")
+
+
+class MissingProductOfInertia(EditingRule):
+    """DX409 missing-product-of-inertia: An inertia tensor is written without its zero products.
+
+    Tensors written by hand often omit the products of inertia that are zero. URDF requires all six numbers;
+    some engines accept fewer, some refuse the file.
+
+    - Pinocchio 4.1 prints on stderr that ``ixy`` is missing and drops the whole tensor: the link is a point
+      mass.
+    - MuJoCo 4.0 refuses the file and names the line.
+    - PyBullet 3.2.7 and Drake 1.51 read zero.
+
+    The effect is a link without moments of inertia in Pinocchio: of order 0.01 to 1 in the mass matrix.
+
+    What to do: write the products that are zero as ``0``. ``dynx doctor --fix`` does so; two engines read a
+    missing product as zero. A number under a misspelled name, ``iyx="0.01"``, is what was meant, and gets the
+    right name. A missing moment (``ixx``, ``iyy``, ``izz``) is DX410: no body has a zero moment, and
+    the file does not contain the number.
+    """
+
+    stage = "reading"
+    advice = "Write all six numbers of the tensor."
+    engines = measured_on("pinocchio", "mujoco")
+    unambiguous = True
+    changed = "wrote the products of inertia that were missing as 0"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield tensors with all three moments and not all products."""
+        for tensor in case.elements("link", "inertial", "inertia"):
+            missing = [name for name in _PRODUCTS if name not in tensor.attributes]
+            if missing and all(name in tensor.attributes for name in _MOMENTS):
+                yield completion(case, tensor, f"<inertia> has no {' and no '.join(missing)}", missing, "0")
+
+
+class IncompleteInertial(EditingRule):
+    """DX410 incomplete-inertial: An inertial has no mass or no inertia tensor.
+
+    ``<inertial>`` needs both ``<mass value="..."/>`` and ``<inertia .../>``. Often ``<mass>2.5</mass>`` was
+    written, which looks right but which no engine reads. A tensor without ``ixx``, ``iyy`` or ``izz`` is
+    none: ``<inertia/>`` is what is left of a template.
+
+    - Pinocchio 4.1 reports that on stderr. Without a mass it drops the whole inertial, so the link weighs
+      nothing; without a tensor the link is a point mass.
+    - PyBullet 3.2.7 and MuJoCo 4.0 refuse the file.
+    - Drake 1.51 reads missing parts as zero: a link with a mass and no tensor is a point mass. One with a
+      tensor and no mass is impossible; Drake warns and replaces it.
+
+    The effect is a file that does not load, or a link without its mass: of order 0.01 to 1 in the mass
+    matrix.
+
+    What to do: complete it. A number under a misspelled name, ``<mass valeu="1.5"/>`` or ``ixxx="0.02"``, is
+    what was meant; ``dynx doctor --fix`` corrects the name. Otherwise it can only guess, and the report says
+    so: a number between the tags, ``<mass>2.5</mass>``, is the mass; a tensor without mass is dropped, so
+    that the link weighs nothing; a mass without tensor stays as a point mass at the origin of the inertial,
+    as in Pinocchio and Drake. ``--choose DX410=weightless`` drops that mass too.
+    """
+
+    stage = "reading"
+    advice = "Give every <inertial> a <mass value> and an <inertia>."
+    engines = EVERY_ENGINE
+    choices = {
+        "point": "make an inertial without mass zero, one without tensor a point mass",
+        "weightless": "make an inertial without mass or tensor zero",
+    }
+    changed = "completed inertials that had no mass or no tensor"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield the first inertial of each link, where it lacks something."""
+        for link in case.source.root.all("link"):
+            inertial = link.first("inertial")
+            if inertial is not None:
+                yield from self._in(case, inertial)
+
+    def _in(self, case: Case, inertial: SourceElement) -> Iterable[Correction]:
+        mass, tensor = inertial.first("mass"), inertial.first("inertia")
+        misspelled = [
+            found
+            for element, names in ((mass, ("value",)), (tensor, _MOMENTS))
+            if element is not None and (found := _misspelled_attributes(case, element, names)) is not None
+        ]
+        if misspelled:
+            yield from misspelled
+            return
+        if mass is not None and "value" in mass.attributes:
+            missing = [name for name in _MOMENTS if tensor is not None and name not in tensor.attributes]
+            if tensor is None or missing:
+                what = (
+                    f"<inertia> has no {' and no '.join(missing)}"
+                    if missing
+                    else "<inertial> has no <inertia>"
+                )
+                yield correction(inertial, what, *self._without_tensor(case, inertial, tensor))
+            return
+        inside = "" if mass is None else text_in(case.source, mass)
+        if mass is None or not is_number(inside):
+            message = "<inertial> has no <mass>" if mass is None else "<mass> has no value"
+            yield correction(inertial, message, case.source.replacement(inertial, zero_inertial()))
+        else:
+            edit = case.source.replacement(mass, f'<mass value="{inside}"/>')
+            yield correction(mass, f"<mass> has {inside} between its tags and no value", edit)
+
+    def _without_tensor(
+        self, case: Case, inertial: SourceElement, tensor: SourceElement | None
+    ) -> tuple[Edit, ...]:
+        if self.chosen(case) == "weightless":
+            return (case.source.replacement(inertial, zero_inertial()),)
+        if tensor is not None:
+            return (case.source.replacement(tensor, ZERO_TENSOR),)
+        return (case.source.insertion(inertial, ZERO_TENSOR),)
+
+
+def _misspelled_attributes(case: Case, element: SourceElement, names: Sequence[str]) -> Correction | None:
+    """Return the correction of the names of attributes, where each that is missing has its number under a
+    name that is close to it."""
+    missing = [name for name in names if name not in element.attributes]
+    meant = misspelled_numbers(element, missing)
+    if not missing or len(meant) < len(missing):
+        return None
+    edits = [edit for right in missing for edit in renaming(case, element, meant[right], right)]
+    texts = [f"{right} {element.attributes[meant[right]]} in {escaped(meant[right])}" for right in missing]
+    detection = found_at(element, f"<{element.tag}> has its {' and its '.join(texts)}")
+    return Correction(detection, tuple(edits), tuple(missing), whole=True)

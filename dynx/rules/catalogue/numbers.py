@@ -1,0 +1,437 @@
+"""Numbers in a form that engines read differently."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from dynx.errors import shown
+from dynx.model.xml.source import Edit, SourceElement
+from dynx.rules import EVERY_ENGINE, Case, Correction, EditingRule, correction, measured_on
+from dynx.rules.numbers_in_text import (
+    MisspelledNumberRule,
+    Misspelling,
+    NumericAttribute,
+    joint_attributes,
+    misspelled_number,
+    misspelled_vector,
+    shape_attributes,
+)
+
+
+class DecimalComma(MisspelledNumberRule):
+    """DX401 decimal-comma: A number is written with a comma instead of a decimal point.
+
+    URDF writes decimals with a point in every language, as XML Schema does. Programs that print numbers by
+    the current locale (a CAD exporter on a German or French computer) write a comma.
+
+    Each engine reads it differently:
+
+    - Pinocchio 4.1: with such a ``<mass>`` or ``<origin>`` of an ``<inertial>`` the whole inertial is
+      dropped, so the link weighs nothing; with such an ``<inertia>`` only the tensor is dropped, so the link
+      is a point mass. A line on stderr says so. In a ``<joint>`` the file is refused.
+    - PyBullet 3.2.7 reads up to the comma: ``2,5`` is 2, ``0,03`` is 0. It prints no warning. In a vector it
+      does so with each of the three numbers.
+    - MuJoCo 4.0 refuses the file and names the line.
+    - Drake 1.51 reads up to the comma in a single number, as PyBullet does, and refuses a vector.
+
+    The effect is as large as the digits behind the comma: a mass of 2 instead of 2.5 kg, an inertia of 0
+    instead of 0.03.
+
+    What to do: write a point. ``dynx doctor --fix`` does so in every number of links and joints.
+
+    There is one other reading: ``1,250`` may be one thousand two hundred and fifty, written with a comma
+    between thousands. dynx reads the comma as a decimal point unless the user chooses
+    ``--choose DX401=thousands``. A number with commas and a point, ``1,250.5``, is unambiguous.
+    """
+
+    advice = "Write decimals with a point."
+    engines = EVERY_ENGINE
+    choices = {
+        "decimal": "read a comma in a number as its decimal point",
+        "thousands": "read a comma in a number as standing between thousands",
+    }
+    changed = "wrote decimal points instead of commas"
+    fault = "comma"
+    description = "with a comma where {meant} needs a point"
+
+    def text_for(self, case: Case, misspelling: Misspelling) -> str:
+        """Return the number as the user chose to read it."""
+        if self.chosen(case) == "thousands" and misspelling.otherwise is not None:
+            return misspelling.otherwise
+        return misspelling.meant
+
+
+class CommaBetweenNumbers(MisspelledNumberRule):
+    """DX402 comma-between-numbers: The numbers of a vector are separated by commas instead of blanks.
+
+    URDF separates the numbers of a vector by blanks. Other formats use commas or semicolons.
+
+    - Pinocchio 4.1 refuses the file where the vector is in a ``<joint>``; in an ``<inertial>`` it drops the
+      whole inertial with a line on stderr, so the link weighs nothing.
+    - PyBullet 3.2.7 reads ``1, 2, 3`` as intended, because it reads the number at the beginning of each word.
+      Without blanks, ``1,2,3``, it finds one word instead of three, prints a warning and uses zeros: a joint
+      sits at its parent's origin.
+    - MuJoCo 4.0 and Drake 1.51 refuse the file.
+
+    The effect is that of a missing offset or rotation: of order 1 in the positions of all links behind it. Of
+    the files that come with PyBullet, ``bicycle/bike.urdf`` has such a vector.
+
+    What to do: separate numbers by blanks. ``dynx doctor --fix`` does so. In ``0,2 0,5 0,1`` the commas are
+    decimal points, see DX401.
+    """
+
+    advice = "Separate the numbers of a vector by blanks alone."
+    engines = EVERY_ENGINE
+    unambiguous = True
+    changed = "separated the numbers of vectors by blanks instead of commas"
+    fault = "separator"
+    description = "with commas or semicolons between the numbers {meant}"
+
+
+class TextAfterNumber(MisspelledNumberRule):
+    """DX403 text-after-number: A number is followed by text that does not belong to it.
+
+    A second point, a unit, a Fortran exponent (``1.5d-3``), a hexadecimal number.
+
+    - Pinocchio 4.1: with such a ``<mass>`` or ``<origin>`` of an ``<inertial>`` the whole inertial is
+      dropped, so the link weighs nothing; with such an ``<inertia>`` only the tensor is dropped, so the link
+      is a point mass. A line on stderr says so. In a ``<joint>`` the file is refused.
+    - PyBullet 3.2.7 reads the number at the beginning and ignores the rest, without a warning. ``1.5d-3`` is
+      then 1.5, a thousand times too large.
+    - MuJoCo 4.0 refuses the file and names the line, but reads hexadecimal numbers.
+    - Drake 1.51 reads single numbers as PyBullet does and refuses vectors; it reads a hexadecimal number as
+      0.
+
+    The effect ranges from none (a limit that is not used) to a link without mass. Of the files that come with
+    PyBullet, ``biped/biped2d_pybullet.urdf`` has ``-1.57.``.
+
+    What to do: write the number alone, in SI units. ``dynx doctor --fix`` keeps the number at the beginning;
+    a Fortran exponent is rewritten with ``e``, a hexadecimal number in decimals. It never converts units:
+    ``25mm`` would become 25, so check its changes. Words with no number at the beginning (``heavy``) are
+    DX420.
+    """
+
+    advice = "Write the number alone, in SI units."
+    engines = EVERY_ENGINE
+    changed = "kept the number where something followed it"
+    fault = "rest"
+    description = "which is no decimal number; {meant} is the readable part"
+
+    def decision(self, case: Case) -> str | None:
+        """Write the decision: there is one reading, and it is a guess."""
+        return f"{self.id}: the number at the beginning was kept, and no unit was converted"
+
+
+class VectorOfWrongLength(MisspelledNumberRule):
+    """DX404 vector-of-wrong-length: A vector has more or fewer than three numbers.
+
+    ``rpy="-3.14159 1.57079 0 0"`` has one too many, ``xyz="0.2 0.1"`` one too few.
+
+    - Pinocchio 4.1 refuses the file where the vector is in a ``<joint>``; in an ``<inertial>`` it drops the
+      whole inertial with a line on stderr, so the link weighs nothing.
+    - PyBullet 3.2.7 uses the first three of four numbers without a warning. With two it prints a warning and
+      uses zeros for all three; in an ``<axis>`` it refuses the file.
+    - MuJoCo 4.0 and Drake 1.51 refuse the file.
+
+    The effect of a vector that became zero is of order 1 in the positions of all links behind it. Of the
+    files that come with PyBullet, ``quadruped/microtaur/microtaur.urdf`` has vectors of four numbers.
+
+    What to do: find out which three numbers were intended. ``dynx doctor --fix`` keeps the first three, as
+    PyBullet does, and adds zeros where numbers are missing, as a person would read the file. With
+    ``--choose DX404=default`` it removes the attribute instead, so that the default applies: zero for an
+    origin, (1, 0, 0) for an axis.
+    """
+
+    advice = "Write three numbers."
+    engines = EVERY_ENGINE
+    choices = {
+        "first": "keep the first three numbers of a vector, and add zeros where some are missing",
+        "default": "remove a vector without three numbers",
+    }
+    changed = "made vectors have three numbers"
+    fault = "count"
+    description = "which has {count} numbers where three are wanted"
+    elements = ("origin", "axis")
+
+    def edit(self, case: Case, attribute: NumericAttribute, misspelling: Misspelling) -> Edit:
+        """Correct or remove the vector, by the user's choice."""
+        if self.chosen(case) == "first":
+            return super().edit(case, attribute, misspelling)
+        if attribute.element.tag == "axis":
+            return case.source.removal(attribute.element)
+        return case.source.attribute_removal(attribute.element, attribute.name)
+
+
+_SHAPES_READ_ALIKE = ("box", "sphere", "cylinder", "capsule", "mesh")
+
+
+class BlankAfterNumber(MisspelledNumberRule):
+    """DX405 blank-after-number: White space follows a number, or a no-break space precedes it.
+
+    Pinocchio 4.1 (its reader is urdfdom) skips white space in front of a number and accepts none behind it:
+
+    - in a ``<mass>`` it prints on stderr that the mass "is not a float" and drops the whole inertial, so the
+      link weighs nothing;
+    - in an ``<inertia>`` it drops the tensor alone, also with a line on stderr, so the link is a point mass;
+    - in a ``<limit>``, ``<dynamics>`` or ``<mimic>`` of a joint it refuses the file.
+
+    PyBullet 3.2.7, MuJoCo 4.0 and Drake 1.51 read the number, and so does dynx. In front of a number all
+    engines read blanks, tabs and line breaks. No engine treats a no-break space (U+00A0) as a blank: MuJoCo
+    refuses it behind a number; in front of one PyBullet reads 0, and MuJoCo and Drake refuse the file. Blanks
+    between and around the three numbers of a vector are accepted everywhere (tabs are not, see DX406).
+
+    The effect is a link without mass, or without a moment of inertia: the mass matrix is off by as much as
+    the link matters, of order 0.01 to 1.
+
+    What to do: remove the blank. ``dynx doctor --fix`` does so and changes no digit.
+    """
+
+    advice = "Remove the white space."
+    engines = measured_on("pinocchio")
+    changed = "removed white space around numbers"
+    fault = "blank"
+    description = "with white space that not every engine skips"
+
+    def applies(self, attribute: NumericAttribute) -> bool:
+        """Check whether the attribute is no size of a shape, which all engines read alike."""
+        return attribute.element.tag not in _SHAPES_READ_ALIKE
+
+
+class TabInVector(MisspelledNumberRule):
+    """DX406 tab-in-vector: The numbers of a vector are separated by a tab, a line break or another blank.
+
+    XML calls tabs and line breaks white space like blanks, and a vector over two lines looks correct. Copied
+    text can hold another kind of blank, such as the no-break space U+00A0.
+
+    - Pinocchio 4.1 separates numbers at blanks alone. A tab in a vector of a ``<joint>`` makes it refuse the
+      file; in an ``<inertial>`` it drops the whole inertial with a line on stderr, so the link weighs
+      nothing.
+    - PyBullet 3.2.7 separates numbers at blanks alone too. It finds one word instead of three, prints a
+      warning and uses zeros. Where there are both blanks and line breaks it can find three words that are not
+      the three numbers. A tab in an ``<axis>`` makes it refuse the file.
+    - MuJoCo 4.0 and Drake 1.51 read tabs and line breaks as intended, and refuse the no-break space.
+
+    The effect is that of a missing offset: of order 1 in the positions of all links behind it, 0.1 in the
+    mass matrix of a small arm.
+
+    What to do: separate numbers by blanks. ``dynx doctor --fix`` does so and changes no digit.
+    """
+
+    advice = "Separate the numbers of a vector by blanks alone."
+    engines = measured_on("pinocchio", "pybullet")
+    changed = "separated the numbers of vectors by blanks instead of tabs and line breaks"
+    fault = "tab"
+    description = "with a tab, a line break or another blank among its numbers"
+
+
+class InfiniteLimit(MisspelledNumberRule):
+    """DX407 infinite-limit: A limit of a joint is infinite.
+
+    ``<limit lower="-inf" upper="inf" effort="inf" velocity="inf"/>`` is understandable, but URDF has no
+    notation for infinity, and engines differ in reading one.
+
+    - Pinocchio 4.1 and Drake 1.51 refuse the file.
+    - PyBullet 3.2.7 and MuJoCo 4.0 read an infinity; MuJoCo refuses ``1e999``.
+
+    dynx refuses it too, because half of the engines do.
+
+    What to do: omit the limit where that is allowed (``type="continuous"`` needs no lower and no upper), or
+    write a number that no joint reaches. ``dynx doctor --fix`` writes the largest double,
+    1.7976931348623157e+308, which all four engines read and which dynx reads as "no limit". Infinite masses,
+    inertias and positions have no such substitute, see DX420.
+    """
+
+    advice = "Write a large finite number, or omit the limit."
+    engines = measured_on("pinocchio", "drake")
+    unambiguous = True
+    changed = "wrote the largest double for infinite limits"
+    fault = "infinite"
+    description = "which is no finite number"
+    elements = ("limit",)
+
+
+class EmptyVector(MisspelledNumberRule):
+    """DX408 empty-vector: An origin has a position or angles without numbers.
+
+    The variable of a template was empty, or an exporter had no value. URDF's default for a missing attribute
+    is zero, and a person would read an empty vector so.
+
+    - Pinocchio 4.1 refuses the file where the origin is that of a ``<joint>``; in an ``<inertial>`` it drops
+      the whole inertial with a line on stderr, so the link weighs nothing.
+    - Drake 1.51 refuses the file.
+    - PyBullet 3.2.7 prints a warning and uses zeros; MuJoCo 4.0 uses zeros. So does dynx.
+
+    The effect is a file that does not load, or a link without mass: of order 0.01 to 1 in the mass matrix.
+
+    What to do: remove the attribute, or write ``0 0 0``. ``dynx doctor --fix`` removes it.
+    """
+
+    advice = "Remove the empty attribute."
+    engines = measured_on("pinocchio", "drake")
+    changed = "removed empty vectors of origins"
+    fault = "empty"
+    description = "without any number"
+    elements = ("origin",)
+
+    def edit(self, case: Case, attribute: NumericAttribute, misspelling: Misspelling) -> Edit:
+        """Return the edit that removes the attribute."""
+        return case.source.attribute_removal(attribute.element, attribute.name)
+
+
+_ELEMENTS_THAT_NEED_NUMBERS = ("mass", "inertia")
+
+
+class AttributeWithoutNumber(MisspelledNumberRule):
+    """DX420 attribute-without-number: An attribute that should hold numbers is empty or holds other text.
+
+    An exporter writes ``<limit lower="" upper="" .../>`` for what the user did not fill in, ``nan`` for the
+    centre of a body without mass, or ``none``.
+
+    - Pinocchio 4.1 refuses the file where the attribute is in a ``<joint>``, fixed ones included. In an
+      ``<inertial>`` it drops the tensor or the whole inertial with a line on stderr.
+    - Drake 1.51 refuses the file.
+    - PyBullet 3.2.7 reads 0 for any word, and ``nan`` and ``inf`` as they are: results are then NaN.
+    - MuJoCo 4.0 reads an empty attribute of a joint as missing, and ``nan`` in a joint as it is. It refuses
+      words, and an empty mass or moment.
+
+    dynx refuses it with its line, except in elements that it does not read (limits of a fixed joint). An
+    empty ``xyz`` or ``rpy`` is DX408, an infinite limit DX407. Expressions of xacro, ``${mass}``, are not
+    corrected: the file has to be expanded.
+
+    What to do: write the numbers. The file does not contain them, so ``dynx doctor --fix`` can only guess,
+    and the report says so: it writes 0 for a mass, an entry of a tensor and a word of a vector, and removes
+    any other attribute, so that its default holds.
+    """
+
+    advice = "Write the numbers, or remove the attribute."
+    engines = measured_on("pinocchio", "mujoco", "drake")
+    changed = "removed attributes without a number, or wrote 0 for what is none"
+    fault = "word"
+    description = "which is no number that every engine reads"
+
+    def matches(self, attribute: NumericAttribute, misspelling: Misspelling) -> bool:
+        """Check for words, empty numbers, and infinite numbers other than limits."""
+        if misspelling.fault == "infinite":
+            return attribute.element.tag != "limit"
+        return misspelling.fault == "word" or (misspelling.fault == "empty" and attribute.count == 1)
+
+    def edit(self, case: Case, attribute: NumericAttribute, misspelling: Misspelling) -> Edit:
+        """Return the edit that removes the attribute, or writes 0 where one is required."""
+        element = attribute.element
+        if element.tag in _ELEMENTS_THAT_NEED_NUMBERS:
+            return case.source.attribute_edit(element, attribute.name, "0")
+        if misspelling.fault == "word" and misspelling.meant:
+            return case.source.attribute_edit(element, attribute.name, misspelling.meant)
+        if element.tag == "axis":
+            return case.source.removal(element)
+        return case.source.attribute_removal(element, attribute.name)
+
+    def decision(self, case: Case) -> str | None:
+        """Return a sentence on the guess, which has no alternative."""
+        return f"{self.id}: no number could be read in an attribute; 0 or its default was used"
+
+
+class MinusNotAscii(MisspelledNumberRule):
+    """DX421 minus-not-ascii: A number has a minus sign or a dash of typography instead of the hyphen-minus.
+
+    Text that was copied from a document or a web page has the minus sign U+2212 or a dash in front of
+    negative numbers. It looks like ``-``, and no engine knows it.
+
+    - Pinocchio 4.1 refuses the file where the number is in a ``<joint>``; in an ``<inertial>`` it drops the
+      whole inertial, or the tensor, with a line on stderr.
+    - PyBullet 3.2.7 reads 0, without a warning.
+    - MuJoCo 4.0 and Drake 1.51 refuse the file.
+
+    The effect is that of a number that became 0: of order 1 for a position, and a range that ends at 0 for a
+    limit.
+
+    What to do: write the hyphen-minus of the keyboard. ``dynx doctor --fix`` does so, and changes no digit.
+    """
+
+    advice = "Write the hyphen-minus of the keyboard."
+    engines = EVERY_ENGINE
+    changed = "wrote the hyphen-minus in numbers"
+    fault = "minus"
+    description = "in which the minus sign is not the hyphen-minus of {meant}"
+
+
+_NEVER_READ = ("calibration", "safety_controller")
+_UNREAD_OF_FIXED = (*_NEVER_READ, "limit", "dynamics", "mimic")
+_UNREAD_OF_CONTINUOUS = ("lower", "upper")
+
+Expression = tuple[NumericAttribute, Misspelling]
+
+
+class ExpressionNotExpanded(EditingRule):
+    """DX429 expression-not-expanded: A number that dynx does not need is an expression of xacro.
+
+    ``<origin rpy="${3.14159/2} 0 0"/>`` of a ``<collision>``, or ``<safety_controller k_velocity="${k}"/>``,
+    is left in a file that was written as URDF and never passed through ``xacro``, or that was expanded by
+    hand.
+
+    - In a ``<collision>`` MuJoCo 4.0 refuses the file ("bad format in attribute 'rpy'").
+    - In ``<calibration>``, ``<safety_controller>``, the position limits of a continuous joint, and the
+      ``<limit>``, ``<dynamics>`` and ``<mimic>`` of a fixed joint, Pinocchio 4.1 refuses the file; so does
+      Drake 1.51 in these limits and this ``<mimic>``.
+    - PyBullet 3.2.7 reads 0, without a warning: the shape is elsewhere, or has no size.
+
+    In a ``<visual>`` every engine loads the file. Elsewhere in a joint, and in an ``<inertial>``, dynx
+    refuses it, because the dynamics depends on the number.
+
+    What to do: write the number, or name the file ``.xacro`` and load it through ``xacro``.
+    ``dynx doctor --fix`` writes the value of mere arithmetic (numbers, ``pi``, ``+ - * /``). The file may not
+    hold the value of any other expression: the ``<collision>``, the element of the joint, or the position
+    limit is removed.
+    """
+
+    stage = "reading"
+    advice = "Write the number, or expand the file with xacro."
+    engines = measured_on("pinocchio", "mujoco", "drake")
+    changed = "wrote the values of expressions of xacro, or removed what they belong to"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield one correction for each collision and each element of a joint with such numbers."""
+        for collision in case.elements("link", "collision"):
+            if found := list(_expressions(case, shape_attributes(collision))):
+                yield _expression_correction(case, found, case.source.removal(collision))
+        for joint in case.source.root.all("joint"):
+            kind = joint.attributes.get("type")
+            by_element: dict[SourceElement, list[Expression]] = {}
+            for each in _expressions(case, joint_attributes(joint)):
+                if _is_unread(each[0], kind):
+                    by_element.setdefault(each[0].element, []).append(each)
+            for element, found in by_element.items():
+                if element.tag == "limit" and kind == "continuous":
+                    removals = (case.source.attribute_removal(element, each.name) for each, _ in found)
+                    yield _expression_correction(case, found, *removals)
+                else:
+                    yield _expression_correction(case, found, case.source.removal(element))
+
+
+def _expressions(case: Case, attributes: Iterable[NumericAttribute]) -> Iterator[Expression]:
+    for attribute in attributes:
+        text = attribute.text_in(case.source)
+        found = misspelled_number(text) if attribute.count == 1 else misspelled_vector(text)
+        if found is not None and found.fault == "expression":
+            yield attribute, found
+
+
+def _is_unread(attribute: NumericAttribute, kind: str | None) -> bool:
+    """Check whether dynx does not read an attribute of a joint of a type."""
+    tag = attribute.element.tag
+    if kind == "continuous" and tag == "limit":
+        return attribute.name in _UNREAD_OF_CONTINUOUS
+    return tag in (_UNREAD_OF_FIXED if kind == "fixed" else _NEVER_READ)
+
+
+def _expression_correction(case: Case, found: list[Expression], *removals: Edit) -> Correction:
+    """Write the values where all are known, and remove what has the expressions otherwise."""
+    first = found[0][0]
+    text = shown(first.element.attributes[first.name])
+    edits = [
+        case.source.attribute_edit(each.element, each.name, misspelling.meant)
+        for each, misspelling in found
+        if misspelling.meant
+    ]
+    message = f"{first.name} of <{first.element.tag}> is {text}, which xacro did not expand"
+    return correction(first.element, message, *(edits if len(edits) == len(found) else removals))

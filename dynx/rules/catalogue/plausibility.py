@@ -1,0 +1,390 @@
+"""Masses and inertias that hardly any body has."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from dynx.model.elements import Inertial
+from dynx.rules import Case, Detection, Rule
+from dynx.rules.geometry import Extent, body_extents, group_extents, link_extent
+from dynx.rules.inertia import MIN_MASS, line_of, rigid_groups
+from dynx.spatial.scalar import Floats
+
+_ROUNDING_OF_BOUNDS = 1e-9
+"""Relative margin for rounding: a spherical shell on a sphere reaches the bound exactly."""
+
+
+class InertiaBeyondGeometry(Rule):
+    """DX501 inertia-beyond-geometry: A moment of inertia is larger than any body of the link's shape and mass
+    can have.
+
+    A body of mass m that reaches at most R from an axis has a moment of inertia about that axis of at most m
+    R^2, reached only if all mass is at the farthest point; real parts have a third of that or less. The rule
+    uses the principal axes of the tensor through the centre of mass, the reach of all shapes of the link and
+    of links rigidly connected to it, and reports moments that no distribution of the mass can have. Shapes
+    are enlarged, never reduced: a mesh counts as its bounding box.
+
+    Usual causes: the tensor is in kg mm^2 or g mm^2 where URDF requires kg m^2; it was taken about the link
+    frame, not the centre of mass; the mesh is scaled by 0.001 and the tensor is not; a placeholder.
+
+    All engines use the numbers unchanged, so they agree with each other, but not with the real robot: torques
+    are too large, and controllers tuned on them too stiff.
+
+    The file does not contain the true tensor, so no edit removes the cause.
+    """
+
+    kind = "practice"
+    advice = "Export the tensor again, in kg m^2 and about the centre of mass."
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the links with such a moment, one detection each, for the moment furthest beyond."""
+        for link, extent in group_extents(case):
+            assert link.inertial is not None
+            excess, moment, bound = max(_against_bounds(link.inertial, extent))
+            if excess > 1.0 + _ROUNDING_OF_BOUNDS:
+                message = (
+                    f"a principal moment is {moment:.3g} kg m^2, {excess:.3g} times the {bound:.3g} that "
+                    f"{link.inertial.mass:.3g} kg have at the farthest point of the link's shape"
+                )
+                yield Detection(link.name, None, link.inertial.line, message)
+
+
+def _against_bounds(inertial: Inertial, extent: Extent) -> Iterator[tuple[float, float, float]]:
+    """Yield each principal moment: how many times its bound it is, itself, and the bound [kg m^2]."""
+    T_link_inertial = inertial.origin.matrix
+    moments, axes = np.linalg.eigh(inertial.tensor)
+    directions = (T_link_inertial[:3, :3] @ axes).T
+    for moment, direction in zip(moments.tolist(), directions, strict=True):
+        bound = inertial.mass * extent.reach_from_axis(T_link_inertial[:3, 3], direction) ** 2
+        yield moment / bound if bound > 0.0 else (np.inf if moment > 0.0 else 0.0), moment, bound
+
+
+_LEAST_RADIUS_OF_GYRATION = 0.01
+"""Ratio to the shape's diagonal; all but 1 % of the mass is then within a tenth of it (Chebyshev)."""
+
+
+class InertiaBelowGeometry(Rule):
+    """DX502 inertia-below-geometry: The inertia is that of a body a hundred times smaller than the link's
+    shape.
+
+    A uniform body has a radius of gyration k = sqrt(I / m) of a fifth to a half of its size (a rod l/3.5, a
+    ball d/3.2). Where even the largest k is below a hundredth of the diagonal of the link's own shape, the
+    mass would have to be concentrated in a speck. Usual causes: the tensor is in kg m^2 times 1e-6 or 1e-9
+    (wrong units in the CAD program), it was written with too few digits (``1e-06`` everywhere), or it was set
+    to zero because an importer required the element.
+
+    All engines that load such a tensor use it. Torques come out too small, forward dynamics is badly
+    conditioned, and simulators with a fixed step may oscillate or diverge at such joints.
+
+    The file does not contain the true tensor, so no edit removes the cause.
+    """
+
+    kind = "practice"
+    advice = "Export the tensor again, in kg m^2 and with enough digits."
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the links with mass whose largest radius of gyration is below 1 % of their own shape."""
+        for link in case.model.links:
+            if link.inertial is None or link.inertial.mass == 0.0:
+                continue
+            extent = link_extent(case.links[link.name], case.source.source)
+            if extent is None or extent.empty:
+                continue
+            largest = max(float(np.linalg.eigvalsh(link.inertial.tensor)[-1]), 0.0)
+            gyration, size = math.sqrt(largest / link.inertial.mass), extent.diagonal()
+            if gyration < _LEAST_RADIUS_OF_GYRATION * size:
+                message = (
+                    f"the largest radius of gyration is {gyration:.2g} m in a shape of {size:.2g} m across"
+                )
+                yield Detection(link.name, None, link.inertial.line, message)
+
+
+_MARGIN_OF_SHAPES = 0.01
+"""Ratio of the margin of the box to its diagonal."""
+
+
+class CenterOfMassOutsideGeometry(Rule):
+    """DX503 center-of-mass-outside-geometry: The centre of mass lies outside the bounding box of the link's
+    shape.
+
+    Mass cannot be negative, so the centre of mass of a body lies within its convex hull, and so within its
+    bounding box. The rule uses the box, along the axes of the link frame, of all shapes of the link and of
+    links rigidly connected to it, widened by a hundredth of its diagonal for shapes that are slightly too
+    small.
+
+    Usual causes: the ``<origin>`` of ``<inertial>`` is in millimetres; it is given in the frame of the CAD
+    assembly or of the parent, not of the link; it was mirrored for the other side and lost a sign; the mesh
+    was moved by the ``<origin>`` of ``<visual>`` and the inertial was not.
+
+    All engines use the numbers unchanged: gravity torques are equally wrong in all of them.
+
+    The file does not contain the true centre of mass, so no edit removes the cause.
+    """
+
+    kind = "practice"
+    advice = "Give the origin of the inertial in metres and in the frame of its own link."
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the links whose centre of mass is outside, and by how much."""
+        for link, extent in group_extents(case):
+            assert link.inertial is not None
+            low, high = extent.box()
+            center = link.inertial.origin.matrix[:3, 3]
+            outside = float(np.max(np.maximum(low - center, center - high)))
+            if outside > _MARGIN_OF_SHAPES * extent.diagonal():
+                message = (
+                    f"the centre of mass is {outside:.3g} m outside the box of {extent.diagonal():.3g} m "
+                    "across that holds the link's shape"
+                )
+                yield Detection(link.name, None, link.inertial.line, message)
+
+
+_MIN_LINKS_ALIKE = 3
+"""Smallest number of links that share a tensor with equal moments."""
+
+
+class PlaceholderInertia(Rule):
+    """DX504 placeholder-inertia: The inertia is a placeholder: the unit matrix, or one tensor for links of
+    different mass.
+
+    Two patterns are reported. A tensor that is exactly the unit matrix: 1 kg m^2 about every axis is the
+    inertia of a steel ball of 0.15 m radius and 111 kg, and not of a usual link. And one tensor with three
+    equal moments (0.001 in many tutorials) that at least three links share although their masses differ: the
+    inertias of real links would differ too.
+
+    All engines use the numbers unchanged. With an identity tensor on a link of a few hundred grams the
+    inertia of the whole arm is that of the placeholder: torques and gains tuned on them are useless.
+
+    The file does not contain the true tensor, so no edit removes the cause. Inertias from the shapes, with
+    mass spread evenly, are a better guess than any placeholder.
+    """
+
+    kind = "practice"
+    advice = "Compute the inertia from the CAD model or from the link's shape and mass."
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the links with mass whose tensor is the unit matrix, or shared by links of different mass."""
+        masses = defaultdict(list)
+        for link in case.model.links:
+            if link.inertial is not None and (moment := _equal_moments(link.inertial)):
+                masses[moment].append(link.inertial.mass)
+        for link in case.model.links:
+            moment = None if link.inertial is None else _equal_moments(link.inertial)
+            if link.inertial is None or not moment:
+                continue
+            if moment == 1.0:
+                message = f"the inertia of {link.inertial.mass:.6g} kg is the unit matrix"
+            elif len(masses[moment]) >= _MIN_LINKS_ALIKE and len(set(masses[moment])) > 1:
+                message = (
+                    f"the inertia is {moment:.6g} kg m^2 about every axis, as on {len(masses[moment])} links "
+                    f"from {min(masses[moment]):.6g} to {max(masses[moment]):.6g} kg"
+                )
+            else:
+                continue
+            yield Detection(link.name, None, link.inertial.line, message)
+
+
+def _equal_moments(inertial: Inertial) -> float | None:
+    """Return the one moment of a diagonal tensor with three equal moments on a link with mass."""
+    off_diagonal = (inertial.ixy, inertial.ixz, inertial.iyz)
+    if inertial.mass == 0.0 or any(off_diagonal) or not inertial.ixx == inertial.iyy == inertial.izz:
+        return None
+    return inertial.ixx
+
+
+_MAX_MASS_RATIO = 1e6
+
+
+class MassRatioExtreme(Rule):
+    """DX505 mass-ratio-extreme: Two bodies that a joint connects differ in mass by a factor of a million or
+    more.
+
+    Links that fixed joints hold together count as one body; a body without mass is not reported here. A sum
+    in double precision carries 16 digits; where a joint connects bodies a million apart, six of them are lost
+    to the difference of scale. The worst case is a light body that carries a heavy one.
+
+    Affected are simulators that solve joints as constraints between free bodies (ODE in Gazebo, contacts in
+    Bullet and MuJoCo), which converge slowly or not at all while joints drift apart and oscillate. Forward
+    dynamics loses digits with every engine, since the condition number of the mass matrix is of the order of
+    the ratio. Inverse dynamics is not affected, and engines agree on it.
+
+    Usual causes: a mass in grams or tonnes beside others in kilograms, or ``mass value="1e-06"`` for a sensor
+    frame because an importer refused links without mass. Only the author of the file knows which, so no edit
+    removes the cause.
+    """
+
+    kind = "practice"
+    advice = "Attach frames without a body by fixed joints, and give every mass in kilograms."
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield moving joints between such bodies, with the head of the lighter rigid group."""
+        heads = {name: group.head for name, group in rigid_groups(case).items()}
+        mass = dict.fromkeys(heads.values(), 0.0)
+        for link in case.model.links:
+            mass[heads[link.name]] += 0.0 if link.inertial is None else link.inertial.mass
+        for joint in case.model.joints:
+            light, heavy = sorted((heads[joint.parent], heads[joint.child]), key=mass.__getitem__)
+            if mass[light] > 0.0 and mass[heavy] >= _MAX_MASS_RATIO * mass[light]:
+                message = (
+                    f"body {light} has {mass[light]:.3g} kg and its neighbour {heavy} {mass[heavy]:.3g} kg, "
+                    f"{mass[heavy] / mass[light]:.1g} times as much"
+                )
+                yield Detection(light, joint.name, case.model.link(light).line, message)
+
+
+_LEAST_DENSITY, _GREATEST_DENSITY = 1.0, 25_000.0
+"""Bounds of the density [kg/m^3]."""
+
+_THINNEST_SIDE = 0.01
+"""Least side of a box, as a share of its diagonal."""
+
+
+class DensityImplausible(Rule):
+    """DX517 density-implausible: A body is denser than any metal, or lighter than air, for the size of its
+    shape.
+
+    The mass of rigidly connected links is divided by the volume of the bounding box of their shapes. That box
+    is larger than the body, so the true density is higher still. Reported are more than 25,000 kg/m^3
+    (osmium, the densest metal, has 22,600) and less than 1 kg/m^3 (air has 1.2). For the upper bound each
+    side of the box counts as at least a hundredth of its diagonal, so that a thin plate is not reported for
+    its drawn thickness.
+
+    Of 1,032 such bodies in example-robot-data the median is 510 kg/m^3, 98 in 100 lie between 16 and 21,400,
+    the least is 2.6 (a drone with an arm), and only the finger knuckles of one hand are beyond a bound: 50 g
+    in cubes of 2 mm.
+
+    Usual causes: a mass in grams or tonnes; a shape in millimetres without ``scale="0.001 0.001 0.001"``; a
+    tiny placeholder for the shape; a mass that an exporter computed from a mesh in the wrong unit.
+
+    All engines use the numbers unchanged. A heavy finger dominates every torque of the arm that carries it.
+
+    The file does not say whether the mass or the shape is wrong, so no edit removes the cause.
+    """
+
+    kind = "practice"
+    advice = "Give the mass in kilograms and the shape in metres."
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the heaviest link of each body whose mass does not fit the size of its shapes."""
+        for group, extent in body_extents(case):
+            masses = {name: case.model.inertial(name).mass for name in group.links}
+            mass, heaviest = math.fsum(masses.values()), max(masses, key=lambda name: masses[name])
+            low, high = extent.box()
+            sides, least = (high - low).tolist(), _THINNEST_SIDE * extent.diagonal()
+            thick = math.prod(max(side, least) for side in sides)
+            volume = math.prod(sides)
+            if not (mass > _GREATEST_DENSITY * thick or mass < _LEAST_DENSITY * volume):
+                continue
+            density = mass / (thick if mass > _GREATEST_DENSITY * thick else volume)
+            size = " x ".join(f"{side:.2g}" for side in sides)
+            message = f"{mass:.3g} kg in a box of {size} m is {density:.2g} kg/m^3"
+            yield Detection(heaviest, None, case.model.inertial(heaviest).line, message)
+
+
+_MICROGRAM = 1e-9
+"""One microgram [kg]."""
+
+
+class MassNegligible(Rule):
+    """DX518 mass-negligible: A link has a mass below a microgram, which no part of a robot has.
+
+    A screw has a gram, a grain of sand a milligram. Masses such as 1e-10 or 1e-15 kg are written because an
+    importer refused a link without mass, or they are residues of a computation whose result is zero. The
+    lightest link of example-robot-data that is not zero has 1e-9 kg, exactly a microgram.
+
+    Engines accept such a mass down to a bound of their own: MuJoCo 4.0.0 refuses a moving body below 1e-15
+    kg. A joint that carries nothing else accelerates by millions of rad/s^2 under the smallest torque, so a
+    simulation with any step diverges, and forward dynamics loses digits.
+
+    What to do: write zero, and attach frames by fixed joints; or enter the mass of the part. The file does
+    not say which was meant, so no edit removes the cause. The mass that ``dynx doctor --fix`` gives to moving
+    links without mass (DX110), 2e-15 kg, is not reported.
+    """
+
+    kind = "practice"
+    advice = "Write zero and attach the frame by a fixed joint, or enter the mass of the part."
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the links with a mass between zero and a microgram."""
+        for name, inertial in case.inertials.items():
+            if inertial is not None and 0.0 < inertial.mass < _MICROGRAM and inertial.mass != 2.0 * MIN_MASS:
+                message = f"the mass is {inertial.mass:.3g} kg"
+                yield Detection(name, None, line_of(case, name, "mass"), message)
+
+
+_GREATEST_MASS_PER_CUBE = 1e7
+"""Largest mass per cube of the length [kg/m^3]."""
+
+_LEAST_SHARE, _LEAST_ROBOT = 0.02, 1e-3
+"""Least length that counts, as a share of the sum of all; least sum [m] of a robot that is examined."""
+
+
+class MassBeyondSize(Rule):
+    """DX519 mass-beyond-size: A body without shapes is far too heavy for the distances between its joints.
+
+    Where no shape tells the size of a body (no shapes, or meshes that are missing), the distances from its
+    frame to its centres of mass and to the joints that it carries do, or those of its neighbours if they are
+    larger; a fiftieth of the sum of such distances in the whole robot is the least that counts. Reported are
+    bodies of more than 1e7 kg per cube of that length. In example-robot-data no body has more than 2e4 (an
+    ankle of 0.6 kg between joints 3 cm apart): 500 times less.
+
+    Usual causes: a mass in grams; a tensor or a mass that an exporter computed from a mesh in millimetres,
+    which makes a finger of 56 g one of 56 tonnes; an extra digit.
+
+    All engines use the numbers unchanged. Torques of all joints before such a body are those of that body
+    alone, and inverse dynamics of one engine may refuse it (DX119). Bodies with shapes are in DX517.
+
+    The file does not contain the true mass, so no edit removes the cause.
+    """
+
+    kind = "practice"
+    advice = "Give the mass in kilograms."
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the heaviest link of each such body."""
+        lengths = _lengths_of_groups(case)
+        shaped = {group.head for group, _ in body_extents(case)}
+        for group in dict.fromkeys(rigid_groups(case).values()):
+            masses = {name: case.model.inertial(name).mass for name in group.links}
+            mass, heaviest = math.fsum(masses.values()), max(masses, key=lambda name: masses[name])
+            length = lengths.get(group.head, math.inf)
+            if group.head not in shaped and mass > _GREATEST_MASS_PER_CUBE * length**3:
+                message = f"the body has {mass:.3g} kg, and the joints around it are {length:.2g} m apart"
+                yield Detection(heaviest, None, case.model.inertial(heaviest).line, message)
+
+
+def _lengths_of_groups(case: Case) -> dict[str, float]:
+    """Return the length [m] that tells the size of each rigid group, by its head; none for a tiny robot."""
+    groups = rigid_groups(case)
+    points: dict[str, list[Floats]] = {group.head: [np.zeros(3)] for group in groups.values()}
+    for link in case.model.links:
+        if link.inertial is not None and link.inertial.mass > 0.0:
+            points[groups[link.name].head].append(_in_head(case, link.name, link.inertial.origin.xyz))
+    neighbours: dict[str, list[str]] = {head: [head] for head in points}
+    for joint in case.model.joints:
+        parent, child = groups[joint.parent].head, groups[joint.child].head
+        if parent != child:
+            points[parent].append(_in_head(case, joint.parent, joint.origin.xyz))
+            neighbours[parent].append(child)
+            neighbours[child].append(parent)
+    own = {head: _diameter(np.stack(found)) for head, found in points.items()}
+    robot = math.fsum(own.values())
+    if robot < _LEAST_ROBOT:
+        return {}
+    least = _LEAST_SHARE * robot
+    return {head: max(least, *(own[each] for each in near)) for head, near in neighbours.items()}
+
+
+def _in_head(case: Case, link: str, xyz: tuple[float, float, float]) -> Floats:
+    """Return a point given in the frame of a link in that of the head of its rigid group (3,)."""
+    R, p = rigid_groups(case)[link].poses[link]
+    return np.asarray(R @ np.array(xyz) + p, dtype=np.float64)
+
+
+def _diameter(points: Floats) -> float:
+    """Return the diagonal of the bounding box of points (n, 3)."""
+    return float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))

@@ -1,0 +1,280 @@
+"""Shapes of visuals and collisions, and the files of their meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from dynx.errors import DescriptionError
+from dynx.model.geometry.mesh_files import MeshNotFoundError, find_mesh, found_by_bullet
+from dynx.model.xml.source import Edit, SourceElement
+from dynx.rules import Case, Correction, Detection, EditingRule, Rule, correction, measured_on
+from dynx.rules.attributes import number_of, vector_of
+from dynx.rules.geometry import (
+    BULLET_ONLY,
+    GREY,
+    KNOWN,
+    geometry_elements,
+    has_shape,
+    lacks_file,
+    shapes_in,
+    visual_faults,
+    visual_textures,
+)
+from dynx.rules.numbers_in_text import decimal
+
+
+class UnknownCollisionShape(EditingRule):
+    """DX417 unknown-collision-shape: A collision has a shape that not every engine knows.
+
+    ``<plane>`` and ``<cdf>`` are PyBullet's extensions to URDF, whose shapes are box, sphere, cylinder and
+    mesh (and capsule in later versions).
+
+    - MuJoCo 4.0 refuses the file: "visual geometry specification not found", also for a collision.
+    - Pinocchio 4.1 drops the shape with a line on stderr; Drake 1.51 warns about it or ignores it.
+    - PyBullet 3.2.7 reads it.
+
+    The dynamics of a link that states its inertia does not depend on shapes; whether the file loads does.
+
+    What to do: write the shape as a box or a mesh where you need it in other engines. ``dynx doctor --fix``
+    removes the ``<collision>``. ``--choose DX417=keep`` keeps it, and MuJoCo refuses the file.
+    """
+
+    stage = "reading"
+    advice = "Write the shape as a box, sphere, cylinder or mesh."
+    engines = measured_on("mujoco")
+    choices = {
+        "remove": "remove collisions of a shape that not every engine knows",
+        "keep": "keep them; MuJoCo then refuses the file",
+    }
+    changed = "removed collisions of unknown shape"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield collisions whose first geometry contains such a shape and no other."""
+        for collision in case.elements("link", "collision"):
+            shapes = shapes_in(collision)
+            if BULLET_ONLY.intersection(shapes) and not KNOWN.intersection(shapes):
+                named = ", ".join(f"<{shape}>" for shape in shapes)
+                message = f"the geometry of <collision> is {named}"
+                yield correction(collision, message, case.source.removal(collision))
+
+
+class ShapeWithoutGeometry(EditingRule):
+    """DX424 shape-without-geometry: A visual or collision has no geometry, or one that no engine knows.
+
+    ``<collision/>``, ``<visual><geometry/></visual>`` or a ``<geometry>`` with an element of another format:
+    a template was not filled in, or an exporter had no shape.
+
+    - PyBullet 3.2.7 refuses the file ("Cannot load URDF file"), also for a visual.
+    - MuJoCo 4.0 refuses it for a collision ("geometry specification not found") and ignores the visual.
+    - Pinocchio 4.1 drops the shape with a line on stderr. Drake 1.51 warns about it or ignores it.
+
+    The dynamics of a link that states its inertia does not depend on shapes; whether the file loads does. The
+    shapes ``<plane>`` and ``<cdf>``, which PyBullet alone reads, are DX417.
+
+    What to do: remove the element, or give it a geometry. ``dynx doctor --fix`` removes it.
+    ``--choose DX424=keep`` keeps it, and engines refuse the file.
+    """
+
+    stage = "reading"
+    advice = "Remove the element, or give it a geometry."
+    engines = measured_on("pybullet", "mujoco")
+    choices = {
+        "remove": "remove visuals and collisions without a geometry that an engine knows",
+        "keep": "keep them; engines then refuse the file",
+    }
+    changed = "removed visuals and collisions without geometry"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield visuals and collisions of links without a known shape."""
+        for link in case.source.root.all("link"):
+            for shape in link.children:
+                if shape.tag in ("visual", "collision") and not has_shape(shape):
+                    found = ", ".join(f"<{tag}>" for tag in shapes_in(shape)) or "nothing"
+                    message = f"the geometry of <{shape.tag}> is {found}"
+                    yield correction(shape, message, case.source.removal(shape))
+
+
+_SIZES_OF_SHAPES: Mapping[str, tuple[str, ...]] = {
+    "box": ("size",),
+    "sphere": ("radius",),
+    "cylinder": ("radius", "length"),
+    "capsule": ("radius", "length"),
+}
+"""The attributes that every engine requires, by shape."""
+
+_KNOWN_SHAPES = (*_SIZES_OF_SHAPES, "mesh")
+
+_LEAST_SIZE = 1e-6
+"""Size [m] in place of zero: too small for anyone to see, and large beside the rounding of contacts."""
+
+
+class CollisionShapeWithoutSize(EditingRule):
+    """DX425 collision-shape-without-size: A size of a collision shape is zero, negative or missing, or a mesh
+    has no file.
+
+    Exporters and templates write ``<box size="0 0 0"/>``, ``<sphere radius="0"/>`` or ``<mesh filename=""/>``
+    for a link that has no shape, and a plate gets a thickness of zero.
+
+    - MuJoCo 4.0 refuses the file for any size that is not positive, of a box, sphere, cylinder or capsule
+      ("size 0 must be positive in geom"), and for a missing attribute ("required attribute missing"). Every
+      positive size will do, however small.
+    - PyBullet 3.2.7 reads sizes of zero and below; it refuses the file ("Cannot load URDF file") where the
+      attribute is missing.
+    - Both refuse a ``<mesh>`` without ``filename``, or with an empty one.
+    - Drake 1.51 reads shapes only into a scene graph. Then a size that is not positive, of a visual shape
+      too, raises ``SystemExit``, which ends the program; it accepts a sphere of radius zero.
+    - Pinocchio 4.1 reads no shapes into a model.
+
+    The dynamics of a link that states its inertia does not depend on shapes; whether the file loads does.
+
+    What to do: remove the shape, or give it its size. ``dynx doctor --fix`` removes the ``<collision>``.
+    ``--choose DX425=thicken`` writes 1e-6 m for each size of zero and positive sizes for negative ones
+    instead, which keeps the contacts of a plate (a shape of which a size or the file is missing is removed
+    all the same); ``--choose DX425=keep`` keeps the file, and MuJoCo refuses it.
+    """
+
+    stage = "reading"
+    advice = "Remove the shape, or give it its size or file."
+    engines = measured_on("mujoco", "pybullet")
+    choices = {
+        "remove": "remove collisions without size",
+        "thicken": "write 1e-6 m for sizes of zero; remove a collision only where a size is missing",
+        "keep": "keep them; engines that need a size then refuse the file",
+    }
+    changed = "removed collision shapes without size or file, or gave them a size"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield the collisions whose first known shape has such a size."""
+        for collision in case.elements("link", "collision"):
+            geometry = collision.first("geometry")
+            children = () if geometry is None else geometry.children
+            shape = next((each for each in children if each.tag in _KNOWN_SHAPES), None)
+            if shape is not None and (fault := _size_fault(shape)):
+                yield correction(shape, f"<{shape.tag}> {fault}", *self._edits(case, collision, shape))
+
+    def _edits(self, case: Case, collision: SourceElement, shape: SourceElement) -> tuple[Edit, ...]:
+        sizes = {name: _sizes_in(shape, name) for name in _SIZES_OF_SHAPES.get(shape.tag, ())}
+        if self.chosen(case) == "remove" or not sizes or None in sizes.values():
+            return (case.source.removal(collision),)
+        return tuple(
+            case.source.attribute_edit(
+                shape, name, " ".join(decimal(abs(each) or _LEAST_SIZE) for each in found)
+            )
+            for name, found in sizes.items()
+            if found is not None and min(found) <= 0.0
+        )
+
+
+def _size_fault(shape: SourceElement) -> str | None:
+    """Describe the fault of a shape's sizes; None also for text that is no number, which has other rules."""
+    if shape.tag == "mesh":
+        return "names no file" if lacks_file(shape) else None
+    for name in _SIZES_OF_SHAPES[shape.tag]:
+        if name not in shape.attributes:
+            return f"has no {name}"
+        found = _sizes_in(shape, name)
+        if found is not None and min(found) <= 0.0:
+            return f'has {name}="{shape.attributes[name]}"'
+    return None
+
+
+def _sizes_in(shape: SourceElement, name: str) -> tuple[float, ...] | None:
+    """Return the sizes [m] in an attribute; None where it is absent or holds anything but finite numbers."""
+    try:
+        if name == "size":
+            return vector_of(shape, name)
+        number = number_of(shape, name)
+    except DescriptionError:
+        return None
+    return None if number is None else (number,)
+
+
+class VisualIncomplete(EditingRule):
+    """DX428 visual-incomplete: A visual lacks a size, a mesh file, or the name or colour of its material.
+
+    Dynamics does not depend on visuals; whether the file loads does. Engines read the first shape and the
+    first material of each.
+
+    - PyBullet 3.2.7 refuses the file ("Cannot load URDF file") for a ``<box>`` without ``size``, a
+      ``<sphere>`` without ``radius``, a ``<cylinder>`` or ``<capsule>`` without ``radius`` or ``length``, a
+      ``<mesh>`` without ``filename`` or with an empty one, and a ``<material>`` without ``name``.
+    - MuJoCo 4.0 refuses it for a ``<color>`` whose ``rgba`` is missing or not four numbers ("attribute 'rgba'
+      does not have enough data"), and for a ``<material>`` with neither name nor colour.
+    - Pinocchio 4.1 and Drake 1.51 load the robot: they read no visuals into a model without geometry.
+
+    A collision without its size is DX425, a material directly in the robot DX427, a second material DX411.
+
+    What to do: write what is missing. ``dynx doctor --fix`` removes a visual whose shape is incomplete, and
+    gives a material a name or a grey colour. ``--choose DX428=keep`` keeps the file as it is, and engines
+    refuse it.
+    """
+
+    stage = "reading"
+    advice = "Write the size, the file, or the name and colour that the visual lacks."
+    engines = measured_on("pybullet", "mujoco")
+    choices = {
+        "complete": "remove visuals of an incomplete shape, and complete their materials",
+        "keep": "keep them; engines then refuse the file",
+    }
+    changed = "removed incomplete visuals, and completed the materials of visuals"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield the faults of each visual of a link."""
+        for visual in case.elements("link", "visual"):
+            faults = list(visual_faults(visual))
+            # A visual is removed once, whatever else is wrong in it.
+            whole = [each for each, _ in faults if each.tag not in ("material", "color")]
+            for element, message in faults:
+                edits = () if whole and element not in whole else (_completion(case, visual, element),)
+                yield correction(element, message, *edits)
+
+
+def _completion(case: Case, visual: SourceElement, element: SourceElement) -> Edit:
+    if element.tag == "material":
+        return case.source.attribute_edit(element, "name", f"visual_in_line_{visual.line}")
+    if element.tag == "color":
+        return case.source.replacement(element, GREY)
+    return case.source.removal(visual)
+
+
+class MeshNotFound(Rule):
+    """DX516 mesh-not-found: The file of a mesh, or of the texture of a visual, is not where the description
+    says.
+
+    Reported are files whose location is certain: a path relative to the description, a ``file://`` path, or a
+    file in a package that was found (in the folders above the description, in ROS_PACKAGE_PATH or
+    AMENT_PREFIX_PATH) but does not contain it. On a case-sensitive file system ``Base.STL`` is not
+    ``base.stl``. Paths that leave the package or repository of the description are not looked at.
+
+    PyBullet 3.2.7 refuses the whole file ("Cannot load URDF file") for a mesh in ``<visual>`` or in
+    ``<collision>``, and so does Drake 1.51 with a scene graph; MuJoCo 4.0 does for ``<collision>`` alone,
+    since it discards what is only visual. A texture in ``<visual>`` is missed by Drake with a scene graph
+    alone; one in a material of the robot is DX426. Pinocchio's ``buildModelFromUrdf`` reads no mesh, its
+    ``buildGeomFromUrdf`` raises. PyBullet takes every path, ``/meshes/a.stl`` too, as relative to the folder
+    of the description and to each folder above it, and searches folders of its own
+    (``setAdditionalSearchPath``), so it may find meshes that others do not; the message says which file it
+    finds in the package or repository. Dynamics does not depend on shapes, and dynx reads the file without
+    them.
+
+    The description does not say which file was meant, so no edit removes the cause; the message gives the
+    nearest name.
+    """
+
+    kind = "practice"
+    advice = "Put the file there, or correct the path, capitals included."
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the first reference to each missing file."""
+        seen = {""}
+        for name, link in case.links.items():
+            shapes = [each for each in geometry_elements(link) if each.tag == "mesh"]
+            for element in (*shapes, *visual_textures(link)):
+                filename = element.attributes.get("filename", "")
+                if filename in seen:
+                    continue
+                seen.add(filename)
+                try:
+                    find_mesh(filename, case.source.source)
+                except MeshNotFoundError as error:
+                    where = found_by_bullet(filename, case.source.source)
+                    yield Detection(name, None, element.line, f"{error}{where}")

@@ -1,0 +1,360 @@
+"""Types of joints, and how joints connect links."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from dynx.engines.pybullet.file_checks import MAX_JOINTS
+from dynx.errors import shown
+from dynx.model import Model
+from dynx.model.elements import Link
+from dynx.model.xml.quoting import quoteattr
+from dynx.model.xml.source import Edit
+from dynx.rules import Case, Correction, Detection, EditingRule, Remedy, Rule, correction, measured_on
+from dynx.rules.case import end_of
+from dynx.rules.joints import TYPES, fresh_name, joint_split, joints_of_type, specifies_base
+
+
+class JointOfSeveralFreedoms(EditingRule):
+    """DX210 joint-of-several-freedoms: A joint is spherical, planar or floating.
+
+    URDF knows ``planar`` and ``floating``; ``spherical`` and ``ball`` are extensions. No other feature is
+    read in so many different ways:
+
+    - ``spherical``: Pinocchio 4.1 and Drake 1.51 refuse the file. PyBullet 3.2.7 reads it; mass matrix and
+      inverse dynamics then have other coordinates than the joint states or fail. MuJoCo 4.0 reads it with
+      quaternions, and refuses the usual limits on it. No engine reads ``ball``.
+    - ``planar``: Pinocchio has (x, y, cos, sin), MuJoCo and Drake three joints or coordinates; PyBullet moves
+      it but cannot do dynamics.
+    - ``floating`` in the middle of a tree: Pinocchio has a quaternion; PyBullet makes the joint FIXED and
+      prints one line on stdout; MuJoCo and Drake refuse it or leave the link free in the world.
+
+    dynx has no such joint and refuses the file.
+
+    What to do: write joints of one degree of freedom each, with massless links between them.
+    ``dynx doctor --fix`` does so: three rotations for a spherical joint, two translations and a rotation for
+    a planar one, three of each for a floating one. The chain has the same motion; its coordinates are angles,
+    singular where the middle angle is 90 degrees, and limits of the joint are dropped. MuJoCo refuses
+    massless links that move (DX110), so the links in between weigh 2e-15 kg. ``--choose DX210=fixed`` makes
+    the joint fixed instead.
+    """
+
+    stage = "reading"
+    advice = "Write joints of one degree of freedom each, with massless links between them."
+    engines = measured_on("pinocchio", "pybullet", "drake")
+    choices = {
+        "split": "split a joint of several degrees of freedom into joints of one, without its limits",
+        "fixed": "make a joint of several degrees of freedom fixed",
+    }
+    changed = "replaced joints of several degrees of freedom"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield such joints, except a floating one below an empty root (DX211)."""
+        for joint in joints_of_type(case, TYPES):
+            kind = joint.attributes["type"]
+            if not joint.attributes.get("name") or (kind == "floating" and specifies_base(case, joint)):
+                continue
+            if self.chosen(case) == "fixed":
+                edits: tuple[Edit, ...] = (case.source.attribute_edit(joint, "type", "fixed"),)
+            else:
+                edits = tuple(joint_split(case.source, joint))
+            yield correction(joint, f"the joint is {kind}", *edits)
+
+
+class FloatingJointAtRoot(EditingRule):
+    """DX211 floating-joint-at-root: A floating joint below an empty root specifies a floating base in the
+    file.
+
+    Some files describe a floating robot in this way: a link ``world`` without inertia, a joint of type
+    ``floating``, and the robot below it. The base is then specified twice, in the file and in the call that
+    loads it.
+
+    - PyBullet 3.2.7 makes the joint fixed, and prints one line on stdout. Then ``useFixedBase`` decides.
+    - Pinocchio 4.1 gives the joint seven coordinates; ``JointModelFreeFlyer`` as a root joint gives seven
+      more. The other joints are right as long as the seven are held.
+    - MuJoCo 4.0 makes it a free joint whatever is below.
+    - Drake 1.51 does not know the type; it leaves the child free in the world and its quaternion at zero.
+
+    dynx reads the joint as fixed and leaves the decision to ``base=``.
+
+    What to do: specify the base in one place. ``dynx doctor --fix`` makes the joint fixed.
+    """
+
+    # Before the rules about inertia, which may give the empty root a body.
+    stage = "reading"
+    advice = "Make the joint fixed, and specify in the loading call whether the base floats."
+    engines = measured_on("mujoco", "drake")
+    changed = "made the floating joint below the root fixed: the loading call says whether the base floats"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield the joint, of which there is at most one."""
+        for joint in joints_of_type(case, ("floating",)):
+            if specifies_base(case, joint):
+                edit = case.source.attribute_edit(joint, "type", "fixed")
+                yield correction(joint, "the joint below the root is floating", edit)
+
+
+class TooManyJoints(Rule):
+    """DX212 too-many-joints: The robot has more joints than PyBullet supports.
+
+    PyBullet 3.2.7 has room for 127 joints, and counts fixed ones. From the 128th on ``getJointState`` and
+    ``getLinkState`` fail, so there are no positions; above 128 coordinates ``calculateInverseDynamics``,
+    ``calculateMassMatrix`` and ``calculateJacobian`` return wrong results without a warning (20 % at 129).
+    Hands with sensors and robots with many named frames exceed this: ``tiago_dual`` of example-robot-data has
+    129 joints.
+
+    Pinocchio 4.1, MuJoCo 4.0 and Drake 1.51 have no such limit.
+
+    What to do: drop frames that PyBullet does not need. ``dynx doctor --fix`` removes links that have no
+    mass, nothing attached to them and a fixed joint: that is, frames. It removes as few as are needed, those
+    without shapes and at the end of the file first. The dynamics is unchanged; programs that use these frames
+    need the original file. ``--choose DX212=keep`` keeps them, and PyBullet cannot load the robot. Where
+    there are not enough of them, or too many joints move, there is no remedy.
+    """
+
+    advice = "Drop links that are mere frames from the file for PyBullet."
+    engines = measured_on("pybullet")
+    choices = {
+        "drop": "remove frames without mass at the ends of the robot until 127 joints are left",
+        "keep": "keep all links; PyBullet then cannot load the robot",
+    }
+
+    def occurrences(self, case: Case) -> Iterable[Detection]:
+        """Yield the first joint too many, in document order."""
+        joints = case.source.root.all("joint")
+        if len(joints) <= MAX_JOINTS:
+            return []
+        message = f"the robot has {len(joints)} joints, fixed ones included; PyBullet accepts {MAX_JOINTS}"
+        return [Detection(None, None, joints[MAX_JOINTS].line, message)]
+
+    def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy | None:
+        """Remove as many links without mass as there are joints too many."""
+        excess = len(case.joints) - MAX_JOINTS
+        if self.chosen(case) == "keep" or excess <= 0:
+            return None
+        dropped = _removable_frames(case)[:excess]
+        if len(dropped) < excess:
+            return None
+        source, carriers = case.source, {joint.child: joint.name for joint in case.model.joints}
+        edits = []
+        for name in dropped:
+            edits += [source.removal(case.links[name]), source.removal(case.joints[carriers[name]])]
+        return Remedy(
+            case.with_source(source.apply(*edits)),
+            f"removed {len(dropped)} links that are mere frames",
+            self.decision(case),
+        )
+
+
+def _removable_frames(case: Case) -> list[str]:
+    """List the links that can be removed, each before its parent: those without shapes first, the last of the
+    document before others."""
+    plain: list[str] = []
+    shaped: list[str] = []
+    for name in _massless_ends(case.model):
+        shapes = case.links[name].all("visual") + case.links[name].all("collision")
+        (shaped if shapes else plain).append(name)
+    return plain + shaped
+
+
+def _massless_ends(model: Model) -> Iterator[str]:
+    attached = dict.fromkeys((link.name for link in model.links), 0)
+    for joint in model.joints:
+        attached[joint.parent] += 1
+    links = {link.name: link for link in model.links}
+    # Depth-first order lists a link before what hangs on it, so backwards the ends come first.
+    for joint in reversed(model.joints):
+        if joint.type == "fixed" and not attached[joint.child] and not _has_inertia(links[joint.child]):
+            attached[joint.parent] -= 1
+            yield joint.child
+
+
+def _has_inertia(link: Link) -> bool:
+    inertial = link.inertial
+    return inertial is not None and (inertial.mass != 0.0 or bool(inertial.tensor.any()))
+
+
+class LoopJoint(EditingRule):
+    """DX220 loop-joint: A ``<loop_joint>`` closes a kinematic loop, which URDF cannot express.
+
+    ``<loop_joint>`` is an extension of a few programs, such as Isaac Sim and the predecessor of Drake's
+    ``MultibodyPlant``: it names two links (``<link1>``, ``<link2>``) that are held together although a robot
+    in URDF is a tree.
+
+    - Drake 1.51 refuses the file: "loop joints are not supported in MultibodyPlant".
+    - Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 ignore it without a warning and load the open tree. So does
+      dynx, with a note.
+
+    What to do: close the loop in the program, by the constraint that your engine has (``createConstraint`` in
+    PyBullet, ``<equality>`` in MJCF, a ball or weld constraint in Drake and Pinocchio). ``dynx doctor --fix``
+    removes the element, which leaves the tree that three engines load. ``--choose DX220=keep`` keeps it for
+    the programs that read it, and Drake refuses the file.
+    """
+
+    stage = "reading"
+    advice = "Remove the <loop_joint> and close the loop in the program."
+    engines = measured_on("drake")
+    choices = {
+        "remove": "remove loop joints, which leaves the tree",
+        "keep": "keep loop joints; Drake then refuses the file",
+    }
+    changed = "removed loop joints"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield every such element of the robot."""
+        for loop in case.source.root.all("loop_joint"):
+            name = shown(loop.attributes.get("name", ""))
+            message = f"<loop_joint> {name} closes a loop, which no engine reads"
+            yield correction(loop, message, case.source.removal(loop))
+
+
+_WORLD = "world"
+
+
+class WorldNotDeclared(EditingRule):
+    """DX221 world-not-declared: A joint has the parent ``world``, which is not a link of the file.
+
+    In Drake a link named ``world`` is the world itself and need not be declared, so a file written for Drake
+    fixes its first link by ``<parent link="world"/>`` alone. In URDF every parent is a link of the file.
+
+    - Drake 1.51 reads the file, and attaches the joint to its world.
+    - Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 refuse it: no link has that name. So does dynx.
+
+    What to do: declare ``<link name="world"/>``. ``dynx doctor --fix`` does so, at the beginning of the
+    robot. All engines then read the robot that Drake reads: a root of this name on a fixed base is harmless
+    in all of them. Load such a robot with the fixed base; on a floating one the world would float, see DX109.
+    """
+
+    stage = "reading"
+    advice = 'Declare <link name="world"/>.'
+    engines = measured_on("pinocchio", "pybullet", "mujoco")
+    changed = "declared the link world"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield the first joint on the world, where the world is not declared."""
+        if _WORLD in case.links:
+            return
+        for joint in case.source.root.all("joint"):
+            if end_of(joint, "parent") == _WORLD:
+                root = case.source.root
+                edit = case.source.insertion(root, f'<link name="{_WORLD}"/>', first=True)
+                message = "the parent of the joint is world, which the file does not declare as a link"
+                yield correction(joint, message, edit)
+                return
+
+
+class SeveralRootLinks(EditingRule):
+    """DX223 several-root-links: A link is the child of no joint, and is not the root of the robot.
+
+    A robot in URDF is one tree. A link whose joint was forgotten or commented out, or a table that was added
+    to the file, is a second tree beside it.
+
+    - Pinocchio 4.1 refuses the file ("two root links found"). PyBullet 3.2.7 ends the process with a crash.
+    - MuJoCo 4.0 fixes every such link to its world, at the origin.
+    - Drake 1.51 reads each tree as a body of its own: in the call that fixes the root, the others float.
+
+    dynx refuses the file: it reads one robot.
+
+    What to do: add the joint, or write two files. The file does not say where the link belongs, so
+    ``dynx doctor --fix`` attaches it to the root by a fixed joint without offset, as MuJoCo does.
+    ``--choose DX223=remove`` removes the smaller trees instead. The root is that of the tree with the most
+    links, of the first one where that leaves a choice.
+    """
+
+    stage = "reading"
+    advice = "Add the joint that is missing, or write a file for each tree."
+    engines = measured_on("pinocchio", "pybullet", "drake")
+    choices = {
+        "attach": "attach a link without joint to the root by a fixed joint, at its origin",
+        "remove": "remove the trees that are not attached to the root",
+    }
+    changed = "attached links without joint to the root, or removed them"
+    changes_physics = True
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield the roots but that of the largest tree."""
+        trees = _links_by_root(case)
+        if len(trees) < 2:
+            return
+        main = max(trees, key=lambda root: len(trees[root]))
+        taken = set(case.joints)
+        for root, links in trees.items():
+            if root == main:
+                continue
+            edits = list(self._edits(case, root, links, main, taken))
+            message = f"the link has no parent joint, and the root of the robot is {shown(main)}"
+            yield correction(case.links[root], message, *edits)
+
+    def _edits(self, case: Case, root: str, links: list[str], main: str, taken: set[str]) -> Iterable[Edit]:
+        source = case.source
+        if self.chosen(case) == "remove":
+            yield from (source.removal(case.links[link]) for link in links)
+            for joint in source.root.all("joint"):
+                if end_of(joint, "child") in links:
+                    yield source.removal(joint)
+            return
+        name = fresh_name(f"{root}_joint", taken)
+        taken.add(name)
+        lines = [
+            f'<joint name={quoteattr(name)} type="fixed">',
+            f"{source.unit}<parent link={quoteattr(main)}/>",
+            f"{source.unit}<child link={quoteattr(root)}/>",
+            "</joint>",
+        ]
+        yield source.insertion_after(case.links[root], "\n".join(lines))
+
+
+def _links_by_root(case: Case) -> dict[str, list[str]]:
+    """Return the links below each root, itself included; empty where the parts form no trees."""
+    joints = case.source.root.all("joint")
+    ends = [(end_of(joint, "parent"), end_of(joint, "child")) for joint in joints]
+    children = [child for _, child in ends]
+    if len(set(children)) < len(children) or any(end not in case.links for each in ends for end in each):
+        return {}
+    below: dict[str, list[str]] = {}
+    for parent, child in ends:
+        below.setdefault(parent, []).append(child)
+    trees: dict[str, list[str]] = {}
+    for root in case.links:
+        if root not in set(children):
+            links = [root]
+            for link in links:
+                links += below.get(link, [])
+            trees[root] = links
+    return trees
+
+
+_JOINT_TAG = "drake:joint"
+
+
+class JointOfDrake(EditingRule):
+    """DX227 joint-of-drake: A <drake:joint> joins two links in one engine and is not there in the others.
+
+    Drake has joints that URDF lacks: ball, universal, planar, screw and curvilinear ones. A file states them
+    in elements of their own, ``<drake:joint name="..." type="ball">``, with the children of a ``<joint>``.
+
+    - Drake 1.51.1 adds the joint.
+    - Pinocchio 4.1, PyBullet 3.2.7 and MuJoCo 4.0 skip the element. So does dynx, with a note. The child is
+      then the root of a tree of its own (DX223), unless another joint carries it; Drake refuses the file in
+      that case ("form one or more loops").
+
+    What to do: write joints that URDF has, in a chain with small links between them (see DX210), or use the
+    file with Drake alone. No chain is a screw, so ``dynx doctor --fix`` removes the element, and DX223 then
+    attaches the child. ``--choose DX227=keep`` keeps it, and Drake loads another robot than the rest.
+    """
+
+    stage = "reading"
+    advice = "Write joints that URDF has, or use the file with Drake alone."
+    engines = measured_on("drake")
+    choices = {
+        "remove": "remove joints that only Drake reads",
+        "keep": "keep such joints; Drake then loads another robot",
+    }
+    changed = "removed joints that only Drake reads"
+
+    def corrections(self, case: Case) -> Iterable[Correction]:
+        """Yield every such element of the robot."""
+        for joint in case.source.root.all(_JOINT_TAG):
+            kind, name = (shown(joint.attributes.get(key, "")) for key in ("type", "name"))
+            message = f"<{_JOINT_TAG}> {name} of type {kind} is a joint in Drake alone"
+            yield correction(joint, message, case.source.removal(joint))
