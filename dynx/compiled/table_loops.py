@@ -497,6 +497,9 @@ class TableLoops(Loops):
             for k, body in enumerate(self._bodies)
         ]
 
+    def combined(self, kind: Step, *columns: Any) -> Sequence[Any]:
+        return [self._result(kind, self._values(columns, k), False) for k in range(len(self._bodies))]
+
     def _result(self, step: Step, operands: Sequence[Operand], stored: bool) -> Any:
         if stored:
             return self._call(step, operands, None)[0]

@@ -167,7 +167,8 @@ class Composite:
 
 
 def _matrix(loops: Loops, placements: Sequence[Placement], v: Array) -> Array:
-    omegas, steps = loops.outward(_step_to_child, loops.root(_root_omega, v), placements, v)
+    omegas, velocities = loops.outward(_step_to_child, loops.root(_root_omega, v), placements, v)
+    steps = loops.combined(ToParent, placements, velocities)
     rigid = [loops.root(_root_composite, omegas[0]), *loops.each(_rigid_composite, omegas)]
     composites = loops.subtrees(_add_composite, rigid, steps)
     base = loops.root(_base_subspace, omegas[0], stored=False)
@@ -191,16 +192,16 @@ def _root_omega(mechanism: Mechanism, v: Array) -> Array:
     return v[..., 3:6] if mechanism.floating else 0 * mechanism.gravity
 
 
-def _step_to_child(body: Body, omega: Array, placement: Placement, speed: Array) -> tuple[Array, ToParent]:
-    """Return the angular velocity of a body in its own axes, and its transform to the parent, from the
-    angular velocity `omega` of the parent and the speed (...,) of the joint."""
+def _step_to_child(body: Body, omega: Array, placement: Placement, speed: Array) -> tuple[Array, Array]:
+    """Return the angular velocity of a body in its own axes, and the velocity of its origin in the parent,
+    from the angular velocity `omega` of the parent and the speed (...,) of the joint."""
     R = placement.R
     own = body.axis * append_axis(speed)
     dp = cross(omega, placement.p)
     rotated = rotate_back(R, omega)
     if body.revolute:
-        return rotated + own, ToParent(placement, dp)
-    return rotated, ToParent(placement, dp + rotate(R, own))
+        return rotated + own, dp
+    return rotated, dp + rotate(R, own)
 
 
 def _root_composite(mechanism: Mechanism, omega: Array) -> Composite:

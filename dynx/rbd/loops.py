@@ -49,6 +49,10 @@ class Loops(ABC):
         """Return ``step(body, *values)`` of every body; `stored` as in `root`."""
 
     @abstractmethod
+    def combined(self, kind: Callable[..., Result], *columns: Any) -> Sequence[Result]:
+        """Return ``kind(*values)`` of every body, which compiled loops do not store a second time."""
+
+    @abstractmethod
     def outward(
         self, step: Callable[..., tuple[State, Result]], root: State, *columns: Any
     ) -> tuple[Sequence[State], Sequence[Result]]:
@@ -155,6 +159,9 @@ class PythonLoops(Loops):
             step(body, *values)
             for body, values in zip(self.mechanism.bodies, self._rows(columns), strict=True)
         ]
+
+    def combined(self, kind: Callable[..., Result], *columns: Any) -> Sequence[Result]:
+        return [kind(*values) for values in self._rows(columns)]
 
     def outward(
         self, step: Callable[..., tuple[State, Result]], root: State, *columns: Any
