@@ -6,7 +6,6 @@ are torques from `dynx.sim.plants.disturbances`, so that they are the same in ev
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
 from typing import ClassVar
 
@@ -36,9 +35,9 @@ Mask = NDArray[np.bool_]
 class BulletPlant(Plant):
     """One robot in its own Bullet world, stepped by Bullet.
 
-    Bullet's stepper has no mimic joints, no armature, and no joint friction that is exact in each step. With
-    them the acceleration is solved from mass matrix and bias, and the stepper applies the torque that causes
-    it: a torque of friction from dynx's own matrices, all else from Bullet's.
+    Bullet has no armature, and no joint friction that is exact in each step. With them the acceleration is
+    solved from mass matrix and bias, and the stepper applies the torque that causes it: a torque of friction
+    from dynx's own matrices, that of armature from Bullet's.
     """
 
     motor_commands: ClassVar[tuple[type, ...]] = (BulletMotorCommand,)
@@ -55,31 +54,16 @@ class BulletPlant(Plant):
             )
         self._floating = model.floating
         self._base_nq, self._base_nv = (7, 6) if model.floating else (0, 0)
-        self._coupling = model.mechanism.coupling
-        self._S = np.eye(0) if self._coupling is None else self._coupling.matrix()
-        self._owners = np.flatnonzero([joint.mimic is None for joint in model.joints if joint.moves])
-        self._solves = self._coupling is not None or disturbances.has_armature
+        self._coupled = model.mechanism.coupling is not None
         self._sticks = disturbances.sticks
         settings = {name: setting.default for name, setting in BulletStepper.settings.items()}
-        self._stepper = BulletStepper(_scene_of_one(self._tree_model), self._h, settings)
+        self._stepper = BulletStepper(_scene_of_one(model), self._h, settings)
         self._robot = self._stepper.robots[0]
-
-    @cached_property
-    def _tree_model(self) -> Model:
-        """The robot with its mimic joints free, as in Bullet's stepper."""
-        if self._coupling is None:
-            return self.model
-        return replace(self.model, joints=tuple(replace(joint, mimic=None) for joint in self.model.joints))
 
     @cached_property
     def _engine(self) -> PyBulletBackend:
         """The backend for bias and mass matrix, made at first use because it opens a client of its own."""
         return PyBulletBackend(self.model, validate=False)
-
-    @cached_property
-    def _tree(self) -> PyBulletBackend:
-        """The backend of the robot with its mimic joints free."""
-        return PyBulletBackend(self._tree_model, validate=False)
 
     @cached_property
     def _friction(self) -> FrictionSolver:
@@ -96,7 +80,7 @@ class BulletPlant(Plant):
 
     def reset(self, q: Floats, v: Floats) -> None:
         self._q, self._v = q, v
-        self._place()
+        self._robot.set_state(q, v)
 
     def step(self, t: float, tau: Floats) -> StepResult:
         first = self._substep(t, tau)
@@ -131,9 +115,8 @@ class BulletPlant(Plant):
 
     def close(self) -> None:
         self._stepper.close()
-        for made in ("_engine", "_tree"):
-            if made in self.__dict__:
-                self.__dict__[made].close()
+        if "_engine" in self.__dict__:
+            self._engine.close()
         if "_dynamics" in self.__dict__:
             self._dynamics.backend.close()
 
@@ -144,12 +127,11 @@ class BulletPlant(Plant):
         if self._sticks:
             if self.disturbances.has_torque:
                 tau = tau + self.disturbances.torque(self._engine, t, q, v)
-            a, moves = self._friction.step(*self._dynamics.mass_matrix_and_bias(q, v), tau, v)
+            _, moves = self._friction.step(*self._dynamics.mass_matrix_and_bias(q, v), tau, v)
             # The torque that Bullet's own dynamics need for this acceleration.
-            solved = self._coupling is not None
-            tau = self._tree_torque(q, v, a) if solved else self._friction.net_torque
-        elif self._solves:
-            tau = self._tree_torque(q, v, self._accelerate(q, v, tau, t))
+            tau = self._friction.net_torque
+        elif self.disturbances.has_armature:
+            tau = self._engine.inverse_dynamics(q, v, self._accelerate(q, v, tau, t))
         elif self.disturbances.has_torque:
             tau = tau + self.disturbances.torque(self._engine, t, q, v)
         return self._advance(Forces([(0, tau)]), moves)
@@ -163,16 +145,8 @@ class BulletPlant(Plant):
                 disturbance = disturbance - self.disturbances.friction(self._v)
         return self._advance(Forces([(0, disturbance)], commands={0: command})), disturbance
 
-    def _tree_torque(self, q: Floats, v: Floats, a: Floats) -> Floats:
-        """Return the torque of every joint of the tree, mimic joints too, that gives acceleration `a`."""
-        coupling = self._coupling
-        if coupling is None:
-            return self._engine.inverse_dynamics(q, v, a)
-        S = self._S
-        return self._tree.inverse_dynamics(coupling.expand_q(q), S @ v, S @ a)
-
     def _advance(self, forces: Forces, moves: Floats | None = None) -> Floats:
-        """Take one step under forces on the tree and read the state; return the acceleration (nv,).
+        """Take one step under forces and read the state; return the acceleration (nv,).
 
         Joints where `moves` is 0 stick: what rounding moved them is undone.
         """
@@ -180,9 +154,9 @@ class BulletPlant(Plant):
         sticking = None
         if moves is not None and 0.0 in moves.tolist():
             sticking = moves[self._base_nv :] == 0.0
+        before = self._robot.placed
         self._stepper.step(1, forces)
         joints, rates = self._joints(sticking)
-        before = self._robot.placed
         if before is None:
             self._read(joints, rates, sticking)
             return (rates - v) / h
@@ -204,10 +178,7 @@ class BulletPlant(Plant):
 
     def _joints(self, sticking: Mask | None) -> tuple[Floats, Floats]:
         """Return the positions and rates of the joints that own a coordinate."""
-        angles, speeds = self._robot.object.joint_states()
-        positions, rates = np.array(angles), np.array(speeds)
-        if self._coupling is not None:
-            positions, rates = positions[self._owners], rates[self._owners]
+        positions, rates = self._robot.joint_state()
         if sticking is not None:
             np.copyto(positions, self._q[self._base_nq :], where=sticking)
             np.copyto(rates, 0.0, where=sticking)
@@ -217,17 +188,11 @@ class BulletPlant(Plant):
         self._q, self._v = q, v
         # Bullet is set to the reported state, rounding of the conversion included, so that a rollout resumed
         # from its record continues bit for bit.
-        if self._floating or self._coupling is not None:
-            self._place()
+        if self._floating or (self._coupled and sticking is not None):
+            self._robot.set_state(q, v)
         elif sticking is not None:
             joints = np.flatnonzero(sticking)
             self._robot.object.place_joints(q[joints].tolist(), [0.0] * len(joints), joints.tolist())
-
-    def _place(self) -> None:
-        q, v = self._q, self._v
-        if self._coupling is not None:
-            q, v = self._coupling.expand_q(q), self._S @ v
-        self._robot.set_state(q, v)
 
 
 def _scene_of_one(model: Model) -> Layout:
