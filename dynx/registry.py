@@ -12,6 +12,7 @@ lies in a room above its class (`door`).
 from __future__ import annotations
 
 import inspect
+import sys
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
@@ -57,14 +58,23 @@ class _Door:
         return body.__get__(instance, owner)
 
 
-def moved_names(package: str, moved: Mapping[str, str]) -> Callable[[str], Any]:
-    """Return the ``__getattr__`` of a package whose public names have moved.
+def moved_names(
+    package: str, moved: Mapping[str, str], home: Mapping[str, str] | None = None
+) -> Callable[[str], Any]:
+    """Return the ``__getattr__`` of a package whose public names have moved, or are imported on use.
 
-    It raises ImportError, whose text also reaches the user of ``from package import name``, for a name of
-    `moved`, and AttributeError for any other name.
+    `home` has the module of each name, as ``"package.module"`` or ``"package.module:other_name"``: the first
+    look-up imports it. For a name of `moved` ImportError is raised, whose text also reaches the
+    user of ``from package import name``, and AttributeError for any other name.
     """
+    homes = home or {}
 
     def getattr_of_package(name: str) -> Any:
+        if name in homes:
+            module, _, other = homes[name].partition(":")
+            found = getattr(import_module(module), other or name)
+            setattr(sys.modules[package], name, found)
+            return found
         if name in moved:
             raise ImportError(f"{package}.{name} is now {moved[name]}", name=package)
         raise AttributeError(f"module {package!r} has no attribute {name!r}")

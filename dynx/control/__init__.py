@@ -1,34 +1,39 @@
-"""Controllers, one per file: frozen dataclasses that compute torques from measurement, setpoint, state."""
+"""Controllers, one per file: frozen dataclasses that compute torques from measurement, setpoint, state.
+
+Each name is imported when it is first used.
+"""
 
 from typing import TYPE_CHECKING
 
-from dynx.control.base import Controller, Measurement, ModelBased, model_dynamics
-from dynx.control.bullet import (
-    BulletMotor,
-    BulletPDMotor,
-    BulletPositionMotor,
-    BulletTorqueMotor,
-    BulletVelocityMotor,
-)
-from dynx.control.computed_torque import ComputedTorque
-from dynx.control.discrete_computed_torque import DiscreteComputedTorque
-from dynx.control.feed_forward import FeedForward
-from dynx.control.friction import JointFriction
-from dynx.control.friction_compensation import FrictionCompensation
-from dynx.control.gravity_compensation import GravityCompensatedPD
-from dynx.control.impedance import Impedance
-from dynx.control.motors_and_encoders import Encoders, MotorLag
-from dynx.control.open_loop import OpenLoop
-from dynx.control.operational_space import OperationalSpace
-from dynx.control.pd import PD
-from dynx.control.pid import PID
-from dynx.control.registry import from_document as controller_from_document
-from dynx.control.registry import register as register_controller
-from dynx.control.registry import to_document as controller_to_document
-from dynx.control.registry import unregister as unregister_controller
-from dynx.control.saturation import Saturated
-from dynx.control.velocity import Velocity
 from dynx.registry import moved_names
+
+if TYPE_CHECKING:
+    from dynx.control.base import Controller, Measurement, ModelBased, model_dynamics
+    from dynx.control.bullet import (
+        BulletMotor,
+        BulletPDMotor,
+        BulletPositionMotor,
+        BulletTorqueMotor,
+        BulletVelocityMotor,
+    )
+    from dynx.control.computed_torque import ComputedTorque
+    from dynx.control.discrete_computed_torque import DiscreteComputedTorque
+    from dynx.control.feed_forward import FeedForward
+    from dynx.control.friction import JointFriction
+    from dynx.control.friction_compensation import FrictionCompensation
+    from dynx.control.gravity_compensation import GravityCompensatedPD
+    from dynx.control.impedance import Impedance
+    from dynx.control.motors_and_encoders import Encoders, MotorLag
+    from dynx.control.open_loop import OpenLoop
+    from dynx.control.operational_space import OperationalSpace
+    from dynx.control.pd import PD
+    from dynx.control.pid import PID
+    from dynx.control.registry import from_document as controller_from_document
+    from dynx.control.registry import register as register_controller
+    from dynx.control.registry import to_document as controller_to_document
+    from dynx.control.registry import unregister as unregister_controller
+    from dynx.control.saturation import Saturated
+    from dynx.control.velocity import Velocity
 
 __all__ = [
     "PD",
@@ -61,14 +66,48 @@ __all__ = [
     "unregister_controller",
 ]
 
+_HOME = {
+    "BulletMotor": "dynx.control.bullet",
+    "BulletPDMotor": "dynx.control.bullet",
+    "BulletPositionMotor": "dynx.control.bullet",
+    "BulletTorqueMotor": "dynx.control.bullet",
+    "BulletVelocityMotor": "dynx.control.bullet",
+    "ComputedTorque": "dynx.control.computed_torque",
+    "Controller": "dynx.control.base",
+    "DiscreteComputedTorque": "dynx.control.discrete_computed_torque",
+    "Encoders": "dynx.control.motors_and_encoders",
+    "FeedForward": "dynx.control.feed_forward",
+    "FrictionCompensation": "dynx.control.friction_compensation",
+    "GravityCompensatedPD": "dynx.control.gravity_compensation",
+    "Impedance": "dynx.control.impedance",
+    "JointFriction": "dynx.control.friction",
+    "Measurement": "dynx.control.base",
+    "ModelBased": "dynx.control.base",
+    "MotorLag": "dynx.control.motors_and_encoders",
+    "OpenLoop": "dynx.control.open_loop",
+    "OperationalSpace": "dynx.control.operational_space",
+    "PD": "dynx.control.pd",
+    "PID": "dynx.control.pid",
+    "Saturated": "dynx.control.saturation",
+    "Velocity": "dynx.control.velocity",
+    "controller_from_document": "dynx.control.registry:from_document",
+    "controller_to_document": "dynx.control.registry:to_document",
+    "model_dynamics": "dynx.control.base",
+    "register_controller": "dynx.control.registry:register",
+    "unregister_controller": "dynx.control.registry:unregister",
+}
+
+# Hidden from type checkers, which would take any name for an attribute: they know the imports above.
 if not TYPE_CHECKING:
-    __getattr__ = moved_names(
-        "dynx.control",
-        {
-            "EngineMotor": "dynx.control.BulletMotor",
-            **{
-                name: f"dynx.control.Bullet{name} (the motor of any engine is dynx.world.{name})"
-                for name in ("PDMotor", "PositionMotor", "TorqueMotor", "VelocityMotor")
-            },
+    _MOVED = {
+        "EngineMotor": "dynx.control.BulletMotor",
+        **{
+            name: f"dynx.control.Bullet{name} (the motor of any engine is dynx.world.{name})"
+            for name in ("PDMotor", "PositionMotor", "TorqueMotor", "VelocityMotor")
         },
-    )
+    }
+    __getattr__ = moved_names(__name__, _MOVED, _HOME)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

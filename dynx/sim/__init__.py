@@ -5,8 +5,7 @@ Each name is imported when it is first used: the options of a simulation are rea
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dynx.registry import moved_names
 
@@ -26,25 +25,25 @@ if TYPE_CHECKING:
     from dynx.sim.simulation import Simulation, SimulationState
 
 _HOME = {
-    "BatchInterrupted": "batch",
-    "BatchRollouts": "batch_rollouts",
-    "Noise": "loop.noise",
-    "Payload": "plants.model_error",
-    "Plant": "plants.plant",
-    "Rollout": "record.rollout",
-    "RolloutComparison": "comparison.comparison",
-    "RolloutInterrupted": "one_rollout",
-    "Scenario": "scenario.scenario",
-    "ScenePlant": "plants.scene_plant",
-    "Simulation": "simulation",
-    "SimulationState": "simulation",
-    "StepResult": "plants.plant",
-    "Summary": "record.rollout_data",
-    "compare": "comparison.comparison",
-    "plant_model": "plants.model_error",
-    "register_plant": "plants.registry",
-    "simulate": "one_rollout",
-    "simulate_batch": "batch",
+    "BatchInterrupted": "dynx.sim.batch",
+    "BatchRollouts": "dynx.sim.batch_rollouts",
+    "Noise": "dynx.sim.loop.noise",
+    "Payload": "dynx.sim.plants.model_error",
+    "Plant": "dynx.sim.plants.plant",
+    "Rollout": "dynx.sim.record.rollout",
+    "RolloutComparison": "dynx.sim.comparison.comparison",
+    "RolloutInterrupted": "dynx.sim.one_rollout",
+    "Scenario": "dynx.sim.scenario.scenario",
+    "ScenePlant": "dynx.sim.plants.scene_plant",
+    "Simulation": "dynx.sim.simulation",
+    "SimulationState": "dynx.sim.simulation",
+    "StepResult": "dynx.sim.plants.plant",
+    "Summary": "dynx.sim.record.rollout_data",
+    "compare": "dynx.sim.comparison.comparison",
+    "plant_model": "dynx.sim.plants.model_error",
+    "register_plant": "dynx.sim.plants.registry:register",
+    "simulate": "dynx.sim.one_rollout",
+    "simulate_batch": "dynx.sim.batch",
 }
 
 __all__ = [
@@ -72,23 +71,13 @@ __all__ = [
 
 # Hidden from type checkers, which would take any name for an attribute: they know the imports above.
 if not TYPE_CHECKING:
-    _moved = moved_names(
-        __name__,
-        {
-            "compare_rollouts": "dynx.compare",
-            "Push": "dynx.ExternalForce",
-            "Snapshot": "dynx.world.Snapshot",
-            "State": "dynx.sim.SimulationState",
-        },
-    )
-
-    def __getattr__(name: str) -> Any:
-        if name not in _HOME:
-            return _moved(name)
-        attribute = "register" if name == "register_plant" else name
-        found = getattr(import_module(f"dynx.sim.{_HOME[name]}"), attribute)
-        globals()[name] = found
-        return found
+    _MOVED = {
+        "compare_rollouts": "dynx.compare",
+        "Push": "dynx.ExternalForce",
+        "Snapshot": "dynx.world.Snapshot",
+        "State": "dynx.sim.SimulationState",
+    }
+    __getattr__ = moved_names(__name__, _MOVED, _HOME)
 
 
 def __dir__() -> list[str]:

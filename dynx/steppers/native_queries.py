@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from importlib import import_module
-from typing import ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from dynx.errors import EngineLimitError
 from dynx.spatial.scalar import Floats
-from dynx.steppers.camera import Camera, Drawing, DrawnShape
 from dynx.steppers.stepper import Stepper, TouchingPoint
+
+if TYPE_CHECKING:
+    from dynx.steppers.camera import Camera, Drawing, DrawnShape
 
 
 class RayHit(NamedTuple):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib.metadata import entry_points
+from typing import TYPE_CHECKING
 
 from dynx.errors import (
     ArgumentError,
@@ -13,9 +14,11 @@ from dynx.errors import (
     shown,
 )
 from dynx.registry import ClassRegistry
-from dynx.steppers.camera import Draw
 from dynx.steppers.native_queries import native_queries_of
 from dynx.steppers.stepper import Stepper
+
+if TYPE_CHECKING:
+    from dynx.steppers.camera import Draw
 
 GROUP = "dynx.steppers"
 """The entry-point group: ``name = "package.module:EngineClass"``."""

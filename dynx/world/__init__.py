@@ -1,43 +1,37 @@
-"""Scenes of robots and bodies, and worlds in which they move and touch, on every engine alike."""
+"""Scenes of robots and bodies, and worlds in which they move and touch, on every engine alike.
+
+Each name is imported when it is first used: a world that moves needs no camera and no distances.
+"""
 
 from typing import TYPE_CHECKING
 
 from dynx.registry import moved_names
-from dynx.steppers.forces import ExternalForce
-from dynx.steppers.materials import InexactMaterial
-from dynx.steppers.registry import register as register_world
-from dynx.steppers.registry import unregister as unregister_world
-from dynx.steppers.registry import world_names
-from dynx.steppers.state import BodyState, RobotState, WorldState
-from dynx.world.camera import Camera, Picture
-from dynx.world.comparison import WorldComparison
-from dynx.world.contacts import ClosestPoints, Contact, RayHits
-from dynx.world.motors import Motor, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
-from dynx.world.record import Record
-from dynx.world.scene import (
-    Material,
-    PointToPoint,
-    Scene,
-    SceneBody,
-    SceneRobot,
-    Weld,
-    body_to_urdf,
-    box,
-    capsule,
-    contact_material,
-    cylinder,
-    ground,
-    mesh,
-    read_scene,
-    scene_names,
-    scene_to_mjcf,
-    sphere,
-    write_scene,
-)
 from dynx.world.separation import Separation, separation
-from dynx.world.snapshot import Snapshot
-from dynx.world.surroundings import ContactTable, Surroundings
-from dynx.world.world import World
+
+if TYPE_CHECKING:
+    from dynx.model.library import scene_names
+    from dynx.steppers.camera import Camera
+    from dynx.steppers.forces import ExternalForce
+    from dynx.steppers.material import Material, contact_material
+    from dynx.steppers.materials import InexactMaterial
+    from dynx.steppers.registry import register as register_world
+    from dynx.steppers.registry import unregister as unregister_world
+    from dynx.steppers.registry import world_names
+    from dynx.steppers.state import BodyState, RobotState, WorldState
+    from dynx.world.camera.picture import Picture
+    from dynx.world.comparison import WorldComparison
+    from dynx.world.contacts import ClosestPoints, Contact, RayHits
+    from dynx.world.motors import Motor, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
+    from dynx.world.record import Record
+    from dynx.world.scene.bodies import SceneBody, body_to_urdf, box, capsule, cylinder, ground, mesh, sphere
+    from dynx.world.scene.constraints import PointToPoint, Weld
+    from dynx.world.scene.files import read_scene, write_scene
+    from dynx.world.scene.mjcf import scene_to_mjcf
+    from dynx.world.scene.robots import SceneRobot
+    from dynx.world.scene.scene import Scene
+    from dynx.world.snapshot import Snapshot
+    from dynx.world.surroundings import ContactTable, Surroundings
+    from dynx.world.world import World
 
 __all__ = [
     "BodyState",
@@ -86,6 +80,56 @@ __all__ = [
     "write_scene",
 ]
 
-# Hidden from type checkers, which would take any name for an attribute.
+_HOME = {
+    "BodyState": "dynx.steppers.state",
+    "Camera": "dynx.steppers.camera",
+    "ClosestPoints": "dynx.world.contacts",
+    "Contact": "dynx.world.contacts",
+    "ContactTable": "dynx.world.surroundings",
+    "ExternalForce": "dynx.steppers.forces",
+    "InexactMaterial": "dynx.steppers.materials",
+    "Material": "dynx.steppers.material",
+    "Motor": "dynx.world.motors",
+    "PDMotor": "dynx.world.motors",
+    "Picture": "dynx.world.camera.picture",
+    "PointToPoint": "dynx.world.scene.constraints",
+    "PositionMotor": "dynx.world.motors",
+    "RayHits": "dynx.world.contacts",
+    "Record": "dynx.world.record",
+    "RobotState": "dynx.steppers.state",
+    "Scene": "dynx.world.scene.scene",
+    "SceneBody": "dynx.world.scene.bodies",
+    "SceneRobot": "dynx.world.scene.robots",
+    "Snapshot": "dynx.world.snapshot",
+    "Surroundings": "dynx.world.surroundings",
+    "TorqueMotor": "dynx.world.motors",
+    "VelocityMotor": "dynx.world.motors",
+    "Weld": "dynx.world.scene.constraints",
+    "World": "dynx.world.world",
+    "WorldComparison": "dynx.world.comparison",
+    "WorldState": "dynx.steppers.state",
+    "body_to_urdf": "dynx.world.scene.bodies",
+    "box": "dynx.world.scene.bodies",
+    "capsule": "dynx.world.scene.bodies",
+    "contact_material": "dynx.steppers.material",
+    "cylinder": "dynx.world.scene.bodies",
+    "ground": "dynx.world.scene.bodies",
+    "mesh": "dynx.world.scene.bodies",
+    "read_scene": "dynx.world.scene.files",
+    "register_world": "dynx.steppers.registry:register",
+    "scene_names": "dynx.model.library",
+    "scene_to_mjcf": "dynx.world.scene.mjcf",
+    "sphere": "dynx.world.scene.bodies",
+    "unregister_world": "dynx.steppers.registry:unregister",
+    "world_names": "dynx.steppers.registry",
+    "write_scene": "dynx.world.scene.files",
+}
+
+# Hidden from type checkers, which would take any name for an attribute: they know the imports above.
 if not TYPE_CHECKING:
-    __getattr__ = moved_names(__name__, {"compare_worlds": "dynx.compare", "Wrench": "dynx.ExternalForce"})
+    _MOVED = {"compare_worlds": "dynx.compare", "Wrench": "dynx.ExternalForce"}
+    __getattr__ = moved_names(__name__, _MOVED, _HOME)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -10,6 +10,9 @@ from typing import NamedTuple
 
 from dynx.spatial.scalar import Floats
 
+MAX_RAY_LENGTH = 1e4
+"""Length of rays without a given one [m]."""
+
 
 @dataclass(frozen=True, eq=False)
 class Contact:

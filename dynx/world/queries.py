@@ -120,9 +120,6 @@ def _ball(shape: Shape) -> tuple[Floats, float]:
     return 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low)) * _ROUNDING
 
 
-MAX_RAY_LENGTH = 1e4
-"""Length of rays without a given one [m]."""
-
 _NO_FORCE = np.zeros(3)
 
 

@@ -8,12 +8,12 @@ import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.distance.avoidance import Avoidance
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model import Model, Pose
 from dynx.model.geometry import Mesh
@@ -29,19 +29,21 @@ from dynx.steppers.registry import renderer_of, world_class
 from dynx.steppers.settings import changed_settings, checked_settings, checked_switches
 from dynx.steppers.state import BodyState, RobotState, WorldState
 from dynx.steppers.stepper import Stepper
-from dynx.world.camera import Camera, Picture, cast_rays, draw_picture
 from dynx.world.commands import Commands, MotorsOf, with_scene_motors
-from dynx.world.contacts import ClosestPoints, Contact, RayHits
+from dynx.world.contacts import MAX_RAY_LENGTH, ClosestPoints, Contact, RayHits
 from dynx.world.motion import Motion, apply_state, checked_state
 from dynx.world.notes.overlaps import Overlap, overlaps_of
 from dynx.world.notes.start_notes import notes_on_engine, notes_on_start
 from dynx.world.preparation import prepare
-from dynx.world.queries import MAX_RAY_LENGTH, Queries
-from dynx.world.scene import Scene
-from dynx.world.scene.avoidance import MARGIN
 from dynx.world.scene.documents import scene_document, scene_from_document
 from dynx.world.scene.paths import ScenePaths
+from dynx.world.scene.scene import MARGIN, Scene
 from dynx.world.snapshot import Snapshot, read_snapshot, write_snapshot
+
+if TYPE_CHECKING:
+    from dynx.distance.avoidance import Avoidance
+    from dynx.world.camera import Camera, Picture
+    from dynx.world.queries import Queries
 
 
 def scene_at(scene: Scene, state: WorldState) -> Scene:
@@ -187,7 +189,6 @@ class World:
         robots = {robot.name: k for k, robot in enumerate(self._layout.robots)}
         bodies = {body.name: k for k, body in enumerate(self._layout.bodies)}
         self._commands = Commands(self._layout, robots, bodies, self.dt / self.substeps, self._kind)
-        self._queries = Queries(scene, self._layout)
         self._identity: str | None = None
         self._motion = Motion(self._layout, self._commands, self._build, self.dt, self.substeps)
         at_start = notes_on_start(self._motion.engine, self._motion.state)
@@ -402,6 +403,13 @@ class World:
         engine."""
         return self._queries.closest_points(self._motion.engine, self.state, a, b, within, native)
 
+    @cached_property
+    def _queries(self) -> Queries:
+        """Questions about the scene, imported when the first is asked."""
+        from dynx.world.queries import Queries
+
+        return Queries(self.scene, self._layout)
+
     @checks_option_names
     def avoidance(
         self, robot: str | None = None, *, margin: float = MARGIN, self_margin: float | None = None
@@ -427,6 +435,9 @@ class World:
 
     def camera(self, camera: Camera, renderer: str | None = None) -> Picture:
         """Return what a camera sees, drawn by dynx or by the renderer of an engine (``"pybullet"``)."""
+        # Imported here, because few worlds are drawn.
+        from dynx.world.camera import cast_rays, draw_picture
+
         draw = cast_rays if renderer is None else renderer_of(renderer)
         return draw_picture(self.scene, self.state, camera, draw)
 

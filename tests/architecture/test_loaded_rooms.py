@@ -68,17 +68,17 @@ FLOWS = {
         "law = control.ComputedTorque(robot, natural_frequency=20.0)\n"
         "dynx.simulate(robot, law, robot.neutral(), duration=0.01, plant='pinocchio')",
         ("world.camera", "steppers.camera", "world.queries", "distance", "ik", "envs"),
-        ("distance", "steppers.camera", "world.camera", "world.queries"),
-        290,
-        42500,
+        (),
+        265,
+        39000,
     ),
     "step of a box": Flow(
         "from dynx.world import Scene, World, box\n"
         "World(Scene('box', bodies=(box('box', (0.1, 0.1, 0.1), mass=1.0),)), 'mujoco').step()",
         ("ik", "sim", "envs", "doctor"),
         (),
-        155,
-        22000,
+        130,
+        18500,
     ),
     "step of the cart-pole": Flow(
         "import gymnasium, dynx.envs\n"
@@ -86,9 +86,9 @@ FLOWS = {
         "environment.reset(seed=0)\n"
         "environment.step(environment.action_space.sample())",
         ("distance", "ik", "world.camera", "steppers.camera"),
-        ("distance", "steppers.camera", "world.camera"),
-        280,
-        38000,
+        (),
+        225,
+        33500,
     ),
 }
 

@@ -19,9 +19,6 @@ from dynx.world.scene.filters import CollisionFilter, merged_links
 from dynx.world.scene.link_frames import LinkFrames
 from dynx.world.scene.robots import SceneRobot
 
-MARGIN = 0.01
-"""Distance [m] that is kept where no other margin is given."""
-
 _IDENTITY: Floats = np.eye(4)
 
 Ignored = Iterable[tuple[frozenset[str], ...]]

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
-from dynx.distance.avoidance import Avoidance
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model import Model
 from dynx.model.elements import Vector
@@ -18,12 +17,17 @@ from dynx.model.numbers import checked_gravity
 from dynx.model.tree import STANDARD_GRAVITY
 from dynx.option_names import checks_option_names
 from dynx.steppers.material import Material
-from dynx.world.scene.avoidance import MARGIN, robot_avoidance, robot_like
 from dynx.world.scene.bodies import SceneBody
 from dynx.world.scene.constraints import Constraint, PointToPoint, Weld
 from dynx.world.scene.filters import CollisionFilter
 from dynx.world.scene.names import WORLD, checked_name, split_name
 from dynx.world.scene.robots import SceneRobot
+
+if TYPE_CHECKING:
+    from dynx.distance.avoidance import Avoidance
+
+MARGIN = 0.01
+"""Distance [m] that is kept where no other margin is given."""
 
 
 @dataclass(frozen=True)
@@ -172,6 +176,9 @@ class Scene:
         margins = margin, self_margin
         kept = self._kept_avoidance.get(margins)
         if kept is None or kept.model is not model:
+            # Distances are imported where something is to be avoided, which a scene that moves does not need.
+            from dynx.world.scene.avoidance import robot_like
+
             kept = self._avoidance(robot_like(self.robots, model), *margins)
             self._kept_avoidance[margins] = kept
         return kept
@@ -181,6 +188,8 @@ class Scene:
         return {}
 
     def _avoidance(self, robot: SceneRobot, margin: float, self_margin: float | None) -> Avoidance:
+        from dynx.world.scene.avoidance import robot_avoidance
+
         ignored = [tuple(map(self._members, pair)) for pair in self.ignored]
         own = margin if self_margin is None else self_margin
         return robot_avoidance(robot, self.robots, self.bodies, self.constraints, ignored, margin, own)

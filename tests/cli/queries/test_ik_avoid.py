@@ -12,7 +12,7 @@ from dynx.backends import backend
 from dynx.cli.shell.main import cli
 from dynx.model.loading import load
 from dynx.world.scene import read_scene
-from dynx.world.scene.avoidance import MARGIN
+from dynx.world.scene.scene import MARGIN
 from tests.cli.queries.test_evaluate import document
 
 
