@@ -10,7 +10,6 @@ import numpy as np
 
 from dynx.cli.shell.output import entry_of
 from dynx.envs.distance import EngineDistance, EpisodeDifference
-from dynx.training.evaluation import mean_of_runs
 
 if TYPE_CHECKING:
     from dynx.training import Evaluation, Policy, TaskSpec, Trained, TrainingSpec
@@ -219,6 +218,9 @@ def run_entry(trained: Trained, seconds: float) -> RunEntry:
 
 def train_document(spec: TrainingSpec, trained: list[Trained], seconds: list[float]) -> TrainDocument:
     """Return the train_document of the runs of a specification, which differ in the seed."""
+    # Imported here, because schemas are written without the extra ``train``.
+    from dynx.training.evaluation import mean_of_runs
+
     mean, (low, high) = mean_of_runs([each.evaluation.mean for each in trained])
     return entry_of(
         TrainDocument,

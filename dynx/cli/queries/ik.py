@@ -26,7 +26,7 @@ from dynx.ik import IKSolutions, closed_form
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 from dynx.world.scene import read_scene
-from dynx.world.scene.avoidance import MARGIN
+from dynx.world.scene.scene import MARGIN
 
 
 def ik(
