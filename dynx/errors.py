@@ -259,14 +259,23 @@ def located(message: str, source: str | None, line: int | None) -> str:
 
 def shown(text: object, limit: int = 80) -> str:
     """Quote `text` for a message, with control characters escaped and at most `limit` characters."""
-    quoted = repr(str(text))
-    return quoted if len(quoted) <= limit else f"{quoted[: limit - 20]}...' ({len(str(text))} characters)"
+    written = _written(text)
+    quoted = repr(written)
+    return quoted if len(quoted) <= limit else f"{quoted[: limit - 20]}...' ({len(written)} characters)"
 
 
 def escaped(text: object, limit: int = 80) -> str:
     """Escape and shorten `text` as `shown` does, without quotes: for a tag, or a message of an engine."""
-    inside = repr(str(text))[1:-1]
-    return inside if len(inside) <= limit else f"{inside[: limit - 20]}... ({len(str(text))} characters)"
+    written = _written(text)
+    inside = repr(written)[1:-1]
+    return inside if len(inside) <= limit else f"{inside[: limit - 20]}... ({len(written)} characters)"
+
+
+def _written(value: object) -> str:
+    try:
+        return str(value)
+    except ValueError:  # an integer of more digits than Python writes, alone or inside `value`
+        return f"{type(value).__name__} with too many digits"
 
 
 def nonblank_lines(text: object) -> list[str]:

@@ -1,13 +1,13 @@
-"""Options of functions: a misspelt name raises an error with the nearest one, and a dataclass can declare the
-arguments of a function."""
+"""Options of functions: a misspelt or former name raises an error with the right one, and a dataclass can
+declare the arguments of a function."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
 from functools import wraps
-from typing import Any, ParamSpec, TypeVar, cast
+from typing import Any, ParamSpec, TypeVar, cast, overload
 
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 
@@ -18,16 +18,51 @@ A = TypeVar("A")
 R = TypeVar("R")
 
 
-def checks_option_names(function: F) -> F:
+@overload
+def checks_option_names(function: F, /) -> F: ...
+@overload
+def checks_option_names(**renamed: str) -> Callable[[F], F]: ...
+def checks_option_names(function: Any = None, /, **renamed: str) -> Any:
     """Decorate a function so that a keyword that it does not have raises UnknownNameError, and
-    one that it needs and does not get ArgumentError, not TypeError."""
-    return _checked(function, function.__name__)
+    one that it needs and does not get ArgumentError, not TypeError.
+
+    `renamed` has the present names of former keywords: ``@checks_option_names(wrenches="forces")``.
+    """
+    if function is None:
+        return lambda decorated: _checked(decorated, decorated.__name__, renamed)
+    return _checked(function, function.__name__, renamed)
 
 
-def checks_field_names(cls: C) -> C:
-    """Decorate a dataclass so that a field that it does not have raises UnknownNameError, not TypeError."""
-    cls.__init__ = _checked(cls.__init__, cls.__name__)  # type: ignore[misc]  # of the class, not an instance
-    return cls
+def checks_field_names(**renamed: str) -> Callable[[C], C]:
+    """Decorate a dataclass so that a field that it does not have raises UnknownNameError, not TypeError.
+
+    `renamed` has the present names of former fields.
+    """
+
+    def decorate(cls: C) -> C:
+        cls.__init__ = _checked(cls.__init__, cls.__name__, renamed)  # type: ignore[misc]
+        return cls
+
+    return decorate
+
+
+def right_name(wrong: str, known: Iterable[str], renamed: Mapping[str, str]) -> str:
+    """Make the clause of an error that names the present name of a former one, or else the nearest."""
+    return f"; it is now {renamed[wrong]}" if wrong in renamed else nearest(wrong, known)
+
+
+def check_arguments(
+    name: str, signature: inspect.Signature, given: Iterable[Any], options: Mapping[str, Any]
+) -> None:
+    """Raise UnknownNameError for a keyword of `options` that the signature of the function `name` does not
+    have, TypeError for other arguments that do not fit it."""
+    for each in options:
+        if each not in signature.parameters:
+            raise UnknownNameError(f"{name} has no option {shown(each)}{nearest(each, signature.parameters)}")
+    try:
+        signature.bind(*given, **options)
+    except TypeError as error:
+        raise TypeError(f"{name}: {error}") from None
 
 
 def takes(arguments: Callable[P, A]) -> Callable[[Callable[[A], R]], Callable[P, R]]:
@@ -41,17 +76,10 @@ def takes(arguments: Callable[P, A]) -> Callable[[Callable[[A], R]], Callable[P,
     def decorate(function: Callable[[A], R]) -> Callable[P, R]:
         name = function.__name__
         signature = inspect.signature(arguments)
-        known = list(signature.parameters)
 
         @wraps(function)
         def called(*given: P.args, **options: P.kwargs) -> R:
-            wrong = next((each for each in options if each not in signature.parameters), None)
-            if wrong is not None:
-                raise UnknownNameError(f"{name} has no option {shown(wrong)}{nearest(wrong, known)}")
-            try:
-                signature.bind(*given, **options)
-            except TypeError as error:
-                raise TypeError(f"{name}: {error}") from None
+            check_arguments(name, signature, given, options)
             return function(arguments(*given, **options))
 
         lines = [
@@ -68,9 +96,8 @@ def takes(arguments: Callable[P, A]) -> Callable[[Callable[[A], R]], Callable[P,
     return decorate
 
 
-def _checked(function: F, name: str) -> F:
+def _checked(function: F, name: str, renamed: Mapping[str, str]) -> F:
     parameters = [each for each in inspect.signature(function).parameters if each != "self"]
-    known = frozenset(parameters)
     needed = [
         each.name
         for each in inspect.signature(function).parameters.values()
@@ -79,12 +106,17 @@ def _checked(function: F, name: str) -> F:
 
     @wraps(function)
     def checked(*arguments: Any, **options: Any) -> Any:
-        if not options.keys() <= known:
-            wrong = next(each for each in options if each not in known)
-            raise UnknownNameError(f"{name} has no option {shown(wrong)}{nearest(wrong, parameters)}")
-        for each in needed:
-            if each not in options:
-                raise ArgumentError(f"{name} needs {each}=..., which has no default")
-        return function(*arguments, **options)
+        try:
+            return function(*arguments, **options)
+        except TypeError:
+            # Names are checked only after a failure, so that a call of microseconds is not delayed.
+            for each in options:
+                if each not in parameters:
+                    clause = right_name(each, parameters, renamed)
+                    raise UnknownNameError(f"{name} has no option {shown(each)}{clause}") from None
+            for each in needed:
+                if each not in options:
+                    raise ArgumentError(f"{name} needs {each}=..., which has no default") from None
+            raise
 
     return cast(F, checked)

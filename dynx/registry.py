@@ -1,9 +1,9 @@
 """Classes by name, from dynx itself, from the running program and from entry points of installed packages.
 
 A name is looked up in three places, in this order: a table of dynx's own classes (which needs no installed
-package), the classes that a program registered, and the entry points of one group. A name never changes its
-meaning: `ClassRegistry.register` refuses a name that is taken, and an entry point with the name of one of
-dynx's own classes is ignored.
+package), the classes that a program registered, and the entry points of one group, if packages may add such
+classes. A name never changes its meaning: `ClassRegistry.register` refuses a name that is taken, and an entry
+point with the name of one of dynx's own classes is ignored.
 
 A class is imported when it is first looked up; listing names imports none. So is the body of a method that
 lies in a room above its class (`door`).
@@ -88,7 +88,7 @@ class ClassRegistry(Generic[Kind]):
     def __init__(
         self,
         word: str,
-        group: str,
+        group: str | None,
         built_in: Mapping[str, str],
         base: Callable[[], type[Kind]],
         *,
@@ -101,7 +101,7 @@ class ClassRegistry(Generic[Kind]):
         name that nobody provides.
         """
         self.group = group
-        """Entry-point group: ``name = "package.module:Class"``."""
+        """Entry-point group, ``name = "package.module:Class"``; None for a kind that packages do not add."""
         self.built_in = built_in
         """Entries of dynx itself."""
         self._word = word
@@ -173,7 +173,8 @@ class ClassRegistry(Generic[Kind]):
         return kind
 
     def _entry_points(self) -> list[EntryPoint]:
-        return [point for point in entry_points(group=self.group) if point.name not in self.built_in]
+        points = () if self.group is None else entry_points(group=self.group)
+        return [point for point in points if point.name not in self.built_in]
 
 
 def _provider(point: EntryPoint) -> str:

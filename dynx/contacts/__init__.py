@@ -12,12 +12,12 @@ the coefficient, or the error is unexplained::
         print(result.case, result.trial, result.figure, result.errors, result.verdict.kind)
 
 A case is a module in `dynx.contacts.cases` with a subclass of `ContactCase`, and a line in
-`dynx.contacts.case.BUILT_IN`; a package offers its cases by entry points in the group
-``dynx.contact_cases``. Its `trials` are independent scenes, which `measure` steps in a world of any engine,
-with the help of `dynx.contacts.motion`. A case names no engine and contains no verdict. It states for each
-figure the tolerance below which an error counts as none, and in `Figure.rests_on` the coefficients without
-which no engine can give the exact value. `dynx.contacts.candidates` lists the settings to which errors may be
-attributed, each with a reason.
+`dynx.contacts.case.BUILT_IN`; `conform` takes those of a program as objects, or by the names that
+`dynx.contacts.case.register` gives them. Its `trials` are independent scenes, which `measure` steps in a
+world of any engine, with the help of `dynx.contacts.motion`. A case names no engine and contains no verdict.
+It states for each figure the tolerance below which an error counts as none, and in `Figure.rests_on` the
+coefficients without which no engine can give the exact value. `dynx.contacts.candidates` lists the settings
+to which errors may be attributed, each with a reason.
 
 The result of an impact depends on the moment within a step at which the bodies touch. A case with an impact
 therefore has several bodies, which touch at different moments, and its figure is the one with the largest

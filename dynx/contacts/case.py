@@ -82,9 +82,6 @@ class ContactCase(ABC):
         """
 
 
-GROUP = "dynx.contact_cases"
-"""The entry-point group: ``name = "package.module:CaseClass"``."""
-
 BUILT_IN = {
     "resting_force": "dynx.contacts.cases.resting_force:RestingForce",
     "resting_depth": "dynx.contacts.cases.resting_depth:RestingDepth",
@@ -111,7 +108,7 @@ BUILT_IN = {
 """Cases of dynx itself, in the order of reports."""
 
 _cases = ClassRegistry(
-    "contact case", GROUP, BUILT_IN, lambda: ContactCase, error=ArgumentError, unknown=UnknownNameError
+    "contact case", None, BUILT_IN, lambda: ContactCase, error=ArgumentError, unknown=UnknownNameError
 )
 case_names = _cases.names
 register = _cases.register

@@ -51,6 +51,7 @@ _MOVED = {
     "SearchLimits": "dynx.ik.options.SearchLimits",
     "Targets": "dynx.model.targets.Targets",
     "checked_targets": "dynx.model.targets.checked_targets",
+    "proofs": "dynx.ik.reach: a status UNREACHABLE and a distance, without proofs by intervals",
     "is_rigid": "dynx.model.targets.is_rigid",
     "spells_options": "dynx.ik.options.spells_options",
 }

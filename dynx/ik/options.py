@@ -293,7 +293,7 @@ def spells_options(function: F) -> F:
     return function
 
 
-@checks_field_names
+@checks_field_names()
 @dataclass(frozen=True, eq=False)
 class FrameTarget:
     """Target of one frame among several that are to be reached at once.

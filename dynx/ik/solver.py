@@ -104,7 +104,14 @@ def inverse_kinematics(
     NotFiniteError) for an invalid argument, and for method ``"engine"`` if the backend has no solver of its
     own; NoClosedFormError if all solutions of an arm without a closed form are wanted, with what is missing.
     """
-    if not backend.compiles:
+    try:
+        compiles = backend.compiles
+    except AttributeError:
+        raise ArgumentError(
+            f"the backend is of type {type(backend).__name__}; wanted a dynx.Backend, "
+            "as dynx.backend(NAME, model) returns it"
+        ) from None
+    if not compiles:
         return _inverse_kinematics(backend, target, frame, q0, options)
     # A few microseconds for a single pose with options that were checked before.
     solvers = backend.kept(KernelSolvers, KernelSolvers)

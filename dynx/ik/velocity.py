@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from dynx.distance.avoidance import AvoidanceSource
 
 
-@checks_field_names
+@checks_field_names()
 @dataclass(frozen=True, eq=False)
 class VelocityTask:
     """The velocity of one frame, its weights, and whether it must be met.

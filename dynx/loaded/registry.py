@@ -2,8 +2,6 @@
 
 A *loading variant* is another documented call by which the users of an engine load a file. Its name begins
 with that of its engine, ``ENGINE:VARIANT``.
-
-Other packages add engines and variants by entry points in the group ``dynx.loaded``.
 """
 
 from __future__ import annotations
@@ -18,7 +16,7 @@ from dynx.registry import ClassRegistry
 
 REGISTRY: ClassRegistry[LoadedRobot] = ClassRegistry(
     "engine",
-    "dynx.loaded",
+    None,
     {
         "pinocchio": "dynx.engines.pinocchio.as_loaded:LoadedPinocchio",
         "pybullet": "dynx.engines.pybullet.as_loaded:LoadedPyBullet",

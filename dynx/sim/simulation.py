@@ -29,7 +29,7 @@ from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.plants.slip_bound import refuse_small_slip
 from dynx.sim.record.rollout import Rollout
 from dynx.sim.scenario.documents import in_words
-from dynx.sim.scenario.scenario import Scenario
+from dynx.sim.scenario.scenario import Scenario, innermost
 from dynx.sim.setup import Setup, step_bytes
 from dynx.sim.step import at_limit
 from dynx.simd.machine import require_memory
@@ -490,8 +490,9 @@ def refuse_other_scenario(rollout: Rollout, scenario: Scenario) -> None:
             f"the rollout to resume is not of this model {shown(scenario.model.name)}: it had {name} {old}; "
             f"now it is {new}"
         )
-    for name, old, new in then.differences(scenario):
-        if name != "duration":
+    for each in then.differences(scenario):
+        if each.field != "duration":
+            name, old, new = innermost(each)
             raise ArgumentError(
                 f"the rollout to resume had {name} {in_words(old)}; now it is {in_words(new)}"
             )

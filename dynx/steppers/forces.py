@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
-from dynx.errors import ArgumentError, shown
+from dynx.errors import ArgumentError, escaped, shown
 from dynx.model.model import Model
 from dynx.model.numbers import checked_entries, is_real, real_array
+from dynx.option_names import checks_field_names
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, REFERENCES
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.so3 import cross
@@ -50,6 +51,7 @@ LOCAL, WORLD = "local", "world"
 ORIGIN = (0.0, 0.0, 0.0)
 
 
+@checks_field_names(frame="on")
 @dataclass(frozen=True)
 class ExternalForce:
     """A wrench (6,), force [N] then moment [N m], on a part from `start` [s] for `duration` [s].
@@ -84,7 +86,8 @@ class ExternalForce:
         what = f"an external force on {shown(self.on)}"
         wrench = checked_entries(f"the wrench of {what}", real_array(f"the wrench of {what}", self.wrench))
         point = checked_entries(f"the point of {what}", real_array(f"the point of {what}", self.point))
-        if wrench.shape != (6,) or self.reference not in REFERENCES:
+        known = isinstance(self.reference, str) and self.reference in REFERENCES
+        if wrench.shape != (6,) or not known:
             raise ArgumentError(
                 f"{what} has a wrench of shape {wrench.shape} in {shown(self.reference)}; wanted (6,) in one "
                 f"of {', '.join(REFERENCES)}"
@@ -97,8 +100,8 @@ class ExternalForce:
         seconds = is_real(self.start) and is_real(self.duration)
         if not seconds or not self.duration > 0.0 or not np.isfinite(self.start):
             raise ArgumentError(
-                f"{what} starts at {self.start!r} and lasts {self.duration!r}; wanted finite, and positive, "
-                "seconds"
+                f"{what} starts at {escaped(self.start)} and lasts {escaped(self.duration)}; wanted a finite "
+                "and a positive number of seconds"
             )
 
     def checked(self, model: Model) -> ExternalForce:

@@ -351,12 +351,22 @@ class Commands:
             elif len(self._robots) == 1 and force.on in self._layout.robots[0].model.frame_names:
                 frames.setdefault(0, []).append((force.on, force))
             else:
-                known = [*self._bodies, *(f"{name}/{r.model.root}" for name, r in self._named_robots())]
                 raise UnknownNameError(
-                    f"a force acts on {shown(force.on)}; wanted a body or robot/link"
-                    f"{nearest(force.on, known)}"
+                    f"a force acts on {shown(force.on)}; wanted a body, robot/link or robot/frame"
+                    f"{nearest(force.on, self._targets(force.on))}"
                 )
         return frames, pushes
+
+    def _targets(self, name: str) -> list[str]:
+        """Return the names of parts that may be meant by `name`: frames with that name, or else all parts."""
+        frames = [
+            (frame, f"{robot}/{frame}")
+            for robot, layout in self._named_robots()
+            for frame in layout.model.frame_names
+        ]
+        same = [full for frame, full in frames if frame == name]
+        alone = [frame for frame, _ in frames] if len(self._robots) == 1 else []
+        return same or [*self._bodies, *alone, *(full for _, full in frames)]
 
     def _named_robots(self) -> list[tuple[str, RobotLayout]]:
         return [(name, self._layout.robots[k]) for name, k in self._robots.items()]

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
+from dynx.errors import ArgumentError, UnknownNameError, shown
 from dynx.model import Model, Pose
 from dynx.model.geometry import Mesh
 from dynx.model.numbers import positive_seconds, whole_number
 from dynx.model.package_search import StrPath
-from dynx.option_names import checks_option_names
+from dynx.option_names import checks_option_names, right_name
 from dynx.registry import door
 from dynx.spatial.scalar import Floats
 from dynx.steppers.forces import ExternalForce
@@ -94,7 +94,8 @@ def _loads_of(loads: Callable[[], object], fixed: Mapping[str, Any]) -> dict[str
         raise ArgumentError(f"loads returned {shown(given)}; wanted a dict of {', '.join(fixed)}")
     for name in given:
         if name not in fixed:
-            raise UnknownNameError(f"loads returned {shown(name)}{nearest(str(name), fixed)}")
+            clause = right_name(str(name), fixed, {"wrenches": "forces"})
+            raise UnknownNameError(f"loads returned {shown(name)}{clause}")
     return {**fixed, **given}
 
 
@@ -209,6 +210,7 @@ class World:
         """Time [s]."""
         return self._motion.time
 
+    @checks_option_names(wrenches="forces")
     def step(
         self,
         n: int = 1,
@@ -241,6 +243,7 @@ class World:
                 return
         self._motion.advance(engine, n, act=self._commands.plan(torques, motors, forces, self._motion.time))
 
+    @checks_option_names(wrenches="forces")
     def run(
         self,
         duration: float,

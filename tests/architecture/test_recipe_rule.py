@@ -65,9 +65,7 @@ def install(monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
     monkeypatch.setattr(registry, "_own_rules", lambda: own)
 
     def install(*values: str) -> None:
-        points = EntryPoints(
-            EntryPoint(f"rule{k}", value, registry.OTHERS.group) for k, value in enumerate(values)
-        )
+        points = EntryPoints(EntryPoint(f"rule{k}", value, "dynx.rules") for k, value in enumerate(values))
         monkeypatch.setattr("dynx.registry.entry_points", lambda *, group: points.select(group=group))
         all_rules.cache_clear()
 

@@ -11,7 +11,7 @@ import pytest
 from dynx.agreement.tolerances import BAR
 from dynx.backends import Backend, backend, installed_backends
 from dynx.errors import ArgumentError, ClosedError, DTypeError, NotFiniteError, ShapeError, UnknownNameError
-from dynx.ik import FrameTarget, IKResult
+from dynx.ik import FrameTarget, IKResult, inverse_kinematics
 from dynx.model import Link, Model, Pose
 from dynx.model.loading import load
 from dynx.spatial.so3 import rotation_from_rpy
@@ -214,3 +214,14 @@ def test_the_engine_s_own_solver_is_evaluated_by_forward_kinematics() -> None:
         assert not result.success[distance > 1e-3].any()
         with pytest.raises(ArgumentError, match="poses"):
             engine.inverse_kinematics(targets[0, :3, 3], "flange", method="engine")
+
+
+@pytest.mark.parametrize("given", [load("six_axis_arm"), "six_axis_arm", None])
+def test_anything_but_a_backend_is_refused(given: Any) -> None:
+    with pytest.raises(ArgumentError, match=r"the backend is of type \w+; wanted a dynx.Backend"):
+        inverse_kinematics(given, [0.4, 0.2, 0.3])
+
+
+def test_names_that_went_say_where_to_look() -> None:
+    with pytest.raises(ImportError, match=r"dynx\.ik\.proofs is now dynx\.ik\.reach"):
+        from dynx.ik import proofs  # type: ignore[attr-defined]  # noqa: F401

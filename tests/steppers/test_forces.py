@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import dynx
-from dynx.errors import ArgumentError
+from dynx.errors import ArgumentError, UnknownNameError
 from dynx.sim import ScenePlant, simulate, simulate_batch
 from dynx.sim.scenario.documents import decode, encode
 from dynx.spatial.scalar import Floats
@@ -133,3 +133,48 @@ def test_an_invalid_force_is_refused(given: dict[str, Any], words: str) -> None:
     arguments: dict[str, Any] = {"on": "tool0", "wrench": (1.0, 0, 0, 0, 0, 0), **given}
     with pytest.raises(ArgumentError, match=words):
         ExternalForce(**arguments)
+
+
+FOREIGN: tuple[Any, ...] = (
+    ["local"],
+    {"local": 1},
+    None,
+    "local ",
+    10**5000,
+    [10**5000],
+    float("nan"),
+    object(),
+)
+"""Values that no field of a force takes."""
+
+
+@pytest.mark.parametrize("field", ["on", "wrench", "start", "duration", "reference", "point"])
+@pytest.mark.parametrize("value", FOREIGN, ids=lambda value: type(value).__name__)
+def test_a_value_of_any_kind_in_any_field_is_refused_by_an_error_of_dynx(field: str, value: Any) -> None:
+    if field == "on" and isinstance(value, str):
+        pytest.skip("a name")
+    with pytest.raises(ArgumentError, match="external force"):
+        ExternalForce(**{"on": "tip", "wrench": [0.0] * 6, field: value})
+
+
+@pytest.mark.parametrize(
+    ("robots", "target", "suggested"),
+    [
+        (("arm",), "tool", "'tool0'"),
+        (("arm",), "brik", "'brick'"),
+        (("arm", "other"), "tool0", "'arm/tool0' or 'other/tool0'"),
+        (("arm", "other"), "arm/tool", "'tool0'"),
+        (("arm", "other"), "arn/tool0", "'arm/tool0'"),
+    ],
+)
+def test_an_unknown_target_names_the_parts_that_may_be_meant(
+    robots: tuple[str, ...], target: str, suggested: str
+) -> None:
+    arm = dynx.load("ur5")
+    scene = Scene(
+        "s",
+        robots=tuple(SceneRobot(name, arm).at(dynx.Pose((k, 0, 0))) for k, name in enumerate(robots)),
+        bodies=(box("brick", (0.1, 0.1, 0.1), mass=1.0, pose=dynx.Pose((0, 5, 0))),),
+    )
+    with World(scene, dt=1e-3) as world, pytest.raises(UnknownNameError, match=f"did you mean .*{suggested}"):
+        world.step(forces=[ExternalForce(target, [0.0] * 6)])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from dynx.cli.shell.lazy import runs
+from dynx.cli.shell.lazy import LazyGroup, runs
 from dynx.cli.shell.options import (
     FiniteRange,
     GroupedCommand,
@@ -19,7 +19,7 @@ from dynx.cli.shell.options import (
 )
 
 
-@click.group()
+@click.group(cls=LazyGroup)
 def env() -> None:
     """List the tasks of reinforcement learning, and measure how far apart the engines are on one.
 

@@ -82,12 +82,12 @@ def vector(text: str) -> list[float]:
 
 
 def push(text: str) -> PushInput:
-    """Read ``FRAME:fx,fy,fz,mx,my,mz[:start[:duration]]``; a wrench of three numbers is a force."""
+    """Read ``FRAME:fx,fy,fz[,mx,my,mz][:start[:duration]]``; a wrench of three numbers is a force."""
     found = _PUSH.fullmatch(text.strip())
     wrench = [] if found is None else plain_numbers(found["wrench"])
     if found is None or len(wrench) not in (3, 6):
         raise click.BadParameter(
-            f"{shown(text)} is not of the form FRAME:fx,fy,fz,mx,my,mz[:START[:DURATION]], "
+            f"{shown(text)} is not of the form FRAME:fx,fy,fz[,mx,my,mz][:START[:DURATION]], "
             "such as tool0:20,0,0,0,0,0:0.5:0.1"
         )
     start, duration = found["start"], found["duration"]
@@ -141,6 +141,7 @@ def _joint_numbers(own: str, others: str) -> CommandKind:
 
 COMMAND_KINDS: dict[Kind, CommandKind] = {
     declared.NUMBER: CommandKind(finite_number, "NUMBER"),
+    declared.SLIP: CommandKind(finite_number, "NUMBER"),
     declared.SECONDS: CommandKind(finite_number, "SECONDS"),
     declared.COUNT: CommandKind(click.IntRange(min=1), "N"),
     declared.PLANT: CommandKind(None, "NAME"),
@@ -157,8 +158,9 @@ COMMAND_KINDS: dict[Kind, CommandKind] = {
     ),
     declared.PUSHES: CommandKind(
         push,
-        "FRAME:fx,fy,fz,mx,my,mz[:START[:DURATION]]",
-        ", in world axes, from START [s] (default 0) for DURATION [s] (default: until the end)",
+        "FRAME:fx,fy,fz[,mx,my,mz][:START[:DURATION]]",
+        " (three numbers are the force alone), in world axes, from START [s] (default 0) for DURATION [s] "
+        "(default: until the end)",
         several=True,
     ),
 }

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
+from inspect import signature
 from typing import Any, overload
 
 from dynx.errors import ArgumentError, DynxError, shown
 from dynx.files.notebook import html_grid
 from dynx.model.numbers import is_real
+from dynx.option_names import check_arguments
 from dynx.sim.comparison.factors import Factor, Mixture
 from dynx.sim.one_rollout import simulate
 from dynx.sim.record.rollout import Rollout
@@ -130,12 +132,13 @@ def compare(ours: Any, theirs: Any, *given: Any, **options: Any) -> Any:
     run there.
 
     Raises ArgumentError for rollouts of robots with other coordinates or without a common time, for anything
-    but two rollouts or a scene with its engines, and for an invalid tolerance; the errors of `World` for a
-    scene that cannot be opened.
+    but two rollouts or a scene with its engines, and for an invalid tolerance; UnknownNameError for an option
+    of another name, TypeError for other arguments that do not fit; the errors of `World` for a scene that
+    cannot be opened.
     """
-    if isinstance(ours, Scene):
-        return compare_engines(ours, theirs, *given, **options)
-    return _compare_rollouts(ours, theirs, *given, **options)
+    comparing = compare_engines if isinstance(ours, Scene) else _compare_rollouts
+    check_arguments("compare", signature(comparing), (ours, theirs, *given), options)
+    return comparing(ours, theirs, *given, **options)
 
 
 def rollout_separation(ours: Rollout, theirs: Rollout) -> Separation:

@@ -195,7 +195,11 @@ def in_words(document: Document) -> str:
     if isinstance(document, str):
         return shown(document)
     text = str(document)
-    return text if len(text) <= MAX_WORDS_LENGTH else f"{text[:MAX_WORDS_LENGTH]}..."
+    if len(text) <= MAX_WORDS_LENGTH:
+        return text
+    return f"{text[:MAX_WORDS_LENGTH]}..." + (
+        f" ({len(document)} entries)" if isinstance(document, list) else ""
+    )
 
 
 def arguments_of(document: Document) -> dict[str, Document]:

@@ -69,6 +69,16 @@ class Number(Kind):
         return float(value)
 
 
+class SlipSpeed(Number):
+    """The speed up to which a friction law is smoothed."""
+
+    def checked(self, name: str, value: Any, model: Model) -> float:
+        """Return a float that is 0 or at least `dynx.control.friction.MIN_SLIP`."""
+        from dynx.control.friction import checked_slip
+
+        return checked_slip(name, value)
+
+
 class Count(Kind):
     """A whole number."""
 
@@ -209,6 +219,7 @@ def as_array(name: str, value: Any) -> Any:
 
 
 NUMBER = Number("a number", float)
+SLIP = SlipSpeed("a number", float)
 SECONDS = Number("a number of seconds", float)
 COUNT = Count("a whole number", int)
 FLAG = Flag("True or False", bool)
@@ -417,6 +428,7 @@ class SimulationOptions:
         0.0,
         "Velocity over which Coulomb friction is smoothed, so that joints never stick",
         unit="rad/s or m/s",
+        kind=SLIP,
         group=JOINTS,
         needs=("friction", ""),
     )

@@ -32,6 +32,7 @@ from dynx.sim.scenario.documents import (
     arguments_of,
     decode,
     encode,
+    in_words,
 )
 from dynx.sim.scenario.documents import NUMBERS as CONTROLLER_NUMBERS
 from dynx.sim.scenario.options import OPTIONS, SimulationOptions, as_array
@@ -66,6 +67,21 @@ class Difference(NamedTuple):
     """Its name; for a field inside another field with a dot, as in ``noise.seed``."""
     ours: Any
     theirs: Any
+
+
+def innermost(difference: Difference) -> Difference:
+    """Return the first entry in which two lists of equal length differ, such as ``pushes[0].wrench``, where
+    the lists have objects or begin alike; any other difference as it is."""
+    name, *pair = difference
+    ours, theirs = (
+        each[ARRAY] if isinstance(each, dict) and each.keys() == {ARRAY} else each for each in pair
+    )
+    if not isinstance(ours, list) or not isinstance(theirs, list) or len(ours) != len(theirs):
+        return difference
+    if not any(isinstance(each, dict) for each in ours) and in_words(ours) != in_words(theirs):
+        return difference
+    k = next(k for k, entries in enumerate(zip(ours, theirs, strict=True)) if not _same(*entries))
+    return innermost(_differences(f"{name}[{k}]", ours[k], theirs[k])[0])
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -33,12 +33,6 @@ def test_no_argument_gives_help() -> None:
     assert "agree" in result.output
 
 
-def test_a_mistyped_command_names_the_nearest() -> None:
-    result = CliRunner().invoke(cli, ["doctr", "ur5"])
-    assert result.exit_code == 2
-    assert "no command 'doctr'; did you mean 'doctor'?" in result.output
-
-
 def test_a_group_of_commands_without_one_gives_help() -> None:
     result = CliRunner().invoke(cli, ["env"])
     assert result.exit_code == 2
@@ -145,3 +139,10 @@ def test_no_standard_output_at_all(arguments: str) -> None:
     done = subprocess.run(["sh", "-c", script], stderr=subprocess.PIPE, text=True, check=False)
     assert done.returncode == 74
     assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(("words", "nearest"), [(["doctr"], "doctor"), (["env", "lst"], "list")])
+def test_a_mistyped_command_of_any_group_names_the_nearest(words: list[str], nearest: str) -> None:
+    result = CliRunner().invoke(cli, words)
+    assert result.exit_code == 2
+    assert f"no command '{words[-1]}'; did you mean '{nearest}'?" in result.output

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -92,3 +93,9 @@ def test_takes_gives_a_function_the_signature_of_a_dataclass() -> None:
     assert product(size=3, rate=1.0) == 3.0
     assert str(inspect.signature(product)) == "(size: 'int', rate: 'float' = 2.0) -> 'float'"
     assert inspect.getdoc(product) == "Multiply.\n\nOptions:\n    rate: Rate [1/s], as measured (default: 2)"
+
+
+@pytest.mark.parametrize("slip", ["much", None, [1.0], -1.0, 1e-30, math.inf, 10**5000, True], ids=type)
+def test_an_invalid_slip_speed_says_what_is_wanted(slip: Any) -> None:
+    with pytest.raises(ArgumentError, match=r"friction_slip is .*wanted a speed: 0, or 1e-09 or more"):
+        simulate(ARM, friction=0.1, friction_slip=slip, duration=0.01)

@@ -202,3 +202,34 @@ def test_a_gain_of_a_controller_inside_another_is_refused_by_name() -> None:
         simulate(other, resume=whole)
     with pytest.raises(ArgumentError, match=r"had controller\.inner PD\(kp \[.*; now it is PID\(kp \["):
         simulate(integral, resume=whole)
+
+
+LOAD = Payload("tool0", 1.0)
+
+
+def force(x: float, start: float = 0.0) -> ExternalForce:
+    return ExternalForce("tool0", [x, 0, 0, 0, 0, 0], start)
+
+
+@pytest.mark.parametrize(
+    ("then", "now", "part"),
+    [
+        ({"pushes": [force(1.0)]}, {"pushes": [force(2.0)]}, "pushes[0].wrench"),
+        (
+            {"pushes": [force(1.0)] * 9},
+            {"pushes": [*[force(1.0)] * 8, force(1.0, start=0.5)]},
+            "pushes[8].start",
+        ),
+        ({"pushes": [force(1.0)] * 9}, {"pushes": [force(1.0)] * 8}, "pushes"),
+        ({"payload": [LOAD, LOAD]}, {"payload": [LOAD, Payload("tool0", 1.5)]}, "payload[1].mass"),
+    ],
+)
+def test_the_refusal_shows_the_first_entry_that_differs(
+    then: dict[str, Any], now: dict[str, Any], part: str
+) -> None:
+    before = simulate(ARM, duration=0.01, **then)
+    with pytest.raises(ArgumentError) as refused:
+        simulate(ARM, duration=0.02, resume=before, **now)
+    had, _, has = str(refused.value).partition(f"had {part} ")[2].partition("; now it is ")
+    assert had
+    assert had != has
