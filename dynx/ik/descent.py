@@ -7,7 +7,6 @@ its inputs. For more coordinates, or several frames, the same text is evaluated 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import cache, lru_cache, partial
 from typing import Any, NamedTuple
 
@@ -16,19 +15,7 @@ from numpy.typing import NDArray
 
 from dynx.backends.base import Backend
 from dynx.ik.coordinates import FrameCoordinates
-from dynx.ik.step import (
-    SETTINGS,
-    TRACKING_SETTINGS,
-    DescentLayout,
-    FrameError,
-    RefinementMemory,
-    TargetKind,
-    TrackingMemory,
-    frame_error,
-    refinement_step,
-    search_step,
-    tracking_step,
-)
+from dynx.ik.step import SEARCH, Descent, FrameError, TargetKind, frame_error
 from dynx.simd.cache import load_kernel, source_version
 from dynx.simd.emit import Settings
 from dynx.simd.image import COMPILE_LOCK
@@ -44,25 +31,6 @@ MAX_COORDINATES = 24
 
 MAX_KERNELS = 64
 """Most kernels, and most kinds of workspaces, that are kept."""
-
-StepText = Callable[..., dict[str, Any]]
-"""`search_step`, `refinement_step` or `tracking_step`."""
-
-
-@dataclass(frozen=True)
-class Descent:
-    """A text of a step, with the layout of its memory and the number of its settings."""
-
-    step: StepText
-    memory: Callable[[int], DescentLayout | RefinementMemory | TrackingMemory]
-    n_settings: int
-    least: int
-    """Place of the least squared error in the memory, after the coordinates."""
-
-
-SEARCH = Descent(search_step, DescentLayout, len(SETTINGS), 5)
-REFINEMENT = Descent(refinement_step, RefinementMemory, len(SETTINGS), 4)
-TRACKING = Descent(tracking_step, TrackingMemory, len(TRACKING_SETTINGS), 4)
 
 
 class Descended(NamedTuple):
@@ -184,7 +152,7 @@ def descend_on_floats(
     bounds: tuple[Sequence[float], Sequence[float]],
 ) -> Descended:
     """Descend from q (nq,) by the text itself; `error_at` returns the error and its Jacobian rows (m, n)."""
-    n, memory = coordinates.count, descent.memory(coordinates.count).initial
+    n, memory = coordinates.count, descent.initial(coordinates.count)
     x, best, least, numbers = coordinates.values(q), q, np.inf, np.array(settings)
     while True:
         error, J = error_at(q)
@@ -244,11 +212,11 @@ class _StepSpace:
     """Memory of one descent; two states, of which each is computed from the other."""
 
     def __init__(self, kernel: Kernel, descent: Descent, kind: TargetKind, n: int) -> None:
-        self.initial = descent.memory(n).initial
+        self.initial = descent.initial(n)
         self.pose, self.jacobian = np.zeros((4, 4)), np.zeros((6, n))
         self.xs = [np.zeros(n), np.zeros(n)]
         self.memories = [np.zeros(len(self.initial)), np.zeros(len(self.initial))]
-        self.target, self.settings = np.zeros(kind.size), np.zeros(descent.n_settings)
+        self.target, self.settings = np.zeros(kind.size), np.zeros(len(descent.settings))
         self.lower, self.upper = np.zeros(n), np.zeros(n)
         self.optional = [np.zeros(size) for size in kind.optional_sizes.values()]
         status = np.zeros(1)
@@ -316,8 +284,8 @@ def _step_kernel(descent: Descent, kind: TargetKind, n: int) -> Kernel:
         return {name: found[name] for name in ("x", "memory", "status")}
 
     shapes: dict[str, tuple[int, ...]] = {"pose": (4, 4), "jacobian": (6, n), "x": (n,)}
-    sizes = {"memory": len(descent.memory(n).initial), "target": kind.size}
-    sizes |= {"settings": descent.n_settings, "lower": n, "upper": n} | kind.optional_sizes
+    sizes = {"memory": len(descent.initial(n)), "target": kind.size}
+    sizes |= {"settings": len(descent.settings), "lower": n, "upper": n} | kind.optional_sizes
     shapes |= {name: (size,) for name, size in sizes.items()}
     return _loaded(("step", descent.step.__name__, kind, n), step, shapes)
 

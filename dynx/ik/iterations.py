@@ -11,7 +11,7 @@ shorter step is tried.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,17 +22,18 @@ from dynx.ik.step import (
     DAMPING,
     HUGE_ERROR,
     MIN_DAMPING,
+    NO_RESULT,
+    REFINEMENT,
+    SEARCH,
     SETTINGS,
+    TRACKING,
     TRACKING_SETTINGS,
     WINDOW,
+    Descent,
     DescentLayout,
-    RefinementMemory,
     TargetKind,
-    TrackingMemory,
     bounded_step,
     frame_error,
-    refinement_step,
-    search_step,
     tracking_step,
     within_bounds,
 )
@@ -94,41 +95,76 @@ def shifted_to(x: Sequence[Any], near: Array, coordinates: FrameCoordinates) -> 
     return np.array(shifted, dtype=object)
 
 
+def _iteration(
+    layout: DescentLayout,
+    n: int,
+    kind: TargetKind,
+    step: Callable[..., dict[str, Any]],
+    tasks: Mapping[str, int],
+    constants: Mapping[str, int],
+) -> Iteration:
+    """Trace a step with n coordinates, with the sizes of further arrays of its tasks and of its constants."""
+    sizes = {"x": n, "memory": len(layout.initial(n)), "target": kind.size, "near": n}
+    shapes = {name: (size,) for name, size in {**sizes, **tasks, **constants}.items()}
+    return Iteration(trace(step, shapes), tuple(constants), n + layout.results)
+
+
 def solver_iteration(
     mechanism: Mechanism, frame: int, coordinates: FrameCoordinates, kind: TargetKind
 ) -> Iteration:
     """Return the iteration that solves for the coordinates that move frame number `frame`.
 
-    Tasks have the arrays ``x``, the first start (n,); ``memory`` (`DescentLayout`); ``target``, the first
-    three rows of a pose (12,), a position (3,) or a rotation (9,); ``near`` (n,), to which periodic angles
-    are shifted; ``cell``, the first row of starts near the target; ``point`` (3,) if there is one; and
-    ``axes`` (12,), weights and bounds per axis, if there are such. The constants are those of `SETTINGS`,
-    then the numbers that the rows of starts follow from (`dynx.ik.starts`).
+    Tasks have the arrays ``x``, the first start (n,); ``memory`` (`SEARCH`); ``target``, the first three rows
+    of a pose (12,), a position (3,) or a rotation (9,); ``near`` (n,), to which periodic angles are shifted;
+    ``cell``, the first row of starts near the target; ``point`` (3,) if there is one; and ``axes`` (12,),
+    weights and bounds per axis, if there are such. The constants are those of `SETTINGS`, then the numbers
+    that the rows of starts follow from (`dynx.ik.starts`).
     """
-    n = coordinates.count
-    path = FramePath.of(mechanism, frame, coordinates)
+    n, path = coordinates.count, FramePath.of(mechanism, frame, coordinates)
 
-    def step(
-        x: Array,
-        memory: Array,
-        target: Array,
-        near: Array,
-        cell: Array,
-        settings: Array,
-        starts: Array,
-        point: Array | None = None,
-        axes: Array | None = None,
-    ) -> dict[str, Any]:
-        error, J = frame_error(kind, path.pose(x), target, point, axes)
-        found = search_step(error, J, x, memory, settings, coordinates.lower, coordinates.upper)
-        found["x"] = shifted_to(found["x"], near, coordinates)
+    def step(cell: Array, starts: Array, memory: Array, **given: Array) -> dict[str, Any]:
+        found = _descent_step(SEARCH, path, coordinates, kind, memory=memory, **given)
         found["restart"] = select(found.pop("again"), _row(memory, cell, starts), NO_RESTART)
         return found
 
-    sizes = {"x": n, "memory": len(DescentLayout(n).initial), "target": kind.size, "near": n}
-    sizes |= {"cell": 1, "settings": len(SETTINGS), "starts": 3} | kind.optional_sizes
-    shapes = {name: (size,) for name, size in sizes.items()}
-    return Iteration(trace(step, shapes), ("settings", "starts"), DescentLayout(n).n_results)
+    tasks = {"cell": 1, **kind.optional_sizes}
+    return _iteration(SEARCH, n, kind, step, tasks, {"settings": len(SETTINGS), "starts": 3})
+
+
+def refinement_iteration(
+    mechanism: Mechanism, frame: int, coordinates: FrameCoordinates, kind: TargetKind
+) -> Iteration:
+    """Return the iteration that reduces the error of frame number `frame` from one configuration.
+
+    Tasks have the arrays ``x``, where it begins (n,); ``memory`` (`REFINEMENT`); ``target``, ``near``,
+    ``point`` and ``axes`` as in `solver_iteration`. The constants are those of `SETTINGS`.
+    """
+    n, path = coordinates.count, FramePath.of(mechanism, frame, coordinates)
+
+    def step(**given: Array) -> dict[str, Any]:
+        return {**_descent_step(REFINEMENT, path, coordinates, kind, **given), "restart": NO_RESTART}
+
+    return _iteration(REFINEMENT, n, kind, step, kind.optional_sizes, {"settings": len(SETTINGS)})
+
+
+def _descent_step(
+    descent: Descent,
+    path: FramePath,
+    coordinates: FrameCoordinates,
+    kind: TargetKind,
+    *,
+    x: Array,
+    memory: Array,
+    target: Array,
+    near: Array,
+    settings: Array,
+    point: Array | None = None,
+    axes: Array | None = None,
+) -> dict[str, Any]:
+    """Return the outputs of a step within the limits, with its periodic angles near to `near`."""
+    error, J = frame_error(kind, path.pose(x), target, point, axes)
+    found = descent.step(error, J, x, memory, settings, coordinates.lower, coordinates.upper)
+    return {**found, "x": shifted_to(found["x"], near, coordinates)}
 
 
 def _row(memory: Array, cell: Array, starts: Array) -> Any:
@@ -140,52 +176,18 @@ def _row(memory: Array, cell: Array, starts: Array) -> Any:
     return select(less(number, near), cell[0] + turned, base + number)
 
 
-def refinement_iteration(
-    mechanism: Mechanism, frame: int, coordinates: FrameCoordinates, kind: TargetKind
-) -> Iteration:
-    """Return the iteration that reduces the error of frame number `frame` from one configuration.
-
-    Tasks have the arrays ``x``, where it begins (n,); ``memory`` (`RefinementMemory`); ``target``, ``near``,
-    ``point`` and ``axes`` as in `dynx.ik.step.solver_iteration`. The constants are those of
-    `SETTINGS`.
-    """
-    n = coordinates.count
-    path = FramePath.of(mechanism, frame, coordinates)
-
-    def step(
-        x: Array,
-        memory: Array,
-        target: Array,
-        near: Array,
-        settings: Array,
-        point: Array | None = None,
-        axes: Array | None = None,
-    ) -> dict[str, Any]:
-        error, J = frame_error(kind, path.pose(x), target, point, axes)
-        found = refinement_step(error, J, x, memory, settings, coordinates.lower, coordinates.upper)
-        found["x"] = shifted_to(found["x"], near, coordinates)
-        return {**found, "restart": NO_RESTART + 0.0 * error.distance}
-
-    memory = RefinementMemory(n)
-    sizes = {"x": n, "memory": len(memory.initial), "target": kind.size, "near": n}
-    sizes |= {"settings": len(SETTINGS)} | kind.optional_sizes
-    shapes = {name: (size,) for name, size in sizes.items()}
-    return Iteration(trace(step, shapes), ("settings",), memory.n_results)
-
-
 def tracking_iteration(
     mechanism: Mechanism, frame: int, coordinates: FrameCoordinates, kind: TargetKind
 ) -> Iteration:
     """Return the iteration that descends to one target of frame number `frame`.
 
-    Tasks have ``x`` and ``near`` (n,), both the start; ``memory``; and ``target`` (`TargetKind`). The
-    constants are those of `TRACKING_SETTINGS`, the bounds ``lower``, ``upper`` and ``reach`` (n,) of
-    `StepBounds`, and ``point`` (3,) if there is one. The tasks of a kernel are the samples of a path,
-    computed in order by one lane: the start of a task is the result of the one before. The kernel returns at
-    the first sample that is not reached, if the settings say so.
+    Tasks have ``x`` and ``near`` (n,), both the start; ``memory`` (`TRACKING`); and ``target``. The constants
+    are those of `TRACKING_SETTINGS`, the bounds ``lower``, ``upper`` and ``reach`` (n,) of `StepBounds`, and
+    ``point`` (3,) if there is one. The tasks of a kernel are the samples of a path, computed in order by one
+    lane: the start of a task is the result of the one before. The kernel returns at the first sample that is
+    not reached, if the settings say so.
     """
-    n = coordinates.count
-    path = FramePath.of(mechanism, frame, coordinates)
+    n, path = coordinates.count, FramePath.of(mechanism, frame, coordinates)
 
     def step(
         x: Array,
@@ -203,13 +205,8 @@ def tracking_iteration(
         high = [minimum(a, b + c) for a, b, c in zip(upper, near, reach, strict=True)]
         return {**tracking_step(error, J, x, memory, settings, low, high), "restart": NO_RESTART}
 
-    layout = TrackingMemory(n)
-    sizes = {"x": n, "memory": len(layout.initial), "target": kind.size, "near": n}
     constants = {"settings": len(TRACKING_SETTINGS), "lower": n, "upper": n, "reach": n}
-    if kind.point:
-        constants["point"] = 3
-    shapes = {name: (size,) for name, size in (sizes | constants).items()}
-    return Iteration(trace(step, shapes), tuple(constants), layout.n_results)
+    return _iteration(TRACKING, n, kind, step, {}, constants | kind.optional_sizes)
 
 
 MAX_STEPS = 300
@@ -238,23 +235,9 @@ _ACTIVE_SET_PASSES = 2
 """Times that coordinates at limits are looked for which a step would lead beyond them."""
 
 
-@dataclass(frozen=True)
-class PostureMemory:
-    """Layout of the variables of a task: result, then what the next steps need."""
-
-    n: int
-    """Number of coordinates."""
-
-    @property
-    def n_results(self) -> int:
-        """Size of the result: coordinates, distance, angle, success, iterations, objective."""
-        return self.n + 5
-
-    @property
-    def initial(self) -> Floats:
-        """Variables of a new task: result, the step along the null space (n,), the share of it that is tried,
-        and the number of steps back to the target."""
-        return np.array([0.0] * (self.n + 4) + [HUGE_ERROR] + [0.0] * self.n + [1.0, 0.0])
+POSTURE = DescentLayout(numbers=(*NO_RESULT, HUGE_ERROR, 1.0, 0.0), results=5, vectors=1)
+"""Further numbers: the objective, a result; the share of the step along the null space that is tried, and the
+number of steps back to the target. The vector is that step."""
 
 
 def posture_iteration(
@@ -262,13 +245,11 @@ def posture_iteration(
 ) -> Iteration:
     """Return the iteration that brings one configuration near to a posture, on the target.
 
-    Tasks have the arrays ``x``, where it begins (n,); ``memory`` (`PostureMemory`); ``target``, ``point`` and
-    ``axes`` as in `dynx.ik.step.solver_iteration`; ``near``, the posture (n,); ``weights`` (n,) of
-    the squared distances; and ``inverse`` (n,), the diagonal of the inverse metric. The constants are those
-    of `SETTINGS`.
+    Tasks have the arrays ``x``, where it begins (n,); ``memory`` (`POSTURE`); ``target``, ``point`` and
+    ``axes`` as in `solver_iteration`; ``near``, the posture (n,); ``weights`` (n,) of the squared distances;
+    and ``inverse`` (n,), the diagonal of the inverse metric. The constants are those of `SETTINGS`.
     """
-    n = coordinates.count
-    path = FramePath.of(mechanism, frame, coordinates)
+    n, path = coordinates.count, FramePath.of(mechanism, frame, coordinates)
     # Periodic angles stay within their limits too: beyond them they would be far from the posture.
     limits = [coordinates.limits(k) for k in range(n)]
 
@@ -288,7 +269,7 @@ def posture_iteration(
         squared = residual.squared
         position_tolerance, rotation_tolerance, max_iterations, _ = settings
         iterations, least = memory[n + 3 : n + 5]
-        along, (share, back) = memory[n + 5 : 2 * n + 5], memory[2 * n + 5 :]
+        (share, back), along = memory[n + 5 : n + 7], memory[n + 7 :]
         reached = residual.reached(position_tolerance, rotation_tolerance)
         away = near - x
         value = sum(w * d * d for w, d in zip(weights, away, strict=True))
@@ -312,20 +293,17 @@ def posture_iteration(
         size = share * _largest(along)
         stationary = best[n + 2] * less(size, _STATIONARY)
         back = select(begins, 0.0, back + 1.0)
-        after = [*best, iterations + 1.0, select(better, value, least), *along, share, back]
+        after = [*best, iterations + 1.0, select(better, value, least), share, back, *along]
         ends = less_equal(max_iterations, iterations)
         return {
             "x": np.array([select(begins, a, b) for a, b in zip(tried, returned, strict=True)], dtype=object),
             "memory": np.array(after, dtype=object),
             "status": select(stationary, REACHED, select(ends, GIVEN_UP, RUNNING)),
-            "restart": NO_RESTART + 0.0 * squared,
+            "restart": NO_RESTART,
         }
 
-    memory = PostureMemory(n)
-    sizes = {"x": n, "memory": len(memory.initial), "target": kind.size, "near": n, "weights": n}
-    sizes |= {"inverse": n, "settings": len(SETTINGS)} | kind.optional_sizes
-    shapes = {name: (size,) for name, size in sizes.items()}
-    return Iteration(trace(step, shapes), ("settings",), memory.n_results)
+    tasks = {"weights": n, "inverse": n, **kind.optional_sizes}
+    return _iteration(POSTURE, n, kind, step, tasks, {"settings": len(SETTINGS)})
 
 
 def _null_step(

@@ -33,18 +33,18 @@ from dynx.files.cache import keep, read_cached
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.iterations import (
     MAX_STEPS,
+    POSTURE,
     SHARE_OF_TOLERANCE,
-    PostureMemory,
     posture_iteration,
     refinement_iteration,
     solver_iteration,
 )
 from dynx.ik.options import Options, SearchLimits
-from dynx.ik.problem import Posture, Problem, Requirement
+from dynx.ik.problem import SOLVERS, Posture, Problem, Requirement
 from dynx.ik.reach import proofs
 from dynx.ik.result import IKResult, ReachedTarget
 from dynx.ik.starts import STARTS_OF_CELL, Starts, StartTable
-from dynx.ik.step import POSES, SETTINGS, DescentLayout, RefinementMemory, TargetKind
+from dynx.ik.step import POSES, REFINEMENT, SEARCH, SETTINGS, TargetKind
 from dynx.model.mechanism import Mechanism
 from dynx.model.model import Model
 from dynx.model.targets import checked_targets, is_rigid
@@ -58,9 +58,7 @@ from dynx.spatial.scalar import Floats
 class Race:
     """Workspace for one target at a time, whose tasks are the starts; not safe for several threads."""
 
-    def __init__(
-        self, kernel: IterationKernel, kind: TargetKind, memory: DescentLayout, starts: Starts
-    ) -> None:
+    def __init__(self, kernel: IterationKernel, kind: TargetKind, starts: Starts) -> None:
         count, n = starts.random.shape
         self.starts = starts
         self._n, self._kind = n, kind
@@ -69,8 +67,8 @@ class Race:
         self._optional = [np.zeros(size) for size in kind.optional_sizes.values()]
         # A task that is a start does not restart.
         self._settings = np.zeros(len(SETTINGS) + 3)
-        self.result = np.zeros((count, memory.n_results))
-        shared = [memory.initial, self.target, self.near, np.zeros(1), *self._optional]
+        self.result = np.zeros((count, n + SEARCH.results))
+        shared = [SEARCH.initial(n), self.target, self.near, np.zeros(1), *self._optional]
         tasks = [self.x, *(np.broadcast_to(row, (count, len(row))) for row in shared)]
         self.run = kernel.bind_race(tasks, self.result, self._settings, starts.random)
         """Function that solves for the present target and returns the number of completed starts."""
@@ -84,8 +82,8 @@ class Race:
         self._settings[:3] = limits.position_tolerance, limits.rotation_tolerance, limits.max_iterations
 
     def solve(self, problem: Problem, indices: list[int]) -> Floats:
-        """Return the memory's results (1, n_results) of the first start that reaches the target, or of the
-        best one, with the iterations and restarts of all starts up to it."""
+        """Return the results (as one row) of the first start that reaches the target, or of the best one,
+        with the iterations and restarts of all starts up to it."""
         self.prepare(problem, indices)
         starts = self.starts
         if starts.near:
@@ -114,12 +112,11 @@ Workspace = tuple[Race, memoryview, memoryview, memoryview, memoryview]
 class PoseCall:
     """Solver of single poses for fixed options; safe to use from several threads."""
 
-    def __init__(
-        self, kernel: IterationKernel, memory: DescentLayout, starts: Starts, problem: Problem, model: Model
-    ) -> None:
+    def __init__(self, kernel: IterationKernel, starts: Starts, problem: Problem, model: Model) -> None:
         """`problem` has the options, any pose as target, and the configuration without q0."""
-        self._kernel, self._memory, self._starts, self._problem = kernel, memory, starts, problem
-        self._indices, self._n, self._width = problem.coordinates.indices, memory.n, memory.n_results
+        self._kernel, self._starts, self._problem = kernel, starts, problem
+        self._indices, self._n = problem.coordinates.indices, problem.coordinates.count
+        self._width = self._n + SEARCH.results
         self._q0 = problem.q0.reshape(-1)
         self._places_all = self._indices == list(range(len(self._q0)))
         lower, upper = model.lower.copy(), model.upper.copy()
@@ -169,7 +166,7 @@ class PoseCall:
         return bool(q0.flags.c_contiguous) and all(low <= x <= high for x, (low, high) in values)
 
     def _workspace(self) -> Workspace:
-        race = Race(self._kernel, self._problem.requirements[0].kind, self._memory, self._starts)
+        race = Race(self._kernel, self._problem.requirements[0].kind, self._starts)
         race.prepare(self._problem, self._indices)
         x, results = (array.reshape(-1).data for array in (race.x, race.result))
         return race, race.target.data, x, race.near.data, results
@@ -200,7 +197,7 @@ class FrameSolver:
         are not reached, and for solutions that are to be near to a posture."""
         self._kernel, self._coordinates, self._kind, self._threads = kernel, coordinates, kind, threads
         self._refinement, self._posture = refinement, posture
-        self._memory, self._table = DescentLayout(coordinates.count), table
+        self._table = table
         self._seeded: tuple[object, Starts | None] = (None, None)
         # Workspaces of single targets that no call uses at the moment.
         self._free: list[Race] = []
@@ -237,13 +234,12 @@ class FrameSolver:
     def nearest(self, problem: Problem, posture: Posture) -> tuple[Floats, IKResult]:
         """Return the objective (count,) and the solutions nearest to a posture, each from its own q0."""
         n, count = self._coordinates.count, problem.count
-        memory = PostureMemory(n)
         near = np.broadcast_to(problem.q0, (*problem.batch, problem.q0.shape[-1])).reshape(count, -1)
         begin = np.ascontiguousarray(near[:, self._coordinates.indices])
         shared = (posture.goal, posture.weights, posture.inverse)
-        tasks = [begin, np.broadcast_to(memory.initial, (count, len(memory.initial)))]
+        tasks = [begin, _repeated(POSTURE.initial(n), count)]
         tasks.append(self._kind.rows(problem.targets, problem.batch))
-        tasks += [np.broadcast_to(each, (count, n)) for each in shared]
+        tasks += [_repeated(each, count) for each in shared]
         optional = problem.requirements[0].optional
         limits = replace(
             problem.limits,
@@ -252,8 +248,8 @@ class FrameSolver:
             max_iterations=MAX_STEPS,
         )
         settings = _settings(replace(problem, limits=limits), 0)
-        tasks += [np.broadcast_to(each, (count, len(each))) for each in optional]
-        rows = np.empty((count, memory.n_results))
+        tasks += [_repeated(each, count) for each in optional]
+        rows = np.empty((count, n + POSTURE.results))
         self._posture()(tasks, rows, settings, begin, threads=self._threads)
         objective = rows[:, n + 4].copy()
         # In place of the objective: the number of restarts of a result.
@@ -283,7 +279,7 @@ class FrameSolver:
         pose = Requirement("", checked_targets(np.eye(4)), None, None, limits)
         q0 = self._coordinates.initial()
         problem = Problem((pose,), self._coordinates, None, q0, False, (), limits, rng)
-        return PoseCall(self._kernel, self._memory, self._starts(problem), problem, model)
+        return PoseCall(self._kernel, self._starts(problem), problem, model)
 
     def _arrays(self, problem: Problem, starts: Starts) -> list[Floats]:
         """Return the arrays (n, size) of all samples that the kernel takes."""
@@ -292,44 +288,38 @@ class FrameSolver:
         near = np.broadcast_to(near, (*problem.batch, size)).reshape(n, size)
         cell = starts.first_rows(problem)
         first = near if problem.begins_at_q0 else starts.rows[cell + starts.offset]
-        memory = np.broadcast_to(self._memory.initial, (n, len(self._memory.initial)))
+        memory = _repeated(SEARCH.initial(size), n)
         target = self._kind.rows(problem.targets, problem.batch)
         arrays = [first, memory, target, near, cell[:, None].astype(np.float64)]
-        arrays += [np.broadcast_to(each, (n, len(each))) for each in problem.requirements[0].optional]
+        arrays += [_repeated(each, n) for each in problem.requirements[0].optional]
         return arrays
 
     def _batch(self, arrays: list[Floats], problem: Problem, starts: Starts, max_restarts: int) -> Floats:
-        """Return the memory's results (n, n_results) of the samples with these arrays."""
-        rows = np.empty((len(arrays[0]), self._memory.n_results))
+        """Return the results (n, coordinates and `SEARCH.results`) of the samples with these arrays."""
+        rows = np.empty((len(arrays[0]), self._coordinates.count + SEARCH.results))
         constants = np.concatenate([_settings(problem, max_restarts), starts.constants])
         self._kernel(arrays, rows, constants, starts.rows, threads=self._threads)
         return rows
 
     def _refine(self, rows: Floats, at: NDArray[np.int64], problem: Problem, starts: Starts) -> None:
-        """Refine the results (n, n_results) of the samples `at` to local minima of their errors."""
-        memory = RefinementMemory(self._coordinates.count)
+        """Refine the results of the samples `at` to local minima of their errors."""
+        n = self._coordinates.count
         _, _, target, near, _, *optional = (array[at] for array in self._arrays(problem, starts))
-        begin = np.ascontiguousarray(rows[at, : memory.n])
-        tasks = [
-            begin,
-            np.broadcast_to(memory.initial, (len(at), len(memory.initial))),
-            target,
-            near,
-            *optional,
-        ]
-        refined = np.empty((len(at), memory.n_results))
+        begin = np.ascontiguousarray(rows[at, :n])
+        tasks = [begin, _repeated(REFINEMENT.initial(n), len(at)), target, near, *optional]
+        refined = np.empty((len(at), n + REFINEMENT.results))
         self._refinement()(tasks, refined, _settings(problem, 0), begin, threads=self._threads)
-        refined[:, memory.n + 3] += rows[at, memory.n + 3]
-        rows[at, : memory.n_results] = refined
+        refined[:, n + 3] += rows[at, n + 3]
+        rows[at, : refined.shape[1]] = refined
 
     def _race(self, problem: Problem, starts: Starts) -> Floats:
-        """Return the memory's results (1, n_results) of the only sample."""
+        """Return the results (1, coordinates and `SEARCH.results`) of the only sample."""
         try:
             race = self._free.pop()
         except IndexError:
             race = None
         if race is None or race.starts is not starts:
-            race = Race(self._kernel, self._kind, self._memory, starts)
+            race = Race(self._kernel, self._kind, starts)
         found = race.solve(problem, self._coordinates.indices)
         self._free.append(race)
         return found
@@ -344,6 +334,11 @@ class FrameSolver:
             starts = Starts.of(self._coordinates, self._table, np.random.default_rng(rng), count)
             self._seeded = (rng, count), starts
         return starts
+
+
+def _repeated(row: Floats, count: int) -> Floats:
+    """Return the same row (size,) for `count` tasks, without a copy."""
+    return np.broadcast_to(row, (count, len(row)))
 
 
 def _settings(problem: Problem, max_restarts: int) -> Floats:
@@ -397,7 +392,7 @@ class KernelSolvers:
     @classmethod
     def of(cls, backend: Backend) -> KernelSolvers:
         """Return those of a backend."""
-        return backend.kept(cls, cls)
+        return backend.kept(SOLVERS, cls)
 
     def solver(self, backend: Backend, problem: Problem) -> FrameSolver:
         """Return the solver for problems of this kind, which is made once."""

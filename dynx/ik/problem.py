@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from dynx.distance.avoidance import Avoidance, AvoidanceSource
 
 
+SOLVERS = "ik.solvers"
+"""Key under which a backend that compiles keeps its solvers (`dynx.ik.kernels.KernelSolvers`)."""
+
 MAXIMA = ("manipulability", "limit_distance")
 """Values of the option `maximize`."""
 

@@ -16,17 +16,14 @@ from dynx.backends.base import Backend
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.descent import (
     MAX_COORDINATES,
-    REFINEMENT,
-    SEARCH,
     Descended,
-    Descent,
     ErrorCall,
     KernelTarget,
     descend_by_kernel,
     descend_on_floats,
 )
 from dynx.ik.options import AxisRequirement, SearchLimits
-from dynx.ik.step import FrameError, TargetKind
+from dynx.ik.step import REFINEMENT, SEARCH, Descent, FrameError, TargetKind
 from dynx.model.model import Model
 from dynx.model.targets import Targets
 from dynx.spatial.scalar import Floats

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
@@ -12,11 +11,9 @@ from numpy.typing import ArrayLike
 
 from dynx.backends.base import Backend
 from dynx.errors import ArgumentError, nearest, shown
-from dynx.ik.kernels import KernelSolvers, kernel_solution
 from dynx.ik.options import IKOptions, Options, spells_options
-from dynx.ik.problem import Problem, argument_note, checked_problem
+from dynx.ik.problem import SOLVERS, Problem, argument_note, checked_problem
 from dynx.ik.reach import proofs
-from dynx.ik.refine import preferred_solutions
 from dynx.ik.result import IKResult
 from dynx.ik.search import Candidate, Search
 from dynx.spatial.scalar import Floats
@@ -25,6 +22,7 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
     from dynx.ik.closed_forms.solutions import IKSolutions
+    from dynx.ik.kernels import KernelSolvers
     from dynx.ik.options import FrameTarget
 
 METHODS = ("dynx", "engine")
@@ -114,7 +112,7 @@ def inverse_kinematics(
     if not compiles:
         return _inverse_kinematics(backend, target, frame, q0, options)
     # A few microseconds for a single pose with options that were checked before.
-    solvers = backend.kept(KernelSolvers, KernelSolvers)
+    solvers = backend.kept(SOLVERS, _kernel_solvers)
     call = solvers.call(frame, options)
     if call is not None:
         found = call(target, q0)
@@ -124,6 +122,13 @@ def inverse_kinematics(
     if call is None and isinstance(frame, str):
         solvers.store_call(frame, options, backend)
     return found
+
+
+def _kernel_solvers() -> KernelSolvers:
+    """Return solvers for a new backend, which keeps them; only what compiles imports them."""
+    from dynx.ik.kernels import KernelSolvers
+
+    return KernelSolvers()
 
 
 def _inverse_kinematics(
@@ -146,19 +151,18 @@ def _inverse_kinematics(
 def _solved(backend: Backend, problem: Problem, method: str) -> IKResult:
     """Return the result of a checked problem. Raises ArgumentError for an unknown method."""
     if method == "dynx":
-        found = kernel_solution(backend, problem)
+        found = None
+        if backend.compiles:
+            from dynx.ik.kernels import kernel_solution
+
+            found = kernel_solution(backend, problem)
         if found is None:
             found = _searched(backend, problem)
         if problem.secondary is None and problem.avoidance is None:
             return found
-        avoidance, is_clear = problem.avoidance, None
-        if avoidance is not None:
-            from dynx.ik.clear import clear_solutions
+        from dynx.ik.refine import refined_solutions
 
-            found = clear_solutions(backend, problem, avoidance, found)
-            is_clear = partial(avoidance.is_clear, backend)
-        if problem.secondary is not None:
-            found = preferred_solutions(backend, problem, problem.secondary, found, is_clear)
+        found = refined_solutions(backend, problem, found)
         errors = _errors_by_frame(list(found.q.reshape(problem.count, -1)), problem, backend)
         return replace(found, by_frame=errors)
     if method == "engine":

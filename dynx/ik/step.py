@@ -23,7 +23,7 @@ large the full step overshoots, so a step that does not reduce it is rejected an
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -377,30 +377,37 @@ def _solved(A: Array, b: Array) -> Array:
     return np.zeros_like(b) if indefinite else np.asarray(found)
 
 
-@dataclass(frozen=True)
-class DescentLayout:
-    """Layout of the variables of a task: result, then what the next steps need."""
-
-    n: int
-    """Number of coordinates."""
-
-    @property
-    def n_results(self) -> int:
-        """Size of the result: coordinates, distance, angle, success, iterations, restarts, squared error."""
-        return self.n + 6
-
-    @property
-    def initial(self) -> Floats:
-        """Variables of a new task."""
-        return np.array([0.0] * (self.n + 5) + [HUGE_ERROR] * (1 + WINDOW) + [0.0])
-
-
 SETTINGS = ("position_tolerance", "rotation_tolerance", "max_iterations", "max_restarts")
 """Settings of searches and refinements, in order."""
 
 TRACKING_SETTINGS = ("position_tolerance", "rotation_tolerance", "max_iterations", "stops", "abandons")
 """Settings of a tracking, in order: the last two are 1 to return at a target that is not reached, and to
 abandon descents without progress."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DescentLayout:
+    """Layout of the memory of a descent: the best coordinates (n,), then numbers, then vectors (n,)."""
+
+    numbers: tuple[float, ...]
+    """Numbers of a new task: distance, angle, success and iterations, then others."""
+    results: int
+    """How many of these numbers are results of the task."""
+    vectors: int = 0
+
+    def initial(self, n: int) -> Floats:
+        """Return the memory of a new task with n coordinates."""
+        return np.array([0.0] * n + [*self.numbers] + [0.0] * (n * self.vectors))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Descent(DescentLayout):
+    """A text of a step, with its settings and the layout of its memory."""
+
+    step: Callable[..., dict[str, Any]]
+    settings: tuple[str, ...]
+    least: int
+    """Place of the least squared error among the numbers."""
 
 
 def search_step(
@@ -437,24 +444,6 @@ def search_step(
     return {"x": np.array(new), "memory": np.array(after), "status": status, "again": again}
 
 
-@dataclass(frozen=True)
-class RefinementMemory:
-    """Layout of the variables of a task: result, then what the next steps need."""
-
-    n: int
-    """Number of coordinates."""
-
-    @property
-    def n_results(self) -> int:
-        """Size of the result: coordinates, distance, angle, success, iterations."""
-        return self.n + 4
-
-    @property
-    def initial(self) -> Floats:
-        """Variables of a new task: result, squared error, damping factor, and whether x is the best one."""
-        return np.array([0.0] * (self.n + 4) + [HUGE_ERROR, DAMPING, 1.0])
-
-
 def refinement_step(
     error: FrameError,
     J: Array,
@@ -464,7 +453,7 @@ def refinement_step(
     lower: Sequence[Any],
     upper: Sequence[Any],
 ) -> dict[str, Any]:
-    """Return x (n,) after a step of a refinement, the memory (`RefinementMemory`) and the status.
+    """Return x (n,) after a step of a refinement, the memory and the status.
 
     A rejected step is followed by an evaluation of the best configuration, from which the next step starts.
     """
@@ -488,25 +477,6 @@ def refinement_step(
     return {"x": np.array(new), "memory": np.array(after), "status": status}
 
 
-@dataclass(frozen=True)
-class TrackingMemory:
-    """Layout of the variables of a task: result, then what the next steps need."""
-
-    n: int
-    """Number of coordinates."""
-
-    @property
-    def n_results(self) -> int:
-        """Size of the result: coordinates, distance, angle, success, number of steps."""
-        return self.n + 4
-
-    @property
-    def initial(self) -> Floats:
-        """Variables of a new task: result, squared error, damping factor, recent errors."""
-        factor = DAMPING / ACCEPTED_FACTOR
-        return np.array([0.0] * self.n_results + [HUGE_ERROR, factor] + [HUGE_ERROR] * WINDOW)
-
-
 def tracking_step(
     error: FrameError,
     J: Array,
@@ -516,7 +486,7 @@ def tracking_step(
     lower: Sequence[Any],
     upper: Sequence[Any],
 ) -> dict[str, Any]:
-    """Return x (n,) after a step of a tracking, the memory (`TrackingMemory`) and the status."""
+    """Return x (n,) after a step of a tracking, the memory and the status."""
     n, squared = len(x), error.squared
     best, (steps, least, factor), recent = memory[:n], memory[n + 3 : n + 6], list(memory[n + 6 :])
     better, accepted = less(squared, least), less_equal(squared, least)
@@ -540,6 +510,37 @@ def tracking_step(
     after = [*result, steps + 1.0 - ended, select(kept, squared, least), factor, *recent[1:], squared]
     following = [select(accepted, a, b) for a, b in zip(new, best, strict=True)]
     return {"x": np.array(following), "memory": np.array(after), "status": status}
+
+
+NO_RESULT = (0.0, 0.0, 0.0, 0.0)
+"""Distance, angle, success and iterations of a new task."""
+
+SEARCH = Descent(
+    step=search_step,
+    settings=SETTINGS,
+    numbers=(*NO_RESULT, 0.0, *[HUGE_ERROR] * (1 + WINDOW), 0.0),
+    results=6,
+    least=5,
+)
+"""Further numbers: restarts and squared error, both results; recent errors; the steps of this start."""
+
+REFINEMENT = Descent(
+    step=refinement_step,
+    settings=SETTINGS,
+    numbers=(*NO_RESULT, HUGE_ERROR, DAMPING, 1.0),
+    results=4,
+    least=4,
+)
+"""Further numbers: squared error, damping factor, and whether x is the best configuration."""
+
+TRACKING = Descent(
+    step=tracking_step,
+    settings=TRACKING_SETTINGS,
+    numbers=(*NO_RESULT, HUGE_ERROR, DAMPING / ACCEPTED_FACTOR, *[HUGE_ERROR] * WINDOW),
+    results=4,
+    least=4,
+)
+"""Further numbers: squared error, damping factor, recent errors."""
 
 
 def squared_length(a: Array) -> Any:

@@ -67,5 +67,5 @@ def test_the_kernel_is_no_worse_than_steps_in_python(monkeypatch: pytest.MonkeyP
             return float(((q - goal) ** 2).sum(axis=-1).mean())
 
         by_kernel = distance()
-        monkeypatch.setattr("dynx.ik.refine.nearest_solutions", lambda *_: None)
+        monkeypatch.setattr("dynx.ik.kernels.nearest_solutions", lambda *_: None)
         assert by_kernel <= distance() * 1.01

@@ -27,7 +27,7 @@ a quartic for q_6. Then follow q_5, which turns R_6 w into R_4' h, and the angle
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -50,138 +50,99 @@ from dynx.ik.closed_forms.subproblems import (
 from dynx.spatial.scalar import Array, Floats, append_axis
 from dynx.spatial.so3 import rotate, rotate_back
 
-WristCase = Literal["intersecting_5_6", "parallel_5_6", "general"]
+ParallelCase = Literal["intersecting_5_6", "parallel_5_6", "parallel_4_5", "intersecting_4_5", "general"]
 
 Terms = tuple[Array, Array, Array]
 
 
 @dataclass(frozen=True, eq=False)
-class ParallelAxes:
+class _ThreeParallelAxes:
     """Geometry at the zero configuration; lengths are relative."""
 
-    case: WristCase
+    case: ParallelCase
     axes: Floats
-    """Directions (6, 3); those of axes 3 and 4 are h_2 or its opposite."""
+    """Directions (6, 3); those of the parallel axes are that of the first of them or its opposite."""
     points: Floats
-    """Points on the axes (6, 3); the last two are nearest to each other."""
+    """Points on the axes (6, 3); those on axes that count as meeting coincide."""
     preferred: Floats
     """Angles (6,) [rad] that stand for arbitrary ones."""
     normal: Floats
-    """A unit normal of h_2."""
-    arbitrary: tuple[int, ...] = (0, 1, 5)
-    """Joints whose angle is arbitrary at some poses."""
+    """A unit normal of the parallel axes."""
 
-    def angles(self, R: Array, p: Array, signs: Array) -> list[Angle]:
-        """Return the six angles of the branch `signs` (..., 3) for E_1 ... E_6 = (R, p)."""
-        h = self.axes
-        q1, q5 = self._outer(R, p, signs[..., 0], signs[..., 2])
-        # Axis 6 as seen from it: R_6 turns R_G^-1 R_1 h into R_5^-1 h.
-        common = h[1]
-        seen = rotate_back(R, turn(h[0], q1, common))
-        q6 = angle_from_to(h[5], seen, turn_back(h[4], q5, common), self.preferred[5])
-        q6 = self._chosen(R, p, q1, q5, q6)
-
-        # The plane motion, by its effect on a normal and on axis 4.
-        turned = turn_back(h[0], q1, rotate(R, turn_back(h[5], q6, turn_back(h[4], q5, self.normal))))
-        tip = self._axis_4(R, p, q1, q5, q6)
-        q2, q3, q4 = self.plane.angles(turned, tip, signs[..., 1], self.preferred[1])
-        return [q1, q2, q3, q4, q5, q6]
+    first: ClassVar[int]
+    """Number of the first parallel axis."""
 
     @property
     def plane(self) -> PlanarArm:
-        """Axes 2, 3 and 4."""
-        return PlanarArm(self.axes[1:4], self.points[1:4], self.normal)
+        """The parallel axes."""
+        three = slice(self.first, self.first + 3)
+        return PlanarArm(self.axes[three], self.points[three], self.normal)
 
     def reaches(self, least: float) -> bool:
         """Return whether every joint changes the terms that determine it by more than `least`."""
         return self.plane.reaches(least)
 
+    def _within_reach(self, joint: int, angle: Angle, centre: Array, back: Array, at: Array) -> Angle:
+        """Return the angle of a joint, and where it is arbitrary one that puts the third parallel axis within
+        reach of the first.
+
+        The joint's axis is then normal to the plane, and the third axis moves on a circle about it: about
+        `centre` as seen from the first axis, which is `back` in the axes of the joint, through `at`.
+        """
+        h = self.axes[joint]
+        # |centre + R^-1 R_joint^-1 at|^2 in the plane.
+        _, cosine, sine = component_terms(back, -h, at)
+        across = at - h * append_axis(dot(h, at))
+        middle = dot(centre, centre) + dot(across, across)
+        return self.plane.reachable(angle, (middle, 2.0 * cosine, 2.0 * sine), self.preferred[joint])
+
+
+class ParallelAxes(_ThreeParallelAxes):
+    """Axes 2, 3 and 4 are parallel; the points on axes 5 and 6 are nearest to each other."""
+
+    first = 1
+    arbitrary: tuple[int, ...] = (0, 1, 5)
+    """Joints whose angle is arbitrary at some poses."""
+
+    def angles(self, R: Array, p: Array, signs: Array) -> list[Angle]:
+        """Return the six angles of the branch `signs` (..., 3) for E_1 ... E_6 = (R, p)."""
+        h, x = self.axes, self.points
+        q1, q5 = self._outer(R, p, signs[..., 0], signs[..., 2])
+        # Axis 6 as seen from it: R_6 turns R_G^-1 R_1 h into R_5^-1 h.
+        common = h[1]
+        seen = rotate_back(R, turn(h[0], q1, common))
+        q6 = angle_from_to(h[5], seen, turn_back(h[4], q5, common), self.preferred[5])
+        at_5 = x[4] + turn_back(h[4], q5, x[3] - x[4])
+        centre = self.plane.across(x[0] + turn_back(h[0], q1, rotate(R, x[5]) + p - x[0]) - x[1])
+        q6 = self._within_reach(5, q6, centre, rotate_back(R, turn(h[0], q1, centre)), at_5 - x[5])
+
+        # The plane motion, by its effect on a normal and on axis 4.
+        turned = turn_back(h[0], q1, rotate(R, turn_back(h[5], q6, turn_back(h[4], q5, self.normal))))
+        at_6 = x[5] + turn_back(h[5], q6, at_5 - x[5])
+        tip = np.asarray(x[0] + turn_back(h[0], q1, rotate(R, at_6) + p - x[0]))
+        q2, q3, q4 = self.plane.angles(turned, tip, signs[..., 1], self.preferred[1])
+        return [q1, q2, q3, q4, q5, q6]
+
     def _outer(self, R: Array, p: Array, shoulder: Array, wrist: Array) -> tuple[Angle, Angle]:
         """Return q_1 and q_5."""
         h, x = self.axes, self.points
-        # Sides of both equations: terms of R_1 h times a vector, and of h times R_5 times a vector.
+        # Terms of R_1 h times a vector, and of h times R_5 times a vector, whose difference is the last.
         tip = rotate(R, x[5]) + p - x[0]
-        by_axis = _turned_terms(h[1], h[0], rotate(R, h[5])), component_terms(h[1], h[4], h[5])
-        by_point = _turned_terms(h[1], h[0], tip), component_terms(h[1], h[4], x[5] - x[4])
-        offset = float(h[1] @ (x[4] - x[0]))
-        if self.case == "general":
-            return self._by_quartic(by_axis, by_point, offset, shoulder, wrist)
-        if self.case == "intersecting_5_6":
-            (known, *first), (of_5, *_) = by_point
-            q1 = solve_linear(first[0], first[1], of_5 + offset - known, shoulder, self.preferred[0])
-            left, (constant, *right) = value_at(by_axis[0], q1), by_axis[1]
-        else:
-            (known, *first), (of_5, *_) = by_axis
-            q1 = solve_linear(first[0], first[1], of_5 - known, shoulder, self.preferred[0])
-            left, (constant, *right) = value_at(by_point[0], q1) - offset, by_point[1]
-        return q1, solve_linear(right[0], right[1], left - constant, wrist, 0.0)
-
-    def _by_quartic(
-        self,
-        by_axis: tuple[Terms, Terms],
-        by_point: tuple[Terms, Terms],
-        offset: float,
-        first: Array,
-        second: Array,
-    ) -> tuple[Angle, Angle]:
-        (a0, *a), (A0, A1, A2) = by_axis
-        (b0, *b), (B0, B1, B2) = by_point
-        determinant = A1 * B2 - A2 * B1
-        left, right = (a0 - A0, *a), (b0 - B0 - offset, *b)
-        cosine = tuple((x * B2 - y * A2) / determinant for x, y in zip(left, right, strict=True))
-        sine = tuple((y * A1 - x * B1) / determinant for x, y in zip(left, right, strict=True))
-        one = (1.0 + 0.0 * left[0], 0.0 * left[0], 0.0 * left[0])
-        unit = combined((1.0, squared(cosine)), (1.0, squared(sine)), (-1.0, linear(one)))
-        q1 = conic_root(unit, first, second)
-        c, s = value_at(cosine, q1), value_at(sine, q1)
-        length = positive_root(c * c + s * s) + 1e-300
-        return q1, Angle(c / length, s / length, separation=q1.separation)
-
-    def _axis_4(self, R: Array, p: Array, q1: Angle, q5: Angle, q6: Angle) -> Array:
-        """Return where E_2 E_3 E_4 moves the point on axis 4."""
-        h, x = self.axes, self.points
-        at_5 = x[4] + turn_back(h[4], q5, x[3] - x[4])
-        at_6 = x[5] + turn_back(h[5], q6, at_5 - x[5])
-        return np.asarray(x[0] + turn_back(h[0], q1, rotate(R, at_6) + p - x[0]))
-
-    def _chosen(self, R: Array, p: Array, q1: Angle, q5: Angle, q6: Angle) -> Angle:
-        """Return q_6, and where it is arbitrary an angle for which axis 4 is within reach of axis 2.
-
-        Axis 6 is then normal to the plane, and axis 4 moves on a circle about it.
-        """
-        h, x = self.axes, self.points
-        at_5 = x[4] + turn_back(h[4], q5, x[3] - x[4]) - x[5]
-        centre = x[0] + turn_back(h[0], q1, rotate(R, x[5]) + p - x[0]) - x[1]
-        centre = centre - h[1] * append_axis(dot(h[1], centre))
-        back = rotate_back(R, turn(h[0], q1, centre))
-        # |centre + R_1^-1 R_G R_6^-1 at_5|^2 in the plane.
-        _, c6, s6 = component_terms(back, -h[5], at_5)
-        across = at_5 - h[5] * append_axis(dot(h[5], at_5))
-        middle = dot(centre, centre) + dot(across, across)
-        return self.plane.reachable(q6, (middle, 2.0 * c6, 2.0 * s6), self.preferred[5])
+        by_axis = component_terms(rotate(R, h[5]), h[0], h[1]), component_terms(h[1], h[4], h[5]), 0.0
+        by_point = (
+            component_terms(tip, h[0], h[1]),
+            component_terms(h[1], h[4], x[5] - x[4]),
+            float(h[1] @ (x[4] - x[0])),
+        )
+        first, other = (by_point, by_axis) if self.case == "intersecting_5_6" else (by_axis, by_point)
+        quartic = self.case == "general"
+        return _linear_pair(first, other, -1.0, quartic, shoulder, wrist, self.preferred[0])
 
 
-def _turned_terms(direction: Floats, axis: Floats, a: Array) -> Terms:
-    """Return (constant, cosine, sine): the terms of (R direction)' a, with R a rotation about `axis`."""
-    return component_terms(a, axis, direction)
+class OuterParallelAxes(_ThreeParallelAxes):
+    """Axes 1, 2 and 3 are parallel."""
 
-
-OuterWristCase = Literal["parallel_4_5", "intersecting_4_5", "general"]
-
-
-@dataclass(frozen=True, eq=False)
-class OuterParallelAxes:
-    """Geometry at the zero configuration; lengths are relative."""
-
-    case: OuterWristCase
-    axes: Floats
-    """Directions (6, 3); those of axes 2 and 3 are h_1 or its opposite."""
-    points: Floats
-    """Points on the axes (6, 3); those on axes 4 and 5 coincide if the axes meet."""
-    preferred: Floats
-    """Angles (6,) [rad] that stand for arbitrary ones."""
-    normal: Floats
-    """A unit normal of h_1."""
+    first = 0
     arbitrary: tuple[int, ...] = (0, 4, 5)
     """Joints whose angle is arbitrary at some poses."""
 
@@ -189,10 +150,12 @@ class OuterParallelAxes:
         """Return the six angles of the branch `signs` (..., 3) for E_1 ... E_6 = (R, p)."""
         h, x, common = self.axes, self.points, self.axes[0]
         w = rotate_back(R, common)
-        q4, q6 = self._outer(R, p, w, signs[..., 0], signs[..., 2])
+        q6, q4 = self._outer(R, p, w, signs[..., 0], signs[..., 2])
         q5 = angle_from_to(h[4], turn(h[5], q6, w), turn_back(h[3], q4, common), self.preferred[4])
         at_4 = x[3] + turn_back(h[3], q4, x[2] - x[3]) - x[4]
-        q5 = self._chosen(R, p, q5, q6, at_4)
+        at_6 = turn_back(h[5], q6, x[4] - x[5])
+        centre = self.plane.across(rotate(R, x[5] + at_6) + p - x[0])
+        q5 = self._within_reach(4, q5, centre, turn(h[5], q6, rotate_back(R, centre)), at_4)
 
         def before_wrist(a: Array) -> Array:
             """Return R_G R_6' a."""
@@ -203,66 +166,55 @@ class OuterParallelAxes:
         turned = before_wrist(turn_back(h[4], q5, turn_back(h[3], q4, self.normal)))
         return [*self.plane.angles(turned, tip, signs[..., 1], self.preferred[0]), q4, q5, q6]
 
-    @property
-    def plane(self) -> PlanarArm:
-        """Axes 1, 2 and 3."""
-        return PlanarArm(self.axes[:3], self.points[:3], self.normal)
-
-    def reaches(self, least: float) -> bool:
-        """Return whether every joint changes the terms that determine it by more than `least`."""
-        return self.plane.reaches(least)
-
     def _outer(self, R: Array, p: Array, w: Array, first: Array, second: Array) -> tuple[Angle, Angle]:
-        """Return q_4 and q_6."""
+        """Return q_6 and q_4."""
         h, x, common = self.axes, self.points, self.axes[0]
         height = dot(common, rotate(R, x[5]) + p - x[3])
-        # Terms in q_4 and q_6 of both equations, whose sum is `total`.
-        of_axis = component_terms(common, h[3], h[4]), component_terms(-h[4], h[5], w)
-        of_point = component_terms(common, h[3], x[4] - x[3]), component_terms(x[5] - x[4], h[5], w)
-        if self.case == "general":
-            return self._by_quartic(of_axis, of_point, height, first, second)
-        if self.case == "parallel_4_5":
-            alone, total, both, total_of_both = of_axis, 0.0 * height, of_point, height
-        else:
-            alone, total, both, total_of_both = of_point, height, of_axis, 0.0 * height
-        (constant, *_), (known, *terms) = alone
-        q6 = solve_linear(terms[0], terms[1], total - constant - known, first, self.preferred[5])
-        (constant, *terms), of_6 = both
-        return solve_linear(
-            terms[0], terms[1], total_of_both - constant - value_at(of_6, q6), second, 0.0
-        ), q6
+        # Terms in q_6 and q_4 of both equations, whose sum is the last.
+        of_axis = component_terms(-h[4], h[5], w), component_terms(common, h[3], h[4]), 0.0 * height
+        of_point = (
+            component_terms(x[5] - x[4], h[5], w),
+            component_terms(common, h[3], x[4] - x[3]),
+            height,
+        )
+        alone, other = (of_point, of_axis) if self.case == "intersecting_4_5" else (of_axis, of_point)
+        quartic = self.case == "general"
+        return _linear_pair(alone, other, 1.0, quartic, first, second, self.preferred[5])
 
-    def _by_quartic(
-        self,
-        of_axis: tuple[tuple[Array, Array, Array], tuple[Array, Array, Array]],
-        of_point: tuple[tuple[Array, Array, Array], tuple[Array, Array, Array]],
-        height: Array,
-        first: Array,
-        second: Array,
-    ) -> tuple[Angle, Angle]:
-        (A0, A1, A2), (a0, *a) = of_axis
-        (B0, B1, B2), (b0, *b) = of_point
-        determinant = A1 * B2 - A2 * B1
-        left, right = (-a0 - A0, *(-each for each in a)), (height - b0 - B0, *(-each for each in b))
-        cosine = tuple((x * B2 - y * A2) / determinant for x, y in zip(left, right, strict=True))
-        sine = tuple((y * A1 - x * B1) / determinant for x, y in zip(left, right, strict=True))
-        one = (1.0 + 0.0 * height, 0.0 * height, 0.0 * height)
-        unit = combined((1.0, squared(cosine)), (1.0, squared(sine)), (-1.0, linear(one)))
-        q6 = conic_root(unit, first, second)
-        c, s = value_at(cosine, q6), value_at(sine, q6)
-        length = positive_root(c * c + s * s) + 1e-300
-        return Angle(c / length, s / length, separation=q6.separation), q6
 
-    def _chosen(self, R: Array, p: Array, q5: Angle, q6: Angle, at_4: Array) -> Angle:
-        """Return q_5, and where it is arbitrary an angle for which axis 3 is within reach of axis 1.
+Equation = tuple[Terms, Terms, Array | float]
+"""Terms f of an angle x, terms g of an angle y, and the value of f + g or f - g."""
 
-        Axis 5 is then normal to the plane, and axis 3 moves on a circle about it.
-        """
-        h, x, plane = self.axes, self.points, self.plane
-        at_6 = turn_back(h[5], q6, x[4] - x[5])
-        centre = plane.across(rotate(R, x[5] + at_6) + p - x[0])
-        back = turn(h[5], q6, rotate_back(R, centre))
-        _, cosine, sine = component_terms(back, -h[4], at_4)
-        across = at_4 - h[4] * append_axis(dot(h[4], at_4))
-        middle = dot(centre, centre) + dot(across, across)
-        return plane.reachable(q5, (middle, 2.0 * cosine, 2.0 * sine), self.preferred[4])
+
+def _linear_pair(
+    alone: Equation,
+    other: Equation,
+    sign: float,
+    quartic: bool,
+    first: Array,
+    second: Array,
+    preferred: float,
+) -> tuple[Angle, Angle]:
+    """Return the angles x and y with f(x) + sign g(y) = value in two equations (subproblem 6).
+
+    The equation `alone` contains no y, unless y is eliminated from both, which leaves a `quartic`. The signs
+    (...,) select x, and y if x is known. x is `preferred` [rad] where it is arbitrary.
+    """
+    (a, A, total), (b, B, total_of_other) = alone, other
+    if not quartic:
+        x = solve_linear(a[1], a[2], total - sign * A[0] - a[0], first, preferred)
+        rest = sign * (total_of_other - value_at(b, x)) - B[0]
+        return x, solve_linear(B[1], B[2], rest, second, 0.0)
+    determinant = A[1] * B[2] - A[2] * B[1]
+    left, right = (
+        (sign * (value - terms[0]) - known, -sign * terms[1], -sign * terms[2])
+        for terms, (known, *_), value in ((a, A, total), (b, B, total_of_other))
+    )
+    cosine = tuple((u * B[2] - w * A[2]) / determinant for u, w in zip(left, right, strict=True))
+    sine = tuple((w * A[1] - u * B[1]) / determinant for u, w in zip(left, right, strict=True))
+    one = (1.0 + 0.0 * left[0], 0.0 * left[0], 0.0 * left[0])
+    unit = combined((1.0, squared(cosine)), (1.0, squared(sine)), (-1.0, linear(one)))
+    x = conic_root(unit, first, second)
+    c, s = value_at(cosine, x), value_at(sine, x)
+    length = positive_root(c * c + s * s) + 1e-300
+    return x, Angle(c / length, s / length, separation=x.separation)

@@ -24,8 +24,8 @@ from dynx.ik.closed_forms.chain import (
     common_point,
     normal_feet,
 )
-from dynx.ik.closed_forms.parallel_axes import OuterParallelAxes, OuterWristCase, ParallelAxes, WristCase
-from dynx.ik.closed_forms.sliding_arms import ParallelArm, SlidingArm, SlidingCase, ThreeSlides
+from dynx.ik.closed_forms.parallel_axes import OuterParallelAxes, ParallelAxes, ParallelCase
+from dynx.ik.closed_forms.sliding_arms import ParallelArm, SlidingArm, ThreeSlides
 from dynx.ik.closed_forms.spherical_wrist import ArmCase, SphericalWrist, unit_normal
 from dynx.ik.closed_forms.subproblems import component_terms
 from dynx.spatial.scalar import Floats
@@ -162,7 +162,7 @@ def _parallel_axes(lines: SpatialLines, preferred: Floats, tolerance: float) -> 
     if min(angle_between(h[0], h[1]), angle_between(h[3], h[4])) < near:
         return None
     h[2], h[3] = along(h[1], h[2]), along(h[1], h[3])
-    case: WristCase = "general"
+    case: ParallelCase = "general"
     if angle_between(h[4], h[5]) < near:
         case, h[5] = "parallel_5_6", along(h[4], h[5])
     points[4], points[5] = normal_feet(h[4], points[4], h[5], points[5])
@@ -170,13 +170,8 @@ def _parallel_axes(lines: SpatialLines, preferred: Floats, tolerance: float) -> 
         if np.linalg.norm(points[5] - points[4]) < near:
             return None
     else:
-        # Terms in the cosine and sine of q_5 of both equations; a point elsewhere on axis 6 mixes them.
-        by_axis, by_point = (
-            np.array([h[1] @ across - (h[1] @ h[4]) * (h[4] @ across), h[1] @ cross(h[4], across)])
-            for across in (h[5], points[5] - points[4])
-        )
-        shift = float(by_axis @ by_point / (by_axis @ by_axis))
-        if np.linalg.norm(by_point - shift * by_axis) < near:
+        shift = _meeting_shift(h[1], h[4], h[5], points[5] - points[4], near)
+        if shift is not None:
             case = "intersecting_5_6"
             points[5] = points[5] - shift * h[5]
             if np.linalg.norm(points[5] - points[4]) < near:
@@ -195,7 +190,7 @@ def _outer_parallel_axes(
     if angle_between(h[0], h[3]) < near:
         return None
     h[1], h[2] = along(h[0], h[1]), along(h[0], h[2])
-    case: OuterWristCase = "general"
+    case: ParallelCase = "general"
     points[4], points[5] = normal_feet(h[4], points[4], h[5], points[5])
     if angle_between(h[3], h[4]) < near:
         case, h[4] = "parallel_4_5", along(h[3], h[4])
@@ -203,12 +198,8 @@ def _outer_parallel_axes(
         if angle_between(h[4], h[5]) < near or np.linalg.norm(cross(h[3], link)) < near:
             return None
     else:
-        # Terms in the cosine and sine of q_4 of both equations; a point elsewhere on axis 5 mixes them.
-        by_axis, by_point = (
-            np.array(component_terms(h[0], h[3], across)[1:]) for across in (h[4], points[4] - points[3])
-        )
-        shift = float(by_axis @ by_point / (by_axis @ by_axis))
-        if np.linalg.norm(by_point - shift * by_axis) < near:
+        shift = _meeting_shift(h[0], h[3], h[4], points[4] - points[3], near)
+        if shift is not None:
             case = "intersecting_4_5"
             points[4] = points[4] - shift * h[4]
             points[3] = points[3] + h[3] * float(h[3] @ (points[4] - points[3]))
@@ -218,6 +209,21 @@ def _outer_parallel_axes(
                 return None
     found = OuterParallelAxes(case, h, points, preferred, unit_normal(h[0]))
     return found if found.reaches(near) else None
+
+
+def _meeting_shift(
+    common: Floats, axis: Floats, next_axis: Floats, offset: Floats, near: float
+) -> float | None:
+    """Return by how much a point is to move back along the next axis so that the angle about `axis` drops out
+    of the equation of that point's height along `common`, or None if it does not.
+
+    A point elsewhere on that axis mixes this equation with that of the direction of the axis.
+    """
+    by_axis, by_point = (
+        np.array(component_terms(common, axis, across)[1:]) for across in (next_axis, offset)
+    )
+    shift = float(by_axis @ by_point / (by_axis @ by_axis))
+    return shift if np.linalg.norm(by_point - shift * by_axis) < near else None
 
 
 def _why_none(chain: Chain) -> str:
@@ -293,14 +299,10 @@ def sliding_arm(
     return found if found.reaches(near) else None
 
 
-def _case(kinds: str, h: Floats, points: Floats, near: float) -> SlidingCase | None:
+def _case(kinds: str, h: Floats, points: Floats, near: float) -> str | None:
     """Return the case of the first three joints, and idealise their axes."""
-    if kinds == "PPR":
-        return "PPR"
-    if kinds == "PRP":
-        return "PRP"
-    if kinds == "RPP":
-        return "RPP"
+    if kinds in ("PPR", "PRP", "RPP"):
+        return kinds
     if kinds == "RRP":
         if angle_between(h[0], h[1]) < near:
             h[1] = along(h[0], h[1])
@@ -318,6 +320,5 @@ def _case(kinds: str, h: Floats, points: Floats, near: float) -> SlidingCase | N
         h[slide] /= np.linalg.norm(h[slide])
     if is_parallel:
         h[2] = along(h[before], h[2])
-    if kinds == "RPR":
-        return "RPR level" if is_level else "RPR parallel" if is_parallel else "RPR general"
-    return "PRR level" if is_level else "PRR parallel" if is_parallel else "PRR general"
+    level = "level" if is_level else "parallel" if is_parallel else "general"
+    return f"{kinds} {level}"

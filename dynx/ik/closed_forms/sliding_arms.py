@@ -32,7 +32,6 @@ without a prismatic joint if its height is that of the arm.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -141,11 +140,6 @@ class ThreeSlides:
         return a
 
 
-SlidingCase = Literal[
-    "PPR", "PRP", "RPP", "RRP meeting", "RRP parallel",
-    "RPR level", "RPR parallel", "RPR general", "PRR level", "PRR parallel", "PRR general",
-]  # fmt: skip
-
 Terms = tuple[Array, Array, Array]
 
 
@@ -153,7 +147,9 @@ Terms = tuple[Array, Array, Array]
 class SlidingArm:
     """Geometry at the zero configuration; lengths are relative."""
 
-    case: SlidingCase
+    case: str
+    """Kinds of the first three joints, such as ``PPR``, and for some ``meeting``, ``parallel``, ``level`` or
+    ``general``."""
     axes: Floats
     """Directions (6, 3)."""
     points: Floats

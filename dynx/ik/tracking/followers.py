@@ -5,7 +5,7 @@ convergent near a target, and it also ends in a local minimum of a target that c
 
 `AvoidingFollower` keeps bodies apart. The samples of another follower are kept as long as they are clear.
 Where one is too close to something, the descent to its target is repeated with the distances that are too
-small as further errors (`dynx.ik.clear`): redundant joints then move around what is in the way. Where that
+small as further errors (`dynx.ik.refine`): redundant joints then move around what is in the way. Where that
 fails, the sample is not reached and stays at the last configuration that is clear.
 """
 
@@ -21,13 +21,13 @@ from numpy.typing import NDArray
 from dynx.backends.base import Backend
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.ik.coordinates import FrameCoordinates
-from dynx.ik.descent import TRACKING, Descended
+from dynx.ik.descent import Descended
 from dynx.ik.iterations import tracking_iteration
 from dynx.ik.kernels import MAX_JOINTS, algorithms
 from dynx.ik.options import SearchLimits
 from dynx.ik.problem import Requirement
 from dynx.ik.search import SearchTask
-from dynx.ik.step import TargetKind, TrackingMemory
+from dynx.ik.step import TRACKING, TargetKind
 from dynx.model.model import Model
 from dynx.model.targets import Targets
 from dynx.simd.image import COMPILE_LOCK
@@ -170,7 +170,7 @@ class KernelFollower:
     def follow(self, q: Floats, targets: Targets, bounds: StepBounds, *, stop: bool) -> Followed:
         """Descend to each target from the solution of the one before."""
         n = self._coordinates.count
-        rows = np.empty((targets.batch[0] + 1, TrackingMemory(n).n_results))
+        rows = np.empty((targets.batch[0] + 1, n + TRACKING.results))
         rows[0, :n] = q[self._coordinates.indices]
         # The results of a sample are the start of the next.
         completed = self._run(rows[:-1, :n], targets, rows[1:], bounds, stop=stop, abandons=False)
@@ -179,7 +179,7 @@ class KernelFollower:
     def descend(self, starts: Floats, targets: Targets, bounds: StepBounds) -> Followed:
         """Descend to each target from its own start."""
         x = np.ascontiguousarray(starts[:, self._coordinates.indices])
-        rows = np.empty((len(x), TrackingMemory(self._coordinates.count).n_results))
+        rows = np.empty((len(x), self._coordinates.count + TRACKING.results))
         self._run(x, targets, rows, bounds, stop=False, abandons=True)
         return self._followed(starts, rows)
 
@@ -187,7 +187,7 @@ class KernelFollower:
         self, x: Floats, targets: Targets, rows: Floats, bounds: StepBounds, *, stop: bool, abandons: bool
     ) -> int:
         """Fill the results of tasks that start at x; return the number of completed ones."""
-        limits, memory = self._limits, TrackingMemory(x.shape[1]).initial
+        limits, memory = self._limits, TRACKING.initial(x.shape[1])
         settings = [
             limits.position_tolerance,
             limits.rotation_tolerance,
@@ -301,7 +301,7 @@ class AvoidingFollower:
 
     def _avoid(self, q: Floats, target: Targets, bounds: StepBounds) -> Followed:
         """Return the sample of a target (1,) that keeps the margins, or else stays clear, near q."""
-        from dynx.ik.clear import AvoidingDescent
+        from dynx.ik.refine import AvoidingDescent
 
         coordinates = self._coordinates
         ((position, rotation),) = target.rows((1,))
