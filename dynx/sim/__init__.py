@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from dynx.sim.batch import BatchInterrupted, simulate_batch
     from dynx.sim.batch_rollouts import BatchRollouts
     from dynx.sim.comparison.comparison import RolloutComparison, compare
-    from dynx.sim.loop.noise import Noise
-    from dynx.sim.one_rollout import RolloutInterrupted, simulate
+    from dynx.sim.noise import Noise
     from dynx.sim.plants.model_error import Payload, plant_model
     from dynx.sim.plants.plant import Plant, StepResult
     from dynx.sim.plants.registry import register as register_plant
@@ -22,17 +21,17 @@ if TYPE_CHECKING:
     from dynx.sim.record.rollout import Rollout
     from dynx.sim.record.rollout_data import Summary
     from dynx.sim.scenario.scenario import Scenario
-    from dynx.sim.simulation import Simulation, SimulationState
+    from dynx.sim.simulation import RolloutInterrupted, Simulation, SimulationState, simulate
 
 _HOME = {
     "BatchInterrupted": "dynx.sim.batch",
     "BatchRollouts": "dynx.sim.batch_rollouts",
-    "Noise": "dynx.sim.loop.noise",
+    "Noise": "dynx.sim.noise",
     "Payload": "dynx.sim.plants.model_error",
     "Plant": "dynx.sim.plants.plant",
     "Rollout": "dynx.sim.record.rollout",
     "RolloutComparison": "dynx.sim.comparison.comparison",
-    "RolloutInterrupted": "dynx.sim.one_rollout",
+    "RolloutInterrupted": "dynx.sim.simulation",
     "Scenario": "dynx.sim.scenario.scenario",
     "ScenePlant": "dynx.sim.plants.scene_plant",
     "Simulation": "dynx.sim.simulation",
@@ -42,7 +41,7 @@ _HOME = {
     "compare": "dynx.sim.comparison.comparison",
     "plant_model": "dynx.sim.plants.model_error",
     "register_plant": "dynx.sim.plants.registry:register",
-    "simulate": "dynx.sim.one_rollout",
+    "simulate": "dynx.sim.simulation",
     "simulate_batch": "dynx.sim.batch",
 }
 

@@ -37,10 +37,10 @@ from dynx.model.configuration import checked_q
 from dynx.model.numbers import checked_array, real_array, whole_number
 from dynx.option_names import takes
 from dynx.sim.batch_rollouts import BatchRollouts
-from dynx.sim.loop.noise import Noise
 from dynx.sim.loop_step import PLACEHOLDER, ArrayDisturbances, LoopStep, gain_shapes, innermost
+from dynx.sim.noise import Noise
+from dynx.sim.plants.disturbances import refuse_unstable
 from dynx.sim.plants.scene_plant import ScenePlant
-from dynx.sim.plants.slip_bound import refuse_unstable
 from dynx.sim.scenario.options import COEFFICIENTS as COEFFICIENTS_KIND
 from dynx.sim.scenario.options import OPTIONS, option
 from dynx.sim.scenario.scenario import Scenario, ScenarioArguments

@@ -2,8 +2,8 @@
 
 On the plant ``compiled`` the robot is one lane of the kernel that batches use (`dynx.sim.loop_step`), however
 few steps are taken at a time. On every other integrated plant the same step is cut at the engine's calls. Its
-pieces round as NumPy does, so that the record is that of `dynx.sim.loop.plain` to the last bit, in two thirds
-of the time.
+pieces round as NumPy does, so that the record is that of `dynx.sim.closed_loop` to the last bit, in two
+thirds of the time.
 """
 
 from __future__ import annotations
@@ -22,10 +22,9 @@ from dynx.control.bullet import BulletMotor
 from dynx.control.content import attributes_of
 from dynx.control.dynamics import EngineDynamics
 from dynx.errors import ArgumentError, CompileError, TraceError, UnsupportedFeatureError
-from dynx.sim.loop.own_controllers import refuse_irreproducible
-from dynx.sim.loop.plain import Loop, LoopState
-from dynx.sim.loop.record import StateBuffers
+from dynx.sim.closed_loop import ClosedLoop, LoopState, StateBuffers
 from dynx.sim.loop_step import CONTROLLER, SETPOINT, ArrayDisturbances, LoopStep, cut_step
+from dynx.sim.own_controllers import refuse_irreproducible
 from dynx.sim.plants.integrated import IntegratedPlant
 from dynx.sim.step_completion import LaneStops, Settling
 from dynx.simd.call_sequence import Integers, StridedRows
@@ -65,7 +64,7 @@ ONE_KERNEL, PIECES = "compiled", "compiled pieces"
 """Names of the executors in a record."""
 
 
-def lane_loop(loop: Loop) -> LaneLoop | str:
+def lane_loop(loop: ClosedLoop) -> LaneLoop | str:
     """Compile a loop as one lane of a batch's kernel; return the reason where that is impossible."""
     plant = loop.plant
     if not isinstance(plant, IntegratedPlant) or not is_one_lane(plant, loop.controller):
@@ -76,7 +75,7 @@ def lane_loop(loop: Loop) -> LaneLoop | str:
         return str(error)
 
 
-def cut_loop(loop: Loop, left: int) -> CutLoop | str:
+def cut_loop(loop: ClosedLoop, left: int) -> CutLoop | str:
     """Compile a loop in pieces for `left` more steps; return the reason where that is impossible or slow."""
     plant = loop.plant
     if left < MIN_STEPS_TO_COMPILE:
@@ -120,7 +119,7 @@ def _replaced(engine: Any) -> bool:
     return any(callable(value) and hasattr(type(engine), name) for name, value in vars(engine).items())
 
 
-def _step_of(loop: Loop) -> LoopStep:
+def _step_of(loop: ClosedLoop) -> LoopStep:
     """Return the step of a loop. Raises TraceError for a controller that must not be traced."""
     plant, sensors, controller = loop.plant, loop.sensors, loop.controller
     if controller is not None:
@@ -166,7 +165,7 @@ class CompiledLoop(ABC, Generic[C]):
     executor: str
     chunk_steps: int
 
-    def __init__(self, loop: Loop, step: LoopStep) -> None:
+    def __init__(self, loop: ClosedLoop, step: LoopStep) -> None:
         self._loop, self._step = loop, step
         self._chunk = 0
         self._times = loop.clock.control_times(0)[:, None]
@@ -289,7 +288,7 @@ class LaneLoop(CompiledLoop[BoundSteps]):
     executor = ONE_KERNEL
     chunk_steps = CHUNK_OF_LANE
 
-    def __init__(self, loop: Loop, step: LoopStep) -> None:
+    def __init__(self, loop: ClosedLoop, step: LoopStep) -> None:
         """Raises TraceError or UnsupportedFeatureError for a controller that cannot be compiled."""
         super().__init__(loop, step)
         self._compiled = CompiledStep(step.text)
@@ -374,7 +373,7 @@ class CutLoop(CompiledLoop[dict[bool, BoundCuts]]):
     executor = PIECES
     chunk_steps = MAX_CHUNK_STEPS
 
-    def __init__(self, loop: Loop, step: LoopStep, plant: IntegratedPlant) -> None:
+    def __init__(self, loop: ClosedLoop, step: LoopStep, plant: IntegratedPlant) -> None:
         """Raises TraceError for a controller that cannot be traced."""
         super().__init__(loop, step)
         if loop.controller is not None:

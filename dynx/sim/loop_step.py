@@ -30,14 +30,14 @@ from dynx.model import Mechanism, Model
 from dynx.rbd.elimination import factorize_mass_matrix, solve_with_factors
 from dynx.rbd.integration import SemiImplicitEuler
 from dynx.rbd.joint_friction import FrictionLaw, FrictionStep, damped_equation
-from dynx.sim.loop.controller_checks import (
+from dynx.sim.controller_checks import (
     ControllerWatch,
     defect_of_next_state,
     defect_of_outcome,
     defect_of_torque,
     is_row,
 )
-from dynx.sim.loop.own_controllers import refuse_irreproducible, traced_torque
+from dynx.sim.own_controllers import refuse_irreproducible, traced_torque
 from dynx.sim.plants.disturbances import Disturbances
 from dynx.sim.plants.integrated import IntegratedPlant
 from dynx.sim.step import MAX_SQUARED_SPEED, at_limit, measure, squared_speed, torque_sum, with_disturbances

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,12 +11,11 @@ import numpy as np
 from dynx.control.base import Controller
 from dynx.control.bullet import BulletMotor
 from dynx.control.saturation import checked_limit
-from dynx.errors import ArgumentError
+from dynx.errors import ArgumentError, LimitError, LimitViolation
 from dynx.model import Model
 from dynx.model.configuration import checked_q
 from dynx.model.numbers import checked_array, whole_number
-from dynx.sim.loop.controller_checks import check_controller
-from dynx.sim.loop.references import SetpointOf, checked_reference
+from dynx.sim.controller_checks import check_controller
 from dynx.sim.plants.disturbances import Disturbances
 from dynx.sim.plants.model_error import plant_model
 from dynx.sim.plants.registry import default_integrator
@@ -25,7 +25,14 @@ from dynx.sim.scenario.scenario import Scenario
 from dynx.simd.machine import require_memory
 from dynx.spatial.scalar import Floats
 from dynx.steppers.clock import MAX_STEPS, Clock
-from dynx.trajectory.base import Trajectory
+from dynx.trajectory.base import Setpoint, Trajectory
+from dynx.trajectory.limit_check import check
+
+UNCHECKED = "check_reference=False simulates it nevertheless"
+"""Advice in the errors of limits."""
+
+SetpointOf = Callable[[Floats], Setpoint]
+"""From times (n,) to setpoints (n, nq), (n, nv), (n, nv)."""
 
 
 @dataclass(frozen=True)
@@ -152,3 +159,71 @@ def _start(model: Model, setpoint_of: SetpointOf | None, scenario: Scenario) -> 
     if q.ndim != 1 or v.ndim != 1:
         raise ArgumentError(f"q0 has shape {q.shape} and v0 {v.shape}; wanted one state")
     return q, v
+
+
+def checked_reference(model: Model, reference: Any, *, within_limits: bool) -> SetpointOf | None:
+    """Return `reference` as a function of time; None stays None.
+
+    Raises ArgumentError for the reference of another robot, and LimitError (if `within_limits`) where it
+    violates position or velocity limits of the model.
+    """
+    if reference is None:
+        return None
+    if not isinstance(reference, Trajectory):
+        return _held(model, reference, within_limits)
+    if (reference.nq, reference.nv) != (model.nq, model.nv):
+        raise ArgumentError(
+            f"the reference has nq {reference.nq} and nv {reference.nv}; "
+            f"{model.name} has nq {model.nq} and nv {model.nv}"
+        )
+    if within_limits:
+        try:
+            check(model, reference, effort=False)
+        except LimitError as error:
+            raise LimitError(f"{error}\n  ({UNCHECKED})", error.violations) from None
+    return reference
+
+
+def setpoints_of(
+    setpoint_of: SetpointOf | None, clock: Clock, controller: Controller[Any] | None
+) -> Setpoint:
+    """Return the setpoint of every control step, `lead` control steps ahead: (n_controls, ...).
+
+    Raises ArgumentError if there is no reference and the controller needs one.
+    """
+    n = clock.n_controls
+    if controller is None:
+        nothing = np.zeros((n, 0))
+        return Setpoint(nothing, nothing, nothing)
+    if setpoint_of is not None:
+        return setpoint_of(clock.control_times(controller.lead))
+    if controller.needs_setpoint:
+        raise ArgumentError(f"{controller.name} needs a reference: a trajectory, or a configuration to hold")
+    model = controller.model
+    rest = np.broadcast_to(np.zeros(model.nv), (n, model.nv))
+    return Setpoint(np.broadcast_to(model.neutral(), (n, model.nq)), rest, rest)
+
+
+def _held(model: Model, q: Any, within_limits: bool) -> SetpointOf:
+    """Return the reference that stays at the configuration `q`."""
+    held = checked_q(model, q, "reference")
+    if held.ndim != 1:
+        raise ArgumentError(f"reference has shape {held.shape}; wanted a trajectory or ({model.nq},)")
+    if within_limits:
+        joints = slice(7 if model.floating else 0, None)
+        rows = zip(
+            model.coordinate_joints, held[joints], model.lower[joints], model.upper[joints], strict=True
+        )
+        found = [
+            LimitViolation(joint.name, "position", 0.0, float(x), float(low if x < low else high), joint.unit)
+            for joint, x, low, high in rows
+            if not low <= x <= high
+        ]
+        if found:
+            raise LimitError(f"the reference of {model.name} breaks limits: {found[0]} ({UNCHECKED})", found)
+
+    def at(times: Floats) -> Setpoint:
+        rest = np.zeros((len(times), model.nv))
+        return Setpoint(np.array(np.broadcast_to(held, (len(times), model.nq))), rest, rest)
+
+    return at

@@ -3,7 +3,7 @@
 The plain executor evaluates them on floats; compiled steps trace them (`dynx.sim.loop_step`). Other
 parts that they share are `clamp` (`dynx.spatial.scalar`), the law of friction and semi-implicit Euler
 (`dynx.sim.plants`), control steps and the delay (`dynx.steppers.clock`), and the checks of what a controller
-returns (`dynx.sim.loop.controller_checks`).
+returns (`dynx.sim.controller_checks`).
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ A kernel corrects the modes of the law of friction (`dynx.rbd.joint_friction`) o
 suffices. For the other lanes it is called again with the corrected modes, until they are right. A lane whose
 modes are right gives the same bits again, so no result depends on its neighbours.
 
-Joints beyond their limits are set to them, with the impacts of `dynx.sim.loop.stops`. For the lanes in which
+Joints beyond their limits are set to them, with the impacts of `dynx.sim.closed_loop`. For the lanes in which
 such a joint moves outwards, and for no other, a kernel computes the velocities after the impact.
 """
 

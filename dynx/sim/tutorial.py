@@ -31,8 +31,8 @@ from dynx.files.figures import new_figure, save_figure
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.sim.named_controllers import BUILT_IN, ControllerRequest, named_controller
-from dynx.sim.one_rollout import simulate
 from dynx.sim.record.rollout import Rollout
+from dynx.sim.simulation import simulate
 from dynx.spatial.scalar import Floats
 from dynx.trajectory import Trajectory, check, cycloidal
 

@@ -53,7 +53,7 @@ from dynx.testing.strategies import models
 from dynx.trajectory.base import Setpoint, Trajectory
 from tests.oracles.closed_form import MODELS
 from tests.sim.bars import tutorial_motion, tutorial_robot
-from tests.sim.loop.test_resume import the_same
+from tests.sim.test_resume import the_same
 
 ARM = tutorial_robot()
 STEPS = 70

@@ -122,7 +122,7 @@ def test_only_failures_of_dynx_hide_the_explanation_of_a_divergence(monkeypatch:
         def fail(*_: object) -> None:
             raise error
 
-        monkeypatch.setattr("dynx.sim.loop.plain.largest_overshoot", fail)
+        monkeypatch.setattr("dynx.sim.closed_loop.largest_overshoot", fail)
         simulate(dynx.load("ur5"), None, v0=np.full(6, 1e5), duration=1.0, plant="reference")
 
     with pytest.raises(DivergedError) as raised:

@@ -21,7 +21,7 @@ from dynx.model.loading import load
 from dynx.sim import Noise, Payload, Scenario, Simulation, compiled_loop, simulate
 from dynx.trajectory.base import Setpoint
 from tests.sim.bars import tutorial_motion, tutorial_robot
-from tests.sim.loop.test_resume import the_same
+from tests.sim.test_resume import the_same
 
 needs_bullet = pytest.mark.skipif("pybullet" not in installed_backends(), reason="PyBullet is not installed")
 ARM = tutorial_robot()

@@ -13,9 +13,9 @@ from dynx.files.notebook import html_grid
 from dynx.model.numbers import is_real
 from dynx.option_names import check_arguments
 from dynx.sim.comparison.factors import Factor, Mixture
-from dynx.sim.one_rollout import simulate
 from dynx.sim.record.rollout import Rollout
 from dynx.sim.scenario.documents import Unknown
+from dynx.sim.simulation import simulate
 from dynx.world.comparison import WorldComparison, compare_engines
 from dynx.world.scene.scene import Scene
 from dynx.world.separation import Separation, separation

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from dynx.backends import Backend
+from dynx.backends import Backend, backend
 from dynx.backends.hooks import solve_mass_matrix
 from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.control.dynamics import EngineDynamics
@@ -24,12 +24,16 @@ from dynx.control.friction import (
     refuse_text,
 )
 from dynx.control.gains import checked_gain
+from dynx.errors import ArgumentError
 from dynx.model import Model
 from dynx.rbd.joint_friction import FrictionLaw
 from dynx.sim.plants.friction_solver import FrictionSolver
 from dynx.sim.step import with_disturbances
 from dynx.spatial.scalar import Floats
 from dynx.steppers.forces import ExternalForce
+
+STABLE = {"rk4": 2.78, "adaptive": np.inf}
+"""Largest h f / (M s) by integrator; 2 for all others."""
 
 
 class Disturbances:
@@ -168,3 +172,47 @@ def _armature_matrix(model: Model, armature: Coefficients) -> Floats:
     numbers = coefficients_by_joint(model, "armature", armature)
     joints = checked_gain("armature", numbers, model.nv - base, per="one for each joint")
     return np.diag(np.concatenate([np.zeros(base), joints]))
+
+
+def refuse_small_slip(disturbances: Disturbances, integrator: str, h: float, q: Floats) -> None:
+    """Raise ArgumentError for a slip speed too small for steps of `h` [s], at configuration `q` (nq,)."""
+    model, slip, dry = disturbances.model, disturbances.friction.slip, disturbances.friction.dry
+    if not slip or not dry.any():
+        return
+    with backend("reference", model, validate=False) as engine:
+        M = engine.mass_matrix(q) + disturbances.armature
+    refuse_unstable(model, slip, STABLE.get(integrator, 2.0), h, M[None], dry[None])
+
+
+def refuse_unstable(
+    model: Model, slip: float, most: float, h: float, M: Floats, dry: Floats, first: int | None = None
+) -> None:
+    """Raise ArgumentError where h f / (M s) is above `most` in any of n rollouts.
+
+    Over a slip speed s dry friction acts near rest like a damper f / s, so that a joint obeys
+    v' = v (1 - h f / (M s)): above 2 every step reverses and enlarges v, until friction jumps between f and
+    -f from step to step.
+
+    `M` (n, nv, nv) are mass matrices with armature, `dry` (n, nv) is dry friction; `first` is the number of
+    the first rollout, if there are several.
+    """
+    root = np.sqrt(dry * (h / slip))
+    try:
+        scaled = root[:, :, None] * np.linalg.inv(M) * root[:, None, :]
+        largest = np.linalg.eigvalsh(scaled)[:, -1]
+    except np.linalg.LinAlgError:
+        return
+    row = int(np.argmax(np.where(np.isfinite(largest), largest, -np.inf)))
+    ratio = float(largest[row])
+    if not ratio > most:
+        return
+    base = 6 if model.floating else 0
+    _, vectors = np.linalg.eigh(scaled[row])
+    joint = model.joint_names[int(np.argmax(np.abs(vectors[base:, -1])))]
+    where = joint if first is None else f"{joint} in rollout {first + row}"
+    raise ArgumentError(
+        f"friction_slip is {slip:g}, so small that dry friction oscillates from step to step: "
+        f"dt f / (M friction_slip) is {ratio:.3g} at {where}, and {most:g} is the largest stable value; give "
+        f"friction_slip {1.01 * slip * ratio / most:.3g} or more, a smaller dt, or friction_slip 0, with "
+        "which joints stick and slide at any dt"
+    )

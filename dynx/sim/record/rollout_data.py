@@ -14,7 +14,7 @@ from dynx.control.base import Controller
 from dynx.errors import ArgumentError
 from dynx.files.notebook import html_grid
 from dynx.model import Model
-from dynx.sim.loop.controller_checks import controller_numbers
+from dynx.sim.controller_checks import controller_numbers
 from dynx.sim.plants.model_error import plant_model
 from dynx.sim.scenario.documents import Unknown
 from dynx.sim.scenario.scenario import Scenario

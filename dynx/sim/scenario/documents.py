@@ -28,7 +28,7 @@ from dynx.control.registry import from_document, to_document
 from dynx.errors import ArgumentError, UnknownNameError, shown
 from dynx.model import Model
 from dynx.model.documents import robot_document, robot_from_document
-from dynx.sim.loop.controller_checks import controller_numbers
+from dynx.sim.controller_checks import controller_numbers
 from dynx.sim.scenario.moved import present_fields, present_name
 from dynx.trajectory.base import Trajectory
 from dynx.world.scene import Scene

@@ -10,6 +10,7 @@ Field = TypeVar("Field")
 MODULES = {
     "dynx.control.engine_motors": "dynx.control.bullet",
     "dynx.sim.clock": "dynx.steppers.clock",
+    "dynx.sim.loop.noise": "dynx.sim.noise",
     "dynx.world.camera.view": "dynx.steppers.camera",
     "dynx.world.layout": "dynx.steppers.layout",
     "dynx.world.scene.material": "dynx.steppers.material",

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from dynx.control.friction import Coefficients
     from dynx.model import Model
-    from dynx.sim.loop.noise import Noise
+    from dynx.sim.noise import Noise
     from dynx.sim.plants.model_error import MassScale, Payload
     from dynx.sim.plants.scene_plant import ScenePlant
     from dynx.steppers.forces import ExternalForce
@@ -230,7 +230,7 @@ _JOINT_VALUES = "True for the description's, one number, one for each joint, or 
 COEFFICIENTS = JointNumbers(_JOINT_VALUES, NumberOrArray)
 LIMITS = JointNumbers(_JOINT_VALUES, NumberOrArray, others=math.inf)
 FACTORS = Factors("a factor, or factors by link", float | dict[str, Any])
-NOISE = Parts("a dynx.Noise, as in Noise(v=1e-3)", dict[str, Any], "dynx.sim.loop.noise:Noise", several=False)
+NOISE = Parts("a dynx.Noise, as in Noise(v=1e-3)", dict[str, Any], "dynx.sim.noise:Noise", several=False)
 PAYLOADS = Parts(
     "a Payload, or a list of them", list[dict[str, Any]], "dynx.sim.plants.model_error:Payload", optional=True
 )

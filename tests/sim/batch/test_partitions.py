@@ -20,7 +20,7 @@ from dynx.errors import ArgumentError
 from dynx.model.loading import load
 from dynx.sim import BatchRollouts, Noise, simulate, simulate_batch
 from dynx.sim import batch as batch_module
-from dynx.sim.loop.sensors import Sensors
+from dynx.sim.closed_loop import Sensors
 from dynx.simd.cache import load_kernel
 from dynx.simd.emit import Settings
 from dynx.spatial.scalar import Floats

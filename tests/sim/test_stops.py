@@ -15,11 +15,11 @@ from dynx.errors import DivergedError
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.sim import Rollout, Scenario, Simulation, simulate
-from dynx.sim.loop.stops import Stops
+from dynx.sim.closed_loop import Stops
 from dynx.spatial.scalar import Floats
 from tests.sim.bars import tutorial_robot
-from tests.sim.loop.test_resume import the_same
 from tests.sim.test_compiled_loop import both
+from tests.sim.test_resume import the_same
 
 ARM = tutorial_robot()
 MASS = backend("reference", ARM)

@@ -17,7 +17,7 @@ from dynx.sim import Payload, Rollout, Scenario, Simulation, simulate, simulate_
 from dynx.trajectory import cycloidal
 from dynx.trajectory.base import Setpoint
 from tests.sim.bars import tutorial_motion, tutorial_robot
-from tests.sim.loop.test_resume import the_same
+from tests.sim.test_resume import the_same
 
 ARM = tutorial_robot()
 REST = np.zeros(6)

@@ -15,8 +15,8 @@ from dynx.model import Model
 from dynx.sim import Scenario, Simulation, simulate, simulate_batch
 from dynx.trajectory.base import Setpoint
 from tests.backends.robots import chain
-from tests.sim.loop.test_resume import the_same
 from tests.sim.test_compiled_loop import both, glue
+from tests.sim.test_resume import the_same
 
 ROBOT = chain(2, "prismatic")
 GOAL = np.array([0.1, -0.2])

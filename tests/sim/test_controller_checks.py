@@ -9,7 +9,7 @@ import numpy as np
 from dynx.control.base import Controller, Measurement
 from dynx.model import Model
 from dynx.model.loading import load
-from dynx.sim.loop.controller_checks import MAX_DEPTH, ControllerWatch
+from dynx.sim.controller_checks import MAX_DEPTH, ControllerWatch
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 

@@ -13,7 +13,7 @@ from dynx.control.base import Controller, Measurement, chain_of, rebind
 from dynx.control.content import is_foreign, is_foreign_module
 from dynx.control.dynamics import Dynamics, Evaluation
 from dynx.errors import TraceError
-from dynx.sim.loop.controller_checks import ControllerWatch, defect_of_outcome
+from dynx.sim.controller_checks import ControllerWatch, defect_of_outcome
 from dynx.simd.expr import Symbol
 from dynx.simd.user_code.arrays import symbol_array, traced_array
 from dynx.simd.user_code.numbers import as_traced

@@ -1,4 +1,4 @@
-"""The plain executor of a closed loop: measure, compute the torque, clamp it, step the plant, record.
+"""A robot under a controller in closed loop: measure, compute the torque, clamp it, step the plant, record.
 
 Arguments were checked before (`dynx.sim.setup`); the loop itself detects torques that are not finite and
 divergence of the state.
@@ -11,24 +11,27 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite
+from operator import le
 from typing import Any
 
 import numpy as np
 
+from dynx.backends import Backend, backend
 from dynx.compiled.step import Status
 from dynx.control.base import Controller, Measurement
 from dynx.control.bullet import BulletMotor
 from dynx.errors import ControlError, DivergedError, DynxError, SimulationError, shown
+from dynx.model import Model
 from dynx.model.numbers import DIVERGENCE_SPEED, refuse_mask
-from dynx.sim.loop.controller_checks import ControllerWatch, defect_of_outcome, defect_of_torque
-from dynx.sim.loop.record import StateBuffers
-from dynx.sim.loop.sensors import Sensors
-from dynx.sim.loop.stops import Stops
+from dynx.sim.controller_checks import ControllerWatch, defect_of_outcome, defect_of_torque
+from dynx.sim.noise import Noise
 from dynx.sim.overshoot import largest_overshoot, overcompensated_friction
+from dynx.sim.plants.integrated import IntegratedPlant
 from dynx.sim.plants.plant import Plant, is_own, plant_errors
-from dynx.sim.step import is_diverged, torque_sum
-from dynx.spatial.scalar import Floats, clamp
+from dynx.sim.step import held_at_limits, is_diverged, measure, torque_sum
+from dynx.spatial.scalar import Array, Floats, clamp
 from dynx.steppers.clock import Clock
+from dynx.steppers.random import Purpose
 from dynx.trajectory.base import Setpoint
 
 FLOAT64 = np.dtype(np.float64)
@@ -39,6 +42,162 @@ PROGRESS_STEPS = 200
 PROBE_DISPLACEMENT = 1e-3
 """Displacement of measured coordinates [rad or m] and velocities [rad/s or m/s] at which a controller is
 evaluated to see whether it changes itself."""
+
+
+@dataclass
+class StateBuffers:
+    """States at n + 1 times, torques and accelerations of the n steps between, and the count of steps."""
+
+    q: Floats
+    v: Floats
+    a: Floats
+    tau: Floats
+    steps: int = 0
+
+    @classmethod
+    def begin(cls, q: Floats, v: Floats, n: int) -> StateBuffers:
+        """Make buffers for n steps from the state (q, v)."""
+        nv = len(v)
+        record = cls(
+            np.empty((n + 1, len(q))),
+            np.empty((n + 1, nv)),
+            np.empty((n, nv)),
+            np.empty((n, nv)),
+        )
+        record.q[0], record.v[0] = q, v
+        return record
+
+    def copy(self) -> StateBuffers:
+        """Return a copy of the steps taken."""
+        n = self.steps
+        return StateBuffers(
+            self.q[: n + 1].copy(), self.v[: n + 1].copy(), self.a[:n].copy(), self.tau[:n].copy(), n
+        )
+
+    def take(self, other: StateBuffers, n: int) -> None:
+        """Replace all steps by the first n of another record."""
+        self.q[: n + 1], self.v[: n + 1] = other.q[: n + 1], other.v[: n + 1]
+        self.a[:n], self.tau[:n] = other.a[:n], other.tau[:n]
+        self.steps = n
+
+    def extended(self, n: int) -> StateBuffers:
+        """Return a copy of the steps taken, in buffers for n steps."""
+        larger = StateBuffers.begin(self.q[0], self.v[0], n)
+        larger.take(self, self.steps)
+        return larger
+
+    def __len__(self) -> int:
+        """Return the number of steps that the buffers hold."""
+        return len(self.tau)
+
+
+class Sensors:
+    """Measurements at the control steps, from the recorded states."""
+
+    def __init__(
+        self, model: Model, clock: Clock, noise: Noise | None, controller: Controller[Any] | None = None
+    ) -> None:
+        """Raises GainError for an invalid standard deviation, ArgumentError for an invalid seed."""
+        self._model = model
+        self._clock = clock
+        self.noise: tuple[Floats, Floats] | None = None
+        """The noise of q and of v at each control step (n_controls, nv)."""
+        if noise is not None and noise.on_measurements(model.nv):
+            self.noise = noise.rows(model, clock.n_controls)
+        size = 0 if controller is None else controller.random_size
+        self.random = (
+            (noise or Noise()).numbers(Purpose.CONTROLLER, (clock.n_controls, size)) if size else None
+        )
+        """The random numbers of the controller at each control step (n_controls, random_size)."""
+
+    @property
+    def plain(self) -> bool:
+        """True if measurements have no delay, no noise and no random numbers."""
+        return self.noise is None and self.random is None and not self._clock.delay_steps
+
+    def __call__(self, step: int, q: Floats, v: Floats) -> Measurement:
+        """Return the measurement at physics step `step`, from the states (n, nq), (n, nv) until then."""
+        clock = self._clock
+        seen, number = clock.measured_step(step), clock.control_number(step)
+        noise = None if self.noise is None else (self.noise[0][number], self.noise[1][number])
+        random = None if self.random is None else self.random[number]
+        return measure(self._model, step * clock.dt, q[seen], v[seen], noise, random)
+
+
+class Stops:
+    """Inelastic impact, after each step of the plant, of the joints that passed their limits.
+
+    The joint is set to its limit. An impulse in that joint alone makes its outward velocity zero and changes
+    the velocities of the other joints according to the mass matrix: v+ = v - M^-1 E (E' M^-1 E)^-1 E' v. An
+    impulse only pushes inwards, so a joint that already moves away from its limit gets none. Steps in which
+    no joint is beyond its limits cost one comparison for each limit.
+    """
+
+    def __init__(self, model: Model, mass_matrix: Callable[[Floats], Floats]) -> None:
+        """`mass_matrix` returns M (nv, nv) of the plant with its armature."""
+        base_q, base_v = (7, 6) if model.floating else (0, 0)
+        self._q_joints, self._base = slice(base_q, None), base_v
+        self._lower, self._upper = model.lower[self._q_joints], model.upper[self._q_joints]
+        self._lowest, self._highest = self._lower.tolist(), self._upper.tolist()
+        self._unit_impulses: Floats = np.eye(model.nv)
+        self._mass_matrix = mass_matrix
+
+    @classmethod
+    def of(cls, plant: Plant, armature: Floats) -> Stops:
+        """Make the stops of a plant with `armature` (nv, nv), by its engine's mass matrix if it has one."""
+        if isinstance(plant, IntegratedPlant):
+            mass_matrix = plant.dynamics.mass_matrix
+        else:
+            mass_matrix = _MassMatrix(plant.model)
+        return cls(plant.model, lambda q: mass_matrix(q) + armature)
+
+    def excess(self, q: Array) -> Any:
+        """Return a number that is positive if a joint is beyond a limit at q (nq,), for symbols."""
+        found: Any = 0.0
+        for x, low, high in zip(q[self._q_joints].tolist(), self._lowest, self._highest, strict=True):
+            beyond = [low - x] if isfinite(low) else []
+            beyond += [x - high] if isfinite(high) else []
+            for each in beyond:
+                found = each.maximum(found)
+        return found
+
+    def __call__(self, q: Floats, v: Floats) -> tuple[Floats, Floats] | None:
+        """Return the state after the impact, or None if no joint is beyond its limits."""
+        values = q[self._q_joints].tolist()
+        if all(map(le, self._lowest, values)) and all(map(le, values, self._highest)):
+            return None
+        held, impacts = held_at_limits(q[self._q_joints], v[self._base :], self._lower, self._upper)
+        q = q.copy()
+        q[self._q_joints] = held
+        struck = np.flatnonzero(impacts)
+        outward, columns = impacts[struck], struck + self._base
+        if not columns.size:
+            return q, v
+        # Velocities after unit impulses on these joints.
+        effects = np.linalg.solve(self._mass_matrix(q), self._unit_impulses[:, columns])
+        while columns.size:
+            impulse = np.linalg.solve(effects[columns], -v[columns])
+            pushing = impulse * outward <= 0.0
+            if pushing.all():
+                v = v + effects @ impulse
+                v[columns] = 0.0
+                break
+            outward, columns, effects = outward[pushing], columns[pushing], effects[:, pushing]
+        return q, v
+
+
+class _MassMatrix:
+    """Mass matrix of a robot without joint dynamics, by a kernel that is loaded when it is first needed."""
+
+    def __init__(self, model: Model) -> None:
+        self._model = model
+
+    @cached_property
+    def _engine(self) -> Backend:
+        return backend("compiled", self._model, validate=False)
+
+    def __call__(self, q: Floats) -> Floats:
+        return self._engine.mass_matrix(q)
 
 
 @dataclass
@@ -55,7 +214,7 @@ class LoopState:
 
 
 @dataclass(frozen=True)
-class Loop:
+class ClosedLoop:
     """One controller on one plant; without a controller there is no torque."""
 
     plant: Plant
