@@ -11,7 +11,7 @@ the coefficient, or the error is unexplained::
     for result in found.results:
         print(result.case, result.trial, result.figure, result.errors, result.verdict.kind)
 
-A case is a module in `dynx.contacts.cases` with a subclass of `ContactCase`, and a line in
+A case is a subclass of `ContactCase` in a module of `dynx.contacts.cases`, and a line in
 `dynx.contacts.case.BUILT_IN`; `conform` takes those of a program as objects, or by the names that
 `dynx.contacts.case.register` gives them. Its `trials` are independent scenes, which `measure` steps in a
 world of any engine, with the help of `dynx.contacts.motion`. A case names no engine and contains no verdict.

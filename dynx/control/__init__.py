@@ -1,4 +1,4 @@
-"""Controllers, one per file: frozen dataclasses that compute torques from measurement, setpoint, state.
+"""Controllers: frozen dataclasses that compute torques from measurement, setpoint, state.
 
 Each name is imported when it is first used.
 """
@@ -16,24 +16,17 @@ if TYPE_CHECKING:
         BulletTorqueMotor,
         BulletVelocityMotor,
     )
-    from dynx.control.computed_torque import ComputedTorque
-    from dynx.control.discrete_computed_torque import DiscreteComputedTorque
-    from dynx.control.feed_forward import FeedForward
-    from dynx.control.friction import JointFriction
-    from dynx.control.friction_compensation import FrictionCompensation
-    from dynx.control.gravity_compensation import GravityCompensatedPD
-    from dynx.control.impedance import Impedance
+    from dynx.control.computed_torque import ComputedTorque, DiscreteComputedTorque
+    from dynx.control.friction import FrictionCompensation, JointFriction
+    from dynx.control.joint_space import PD, PID, FeedForward, GravityCompensatedPD, Velocity
     from dynx.control.motors_and_encoders import Encoders, MotorLag
     from dynx.control.open_loop import OpenLoop
-    from dynx.control.operational_space import OperationalSpace
-    from dynx.control.pd import PD
-    from dynx.control.pid import PID
     from dynx.control.registry import from_document as controller_from_document
     from dynx.control.registry import register as register_controller
     from dynx.control.registry import to_document as controller_to_document
     from dynx.control.registry import unregister as unregister_controller
     from dynx.control.saturation import Saturated
-    from dynx.control.velocity import Velocity
+    from dynx.control.task_space import Impedance, OperationalSpace
 
 __all__ = [
     "PD",
@@ -74,22 +67,22 @@ _HOME = {
     "BulletVelocityMotor": "dynx.control.bullet",
     "ComputedTorque": "dynx.control.computed_torque",
     "Controller": "dynx.control.base",
-    "DiscreteComputedTorque": "dynx.control.discrete_computed_torque",
+    "DiscreteComputedTorque": "dynx.control.computed_torque",
     "Encoders": "dynx.control.motors_and_encoders",
-    "FeedForward": "dynx.control.feed_forward",
-    "FrictionCompensation": "dynx.control.friction_compensation",
-    "GravityCompensatedPD": "dynx.control.gravity_compensation",
-    "Impedance": "dynx.control.impedance",
+    "FeedForward": "dynx.control.joint_space",
+    "FrictionCompensation": "dynx.control.friction",
+    "GravityCompensatedPD": "dynx.control.joint_space",
+    "Impedance": "dynx.control.task_space",
     "JointFriction": "dynx.control.friction",
     "Measurement": "dynx.control.base",
     "ModelBased": "dynx.control.base",
     "MotorLag": "dynx.control.motors_and_encoders",
     "OpenLoop": "dynx.control.open_loop",
-    "OperationalSpace": "dynx.control.operational_space",
-    "PD": "dynx.control.pd",
-    "PID": "dynx.control.pid",
+    "OperationalSpace": "dynx.control.task_space",
+    "PD": "dynx.control.joint_space",
+    "PID": "dynx.control.joint_space",
     "Saturated": "dynx.control.saturation",
-    "Velocity": "dynx.control.velocity",
+    "Velocity": "dynx.control.joint_space",
     "controller_from_document": "dynx.control.registry:from_document",
     "controller_to_document": "dynx.control.registry:to_document",
     "model_dynamics": "dynx.control.base",

@@ -1,4 +1,5 @@
-"""Computed torque: inverse dynamics of an acceleration that makes the error converge to zero."""
+"""Computed torque: inverse dynamics of an acceleration that makes the error converge to zero, and for a plant
+in discrete time the inverse of its integration step."""
 
 from __future__ import annotations
 
@@ -7,9 +8,10 @@ from dataclasses import dataclass
 from numpy.typing import ArrayLike
 
 from dynx.backends import Backend
-from dynx.control.base import Measurement, ModelBased, gain
+from dynx.control.base import Measurement, ModelBased, gain, parameter
 from dynx.control.gains import feedback_gains
 from dynx.model import Model
+from dynx.model.numbers import positive_seconds
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Array, Floats
 from dynx.trajectory.base import Setpoint
@@ -56,4 +58,39 @@ def commanded_acceleration(
 ) -> Array:
     """Return a* + kd (v* - v) + kp (q* - q), for arrays of any scalar."""
     a: Array = a_wanted + kd * (v_wanted - v) + kp * (q_wanted - q)
+    return a
+
+
+@dataclass(frozen=True)
+class DiscreteComputedTorque(ModelBased[None], pure=True):
+    """Torque with which one step of semi-implicit Euler ends exactly at the next setpoint.
+
+    The step of Bullet, and dynx's default, is v' = v + dt a, q' = q + dt v'. Solved for a it gives a = ((q* -
+    q) / dt - v) / dt, where q* is the setpoint at the end of the step. The tracking error is then round-off.
+    An initial error is removed in one step, however large the torque, and velocities are the difference
+    quotients of the reference.
+
+    It is exact if the control step equals the physics step and there is no friction; with friction wrap it in
+    `FrictionCompensation`. With another plant (RK4, sub-steps) an error of the order of dt remains.
+    """
+
+    control_dt: float = parameter("s")
+
+    lead = 1
+
+    def __init__(self, model: Model, *, control_dt: float, backend: str | Backend = DEFAULT_ENGINE) -> None:
+        """`control_dt` [s] is the plant's step. Raises ArgumentError if it is not positive."""
+        super().__init__(model, backend)
+        self._set(control_dt=positive_seconds("control_dt", control_dt))
+
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
+        """Return the torque (nv,); the setpoint is that of the end of the step."""
+        _, q, v = measurement
+        a = one_step_acceleration(q, v, setpoint.q, self.control_dt)
+        return self.dynamics.inverse_dynamics(q, v, a), None
+
+
+def one_step_acceleration(q: Array, v: Array, q_next: Array, dt: Array | float) -> Array:
+    """Solve q + dt (v + dt a) = q_next for a, for arrays of any scalar type."""
+    a: Array = ((q_next - q) / dt - v) / dt
     return a

@@ -1,20 +1,23 @@
-"""Joint friction: viscous damping and dry friction, for plants and for their compensation."""
+"""Joint friction: viscous damping and dry friction, for plants, and its compensation, which adds the torque
+of friction to that of another controller."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.backends.joint_dynamics import JointDynamicsTerms
+from dynx.control.base import Controller, ControllerState, Measurement, Wrapper, parameter
 from dynx.control.gains import checked_gain
 from dynx.errors import ArgumentError, GainError, UnknownNameError, shown
 from dynx.model import Model
 from dynx.model.numbers import is_real, real_array
 from dynx.spatial.scalar import Array, Floats, sign, tanh
+from dynx.trajectory.base import Setpoint
 
 SLIP = 1e-2
 """Default speed [rad/s or m/s] at which compensation of dry friction has 76 % of its magnitude."""
@@ -168,3 +171,70 @@ def refuse_text(name: str, given: object, joints: int, own: str = "True") -> Non
             f"{name} is {shown(given)}; wanted one number, an array ({joints},) in the order of the joints, "
             f"numbers by joint as in {{joint: number}}, or {own} for the values of the description"
         )
+
+
+SPEEDS = ("measured", "setpoint")
+
+
+@dataclass(frozen=True)
+class FrictionCompensation(Wrapper[ControllerState], pure=True):
+    """Torque of another controller plus d v + f tanh(v / slip), where v is measured or that of the setpoint.
+
+    With the measured speed the friction of a moving plant is cancelled if the coefficients are those of the
+    plant, but noise or overestimated friction may make the joint unstable, and a joint that sticks gets no
+    compensation: its speed is 0. The speed of the setpoint cannot make it unstable, and moves a joint that
+    sticks: with it and ``slip=0`` the torque breaks a joint loose as soon as the setpoint moves.
+    """
+
+    damping: bool | Floats = parameter("N m s/rad or N s/m")
+    friction: bool | Floats = parameter("N m or N")
+    slip: float = parameter("rad/s or m/s")
+    speed: str = parameter("")
+    losses: JointFriction = field(init=False, repr=False)
+
+    def __init__(
+        self,
+        inner: Controller[ControllerState],
+        *,
+        damping: Coefficients | None = None,
+        friction: Coefficients | None = None,
+        slip: float = SLIP,
+        speed: str = "measured",
+    ) -> None:
+        """The coefficients are those of `JointFriction`. Without both they are those of the description.
+
+        Of one alone the other is not compensated, because a plant without damping, as is the default of
+        `simulate`, is driven away by a torque along its speed.
+        """
+        if damping is None and friction is None:
+            damping = friction = True
+        damping, friction = (False if each is None else each for each in (damping, friction))
+        if speed not in SPEEDS:
+            raise ArgumentError(f"speed is {shown(speed)}; wanted one of {', '.join(SPEEDS)}")
+        super().__init__(inner)
+        self._set(
+            damping=_coefficients(inner.model, "damping", damping),
+            friction=_coefficients(inner.model, "friction", friction),
+            slip=float(slip),
+            speed=speed,
+            losses=JointFriction(inner.model, damping, friction, slip),
+        )
+
+    def torque(
+        self, measurement: Measurement, setpoint: Setpoint, state: ControllerState
+    ) -> tuple[Floats, ControllerState]:
+        """Return the torque (nv,) of the inner controller plus that of friction."""
+        tau, state = self.inner.torque(measurement, setpoint, state)
+        return tau + self.losses(measurement.v if self.speed == "measured" else setpoint.v), state
+
+    @property
+    def name(self) -> str:
+        """Name of the inner controller, followed by a word for the compensation."""
+        return f"{self.inner.name}, friction compensated"
+
+
+def _coefficients(model: Model, name: str, given: Coefficients) -> bool | Floats:
+    """True or False as given, numbers as an array with one for each joint."""
+    if isinstance(given, bool):
+        return given
+    return checked_gain(name, coefficients_by_joint(model, name, given), len(model.joint_names))

@@ -1,4 +1,11 @@
-"""Controllers of the joints of a robot, without the six degrees of freedom of a floating base."""
+"""Controllers of the joints of a robot, without the six degrees of freedom of a floating base.
+
+PD                    tau = kp (q* - q) + kd (v* - v)
+PID                   with anti-windup
+velocity              tau = kd (v* - v), which lets positions drift
+gravity compensation  tau = g(q) + kp (q* - q) + kd (v* - v)
+feed-forward          tau = ID(q*, v*, a*)
+"""
 
 from __future__ import annotations
 
@@ -7,11 +14,17 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from dynx.control.base import Controller, ControllerState, Measurement
+from dynx.backends import Backend
+from dynx.control.base import Controller, ControllerState, Measurement, ModelBased, gain, parameter
+from dynx.control.gains import checked_gain
+from dynx.control.saturation import checked_limit
 from dynx.model import Model
 from dynx.model.model import refuse_other_than_model
-from dynx.spatial.scalar import Array
+from dynx.model.numbers import positive_seconds
+from dynx.registry import DEFAULT_ENGINE
+from dynx.spatial.scalar import Array, Floats, clamp
 from dynx.trajectory.base import Setpoint
 
 
@@ -47,3 +60,155 @@ class JointSpace(Controller[ControllerState]):
     def all_torques(self, joint_torque: Any) -> Any:
         """Return the torque (nv,) whose joint part is `joint_torque` (n,)."""
         return np.concatenate([np.zeros(6), joint_torque]) if self.model.floating else joint_torque
+
+
+@dataclass(frozen=True)
+class PD(JointSpace[None], pure=True):
+    """A spring and a damper from each joint to its setpoint; it needs no model of the masses.
+
+    Under gravity an arm hangs by g / kp below its setpoint.
+    """
+
+    kp: Floats = gain("N m/rad or N/m")
+    kd: Floats = gain("N m s/rad or N s/m")
+
+    def __init__(self, model: Model, *, kp: ArrayLike, kd: ArrayLike) -> None:
+        """`kp` [N m/rad or N/m] and `kd` [N m s/rad or N s/m]: one number, or one for each joint."""
+        super().__init__(model)
+        n, per = self.n_joints, "one for each joint"
+        self._set(kp=checked_gain("kp", kp, n, per=per), kd=checked_gain("kd", kd, n, per=per))
+
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
+        states = self.joint_states(measurement, setpoint)
+        return self.all_torques(pd_torque(*states, self.kp, self.kd)), None
+
+
+def pd_torque(q: Array, v: Array, q_wanted: Array, v_wanted: Array, kp: Array, kd: Array) -> Array:
+    """Return kp (q* - q) + kd (v* - v), for arrays of any scalar."""
+    tau: Array = kp * (q_wanted - q) + kd * (v_wanted - v)
+    return tau
+
+
+@dataclass(frozen=True)
+class Velocity(JointSpace[None], pure=True):
+    """A damper from each joint to its velocity setpoint; positions are not controlled."""
+
+    kd: Floats = gain("N m s/rad or N s/m")
+
+    def __init__(self, model: Model, *, kd: ArrayLike) -> None:
+        """`kd` [N m s/rad or N s/m]: one number, or one for each joint."""
+        super().__init__(model)
+        self._set(kd=checked_gain("kd", kd, self.n_joints, per="one for each joint"))
+
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
+        rates = self.v_joints
+        return self.all_torques(self.kd * (setpoint.v[rates] - measurement.v[rates])), None
+
+
+@dataclass(frozen=True)
+class PID(JointSpace[Floats], pure=True):
+    """tau = kp e + kd e' + z with z' = ki e, saturated at the effort limits.
+
+    Anti-windup by back-calculation (Astrom and Murray, Feedback Systems, section 11.4): the torque beyond the
+    limits is fed back into z with the time constant `tracking_time`, so z stays within the range of the
+    motors. The state is z (n,) [N m or N], the integral part of the torque.
+    """
+
+    kp: Floats = gain("N m/rad or N/m")
+    ki: Floats = gain("N m/(rad s) or N/(m s)")
+    kd: Floats = gain("N m s/rad or N s/m")
+    control_dt: float = parameter("s")
+    tracking_time: float = parameter("s")
+    limit: Floats = parameter("N m or N")
+
+    def __init__(
+        self,
+        model: Model,
+        *,
+        kp: ArrayLike,
+        ki: ArrayLike,
+        kd: ArrayLike,
+        control_dt: float,
+        tracking_time: float | None = None,
+        limit: ArrayLike | None = None,
+    ) -> None:
+        """`control_dt` [s] is the step of the integral, the control step.
+
+        `limit` (n,) or one number [N m or N] is by default the model's effort
+        limits; `tracking_time` [s] is by default ten control steps. Raises GainError, ArgumentError, and
+        LimitError for a limit of 0.
+        """
+        super().__init__(model)
+        gains = {"kp": kp, "ki": ki, "kd": kd}
+        n, per = self.n_joints, "one for each joint"
+        self._set(**{name: checked_gain(name, value, n, per=per) for name, value in gains.items()})
+        dt = positive_seconds("control_dt", control_dt)
+        span = 10.0 * dt if tracking_time is None else positive_seconds("tracking_time", tracking_time)
+        self._set(control_dt=dt, tracking_time=span, limit=checked_limit(model, limit)[self.v_joints])
+
+    def initial_state(self) -> Floats:
+        """Return the integral part 0."""
+        return np.zeros(self.n_joints)
+
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: Floats) -> tuple[Floats, Floats]:
+        """Return the torque (nv,) within the limits, and the next integral part."""
+        q, v, q_wanted, v_wanted = self.joint_states(measurement, setpoint)
+        error = q_wanted - q
+        wanted = state + pd_torque(q, v, q_wanted, v_wanted, self.kp, self.kd)
+        tau = clamp(wanted, self.limit)
+        # A factor above 1 would overcompensate the torque beyond the limits.
+        share = min(1.0, self.control_dt / self.tracking_time)
+        integral = state + self.control_dt * self.ki * error + share * (tau - wanted)
+        return self.all_torques(tau), integral
+
+
+@dataclass(frozen=True)
+class GravityCompensatedPD(ModelBased[None], pure=True):
+    """PD control with gravity compensation, so that there is no error at rest.
+
+    Globally asymptotically stable for a constant setpoint (Takegaki and Arimoto 1981; Siciliano et al.,
+    Robotics, section 8.5.1).
+    """
+
+    kp: Floats = gain("N m/rad or N/m")
+    kd: Floats = gain("N m s/rad or N s/m")
+
+    def __init__(
+        self, model: Model, *, kp: ArrayLike, kd: ArrayLike, backend: str | Backend = DEFAULT_ENGINE
+    ) -> None:
+        """Gains are those of `PD`."""
+        super().__init__(model, backend)
+        self._set(kp=checked_gain("kp", kp, model.nv), kd=checked_gain("kd", kd, model.nv))
+
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
+        weight = self.dynamics.gravity_torque(measurement.q)
+        return weight + pd_torque(
+            measurement.q, measurement.v, setpoint.q, setpoint.v, self.kp, self.kd
+        ), None
+
+
+@dataclass(frozen=True)
+class FeedForward(ModelBased[None], pure=True):
+    """Inverse dynamics of the setpoint, and with gains PD control of the remaining error.
+
+    Without gains there is no feedback: errors are not corrected, and gravity makes them grow.
+    """
+
+    kp: Floats = gain("N m/rad or N/m")
+    kd: Floats = gain("N m s/rad or N s/m")
+
+    def __init__(
+        self,
+        model: Model,
+        *,
+        kp: ArrayLike = 0.0,
+        kd: ArrayLike = 0.0,
+        backend: str | Backend = DEFAULT_ENGINE,
+    ) -> None:
+        """Gains `kp` and `kd` are those of `PD`; by default there are none."""
+        super().__init__(model, backend)
+        self._set(kp=checked_gain("kp", kp, model.nv), kd=checked_gain("kd", kd, model.nv))
+
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
+        tau = self.dynamics.inverse_dynamics(*setpoint)
+        return tau + pd_torque(measurement.q, measurement.v, setpoint.q, setpoint.v, self.kp, self.kd), None

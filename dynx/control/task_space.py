@@ -1,4 +1,6 @@
-"""The error of a frame of the robot, on which the task-space controllers act."""
+"""Controllers of a frame of the robot: impedance control, a spring and a damper between the frame and its
+reference, and operational-space control with linear error dynamics, where the remaining freedom keeps a
+posture."""
 
 from __future__ import annotations
 
@@ -6,10 +8,16 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dynx.backends import Backend
-from dynx.control.base import ControllerState, Measurement, ModelBased
+from dynx.control.base import ControllerState, Measurement, ModelBased, gain, parameter
+from dynx.control.computed_torque import commanded_acceleration
+from dynx.control.gains import checked_gain, feedback_gains
 from dynx.model import Model
+from dynx.rbd.elimination import solve_mass_matrix
+from dynx.rbd.linear import solve_columns
+from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import pose_error
 from dynx.trajectory.base import Setpoint
@@ -48,3 +56,105 @@ class TaskSpace(ModelBased[ControllerState]):
         linear, angular = pose_error(wanted, dynamics.forward_kinematics(measurement.q, frame))
         wanted_twist = dynamics.jacobian(setpoint.q, frame) @ setpoint.v
         return FrameMotionError(np.concatenate([linear, angular]), wanted_twist - J @ measurement.v, J)
+
+
+@dataclass(frozen=True)
+class Impedance(TaskSpace[None], pure=True):
+    """tau = J' (K e + D e') + g(q) - B v, without shaping the inertia.
+
+    It is passive for a reference at rest: it supplies no energy to its environment (Hogan 1985; Siciliano et
+    al., Robotics, section 9.2). A steady force F displaces the frame by F / K.
+    """
+
+    stiffness: Floats = gain("N/m, N m/rad")
+    damping: Floats = gain("N s/m, N m s/rad")
+    joint_damping: Floats = gain("N m s/rad or N s/m")
+
+    def __init__(
+        self,
+        model: Model,
+        frame: str,
+        *,
+        stiffness: ArrayLike,
+        damping: ArrayLike,
+        joint_damping: ArrayLike = 0.0,
+        backend: str | Backend = DEFAULT_ENGINE,
+    ) -> None:
+        """`stiffness` K [N/m, N m/rad] and `damping` D [N s/m, N m s/rad] along the world's axes.
+
+        (6,), linear then angular, or one number; `joint_damping` B (nv,) damps motions that do not move the
+        frame. Raises GainError, UnknownNameError for the frame.
+        """
+        super().__init__(model, frame, backend)
+        per = "linear then angular"
+        self._set(
+            stiffness=checked_gain("stiffness", stiffness, 6, per=per),
+            damping=checked_gain("damping", damping, 6, per=per),
+            joint_damping=checked_gain("joint_damping", joint_damping, model.nv),
+        )
+
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
+        error = self._error(measurement, setpoint)
+        wrench = self.stiffness * error.pose + self.damping * error.twist
+        weight = self.dynamics.gravity_torque(measurement.q)
+        return weight + error.jacobian.T @ wrench - self.joint_damping * measurement.v, None
+
+
+@dataclass(frozen=True)
+class OperationalSpace(TaskSpace[None], pure=True):
+    """Computed torque in the space of a frame (Khatib 1987; Siciliano et al., Robotics, section 8.6.2).
+
+    The frame's error e obeys e'' + kd e' + kp e = 0. Joint accelerations that do not accelerate the frame
+    move the posture to the setpoint, by the projector of the dynamically consistent inverse J# = M^-1 J' (J
+    M^-1 J' + damping^2)^-1. `damping` keeps the torque finite near singular postures, and causes an error.
+    """
+
+    kp: Floats = gain("1/s^2")
+    kd: Floats = gain("1/s")
+    posture_kp: Floats = gain("1/s^2")
+    posture_kd: Floats = gain("1/s")
+    damping: float = parameter("")
+
+    def __init__(
+        self,
+        model: Model,
+        frame: str,
+        *,
+        kp: ArrayLike | None = None,
+        kd: ArrayLike | None = None,
+        natural_frequency: ArrayLike | None = None,
+        damping_ratio: ArrayLike = 1.0,
+        posture_kp: ArrayLike = 0.0,
+        posture_kd: ArrayLike = 1.0,
+        damping: float = 1e-3,
+        backend: str | Backend = DEFAULT_ENGINE,
+    ) -> None:
+        """Gains of the frame (6,), linear then angular, or one number; of the posture (nv,).
+
+        Units as those of `ComputedTorque`. Raises GainError, UnknownNameError for the frame.
+        """
+        super().__init__(model, frame, backend)
+        kp, kd = feedback_gains(6, kp, kd, natural_frequency, damping_ratio)
+        self._set(
+            kp=kp,
+            kd=kd,
+            posture_kp=checked_gain("posture_kp", posture_kp, model.nv),
+            posture_kd=checked_gain("posture_kd", posture_kd, model.nv),
+            damping=float(checked_gain("damping", damping, 1, per="")[0]),
+        )
+
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
+        _, q, v = measurement
+        dynamics, frame = self.dynamics, self.frame
+        error = self._error(measurement, setpoint)
+        wanted = dynamics.frame_acceleration(*setpoint, frame) + self.kd * error.twist + self.kp * error.pose
+        left = wanted - dynamics.jacobian_derivative(q, v, frame) @ v
+        posture = commanded_acceleration(q, v, *setpoint, self.posture_kp, self.posture_kd)
+        J = error.jacobian
+        inverse = solve_mass_matrix(self.model.mechanism, dynamics.mass_matrix(q), J.T)
+        a = (
+            posture
+            + inverse
+            @ solve_columns(J @ inverse + self.damping**2 * np.eye(6), (left - J @ posture)[:, None])[:, 0]
+        )
+        return dynamics.inverse_dynamics(q, v, a), None

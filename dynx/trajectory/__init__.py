@@ -12,12 +12,10 @@ Each function returns a `Trajectory`; docs/trajectories.md compares them.
 
 from dynx.trajectory.base import Setpoint, Trajectory
 from dynx.trajectory.concatenation import concatenate
-from dynx.trajectory.cycloidal import cycloidal
 from dynx.trajectory.excitation import Identifiability, excitation
 from dynx.trajectory.limit_check import check, violations
 from dynx.trajectory.line import LineTrajectory, line
-from dynx.trajectory.polynomials import cubic, quintic
-from dynx.trajectory.rest_to_rest import s_curve, trapezoidal
+from dynx.trajectory.rest_to_rest import cubic, cycloidal, quintic, s_curve, trapezoidal
 from dynx.trajectory.time_optimal import time_optimal
 from dynx.trajectory.time_optimal_path import time_optimal_path
 from dynx.trajectory.waypoints import spline

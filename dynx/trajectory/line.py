@@ -26,10 +26,9 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, pose_error
 from dynx.spatial.so3 import quat_exp, quat_from_rotation, quat_log, rotation_from_quat
 from dynx.trajectory.base import Trajectory
-from dynx.trajectory.curve import PiecewisePolynomial
+from dynx.trajectory.curve import PiecewisePolynomial, TimeScaledTrajectory, checked_law, end_setpoints
 from dynx.trajectory.limit_check import open_backend
-from dynx.trajectory.polynomials import quintic
-from dynx.trajectory.time_scaling import TimeScaledTrajectory, checked_law, end_setpoints
+from dynx.trajectory.rest_to_rest import quintic
 from dynx.trajectory.waypoints import spline_curve
 
 MIN_INTERVALS, RELIABLE_INTERVALS, MAX_INTERVALS = 8, 256, 1024

@@ -1,22 +1,31 @@
-"""Time-optimal motions along a straight line in joint space, from rest to rest, under limits.
+"""Motions between two states in closed form: cycloidal, polynomial, and time-optimal under limits.
 
-Every coordinate is a multiple of one path parameter s(t) from 0 to 1, so the joints start together, stop
-together and stay on the line; each limit of s is the smallest over the joints. The trapezoidal profile and
-the double S have closed forms (profiles as in Biagiotti and Melchiorri, Trajectory Planning for Automatic
-Machines and Robots, sections 3.2 and 3.4, from rest to rest).
+The cycloidal motion has a sinusoidal acceleration that is 0 at both ends,
+
+    s(t) = t/T - sin(2 pi t/T) / (2 pi),   0 <= t <= T
+
+(Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and Robots, section 2.2.2); polynomials
+are of degree three and five (Siciliano et al., Robotics, section 4.2.1).
+
+In the time-optimal motions, from rest to rest, every coordinate is a multiple of one path parameter s(t) from
+0 to 1, so the joints start together, stop together and stay on the line; each limit of s is the smallest over
+the joints. The trapezoidal profile and the double S have closed forms (profiles as in Biagiotti and
+Melchiorri, sections 3.2 and 3.4).
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, TrajectoryError
 from dynx.model import Model
-from dynx.trajectory.base import MAX_DURATION, MIN_DURATION, Trajectory, checked_duration
-from dynx.trajectory.curve import PiecewisePolynomial, polynomial_from_phases, single_polynomial
+from dynx.spatial.scalar import Floats
+from dynx.trajectory.base import MAX_DURATION, MIN_DURATION, Trajectory, checked_duration, read_only
+from dynx.trajectory.curve import Curve, PiecewisePolynomial, polynomial_from_phases, single_polynomial
 from dynx.trajectory.displacement import Ends, checked_ends
 from dynx.trajectory.motion_limits import (
     LIMIT_MARGIN,
@@ -135,3 +144,114 @@ def _standstill(ends: Ends, duration: float) -> Trajectory:
 def _require_finite(name: str, bound: float) -> None:
     if bound == math.inf:
         raise ArgumentError(f"{name} is infinite for everything that moves; wanted a limit")
+
+
+def cycloidal(q0: ArrayLike, q1: ArrayLike, duration: float, *, model: Model | None = None) -> Trajectory:
+    """Return the cycloidal motion from rest at `q0` to rest at `q1` (nq,) in `duration` [s]:
+
+        q = q0 + (q1 - q0) (t/T - sin(2 pi t/T) / (2 pi))
+
+    The largest speed is 2 (q1 - q0) / T, at T/2; the largest acceleration 2 pi (q1 - q0) / T^2, at T/4 and
+    3T/4. A robot with a floating base needs its `model`: the base moves along one screw axis, and v, a are in
+    its axes. The quaternion of q1 may be returned with the opposite sign, which is the same orientation.
+
+    Raises ArgumentError (ShapeError, DTypeError, NotFiniteError) for invalid arguments.
+    """
+    ends = checked_ends(q0, q1, model)
+    T = checked_duration(duration)
+    return ends.rest_to_rest(T, Cycloid(T, read_only(ends.displacement)))
+
+
+@dataclass(frozen=True, eq=False)
+class Cycloid(Curve):
+    """`direction` (k,) times the cycloidal motion law over [0, duration]."""
+
+    duration: float
+    direction: Floats
+
+    @property
+    def knots(self) -> Floats:
+        return np.array([0.0, self.duration])
+
+    def __call__(self, t: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return the motion law and its exact derivatives, times the direction."""
+        T = self.duration
+        part = t / T
+        sine = np.sin(2.0 * np.pi * part)
+        half = np.sin(np.pi * part)
+        s = part - sine / (2.0 * np.pi)
+        # 1 - cos(2 u) = 2 sin(u)^2, which does not cancel near rest.
+        s_dot = 2.0 * half * half / T
+        s_ddot = 2.0 * np.pi * sine / (T * T)
+        return (
+            s[:, None] * self.direction,
+            s_dot[:, None] * self.direction,
+            s_ddot[:, None] * self.direction,
+        )
+
+
+def cubic(
+    q0: ArrayLike,
+    q1: ArrayLike,
+    duration: float,
+    *,
+    v0: ArrayLike | None = None,
+    v1: ArrayLike | None = None,
+    model: Model | None = None,
+) -> Trajectory:
+    """Return the cubic from `q0` with velocity `v0` to `q1` with `v1` in `duration` [s]; v0, v1 default to 0.
+
+    Of all motions between these states it has the smallest integral of a^2. Its acceleration jumps at the
+    ends: from rest to rest it is 6 (q1 - q0) / T^2 there. A floating base needs the `model`, moves along one
+    screw axis and must start and end at rest: v0[:6] and v1[:6] must be 0.
+
+    Raises ArgumentError (ShapeError, DTypeError, NotFiniteError) for invalid arguments.
+    """
+    ends = checked_ends(q0, q1, model)
+    T = checked_duration(duration)
+    d, begin, finish = ends.displacement, ends.velocity("v0", v0), ends.velocity("v1", v1)
+    square = (3.0 * d / T - 2.0 * begin - finish) / T
+    cube = (begin + finish - 2.0 * d / T) / (T * T)
+    curve = single_polynomial(T, 0.0 * d, begin, square, cube)
+    last = 2.0 * (2.0 * finish + begin - 3.0 * d / T) / T
+    return ends.trajectory(T, curve, (begin, 2.0 * square), (finish, last))
+
+
+def quintic(
+    q0: ArrayLike,
+    q1: ArrayLike,
+    duration: float,
+    *,
+    v0: ArrayLike | None = None,
+    v1: ArrayLike | None = None,
+    a0: ArrayLike | None = None,
+    a1: ArrayLike | None = None,
+    model: Model | None = None,
+) -> Trajectory:
+    """Return the quintic from the state (`q0`, `v0`, `a0`) to (`q1`, `v1`, `a1`) in `duration` [s].
+
+    v and a default to 0. Of all motions between these states it has the smallest integral of the squared
+    jerk. A floating base needs the `model`, moves along one screw axis and must start and end at rest: the
+    first six entries of v and a must be 0.
+
+    Raises ArgumentError (ShapeError, DTypeError, NotFiniteError) for invalid arguments.
+    """
+    ends = checked_ends(q0, q1, model)
+    T = checked_duration(duration)
+    d = ends.displacement
+    v_start, v_end = ends.velocity("v0", v0), ends.velocity("v1", v1)
+    a_start, a_end = ends.velocity("a0", a0), ends.velocity("a1", a1)
+    # Differences of position, velocity and acceleration left at T, in units where T = 1.
+    x = d - T * v_start - 0.5 * T * T * a_start
+    v = T * (v_end - v_start - T * a_start)
+    a = T * T * (a_end - a_start)
+    curve = single_polynomial(
+        T,
+        0.0 * d,
+        v_start,
+        0.5 * a_start,
+        (10.0 * x - 4.0 * v + 0.5 * a) / T**3,
+        (-15.0 * x + 7.0 * v - a) / T**4,
+        (6.0 * x - 3.0 * v + 0.5 * a) / T**5,
+    )
+    return ends.trajectory(T, curve, (v_start, a_start), (v_end, a_end))

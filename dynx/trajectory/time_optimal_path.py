@@ -31,11 +31,10 @@ from dynx.model import Model
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory, read_only_setpoint
-from dynx.trajectory.curve import PiecewisePolynomial
+from dynx.trajectory.curve import PiecewisePolynomial, TimeScaledTrajectory, end_setpoints
 from dynx.trajectory.displacement import DisplacementTrajectory, Ends, configuration
 from dynx.trajectory.limit_check import open_backend
 from dynx.trajectory.motion_limits import checked_limit, require_positive_finite, velocity_limits
-from dynx.trajectory.time_scaling import TimeScaledTrajectory, end_setpoints
 from dynx.trajectory.waypoints import checked_waypoints, spline_curve
 
 NEGLIGIBLE = 1e-12

@@ -1,22 +1,24 @@
-"""The links of a robot as nodes of the page: placed by configuration, with visual and collision shapes."""
+"""Robots and scenes as nodes of the page, placed by configuration or by poses of parts, and a camera that
+follows a part."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from dynx.errors import DynxError
+from dynx.errors import ArgumentError, DynxError, nearest, shown
 from dynx.model import Model
 from dynx.model.geometry import Mesh, Shape
 from dynx.model.geometry.links import Collision, Colour, Visual
 from dynx.model.geometry.visible_shapes import link_shapes
 from dynx.rbd.link_poses import link_poses
 from dynx.spatial.scalar import Floats
-from dynx.viewer.colours import GREY, ORANGE, RGB
-from dynx.viewer.drawn_parts import DrawnParts, wxyz
+from dynx.spatial.so3 import quat_from_rotation
+from dynx.viewer.colours import GREY, ORANGE, RGB, VERMILION
+from dynx.viewer.page import Page
 from dynx.viewer.triangles import (
     TRIANGLE_BUDGET,
     Triangles,
@@ -26,6 +28,79 @@ from dynx.viewer.triangles import (
     resized,
     turned_outwards,
 )
+from dynx.world.scene import SceneBody
+
+_STILL = 1e-12
+"""Change of a pose below which it is not sent [m, and entries of a rotation]."""
+
+Quaternion = tuple[float, float, float, float]
+
+
+class DrawnParts:
+    """Nodes of the page by the names of parts, below one root.
+
+    The node of a part may lie below that of another. A revolute joint then changes only the rotation of one
+    node, and what is fixed to a part moves with it, so that a page gets far fewer messages than for poses in
+    the world.
+    """
+
+    def __init__(self, root: Any, parts: dict[str, Any], above: Mapping[str, str]) -> None:
+        """`above` names the part below whose node that of a part lies; the others lie below the root."""
+        self._root = root
+        self.parts = parts
+        """The node of each part."""
+        self._number = {name: k for k, name in enumerate(parts)}
+        # The last row is the world.
+        self._above = np.array([self._number[above[n]] if n in above else -1 for n in parts], dtype=np.intp)
+        self._poses = np.tile(np.eye(4), (len(parts) + 1, 1, 1))
+        self._sent = np.full((len(parts), 3, 4), np.nan)
+        self._placed: list[Callable[[Mapping[str, Floats]], None]] = []
+
+    def on_placed(self, placed: Callable[[Mapping[str, Floats]], None]) -> None:
+        """Call `placed(poses)` whenever parts were placed."""
+        self._placed.append(placed)
+
+    def pose(self, name: str) -> Floats:
+        """Return the pose (4, 4) in the world at which a part was placed last."""
+        return np.array(self._poses[self._number[name]])
+
+    def place(self, poses: Mapping[str, Floats]) -> None:
+        """Place parts at the poses (4, 4) in the world given."""
+        for name, T in poses.items():
+            self._poses[self._number[name]] = T
+        here, above = self._poses[:-1], self._poses[self._above]
+        inverse = np.swapaxes(above[:, :3, :3], 1, 2)
+        seen = inverse @ here[:, :3]
+        seen[:, :, 3:] -= inverse @ above[:, :3, 3:]
+        still = np.abs(seen - self._sent).max(axis=(1, 2), initial=0.0) <= _STILL
+        moved = np.flatnonzero(~still)
+        self._sent[moved] = seen[moved]
+        nodes = list(self.parts.values())
+        turns = np.roll(quat_from_rotation(seen[moved, :, :3]), 1, axis=-1).tolist()
+        for k, turn, origin in zip(moved.tolist(), turns, seen[moved, :, 3].tolist(), strict=True):
+            nodes[k].wxyz, nodes[k].position = tuple(turn), tuple(origin)
+        for placed in self._placed:
+            placed(poses)
+
+    def remove(self) -> None:
+        """Remove all parts from the page."""
+        self._root.remove()
+
+    @property
+    def visible(self) -> bool:
+        """True while the parts are shown."""
+        return bool(self._root.visible)
+
+    @visible.setter
+    def visible(self, shown: bool) -> None:
+        self._root.visible = shown
+
+
+def wxyz(R: Floats) -> Quaternion:
+    """Return the unit quaternion (w, x, y, z) of a rotation (3, 3), as viser writes it."""
+    x, y, z, w = quat_from_rotation(R).tolist()
+    return (w, x, y, z)
+
 
 COLLISION_OPACITY = 0.4
 GHOST_OPACITY = 0.3
@@ -265,3 +340,177 @@ def size_of(model: Model) -> float:
     origins = np.array([T[:3, 3] for _, T in link_poses(model, model.neutral())])
     extent = float(np.linalg.norm(origins.max(axis=0) - origins.min(axis=0)))
     return extent if extent > 0.0 else 0.3
+
+
+class DrawnScene(DrawnParts):
+    """Robots by name and bodies; a part is a body, or a link as ``robot/link``."""
+
+    def __init__(
+        self,
+        scene: Any,
+        path: str,
+        robots: Mapping[str, Model],
+        bodies: Iterable[SceneBody] = (),
+        look: Look = AS_DESCRIBED,
+    ) -> None:
+        """`scene` is that of a viser server, and `path` the node of everything drawn here."""
+        root = scene.add_frame(path, show_axes=False)
+        self.robots = {
+            name: DrawnRobot(scene, f"{path}/robot{k}", model, look)
+            for k, (name, model) in enumerate(robots.items())
+        }
+        """The robots by name."""
+        parts: dict[str, Any] = {
+            f"{robot}/{link}": node
+            for robot, drawn in self.robots.items()
+            for link, node in drawn.links.items()
+        }
+        faults = [
+            fault if fault.startswith(f"{name} ") else f"{name}: {fault}"
+            for name, drawn in self.robots.items()
+            for fault in drawn.notes
+        ]
+        start = {
+            f"{robot}/{link}": drawn.pose(link)
+            for robot, drawn in self.robots.items()
+            for link in drawn.links
+        }
+        self._bodies: dict[str, list[Any]] = {}
+        for k, body in enumerate(bodies):
+            node = parts[body.name] = scene.add_frame(f"{path}/body{k}", show_axes=False)
+            self._bodies[body.name] = []
+            try:
+                self._bodies[body.name] = list(_add_body(scene, node, body, look))
+            except DynxError as error:
+                faults.append(f"{body.name}: {error}")
+            start[body.name] = body.pose.matrix
+        above = {
+            f"{robot}/{link}": f"{robot}/{parent}"
+            for robot, drawn in self.robots.items()
+            for link, parent in drawn.above.items()
+        }
+        super().__init__(root, parts, above)
+        self.place(start)
+        self.faults = tuple(faults)
+        """Shapes that cannot be drawn, one sentence each."""
+
+    @property
+    def visuals(self) -> dict[str, list[Any]]:
+        """The nodes of the visual shapes of each link of the robots, and of each body."""
+        links = {
+            f"{name}/{link}": nodes
+            for name, robot in self.robots.items()
+            for link, nodes in robot.visuals.items()
+        }
+        return links | self._bodies
+
+    def show(self, *, visuals: bool, collisions: bool) -> None:
+        """Show or hide the visual shapes and the collision shapes of the robots."""
+        for robot in self.robots.values():
+            robot.show(visuals=visuals, collisions=collisions)
+
+
+def _add_body(scene: Any, node: Any, body: SceneBody, look: Look) -> Iterator[Any]:
+    rgba = body.material.rgba
+    opacity = look.opacity or (None if rgba[3] == 1.0 else rgba[3])
+    for k, placed in enumerate(body.shapes):
+        yield add_triangles(
+            scene,
+            f"{node.name}/shape{k}",
+            resized(reduced(placed.shape, look.triangles), look.size),
+            placed.origin.matrix,
+            look.colour or rgb_of(rgba),
+            opacity,
+            flat=isinstance(placed.shape, Mesh),
+        )
+
+
+class ContactArrows:
+    """An arrow for each contact, along its force, at its point; the scale is fixed, in metres a newton."""
+
+    def __init__(self, scene: Any, metres_per_newton: float, thickness: float) -> None:
+        self._scene, self._scale, self._thickness = scene, metres_per_newton, thickness
+        self._node: Any = None
+        self.shown = True
+        """True while the arrows are shown."""
+
+    def put(self, points: Floats, forces: Floats) -> None:
+        """Show forces (m, 3) [N] at points (m, 3) [m], in world axes."""
+        if not self.shown or not len(points):
+            if self._node is not None:
+                self._node.visible = False
+            return
+        ends = points + self._scale * forces
+        segments = np.stack([points, ends], axis=1).astype(np.float32)
+        if self._node is None:
+            self._node = self._scene.add_arrows(
+                "/contact_forces",
+                segments,
+                VERMILION,
+                shaft_radius=self._thickness,
+                head_radius=2.5 * self._thickness,
+                head_length=4.0 * self._thickness,
+            )
+        else:
+            self._node.points = segments
+            self._node.visible = True
+
+
+_NO_PART = "none"
+
+_FREE, _FOLLOWS, _FIRST_PERSON = "free", "moves with", "looks from"
+
+
+class FollowingCamera:
+    """The controls of the camera; it moves all open pages alike."""
+
+    def __init__(self, page: Page, drawn: DrawnParts) -> None:
+        self._page, self._drawn = page, drawn
+        self._before: Floats | None = None
+        gui = page.gui
+        with gui.add_folder("camera", expand_by_default=False):
+            self._mode = gui.add_dropdown("it is", (_FREE, _FOLLOWS, _FIRST_PERSON), initial_value=_FREE)
+            # An empty scene has no part.
+            self._part = gui.add_dropdown("part", tuple(drawn.parts) or (_NO_PART,))
+        self._mode.on_update(lambda _: self._start())
+        self._part.on_update(lambda _: self._start())
+        drawn.on_placed(self._move)
+
+    def watch(self, drawn: DrawnParts) -> None:
+        """Follow the parts of another drawing with the same names from now on."""
+        self._drawn, self._before = drawn, None
+        drawn.on_placed(self._move)
+
+    def follow(self, part: str | None, *, first_person: bool = False) -> None:
+        """Follow a part; None leaves the camera where it is. Raises ArgumentError for an unknown part."""
+        if part is not None:
+            if part not in self._drawn.parts:
+                raise ArgumentError(f"no part {shown(part)}{nearest(str(part), self._drawn.parts)}")
+            self._part.value = part
+        self._mode.value = _FREE if part is None else _FIRST_PERSON if first_person else _FOLLOWS
+        self._start()
+
+    def _start(self) -> None:
+        with self._page.lock:
+            self._before = None
+            part = self._part.value
+            self._move({part: self._drawn.pose(part)} if part in self._drawn.parts else {})
+
+    def _move(self, poses: Mapping[str, Floats]) -> None:
+        mode = self._mode.value
+        T = poses.get(self._part.value)
+        if mode == _FREE or T is None:
+            return
+        origin = np.array(T[:3, 3])
+        shift = None if self._before is None else origin - self._before
+        self._before = origin
+        for client in self._page.server.get_clients().values():
+            camera = client.camera
+            if mode == _FIRST_PERSON:
+                with client.atomic():
+                    camera.up_direction = tuple(T[:3, 2].tolist())
+                    camera.position = tuple(origin.tolist())
+                    camera.look_at = tuple((origin + T[:3, 0]).tolist())
+            elif shift is not None:
+                # viser moves what the camera looks at along with it.
+                camera.position = tuple((np.array(camera.position) + shift).tolist())

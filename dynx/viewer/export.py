@@ -21,7 +21,7 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_rpy
 from dynx.steppers.camera import DrawnShape
-from dynx.viewer.browser.client import standalone
+from dynx.viewer.browser import standalone
 from dynx.viewer.colours import GREY, SKY_BLUE
 from dynx.viewer.drawn_robot import size_of
 from dynx.viewer.framing import VIEW_DIRECTION, box_around, fitting_distance

@@ -19,6 +19,7 @@ from dynx.viewer.triangles import triangles_of
 if TYPE_CHECKING:
     from dynx.world.scene import SceneBody
 
+
 VIEW_DIRECTION = np.array([1.0, -1.0, 0.7]) / math.sqrt(2.49)
 """Unit vector (3,) from what is seen to the camera."""
 

@@ -13,10 +13,9 @@ from dynx.model.elements import Inertial
 from dynx.model.geometry import Box, Sphere
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import rotation_from_quat
-from dynx.viewer.browser.client import names_element
+from dynx.viewer.browser import names_element
 from dynx.viewer.colours import BLUE, RGB, SKY_BLUE, VERMILION, YELLOW
-from dynx.viewer.drawn_parts import wxyz
-from dynx.viewer.drawn_robot import DrawnRobot, size_of
+from dynx.viewer.drawn_robot import DrawnRobot, size_of, wxyz
 from dynx.viewer.page import Page
 from dynx.viewer.triangles import triangles_of
 

@@ -2,22 +2,286 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from dynx.spatial.scalar import Floats
-from dynx.viewer.colours import BLUE, SKY_BLUE, css
-from dynx.viewer.drawn_robot import AS_DESCRIBED, GHOST_OPACITY, GHOST_SIZE, Look
-from dynx.viewer.drawn_scene import ContactArrows, DrawnScene
-from dynx.viewer.following_camera import FollowingCamera
+from dynx.viewer.colours import BLUE, DASHES, SERIES, SKY_BLUE, css
+from dynx.viewer.controls import slider_step
+from dynx.viewer.drawn_robot import (
+    AS_DESCRIBED,
+    GHOST_OPACITY,
+    GHOST_SIZE,
+    ContactArrows,
+    DrawnScene,
+    FollowingCamera,
+    Look,
+)
 from dynx.viewer.framing import box_around, has_ground
+from dynx.viewer.library import uplot
 from dynx.viewer.marks import NamedParts
 from dynx.viewer.motion import PARTED, Motion, motion_separation
 from dynx.viewer.page import Page
-from dynx.viewer.timeline import Curves, Timeline
+
+UPDATES_PER_SECOND = 40.0
+"""Rate at which the page is moved while a motion plays; 30 arrive where the machine is busy."""
+
+SLIDER_UPDATES_PER_SECOND = 10.0
+"""Largest rate at which the slider moves while a motion plays: the page lays out its panel anew each time."""
+
+SPEEDS = ("1/10", "1/4", "1/2", "1", "2", "4")
+"""Choices of the speed, relative to the clock."""
+
+
+class Timeline:
+    """The controls of the time, and the thread that plays."""
+
+    def __init__(
+        self, page: Page, end: float, step: float, show: Callable[[float], None], *, play: bool = False
+    ) -> None:
+        """`show(time)` shows the motion at a time from 0 to `end` [s]; `step` [s] is that of two buttons."""
+        self._page, self._end, self._step, self._show = page, max(end, 1e-9), step, show
+        self._ended = page.ended
+        self._time = 0.0
+        self._running = threading.Event()
+        gui = page.gui
+        with gui.add_folder("time"):
+            self._slider = gui.add_slider(
+                "time [s]", 0.0, self._end, step=slider_step(0.0, self._end), initial_value=0.0
+            )
+            self._button = gui.add_button("play")
+            back, forward = gui.add_button("step back"), gui.add_button("step forward")
+            self._speed = gui.add_dropdown("speed", SPEEDS, initial_value="1")
+            self._loop = gui.add_checkbox("loop", initial_value=False)
+        self._slider.on_update(self._scrubbed)
+        self._button.on_click(lambda _: self.play_or_pause())
+        back.on_click(lambda _: self._move(-self._step))
+        forward.on_click(lambda _: self._move(self._step))
+        page.on_own_key("P", "play or pause", self.play_or_pause)
+        page.at_end(self._running.set)
+        self._thread = threading.Thread(target=self._play, name="dynx timeline", daemon=True)
+        self.go_to(0.0)
+        self._thread.start()
+        if play:
+            self.play()
+
+    @property
+    def time(self) -> float:
+        """The time that is shown [s]."""
+        return self._time
+
+    @property
+    def playing(self) -> bool:
+        """True while the motion plays."""
+        return self._running.is_set()
+
+    def play(self) -> None:
+        """Play on; from the start if the motion is at its end."""
+        if self._time >= self._end:
+            self.go_to(0.0)
+        self._button.label = "pause"
+        self._running.set()
+
+    def play_or_pause(self) -> None:
+        """Pause what plays, and play what does not."""
+        if self.playing:
+            self.pause()
+        else:
+            self.play()
+
+    def pause(self) -> None:
+        """Stop playing."""
+        self._running.clear()
+        self._slider.value = self._time
+        self._button.label = "play"
+
+    def go_to(self, time: float) -> None:
+        """Show the motion at a time [s], moved into its range."""
+        self._place(time, slider=True)
+
+    def _place(self, time: float, *, slider: bool) -> None:
+        with self._page.lock, self._page.together():
+            if self._ended.is_set():
+                return
+            self._time = min(max(time, 0.0), self._end)
+            if slider:
+                self._slider.value = self._time
+            self._show(self._time)
+
+    def _move(self, by: float) -> None:
+        self.pause()
+        self.go_to(self._time + by)
+
+    def _scrubbed(self, event: Any) -> None:
+        if event.client is None:  # Moved by `go_to`, not in the page.
+            return
+        with self._page.lock, self._page.together():
+            self._time = float(self._slider.value)
+            self._show(self._time)
+
+    def _play(self) -> None:
+        period = 1.0 / UPDATES_PER_SECOND
+        while not self._ended.is_set():
+            self._running.wait()
+            if self._ended.is_set():
+                return
+            began, start, speed = time.monotonic(), self._time, self._speed.value
+            moved = -math.inf
+            while self._running.is_set() and self._speed.value == speed:
+                wanted = start + (time.monotonic() - began) * _number(speed)
+                if wanted >= self._end:
+                    self.go_to(self._end)
+                    if self._loop.value:
+                        self.go_to(0.0)
+                    else:
+                        self.pause()
+                    break
+                now = time.monotonic()
+                slider = now - moved >= 1.0 / SLIDER_UPDATES_PER_SECOND
+                moved = now if slider else moved
+                self._place(wanted, slider=slider)
+                # The next multiple of the period, whatever this update took.
+                if self._ended.wait(period - (time.monotonic() - began) % period):
+                    return
+                if self._time != wanted:  # Scrubbed meanwhile: go on from there.
+                    break
+
+
+def _number(speed: str) -> float:
+    above, _, below = speed.partition("/")
+    return float(above) / float(below or 1.0)
+
+
+MAX_POINTS = 400
+"""Largest number of points of a curve."""
+
+CURVE_UPDATES_PER_SECOND = 5.0
+"""Largest rate at which curves are redrawn while a motion plays."""
+
+VALUES_PER_SECOND = 20_000.0
+"""Largest number of values of one plot that are sent a second while a motion plays."""
+
+_SMALL = 0.05
+"""Values below which a plot shows a power of ten: the numbers at its axis have three decimals."""
+_NOTHING = 1e-12
+"""Values below which they count as zero."""
+
+_PADDING = (8, 16, 0, 0)
+"""Space above, right of, below and left of a plot for half of a number at the end of an axis [pixels]."""
+
+_LARGEST_LEGEND = 7
+"""Number of curves up to which the legend is shown; of more, one can be chosen."""
+
+_ALL = "(all)"
+
+
+class Curves:
+    """Some quantities over time; what comes after the time that is shown is left out.
+
+    The legend of many curves would be higher than the plot, so that one of them is chosen by its name.
+    """
+
+    def __init__(
+        self,
+        page: Page,
+        title: str,
+        t: Floats,
+        values: Floats,
+        names: Sequence[str],
+        span: tuple[float, float] | None = None,
+    ) -> None:
+        """`values` (n, m) are those of m quantities `names` at the times t (n,) [s].
+
+        The axis of time covers the times `span` [s]; by default from the first to the last of t.
+        """
+        picked = np.unique(np.linspace(0, len(t) - 1, min(len(t), MAX_POINTS)).round().astype(int))
+        self._t, self._values = np.ascontiguousarray(t[picked]), np.array(values[picked], dtype=np.float64)
+        self._span = span or (float(self._t[0]), float(self._t[-1]))
+        self._drawn_at = -math.inf
+        self._period = max(1.0 / CURVE_UPDATES_PER_SECOND, self._values.size / VALUES_PER_SECOND)
+        power = _power(self._values)
+        if power:
+            self._values *= 10.0**power
+            title = f"{title} x 1e-{power}"
+        self._page, self._names = page, tuple(names)
+        self._picked = range(len(names))
+        self._shown = len(self._t)
+        if len(names) > _LARGEST_LEGEND:
+            choice = page.gui.add_dropdown("curve", (_ALL, *names), initial_value=_ALL)
+            choice.on_update(lambda _: self._pick(choice.value))
+        self._plot = page.gui.add_uplot(
+            self._data(),
+            series=self._series(),
+            title=title,
+            scales=self._scales(),
+            legend=self._legend(),
+            aspect=1.6,
+            padding=_PADDING,
+        )
+
+    def put(self, now: float, *, at_once: bool = False) -> None:
+        """Draw the curves up to the time `now` [s]; not more often than the page can follow, or `at_once`."""
+        clock = time.monotonic()
+        if not at_once and clock - self._drawn_at < self._period:
+            return
+        self._drawn_at = clock
+        self._shown = int(np.searchsorted(self._t, now + 1e-9, side="right"))
+        self._plot.data = self._data()
+
+    def _pick(self, name: str) -> None:
+        """Draw the curve of that name alone, in its colour, or all."""
+        k = self._names.index(name) if name != _ALL else None
+        self._picked = range(len(self._names)) if k is None else range(k, k + 1)
+        with self._page.lock, self._page.together():
+            self._plot.data, self._plot.series = self._data(), self._series()
+            self._plot.scales, self._plot.legend = self._scales(), self._legend()
+
+    def _data(self) -> tuple[Floats, ...]:
+        shown = self._values[:, self._picked]
+        shown[self._shown :] = np.nan
+        return (self._t, *(np.ascontiguousarray(column) for column in shown.T))
+
+    def _series(self) -> tuple[Any, ...]:
+        return (uplot.Series(label="t"), *(_series(k, self._names[k]) for k in self._picked))
+
+    def _scales(self) -> dict[str, Any]:
+        """Return the ranges of both axes: those of the whole motion, so that they stay while it plays."""
+        values = self._values[:, self._picked]
+        finite = values[np.isfinite(values)]
+        low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
+        margin = 0.05 * (high - low) or max(abs(high), 1.0) * 0.05
+        return {
+            "x": uplot.Scale(time=False, auto=False, range=self._span),
+            "y": uplot.Scale(range=(low - margin, high + margin)),
+        }
+
+    def _legend(self) -> Any:
+        return uplot.Legend(show=len(self._picked) <= _LARGEST_LEGEND)
+
+
+def _power(values: Floats) -> int:
+    """Return the power of ten by which values are multiplied, so that three decimals show them."""
+    finite = values[np.isfinite(values)]
+    largest = float(np.abs(finite).max(initial=0.0))
+    if largest >= _SMALL or largest < _NOTHING:
+        return 0
+    return 3 * math.ceil(-math.log10(largest) / 3.0)
+
+
+def _series(k: int, name: str) -> Any:
+    """Return the look of the curve with the number k."""
+    stroke, (look, dashes) = css(SERIES[k % len(SERIES)]), DASHES[k // len(SERIES) % len(DASHES)]
+    if dashes is None:
+        return uplot.Series(label=name, stroke=stroke, width=2, pxAlign=False)
+    # The legend shows only the colour.
+    return uplot.Series(label=f"{name} ({look})", stroke=stroke, width=2, dash=dashes, pxAlign=False)
+
 
 _NO_PART = "none"
 

@@ -16,9 +16,7 @@ import numpy as np
 from dynx.errors import ArgumentError, shown
 from dynx.model.numbers import whole_number
 from dynx.spatial.scalar import Floats
-from dynx.viewer.browser.access import Access, is_loopback
-from dynx.viewer.browser.client import NO_SOFTWARE_MESSAGE, Client
-from dynx.viewer.browser.messages import CheckedMessages
+from dynx.viewer.browser import NO_SOFTWARE_MESSAGE, Access, CheckedMessages, Client, is_loopback
 from dynx.viewer.framing import VIEW_DIRECTION, fitting_distance, round_length
 from dynx.viewer.library import serve, silent
 

@@ -15,9 +15,7 @@ from dynx.errors import ArgumentError, ClosedError, DynxError, nearest, shown
 from dynx.model.numbers import checked_array
 from dynx.rbd.link_poses import link_poses
 from dynx.spatial.scalar import Floats
-from dynx.viewer.drawn_robot import AS_DESCRIBED, Look
-from dynx.viewer.drawn_scene import ContactArrows, DrawnScene
-from dynx.viewer.following_camera import FollowingCamera
+from dynx.viewer.drawn_robot import AS_DESCRIBED, ContactArrows, DrawnScene, FollowingCamera, Look
 from dynx.viewer.framing import box_around, has_ground
 from dynx.viewer.marks import NamedParts
 from dynx.viewer.motion import Motion, fixed_bodies, motion_of_state

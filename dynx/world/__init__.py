@@ -23,8 +23,18 @@ if TYPE_CHECKING:
     from dynx.world.contacts import ClosestPoints, Contact, RayHits
     from dynx.world.motors import Motor, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
     from dynx.world.record import Record
-    from dynx.world.scene.bodies import SceneBody, body_to_urdf, box, capsule, cylinder, ground, mesh, sphere
-    from dynx.world.scene.constraints import PointToPoint, Weld
+    from dynx.world.scene.bodies import (
+        PointToPoint,
+        SceneBody,
+        Weld,
+        body_to_urdf,
+        box,
+        capsule,
+        cylinder,
+        ground,
+        mesh,
+        sphere,
+    )
     from dynx.world.scene.files import read_scene, write_scene
     from dynx.world.scene.mjcf import scene_to_mjcf
     from dynx.world.scene.robots import SceneRobot
@@ -92,7 +102,7 @@ _HOME = {
     "Motor": "dynx.world.motors",
     "PDMotor": "dynx.world.motors",
     "Picture": "dynx.world.camera.picture",
-    "PointToPoint": "dynx.world.scene.constraints",
+    "PointToPoint": "dynx.world.scene.bodies",
     "PositionMotor": "dynx.world.motors",
     "RayHits": "dynx.world.contacts",
     "Record": "dynx.world.record",
@@ -104,7 +114,7 @@ _HOME = {
     "Surroundings": "dynx.world.surroundings",
     "TorqueMotor": "dynx.world.motors",
     "VelocityMotor": "dynx.world.motors",
-    "Weld": "dynx.world.scene.constraints",
+    "Weld": "dynx.world.scene.bodies",
     "World": "dynx.world.world",
     "WorldComparison": "dynx.world.comparison",
     "WorldState": "dynx.steppers.state",

@@ -24,7 +24,7 @@ from dynx.steppers.layout import (
     RobotLayout,
 )
 from dynx.world.scene import Material, PointToPoint, Scene, SceneBody, SceneRobot, Weld
-from dynx.world.scene.link_frames import LinkFrames
+from dynx.world.scene.robots import LinkFrames
 
 MAX_COLLIDERS = 10_000
 """Largest number of links and bodies with shapes; the filter has an entry for each pair."""

@@ -21,9 +21,8 @@ from dynx.steppers.layout import Layout
 from dynx.steppers.native_queries import NativeQueries, RayHit, native_queries_of
 from dynx.steppers.state import WorldState
 from dynx.steppers.stepper import Stepper, TouchingPoint
+from dynx.world.boxes import OwnerPoses, collider_box, shape_box
 from dynx.world.contacts import ClosestPoints, Contact, RayHits
-from dynx.world.geometry.boxes import collider_box, shape_box
-from dynx.world.geometry.owner_poses import OwnerPoses
 from dynx.world.scene import Scene
 
 

@@ -32,8 +32,7 @@ from dynx.steppers.stepper import Stepper
 from dynx.world.commands import Commands, MotorsOf, with_scene_motors
 from dynx.world.contacts import MAX_RAY_LENGTH, ClosestPoints, Contact, RayHits
 from dynx.world.motion import Motion, apply_state, checked_state
-from dynx.world.notes.overlaps import Overlap, overlaps_of
-from dynx.world.notes.start_notes import notes_on_engine, notes_on_start
+from dynx.world.notes.start_notes import Overlap, notes_on_engine, notes_on_start, overlaps_of
 from dynx.world.preparation import prepare
 from dynx.world.scene.documents import scene_document, scene_from_document
 from dynx.world.scene.paths import ScenePaths

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from dynx.contacts import ContactCase, Figure, conform
-from dynx.contacts.cases.slope import Slope
+from dynx.contacts.cases.friction import Slope
 from dynx.errors import ArgumentError
 from dynx.model import Pose
 from dynx.world import Scene, World, box, ground, register_world, unregister_world

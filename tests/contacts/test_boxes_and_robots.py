@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import dynx
-from dynx.contacts.cases import driven_platform, pushed_box, standing_robot, tipping_box
-from dynx.contacts.scenes import G
+from dynx.contacts.cases import friction, resting
+from dynx.contacts.motion import G
 from dynx.spatial.scalar import Floats
 
 
@@ -39,71 +39,69 @@ def tip(b: float, h: float, force: Floats, push: Floats | None, angle: float) ->
     return w, worst
 
 
-@pytest.mark.parametrize("angle", tipping_box.ANGLES)
+@pytest.mark.parametrize("angle", friction.ANGLES)
 def test_a_box_tips_on_a_slope_as_its_equation_of_motion_says(angle: float) -> None:
-    slope = math.atan(tipping_box.TippingBox.trials["tips"].tangent)
+    slope = math.atan(friction.TippingBox.trials["tips"].tangent)
     force = G * np.array([math.sin(slope), -math.cos(slope)])
-    w, ratio = tip(tipping_box.HALF_WIDTH, tipping_box.HALF_HEIGHT, force, None, angle)
-    assert math.isclose(tipping_box.tipping_speed(slope, angle), w, rel_tol=1e-4)
+    w, ratio = tip(friction.HALF_WIDTH, friction.HALF_HEIGHT, force, None, angle)
+    assert math.isclose(friction.tipping_speed_on_slope(slope, angle), w, rel_tol=1e-4)
     # The edge does not slip.
-    assert ratio < tipping_box.TippingBox.trials["tips"].friction
+    assert ratio < friction.TippingBox.trials["tips"].friction
 
 
 def test_a_box_does_not_tip_below_the_threshold() -> None:
-    slope = math.atan(tipping_box.HALF_WIDTH / tipping_box.HALF_HEIGHT)
-    assert tipping_box.tipping_speed(slope + 1e-9, 1e-6) > 0.0
+    slope = math.atan(friction.HALF_WIDTH / friction.HALF_HEIGHT)
+    assert friction.tipping_speed_on_slope(slope + 1e-9, 1e-6) > 0.0
     with pytest.raises(ValueError, match="math domain"):
-        tipping_box.tipping_speed(slope - 1e-3, 1e-6)
+        friction.tipping_speed_on_slope(slope - 1e-3, 1e-6)
 
 
 def test_a_pushed_cube_tips_as_its_equation_of_motion_says() -> None:
-    push = pushed_box.PushedBox.trials["tips"]
-    half = pushed_box.HALF
+    push = friction.PushedBox.trials["tips"]
+    half = friction.HALF
     force, at_top = np.array([0.0, -G]), np.array([push.force, 0.0])
-    w, ratio = tip(half, half, force, at_top, pushed_box.TILT)
-    assert math.isclose(pushed_box.tipping_speed(push.force, pushed_box.TILT), w, rel_tol=1e-4)
+    w, ratio = tip(half, half, force, at_top, friction.TILT)
+    assert math.isclose(friction.tipping_speed_under_push(push.force, friction.TILT), w, rel_tol=1e-4)
     assert ratio < push.friction
 
 
 def test_trials_are_on_the_sides_of_the_thresholds_that_their_names_say() -> None:
-    ratio = tipping_box.HALF_WIDTH / tipping_box.HALF_HEIGHT
-    trials = tipping_box.TippingBox.trials
+    ratio = friction.HALF_WIDTH / friction.HALF_HEIGHT
+    trials = friction.TippingBox.trials
     assert trials["rests"].tangent < min(trials["rests"].friction, ratio)
     assert trials["slides"].friction < min(trials["slides"].tangent, ratio)
     assert ratio < trials["tips"].tangent < trials["tips"].friction
-    pushes = pushed_box.PushedBox.trials
+    pushes = friction.PushedBox.trials
     assert pushes["stays"].force < pushes["stays"].friction * G
     assert pushes["slides"].force > pushes["slides"].friction * G
     # Push and friction turn a cube that slides about its centre less than the normal force at its edge can.
     push = pushes["slides"]
-    lever = push.height - pushed_box.HALF
-    assert push.force * lever + push.friction * G * pushed_box.HALF < G * pushed_box.HALF
-    limit = driven_platform.FRICTION * G * (driven_platform.PLATFORM + driven_platform.BLOCK)
-    forces = driven_platform.DrivenPlatform.trials
+    lever = push.height - friction.HALF
+    assert push.force * lever + push.friction * G * friction.HALF < G * friction.HALF
+    limit = resting.FRICTION * G * (resting.PLATFORM + resting.BLOCK)
+    forces = resting.DrivenPlatform.trials
     assert forces["sticks"] < limit < forces["slides"]
 
 
 @pytest.mark.parametrize("force", [0.0, 5.0, 11.0, 12.0, 30.0])
 def test_platform_and_block_have_the_momentum_of_the_force(force: float) -> None:
-    block, platform = driven_platform.accelerations(force)
-    total = driven_platform.BLOCK * block + driven_platform.PLATFORM * platform
+    block, platform = resting.accelerations(force)
+    total = resting.BLOCK * block + resting.PLATFORM * platform
     assert math.isclose(total, force, abs_tol=1e-12)
-    assert block <= min(platform, driven_platform.FRICTION * G) + 1e-12
+    assert block <= min(platform, resting.FRICTION * G) + 1e-12
 
 
 def test_platform_and_block_change_continuously_at_the_threshold() -> None:
-    limit = driven_platform.FRICTION * G * (driven_platform.PLATFORM + driven_platform.BLOCK)
-    assert np.allclose(
-        driven_platform.accelerations(limit), driven_platform.accelerations(limit * (1 + 1e-12))
-    )
+    limit = resting.FRICTION * G * (resting.PLATFORM + resting.BLOCK)
+    assert np.allclose(resting.accelerations(limit), resting.accelerations(limit * (1 + 1e-12)))
 
 
 def test_forces_on_feet_balance_the_weight_of_the_robot_that_is_simulated() -> None:
-    weight, front = standing_robot.foot_forces()
-    robot = dynx.load(standing_robot.quadruped(), base="floating")
+    weight, front = resting.foot_forces()
+    robot = dynx.load(resting.quadruped(), base="floating")
     assert math.isclose(weight, robot.total_mass * G)
-    q = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, *[standing_robot.LEG] * 4])
+    q = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, *[resting.LEG] * 4])
     # The moment of gravity about the y axis through the rear feet, from the dynamics of the robot.
     gravity = dynx.backend("reference", robot).gravity_torque(q)
-    moment = gravity[4] - standing_robot.REACH * gravity[2]
-    assert math.isclose(-moment, front * 2.0 * standing_robot.REACH, rel_tol=1e-12)
+    moment = gravity[4] - resting.REACH * gravity[2]
+    assert math.isclose(-moment, front * 2.0 * resting.REACH, rel_tol=1e-12)

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from dynx.contacts import Figure, find_case
-from dynx.contacts.cases.stack import BOXES, EDGE
+from dynx.contacts.cases.resting import BOXES, EDGE
+from dynx.contacts.motion import G
 from dynx.contacts.run import CaseRun, Measured, carry_out
-from dynx.contacts.scenes import G
 from dynx.steppers.registry import installed_worlds
 
 WITHOUT_HOPS = {"impedance": (0.02, 0.9, 1.0, 0.5, 2.0), "time_constant": 1e-6, "substeps": 8}

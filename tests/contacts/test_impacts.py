@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.contacts.cases import bouncing_ball
-from dynx.contacts.impacts import Throw, after_bounce, farthest, rms_deviation, speeds_after_collision
+from dynx.contacts.cases import collisions
+from dynx.contacts.motion import Throw, after_bounce, farthest, rms_deviation, speeds_after_collision
 
 MASSES = st.floats(0.01, 100.0)
 SPEEDS = st.floats(-10.0, 10.0)
@@ -73,35 +73,35 @@ def test_bounces_are_those_of_a_ball_whose_flights_are_integrated() -> None:
         flight = (velocity + math.sqrt(velocity**2 + 2.0 * g * height)) / g
         time += flight
         impacts.append(time)
-        velocity, height = bouncing_ball.RESTITUTION * (g * flight - velocity), 0.0
+        velocity, height = collisions.RESTITUTION * (g * flight - velocity), 0.0
         tops.append(velocity**2 / (2.0 * g))
-    unit = bouncing_ball.fall_time(1.0)
-    assert np.allclose([bouncing_ball.impact_time(n) for n in range(1, 5)], np.array(impacts) / unit)
-    assert np.allclose(tops, [bouncing_ball.RESTITUTION ** (2 * n) for n in range(1, 5)])
+    unit = collisions.fall_time(1.0)
+    assert np.allclose([collisions.impact_time(n) for n in range(1, 5)], np.array(impacts) / unit)
+    assert np.allclose(tops, [collisions.RESTITUTION ** (2 * n) for n in range(1, 5)])
 
 
 @pytest.mark.parametrize("dt", [1e-2, 1e-3])
 def test_flights_are_told_apart_where_no_sample_is_near_the_ground(dt: float) -> None:
     g, merged = 9.81, 0
-    for fall in bouncing_ball.HEIGHTS:
-        unit = bouncing_ball.fall_time(fall)
-        ends = np.array([bouncing_ball.impact_time(n) for n in range(1, 6)]) * unit
+    for fall in collisions.BOUNCING_BALL_HEIGHTS:
+        unit = collisions.fall_time(fall)
+        ends = np.array([collisions.impact_time(n) for n in range(1, 6)]) * unit
         times = np.arange(0.0, ends[3], dt)
         number = np.searchsorted(ends, times)
-        launch = bouncing_ball.RESTITUTION**number * np.where(number, math.sqrt(2.0 * g * fall), 0.0)
+        launch = collisions.RESTITUTION**number * np.where(number, math.sqrt(2.0 * g * fall), 0.0)
         since = times - np.where(number, ends[number - 1], 0.0)
         heights = np.where(number, launch * since, fall) - 0.5 * g * since**2
-        merged += int(np.any(np.diff(number)[heights[1:] > bouncing_ball.MIN_HEIGHT * fall]))
-        found = bouncing_ball.rebound_heights(heights / fall, launch - g * since)
-        wanted = [bouncing_ball.RESTITUTION ** (2 * n) for n in range(1, 4)]
+        merged += int(np.any(np.diff(number)[heights[1:] > collisions.MIN_HEIGHT * fall]))
+        found = collisions.rebound_heights(heights / fall, launch - g * since)
+        wanted = [collisions.RESTITUTION ** (2 * n) for n in range(1, 4)]
         assert np.allclose(found, wanted, rtol=0.0, atol=g * dt**2 / 8.0 / fall + 1e-12)
     assert (merged > 0) == (dt > 5e-3)
 
 
 def test_all_bounces_take_as_long_as_their_geometric_series() -> None:
     # All bounces take (1 + e) / (1 - e) of the time of the fall.
-    e = bouncing_ball.RESTITUTION
-    assert math.isclose(bouncing_ball.impact_time(60), (1.0 + e) / (1.0 - e), rel_tol=1e-12)
+    e = collisions.RESTITUTION
+    assert math.isclose(collisions.impact_time(60), (1.0 + e) / (1.0 - e), rel_tol=1e-12)
 
 
 def test_farthest_is_the_largest_error_and_not_the_largest_number() -> None:

@@ -28,9 +28,8 @@ from dynx.control import (
     Saturated,
     Velocity,
 )
-from dynx.control.computed_torque import commanded_acceleration
-from dynx.control.discrete_computed_torque import one_step_acceleration
-from dynx.control.pd import pd_torque
+from dynx.control.computed_torque import commanded_acceleration, one_step_acceleration
+from dynx.control.joint_space import pd_torque
 from dynx.errors import ArgumentError, ShapeError
 from dynx.model.loading import load
 from dynx.trajectory.base import Setpoint

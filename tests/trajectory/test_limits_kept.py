@@ -12,7 +12,7 @@ from dynx import load
 from dynx.errors import ArgumentError, TrajectoryError
 from dynx.spatial.scalar import Floats
 from dynx.trajectory import Trajectory, s_curve, time_optimal, time_optimal_path, trapezoidal
-from dynx.trajectory.time_scaling import TimeScaledTrajectory
+from dynx.trajectory.curve import TimeScaledTrajectory
 from tests.examples import one_robot
 from tests.trajectory.motions import bounds, displacements, floating, hundredths
 

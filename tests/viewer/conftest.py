@@ -14,7 +14,7 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_quat
 from dynx.viewer import Viewer
-from dynx.viewer.drawn_parts import DrawnParts
+from dynx.viewer.drawn_robot import DrawnParts
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 

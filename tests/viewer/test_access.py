@@ -20,8 +20,7 @@ from websockets.sync.client import connect
 
 import dynx
 from dynx.viewer import Viewer
-from dynx.viewer.browser.access import Access, is_loopback
-from dynx.viewer.browser.messages import alike, fits
+from dynx.viewer.browser import Access, alike, fits, is_loopback
 from tests.viewer.conftest import Opened, connected, until
 
 VERSION: Any = f"viser-v{viser.__version__}"

@@ -20,9 +20,8 @@ from dynx.viewer.motion import (
     motion_of_run,
     motion_separation,
 )
-from dynx.viewer.motion_view import MotionView
+from dynx.viewer.motion_view import Curves, MotionView, _power
 from dynx.viewer.page import Page
-from dynx.viewer.timeline import Curves, _power
 from dynx.world import Scene, SceneRobot, box, ground
 from dynx.world.comparison import compare_engines
 from dynx.world.scene import read_scene

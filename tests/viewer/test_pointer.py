@@ -11,7 +11,7 @@ import numpy as np
 import dynx
 from dynx.spatial.scalar import Floats
 from dynx.viewer import view
-from dynx.viewer.browser.client import HOVERED
+from dynx.viewer.browser import HOVERED
 from dynx.world import World
 from dynx.world.scene import read_scene
 from tests.viewer.conftest import PATIENCE, PICTURE, Opened, OpenPage, antialiased, connected, pixel_of, until

@@ -10,7 +10,7 @@ import dynx
 from dynx import Pose
 from dynx.spatial.scalar import Floats
 from dynx.world import PointToPoint, Scene, SceneRobot, Weld, World, box
-from dynx.world.scene.link_frames import LinkFrames
+from dynx.world.scene.robots import LinkFrames
 from tests.world.engines import WORLDS
 
 pytestmark = pytest.mark.parametrize("engine", WORLDS)

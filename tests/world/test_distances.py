@@ -15,7 +15,7 @@ from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, 
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies.geometry import poses
 from dynx.world import Scene, SceneBody, SceneRobot, World, box, ground, sphere
-from dynx.world.geometry.boxes import shape_box
+from dynx.world.boxes import shape_box
 from tests.distance.shapes import random_pose
 from tests.world.engines import WORLDS
 

@@ -15,7 +15,7 @@ from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, 
 from dynx.model.tree import Base
 from dynx.spatial.so3 import rotation_from_rpy
 from dynx.world import Scene, SceneBody, SceneRobot, World, box, ground, sphere
-from dynx.world.geometry.boxes import shape_box
+from dynx.world.boxes import shape_box
 from tests.world.engines import WORLDS
 from tests.world.standing import quadruped
 

@@ -14,7 +14,7 @@ from dynx.model.geometry.ray_casting import cast_on_shape
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import scenes
 from dynx.world import Scene, SceneBody, World
-from dynx.world.geometry.owner_poses import OwnerPoses
+from dynx.world.boxes import OwnerPoses
 from dynx.world.queries import first_hits
 from tests.conftest import needs_examples
 from tests.world.engines import WORLDS

@@ -19,7 +19,7 @@ from dynx.model.library import robots
 from dynx.model.tree import Base
 from dynx.spatial.scalar import Floats
 from dynx.world import Scene, SceneRobot, World, ground
-from dynx.world.geometry.boxes import shape_box
+from dynx.world.boxes import shape_box
 from tests.world.engines import WORLDS
 
 

@@ -1,1 +1,1 @@
-"""Cases of dynx, one in each module."""
+"""Cases of dynx, those of one kind of contact in one module."""

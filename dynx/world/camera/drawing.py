@@ -16,8 +16,8 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import inverse
 from dynx.steppers.camera import Camera, Draw, Drawing, DrawnShape
 from dynx.steppers.state import WorldState
+from dynx.world.boxes import shape_box
 from dynx.world.camera.picture import Picture
-from dynx.world.geometry.boxes import shape_box
 from dynx.world.scene import Scene
 
 MAX_PAIRS = 1_000_000

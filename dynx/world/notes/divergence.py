@@ -16,9 +16,7 @@ from dynx.steppers.layout import Layout, Owner
 from dynx.steppers.state import WorldState
 from dynx.steppers.stepper import Stepper
 from dynx.world.motors import JointLaw
-from dynx.world.notes.overlaps import overlaps_of
-from dynx.world.notes.start_notes import joints_beyond_limits, violations
-from dynx.world.notes.unbounded_motions import unbounded_motions
+from dynx.world.notes.start_notes import joints_beyond_limits, overlaps_of, unbounded_motions, violations
 
 MIN_SPEED_CHANGE = 100.0
 """Change of a velocity [rad/s or m/s] in one step from which a torque or force is a likely cause."""

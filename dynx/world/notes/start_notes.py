@@ -3,19 +3,97 @@ without a bound; coefficients of contact that the engine does not have."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
 from dynx.errors import shown
+from dynx.model.mechanism import ROOT, Mechanism
 from dynx.spatial.so3 import quat_from_rotation, quat_log
-from dynx.steppers.layout import ConstraintLayout, Layout
+from dynx.steppers.conditioning import main_joints, singular_direction
+from dynx.steppers.layout import Collider, ConstraintLayout, Layout
 from dynx.steppers.materials import inexact_materials
 from dynx.steppers.state import WorldState
 from dynx.steppers.stepper import Stepper
-from dynx.world.geometry.owner_poses import owner_pose
-from dynx.world.notes.overlaps import overlaps_of
-from dynx.world.notes.unbounded_motions import unbounded_motions
+from dynx.world.boxes import owner_pose, shape_box
+
+MIN_DEPTH = 1e-3
+"""Depth [m] from which two parts count as overlapping: at rest, parts sink into one another by less."""
+
+MIN_DEPTH_SHARE = 0.05
+"""Depth from which two smaller parts do, relative to the shortest edge of the smaller one's box."""
+
+
+class Overlap(NamedTuple):
+    """Two parts that overlap, and by how much at their deepest contact [m]."""
+
+    a: str
+    b: str
+    depth: float
+
+
+def overlaps_of(engine: Stepper) -> tuple[Overlap, ...]:
+    """Return the parts that may touch and overlap at the present state, the deepest first."""
+    deepest: dict[tuple[int, int], float] = {}
+    for point in engine.contacts():
+        pair = min(point.a, point.b), max(point.a, point.b)
+        deepest[pair] = max(deepest.get(pair, 0.0), -point.distance)
+    colliders = engine.layout.colliders
+    found = [
+        Overlap(colliders[a].name, colliders[b].name, depth)
+        for (a, b), depth in deepest.items()
+        if depth > min(MIN_DEPTH, MIN_DEPTH_SHARE * min(_shortest_edge(colliders[k]) for k in (a, b)))
+    ]
+    return tuple(sorted(found, key=lambda overlap: -overlap.depth))
+
+
+def _shortest_edge(collider: Collider) -> float:
+    """Return the shortest edge of the boxes around the shapes [m]."""
+    boxes = (shape_box(each.shape, each.T) for each in collider.shapes)
+    return min(float(np.min(upper - lower)) for lower, upper in boxes)
+
+
+def unbounded_motions(layout: Layout, state: WorldState) -> Iterator[str]:
+    """Yield, for each robot, why its acceleration has no bound at a state or where two of its axes align."""
+    for robot in layout.robots:
+        model = robot.model
+        if not model.mechanism.bodies:
+            continue
+        found = singular_direction(model, state.robots[robot.name].q)
+        if found is not None:
+            _, direction = found
+            joints = [shown(f"{robot.name}/{name}") for name in main_joints(model, direction)]
+            yield (
+                f"the mass matrix of {shown(robot.name)} is singular to rounding, because its links have "
+                f"almost no inertia about {' and '.join(joints) or 'its base'}"
+            )
+        elif (axes := _massless_gimbal(model.mechanism)) is not None:
+            moving = [joint.name for joint in model.joints if joint.moves]
+            first, last = (shown(f"{robot.name}/{moving[k]}") for k in axes)
+            yield (
+                f"the links between {first} and {last} have no mass, so that the motion has no bound where "
+                "the axes of these two joints align"
+            )
+
+
+def _massless_gimbal(mechanism: Mechanism) -> tuple[int, int] | None:
+    """Return the first and the last of three revolute joints in series without mass between them."""
+    children = Counter(body.parent for body in mechanism.bodies)
+    for last, body in enumerate(mechanism.bodies):
+        chain = [last]
+        while len(chain) < 3 and (parent := mechanism.bodies[chain[-1]].parent) != ROOT:
+            inertia = mechanism.bodies[parent].inertia
+            if float(inertia.mass) != 0.0 or np.any(inertia.rotational_inertia != 0.0):
+                break
+            if children[parent] > 1:
+                break
+            chain.append(parent)
+        if len(chain) == 3 and body.revolute and all(mechanism.bodies[k].revolute for k in chain):
+            return chain[-1], last
+    return None
+
 
 MAX_OVERLAPS = 5
 """Largest number of overlaps that are noted one by one."""

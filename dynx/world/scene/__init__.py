@@ -10,8 +10,18 @@ from dynx.registry import moved_names
 if TYPE_CHECKING:
     from dynx.model.library import scene_names
     from dynx.steppers.material import Material, contact_material
-    from dynx.world.scene.bodies import SceneBody, body_to_urdf, box, capsule, cylinder, ground, mesh, sphere
-    from dynx.world.scene.constraints import PointToPoint, Weld
+    from dynx.world.scene.bodies import (
+        PointToPoint,
+        SceneBody,
+        Weld,
+        body_to_urdf,
+        box,
+        capsule,
+        cylinder,
+        ground,
+        mesh,
+        sphere,
+    )
     from dynx.world.scene.files import read_scene, write_scene
     from dynx.world.scene.mjcf import scene_to_mjcf
     from dynx.world.scene.robots import SceneRobot
@@ -40,11 +50,11 @@ __all__ = [
 
 _HOME = {
     "Material": "dynx.steppers.material",
-    "PointToPoint": "dynx.world.scene.constraints",
+    "PointToPoint": "dynx.world.scene.bodies",
     "Scene": "dynx.world.scene.scene",
     "SceneBody": "dynx.world.scene.bodies",
     "SceneRobot": "dynx.world.scene.robots",
-    "Weld": "dynx.world.scene.constraints",
+    "Weld": "dynx.world.scene.bodies",
     "body_to_urdf": "dynx.world.scene.bodies",
     "box": "dynx.world.scene.bodies",
     "capsule": "dynx.world.scene.bodies",

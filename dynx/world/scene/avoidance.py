@@ -13,11 +13,9 @@ from dynx.errors import ArgumentError, DescriptionError, shown
 from dynx.model import Link, Model
 from dynx.model.geometry import Collision
 from dynx.spatial.scalar import Floats
-from dynx.world.scene.bodies import SceneBody
-from dynx.world.scene.constraints import Constraint, Weld
+from dynx.world.scene.bodies import Constraint, SceneBody, Weld
 from dynx.world.scene.filters import CollisionFilter, merged_links
-from dynx.world.scene.link_frames import LinkFrames
-from dynx.world.scene.robots import SceneRobot
+from dynx.world.scene.robots import LinkFrames, SceneRobot
 
 _IDENTITY: Floats = np.eye(4)
 

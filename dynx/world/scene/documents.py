@@ -39,8 +39,7 @@ from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_quat
 from dynx.steppers.material import DEFAULT_MATERIAL, Material
 from dynx.world.motors import Motor, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
-from dynx.world.scene.bodies import SceneBody
-from dynx.world.scene.constraints import Constraint, PointToPoint, Weld
+from dynx.world.scene.bodies import Constraint, PointToPoint, SceneBody, Weld
 from dynx.world.scene.paths import ScenePaths
 from dynx.world.scene.robots import SceneRobot
 from dynx.world.scene.scene import Scene

@@ -6,8 +6,7 @@ from collections.abc import Iterable
 
 from dynx.model import Model
 from dynx.world.scene.bodies import SceneBody
-from dynx.world.scene.names import split_name
-from dynx.world.scene.robots import SceneRobot
+from dynx.world.scene.robots import SceneRobot, split_name
 
 
 class CollisionFilter:

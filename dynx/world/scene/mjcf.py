@@ -28,11 +28,9 @@ from dynx.spatial.so3 import rotation_from_quat, rotation_from_rpy, skew
 from dynx.steppers.contact_springs import damping_ratio
 from dynx.steppers.material import geometric_means, material_numbers
 from dynx.steppers.mean_coefficients import contact_directions, contact_priorities
-from dynx.world.scene.constraints import PointToPoint, Weld
+from dynx.world.scene.bodies import PointToPoint, Weld
 from dynx.world.scene.filters import CollisionFilter, merged_links
-from dynx.world.scene.link_frames import LinkFrames
-from dynx.world.scene.names import WORLD, split_name
-from dynx.world.scene.robots import SceneRobot
+from dynx.world.scene.robots import WORLD, LinkFrames, SceneRobot, split_name
 from dynx.world.scene.scene import Scene
 
 LEAST_INERTIA = 1e-15

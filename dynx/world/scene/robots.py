@@ -15,10 +15,56 @@ from dynx.model.configuration import checked_q, neutral
 from dynx.model.elements import checked_pose
 from dynx.model.model import refuse_other_than_model
 from dynx.model.numbers import checked_array
+from dynx.model.urdf.values import name_fault
+from dynx.rbd.kinematics import body_poses
+from dynx.spatial.scalar import Floats
+from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import quat_from_rotation
 from dynx.steppers.material import DEFAULT_MATERIAL, Material, checked_material
 from dynx.world.motors import Motor, combine
-from dynx.world.scene.names import checked_name
+
+WORLD = "world"
+"""Name of the fixed world in constraints."""
+
+
+def checked_name(what: str, name: object) -> str:
+    """Return the name of a robot, body or group; raise ArgumentError for an invalid one."""
+    if not isinstance(name, str):
+        raise ArgumentError(f"the name of a {what} is {shown(name)}; wanted a str")
+    fault = name_fault(name)
+    if fault is not None:
+        raise ArgumentError(f"the name of a {what} {fault}")
+    if "/" in name or name == WORLD:
+        raise ArgumentError(
+            f"the name of a {what} is {shown(name)}; wanted one other than {WORLD!r} and without '/', which "
+            "joins the names of a robot and its link"
+        )
+    return name
+
+
+def split_name(name: str) -> tuple[str, str | None]:
+    """Return the robot or body of a name, and the link where it is ``robot/link``."""
+    owner, slash, link = name.partition("/")
+    return owner, link if slash else None
+
+
+class LinkFrames:
+    """The frames of a robot's links: the body of the mechanism that each is fixed to, and its pose there."""
+
+    def __init__(self, model: Model) -> None:
+        self._mechanism = model.mechanism
+        frames = model.mechanism.frames
+        self._at = {frame.name: (frame.body, homogeneous(frame.R, frame.p)) for frame in frames}
+
+    def __getitem__(self, link: str) -> tuple[int, Floats]:
+        body, T = self._at[link]
+        return body, np.asarray(T, dtype=np.float64)
+
+    def pose(self, q: Floats, link: str) -> Floats:
+        """Return T_world_link (4, 4) at the configuration `q` (nq,) of the model."""
+        poses = body_poses(self._mechanism, self._mechanism.tree_q(q))
+        body, T = self[link]
+        return np.asarray(homogeneous(*poses[body]) @ T)
 
 
 @dataclass(frozen=True)

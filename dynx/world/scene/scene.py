@@ -17,11 +17,9 @@ from dynx.model.numbers import checked_gravity
 from dynx.model.tree import STANDARD_GRAVITY
 from dynx.option_names import checks_option_names
 from dynx.steppers.material import Material
-from dynx.world.scene.bodies import SceneBody
-from dynx.world.scene.constraints import Constraint, PointToPoint, Weld
+from dynx.world.scene.bodies import Constraint, PointToPoint, SceneBody, Weld
 from dynx.world.scene.filters import CollisionFilter
-from dynx.world.scene.names import WORLD, checked_name, split_name
-from dynx.world.scene.robots import SceneRobot
+from dynx.world.scene.robots import WORLD, SceneRobot, checked_name, split_name
 
 if TYPE_CHECKING:
     from dynx.distance.avoidance import Avoidance
@@ -249,9 +247,7 @@ def _instances(name: str, parts: object, kinds: type | UnionType) -> tuple[objec
 
 
 def _spelled(kinds: object) -> str:
-    return (
-        kinds.__name__ if isinstance(kinds, type) else str(kinds).replace("dynx.world.scene.constraints.", "")
-    )
+    return kinds.__name__ if isinstance(kinds, type) else str(kinds).replace("dynx.world.scene.bodies.", "")
 
 
 def _names(what: str, names: object) -> tuple[str, ...]:

@@ -16,12 +16,8 @@ import pytest
 import dynx
 from dynx import trajectory
 from dynx.control.base import Controller, Measurement
-from dynx.control.computed_torque import ComputedTorque
-from dynx.control.discrete_computed_torque import DiscreteComputedTorque
-from dynx.control.feed_forward import FeedForward
-from dynx.control.gravity_compensation import GravityCompensatedPD
-from dynx.control.pd import PD
-from dynx.control.pid import PID
+from dynx.control.computed_torque import ComputedTorque, DiscreteComputedTorque
+from dynx.control.joint_space import PD, PID, FeedForward, GravityCompensatedPD
 from dynx.control.saturation import Saturated
 from dynx.errors import ArgumentError, DivergedError, UnsupportedFeatureError
 from dynx.model import Model
@@ -172,7 +168,7 @@ def test_ctrl_c_keeps_what_is_done(
 KILLED = """
 import os, signal, sys, numpy as np, dynx
 from dynx import trajectory
-from dynx.control.pd import PD
+from dynx.control.joint_space import PD
 from dynx.sim import batch
 batch.PART = 4
 arm = dynx.load("ur5")

@@ -28,7 +28,7 @@ from dynx.world import (
     scene_to_mjcf,
     sphere,
 )
-from dynx.world.scene.link_frames import LinkFrames
+from dynx.world.scene.robots import LinkFrames
 from tests.world.materials import four_materials
 from tests.world.scene.test_files import require_robots
 

@@ -1,1 +1,0 @@
-"""Scripts of dynx that run in the browser."""
