@@ -21,6 +21,8 @@ MODULES = {
     "dynx.sim.clock": "dynx.steppers.clock",
     "dynx.sim.loop.noise": "dynx.sim.noise",
     "dynx.trajectory.cycloidal": "dynx.trajectory.rest_to_rest",
+    "dynx.trajectory.excitation": "dynx.trajectory.identification",
+    "dynx.trajectory.line": "dynx.trajectory.straight_line",
     "dynx.trajectory.polynomials": "dynx.trajectory.rest_to_rest",
     "dynx.trajectory.time_scaling": "dynx.trajectory.curve",
     "dynx.world.camera.view": "dynx.steppers.camera",
