@@ -34,7 +34,7 @@ import sys
 from dynx.world import World
 from tests.world.test_saving import final
 with World.read(sys.argv[1]) as world:
-    print(world.time.hex(), final(world, 1000).tobytes().hex())
+    print(world.time.hex(), final(world, 300).tobytes().hex())
 """
 
 
@@ -45,11 +45,11 @@ def test_a_saved_world_continues_bit_for_bit(engine: str, tmp_path: Path) -> Non
         world.write(tmp_path / "world")
         snapshot = world.save()
         time = world.time
-        expected = final(world, 1000)
+        expected = final(world, 300)
         assert len(world.contacts()) > 8
         world.restore(snapshot)
         assert world.time == time
-        assert (final(world, 1000) == expected).all()
+        assert (final(world, 300) == expected).all()
     run = subprocess.run(
         [sys.executable, "-c", IN_ANOTHER_PROCESS, str(tmp_path / "world")],
         capture_output=True,

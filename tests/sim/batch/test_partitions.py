@@ -80,7 +80,7 @@ def assert_rows(found: BatchRollouts, rows: slice) -> None:
         assert one.tobytes() == np.ascontiguousarray(other).tobytes(), field.name
 
 
-@settings(max_examples=25)
+@settings(max_examples=15)
 @given(
     first=st.integers(0, ROLLOUTS - 1),
     count=st.integers(1, ROLLOUTS),

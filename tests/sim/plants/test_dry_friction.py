@@ -176,7 +176,6 @@ def test_modes_that_cycle_are_corrected_one_at_a_time(monkeypatch: pytest.Monkey
 
 RUBBING = {
     "allegro_left_hand": 1e-3,
-    "centauro": 1e-2,
     "hextilt": 1e-3,
     "six_axis_arm": 1e-2,
     "tiago_no_hand": 1e-2,

@@ -72,7 +72,7 @@ def scenarios(draw: st.DrawFn) -> Scenario:
     )
 
 
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(scenario=scenarios())
 def test_a_scenario_survives_json_and_pickling(scenario: Scenario) -> None:
     text = scenario.to_json()
