@@ -22,8 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.distance.cores import Core, CylinderCore, PointCore, SegmentCore
-from dynx.distance.gjk import CorePair
-from dynx.distance.simplices import nearest_to_origin
+from dynx.distance.gjk import CorePair, nearest_to_origin
 from dynx.spatial.plain import dot, minus
 from dynx.spatial.scalar import Floats
 

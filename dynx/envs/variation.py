@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from dynx.compiled.scaled_links import ScaledLinks
+from dynx.compiled.parametric import ScaledLinks
 from dynx.control.array_dynamics import ArrayDynamics
 from dynx.envs.randomization import Parameter, Randomization, parameters_of, require_name
 from dynx.envs.task import RobotTask

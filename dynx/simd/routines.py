@@ -36,9 +36,6 @@ Place = Literal["vectors", "constants"] | int
 """Where the values of a port are: in the workspace, in the table of constants (inputs only), or in the rows
 of the caller's array of this number, counting inputs, then outputs."""
 
-OPERAND_BYTES = 4
-"""Size of an entry of the table of calls."""
-
 
 @dataclass(frozen=True)
 class Routine:

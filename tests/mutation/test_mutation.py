@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from pathlib import Path
 
 import pytest
 
 pytest.importorskip("mutmut", reason="mutation runs need the extra 'mutation'")
 
+from tests.mutation.__main__ import MIN_PER_ROOM, SOURCES
 from tests.mutation.coverage_map import CoverageMap
 from tests.mutation.population import places, sample
 from tests.mutation.trial import BROKEN, CAUGHT, SURVIVED, ordered, verdict
+from tests.mutation.warm import ROOT
 
 SOURCE = '''"""Docstring."""
 from typing import TYPE_CHECKING, Any, cast
@@ -41,6 +44,26 @@ def root(tmp_path: Path) -> Path:
 def test_the_population_is_what_decides_behaviour(root: Path) -> None:
     found = {(place.function, place.text, place.line) for place in places(root, "dynx/f.py")}
     assert found == {("f", "== 1", 13), ("f", "1", 13), ("f", 'cast("int", x) + 2', 15), ("f", "2", 15)}
+
+
+SMALL_ROOMS = {"safe_path"}
+"""Rooms with fewer places than a sample takes of each: all of them are in it."""
+
+
+@pytest.mark.parametrize("room", SOURCES)
+def test_a_sample_takes_enough_mutants_of_every_room(room: str) -> None:
+    source = ROOT / SOURCES[room]
+    files = (
+        [source] if source.is_file() else sorted(source.rglob("*.py"), key=lambda file: file.stat().st_size)
+    )
+    found = (place for file in files for place in places(ROOT, file.relative_to(ROOT).as_posix()))
+    enough = len(list(islice(found, MIN_PER_ROOM))) == MIN_PER_ROOM
+    assert enough == (room not in SMALL_ROOMS)
+
+
+def test_every_room_is_a_source() -> None:
+    rooms = {file.relative_to(ROOT / "dynx").parts[0] for file in (ROOT / "dynx").rglob("*.py")}
+    assert {room.removesuffix(".py") for room in rooms if not room.startswith("_")} == SOURCES.keys()
 
 
 def test_a_sample_is_one_mutant_of_each_of_its_places(root: Path) -> None:

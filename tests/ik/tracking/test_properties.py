@@ -149,3 +149,20 @@ def test_only_joints_that_move_the_frame_change(name: str) -> None:
     assert result
     np.testing.assert_array_equal(result.q[:, 7:], np.tile(q[7:], (10, 1)))
     assert not result.rotation_error.any()
+
+
+@both_kinds
+def test_a_limited_sample_has_the_least_error_within_its_bounds(name: str) -> None:
+    """No coordinate can move from its bound, or between its bounds, so that the error falls."""
+    q0, count, dt = np.array([0.1, -1.3, 1.6, -1.9, -1.5, 0.2]), 30, 0.01
+    with backend(name, ARM) as engine:
+        T = np.repeat(engine.forward_kinematics(q0, "flange")[None], count, axis=0)
+        angle = np.linspace(0.0, 1.0, count)
+        T[:, :3, 3] += 0.15 * np.stack([np.cos(angle) - 1.0, np.sin(angle), 0.0 * angle], axis=-1)
+        result = engine.track(T, "flange", q0, dt=dt, velocity_limit=0.3)
+        assert (result.status[1:] == TrackStatus.LIMITED).all()
+        before = np.concatenate([q0[None], result.q[:-1]])
+        lower, upper = np.maximum(ARM.lower, before - 0.3 * dt), np.minimum(ARM.upper, before + 0.3 * dt)
+        error = np.concatenate(pose_error(T, engine.forward_kinematics(result.q, "flange")), axis=-1)
+        descent = np.einsum("nij,ni->nj", engine.jacobian(result.q, "flange"), error)
+    assert np.abs(np.clip(result.q + descent, lower, upper) - result.q).max() < TOLERANCE
