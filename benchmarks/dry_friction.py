@@ -13,6 +13,7 @@ from time import process_time
 
 import numpy as np
 
+from dynx.bench.timing import interleaved
 from dynx.control import PD, ComputedTorque
 from dynx.errors import DynxError
 from dynx.model import Model
@@ -64,13 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def fastest(advances: Sequence[Callable[[], object]], rounds: int) -> list[float]:
     """Return the least processor time [s] of each function, called in turn."""
-    best = [np.inf] * len(advances)
-    for _ in range(rounds):
-        for k, advance in enumerate(advances):
-            started = process_time()
-            advance()
-            best[k] = min(best[k], process_time() - started)
-    return best
+    return [each.least for each in interleaved(advances, rounds, process_time, calls_per_timing=1)]
 
 
 def _print_row(name: str, without: float, rubbing: float, stuck: float) -> bool:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from benchmarks.test_inverse_kinematics import TOLERANCE, Arm, toolbox_solver
 from dynx.backends import Backend, backend
+from dynx.bench.timing import interleaved, once
 from dynx.ik import IKResult
 from dynx.model import Model
 from dynx.model.loading import load
@@ -52,12 +53,7 @@ def shortest(
     call: Callable[[], object], repeats: int = REPEATS, clock: Callable[[], float] = time.perf_counter
 ) -> float:
     """Return the shortest time of a call [us]."""
-    times = []
-    for _ in range(repeats):
-        begin = clock()
-        call()
-        times.append(clock() - begin)
-    return 1e6 * min(times)
+    return 1e6 * interleaved([call], repeats, clock, calls_per_timing=1)[0].least
 
 
 def verified(model: Model, other: Backend, frame: str, targets: Floats, found: IKResult) -> NDArray[np.bool_]:
@@ -89,9 +85,8 @@ def measure(name: str, count: int, toolbox: bool) -> None:
     arm, rng = ARMS[name], np.random.default_rng(2026)
     model = model_of(arm)
     with backend("compiled", model, threads=1) as engine, backend("pinocchio", model) as other:
-        begin = time.perf_counter()
-        engine.inverse_kinematics(engine.forward_kinematics(model.neutral(), arm.frame), arm.frame)
-        first = time.perf_counter() - begin
+        neutral = engine.forward_kinematics(model.neutral(), arm.frame)
+        first = once(partial(engine.inverse_kinematics, neutral, arm.frame))
         targets = engine.forward_kinematics(model.random(rng, count), arm.frame)
         found = engine.inverse_kinematics(targets, arm.frame)
         share = verified(model, other, arm.frame, targets, found).mean()

@@ -7,13 +7,14 @@ pair of links.
 from __future__ import annotations
 
 import time
+from functools import partial
 from typing import Any
 
-import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 import dynx
+from dynx.bench.timing import interleaved
 from dynx.world import Scene, SceneRobot, World, box
 
 ROUNDS = 30
@@ -29,16 +30,16 @@ def test_closest_points(
     crate = box("crate", (0.3, 0.3, 0.3), pose=dynx.Pose(where))
     scene = Scene("s", robots=(SceneRobot("robot", dynx.load(robot)),), bodies=(crate,))
     with World(scene, engine) as world:
-        best = {False: np.inf, True: np.inf}
-        for _ in range(1 if benchmark.disabled else ROUNDS):
-            # Alternately, because the load of the machine changes.
-            for native in best:
-                began = time.process_time()
-                pairs = world.closest_points("robot", "crate", within=5.0, native=native)
-                best[native] = min(best[native], (time.process_time() - began) / len(pairs))
+        calls = [
+            partial(world.closest_points, "robot", "crate", within=5.0, native=native)
+            for native in (False, True)
+        ]
+        rounds = 1 if benchmark.disabled else ROUNDS
+        times = interleaved(calls, rounds, time.process_time, calls_per_timing=1)
+        own, native = (1e6 * each.least / len(call()) for each, call in zip(times, calls, strict=True))
         repeat: Any = benchmark.pedantic
         repeat(
             lambda: world.closest_points("robot", "crate", within=5.0),
             rounds=1 if benchmark.disabled else ROUNDS,
         )
-    benchmark.extra_info.update(us=1e6 * best[False], native_us=1e6 * best[True])
+    benchmark.extra_info.update(us=own, native_us=native)

@@ -18,6 +18,7 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 
 import dynx
+from dynx.bench.timing import interleaved
 from dynx.spatial.scalar import Floats
 from dynx.world import PDMotor, PositionMotor, Scene, SceneRobot, World, ground
 
@@ -110,16 +111,9 @@ def compare(
     """Time a step of the world and of the raw engine in turn, because the load of the machine changes."""
     steps = 3 if benchmark.disabled else STEPS
     rounds = 1 if benchmark.disabled else ROUNDS
-    best = {"world": np.inf, "raw": np.inf}
-    for _ in range(rounds):
-        for name, call in (("world", step), ("raw", raw)):
-            began = time.process_time()
-            for _ in range(steps):
-                call()
-            best[name] = min(best[name], (time.process_time() - began) / steps)
+    times = interleaved([step, raw], rounds, time.process_time, calls_per_timing=steps)
+    of_world, of_raw = (1e6 * each.least for each in times)
     repeat: Any = benchmark.pedantic
     repeat(step, rounds=rounds)
     assert np.isfinite(world.state.robots["dog"].q).all()
-    benchmark.extra_info.update(
-        us=1e6 * best["world"], raw_us=1e6 * best["raw"], more_us=1e6 * (best["world"] - best["raw"])
-    )
+    benchmark.extra_info.update(us=of_world, raw_us=of_raw, more_us=of_world - of_raw)

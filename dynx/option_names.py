@@ -51,6 +51,20 @@ def right_name(wrong: str, known: Iterable[str], renamed: Mapping[str, str]) -> 
     return f"; it is now {renamed[wrong]}" if wrong in renamed else nearest(wrong, known)
 
 
+def refuse_options(
+    name: str, options: Iterable[str], function: Callable[..., Any], renamed: Mapping[str, str]
+) -> None:
+    """Raise UnknownNameError for the first of `options` that is no parameter of `function`."""
+    known = [
+        each.name
+        for each in inspect.signature(function).parameters.values()
+        if each.name != "self" and each.kind is not each.VAR_KEYWORD
+    ]
+    for each in options:
+        if each not in known:
+            raise UnknownNameError(f"{name} has no option {shown(each)}{right_name(each, known, renamed)}")
+
+
 def check_arguments(
     name: str, signature: inspect.Signature, given: Iterable[Any], options: Mapping[str, Any]
 ) -> None:
@@ -97,7 +111,6 @@ def takes(arguments: Callable[P, A]) -> Callable[[Callable[[A], R]], Callable[P,
 
 
 def _checked(function: F, name: str, renamed: Mapping[str, str]) -> F:
-    parameters = [each for each in inspect.signature(function).parameters if each != "self"]
     needed = [
         each.name
         for each in inspect.signature(function).parameters.values()
@@ -110,10 +123,7 @@ def _checked(function: F, name: str, renamed: Mapping[str, str]) -> F:
             return function(*arguments, **options)
         except TypeError:
             # Names are checked only after a failure, so that a call of microseconds is not delayed.
-            for each in options:
-                if each not in parameters:
-                    clause = right_name(each, parameters, renamed)
-                    raise UnknownNameError(f"{name} has no option {shown(each)}{clause}") from None
+            refuse_options(name, options, function, renamed)
             for each in needed:
                 if each not in options:
                     raise ArgumentError(f"{name} needs {each}=..., which has no default") from None

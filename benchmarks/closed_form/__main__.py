@@ -17,6 +17,7 @@ import numpy as np
 
 from benchmarks.closed_form.peers import Solver, installed_solvers
 from dynx.backends import Backend, backend
+from dynx.bench.timing import interleaved
 from dynx.ik.closed_forms.chain import chain_to
 from dynx.model import Model
 from dynx.model.loading import load
@@ -68,12 +69,7 @@ def checked(model: Model, engine: Backend, frame: str, T: Floats, q: Floats) -> 
 
 def shortest(call: Callable[[], object]) -> float:
     """Return the least processor time of a call [us]."""
-    times = []
-    for _ in range(REPEATS):
-        begin = time.process_time()
-        call()
-        times.append(time.process_time() - begin)
-    return 1e6 * min(times)
+    return 1e6 * interleaved([call], REPEATS, time.process_time, calls_per_timing=1)[0].least
 
 
 def row(

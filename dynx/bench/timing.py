@@ -28,6 +28,11 @@ class Times:
         return float(np.median(self.seconds))
 
     @property
+    def least(self) -> float:
+        """Least time [s], which other programs delayed the least."""
+        return min(self.seconds)
+
+    @property
     def quartiles(self) -> tuple[float, float]:
         """Lower and upper quartile over the repetitions [s]."""
         low, high = np.percentile(self.seconds, [25.0, 75.0])
@@ -48,9 +53,19 @@ class Times:
         return Times(tuple(each / count for each in self.seconds))
 
 
-def interleaved(calls: Sequence[Call], repetitions: int, clock: Clock = time.perf_counter) -> list[Times]:
-    """Time each call. Every repetition makes all calls, starting with a different one each time."""
-    rounds = [_rounds(call, clock) for call in calls]
+def interleaved(
+    calls: Sequence[Call],
+    repetitions: int,
+    clock: Clock = time.perf_counter,
+    *,
+    calls_per_timing: int | None = None,
+) -> list[Times]:
+    """Time each call. Every repetition makes all calls, starting with a different one each time.
+
+    `calls_per_timing` None repeats a call within a timing until that takes `MIN_TIMING_SECONDS`, after trials
+    that warm it up.
+    """
+    rounds = [calls_per_timing or _rounds(call, clock) for call in calls]
     found: list[list[float]] = [[] for _ in calls]
     for repetition in range(repetitions):
         for turn in range(len(calls)):
