@@ -22,7 +22,12 @@ from dynx.bench.session import (
     Session,
     benchmark_cases,
 )
-from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, interruptible, one_line
+from dynx.cli.shell.exits import (
+    complain,
+    exit_code,
+    interruptible,
+    one_line,
+)
 from dynx.cli.shell.inputs import Locks, chosen_frame, load_robot
 from dynx.cli.shell.output import Entry, check_json, counted, present, progress_bar
 from dynx.cli.shell.tables import Table
@@ -89,13 +94,8 @@ def run_bench(session: Session, *, json_path: str | None) -> int:
         wrong_ones = wrong(found)
         for each in wrong_ones:
             complain(f"{each.implementation}, {each.case.quantity.replace('_', ' ')}: {each.problem}")
-        if error is not None:
-            complain(str(error))
-    if interruption.code is not None:
-        return interruption.code
-    if error is not None:
-        return BAD_INPUT
-    return NEGATIVE_RESULT if wrong_ones else DONE
+        code = exit_code(error, negative=bool(wrong_ones))
+    return code if interruption.code is None else interruption.code
 
 
 MAX_IDLE_LOAD = 0.5

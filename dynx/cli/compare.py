@@ -12,7 +12,7 @@ from typing import Literal, TypedDict
 
 from rich.console import Console
 
-from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, one_line, short_line
+from dynx.cli.shell.exits import exit_code, one_line, short_line
 from dynx.cli.shell.output import Entry, check_json, counted, entry_of, present, progress_bar
 from dynx.cli.shell.tables import MAX_ROWS, Table, print_rest
 from dynx.errors import ArgumentError
@@ -47,10 +47,7 @@ def compare_files(
             progress=progress,
         )
     error = present(document(comparison, first, second), show, json_path, quiet=quiet)
-    if error is not None:
-        complain(str(error))
-        return BAD_INPUT
-    return DONE if comparison.alike else NEGATIVE_RESULT
+    return exit_code(error, negative=not comparison.alike)
 
 
 def _read(first: str, second: str, robot: str | None) -> tuple[Rollout, Rollout]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from dynx.cli.shell.exits import DONE, interruptible, one_line
 from dynx.cli.shell.inputs import Numbers, configuration
-from dynx.cli.shell.output import check_writable, console, progress_bar
+from dynx.cli.shell.output import check_writable, console, progress_bar, simulated_time_bar
 from dynx.errors import ArgumentError, DynxError, RobotNotFoundError, nearest, shown
 from dynx.files.reading import irregularity
 from dynx.model import Model
@@ -107,7 +107,6 @@ def view(
 
 
 def _export(viewer: Viewer, path: str) -> None:
-    from dynx.cli.shell.output import progress_bar
     from dynx.viewer.export import film_length
 
     film = path.lower().endswith(".gif") and viewer.view.duration
@@ -277,12 +276,5 @@ def open_scene(
         raise ArgumentError(f"--engine names {', '.join(chosen)}; wanted {wanted}")
     time = DEFAULT_DURATION if duration is None else duration
     samples = min(MAX_FRAMES, max(2, round(FRAME_RATE * time)))
-    total = round(1e3 * time) * len(chosen)
-    before: dict[str, float] = {}
-    with progress_bar(total, words="simulated time [ms]") as advance:
-
-        def progress(engine: str, now: float) -> None:
-            before[engine] = now
-            advance(round(1e3 * sum(before.values())), f"{engine}, simulated time [ms]")
-
+    with simulated_time_bar(len(chosen), time) as progress:
         return compare_engines(scene, chosen, time, step, samples=samples, progress=progress)

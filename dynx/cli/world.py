@@ -14,11 +14,10 @@ import numpy as np
 from rich.console import Console
 
 from dynx.cli.shell.exits import (
-    BAD_INPUT,
     DONE,
     INTERRUPTED,
-    NEGATIVE_RESULT,
     complain,
+    exit_code,
     failure_of,
     interruptible,
     one_line,
@@ -32,7 +31,7 @@ from dynx.cli.shell.output import (
     counted,
     entry_of,
     present,
-    progress_bar,
+    simulated_time_bar,
 )
 from dynx.cli.shell.tables import MAX_ROWS, Table, print_rest
 from dynx.errors import ArgumentError, DynxError, nearest, shown
@@ -84,22 +83,14 @@ def world(
     chosen = engines or installed_worlds()
     described = read_scene(scene)
     given = settings_by_engine(chosen, settings)
-    errors: list[DynxError] = []
+    errors: list[DynxError | None] = []
 
     def save(world: World) -> None:
         if save_path is not None:
-            error = failure_of(world.write, own_path(save_path, world.engine, len(chosen)))
-            errors.extend([error] if error is not None else [])
+            errors.append(failure_of(world.write, own_path(save_path, world.engine, len(chosen))))
 
     with interruptible() as interruption:
-        total = round(1e3 * duration) * len(chosen)
-        before: dict[str, float] = {}
-        with progress_bar(total, enabled=not quiet) as advance:
-
-            def progress(engine: str, time: float) -> None:
-                before[engine] = time
-                advance(round(1e3 * sum(before.values())), f"{engine}, simulated time [ms]")
-
+        with simulated_time_bar(len(chosen), duration, enabled=not quiet) as progress:
             ended: ComparisonInterrupted | None = None
             try:
                 comparison = compare_engines(
@@ -116,20 +107,12 @@ def world(
                 ended, comparison = early, early.comparison
         interruption.finishing = True
         if plot_path is not None:
-            error = failure_of(plot, comparison, plot_path)
-            errors.extend([error] if error is not None else [])
-        made = document(comparison)
-        error = present(made, show, json_path, quiet=quiet)
-        errors.extend([error] if error is not None else [])
+            errors.append(failure_of(plot, comparison, plot_path))
+        errors.append(present(document(comparison), show, json_path, quiet=quiet))
         if ended is not None:
             complain(f"{ended} of {len(chosen)}")
-    for each in errors:
-        complain(str(each))
-    if ended is not None:
-        return interruption.code or INTERRUPTED
-    if errors:
-        return BAD_INPUT
-    return NEGATIVE_RESULT if _is_negative(comparison, within) else DONE
+    code = exit_code(*errors, negative=_is_negative(comparison, within))
+    return code if ended is None else interruption.code or INTERRUPTED
 
 
 def _export(scene: str, path: str, *, quiet: bool) -> int:

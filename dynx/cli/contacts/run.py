@@ -30,8 +30,8 @@ from dynx.cli.shell.exits import (
     BAD_INPUT,
     DONE,
     INTERRUPTED,
-    NEGATIVE_RESULT,
     complain,
+    exit_code,
     failure_of,
     interruptible,
     one_line,
@@ -130,16 +130,12 @@ def _conclude(
         errors.append(failure_of(write_text, html_path, page))
     tables = (lambda *_: None) if quiet else partial(show, every_figure=every_figure)
     errors.append(present(report, tables, json_path))
-    for error in errors:
-        if error is not None:
-            complain(str(error))
-    if any(error is not None for error in errors):
-        return BAD_INPUT
-    if not found.results and not found.not_done:
+    nothing = not found.results and not found.not_done
+    code = exit_code(*errors, negative=bool(nothing or found.unexplained or found.failures))
+    if nothing and code != BAD_INPUT:
         lost = (*found.failures, *found.refusals)
         complain("nothing was measured" + (f"; {lost[0].engine}: {lost[0].message}" if lost else ""))
-        return NEGATIVE_RESULT
-    return NEGATIVE_RESULT if found.unexplained or found.failures else DONE
+    return code
 
 
 def _list_cases(cases: Sequence[ContactCase]) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 from rich.console import Console
 
 from dynx.cli.learning.documents import PolicyEntry, TaskEntry, TasksDocument, distance_document, policy_entry
-from dynx.cli.shell.exits import BAD_INPUT, DONE, complain, interruptible, one_line
+from dynx.cli.shell.exits import DONE, exit_code, interruptible, one_line
 from dynx.cli.shell.options import json_value
 from dynx.cli.shell.output import Entry, check_json, console, entry_of, present, progress_bar, write_json
 from dynx.cli.shell.tables import Table
@@ -59,10 +59,7 @@ def distance(
         interruption.finishing = True
         made = distance_document(env_id, given, found, judged)
         error = present(made, show, json_path, quiet=quiet)
-    if error is not None:
-        complain(str(error))
-        return BAD_INPUT
-    return DONE
+    return exit_code(error)
 
 
 def _first_policy(policies: tuple[str, ...], env_id: str, engine: str) -> Act | None:

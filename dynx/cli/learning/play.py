@@ -11,7 +11,7 @@ import numpy as np
 from rich.console import Console
 
 from dynx.cli.learning.documents import play_document
-from dynx.cli.shell.exits import BAD_INPUT, DONE, complain, interruptible, one_line
+from dynx.cli.shell.exits import DONE, exit_code, interruptible, one_line
 from dynx.cli.shell.options import json_value
 from dynx.cli.shell.output import Entry, check_json, check_writable, console, counted, present, progress_bar
 from dynx.cli.shell.tables import Table
@@ -75,10 +75,7 @@ def play(
         interruption.finishing = True
         made = play_document(policy, trained, found)
         error = present(made, show, json_path, quiet=quiet)
-    if error is not None:
-        complain(str(error))
-        return BAD_INPUT
-    return DONE
+    return exit_code(error)
 
 
 def _task_of(policy: str, options: Sequence[tuple[str, str]], own_task: str | None) -> TaskSpec:

@@ -9,12 +9,11 @@ from pathlib import Path
 from rich.console import Console
 
 from dynx.cli.learning.documents import train_document
-from dynx.cli.shell.exits import BAD_INPUT, DONE, complain, failure_of, interruptible, one_line
+from dynx.cli.shell.exits import exit_code, failure_of, interruptible, one_line
 from dynx.cli.shell.options import json_value
 from dynx.cli.shell.output import Advance, Entry, check_json, check_writable, log, present, progress_bar
 from dynx.cli.shell.tables import Table
 from dynx.envs.registration import bare_name, task_id
-from dynx.errors import DynxError
 from dynx.files.figures import new_figure, picture_format, save_figure
 from dynx.training import Progress, Schedule, TaskSpec, Trained, TrainingSpec, recipe_of
 from dynx.training import train as train_run
@@ -92,13 +91,9 @@ def train(
             times.append(time.perf_counter() - started)
         interruption.finishing = True
         made = train_document(run, runs, times)
-        errors = [present(made, show, json_path, quiet=quiet)]
-        if plot_path is not None:
-            errors.append(failure_of(plot, runs, plot_path))
-    failed: list[DynxError] = [each for each in errors if each is not None]
-    for each in failed:
-        complain(str(each))
-    return BAD_INPUT if failed else DONE
+        unwritten = present(made, show, json_path, quiet=quiet)
+        unplotted = None if plot_path is None else failure_of(plot, runs, plot_path)
+    return exit_code(unwritten, unplotted)
 
 
 class _Reporter:

@@ -66,6 +66,15 @@ def failure_of(call: Callable[..., object], *args: object) -> DynxError | None:
     return None
 
 
+def exit_code(*errors: DynxError | None, negative: bool = False) -> int:
+    """Write the errors of files, where there are any, to standard error; return the exit code of a command,
+    whose result is `negative` or not."""
+    found = [each for each in errors if each is not None]
+    for each in found:
+        complain(str(each))
+    return BAD_INPUT if found else NEGATIVE_RESULT if negative else DONE
+
+
 class ClosedPipe(Exception):
     """The reader of standard output closed it."""
 

@@ -148,6 +148,23 @@ def progress_bar(total: int, done: int = 0, words: str = "", *, enabled: bool = 
         )
 
 
+@contextmanager
+def simulated_time_bar(
+    engines: int, duration: float, *, enabled: bool = True
+) -> Iterator[Callable[[str, float], None]]:
+    """Show a bar while several engines simulate `duration` [s] each; yield a function to call with
+    the name of an engine and the time [s] that it reached."""
+    reached: dict[str, float] = {}
+    total, words = round(1e3 * duration) * engines, "simulated time [ms]"
+    with progress_bar(total, words=words, enabled=enabled) as advance:
+
+        def progress(engine: str, time: float) -> None:
+            reached[engine] = time
+            advance(round(1e3 * sum(reached.values())), f"{engine}, {words}")
+
+        yield progress
+
+
 def log(line: str) -> None:
     """Write a line at once, unless standard error is a terminal, which shows the bar."""
     # Where standard error cannot be written, the work goes on.

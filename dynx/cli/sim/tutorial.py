@@ -11,10 +11,8 @@ from rich.console import Console
 
 from dynx._version import __version__
 from dynx.cli.shell.exits import (
-    BAD_INPUT,
-    DONE,
-    NEGATIVE_RESULT,
     complain,
+    exit_code,
     failure_of,
     interruptible,
     one_line,
@@ -114,13 +112,10 @@ def run_tutorial(
             for plant, outcome in row.outcomes.items()
             if outcome.failed
         ]
-        for complaint in [*failed, *(str(error) for error in errors if error is not None)]:
+        for complaint in failed:
             complain(complaint)
-    if interruption.code is not None:
-        return interruption.code
-    if any(error is not None for error in errors):
-        return BAD_INPUT
-    return NEGATIVE_RESULT if failed else DONE
+        code = exit_code(*errors, negative=bool(failed))
+    return code if interruption.code is None else interruption.code
 
 
 def document(experiments: Tutorial, rows: Sequence[Row]) -> dict[str, Any]:

@@ -1,16 +1,18 @@
-"""Progress bars: on a terminal alone, and with words for the time that they show."""
+"""Progress bars, on a terminal alone and with words for the time that they show; entries of documents."""
 
 from __future__ import annotations
 
 import io
 import re
 import sys
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, TypedDict
 
+import numpy as np
 import pytest
 from rich.console import Console
 
-from dynx.cli.shell.output import progress_bar
+from dynx.cli.shell.output import entry_of, progress_bar
 
 
 class Screen(io.StringIO):
@@ -45,3 +47,20 @@ def test_without_a_terminal_or_with_quiet_there_is_no_bar(
     terminal: bool, enabled: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert shown(monkeypatch, terminal=terminal, enabled=enabled) == ""
+
+
+class Part(TypedDict):
+    name: str
+    numbers: list[float]
+    pair: list[str]
+
+
+def test_an_entry_has_the_attributes_that_its_keys_name() -> None:
+    source = SimpleNamespace(name="arm", numbers=np.array([1.0, 2.0]), pair=("a", "b"), other=3)
+    entry = entry_of(Part, source, name="leg")
+    assert entry == {"name": "leg", "numbers": [1.0, 2.0], "pair": ["a", "b"]}
+    assert isinstance(entry["numbers"], list)
+    with pytest.raises(AttributeError):
+        entry_of(Part, SimpleNamespace(name="arm"))
+    with pytest.raises(AssertionError):
+        entry_of(Part, source, names="a key that no entry has")
