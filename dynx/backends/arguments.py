@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.backends.solvability import singular_matrix
 from dynx.errors import (
     ArgumentError,
     ClosedError,
-    SingularMassMatrixError,
     UnknownNameError,
     nearest,
     shown,
@@ -117,8 +117,5 @@ class Arguments:
             rows = np.argwhere(~np.isfinite(a).all(axis=-1))
             where = "at this configuration" if a.ndim == 1 else f"at sample {rows[0].tolist()}"
             more = f" (and {len(rows) - 1} more)" if len(rows) > 1 else ""
-            raise SingularMassMatrixError(
-                f"the mass matrix of {self._model.name} is singular {where}{more}: "
-                "no unique acceleration exists"
-            )
+            raise singular_matrix(self._model.name, where + more)
         return a

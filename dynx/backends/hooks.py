@@ -22,9 +22,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.backends.quantities import QUANTITIES, Quantity
-from dynx.backends.solvability import magnitudes_of_rows, rounding_of_eigenvalues
+from dynx.backends.solvability import magnitudes_of_rows, rounding_of_eigenvalues, singular_matrix
 from dynx.backends.straight import BindingCall
-from dynx.errors import SingularMassMatrixError
 from dynx.model import Mechanism, Model
 from dynx.rbd import jacobians, kinematics
 from dynx.rbd.jacobians import Reference
@@ -187,7 +186,7 @@ def solve_mass_matrix(M: Floats, torque: Floats) -> Floats:
     """
     a = solution_or_nan(M, torque)
     if not np.isfinite(a).all():
-        raise SingularMassMatrixError("the mass matrix is singular: no unique acceleration exists")
+        raise singular_matrix()
     return a
 
 

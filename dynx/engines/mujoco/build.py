@@ -31,7 +31,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dynx.backends.solvability import Solvability
+from dynx.backends.solvability import Solvability, refuse_singular_start
 from dynx.engines.mujoco.coordinates import quat_wxyz
 from dynx.engines.mujoco.library import MAX_DEPTH, mujoco, silence_warnings, silent_data
 from dynx.engines.mujoco.materials import ContactMaterials, constraint_reference, limit_reference, set_options
@@ -46,7 +46,6 @@ from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_rpy, skew
-from dynx.steppers.conditioning import refuse_singular_start
 from dynx.steppers.layout import WORLD, BodyLayout, Layout, Owner, RobotLayout
 
 MAX_NV = 1000
@@ -358,7 +357,7 @@ def build_scene(layout: Layout, dt: float, settings: Mapping[str, Any]) -> Built
         Solvability(robot.model).refuse_singular(joint_dynamics=False)
         if settings["solver"] != "pgs":
             # The other solvers minimise a function that is not convex for such a mass matrix.
-            refuse_singular_start(robot, "use solver='pgs'")
+            refuse_singular_start(robot.model, robot.q, "use solver='pgs'")
         _add_robot(spec, number, robot, carriers)
         _couple_mimics(spec, number, robot, reference, impedance)
     for number, body in enumerate(layout.bodies):

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dynx.backends.solvability import main_joints, singular_direction
 from dynx.errors import shown
 from dynx.model.mechanism import ROOT, Mechanism
 from dynx.spatial.so3 import quat_from_rotation, quat_log
-from dynx.steppers.conditioning import main_joints, singular_direction
 from dynx.steppers.layout import Collider, ConstraintLayout, Layout
 from dynx.steppers.materials import inexact_materials
 from dynx.steppers.state import WorldState
@@ -63,8 +63,7 @@ def unbounded_motions(layout: Layout, state: WorldState) -> Iterator[str]:
             continue
         found = singular_direction(model, state.robots[robot.name].q)
         if found is not None:
-            _, direction = found
-            joints = [shown(f"{robot.name}/{name}") for name in main_joints(model, direction)]
+            joints = [shown(f"{robot.name}/{name}") for name in main_joints(model, found.direction)]
             yield (
                 f"the mass matrix of {shown(robot.name)} is singular to rounding, because its links have "
                 f"almost no inertia about {' and '.join(joints) or 'its base'}"
