@@ -9,7 +9,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 
 from dynx.model import Model
-from dynx.model.urdf.elements import FRAME_TAG, LOCKED_TAG
+from dynx.model.urdf.reader import FRAME_TAG, LOCKED_TAG
 
 
 def spelled_out(model: Model) -> str:

@@ -36,7 +36,7 @@ from dynx.agreement.comparison import DERIVED, REFEREE, Comparison
 from dynx.agreement.identities import IdentityCheck
 from dynx.errors import DynxError, UnknownNameError, nearest, shown
 from dynx.files.documents import document_of
-from dynx.files.notebook import html_grid
+from dynx.files.pages import html_grid
 
 # Backends that are probably wrong where results differ, and the evidence against them.
 

@@ -18,7 +18,7 @@ from dynx.backends import Backend, backend
 from dynx.control.content import attributes_of, content_of, fields_of
 from dynx.control.dynamics import Dynamics, EngineDynamics
 from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
-from dynx.files.notebook import html_grid
+from dynx.files.pages import html_grid
 from dynx.model import Model
 from dynx.model.model import refuse_other_than_model
 from dynx.registry import DEFAULT_ENGINE

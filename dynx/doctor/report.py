@@ -14,7 +14,7 @@ from typing import Any, Literal, get_args
 from dynx._version import __version__
 from dynx.agreement.report import LoadFailure
 from dynx.files.documents import document_of, to_json_values
-from dynx.files.notebook import html_grid
+from dynx.files.pages import html_grid
 from dynx.loaded import engine_of
 from dynx.loaded.difference import Deviation
 from dynx.model.xml.text import TextForm

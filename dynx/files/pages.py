@@ -1,4 +1,5 @@
-"""HTML pages for people: one self-contained file without scripts, for screen and paper.
+"""HTML for people: pages of one self-contained file without scripts, for screen and paper, and tables for
+notebooks.
 
 No other module imports Jinja2. The folder `templates` holds the frame, the colours and the parts that all
 pages share; a package has its own beside its module. Everything they print is escaped, and control characters
@@ -7,6 +8,8 @@ are made visible: names in a description may hold anything.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 from dynx._version import __version__
@@ -43,3 +46,17 @@ def _printable(value: Any) -> Any:
     if not isinstance(value, str) or hasattr(value, "__html__"):
         return value
     return "".join(c if c.isprintable() or c in "\n\t" else repr(c)[1:-1] for c in value)
+
+
+def html_table(title: str, rows: Mapping[str, object]) -> str:
+    """Return a table of two columns under a title; text is escaped."""
+    return html_grid(title, (), ((name, value) for name, value in rows.items()))
+
+
+def html_grid(title: str, head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+    """Return a table with a head under a title; text is escaped."""
+    top = "".join(f"<th>{escape(name)}</th>" for name in head)
+    body = "".join(
+        "<tr>" + "".join(f"<td>{escape(str(cell))}</td>" for cell in row) + "</tr>" for row in rows
+    )
+    return f"<table><caption>{escape(title)}</caption>{f'<tr>{top}</tr>' if top else ''}{body}</table>"

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.files.notebook import html_table
+from dynx.files.pages import html_table
 from dynx.spatial.scalar import Floats
 
 Measures = tuple[float, float, float, int]

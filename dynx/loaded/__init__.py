@@ -5,7 +5,6 @@ reads the file itself, so that differences in reading show. Results are still in
 robots are compared, not conventions.
 """
 
-from dynx.loaded.description import LoadedInertial, LoadedJoint, LoadedModel
 from dynx.loaded.registry import (
     COMMON_VARIANTS,
     ENGINES,
@@ -15,7 +14,7 @@ from dynx.loaded.registry import (
     load_as,
     loader_class,
 )
-from dynx.loaded.robot import LoadedRobot
+from dynx.loaded.robot import LoadedInertial, LoadedJoint, LoadedModel, LoadedRobot
 
 __all__ = [
     "COMMON_VARIANTS",

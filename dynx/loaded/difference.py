@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from dynx.loaded.description import LoadedInertial, LoadedJoint, LoadedModel
+from dynx.loaded.robot import LoadedInertial, LoadedJoint, LoadedModel
 from dynx.model import Joint, Model
 from dynx.model.tree import STANDARD_GRAVITY
 from dynx.spatial.scalar import Floats

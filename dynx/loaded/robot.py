@@ -1,18 +1,73 @@
-"""The interface of a robot that an engine has loaded from its file."""
+"""Interface of a robot that an engine has loaded from its file: its description, quantities and calls."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar, TypeVar
 
 import numpy as np
 
 from dynx.errors import EngineError, UnusableEngineError, shown
-from dynx.loaded.description import LoadedModel
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
+
+Bounds = tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedInertial:
+    """The inertia that an engine holds for a link, with that of the links merged into it.
+
+    `mass` is in kg, `center` (3,) [m] is the centre of mass in the link frame, `inertia` (3, 3) [kg m^2] the
+    tensor about it in the axes of the link frame. `merged` names the other links whose inertia is included,
+    because the engine merges links that fixed joints connect.
+    """
+
+    mass: float
+    center: Floats
+    inertia: Floats
+    merged: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedJoint:
+    """The properties that an engine holds for a joint that moves; None where it reports none.
+
+    `placement` (4, 4) is the pose of the joint frame at value 0 in the frame of the URDF parent link,
+    `axis` (3,) the axis in the joint frame, as the engine holds it (its length may not be 1).
+    """
+
+    type: str
+    placement: Floats | None = None
+    axis: Floats | None = None
+    limits: Bounds | None = None
+    velocity: float | None = None
+    effort: float | None = None
+    damping: float | None = None
+    friction: float | None = None
+    armature: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedModel:
+    """The whole model as the engine reports it.
+
+    `links` has an entry for each link that still exists in the engine, `joints` for each joint that
+    moves there. `base_frame` (4, 4) is the pose of the root link in the world at the neutral
+    configuration, `gravity` (3,) [m/s^2] the engine's default.
+    """
+
+    engine: str
+    links: Mapping[str, LoadedInertial]
+    joints: Mapping[str, LoadedJoint]
+    base_frame: Floats
+    gravity: Floats
+    missing_links: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = field(default=())
+
 
 Self = TypeVar("Self", bound="LoadedRobot")
 
@@ -131,3 +186,13 @@ def lacking_joints(engine: str, model: Model, instead: Mapping[str, str]) -> Unu
     """
     listed = ", ".join(f"{shown(name)} ({kind})" for name, kind in list(instead.items())[:5])
     return UnusableEngineError(f"{engine} lacks joints of {model.name} with one degree of freedom: {listed}")
+
+
+def call_on_joint(call: str, joint: str) -> str:
+    """Return the address of a call on one joint."""
+    return f"{call}@{joint}"
+
+
+def called_joints(calls: Collection[str], call: str, joints: Collection[str]) -> Iterator[str]:
+    """Yield those of the `joints` on which `call` is made: all of them by a call on the whole robot."""
+    return (joint for joint in joints if call in calls or call_on_joint(call, joint) in calls)

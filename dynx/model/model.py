@@ -10,7 +10,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, shown
-from dynx.files.notebook import html_grid
+from dynx.files.pages import html_grid
 from dynx.model import configuration, topology
 from dynx.model.elements import IDENTITY, Frame, Joint, Link, Note, Pose, checked_pose
 from dynx.model.geometry.links import Geometry
@@ -20,7 +20,7 @@ from dynx.model.topology import refuse_unbounded_numbers
 from dynx.model.tree import NO_GEOMETRY, STANDARD_GRAVITY, Base, Tree, checked_base
 from dynx.model.urdf.writer import write_urdf
 from dynx.registry import door
-from dynx.spatial.extended import longdouble
+from dynx.spatial.scalar import longdouble
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +96,7 @@ class Model(Tree):
 
     @cached_property
     def extended_mechanism(self) -> Mechanism:
-        """`mechanism` with its inertias merged in extended precision (`dynx.spatial.extended`)."""
+        """`mechanism` with its inertias merged in extended precision (`dynx.spatial.scalar`)."""
         return build_mechanism(self, longdouble)
 
     def with_base(self, base: Base) -> Model:

@@ -1,15 +1,16 @@
-"""Poses and twists of the bodies, in world axes (Featherstone 2008, sections 4.4 and 5.3)."""
+"""Poses and twists of the bodies and links, in world axes (Featherstone 2008, sections 4.4 and 5.3)."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from dynx.model import Model
 from dynx.model.mechanism import ROOT, Body, Mechanism, joint_motion
 from dynx.rbd.loops import Loops, PythonLoops
-from dynx.spatial.scalar import Array, append_axis
+from dynx.spatial.scalar import Array, Floats, append_axis
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import cross, rotate, rotation_from_quat
 
@@ -129,3 +130,18 @@ def ancestry(mechanism: Mechanism, body: int) -> list[int]:
         path.append(body)
         body = mechanism.bodies[body].parent
     return path
+
+
+def link_poses(model: Model, q: Floats) -> Iterator[tuple[str, Floats]]:
+    """Yield every link with its pose in the world (..., 4, 4) at the configuration q (..., nq)."""
+    links = {link.name for link in model.links}
+    return (each for each in frame_poses(model, q) if each[0] in links)
+
+
+def frame_poses(model: Model, q: Floats) -> Iterator[tuple[str, Floats]]:
+    """Yield every frame with its pose in the world (..., 4, 4) at the configuration q (..., nq)."""
+    mechanism = model.mechanism
+    poses = body_poses(mechanism, mechanism.tree_q(q))
+    for frame in mechanism.frames:
+        T = homogeneous(*poses[frame.body]) @ homogeneous(frame.R, frame.p)
+        yield frame.name, np.asarray(T, dtype=np.float64)

@@ -7,7 +7,7 @@ from collections.abc import Collection, Sequence
 
 from dynx.errors import escaped
 from dynx.model.elements import Pose, Vector
-from dynx.model.urdf.elements import QUATERNION, read_origin, reads_quaternions
+from dynx.model.urdf.reader import QUATERNION, read_origin, reads_quaternions
 from dynx.model.urdf.values import Reading
 from dynx.model.xml.reading import Element
 from dynx.model.xml.source import Edit, SourceElement, XmlSource

@@ -11,7 +11,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from dynx.engines.pybullet.inertia_checks import CACHE_SIZE, bullet_reading, tree_may_reject
+from dynx.engines.pybullet.file_checks import CACHE_SIZE, bullet_reading, tree_may_reject
 from dynx.model.elements import IDENTITY, Inertial, Pose, Vector
 from dynx.model.mechanism import pose_arrays
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
@@ -19,8 +19,7 @@ from dynx.rules.attributes import orientation_edits
 from dynx.rules.case import Case, end_of
 from dynx.rules.numbers_in_text import MOMENTS, decimal, is_number
 from dynx.rules.rule import Detection, Remedy, Rule, links_of, measured_on
-from dynx.spatial.extended import FLOAT64_EPS, jacobi_eigen, longdouble
-from dynx.spatial.scalar import Array
+from dynx.spatial.scalar import FLOAT64_EPS, Array, jacobi_eigen, longdouble
 from dynx.spatial.so3 import rotation_from_rpy, rpy_from_rotation
 
 # The inertia of a link in extended precision: sums, principal axes, and conversion to an element.

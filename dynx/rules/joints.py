@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynx.model.xml.quoting import quoteattr
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
+from dynx.model.xml.text import quoteattr
 from dynx.rules.attributes import number_or_none
 from dynx.rules.case import Case, end_of
 from dynx.rules.inertia import least_inertial

@@ -13,7 +13,7 @@ from typing import ClassVar, Literal
 
 from dynx.errors import shown
 from dynx.model.elements import Vector
-from dynx.model.urdf.elements import QUATERNION, reads_quaternions, rpy_of_quaternion
+from dynx.model.urdf.reader import QUATERNION, reads_quaternions, rpy_of_quaternion
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.rules.case import Case
 from dynx.rules.rule import Correction, EditingRule, Stage, correction

@@ -14,7 +14,7 @@ from typing import ClassVar, Literal, get_args
 from packaging.specifiers import SpecifierSet
 
 from dynx.loaded import engine_of
-from dynx.loaded.calls import call_on_joint
+from dynx.loaded.robot import call_on_joint
 from dynx.model.tree import Base
 from dynx.model.xml.source import Edit, SourceElement
 from dynx.rules.case import Case
@@ -45,7 +45,7 @@ applied first and must not use `Case.model`. ``model``: the cause is in the robo
 
 Level = Literal["safe", "rounding", "physics"]
 """Largest change that a remedy makes: none that a reader notices, rounding of the equations of motion, or
-more (`dynx.doctor.prove.mending`)."""
+more (`dynx.doctor.mending`)."""
 
 LEVELS: tuple[Level, ...] = get_args(Level)
 
@@ -219,7 +219,7 @@ class CallingRule(Rule):
     """The change, as in `Remedy.changed`."""
 
     per_joint: ClassVar[bool] = True
-    """True if each call can also be made on single joints (`dynx.loaded.calls`), those of the detections."""
+    """True if each call can also be made on single joints (`dynx.loaded.robot`), those of the detections."""
 
     def detect(self, case: Case) -> Sequence[Detection]:
         """Return the occurrences in which the calls are not yet made."""

@@ -13,7 +13,7 @@ import numpy as np
 from dynx.errors import ArgumentError, shown
 from dynx.files.arrays import SCHEMA_ENTRY, read_arrays, write_arrays
 from dynx.files.figures import new_figure, save_figure
-from dynx.files.notebook import html_table
+from dynx.files.pages import html_table
 from dynx.sim.record.csv_file import coordinate_names
 from dynx.sim.scenario.scenario import Scenario
 from dynx.spatial.scalar import Floats

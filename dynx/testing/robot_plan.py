@@ -13,10 +13,9 @@ import pytest
 from dynx.backends.registry import backend_class
 from dynx.errors import DynxError, RobotNotFoundError, shown
 from dynx.loaded.registry import ENGINES
-from dynx.model.expansion import ALL, RobotInput, expand, is_library_name
+from dynx.model.expansion import ALL, RobotInput, expand, is_library_name, left_out_note
 from dynx.model.loading import load
 from dynx.model.tree import Base
-from dynx.model.xacro_robots import left_out_note
 
 if TYPE_CHECKING:
     from dynx.doctor.formats import Baseline

@@ -12,9 +12,8 @@ import numpy as np
 from dynx.errors import ArgumentError, DynxError, nearest, shown
 from dynx.model import Model
 from dynx.model.geometry import Mesh, Shape
-from dynx.model.geometry.links import Collision, Colour, Visual
-from dynx.model.geometry.visible_shapes import link_shapes
-from dynx.rbd.link_poses import link_poses
+from dynx.model.geometry.links import Collision, Colour, Visual, link_shapes
+from dynx.rbd.kinematics import link_poses
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
 from dynx.viewer.colours import GREY, ORANGE, RGB, VERMILION

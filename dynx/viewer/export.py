@@ -15,8 +15,7 @@ from dynx.files.reading import checked_path
 from dynx.files.writing import write_bytes
 from dynx.model import Model
 from dynx.model.geometry import Cylinder, Shape
-from dynx.model.geometry.links import Colour
-from dynx.model.geometry.visible_shapes import link_shapes
+from dynx.model.geometry.links import Colour, link_shapes
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_rpy

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from dynx.errors import ArgumentError
 from dynx.model import Model
-from dynx.rbd.link_poses import link_poses
+from dynx.rbd.kinematics import link_poses
 from dynx.sim import Rollout, ScenePlant
 from dynx.spatial.scalar import Floats
 from dynx.steppers.state import WorldState

@@ -17,7 +17,7 @@ from dynx.model.configuration import checked_q, sampling_range
 from dynx.model.geometry import Sphere
 from dynx.model.rotations import quat_from_rpy, rpy_from_quat
 from dynx.model.topology import longest_chain_end
-from dynx.rbd.link_poses import frame_poses, link_poses
+from dynx.rbd.kinematics import frame_poses, link_poses
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous

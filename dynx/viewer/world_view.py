@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, ClosedError, DynxError, nearest, shown
 from dynx.model.numbers import checked_array
-from dynx.rbd.link_poses import link_poses
+from dynx.rbd.kinematics import link_poses
 from dynx.spatial.scalar import Floats
 from dynx.viewer.drawn_robot import AS_DESCRIBED, ContactArrows, DrawnScene, FollowingCamera, Look
 from dynx.viewer.framing import box_around, has_ground

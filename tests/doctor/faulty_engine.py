@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from dynx.doctor.examine.examination import Examination, Examiner, model_without_mimics
+from dynx.doctor.examination import Examination, Examiner, model_without_mimics
 from dynx.errors import EngineError
 from dynx.loaded import LoadedModel, LoadedRobot
 from dynx.model import Inertial, Model

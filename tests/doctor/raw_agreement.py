@@ -15,8 +15,7 @@ from typing import Any
 import numpy as np
 
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.examine.engine_input import without_meshes
-from dynx.doctor.examine.examination import TILTED_GRAVITY, draw_states, model_without_mimics
+from dynx.doctor.examination import TILTED_GRAVITY, draw_states, model_without_mimics, without_meshes
 from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
 from tests.doctor.survey_files import Entry, read_entries

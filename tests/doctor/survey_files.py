@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from dynx.doctor import diagnose
-from dynx.doctor.examine.engine_input import temporary_urdf, without_meshes
+from dynx.doctor.examination import temporary_urdf, without_meshes
 from dynx.engines.silence import silence
 from dynx.errors import DynxError
 from dynx.loaded import installed_engines

@@ -186,7 +186,7 @@ def test_a_missing_engine_is_named_when_asked_for_and_left_out_otherwise(
 
     known = registry.loader_class
     monkeypatch.setattr(registry, "loader_class", refuse_to_load)
-    monkeypatch.setattr("dynx.doctor.examine.examination.loader_class", refuse_to_load)
+    monkeypatch.setattr("dynx.doctor.examination.loader_class", refuse_to_load)
     report = diagnose(TRAP, counterexamples=False)
     assert [each.engine for each in report.engines] == [e for e in ENGINES if e not in ("mujoco", "drake")]
     with pytest.raises(NotInstalledError, match=r"dynx\[drake\]"):

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from dynx.doctor import DoctorReport, diagnose
-from dynx.doctor.examine.examination import LOADING, TORQUE
+from dynx.doctor.examination import LOADING, TORQUE
 from dynx.loaded import LoadedRobot
 from dynx.model import Inertial
 from dynx.reference.backend import ReferenceBackend

@@ -14,10 +14,10 @@ from rich.console import Console
 
 from dynx.cli.doctor.tables import show_one
 from dynx.doctor.diagnosis import diagnose
-from dynx.doctor.examine.examination import draw_states, model_without_mimics, reference_values
+from dynx.doctor.examination import draw_states, model_without_mimics, reference_values
 from dynx.doctor.formats import sarif_document
 from dynx.doctor.formats.html import engine_map
-from dynx.doctor.prove.mending import level_of
+from dynx.doctor.mending import level_of
 from dynx.doctor.report import DoctorReport
 from dynx.errors import UnknownNameError
 from dynx.loaded import ENGINES, installed_engines

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from dynx.agreement.tolerances import BAR
 from dynx.doctor import DoctorReport, compare_as_loaded, diagnose
 from dynx.doctor.diagnosis import open_case
-from dynx.doctor.examine.examination import TORQUE, Examiner
+from dynx.doctor.examination import TORQUE, Examiner
 from dynx.doctor.formats.baseline import differences
 from dynx.loaded import engine_of, installed_engines
 from dynx.rules import Case

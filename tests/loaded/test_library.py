@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.examine.engine_input import temporary_urdf, without_meshes
+from dynx.doctor.examination import temporary_urdf, without_meshes
 from dynx.engines.pinocchio.as_loaded import LoadedPinocchio
 from dynx.errors import DynxError, EngineError
 from dynx.loaded.difference import model_difference

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from dynx.model.expansion import expand
-from dynx.model.xacro_robots import left_out_note, xacro_robots
+from dynx.model.expansion import expand, left_out_note, xacro_robots
 
 OPEN = '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"'
 LINK = '<link name="base"/>'

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dynx.doctor.examine.examination import ReferenceValues, draw_states, max_change, reference_values
+from dynx.doctor.examination import ReferenceValues, draw_states, max_change, reference_values
 from dynx.rules import Case
 from dynx.spatial.scalar import Floats
 

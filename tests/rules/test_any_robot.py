@@ -6,7 +6,7 @@ from hypothesis import given, note
 from hypothesis import strategies as st
 
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.examine.examination import TILTED_GRAVITY
+from dynx.doctor.examination import TILTED_GRAVITY
 from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, Rule, all_rules

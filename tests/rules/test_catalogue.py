@@ -9,7 +9,7 @@ import pytest
 from packaging.specifiers import SpecifierSet
 
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.examine.examination import TILTED_GRAVITY
+from dynx.doctor.examination import TILTED_GRAVITY
 from dynx.errors import UnknownNameError
 from dynx.loaded import ENGINES, VARIANTS
 from dynx.model.xml.source import SourceElement, XmlSource

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from dynx.agreement.tolerances import BAR
-from dynx.engines.pybullet.inertia_checks import diagonalisation_error
+from dynx.engines.pybullet.file_checks import diagonalisation_error
 from dynx.model.elements import Inertial, Pose
 from dynx.model.library import DYNX_MODELS, robots
 from dynx.model.tree import Base

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.doctor.prove.mending import mend
+from dynx.doctor.mending import mend
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.model.tree import Base

@@ -14,8 +14,8 @@ import pytest
 from packaging.specifiers import SpecifierSet
 
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.examine.examination import Examination, Examiner, ReferenceValues
-from dynx.doctor.prove.mending import mend
+from dynx.doctor.examination import Examination, Examiner, ReferenceValues
+from dynx.doctor.mending import mend
 from dynx.errors import ModelError
 from dynx.loaded import VARIANTS, engine_of, installed_engines, loader_class
 from dynx.rules import Case, Rule, all_rules

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from dynx.doctor import diagnose
-from dynx.engines.pybullet.inertia_checks import MAX_ASYMMETRY, tree_asymmetry
+from dynx.engines.pybullet.file_checks import MAX_ASYMMETRY, tree_asymmetry
 from dynx.engines.silence import silence
 from dynx.model.elements import Inertial, Pose
 from dynx.rules import Case, find_rule

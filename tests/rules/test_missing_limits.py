@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from dynx.doctor.examine.engine_input import temporary_urdf
+from dynx.doctor.examination import temporary_urdf
 from dynx.engines.silence import silence
 from dynx.loaded import installed_engines, load_as, loader_class
 from dynx.rules import Case, find_rule

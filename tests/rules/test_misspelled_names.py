@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.doctor.prove.mending import level_of
+from dynx.doctor.mending import level_of
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, find_rule
 from dynx.rules.attributes import ATTRIBUTES, meant_name, misspelled_numbers

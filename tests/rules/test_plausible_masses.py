@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.doctor.prove.mending import readable
+from dynx.doctor.mending import readable
 from dynx.model.library import find, robots
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, find_rule

@@ -12,8 +12,7 @@ from typing import Any
 
 import pytest
 
-from dynx.doctor.examine.engine_input import temporary_urdf, without_meshes
-from dynx.doctor.examine.examination import model_without_mimics
+from dynx.doctor.examination import model_without_mimics, temporary_urdf, without_meshes
 from dynx.engines.silence import silence
 from dynx.loaded import LoadedJoint, installed_engines, load_as, loader_class
 from dynx.rules.registry import find_trap, trap_case

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.examine.examination import Examiner
+from dynx.doctor.examination import Examiner
 from dynx.errors import DescriptionError
 from dynx.loaded import installed_engines
 from dynx.model.xml.source import XmlSource

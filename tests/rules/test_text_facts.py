@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dynx.doctor.examine.engine_input import temporary_urdf
+from dynx.doctor.examination import temporary_urdf
 from dynx.engines.silence import silence
 from dynx.errors import EngineError
 from dynx.loaded import LoadedInertial, LoadedJoint, installed_engines, load_as

@@ -4,8 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.spatial.extended import jacobi_eigen, longdouble
-from dynx.spatial.scalar import Array
+from dynx.spatial.scalar import Array, jacobi_eigen, longdouble
 
 EPS = float(np.finfo(np.longdouble).eps)
 

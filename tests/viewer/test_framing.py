@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 import dynx
 from dynx.model.geometry import Box, Sphere
-from dynx.model.geometry.visible_shapes import link_shapes
-from dynx.rbd.link_poses import link_poses
+from dynx.model.geometry.links import link_shapes
+from dynx.rbd.kinematics import link_poses
 from dynx.spatial.scalar import Floats
 from dynx.viewer import view
 from dynx.viewer.drawn_robot import GHOST_SIZE

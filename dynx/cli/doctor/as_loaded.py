@@ -16,7 +16,7 @@ from dynx.cli.shell.output import console, counted, summary_line
 from dynx.cli.shell.run import carry_out
 from dynx.cli.shell.tables import Table
 from dynx.doctor.formats import wording
-from dynx.doctor.formats.vote import Vote, largest_error, largest_quantity_error, vote
+from dynx.doctor.formats.causes import Vote, largest_error, largest_quantity_error, vote
 from dynx.doctor.report import DoctorReport, EngineResult
 from dynx.doctor.task import DoctorTask, check_engines, missing_engines
 from dynx.model.expansion import expand, refusals

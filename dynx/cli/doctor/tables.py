@@ -15,8 +15,14 @@ from dynx.cli.shell.exits import one_line, short_line
 from dynx.cli.shell.output import counted, summary_line
 from dynx.cli.shell.tables import Table
 from dynx.doctor.formats import wording
-from dynx.doctor.formats.causes import ROUNDING, RuleFindings, catalogue_entry, causes, severity
-from dynx.doctor.formats.vote import largest_error
+from dynx.doctor.formats.causes import (
+    ROUNDING,
+    RuleFindings,
+    catalogue_entry,
+    causes,
+    largest_error,
+    severity,
+)
 from dynx.doctor.report import DoctorReport, EngineResult, Finding, Status
 
 _PLACES = (4, 3, 2, 1)

@@ -10,7 +10,7 @@ from typing import Any, Generic, Protocol, TypeVar
 from dynx.cli.shell.exits import complain, interruptible, remark, short_line
 from dynx.cli.shell.output import counted, log, progress_bar
 from dynx.errors import DynxError
-from dynx.model.xacro_robots import left_out_note
+from dynx.model.expansion import left_out_note
 from dynx.simd.machine import core_count
 from dynx.workers import Workers
 

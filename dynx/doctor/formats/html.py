@@ -17,13 +17,12 @@ import numpy as np
 from dynx._version import __version__
 from dynx.doctor.formats import wording
 from dynx.doctor.formats.baseline import Baseline
-from dynx.doctor.formats.causes import ROUNDING, causes
-from dynx.doctor.formats.vote import largest_error
+from dynx.doctor.formats.causes import ROUNDING, causes, largest_error
 from dynx.doctor.lines import Opcode, line_opcodes, lines_of
 from dynx.doctor.report import DoctorReport
 from dynx.files.pages import page_environment, page_text
 from dynx.loaded.difference import Deviation
-from dynx.model.xacro_robots import left_out_note
+from dynx.model.expansion import left_out_note
 
 if TYPE_CHECKING:
     from dynx.files.pages import Environment

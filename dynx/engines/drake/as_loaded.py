@@ -37,9 +37,15 @@ from dynx.engines.drake.library import (
 )
 from dynx.errors import EngineError, ModelError, UnusableEngineError, located, shown
 from dynx.files.reading import read_file
-from dynx.loaded.calls import called_joints
-from dynx.loaded.description import LoadedInertial, LoadedJoint, LoadedModel
-from dynx.loaded.robot import LoadedRobot, lacking_joints, require_file
+from dynx.loaded.robot import (
+    LoadedInertial,
+    LoadedJoint,
+    LoadedModel,
+    LoadedRobot,
+    called_joints,
+    lacking_joints,
+    require_file,
+)
 from dynx.model import Model
 from dynx.model.mechanism import float64, pose_arrays
 from dynx.model.xml.source import SourceElement, XmlSource

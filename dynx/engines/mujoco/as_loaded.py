@@ -22,9 +22,15 @@ import numpy as np
 from dynx.engines.mujoco.library import MAX_DEPTH, mujoco, silence_warnings
 from dynx.engines.silence import silence
 from dynx.errors import EngineError, UnusableEngineError, nonblank_lines, shown
-from dynx.loaded.calls import called_joints
-from dynx.loaded.description import LoadedInertial, LoadedJoint, LoadedModel
-from dynx.loaded.robot import LoadedRobot, lacking_joints, require_file
+from dynx.loaded.robot import (
+    LoadedInertial,
+    LoadedJoint,
+    LoadedModel,
+    LoadedRobot,
+    called_joints,
+    lacking_joints,
+    require_file,
+)
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous

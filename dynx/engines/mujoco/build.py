@@ -41,9 +41,8 @@ from dynx.model.elements import Inertial, Pose
 from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
 from dynx.model.geometry.mjcf import MIN_HEIGHT_RANGE
 from dynx.model.mechanism import ROOT
-from dynx.spatial.extended import FLOAT64_EPS, jacobi_eigen, longdouble
 from dynx.spatial.inertia import RigidInertia
-from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.scalar import FLOAT64_EPS, Array, Floats, jacobi_eigen, longdouble
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_rpy, skew
 from dynx.steppers.layout import WORLD, BodyLayout, Layout, Owner, RobotLayout

@@ -18,8 +18,14 @@ from dynx.engines.pinocchio.engine_model import MAX_NV, WORLD
 from dynx.engines.pinocchio.library import pin
 from dynx.engines.silence import capture_output
 from dynx.errors import EngineError, UnusableEngineError, nonblank_lines
-from dynx.loaded.description import LoadedInertial, LoadedJoint, LoadedModel
-from dynx.loaded.robot import LoadedRobot, lacking_joints, require_file
+from dynx.loaded.robot import (
+    LoadedInertial,
+    LoadedJoint,
+    LoadedModel,
+    LoadedRobot,
+    lacking_joints,
+    require_file,
+)
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 

@@ -33,9 +33,14 @@ from dynx.engines.pybullet.client import ORIGIN, LoadedClient, Setting
 from dynx.engines.pybullet.file_checks import require_harmless
 from dynx.engines.pybullet.library import bullet
 from dynx.errors import UnusableEngineError, shown
-from dynx.loaded.calls import called_joints
-from dynx.loaded.description import LoadedInertial, LoadedJoint, LoadedModel
-from dynx.loaded.robot import LoadedRobot, lacking_joints
+from dynx.loaded.robot import (
+    LoadedInertial,
+    LoadedJoint,
+    LoadedModel,
+    LoadedRobot,
+    called_joints,
+    lacking_joints,
+)
 from dynx.model import Model
 from dynx.model.mechanism import ROOT
 from dynx.spatial.scalar import Floats

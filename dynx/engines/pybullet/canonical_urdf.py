@@ -28,9 +28,8 @@ from decimal import Decimal
 import numpy as np
 
 from dynx.model.mechanism import ROOT, Mechanism
-from dynx.spatial.extended import FLOAT64_EPS, jacobi_eigen, longdouble
 from dynx.spatial.inertia import RigidInertia
-from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.scalar import FLOAT64_EPS, Array, Floats, jacobi_eigen, longdouble
 from dynx.spatial.so3 import rotate_back, rpy_from_rotation, skew
 
 

@@ -25,9 +25,8 @@ from dynx.engines.pybullet.motors import BulletMotorCommand
 from dynx.model.mechanism import Mechanism
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.branchless import quat_exp
-from dynx.spatial.extended import longdouble
 from dynx.spatial.inertia import inertia_about_origin
-from dynx.spatial.scalar import Floats
+from dynx.spatial.scalar import Floats, longdouble
 from dynx.spatial.so3 import cross, quat_from_rotation, quat_product, rotation_from_quat
 from dynx.steppers.layout import BodyLayout, Collider, RobotLayout
 from dynx.steppers.state import BodyState, RobotState

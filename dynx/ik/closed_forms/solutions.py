@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.errors import ArgumentError
-from dynx.files.notebook import html_table
+from dynx.files.pages import html_table
 from dynx.ik.coordinates import FULL_TURN
 from dynx.ik.result import NOT_FOUND, REACHED, IKResult
 from dynx.model import Model

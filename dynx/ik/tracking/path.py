@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.backends.base import Backend
-from dynx.files.notebook import html_table
+from dynx.files.pages import html_table
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.problem import Requirement
 from dynx.ik.step import rotation_between

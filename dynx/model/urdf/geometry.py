@@ -24,7 +24,7 @@ from dynx.model.geometry import (
 )
 from dynx.model.geometry.mesh_files import MeshNotFoundError, find_above, find_mesh, reason_unknown
 from dynx.model.package_search import StrPath
-from dynx.model.urdf.elements import read_origin, reads_quaternions
+from dynx.model.urdf.reader import read_origin, reads_quaternions
 from dynx.model.urdf.values import Reading
 from dynx.model.xml.reading import Element, read_xml
 

@@ -21,9 +21,9 @@ from dynx.model.geometry import (
     Visual,
 )
 from dynx.model.tree import Tree
-from dynx.model.urdf.elements import FRAME_TAG, LOCKED_TAG
+from dynx.model.urdf.reader import FRAME_TAG, LOCKED_TAG
 from dynx.model.urdf.values import name_fault
-from dynx.model.xml.quoting import quoteattr
+from dynx.model.xml.text import quoteattr
 
 # Writer of the visual and collision shapes of a link as URDF text.
 

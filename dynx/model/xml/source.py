@@ -14,9 +14,8 @@ from functools import cached_property
 from xml.parsers import expat
 
 from dynx.model.elements import Note
-from dynx.model.xml.quoting import quoteattr
 from dynx.model.xml.reading import repair_of
-from dynx.model.xml.text import TextForm, decode_with_encoding, strip_ends
+from dynx.model.xml.text import TextForm, decode_with_encoding, quoteattr, strip_ends
 
 _DECLARED = re.compile(r"""<\?xml[^>]*?\bencoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
 _LINE_END = re.compile(rb"\r\n|\r|\n")

@@ -1,4 +1,5 @@
-"""Decoding of XML documents: byte-order marks, declared encodings, stray characters at the ends."""
+"""Decoding of XML documents: byte-order marks, declared encodings, stray characters at the ends; quoting of
+attributes."""
 
 from __future__ import annotations
 
@@ -92,3 +93,19 @@ def _decode_strictly(data: bytes, encoding: str, source: str) -> str:
     except UnicodeError as error:
         reason = getattr(error, "reason", str(error))
         raise DescriptionError(f"is not valid {encoding}: {reason}", source=source) from None
+
+
+_ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", "\n": "&#10;", "\r": "&#13;", "\t": "&#9;"})
+
+
+def quoteattr(text: str) -> str:
+    """Return a text as the value of an attribute, in quotes, as `xml.sax.saxutils.quoteattr` does.
+
+    That module imports an HTTP client, which takes a sixth of the time in which models are imported.
+    """
+    escaped = text.translate(_ESCAPES)
+    if '"' not in escaped:
+        return f'"{escaped}"'
+    if "'" not in escaped:
+        return f"'{escaped}'"
+    return '"' + escaped.replace('"', "&quot;") + '"'

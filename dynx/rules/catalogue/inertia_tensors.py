@@ -9,7 +9,7 @@ from itertools import product
 
 import numpy as np
 
-from dynx.engines.pybullet.inertia_checks import (
+from dynx.engines.pybullet.file_checks import (
     MAX_ASYMMETRY,
     bullet_reading,
     diagonalisation_error,
@@ -39,8 +39,7 @@ from dynx.rules.inertia import (
     with_inertials,
     with_raised_moments,
 )
-from dynx.spatial.extended import FLOAT64_EPS, longdouble
-from dynx.spatial.scalar import Floats
+from dynx.spatial.scalar import FLOAT64_EPS, Floats, longdouble
 from dynx.spatial.so3 import rotation_from_rpy
 
 _MAX_CORRECTIONS = 4

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from dynx.errors import escaped
-from dynx.model.xml.quoting import quoteattr
 from dynx.model.xml.source import Edit, SourceElement
+from dynx.model.xml.text import quoteattr
 from dynx.rules import (
     Case,
     Correction,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator
 
 from dynx.errors import DescriptionError, shown
-from dynx.model.urdf.elements import FULL_TURN, QUATERNION
+from dynx.model.urdf.reader import FULL_TURN, QUATERNION
 from dynx.model.xml.source import SourceElement
 from dynx.rules import (
     EVERY_ENGINE,

@@ -8,8 +8,8 @@ from dynx.engines.pybullet.file_checks import MAX_JOINTS
 from dynx.errors import shown
 from dynx.model import Model
 from dynx.model.elements import Link
-from dynx.model.xml.quoting import quoteattr
 from dynx.model.xml.source import Edit
+from dynx.model.xml.text import quoteattr
 from dynx.rules import Case, Correction, Detection, EditingRule, Remedy, Rule, correction, measured_on
 from dynx.rules.case import end_of
 from dynx.rules.joints import TYPES, fresh_name, joint_split, joints_of_type, specifies_base

@@ -9,7 +9,7 @@ from inspect import signature
 from typing import Any, overload
 
 from dynx.errors import ArgumentError, DynxError, shown
-from dynx.files.notebook import html_grid
+from dynx.files.pages import html_grid
 from dynx.model.numbers import is_real
 from dynx.option_names import check_arguments
 from dynx.sim.comparison.factors import Factor, Mixture

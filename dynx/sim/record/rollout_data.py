@@ -12,7 +12,7 @@ import numpy as np
 from dynx.backends import backend
 from dynx.control.base import Controller
 from dynx.errors import ArgumentError
-from dynx.files.notebook import html_grid
+from dynx.files.pages import html_grid
 from dynx.model import Model
 from dynx.sim.controller_checks import controller_numbers
 from dynx.sim.plants.model_error import plant_model

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from dynx.errors import ArgumentError
 from dynx.model.geometry import HeightField, Mesh, Shape
+from dynx.model.geometry.links import link_shapes
 from dynx.model.geometry.ray_casting import cast_on_shape
-from dynx.model.geometry.visible_shapes import link_shapes
-from dynx.rbd.link_poses import link_poses
+from dynx.rbd.kinematics import link_poses
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import inverse
 from dynx.steppers.camera import Camera, Draw, Drawing, DrawnShape

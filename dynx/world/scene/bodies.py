@@ -30,7 +30,7 @@ from dynx.model.geometry import (
     solid_properties,
 )
 from dynx.model.numbers import checked_array, finite_numbers, finite_vector, positive_number
-from dynx.model.urdf.elements import inertia_fault
+from dynx.model.urdf.reader import inertia_fault
 from dynx.spatial.scalar import Floats
 from dynx.steppers.material import DEFAULT_MATERIAL, Material, checked_material
 from dynx.world.scene.robots import checked_name

@@ -20,9 +20,8 @@ from dynx.errors import EngineLimitError, UnsupportedFeatureError, shown
 from dynx.model.elements import IDENTITY, Inertial, Joint, Pose
 from dynx.model.geometry import HeightField, Plane
 from dynx.model.geometry.mjcf import ShapeWriter, placement, quat_text, text
-from dynx.spatial.extended import FLOAT64_EPS, jacobi_eigen, longdouble
 from dynx.spatial.inertia import RigidInertia
-from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.scalar import FLOAT64_EPS, Array, Floats, jacobi_eigen, longdouble
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_quat, rotation_from_rpy, skew
 from dynx.steppers.contact_springs import damping_ratio

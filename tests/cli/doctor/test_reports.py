@@ -24,7 +24,7 @@ from dynx.cli.shell.main import cli
 from dynx.cli.shell.run import carry_out
 from dynx.doctor.formats import read_baseline
 from dynx.doctor.formats.baseline import Baseline
-from dynx.doctor.formats.vote import vote
+from dynx.doctor.formats.causes import vote
 from dynx.doctor.report import DoctorReport, EngineResult, PairError
 from dynx.doctor.task import DoctorTask, examine, missing_engines
 from dynx.errors import ArgumentError, NotInstalledError

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.doctor.counterexample.reductions import maximal_changes
+from dynx.doctor.counterexample import maximal_changes
 
 NUMBERS = st.sets(st.integers(0, 60))
 

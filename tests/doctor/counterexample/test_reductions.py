@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx import load
-from dynx.doctor.counterexample.reductions import (
+from dynx.doctor.counterexample import (
     Reductions,
     complexity,
     fewer_extras,

@@ -14,10 +14,9 @@ from hypothesis import strategies as st
 
 from dynx import load
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.counterexample import search
-from dynx.doctor.counterexample.reductions import complexity
-from dynx.doctor.counterexample.search import INITIAL_STATES, smallest_counterexample
-from dynx.doctor.examine.examination import model_without_mimics
+from dynx.doctor import counterexample
+from dynx.doctor.counterexample import INITIAL_STATES, complexity, smallest_counterexample
+from dynx.doctor.examination import model_without_mimics
 from dynx.doctor.report import Counterexample
 from dynx.errors import DynxError
 from dynx.model import Model
@@ -207,7 +206,7 @@ class Clock:
 def test_the_budget_is_respected(budget: int, monkeypatch: pytest.MonkeyPatch) -> None:
     difference = error_at_angle("arm_4_link", "arm_3_joint")
     clock = Clock(difference)
-    monkeypatch.setattr(search, "perf_counter", clock)
+    monkeypatch.setattr(counterexample, "perf_counter", clock)
     result = smallest_counterexample(
         case_of("tiago"), clock.difference, tolerance=BAR, seed=0, budget=float(budget)
     )
@@ -219,7 +218,7 @@ def test_the_budget_is_respected(budget: int, monkeypatch: pytest.MonkeyPatch) -
 def test_the_number_of_trials_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
     difference = error_at_angle("arm_4_link", "arm_3_joint")
     clock = Clock(difference)
-    monkeypatch.setattr(search, "MAX_TRIALS", 40)
+    monkeypatch.setattr(counterexample, "MAX_TRIALS", 40)
     assert_shows(find_counterexample(case_of("tiago"), clock.difference), difference, "fixed")
     assert clock.now <= 40
 

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.doctor.counterexample.reductions import ReducibleState
+from dynx.doctor.counterexample import ReducibleState
 from dynx.testing.strategies import models, samples
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from dynx.doctor.prove.mending import mend
+from dynx.doctor.mending import mend
 from dynx.model.library import find
 from dynx.model.loading import read_model
 from dynx.model.tree import Base

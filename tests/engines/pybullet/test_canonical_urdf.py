@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from dynx.engines.pybullet.canonical_urdf import ballast_for, bullet_tree, locale_free, write_bullet_urdf
 from dynx.model import Model
 from dynx.model.mechanism import build_mechanism
-from dynx.spatial.extended import longdouble
+from dynx.spatial.scalar import longdouble
 from dynx.spatial.so3 import rotation_from_quat, rotation_from_rpy, rpy_from_rotation
 from dynx.testing.strategies import models
 from tests.backends.robots import mixed_robot

@@ -8,9 +8,8 @@ from hypothesis import strategies as st
 from dynx.engines.pybullet.canonical_urdf import Ballast, ballast_for, principal_inertia
 from dynx.model import Inertial, Joint, Link, Model, Pose
 from dynx.model.mechanism import build_mechanism
-from dynx.spatial.extended import longdouble
 from dynx.spatial.inertia import RigidInertia
-from dynx.spatial.scalar import Array
+from dynx.spatial.scalar import Array, longdouble
 from dynx.spatial.so3 import skew
 from dynx.testing.strategies import models
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from dynx.engines.pybullet.inertia_checks import bullet_reading, diagonalisation_error, tree_may_reject
+from dynx.engines.pybullet.file_checks import bullet_reading, diagonalisation_error, tree_may_reject
 from dynx.engines.pybullet.library import bullet
 from dynx.engines.silence import silence
 from dynx.model.elements import Inertial, Pose

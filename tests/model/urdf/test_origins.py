@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from dynx.errors import DescriptionError
 from dynx.model import Model, Pose
 from dynx.model.loading import load
-from dynx.model.urdf.elements import reads_quaternions
+from dynx.model.urdf.reader import reads_quaternions
 from dynx.spatial.so3 import rotation_from_quat
 from dynx.testing.strategies import unit_vectors
 from tests.model.descriptions import INERTIAL, joint, link

@@ -9,7 +9,7 @@ from xml.sax.saxutils import quoteattr as expected
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.model.xml.quoting import quoteattr
+from dynx.model.xml.text import quoteattr
 
 
 @given(st.text(alphabet=st.one_of(st.sampled_from("&<>\"'\n\r\t;#"), st.characters())))

@@ -15,8 +15,7 @@ from dynx.loaded import installed_engines, load_as
 from dynx.model.elements import Note
 from dynx.model.library import find
 from dynx.model.loading import load
-from dynx.model.xml.reading import read_xml
-from dynx.model.xml.repair import repaired
+from dynx.model.xml.reading import read_xml, repaired
 from dynx.model.xml.source import XmlSource
 
 TEXT = find("scara").read_text(encoding="utf-8")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from dynx.doctor import diagnose
-from dynx.doctor.examine.engine_input import without_meshes
+from dynx.doctor.examination import without_meshes
 from dynx.loaded import installed_engines
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, find_rule

@@ -8,9 +8,8 @@ from hypothesis import given
 from dynx.model.elements import Inertial, Pose
 from dynx.model.mechanism import pose_arrays
 from dynx.rules.inertia import CentralInertia
-from dynx.spatial.extended import longdouble
 from dynx.spatial.inertia import RigidInertia, inertia_about_origin
-from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.scalar import Array, Floats, longdouble
 from dynx.testing.strategies import inertials, poses
 
 EPS = float(np.finfo(float).eps)

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.examine.engine_input import line_map
-from dynx.doctor.examine.examination import (
+from dynx.doctor.examination import (
     ReferenceValues,
     draw_states,
+    line_map,
     model_without_mimics,
     reference_values,
 )
@@ -268,7 +268,7 @@ def mend(
 
     `rules` are those to choose from (default: the whole catalogue; text that dynx cannot read otherwise
     is mended by any rule), `wanted` selects the detections to act on (default: all). Remedies above `level`
-    (`dynx.doctor.prove.mending`) are left undone.
+    (`dynx.doctor.mending`) are left undone.
     """
     chosen_rules = all_rules() if rules is None else rules
     ordered = [rule for stage in ("reading", "model") for rule in chosen_rules if rule.stage == stage]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynx.doctor.examine.engine_input import temporary_urdf, without_meshes
+from dynx.doctor.examination import temporary_urdf, without_meshes
 from dynx.engines.silence import silence
 from dynx.loaded import installed_engines
 from dynx.model.geometry.mesh_files import find_mesh

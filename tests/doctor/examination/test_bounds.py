@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dynx.doctor import diagnose
-from dynx.doctor.examine import examination
+from dynx.doctor import diagnose, examination
 from tests.rules.documents import case_of, joint, link
 
 PAIR = case_of(link("base"), link("arm"), joint("elbow", "base", "arm")).source.text

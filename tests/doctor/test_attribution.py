@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import pytest
 
-from dynx.doctor.examine.examination import LOADING, TORQUE
-from dynx.doctor.prove.attribution import AttributedCause, CauseAttributor
-from dynx.doctor.prove.mending import mend
+from dynx.doctor.attribution import AttributedCause, CauseAttributor
+from dynx.doctor.examination import LOADING, TORQUE
+from dynx.doctor.mending import mend
 from dynx.loaded import LoadedRobot
 from dynx.rules import Case, Detection, Remedy, Rule, find_rule
 from dynx.spatial.scalar import Floats

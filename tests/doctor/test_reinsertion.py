@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dynx.doctor.prove.attribution import reinserted_text
+from dynx.doctor.attribution import reinserted_text
 from dynx.model.xml.source import XmlSource
 
 LINES = ("<robot>", *(f'  <link name="l{k}" mass="{k}"/>' for k in range(6)), "</robot>")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from dynx.doctor.formats.vote import vote
+from dynx.doctor.formats.causes import vote
 from dynx.doctor.report import EngineResult, PairError
 from tests.doctor.formats.reports import alike
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from dynx.doctor.examine.examination import draw_states, model_without_mimics, reference_values
+from dynx.doctor.examination import draw_states, model_without_mimics, reference_values
 from dynx.model.xml.source import XmlSource
 
 LINK = (

@@ -10,7 +10,7 @@ import pytest
 
 from dynx.agreement.tolerances import BAR
 from dynx.doctor import diagnose
-from dynx.doctor.examine.examination import LOADING, MAX_LIMIT_DISTANCE, draw_states, model_without_mimics
+from dynx.doctor.examination import LOADING, MAX_LIMIT_DISTANCE, draw_states, model_without_mimics
 from dynx.loaded import installed_engines
 from dynx.model.xml.source import XmlSource
 from dynx.rules.registry import find_trap

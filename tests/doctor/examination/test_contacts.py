@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from dynx.doctor.diagnosis import compare_as_loaded, diagnose
-from dynx.doctor.examine.contacts import (
+from dynx.doctor.examination import (
+    Examiner,
     deepest_contact,
     describe_contacts,
     following_positions,
     links_in_contact,
+    model_without_mimics,
 )
-from dynx.doctor.examine.examination import Examiner, model_without_mimics
 from dynx.doctor.formats import wording
 from dynx.loaded import installed_engines
 from dynx.rules import Case

@@ -8,12 +8,12 @@ import pytest
 
 from dynx.agreement.tolerances import BAR
 from dynx.doctor.diagnosis import diagnose
-from dynx.doctor.examine.examination import Examiner
-from dynx.doctor.prove.mending import all_except, mend, place_of, refusal
+from dynx.doctor.examination import Examiner
+from dynx.doctor.mending import all_except, mend, place_of, refusal
 from dynx.loaded import installed_engines
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, find_rule
-from tests.doctor.prove.test_attribution import Replacement
+from tests.doctor.test_attribution import Replacement
 from tests.rules.documents import case_of, joint, link
 from tests.rules.trap_cases import trap
 

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dynx.doctor.attribution import AttributedCause, CauseAttributor
 from dynx.doctor.diagnosis import diagnose
-from dynx.doctor.examine.examination import ACCELERATION, TORQUE, Examiner
-from dynx.doctor.prove.attribution import AttributedCause, CauseAttributor
-from dynx.doctor.prove.mending import mend, place_of
+from dynx.doctor.examination import ACCELERATION, TORQUE, Examiner
+from dynx.doctor.mending import mend, place_of
 from dynx.loaded import installed_engines, loader_class
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, Rule, all_rules, find_rule

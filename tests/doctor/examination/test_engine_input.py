@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.doctor import diagnose
-from dynx.doctor.examine.engine_input import temporary_urdf, with_mesh_boxes, without_meshes
+from dynx.doctor.examination import temporary_urdf, with_mesh_boxes, without_meshes
 from dynx.loaded import installed_engines
 from dynx.model.xml.source import SourceElement, XmlSource
 from tests.rules.documents import case_of, link

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dynx.doctor.examine.engine_input import with_original_lines
-from dynx.doctor.prove.mending import detections, readable
+from dynx.doctor.examination import with_original_lines
+from dynx.doctor.mending import detections, readable
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, find_rule
 from dynx.rules.registry import trap_case

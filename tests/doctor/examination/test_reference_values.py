@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.examine.examination import (
+from dynx.doctor.examination import (
     TILTED_GRAVITY,
     draw_states,
     model_without_mimics,

@@ -2,31 +2,233 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from itertools import count
+from itertools import count, product
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from dynx.agreement.referee import Referee
 from dynx.agreement.tolerances import BAR
 from dynx.backends.solvability import singular_coordinates
-from dynx.doctor.examine.engine_input import temporary_urdf, without_meshes
+from dynx.doctor.lines import line_opcodes, lines_of
 from dynx.engines.silence import silence
 from dynx.errors import DescriptionError, DynxError, UnusableEngineError
 from dynx.loaded import LoadedModel, LoadedRobot, loader_class
 from dynx.model import Model
 from dynx.model.elements import Vector
+from dynx.model.geometry.formats.facets import STL_FACET
 from dynx.model.loading import read_model
 from dynx.model.tree import Base
-from dynx.model.xml.source import SourceElement, XmlSource
+from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.reference.backend import ReferenceBackend
+from dynx.rules import Detection, Rule
 from dynx.rules.case import Case
+from dynx.rules.geometry import bullet_box, collision_meshes, has_shape, may_be_refused, texture_replacements
 from dynx.rules.inertia import has_inertial_data
 from dynx.spatial.scalar import Floats
+
+# Collision meshes for PyBullet's plain call, each replaced by the eight corners of its bounding box.
+#
+# Without ``URDF_USE_INERTIA_FROM_FILE`` PyBullet computes inertias from the bounding boxes of shapes in
+# their own frames, so the corners give the same inertia as the mesh. They load faster, and PyBullet never
+# sees the file that a description names: its readers end the process on damaged files, and open any path.
+#
+# PyBullet adds another margin to the hull of an OBJ file than to that of STL and COLLADA files, so the
+# corners keep that difference. It reads no text STL, and ignores the up axis of COLLADA. A mesh that dynx
+# cannot find or read is left out.
+
+
+_FACES = (
+    *((0, 1, 2), (1, 3, 2), (4, 6, 5), (5, 6, 7), (0, 4, 1), (1, 4, 5)),
+    *((2, 3, 6), (3, 7, 6), (0, 2, 4), (2, 6, 4), (1, 5, 3), (3, 5, 7)),
+)
+"""Triangles of a box by the numbers of its corners."""
+
+
+def with_mesh_boxes(source: XmlSource, folder: Path) -> XmlSource:
+    """Replace each collision mesh by a mesh of the corners of its box, written into `folder`; those that
+    cannot be found or read are removed."""
+    return source.apply(*_edits(source, folder))
+
+
+def _edits(source: XmlSource, folder: Path) -> Iterator[Edit]:
+    written: dict[str, Path | None] = {}
+    for link in source.root.all("link"):
+        for collision, mesh in collision_meshes(link):
+            name = mesh.attributes.get("filename", "")
+            if name not in written:
+                written[name] = _write_corners(folder / f"mesh{len(written)}", name, source.source)
+            path = written[name]
+            if path is None:
+                yield source.keeping_lines(source.removal(collision))
+            else:
+                yield source.attribute_edit(mesh, "filename", str(path))
+
+
+def _write_corners(path: Path, name: str, source: str) -> Path | None:
+    """Write the corners of the box of a mesh, as OBJ for an OBJ file, else as STL; None if it is not read."""
+    found = bullet_box(name, source)
+    if found is None:
+        return None
+    (low, high), suffix = found
+    corners = list(product(*zip(low, high, strict=True)))
+    if suffix == ".obj":
+        lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in corners]
+        lines += [f"f {i + 1} {j + 1} {k + 1}" for i, j, k in _FACES]
+        path = path.with_suffix(suffix)
+        path.write_text("\n".join([*lines, ""]), encoding="ascii")
+        return path
+    facets = np.zeros(len(_FACES), STL_FACET)
+    facets["corners"] = np.array(corners)[np.array(_FACES)]
+    path = path.with_suffix(".stl")
+    path.write_bytes(bytes(80) + len(_FACES).to_bytes(4, "little") + facets.tobytes())
+    return path
+
+
+# Line map from the file made readable to the user's file, in which the lines of findings are reported.
+
+
+def with_original_lines(
+    found: Sequence[tuple[Rule, Detection]], given: XmlSource, readable: XmlSource
+) -> list[tuple[Rule, Detection]]:
+    """Translate the lines of detections to the `given` text; rules about the text have these already."""
+    if given.data == readable.data:
+        return list(found)
+    lines = line_map(*(lines_of(each.text_with_lines_before) for each in (given, readable)))
+    return [
+        (rule, replace(each, line=lines.get(each.line, each.line)))
+        if rule.stage == "model" and each.line is not None
+        else (rule, each)
+        for rule, each in found
+    ]
+
+
+def line_map(given: Sequence[str], readable: Sequence[str]) -> dict[int, int]:
+    """Map each line of the readable text to its line in the given text; a new line to where it was added."""
+    lines = {}
+    for _, first, last, start, end in line_opcodes(readable, given):
+        for k in range(first, last):
+            lines[k + 1] = min(start + k - first, max(end - 1, 0)) + 1
+    return lines
+
+
+_BOX = '<box size="1 1 1"/>'
+
+
+def without_meshes(source: XmlSource, *, collisions: bool = True) -> XmlSource:
+    """Remove visual shapes, textures that engines find and, with `collisions`, collision shapes that are
+    meshes. Visuals for which an engine may refuse the file are left, with a box in place of a mesh file."""
+    links = source.root.all("link")
+    visuals = [shape for link in links for shape in link.all("visual") if has_shape(shape)]
+    left = [shape for shape in visuals if may_be_refused(shape)]
+    shapes = [shape for shape in visuals if shape not in left]
+    boxes = [source.replacement(mesh, _BOX) for shape in left for mesh in _named_meshes(shape)]
+    if collisions:
+        shapes += [shape for link in links for shape, _ in collision_meshes(link)]
+    edits = (*map(source.removal, shapes), *boxes, *texture_replacements(source))
+    return source.apply(*map(source.keeping_lines, edits))
+
+
+def _named_meshes(shape: SourceElement) -> list[SourceElement]:
+    """Return the meshes of a shape that name a file."""
+    return [each for each in shape.walk() if each.tag == "mesh" and each.attributes.get("filename")]
+
+
+@contextmanager
+def temporary_urdf(source: XmlSource, *, mesh_boxes: bool = False) -> Iterator[Path]:
+    """Write the document, with `mesh_boxes` in place of collision meshes, to a file that exists while the
+    context lasts."""
+    with TemporaryDirectory(prefix="dynx-", ignore_cleanup_errors=True) as folder:
+        path = Path(folder) / "robot.urdf"
+        written = with_mesh_boxes(source, Path(folder)) if mesh_boxes else source
+        path.write_bytes(written.to_bytes())
+        yield path
+
+
+STATES = 500
+"""Number of states at which contacts are looked for, without dynamics: 5 to 15 ms of most robots."""
+
+_MAX_PAIRS = 4
+"""Number of pairs that are listed."""
+
+
+@dataclass
+class LinkContact:
+    """Number of states in which two links touch, how deep they penetrate each other at most [m], and the
+    positions of the joints where they do."""
+
+    states: int = 0
+    depth: float = 0.0
+    positions: Mapping[str, float] = field(default_factory=dict)
+
+
+def describe_contacts(case: Case, engine: str, seed: int) -> str:
+    """Write which links touch in an engine; empty where the engine cannot tell."""
+    try:
+        found = links_in_contact(case, engine, seed)
+    except DynxError:
+        return ""
+    if not found:
+        return f"none touch in {STATES} states within limits in which mimic joints follow; in others some do"
+    deepest = sorted(found.items(), key=lambda item: -item[1].depth)
+    listed = [
+        f"{one} and {other} touch in {each.states} of {STATES} states, up to {1e3 * each.depth:.3g} mm deep"
+        for (one, other), each in deepest[:_MAX_PAIRS]
+    ]
+    more = len(deepest) - _MAX_PAIRS
+    return "; ".join([*listed, *([f"and {more} more pairs"] if more > 0 else [])])
+
+
+def deepest_contact(case: Case, engines: Iterable[str], seed: int) -> Mapping[str, float] | None:
+    """Return the positions of the joints at which two links penetrate each other most deeply, in the first of
+    these engines in which any do; None where none touch."""
+    for engine in engines:
+        try:
+            found = links_in_contact(case, engine, seed)
+        except DynxError:
+            continue
+        if found:
+            return max(found.values(), key=lambda contact: contact.depth).positions
+    return None
+
+
+def links_in_contact(case: Case, engine: str, seed: int) -> Mapping[tuple[str, str], LinkContact]:
+    """Find the pairs of links that touch; raises EngineError where the engine refuses the file."""
+    model = model_without_mimics(case.source, case.base)
+    base = 7 if model.floating else 0
+    found: dict[tuple[str, str], LinkContact] = {}
+    with (
+        temporary_urdf(without_meshes(case.source)) as path,
+        silence(),
+        loader_class(engine)(path, model) as robot,
+    ):
+        for q in following_positions(case, STATES, seed):
+            for pair, depth in robot.contacts(q).items():
+                contact = found.setdefault(pair, LinkContact())
+                contact.states += 1
+                if depth > contact.depth:
+                    contact.depth = depth
+                    contact.positions = dict(zip(model.joint_names, q[base:].tolist(), strict=True))
+    return found
+
+
+def following_positions(case: Case, count: int, seed: int) -> Floats:
+    """Draw positions (count, nq) of all moving joints within their limits, in which mimic joints follow."""
+    free, model = model_without_mimics(case.source, case.base), case.model
+    q = draw_states(model, count, seed).q
+    base = 7 if model.floating else 0
+    columns = {joint.name: q[:, base + k] for k, joint in enumerate(model.coordinate_joints)}
+    for joint in model.joints:
+        if joint.mimic is not None and joint.mimic.joint in columns:
+            columns[joint.name] = joint.mimic.multiplier * columns[joint.mimic.joint] + joint.mimic.offset
+    held = np.zeros(count)
+    return np.column_stack([q[:, :base], *(columns.get(name, held) for name in free.joint_names)])
+
 
 # Reference values for a file: the robot as dynx reads it, evaluated by the algorithms of `dynx.rbd`.
 #

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dynx.agreement.tolerances import BAR
-from dynx.doctor.examine.examination import (
+from dynx.doctor.examination import (
     ACCELERATION,
     JACOBIAN,
     KINEMATICS,
