@@ -455,27 +455,19 @@ def frame_solver(backend: Backend, problem: Problem) -> FrameSolver:
     """Return the solver for problems of this kind, whose kernel comes from the cache if it is there."""
     model, coordinates = backend.model, problem.coordinates
     frame, kind, margin = solver_key(problem)
-    number = model.frame_index(frame)
-    content = (model.links, model.joints, model.extra_frames, model.base_pose, number, kind, margin)
-
-    def load(iteration: IterationBuilder) -> IterationKernel:
-        recipe = repr((algorithms(), iteration.__name__, content)).encode()
-        return load_iteration(
-            recipe, lambda: iteration(simplify_mechanism(model.mechanism), number, coordinates, kind)
-        )
 
     @cache
     def refinement() -> IterationKernel:
         with COMPILE_LOCK:
-            return load(refinement_iteration)
+            return frame_kernel(refinement_iteration, model, frame, coordinates, kind, margin)
 
     @cache
     def posture() -> IterationKernel:
         with COMPILE_LOCK:
-            return load(posture_iteration)
+            return frame_kernel(posture_iteration, model, frame, coordinates, kind, margin)
 
     def start_table() -> StartTable:
-        recipe = repr((algorithms(), "starts", content, host())).encode()
+        recipe = repr((algorithms(), "starts", _content(model, frame, kind, margin), host())).encode()
         name = f"{sha256(recipe).hexdigest()}.starts"
         found = read_cached(name)
         table = None if found is None else StartTable.from_content(found, coordinates.count)
@@ -485,7 +477,32 @@ def frame_solver(backend: Backend, problem: Problem) -> FrameSolver:
         return table
 
     table = start_table() if kind == POSES else None
-    return FrameSolver(load(solver_iteration), refinement, posture, coordinates, kind, table, backend.threads)
+    search = frame_kernel(solver_iteration, model, frame, coordinates, kind, margin)
+    return FrameSolver(search, refinement, posture, coordinates, kind, table, backend.threads)
+
+
+def frame_kernel(
+    iteration: IterationBuilder,
+    model: Model,
+    frame: str,
+    coordinates: FrameCoordinates,
+    kind: TargetKind,
+    margin: bytes = b"",
+    lanes: int | None = None,
+) -> IterationKernel:
+    """Return the kernel of an iteration for targets of this kind, from the cache if possible; `margin` are
+    the bytes of the margin of the limits in `coordinates`."""
+    recipe = repr((algorithms(), iteration.__name__, _content(model, frame, kind, margin))).encode()
+    number, mechanism = model.frame_index(frame), model.mechanism
+    return load_iteration(
+        recipe, lambda: iteration(simplify_mechanism(mechanism), number, coordinates, kind), lanes=lanes
+    )
+
+
+def _content(model: Model, frame: str, kind: TargetKind, margin: bytes) -> tuple[object, ...]:
+    """Return what a kernel of a frame depends on."""
+    number = model.frame_index(frame)
+    return (model.links, model.joints, model.extra_frames, model.base_pose, number, kind, margin)
 
 
 def _key(frame: Any, options: Mapping[str, Any]) -> object:

@@ -385,7 +385,7 @@ TRACKING_SETTINGS = ("position_tolerance", "rotation_tolerance", "max_iterations
 abandon descents without progress."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class DescentLayout:
     """Layout of the memory of a descent: the best coordinates (n,), then numbers, then vectors (n,)."""
 
@@ -400,7 +400,7 @@ class DescentLayout:
         return np.array([0.0] * n + [*self.numbers] + [0.0] * (n * self.vectors))
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Descent(DescentLayout):
     """A text of a step, with its settings and the layout of its memory."""
 

@@ -19,22 +19,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.backends.base import Backend
-from dynx.compiled.simplification import simplify_mechanism
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.descent import Descended
 from dynx.ik.iterations import tracking_iteration
-from dynx.ik.kernels import MAX_JOINTS, algorithms
+from dynx.ik.kernels import MAX_JOINTS, frame_kernel
 from dynx.ik.options import SearchLimits
 from dynx.ik.problem import Requirement
 from dynx.ik.search import SearchTask
 from dynx.ik.step import TRACKING, TargetKind
-from dynx.model.model import Model
 from dynx.model.targets import Targets
 from dynx.simd.image import COMPILE_LOCK
-from dynx.simd.iteration import (
-    IterationKernel,
-    load_iteration,
-)
+from dynx.simd.iteration import IterationKernel
 from dynx.spatial.scalar import Floats
 
 if TYPE_CHECKING:
@@ -230,21 +225,10 @@ def path_follower(
 
     def make() -> IterationKernel:
         with COMPILE_LOCK:
-            return path_kernel(backend.model, frame, kind)
+            alone = FrameCoordinates(backend.model, frame)
+            return frame_kernel(tracking_iteration, backend.model, frame, alone, kind, lanes=1)
 
     return KernelFollower(backend.kept(("path", frame, kind), make), coordinates, kind, point, limits)
-
-
-def path_kernel(model: Model, frame: str, kind: TargetKind) -> IterationKernel:
-    """Return the kernel that follows targets of this kind one after the other, from the cache if possible."""
-    coordinates, number = FrameCoordinates(model, frame), model.frame_index(frame)
-    content = (model.links, model.joints, model.extra_frames, model.base_pose, number, kind)
-    mechanism = simplify_mechanism(model.mechanism)
-    return load_iteration(
-        repr(("path", algorithms(), content)).encode(),
-        lambda: tracking_iteration(mechanism, number, coordinates, kind),
-        lanes=1,
-    )
 
 
 CHUNK = 64

@@ -13,7 +13,7 @@ does not reach a sample:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
@@ -270,9 +270,7 @@ class PathTracker:
             found = self._follower.follow(q, between.targets(parts), bounds, stop=True)
             steps += int(found.iterations.sum())
             if found.reached.all():
-                last = _last(found)
-                last.iterations[0] = steps
-                return last
+                return replace(found.part(slice(-1, None)), iterations=np.array([steps]))
             parts *= 2
         return None
 
@@ -344,10 +342,3 @@ def _repeated(target: Targets, count: int) -> Targets:
         None if target.positions is None else np.repeat(target.positions, count, axis=0),
         None if target.rotations is None else np.repeat(target.rotations, count, axis=0),
     )
-
-
-def _last(found: Followed) -> Followed:
-    return Followed(
-        found.q[-1:], found.position_error[-1:], found.rotation_error[-1:], found.reached[-1:],
-        found.iterations[-1:].copy(),
-    )  # fmt: skip
