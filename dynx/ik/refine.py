@@ -75,14 +75,14 @@ def refined_solutions(backend: Backend, problem: Problem, first: IKResult) -> IK
     for (k, task), target in samples:
         if not success[k]:
             continue
-        sample = _Sample(backend, problem, search, task, target, starts[k])
+        wanted = _OneTarget(backend, problem, search, task, target, starts[k])
         if finder is not None:
-            found, sentences[k] = finder.find(sample, q[k])
+            found, sentences[k] = finder.find(wanted, q[k])
             success[k] = not sentences[k]
             keep(k, found)
         if secondary is not None and success[k] and problem.coordinates.count:
             goal = None if goals is None else goals[k]
-            best = _preferred(sample, q[k], replace(secondary, nearest=goal), avoidance)
+            best = _preferred(wanted, q[k], replace(secondary, nearest=goal), avoidance)
             # Rounding decides at the edge of a tolerance or of a margin: otherwise what was found stays.
             if best is not None:
                 keep(k, best)
@@ -97,7 +97,7 @@ Target = tuple[Floats | None, Floats | None]
 
 
 @dataclass(frozen=True, eq=False)
-class _Sample:
+class _OneTarget:
     """One target of a problem, and the sources of its candidates."""
 
     backend: Backend
@@ -171,44 +171,44 @@ _RANK = 1e-6
 
 
 def _preferred(
-    sample: _Sample, q: Floats, secondary: Secondary, avoidance: Avoidance | None
+    wanted: _OneTarget, q: Floats, secondary: Secondary, avoidance: Avoidance | None
 ) -> Candidate | None:
     """Return the best solution, improved, of those that keep all margins; None if no candidate is one.
 
     Candidates are q (nq,), the start with the joints of the goal, and the solutions of the closed form, if
     there is one, or those from random starts: in a kernel, if one applies, otherwise one after the other.
     """
-    coordinates, limits, goal = sample.problem.coordinates, sample.problem.limits, secondary.nearest
-    rng, count = np.random.default_rng(sample.problem.rng), min(limits.max_restarts, STARTS)
-    begins = [q] if goal is None else [coordinates.with_joints_of(sample.start, goal), q]
-    known = sample.from_closed_form()
+    coordinates, limits, goal = wanted.problem.coordinates, wanted.problem.limits, secondary.nearest
+    rng, count = np.random.default_rng(wanted.problem.rng), min(limits.max_restarts, STARTS)
+    begins = [q] if goal is None else [coordinates.with_joints_of(wanted.start, goal), q]
+    known = wanted.from_closed_form()
     is_complete = known is not None
     if known is None:
-        known = sample.from_kernel(rng, count, begins[:-1])
+        known = wanted.from_kernel(rng, count, begins[:-1])
     if known is None:
-        known = [coordinates.random(sample.start, rng) for _ in range(count)]
+        known = [coordinates.random(wanted.start, rng) for _ in range(count)]
     begins += [coordinates.clipped(each) for each in known]
     # The kernel knows nothing of what is to be avoided.
     if avoidance is None and not is_complete:
-        best = _nearest_by_kernel(sample, begins, secondary)
+        best = _nearest_by_kernel(wanted, begins, secondary)
         if best is not None:
             return best
 
     def is_admissible(q: Floats) -> bool:
-        return avoidance is None or avoidance.is_clear(sample.backend, q)
+        return avoidance is None or avoidance.is_clear(wanted.backend, q)
 
-    objective = secondary.objective(coordinates, sample.task)
+    objective = secondary.objective(coordinates, wanted.task)
     solutions: list[tuple[float, Candidate]] = []
     iterations = 0
     for start in begins:
-        found, steps = sample.descended(start, begins[0] if goal is None else goal)
+        found, steps = wanted.descended(start, begins[0] if goal is None else goal)
         iterations += steps
         if found.success and is_admissible(found.q):
             solutions.append((objective(found.q), found))
     solutions.sort(key=lambda each: each[0])
     improved: list[tuple[float, Candidate]] = []
     for value, begin in solutions[:MAX_IMPROVED]:
-        found, steps, reached = _improved(sample, begin, value, objective, is_admissible)
+        found, steps, reached = _improved(wanted, begin, value, objective, is_admissible)
         iterations += steps
         improved.append((reached, found))
     if not improved:
@@ -219,7 +219,7 @@ def _preferred(
 
 
 def _improved(
-    sample: _Sample,
+    wanted: _OneTarget,
     best: Candidate,
     value: float,
     objective: Objective,
@@ -227,17 +227,17 @@ def _improved(
 ) -> tuple[Candidate, int, float]:
     """Return the solution after steps in the null space that lower the objective from `value`, the number of
     steps, and the objective."""
-    coordinates, length, steps = sample.problem.coordinates, _FIRST_STEP, 0
+    coordinates, length, steps = wanted.problem.coordinates, _FIRST_STEP, 0
     direction: Floats | None = None
     while steps < MAX_STEPS and length > _LEAST_STEP:
         steps += 1
         if direction is None:
-            direction = _descent_direction(coordinates, sample.task, best.q, objective)
+            direction = _descent_direction(coordinates, wanted.task, best.q, objective)
             if direction is None:
                 break
         x = np.array(coordinates.values(best.q)) + length * direction
         moved = np.clip(x, coordinates.lower, coordinates.upper).tolist()
-        trial, _ = sample.descended(coordinates.with_values(best.q, moved), best.q)
+        trial, _ = wanted.descended(coordinates.with_values(best.q, moved), best.q)
         lower = objective(trial.q) if trial.success else np.inf
         if lower < value and is_admissible(trial.q):
             best, value, direction = trial, lower, None
@@ -282,16 +282,16 @@ def _descent_direction(
     return None
 
 
-def _nearest_by_kernel(sample: _Sample, begins: list[Floats], secondary: Secondary) -> Candidate | None:
+def _nearest_by_kernel(wanted: _OneTarget, begins: list[Floats], secondary: Secondary) -> Candidate | None:
     """Return the best of some solutions, improved by a kernel, or None if no kernel applies, or if the
     objective is no posture."""
-    backend, coordinates = sample.backend, sample.problem.coordinates
+    backend, coordinates = wanted.backend, wanted.problem.coordinates
     posture = None if coordinates.floating else secondary.posture(coordinates)
     if posture is None or not backend.compiles:
         return None
     from dynx.ik.kernels import nearest_solutions
 
-    found = nearest_solutions(backend, sample.from_starts(begins), posture)
+    found = nearest_solutions(backend, wanted.from_starts(begins), posture)
     if found is None:
         return None
     objective, solutions = found
@@ -299,7 +299,7 @@ def _nearest_by_kernel(sample: _Sample, begins: list[Floats], secondary: Seconda
     if not solutions.success[best]:
         return None
     # Joints that do not count stay near the start.
-    shift_to, counts = sample.start.copy(), posture.weights > 0.0
+    shift_to, counts = wanted.start.copy(), posture.weights > 0.0
     shift_to[np.array(coordinates.indices)[counts]] = posture.goal[counts]
     q = coordinates.nearest(solutions.q[best], shift_to)
     errors = float(solutions.position_error[best]), float(solutions.rotation_error[best])
@@ -471,15 +471,15 @@ class _ClearFinder:
         # Two solutions differ by twice the tolerances.
         self._slack = 2.0 * (limits.position_tolerance + FRAME_REACH * limits.rotation_tolerance)
 
-    def find(self, sample: _Sample, solution: Floats) -> tuple[Candidate, str]:
+    def find(self, wanted: _OneTarget, solution: Floats) -> tuple[Candidate, str]:
         """Return a configuration that reaches the target and keeps the margins, and an empty text; or the one
         that lacks least, and a sentence on what prevents it."""
         from dynx.distance.avoidance import FIXED, OF_TARGET, collision_sentence, inevitable_sentence
 
-        tally, task = _Tally(), sample.task
+        tally, task = _Tally(), wanted.task
         descent = AvoidingDescent(task, self._avoidance, self._backend, self._problem.coordinates)
         starts, improvements = 0, 0
-        for solutions, drawn, is_all in self._rounds(sample, solution):
+        for solutions, drawn, is_all in self._rounds(wanted, solution):
             starts, complete = starts + drawn, is_all
             restarts = starts - 1
             lacking: list[tuple[float, Candidate]] = []
@@ -510,10 +510,10 @@ class _ClearFinder:
             self._avoidance, tally.blockers, tally.pairs, tally.count, complete=complete
         )
 
-    def _rounds(self, sample: _Sample, solution: Floats) -> Iterator[tuple[list[Floats], int, bool]]:
+    def _rounds(self, wanted: _OneTarget, solution: Floats) -> Iterator[tuple[list[Floats], int, bool]]:
         """Yield solutions with the number of starts that they took, and whether there are no others."""
-        problem, coordinates, start = self._problem, self._problem.coordinates, sample.start
-        known = sample.from_closed_form() if coordinates.count else []
+        problem, coordinates, start = self._problem, self._problem.coordinates, wanted.start
+        known = wanted.from_closed_form() if coordinates.count else []
         if known is not None:
             # Full turns change no distance.
             yield [solution, *_distinct(known, [solution], coordinates, 2.0 * math.pi)], 1, True
@@ -524,9 +524,9 @@ class _ClearFinder:
         while left > 0:
             count = min(STARTS, left)
             left -= count
-            found = sample.from_kernel(rng, count)
+            found = wanted.from_kernel(rng, count)
             if found is None:
-                found = [sample.descended(coordinates.random(start, rng), start)[0].q for _ in range(count)]
+                found = [wanted.descended(coordinates.random(start, rng), start)[0].q for _ in range(count)]
             new = _distinct(found, seen, coordinates)
             seen += new
             yield new, count, False
