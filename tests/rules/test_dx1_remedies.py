@@ -9,12 +9,15 @@ import pytest
 from hypothesis import given, settings
 
 import dynx
+from dynx.doctor import diagnose
+from dynx.errors import DescriptionError
 from dynx.model import Inertial, Model
 from dynx.model.library import EXAMPLE_ROBOT_DATA, robots
 from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, Remedy, all_rules, find_rule
 from dynx.rules.inertia import CentralInertia, inertial_edits
+from dynx.rules.registry import find_trap
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models
 from tests.rules.documents import case_of, joint, link
@@ -231,3 +234,17 @@ def with_inertial(case: Case, name: str, inertial: Inertial) -> Case:
     old = {each.name: each.inertial for each in case.model.links}[name]
     assert old is not None
     return case.with_source(case.source.apply(*inertial_edits(case.source, element, old, inertial)))
+
+
+@pytest.mark.parametrize(("choice", "mass"), [(None, 1.5), ("absolute", 1.5), ("zero", 0.0)])
+def test_the_sign_is_removed_or_the_mass_zero(choice: str | None, mass: float) -> None:
+    with pytest.raises(DescriptionError, match="wanted at least 0"):
+        dynx.load(find_trap("DX120"))
+    choose = None if choice is None else {"DX120": choice}
+    report = diagnose(find_trap("DX120"), engines=["pinocchio"], samples=1, choose=choose)
+    [finding] = [each for each in report.findings if each.rule == "DX120"]
+    assert (finding.link, finding.line, finding.proved) == ("lower", 20, True)
+    assert report.explained
+    assert report.mended is not None
+    assert dynx.load(report.mended).inertial("lower").mass == mass
+    assert any("DX120=" in each and "otherwise --choose" in each for each in report.choices)

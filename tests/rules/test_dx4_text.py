@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import importlib.util
 from pathlib import Path
 
@@ -9,14 +10,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from dynx.cli.doctor.files import write_mended
+from dynx.doctor import diagnose
+from dynx.doctor.task import DoctorTask, examine
+from dynx.loaded import installed_engines
 from dynx.model.library import find
 from dynx.model.loading import load
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, all_rules, find_rule
 from dynx.rules.catalogue.document import MAX_LINE_BYTES
 from dynx.rules.numbers_in_text import MisspelledNumberRule, NumericAttribute, numeric_attributes
+from dynx.rules.registry import trap_case
 from dynx.testing.strategies import urdf_text
-from tests.rules.documents import case_of, joint
+from tests.rules.documents import LIMIT, case_of, joint, link
 from tests.rules.trap_cases import assert_same_robot, changed_lines, mended, only, trap
 
 READING = tuple(rule.id for rule in all_rules() if rule.stage == "reading")
@@ -233,3 +239,130 @@ def test_a_number_under_a_misspelled_name_is_what_was_meant(right: str, wrong: s
     assert len(found) == 1
     model, meant = remedy.case.model, Case(XmlSource(text)).model
     assert [link.inertial for link in model.links] == [link.inertial for link in meant.links]
+
+
+TEXT = trap_case("DX101").source.text
+RULE = find_rule("DX422")
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r", "\r\r\n", "\r \t\n"])
+def test_a_line_end_is_reported_where_text_follows_a_lone_carriage_return(end: str) -> None:
+    case = Case(XmlSource(TEXT.replace("\n", end), "robot.urdf"))
+    found = RULE.detect(case)
+    assert bool(found) == (end == "\r")
+    if not found:
+        return
+    assert [(each.link, each.joint, each.line) for each in found] == [(None, None, 1)]
+    remedy = RULE.remedy(case, found)
+    assert remedy is not None
+    assert remedy.case.source.text == TEXT
+    assert not RULE.detect(remedy.case)
+
+
+def test_a_single_place_is_reported_at_its_line() -> None:
+    lines = TEXT.splitlines(keepends=True)
+    lines[4] = lines[4].replace("\n", "\r")
+    [found] = RULE.detect(Case(XmlSource("".join(lines))))
+    assert (found.line, found.message) == (5, "a line ends with a carriage return alone")
+
+
+def test_faults_of_a_file_with_carriage_returns_have_the_lines_of_the_file_with_line_feeds() -> None:
+    engines = [name for name in ("pinocchio", "pybullet") if name in installed_engines()]
+    right, found = (diagnose(text, engines=engines, samples=1) for text in (TEXT, TEXT.replace("\n", "\r")))
+    places = {(each.rule, each.link, each.line) for each in found.findings if each.rule != "DX422"}
+    assert places == {(each.rule, each.link, each.line) for each in right.findings}
+    assert found.explained
+    if "pybullet" in engines:
+        assert found.mended is not None
+        assert "\r" not in found.mended
+        assert [each.level for each in found.changes if each.rule == "DX422"] == ["safe"]
+
+
+PLAIN = case_of(link("base"), link("arm"), joint("elbow", "base", "arm")).source.text
+NAMED = PLAIN.replace('"arm"', '"größe"').replace('"elbow"', '"öse"')
+COMMENTED = PLAIN.replace("<link", "<!-- größe --><link", 1)
+
+
+def declared(encoding: str, text: str) -> bytes:
+    """Return the text, with a declaration of its encoding."""
+    return f'<?xml version="1.0" encoding="{encoding}"?>\n{text}'.encode(encoding)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        NAMED.encode(),
+        codecs.BOM_UTF8 + NAMED.encode(),
+        declared("UTF-8", NAMED),
+        declared("ISO-8859-1", COMMENTED),
+        declared("ISO-8859-1", PLAIN),
+        COMMENTED.encode("latin-1"),
+        declared("Shift_JIS", PLAIN.replace("<link", "<!-- 表示 --><link", 1)),
+        b"\n\n" + PLAIN.encode() + b"\0\0",
+    ],
+)
+def test_engines_load_a_file_whose_names_are_utf8(data: bytes) -> None:
+    report = diagnose(data, samples=1)
+    assert report.alike
+    assert not report.findings
+
+
+@pytest.mark.parametrize(
+    ("data", "line"),
+    [
+        (NAMED.encode("latin-1"), None),
+        (declared("ISO-8859-1", NAMED), None),
+        (declared("windows-1252", NAMED), None),
+        (NAMED.encode("utf-16"), 1),
+        (declared("UTF-16", NAMED), 2),
+        (PLAIN.encode("utf-16-le"), 1),
+        (PLAIN.encode("utf-32"), 1),
+    ],
+)
+def test_other_files_are_saved_in_utf8(data: bytes, line: int | None, tmp_path: Path) -> None:
+    path = tmp_path / "robot.urdf"
+    path.write_bytes(data)
+    report = examine(DoctorTask(str(path), "fixed", samples=1))
+    [finding] = report.differences
+    assert (finding.rule, finding.proved) == ("DX440", True)
+    assert line in (None, finding.line)
+    assert set(finding.engines) == {each.engine for each in report.engines}
+    mended = tmp_path / "mended.urdf"
+    assert write_mended(str(mended), report, over_input=False)
+    text = mended.read_bytes().decode("utf-8")
+    assert ("größe" in text) == (finding.line != 1 or "größe".encode("utf-16-le") in data)
+    assert "UTF-16" not in text
+    assert diagnose(mended, samples=1).alike
+
+
+@pytest.mark.parametrize("encoding", ["cp037", "idna", "no-such-encoding", "utf-7"])
+def test_an_encoding_that_cannot_be_read_is_a_refusal_with_the_reason(encoding: str) -> None:
+    try:
+        data = f'<?xml version="1.0" encoding="{encoding}"?>{PLAIN}'.encode(encoding)
+    except (LookupError, UnicodeError):
+        data = f'<?xml version="1.0" encoding="{encoding}"?>{PLAIN}'.encode()
+    report = diagnose(data, samples=1)
+    assert report.error is None or report.error.type == "DescriptionError"
+
+
+@pytest.mark.skipif("pinocchio" not in installed_engines(), reason="only Pinocchio reads the version")
+@pytest.mark.parametrize(
+    ("version", "missing", "rules"),
+    [
+        ("1.1", "effort", {"DX204"}),
+        ("1.1", "lower", set()),
+        ("1.2", "effort", set()),
+        ("1.2", "lower", {"DX222"}),
+        ("2.0", "effort", {"DX204", "DX416"}),
+        ("2.0", "lower", {"DX416"}),
+    ],
+)
+def test_each_version_has_its_own_rule(version: str, missing: str, rules: set[str]) -> None:
+    """URDF 1.2 requires both ends and no effort; a version that does not exist counts as its remedy."""
+    limit = LIMIT.replace(f'{missing}="', 'other="')
+    text = case_of(link("a"), link("b"), joint("j", "a", "b", limit=limit)).source.text
+    text = text.replace("<robot ", f'<robot version="{version}" ')
+    report = diagnose(text, engines=["pinocchio"], counterexamples=False)
+    assert {each.rule for each in report.findings if each.kind == "difference"} == rules
+    assert all(each.proved for each in report.differences)
+    assert report.explained
