@@ -6,14 +6,16 @@ import re
 from collections.abc import Mapping
 from importlib import import_module
 from types import FunctionType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dynx.envs.environment import TaskEnvironment
 from dynx.envs.library import AutoresetMode, register, registry
 from dynx.envs.randomization import Randomization
 from dynx.envs.task import RobotTask, Task
-from dynx.envs.vector import RobotVectorEnvironment
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
+
+if TYPE_CHECKING:
+    from dynx.envs.vector import RobotVectorEnvironment
 
 COMPILED = "compiled"
 """The engine of vector environments, whose kernels are compiled."""
@@ -89,6 +91,9 @@ def make_vector_environment(
     Raises ArgumentError for another engine or a task that is no `RobotTask`: those step one by one or in
     processes, by ``vectorization_mode="sync"`` or ``"async"``.
     """
+    # Imported here, because single environments need no compiler.
+    from dynx.envs.vector import RobotVectorEnvironment
+
     made = task_class(task).with_options(options)
     if engine != COMPILED or not isinstance(made, RobotTask):
         subject = type(made).__name__ if engine == COMPILED else f"engine {shown(engine)}"

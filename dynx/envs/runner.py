@@ -7,51 +7,71 @@ dynamics of a backend, or over `World.step`.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dynx.backends.base import Backend
 from dynx.backends.registry import backend
-from dynx.compiled.parametric import ParametricDynamics, parametric
 from dynx.control.dynamics import EngineDynamics
-from dynx.envs.library import spaces
+from dynx.envs.library import AutoresetMode, spaces
 from dynx.envs.randomization import Parameter, Randomization
 from dynx.envs.task import (
     Episode,
     Episodes,
-    ForwardDynamics,
+    Move,
     Outcome,
     RobotTask,
     State,
+    StepFriction,
     WorldTask,
     control_step,
+    free_move,
 )
 from dynx.envs.variation import VariedRobot, VariedScene
-from dynx.errors import DivergedError, ShapeError
+from dynx.errors import DivergedError, ShapeError, UnsupportedFeatureError
 from dynx.model.numbers import DIVERGENCE_SPEED
+from dynx.rbd.joint_friction import FrictionLaw
+from dynx.rbd.parameters import JointCoefficients
 from dynx.spatial.scalar import Array, Floats
 from dynx.steppers.state import RobotState, WorldState
-from dynx.world.scene import Scene, SceneRobot
-from dynx.world.snapshot import Snapshot
-from dynx.world.world import World
+
+if TYPE_CHECKING:
+    from dynx.world.scene import Scene
+    from dynx.world.snapshot import Snapshot
+    from dynx.world.world import World
+
+COMPILED = "compiled"
+"""Name of the engine whose kernels take whole steps."""
 
 ROBOT = "robot"
 """Name of the robot in the scene that is drawn."""
 
 
+def robot_episodes(task: RobotTask, engine: str) -> RobotEpisodes:
+    """Return the episodes of a task of one robot: on `compiled` in a lane of its kernel, otherwise, and for a
+    task that cannot be compiled, on floats."""
+    if engine == COMPILED:
+        try:
+            return CompiledEpisodes(task, engine)
+        except UnsupportedFeatureError:
+            pass
+    return RobotEpisodes(task, engine)
+
+
 class RobotEpisodes(Episodes):
-    """Episodes of a task of one robot, whose dynamics a backend evaluates."""
+    """Episodes of a task of one robot on floats, whose dynamics a backend evaluates."""
 
     def __init__(self, task: RobotTask, engine: str) -> None:
         self._task = task
         self._backend = backend(engine, task.model, validate=False)
         self._robot = EngineDynamics(self._backend)
-        self._forward: ForwardDynamics = self._robot.forward_dynamics
+        self._move: Move = partial(free_move, task, self._robot.forward_dynamics)
         self._variation: RobotVariation | None = None
         self._discrete = isinstance(task.action_space, spaces.Discrete)
         self._dtype, self._shape = task.observation_space.dtype, task.observation_space.shape
@@ -60,13 +80,14 @@ class RobotEpisodes(Episodes):
 
     def vary(self, randomization: Randomization) -> tuple[Parameter, ...]:
         """Return the parameters of this robot that episodes draw."""
-        self._variation = RobotVariation(VariedRobot(self._task, randomization), self._backend)
-        return self._variation.robot.parameters
+        varied = VariedRobot(self._task, randomization)
+        self._variation = RobotVariation(self._task, varied, self._backend)
+        return varied.drawn_parameters
 
     def set_parameters(self, values: Floats) -> None:
         """Give the robot of the next episode the values (k,) of the parameters that `vary` returned."""
         assert self._variation is not None, "vary was not called"
-        self._forward = self._variation.forward_dynamics(values)
+        self._move = self._variation.move(values)
 
     @property
     def state(self) -> State:
@@ -90,7 +111,7 @@ class RobotEpisodes(Episodes):
             actions: Sequence[Array] = [given] * task.substeps
         else:
             actions = self._variation.acting_actions(given, first=self._steps == 0)
-        moved = control_step(task, robot, self._forward, before, actions)
+        moved = control_step(task, robot, self._move, before, actions)
         self._steps += 1
         self._refuse_divergence(moved.q, moved.v)
         after = self._state = task.settle(moved)
@@ -109,14 +130,17 @@ class RobotEpisodes(Episodes):
 
     def _refuse_divergence(self, q: Floats, v: Floats) -> None:
         if not v @ v < DIVERGENCE_SPEED**2:
-            dt = self._task.control_dt
-            raise DivergedError(
-                f"the velocity after step {self._steps} ({self._steps * dt:.6g} s) is not finite or beyond "
-                f"{DIVERGENCE_SPEED:g}; smaller steps (substeps) or actions may help",
-                time=self._steps * dt,
-                step=self._steps,
-                state=(q, v),
-            )
+            self._raise_divergence(q, v)
+
+    def _raise_divergence(self, q: Floats, v: Floats) -> NoReturn:
+        dt = self._task.control_dt
+        raise DivergedError(
+            f"the velocity after step {self._steps} ({self._steps * dt:.6g} s) is not finite or beyond "
+            f"{DIVERGENCE_SPEED:g}; smaller steps (substeps) or actions may help",
+            time=self._steps * dt,
+            step=self._steps,
+            state=(q, v),
+        )
 
     def picture(self, width: int, height: int) -> NDArray[np.uint8]:
         """Draw the robot by rays through the shapes of its description."""
@@ -138,53 +162,85 @@ class RobotEpisodes(Episodes):
             self._viewer = None
 
 
-COMPILED = "compiled"
+class CompiledEpisodes(RobotEpisodes):
+    """Episodes of a task of one robot in one lane of the kernel of `dynx.envs.vector`, with its bits."""
+
+    def __init__(self, task: RobotTask, engine: str) -> None:
+        """Raises UnsupportedFeatureError for a task that cannot be compiled."""
+        super().__init__(task, engine)
+        self._varied: VariedRobot | None = None
+        self._drawn: Floats = np.zeros(0)
+        self._open_lane()
+
+    def _open_lane(self) -> None:
+        # Imported here, because other engines need no compiler.
+        from dynx.envs.task_step import TaskLanes, TaskStep
+
+        self._step = TaskStep(self._task, AutoresetMode.NEXT_STEP, None, self._varied)
+        self._lanes = TaskLanes(self._step, 1)
+
+    def vary(self, randomization: Randomization) -> tuple[Parameter, ...]:
+        """Return the parameters of this robot that episodes draw."""
+        self._varied = VariedRobot(self._task, randomization)
+        self._open_lane()
+        return self._varied.drawn_parameters
+
+    def set_parameters(self, values: Floats) -> None:
+        """Give the robot of the next episode the values (k,) of the parameters that `vary` returned."""
+        if "parameters" in self._lanes.arrays:
+            self._lanes.arrays["parameters"][0] = values
+
+    def step(self, action: Any) -> Outcome:
+        lanes, task = self._lanes, self._task
+        now, arrays = lanes.now, lanes.arrays
+        now["state"][0], now["steps"][0] = self._step.layout.row(self._state), float(self._steps)
+        arrays["action"][0] = np.ravel(action)
+        lanes.evaluate()
+        self._steps += 1
+        after = self._step.layout.state(lanes.end["state"][0].copy())
+        if lanes.flags[0] >= self._step.diverged:
+            self._raise_divergence(after.q, after.v)
+        lanes.accept()
+        self._state = after
+        observation = arrays["observation"][0].astype(self._dtype).reshape(self._shape)
+        return Outcome(
+            observation, float(arrays["reward"][0, 0]), bool(lanes.flags[0]), task.info(self._robot, after)
+        )
 
 
 class RobotVariation:
-    """Forward dynamics of a robot with drawn parameters, and the actions that act after a delay.
+    """Steps of a robot with drawn parameters, and the actions that act after a delay.
 
-    An engine loads the robot anew for each episode in which masses differ; the backend `compiled`, which
-    would compile it anew, has a kernel with masses as inputs.
+    The engine loads the robot anew for each episode in which masses differ.
     """
 
-    def __init__(self, robot: VariedRobot, nominal: Backend) -> None:
+    def __init__(self, task: RobotTask, robot: VariedRobot, nominal: Backend) -> None:
         self.robot = robot
         """The parameters and what they change."""
-        self._nominal = nominal
+        self._task, self._nominal = task, nominal
         self._own: Backend | None = None
-        self._parametric: ParametricDynamics | None = None
-        if robot.changes_masses and nominal.name == COMPILED:
-            self._parametric = parametric(
-                nominal.model, links=robot.link_names, point_payload=robot.payload_frame
-            )
-        self._values: Floats = np.zeros(0)
+        self._drawn: Floats = np.zeros(0)
         self._earlier: list[Array] = []
 
-    def forward_dynamics(self, values: Floats) -> ForwardDynamics:
-        """Return the acceleration of q, v, tau with these values (k,), which hold until the next call."""
-        self._values = values
-        rigid = self._rigid_dynamics(values)
-        robot = self.robot
-        return lambda q, v, tau: rigid(q, v, tau + robot.joint_torque(values, v))
-
-    def _rigid_dynamics(self, values: Floats) -> Callable[..., Any]:
-        if not self.robot.changes_masses:
-            return EngineDynamics(self._nominal).forward_dynamics
-        if self._parametric is not None:
-            dynamics = self._parametric
-            parameters = self.robot.parametric_values(values, dynamics.parameters.defaults)
-            return lambda q, v, tau: dynamics.forward_dynamics(q, v, tau, parameters)
+    def move(self, drawn: Floats) -> Move:
+        """Return the steps of the integrator with these values (k,), which hold until the next call."""
+        self._drawn = drawn
+        parameters, values = self.robot.parameters, self.robot.values(drawn)
         self.close()
-        self._own = backend(self._nominal.name, self.robot.model(values), validate=False)
-        return EngineDynamics(self._own).forward_dynamics
+        if parameters.scaled or parameters.point_payload is not None:
+            self._own = backend(self._nominal.name, parameters.model_of(values), validate=False)
+        dynamics = EngineDynamics(self._nominal if self._own is None else self._own)
+        joints = parameters.joints(values)
+        if joints is None:
+            return partial(free_move, self._task, dynamics.forward_dynamics)
+        return EngineFriction(self._task, dynamics, joints).move
 
     def acting_actions(self, action: Array, *, first: bool) -> list[Array]:
         """Return the action that acts in each step of the integrator; the `first` of an episode acts until
         a later one does."""
         if first:
             self._earlier = [action] * self.robot.delayed_actions
-        acting = self.robot.acting_actions(self._values, action, self._earlier)
+        acting = self.robot.acting_actions(self._drawn, action, self._earlier)
         self._earlier = [action, *self._earlier][: self.robot.delayed_actions]
         return acting
 
@@ -193,6 +249,33 @@ class RobotVariation:
         if self._own is not None:
             self._own.close()
             self._own = None
+
+
+class EngineFriction(StepFriction):
+    """Joint friction on floats, with the mass matrix and the bias of an engine."""
+
+    def __init__(self, task: RobotTask, dynamics: EngineDynamics, joints: JointCoefficients) -> None:
+        # Imported here, because its kernel needs the compiler.
+        from dynx.sim.plants.friction_solver import FrictionSolver
+
+        law = FrictionLaw.of(task.model, joints.friction)
+        super().__init__(task, law.joints)
+        self._dynamics, self._damping = dynamics, joints.damping
+        damping = joints.damping if self.damps_implicitly else None
+        self._solver = FrictionSolver(law, joints.friction, task.step_dt, damping=damping)
+
+    def solve(self, q: Floats, v: Floats, tau: Floats) -> tuple[Floats, Floats]:
+        M, bias = self._dynamics.mass_matrix_and_bias(q, v)
+        a, moves = self._solver.step(M, bias, self._slowed(tau, v), v)
+        after = v + self._task.step_dt * a
+        return a, np.sign(after[self._joints]) * moves[self._joints]
+
+    def held(self, q: Floats, v: Floats, tau: Floats, start: Floats, modes: Floats) -> Floats:
+        M, bias = self._dynamics.mass_matrix_and_bias(q, v)
+        return self._solver.with_modes(M, bias, self._slowed(tau, v), start, modes)
+
+    def _slowed(self, tau: Floats, v: Floats) -> Floats:
+        return tau if self.damps_implicitly else tau - self._damping * v
 
 
 class WorldEpisodes(Episodes):
@@ -288,6 +371,9 @@ class WorldEpisodes(Episodes):
             self._viewer = None
 
     def _open(self, scene: Scene) -> World:
+        # Imported here, because tasks of one robot need no world.
+        from dynx.world.world import World
+
         return World(scene, self._engine, **self._options)
 
     def _scene_of_episode(self, rng: np.random.Generator, memory: SimpleNamespace) -> Scene | None:
@@ -313,6 +399,7 @@ def draw_robot(task: RobotTask, state: State, width: int, height: int) -> NDArra
     """Draw the robot (height, width, 3), seen by the camera of the task."""
     # Imported here, because most environments draw no picture.
     from dynx.world.camera import cast_rays, draw_picture
+    from dynx.world.scene import Scene, SceneRobot
 
     scene = Scene(robots=(SceneRobot(ROBOT, task.model),))
     seen = WorldState(0.0, {ROBOT: RobotState(state.q, state.v)}, {})

@@ -11,7 +11,7 @@ import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from importlib import import_module
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
@@ -26,9 +26,8 @@ from dynx.envs.randomization import Parameter, Randomization
 from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError, nearest, shown
 from dynx.model import Model
 from dynx.model.numbers import MAX_MAGNITUDE, is_real
-from dynx.rbd.integration import Accelerate, ExplicitEuler, RungeKutta4
+from dynx.rbd.integration import Accelerate, ExplicitEuler, RungeKutta4, SemiImplicitEuler
 from dynx.registry import DEFAULT_ENGINE
-from dynx.sim.plants.integrators import CompiledBaseEuler
 from dynx.spatial.scalar import Array
 from dynx.steppers.registry import world_names
 
@@ -179,7 +178,7 @@ class State(NamedTuple):
 
 SCHEMES: dict[str, Callable[[Model, float], Any]] = {
     "euler": ExplicitEuler,
-    "semi_implicit": CompiledBaseEuler,
+    "semi_implicit": SemiImplicitEuler,
     "rk4": RungeKutta4,
 }
 """Integration schemes by name, made of a model and a step [s]."""
@@ -261,6 +260,11 @@ class RobotTask(Task):
     def _scheme(self) -> Any:
         if self.integrator not in SCHEMES:
             raise ArgumentError(f"integrator is {shown(self.integrator)}{nearest(self.integrator, SCHEMES)}")
+        if self.integrator == "semi_implicit" and self.model.floating:
+            # Its compiled step of a base on floats is imported only where there is one.
+            from dynx.sim.plants.integrators import CompiledBaseEuler
+
+            return CompiledBaseEuler(self.model, self.step_dt)
         return SCHEMES[self.integrator](self.model, self.step_dt)
 
     @classmethod
@@ -270,19 +274,16 @@ class RobotTask(Task):
 
     def open(self, engine: str) -> Episodes:
         """Return the episodes of this task on a backend."""
-        return _opened("RobotEpisodes", self, engine)
+        return _opened("robot_episodes", self, engine)
 
 
-ForwardDynamics = Callable[..., Any]
-"""Acceleration (nv,) of q, v and tau."""
+Move = Callable[..., tuple[Array, Array]]
+"""Function of q (nq,), v (nv,) and tau (nv,) at the beginning of a step of the integrator that returns q and
+v at its end."""
 
 
 def control_step(
-    task: RobotTask,
-    robot: Dynamics,
-    forward_dynamics: ForwardDynamics,
-    before: State,
-    actions: Sequence[Array],
+    task: RobotTask, robot: Dynamics, move: Move, before: State, actions: Sequence[Array]
 ) -> State:
     """Return the state after ``task.control_dt``, before the task settles it.
 
@@ -290,13 +291,49 @@ def control_step(
     """
     q, v, memory = before
     for action in actions:
-        tau = task.torque(robot, State(q, v, memory), action)
-        q, v = task.advance(partial(_acceleration, forward_dynamics, tau), q, v)
+        q, v = move(q, v, task.torque(robot, State(q, v, memory), action))
     return State(q, v, memory)
 
 
-def _acceleration(forward_dynamics: ForwardDynamics, tau: Array, q: Array, v: Array) -> Any:
-    return forward_dynamics(q, v, tau)
+def free_move(
+    task: RobotTask, forward_dynamics: Callable[..., Any], q: Array, v: Array, tau: Array
+) -> tuple[Array, Array]:
+    """Return q and v after a step of the integrator without joint friction."""
+    return task.advance(lambda q, v: forward_dynamics(q, v, tau), q, v)
+
+
+class StepFriction(ABC):
+    """Joint friction in the steps of a task, by the law of `dynx.rbd.joint_friction`, for any scalar.
+
+    Which joints stick is found by the law at the beginning of a step, and held to its end.
+    """
+
+    def __init__(self, task: RobotTask, joints: Sequence[int]) -> None:
+        """`joints` are the numbers of the coordinates with dry friction."""
+        self._task, self._joints = task, list(joints)
+        self.damps_implicitly = task.integrator != "rk4"
+        """True if damping acts on the velocity at the end of a step, as the law has it."""
+
+    @abstractmethod
+    def solve(self, q: Array, v: Array, tau: Array) -> tuple[Array, Array]:
+        """Return the acceleration (nv,), and the modes (n,) of the joints: 0 for one that sticks, otherwise
+        the sign of its velocity after the step."""
+
+    @abstractmethod
+    def held(self, q: Array, v: Array, tau: Array, start: Array, modes: Array) -> Array:
+        """Return the acceleration (nv,) in given modes; joints that stick lose the velocity `start`."""
+
+    def move(self, q: Array, v: Array, tau: Array) -> tuple[Array, Array]:
+        """Return q and v after a step of the integrator; joints that stick are at rest after it."""
+        a, modes = self.solve(q, v, tau)
+
+        def accelerate(at: Array, velocity: Array) -> Array:
+            return a if at is q and velocity is v else self.held(at, velocity, tau, v, modes)
+
+        q_next, v_next = self._task.advance(accelerate, q, v)
+        v_next, joints = v_next.copy(), self._joints
+        v_next[joints] = np.where(modes * v_next[joints] > 0.0, v_next[joints], 0.0)
+        return q_next, v_next
 
 
 @dataclass
@@ -414,9 +451,9 @@ def refuse_unphysical(name: str, value: object, unit: str, *, zero: bool = False
         raise ArgumentError(f"{name} is {shown(value)}; wanted a number {wanted} [{unit}]")
 
 
-def _opened(kind: str, task: Task, engine: str) -> Episodes:
-    """Return the episodes of a task, of a class of `dynx.envs.runner`, which imports this module."""
-    episodes: Episodes = getattr(import_module("dynx.envs.runner"), kind)(task, engine)
+def _opened(make: str, task: Task, engine: str) -> Episodes:
+    """Return the episodes of a task, made by `dynx.envs.runner`, which imports this module."""
+    episodes: Episodes = getattr(import_module("dynx.envs.runner"), make)(task, engine)
     return episodes
 
 

@@ -14,18 +14,22 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dynx.compiled.step import StepText
+from dynx.compiled.parametric import ParametricDynamics
+from dynx.compiled.step import BoundSteps, StepText, compiled
 from dynx.control.array_dynamics import ArrayDynamics
 from dynx.envs.library import AutoresetMode, spaces
-from dynx.envs.task import RobotTask, State, control_step
+from dynx.envs.task import Move, RobotTask, State, StepFriction, control_step, free_move
 from dynx.envs.variation import VariedRobot
 from dynx.errors import ArgumentError, ShapeError, UnsupportedFeatureError
 from dynx.model.numbers import DIVERGENCE_SPEED
+from dynx.rbd.joint_friction import FrictionLaw, damped_equation
+from dynx.sim.plants.friction_solver import BLOCK_CORRECTIONS, MAX_SOLUTIONS
+from dynx.simd.target import host
 from dynx.simd.user_code.arrays import symbol_array, traced_array
 from dynx.simd.user_code.numbers import select
-from dynx.spatial.scalar import Array
+from dynx.spatial.scalar import Array, Floats, sign
 
-TERMINATED, TRUNCATED, INVALID, DIVERGED = 1, 1 << 8, 1 << 16, 1 << 24
+TERMINATED, TRUNCATED, INVALID, DIVERGED, UNSETTLED = 1, 1 << 8, 1 << 16, 1 << 24, 1 << 32
 """Bits of the output ``flags``, an integer of 64 bits: one byte for each flag, so that the bytes are arrays
 of bool without any conversion. A kernel writes doubles; these have the bit patterns of the integers."""
 
@@ -64,6 +68,9 @@ class RowLayout(NamedTuple):
 class TaskStep:
     """A control step of one task, one autoreset mode and one time limit."""
 
+    diverged = DIVERGED
+    """Least number of the flags of an environment that diverged."""
+
     def __init__(
         self,
         task: RobotTask,
@@ -81,6 +88,13 @@ class TaskStep:
             )
         self._task, self._mode = task, mode
         self._varied, self._noisy_actions = varied, noisy_actions
+        self._friction: JointFrictionText | None = None
+        self._parametric: ParametricDynamics | None = None
+        if varied is not None and varied.parameters.names:
+            self._parametric = ParametricDynamics(varied.parameters)
+            if varied.parameters.joint_dynamics:
+                law = FrictionLaw.of(task.model, varied.dry_joints)
+                self._friction = JointFrictionText(task, law, self._parametric)
         self._limit = math.inf if max_episode_steps is None else float(max_episode_steps)
         self.layout = RowLayout.of(task)
         self._robot = ArrayDynamics(task.model)
@@ -93,23 +107,31 @@ class TaskStep:
         self.observations = shape[0]
         self.actions = 1 if isinstance(space, spaces.Discrete) else math.prod(space.shape)
 
+    @property
+    def modes(self) -> int:
+        """Number of modes of dry friction in all steps of the integrator."""
+        return 0 if self._friction is None else self._friction.size * self._task.substeps
+
     def text(self, start: Mapping[str, Any] | None = None) -> StepText:
         """Return the text of a step, or of the start of episodes with the options `start`.
 
         Inputs of a step: ``state`` (layout), the number of ``steps``, ``action``, and ``random`` for the
         start of the next episode; where they are drawn, ``parameters`` of the motion, ``noise`` on the
-        action, and ``earlier`` actions that may still act. Outputs: ``state``, ``steps``, ``observation``,
-        ``reward``, ``flags``, ``earlier`` if it is an input, and in mode SAME_STEP ``final``, the last
-        observation of the episode. A start has ``state`` and ``observation`` of ``random``.
+        action, ``earlier`` actions that may still act, and the ``modes`` of dry friction with which a step is
+        repeated. Outputs: ``state``, ``steps``, ``observation``, ``reward``, ``flags``, ``earlier`` if it is
+        an input, ``next_modes``, and in mode SAME_STEP ``final``, the last observation of the episode. A
+        start has ``state`` and ``observation`` of ``random``.
         """
         sizes = {"random": self._task.random_size}
         evaluate: Callable[..., dict[str, Any]] = self._step if start is None else self._start
         if start is None:
             sizes = {"state": self.layout.size, "steps": 1, "action": self.actions, **sizes}
-            if self._varied is not None and self._varied.parameters:
-                sizes["parameters"] = len(self._varied.parameters)
+            if self._varied is not None and self._varied.drawn_parameters:
+                sizes["parameters"] = len(self._varied.drawn_parameters)
                 if self._varied.delayed_actions:
                     sizes["earlier"] = self._varied.delayed_actions * self.actions
+            if self.modes:
+                sizes |= {"modes": self.modes, "one_by_one": 1}
             if self._noisy_actions:
                 sizes["noise"] = self.actions
 
@@ -135,21 +157,24 @@ class TaskStep:
             low, high = (each.ravel().astype(np.float64) for each in (space.low, space.high))
             noisy = np.clip(action + inputs["noise"], low, high)
         results: dict[str, Any] = {}
-        actions, forward_dynamics = [noisy] * task.substeps, robot.forward_dynamics
+        actions: list[Array] = [noisy] * task.substeps
+        move: Move = partial(free_move, task, robot.forward_dynamics)
         if self._varied is not None and "parameters" in inputs:
-            values = inputs["parameters"]
-            forward_dynamics = partial(self._forward_dynamics, self._varied, values)
+            drawn = inputs["parameters"]
+            move = self._move(self._varied, drawn, inputs, move)
             if "earlier" in inputs:
-                actions, results["earlier"] = self._delayed(
-                    self._varied, values, count, noisy, inputs["earlier"]
-                )
-        moved = control_step(task, robot, forward_dynamics, before, [self._shaped(each) for each in actions])
+                earlier = inputs["earlier"]
+                actions, results["earlier"] = self._delayed(self._varied, drawn, count, noisy, earlier)
+        moved = control_step(task, robot, move, before, [self._shaped(each) for each in actions])
         given = self._shaped(noisy)
         after = task.settle(moved)
         reward = _number(task.reward(robot, before, given, after))
         taken = count + 1.0
         terminated, truncated = _mask(task.terminated(robot, after)), _mask(taken >= self._limit)
         flags = _flags(terminated, truncated)
+        if self._friction is not None and self.modes:
+            results["next_modes"], changes = self._friction.results()
+            flags = select(changes > 0.0, _bits(UNSETTLED), flags)
         flags = select(np.sum(moved.v * moved.v) < DIVERGENCE_SPEED**2, flags, _bits(DIVERGED))
         flags = select(_is_valid(space, action), flags, _bits(INVALID))
         ends = np.maximum(terminated, truncated)
@@ -176,14 +201,21 @@ class TaskStep:
         space = self._task.action_space
         return action[0] if isinstance(space, spaces.Discrete) else action.reshape(space.shape)
 
-    def _forward_dynamics(self, varied: VariedRobot, values: Array, q: Array, v: Array, tau: Array) -> Array:
-        total = tau + varied.joint_torque(values, v)
-        if not varied.changes_masses:
-            return np.asarray(self._robot.forward_dynamics(q, v, total))
-        return traced_array(varied.forward_dynamics(*(symbol_array(each) for each in (values, q, v, total))))
+    def _move(self, varied: VariedRobot, drawn: Array, inputs: Mapping[str, Array], free: Move) -> Move:
+        """Return the steps of the integrator of a robot with drawn parameters."""
+        if self._parametric is None:
+            return free
+        dynamics, values = self._parametric, varied.values(symbol_array(drawn))
+        if self._friction is not None:
+            return self._friction.moves(values, inputs)
+
+        def forward_dynamics(q: Array, v: Array, tau: Array) -> Array:
+            return traced_array(dynamics.acceleration(values, *map(symbol_array, (q, v, tau))))
+
+        return partial(free_move, self._task, forward_dynamics)
 
     def _delayed(
-        self, varied: VariedRobot, values: Array, count: Any, action: Array, earlier: Array
+        self, varied: VariedRobot, drawn: Array, count: Any, action: Array, earlier: Array
     ) -> tuple[list[Array], Array]:
         """Return the action that acts in each step of the integrator, and the actions before the next."""
         # Before the first action of an episode there was none; it acts from the beginning.
@@ -191,7 +223,7 @@ class TaskStep:
             np.where(count == 0.0, action, row)
             for row in earlier.reshape(varied.delayed_actions, self.actions)
         ]
-        acting = varied.acting_actions(values, action, rows)
+        acting = varied.acting_actions(drawn, action, rows)
         return acting, np.concatenate([action, *rows[:-1]])
 
     def _observation(self, state: State) -> Array:
@@ -202,6 +234,128 @@ class TaskStep:
                 f"its observation space has {(self.observations,)}"
             )
         return found
+
+
+class JointFrictionText(StepFriction):
+    """Joint friction on symbols, with coefficients that are inputs of the kernel.
+
+    A step whose modes of dry friction are not settled is repeated with those in ``next_modes``.
+    """
+
+    def __init__(self, task: RobotTask, law: FrictionLaw, dynamics: ParametricDynamics) -> None:
+        super().__init__(task, law.joints)
+        self._law, self._dynamics, self._h = law, dynamics, task.step_dt
+        self._shifts: list[Array] = []
+        self.size = len(law.joints)
+        """Number of modes in a step of the integrator."""
+
+    def moves(self, values: Array, inputs: Mapping[str, Array]) -> Move:
+        """Return the steps of the integrator of a control step, with the values of the parameters (n,)."""
+        self._values = values
+        self._shifts.clear()
+        self._given = symbol_array(inputs["modes"]) if self.size else np.zeros(0)
+        self._one_by_one = symbol_array(inputs["one_by_one"])[0] if self.size else 0.0
+        self._changes: Any = 0.0
+        return self.move
+
+    def results(self) -> tuple[Array, Any]:
+        """Return the modes (substeps n,) with which an unsettled step is repeated, and the sum of their
+        corrections."""
+        return np.concatenate(self._shifts), traced_array([self._changes])[0]
+
+    def solve(self, q: Array, v: Array, tau: Array) -> tuple[Array, Array]:
+        q, v, tau = map(symbol_array, (q, v, tau))
+        A, r, friction = self._equation(q, v, tau, v)
+        first = len(self._shifts) * self.size
+        shift = self._given[first : first + self.size]
+        _, found, following = self._law.step(A, r, v, friction, self._h, shift, self._one_by_one)
+        self._shifts.append(following)
+        self._changes = self._changes + found.changes
+        dry = self._joints
+        modes = sign(v[dry] + self._h * found.a[dry]) * found.moves[dry] if dry else np.zeros(0)
+        return traced_array(found.a), traced_array(modes)
+
+    def held(self, q: Array, v: Array, tau: Array, start: Array, modes: Array) -> Array:
+        q, v, tau, start, modes = map(symbol_array, (q, v, tau, start, modes))
+        A, r, friction = self._equation(q, v, tau, start)
+        return traced_array(self._law.solve(A, r, start, friction, self._h, modes, 0.0).a)
+
+    def _equation(self, q: Array, v: Array, tau: Array, start: Array) -> tuple[Array, Array, Array]:
+        """Return A and r of the law, and the dry friction of its joints."""
+        M, r, joints = self._dynamics.equation(self._values, q, v, tau)
+        assert joints is not None
+        h, at = (self._h, start) if self.damps_implicitly else (0.0, v)
+        A, r = damped_equation(M, r, at, h, joints.damping, np.zeros(len(v)))
+        return A, r, joints.friction[self._joints]
+
+
+class TaskLanes:
+    """Environments of a task in the lanes of its kernel, with the arrays that it reads and writes.
+
+    The state is read from one set of arrays and written to another, in turn.
+    """
+
+    def __init__(self, step: TaskStep, count: int) -> None:
+        kernel, rows = compiled(step.text()), max(count, host().lanes)
+        sizes = {port.name: port.size for port in kernel.inputs + kernel.outputs}
+        state = {
+            name: np.zeros((2, rows, sizes[name])) for name in ("state", "steps", "earlier") if name in sizes
+        }
+        self.arrays: dict[str, Floats] = {name: np.zeros((rows, size)) for name, size in sizes.items()}
+        """Inputs and outputs by name (rows, size), but for the state."""
+        turns = np.arange(2)
+        known = {name: (array[None], 0 * turns) for name, array in self.arrays.items()}
+        steps = BoundSteps(
+            [kernel],
+            0 * turns,
+            known | {name: (array, turns) for name, array in state.items()},
+            {name: (array, 1 - turns) for name, array in state.items()},
+            first=0,
+            lanes=rows,
+            status=None,
+        )
+        self._calls = [steps.single(turn) for turn in range(2)]
+        self._sets: list[dict[str, Floats]] = [
+            {name: array[turn] for name, array in state.items()} for turn in range(2)
+        ]
+        self._turn = 0
+        self.flags = self.arrays["flags"][:count, 0].view(np.int64)
+        """Flags (count,) of the last step."""
+        self._every_flag = self.arrays["flags"][:, 0].view(np.int64)
+        self._settles = bool(step.modes)
+
+    @property
+    def now(self) -> dict[str, Floats]:
+        """The present ``state``, ``steps`` and ``earlier`` actions (rows, size)."""
+        return self._sets[self._turn]
+
+    @property
+    def end(self) -> dict[str, Floats]:
+        """The same at the end of the step that was evaluated."""
+        return self._sets[1 - self._turn]
+
+    def evaluate(self) -> None:
+        """Evaluate a step from the present state; `accept` makes its end the present state."""
+        self._calls[self._turn]()
+        if self._settles and self._every_flag.max() >= UNSETTLED:
+            self._settle()
+
+    def accept(self) -> None:
+        """Go on from the end of the step that was evaluated."""
+        self._turn = 1 - self._turn
+
+    def _settle(self) -> None:
+        """Repeat the step with corrected modes of dry friction until they are right."""
+        arrays = self.arrays
+        for count in range(1, MAX_SOLUTIONS):
+            unsettled = self._every_flag >= UNSETTLED
+            if not unsettled.any():
+                break
+            arrays["modes"][unsettled] = arrays["next_modes"][unsettled]
+            arrays["one_by_one"][...] = float(count >= BLOCK_CORRECTIONS)
+            self._calls[self._turn]()
+        arrays["modes"][...], arrays["one_by_one"][...] = 0.0, 0.0
+        self._every_flag[self._every_flag >= UNSETTLED] = 0
 
 
 def _selected(condition: Any, yes: State, no: State) -> State:

@@ -9,32 +9,22 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dynx.compiled.parametric import ScaledLinks
-from dynx.control.array_dynamics import ArrayDynamics
-from dynx.envs.randomization import Parameter, Randomization, parameters_of, require_name
+from dynx.envs.randomization import AXES, Parameter, Randomization, parameters_of, require_name
 from dynx.envs.task import RobotTask
 from dynx.errors import UnknownNameError, UnsupportedFeatureError, nearest, shown
-from dynx.model import Inertial, Model, Pose
-from dynx.model.elements import Joint
-from dynx.sim.plants.model_error import Payload, plant_model
+from dynx.model import Model
+from dynx.rbd.parameters import POINT, Parameters
 from dynx.spatial.scalar import Array, Floats
-from dynx.steppers.material import Material
-from dynx.world.scene import Scene, SceneBody, SceneRobot
 
-MASS_FIELDS = ("mass_scale", "payload")
-ROBOT_FIELDS = (*MASS_FIELDS, "joint_damping", "joint_friction", "delay")
+if TYPE_CHECKING:
+    from dynx.steppers.material import Material
+    from dynx.world.scene import Scene, SceneBody, SceneRobot
 
-SLIP_SPEED = 0.01
-"""Least speed [rad/s or m/s] from which dry friction has its full torque."""
-
-STEPS_TO_STOP = 2.0
-"""Least number of steps in which dry friction stops a joint that moves alone: with fewer the joint would
-change its direction from step to step."""
-
+ROBOT_FIELDS = ("mass_scale", "payload", "joint_damping", "joint_friction", "delay")
 JOINT_FIELDS = ("joint_damping", "joint_friction")
 SCENE_FIELDS = ("mass_scale", "payload", *JOINT_FIELDS, "friction_scale")
 
@@ -42,8 +32,7 @@ SCENE_FIELDS = ("mass_scale", "payload", *JOINT_FIELDS, "friction_scale")
 class VariedRobot:
     """The parameters of one task that episodes draw, and what they change; on floats or on symbols.
 
-    `values` (k,) has the values of `parameters`, in order. Dry friction is proportional to the velocity below
-    a small speed, so a loaded joint creeps where a real one sticks.
+    `drawn` (k,) has the values of `drawn_parameters`, in order.
     """
 
     def __init__(self, task: RobotTask, randomization: Randomization) -> None:
@@ -56,10 +45,7 @@ class VariedRobot:
             )
         self._task, model = task, task.model
         self._model = model
-        self._payload = randomization.payload_frame
-        if self._payload is not None:
-            model.frame_index(self._payload)
-        self.parameters: tuple[Parameter, ...] = parameters_of(
+        self.drawn_parameters: tuple[Parameter, ...] = parameters_of(
             randomization, ROBOT_FIELDS, self._required, task.step_dt
         )
         """Parameters that change the motion."""
@@ -67,70 +53,50 @@ class VariedRobot:
         massive = [
             link.name for link in model.links if link.inertial is not None and link.inertial.mass > 0.0
         ]
-        self._links: dict[str, int] = (
+        links: dict[str, int] = (
             dict.fromkeys(massive, scales[None]) if None in scales else {str(k): c for k, c in scales.items()}
         )
-        self._array_code = ScaledLinks(model, tuple(self._links), self._payload)
-        bounds = {each.field: each.distribution.bounds for each in self.parameters}
+        bounds = {each.field: each.distribution.bounds for each in self.drawn_parameters}
+        self.parameters = Parameters(
+            model,
+            scaled=tuple(links),
+            point_payload=randomization.payload_frame,
+            joint_dynamics="joint_damping" in bounds or "joint_friction" in bounds,
+        )
+        """The parameters of the robot, of which some are drawn."""
+        self._sources = [*links.values(), *self._columns("payload").values(), *self._sources_of_joints()]
         self.delayed_actions = math.ceil(
             np.round(bounds.get("delay", (0.0, 0.0))[1] / task.step_dt) / task.substeps
         )
         """Number of actions before the present one that may still act."""
-        self._stopping = (
-            STEPS_TO_STOP * task.step_dt * _mobilities(model) if "joint_friction" in bounds else 0.0
-        )
+
+    def _sources_of_joints(self) -> list[int | None]:
+        """Return the column of each coefficient of the joints; None for those that are 0."""
+        if not self.parameters.joint_dynamics:
+            return []
+        columns, names = [self._columns(field) for field in JOINT_FIELDS], self._model.joint_names
+        return [
+            column
+            for joint in self._model.joints
+            if joint.moves
+            for column in (
+                # One value for all joints is that of the joints with a coordinate, not of those that mimic.
+                *(each.get(joint.name, each.get(None) if joint.name in names else None) for each in columns),
+                None,
+            )
+        ]
 
     @property
-    def changes_masses(self) -> bool:
-        """True if masses or a payload are drawn."""
-        return any(each.field in MASS_FIELDS for each in self.parameters)
+    def dry_joints(self) -> Floats:
+        """1 for coordinates (nv,) with dry friction that is drawn, otherwise 0."""
+        joints = self.parameters.joints(np.array([float(each is not None) for each in self._sources]))
+        return np.zeros(self._model.nv) if joints is None else np.sign(joints.friction)
 
-    def model(self, values: Array) -> Model:
-        """Return the robot with the drawn masses and payload."""
-        scale = {link: float(values[column]) for link, column in self._links.items()}
-        payload = None
-        if self._payload is not None:
-            mass, *center = self._payload_values(values)
-            payload = Payload(self._payload, float(mass), tuple(map(float, center)))
-        return plant_model(self._model, payload, scale)
+    def values(self, drawn: Array) -> Array:
+        """Return the values (n,) of `parameters`."""
+        return np.array([0.0 if column is None else drawn[column] for column in self._sources])
 
-    def forward_dynamics(self, values: Array, q: Array, v: Array, tau: Array) -> Array:
-        """Return the acceleration (nv,) of the robot with the drawn masses and payload, on plain symbols."""
-        factors = [values[column] for column in self._links.values()]
-        return self._array_code.forward_dynamics(factors, self._payload_values(values), q, v, tau)
-
-    def parametric_values(self, values: Array, defaults: Array) -> Array:
-        """Return the parameters of `dynx.compiled.parametric` for `link_names` and `payload_frame`."""
-        scaled = np.array(defaults)
-        for number, column in enumerate(self._links.values()):
-            scaled[10 * number : 10 * (number + 1)] *= values[column]
-        if self._payload is not None:
-            scaled[-4:] = self._payload_values(values)
-        return scaled
-
-    @property
-    def link_names(self) -> tuple[str, ...]:
-        """Links whose masses are drawn."""
-        return tuple(self._links)
-
-    @property
-    def payload_frame(self) -> str | None:
-        """Frame that carries the payload."""
-        return self._payload
-
-    def joint_torque(self, values: Array, v: Array) -> Any:
-        """Return the torque (nv,) of damping and dry friction of the joints, to be added to the task's."""
-        damping, friction = (
-            self._of_joints("joint_damping", values),
-            self._of_joints("joint_friction", values),
-        )
-        if friction is None:
-            return 0.0 if damping is None else -damping * v
-        speed = np.maximum(SLIP_SPEED, self._stopping * friction)
-        torque = -friction * np.clip(v / speed, -1.0, 1.0)
-        return torque if damping is None else torque - damping * v
-
-    def acting_actions(self, values: Array, action: Array, earlier: Sequence[Array]) -> list[Array]:
+    def acting_actions(self, drawn: Array, action: Array, earlier: Sequence[Array]) -> list[Array]:
         """Return the action that acts in each step of the integrator, from the present one and from those
         before (`delayed_actions`, ...), the latest first."""
         task, column = self._task, self._columns("delay").get(None)
@@ -139,7 +105,7 @@ class VariedRobot:
             chosen = action
             for age in range(len(earlier) if column is not None else 0):
                 passed = (step + age * task.substeps + 0.5) * task.step_dt
-                chosen = np.where(values[column] > passed, earlier[age], chosen)
+                chosen = np.where(drawn[column] > passed, earlier[age], chosen)
             acting.append(chosen)
         return acting
 
@@ -151,26 +117,7 @@ class VariedRobot:
         return part
 
     def _columns(self, field: str) -> dict[str | None, int]:
-        return {each.part: k for k, each in enumerate(self.parameters) if each.field == field}
-
-    def _payload_values(self, values: Array) -> list[Any]:
-        return [values[column] for column in self._columns("payload").values()]
-
-    def _of_joints(self, field: str, values: Array) -> Any:
-        """Return a parameter of the joints (nv,), or None if it is not drawn."""
-        columns, names = self._columns(field), self._model.joint_names
-        if not columns:
-            return None
-        base = [0.0] * (6 if self._model.floating else 0)
-        shared = columns.get(None)
-        found = [columns.get(name, shared) for name in names]
-        return np.stack([*base, *(0.0 * values[0] if column is None else values[column] for column in found)])
-
-
-def _mobilities(model: Model) -> Array:
-    """Return the acceleration of each coordinate (nv,) by a unit torque, in the neutral configuration."""
-    M = np.asarray(ArrayDynamics(model).mass_matrix(model.neutral()), dtype=np.float64)
-    return np.array(np.diag(np.linalg.pinv(M)))
+        return {each.part: k for k, each in enumerate(self.drawn_parameters) if each.field == field}
 
 
 class VariedScene:
@@ -213,16 +160,32 @@ class VariedScene:
 
         def of_robot(robot: SceneRobot) -> SceneRobot:
             links = [link.name for link in robot.model.links]
-            scales = {name: value("mass_scale", f"{robot.name}/{name}") or 1.0 for name in links}
-            model = plant_model(robot.model, None, scales)
-            if self._payload is not None and self._payload.startswith(f"{robot.name}/"):
-                numbers = [drawn["payload", name] for name in ("mass", "x", "y", "z")]
-                model = with_point_mass(model, self._payload.partition("/")[2], numbers[0], numbers[1:])
-            joints = [
-                _with_friction(joint, *(value(field, f"{robot.name}/{joint.name}") for field in JOINT_FIELDS))
-                for joint in robot.model.joints
+            known = {
+                f"{link}.scale": value("mass_scale", f"{robot.name}/{link}")
+                for link in links
+                if robot.model.inertial(link).mass > 0.0
+            }
+            for joint in robot.model.joints:
+                for field in JOINT_FIELDS if joint.moves else ():
+                    coefficient = field.removeprefix("joint_")
+                    known[f"{joint.name}.{coefficient}"] = value(field, f"{robot.name}/{joint.name}")
+            owner, _, frame = (self._payload or "").partition("/")
+            if owner == robot.name:
+                known |= {
+                    f"{frame}.point.{name}": drawn["payload", part]
+                    for name, part in zip(POINT, ("mass", *AXES), strict=True)
+                }
+            given = {name: x for name, x in known.items() if x is not None}
+            parameters = Parameters(
+                robot.model,
+                scaled=tuple(link for link in links if f"{link}.scale" in given),
+                point_payload=frame if owner == robot.name else None,
+                joint_dynamics=any(field in JOINT_FIELDS for field, _ in drawn),
+            )
+            numbers = [
+                given.get(name, x) for name, x in zip(parameters.names, parameters.defaults, strict=True)
             ]
-            model = replace(model, joints=tuple(joints))
+            model = parameters.model_of(np.array(numbers))
             materials = {name: painted(robot.material_of(name), f"{robot.name}/{name}") for name in links}
             return replace(robot, model=model, materials=tuple(materials.items()))
 
@@ -263,43 +226,3 @@ def _parts(kind: str, model: Model) -> Sequence[str]:
     if kind == "frame":
         return model.frame_names
     return model.joint_names if kind == "joint that moves" else [link.name for link in model.links]
-
-
-def _with_friction(joint: Joint, damping: float | None, friction: float | None) -> Joint:
-    if not joint.moves or (damping is None and friction is None):
-        return joint
-    own = joint.dynamics
-    dynamics = replace(
-        own,
-        damping=own.damping if damping is None else damping,
-        friction=own.friction if friction is None else friction,
-    )
-    return replace(joint, dynamics=dynamics)
-
-
-def with_point_mass(model: Model, frame: str, mass: float, center: Sequence[float]) -> Model:
-    """Return the robot with a point mass [kg] at a place (3,) [m] of a frame, in the inertia of its link.
-
-    The total has the centre of mass and the tensor of both (Steiner's theorem).
-    """
-    if mass == 0.0:
-        return model
-    place = model.frames[model.frame_index(frame)]
-    T_link_frame = place.placement.matrix
-    point = T_link_frame[:3, :3] @ np.asarray(center, dtype=np.float64) + T_link_frame[:3, 3]
-    own = model.inertial(place.link)
-    T_link_center = own.origin.matrix
-    R, own_center = T_link_center[:3, :3], T_link_center[:3, 3]
-    total = own.mass + mass
-    common = (own.mass * own_center + mass * point) / total
-    tensor = R @ own.tensor @ R.T + own.mass * _steiner(own_center - common) + mass * _steiner(point - common)
-    (xx, xy, xz), (_, yy, yz), (_, _, zz) = tensor.tolist()
-    x, y, z = common.tolist()
-    inertial = Inertial(total, Pose((x, y, z)), xx, xy, xz, yy, yz, zz)
-    links = [replace(each, inertial=inertial) if each.name == place.link else each for each in model.links]
-    return replace(model, links=tuple(links))
-
-
-def _steiner(offset: Floats) -> Floats:
-    """Return the tensor (3, 3) of a unit point mass at an offset (3,)."""
-    return np.asarray(offset @ offset * np.eye(3) - np.outer(offset, offset))

@@ -8,13 +8,13 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dynx.compiled.step import BoundSteps, compiled
+from dynx.compiled.step import compiled
 from dynx.envs.environment import checked_action
 from dynx.envs.library import AutoresetMode, Space, VectorEnv, batch_space, spaces
 from dynx.envs.randomization import Randomization, Variation
 from dynx.envs.runner import draw_robot
 from dynx.envs.task import RobotTask
-from dynx.envs.task_step import INVALID, TaskStep
+from dynx.envs.task_step import INVALID, TaskLanes, TaskStep
 from dynx.envs.variation import VariedRobot
 from dynx.errors import (
     ArgumentError,
@@ -28,7 +28,6 @@ from dynx.errors import (
     shown,
 )
 from dynx.model.numbers import checked_array, whole_number
-from dynx.simd.target import host
 from dynx.spatial.scalar import Floats
 
 RENDER_MODES = ("rgb_array",)
@@ -93,46 +92,25 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
             drawn = Randomization.read(randomize)
             varied = VariedRobot(task, drawn)
             spaces_of_one = task.observation_space, task.action_space
-            self._variation = Variation(drawn, varied.parameters, *spaces_of_one, count=n)
+            self._variation = Variation(drawn, varied.drawn_parameters, *spaces_of_one, count=n)
         noisy = self._variation is not None and self._variation.action_noise is not None
         self._task_step = TaskStep(task, mode, max_episode_steps, varied, noisy_actions=noisy)
         self._layout = self._task_step.layout
         self._copy = copy
-        self._rows = max(n, host().lanes)
         self._make_buffers()
         self._running = False
 
     def _make_buffers(self) -> None:
-        """Allocate the arrays of the kernel, and bind it to them: the state is read from one set and written
-        to another, in turn."""
-        kernel, rows, n = compiled(self._task_step.text()), self._rows, self.num_envs
-        sizes = {port.name: port.size for port in kernel.inputs + kernel.outputs}
-        state = {
-            name: np.zeros((2, rows, sizes[name])) for name in ("state", "steps", "earlier") if name in sizes
-        }
-        arrays = {name: np.zeros((rows, size)) for name, size in sizes.items()}
-        turns = np.arange(2)
-        known = {name: (array[None], 0 * turns) for name, array in arrays.items()}
-        steps = BoundSteps(
-            [kernel],
-            0 * turns,
-            known | {name: (array, turns) for name, array in state.items()},
-            {name: (array, 1 - turns) for name, array in state.items()},
-            first=0,
-            lanes=rows,
-            status=None,
-        )
-        self._calls = [steps.single(turn) for turn in range(2)]
-        self._sets, self._turn = (
-            [{name: array[turn] for name, array in state.items()} for turn in range(2)],
-            0,
-        )
-        self._random, self._arrays = arrays["random"], arrays
+        """Allocate the arrays of the kernel, and views of them for all environments."""
+        n = self.num_envs
+        self._lanes = lanes = TaskLanes(self._task_step, n)
+        arrays = self._arrays = lanes.arrays
+        self._random = arrays["random"]
         self._actions = arrays["action"][:n, 0] if self._discrete else arrays["action"][:n]
         if not self._discrete:
             self._actions = self._actions.reshape(n, *(self.single_action_space.shape or ()))
         self._found, self._rewards = arrays["observation"][:n], arrays["reward"][:n, 0]
-        self._flags = arrays["flags"][:n, 0].view(np.int64)
+        self._flags = lanes.flags
         flags = self._flags.view(np.bool_).reshape(n, 8)
         self._terminated, self._truncated = flags[:, 0], flags[:, 1]
         dtype = self.single_observation_space.dtype
@@ -142,7 +120,7 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
     @property
     def states(self) -> Floats:
         """Copy of q, v and memory of each environment (num_envs, nq + nv + k)."""
-        return np.array(self._sets[self._turn]["state"][: self.num_envs])
+        return np.array(self._lanes.now["state"][: self.num_envs])
 
     def set_states(self, states: ArrayLike) -> None:
         """Set q, v and memory of each environment (num_envs, nq + nv + k), at the start of an episode."""
@@ -152,7 +130,7 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         array = checked_array("states", states, self._layout.size)
         if array.shape != (self.num_envs, self._layout.size):
             raise ShapeError(f"states have shape {array.shape}; wanted {(self.num_envs, self._layout.size)}")
-        now = self._sets[self._turn]
+        now = self._lanes.now
         now["state"][: self.num_envs] = array
         now["steps"][...] = 0.0
         self._ended = NONE_ENDED
@@ -179,7 +157,7 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         given = dict(options or {})
         mask = checked_reset_mask(given.pop("reset_mask", None), self.num_envs, started=self._running)
         self.task.require_start_options(given)
-        n, now, found = self.num_envs, self._sets[self._turn], self._arrays["observation"]
+        n, now, found = self.num_envs, self._lanes.now, self._arrays["observation"]
         rows = np.flatnonzero(mask)
         if self._variation is not None and (seed is not None or not self._running):
             self._variation.seed(self.np_random_seed, self.np_random)
@@ -222,13 +200,12 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         self._actions[...] = actions
         if self._variation is not None and self._variation.action_noise is not None:
             self._arrays["noise"][: self.num_envs] = self._variation.noise_on_actions()
-        turn = self._turn
-        self._calls[turn]()
+        self._lanes.evaluate()
         flags = self._flags
         largest = flags.max()
         if largest >= INVALID:
             raise_defect(self.single_action_space, self._actions, flags >= INVALID)
-        self._turn = 1 - turn
+        self._lanes.accept()
         infos: dict[str, Any] = {}
         if self._variation is not None:
             self._variation.count_step()
@@ -299,7 +276,7 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
     def close_extras(self, **kwargs: Any) -> None:
         """Release the kernels."""
         self._running = False
-        self._calls = []
+        del self._lanes, self._arrays
 
     def _refuse_closed(self) -> None:
         if self.closed:

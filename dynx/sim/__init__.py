@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 from dynx.registry import moved_names
 
 if TYPE_CHECKING:
+    from dynx.rbd.parameters import Payload, plant_model
     from dynx.sim.batch import BatchInterrupted, simulate_batch
     from dynx.sim.batch_rollouts import BatchRollouts
     from dynx.sim.comparison.comparison import RolloutComparison, compare
     from dynx.sim.noise import Noise
-    from dynx.sim.plants.model_error import Payload, plant_model
     from dynx.sim.plants.plant import Plant, StepResult
     from dynx.sim.plants.registry import register as register_plant
     from dynx.sim.plants.scene_plant import ScenePlant
@@ -27,7 +27,7 @@ _HOME = {
     "BatchInterrupted": "dynx.sim.batch",
     "BatchRollouts": "dynx.sim.batch_rollouts",
     "Noise": "dynx.sim.noise",
-    "Payload": "dynx.sim.plants.model_error",
+    "Payload": "dynx.rbd.parameters",
     "Plant": "dynx.sim.plants.plant",
     "Rollout": "dynx.sim.record.rollout",
     "RolloutComparison": "dynx.sim.comparison.comparison",
@@ -39,7 +39,7 @@ _HOME = {
     "StepResult": "dynx.sim.plants.plant",
     "Summary": "dynx.sim.record.rollout_data",
     "compare": "dynx.sim.comparison.comparison",
-    "plant_model": "dynx.sim.plants.model_error",
+    "plant_model": "dynx.rbd.parameters",
     "register_plant": "dynx.sim.plants.registry:register",
     "simulate": "dynx.sim.simulation",
     "simulate_batch": "dynx.sim.batch",

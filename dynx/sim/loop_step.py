@@ -434,7 +434,8 @@ class LoopStep:
             M = evaluate_quantity(mechanism, "mass_matrix", (), q)
             r, damping, friction = tau - evaluate_quantity(mechanism, "bias_torque", (), q, v), None, None
         else:
-            M, r, damping, friction = self.plant.equation(given["parameters"], q, v, tau)
+            M, r, joints = self.plant.equation(given["parameters"], q, v, tau)
+            damping, friction = (None, None) if joints is None else (joints.damping, joints.friction)
         return M, r, armature, damping, friction
 
     def _acceleration(

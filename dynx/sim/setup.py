@@ -15,9 +15,9 @@ from dynx.errors import ArgumentError, LimitError, LimitViolation
 from dynx.model import Model
 from dynx.model.configuration import checked_q
 from dynx.model.numbers import checked_array, whole_number
+from dynx.rbd.parameters import plant_model
 from dynx.sim.controller_checks import check_controller
 from dynx.sim.plants.disturbances import Disturbances
-from dynx.sim.plants.model_error import plant_model
 from dynx.sim.plants.registry import default_integrator
 from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.scenario.documents import Unknown

@@ -16,6 +16,7 @@ IDEAS = {
     "distance of two motions": r"^class Separation\b",
     "force from outside": r"def share\(self, t: float",
     "joint friction": r"^class FrictionLaw\b",
+    "parameters in which robots differ": r"^class Parameters\b|^def plant_model\b",
 }
 """Text that only the module of an idea contains, by the name of the idea."""
 

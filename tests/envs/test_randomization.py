@@ -11,8 +11,7 @@ from gymnasium.vector import AutoresetMode
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import dynx.envs
-from dynx.backends import backend, installed_backends
+from dynx.backends import installed_backends
 from dynx.envs import Randomization
 from dynx.envs.environment import TaskEnvironment
 from dynx.envs.task import State
@@ -21,10 +20,9 @@ from dynx.envs.tasks.pendulum import Pendulum
 from dynx.envs.tasks.push import Push
 from dynx.envs.tasks.reach import Reach
 from dynx.envs.tasks.stand import Stand
-from dynx.envs.variation import VariedRobot, with_point_mass
+from dynx.envs.variation import VariedRobot
 from dynx.envs.vector import RobotVectorEnvironment
 from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError
-from dynx.sim.plants.model_error import Payload, plant_model
 
 CART_POLE: dict[str, Any] = {
     "mass_scale": {"pole": (0.5, 2.0), "cart": {"log_uniform": (0.5, 2.0)}},
@@ -125,7 +123,9 @@ def test_the_kernel_takes_the_steps_of_every_engine(task: Any, drawn: Any) -> No
                     assert observation == pytest.approx(observations[k], abs=1e-6)
                     assert reward == pytest.approx(rewards[k], abs=1e-9)
                     assert ended == terminated[k]
-                assert np.concatenate(episodes.state) == pytest.approx(envs.states[k], abs=1e-9)
+                end = np.concatenate(episodes.state)
+                assert end == pytest.approx(envs.states[k], abs=1e-9)
+                assert engine != "compiled" or np.array_equal(end, envs.states[k])
     assert np.abs(envs.states - starts).max() > 1e-3
 
 
@@ -155,10 +155,10 @@ def test_joint_friction_opposes_the_motion(engine: str) -> None:
             env.step(np.zeros(1, dtype=np.float32))
             velocities.append(float(episodes.state.v[0]))
     free, damped, rubbed, stopped = velocities
-    assert free - damped == pytest.approx(0.05 * 0.2 * 2.0 / inertia, rel=1e-9)
+    # Damping acts on the velocity at the end of the step.
+    assert damped == pytest.approx(free / (1.0 + 0.05 * 0.2 / inertia), rel=1e-9)
     assert free - rubbed == pytest.approx(0.05 * 0.3 / inertia, rel=1e-9)
-    # Friction beyond any bound halves the velocity in each step, and never turns it round.
-    assert stopped == pytest.approx(1.0, rel=1e-9)
+    assert stopped == 0.0
 
 
 def test_a_delay_shifts_actions() -> None:
@@ -220,16 +220,6 @@ def test_noise_differs_from_step_to_step() -> None:
     noises += [envs.step(rest)[0][:, 2] - envs.states[:, 1] for _ in range(3)]
     # Two of 200 independent numbers of float32 are the same with a probability of about 1e-3.
     assert np.unique(np.concatenate(noises).round(6)).size > 190
-
-
-@pytest.mark.parametrize("frame", ["tool0", "forearm_link"])
-def test_a_payload_of_a_world_is_a_body_on_the_link(frame: str) -> None:
-    model, rng = dynx.load("ur5"), np.random.default_rng(0)
-    placed = with_point_mass(model, frame, 2.0, (0.1, -0.2, 0.3))
-    added = plant_model(model, Payload(frame, 2.0, (0.1, -0.2, 0.3)), 1.0)
-    q, v, a = (rng.normal(size=6) for _ in range(3))
-    one, other = (backend("reference", each).inverse_dynamics(q, v, a) for each in (placed, added))
-    assert one == pytest.approx(other, rel=1e-12)
 
 
 def test_worlds_have_the_drawn_parameters() -> None:

@@ -14,8 +14,8 @@ from dynx.control.base import Controller
 from dynx.errors import ArgumentError
 from dynx.files.pages import html_grid
 from dynx.model import Model
+from dynx.rbd.parameters import plant_model
 from dynx.sim.controller_checks import controller_numbers
-from dynx.sim.plants.model_error import plant_model
 from dynx.sim.scenario.documents import Unknown
 from dynx.sim.scenario.scenario import Scenario
 from dynx.sim.setup import clock_of, disturbances_of, effort_limits_of, refuse_unknown

@@ -20,6 +20,7 @@ MODULES = {
     "dynx.control.velocity": "dynx.control.joint_space",
     "dynx.sim.clock": "dynx.steppers.clock",
     "dynx.sim.loop.noise": "dynx.sim.noise",
+    "dynx.sim.plants.model_error": "dynx.rbd.parameters",
     "dynx.trajectory.cycloidal": "dynx.trajectory.rest_to_rest",
     "dynx.trajectory.excitation": "dynx.trajectory.identification",
     "dynx.trajectory.line": "dynx.trajectory.straight_line",

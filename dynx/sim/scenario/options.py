@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
     from dynx.control.friction import Coefficients
     from dynx.model import Model
+    from dynx.rbd.parameters import MassScale, Payload
     from dynx.sim.noise import Noise
-    from dynx.sim.plants.model_error import MassScale, Payload
     from dynx.sim.plants.scene_plant import ScenePlant
     from dynx.steppers.forces import ExternalForce
 
@@ -232,7 +232,7 @@ LIMITS = JointNumbers(_JOINT_VALUES, NumberOrArray, others=math.inf)
 FACTORS = Factors("a factor, or factors by link", float | dict[str, Any])
 NOISE = Parts("a dynx.Noise, as in Noise(v=1e-3)", dict[str, Any], "dynx.sim.noise:Noise", several=False)
 PAYLOADS = Parts(
-    "a Payload, or a list of them", list[dict[str, Any]], "dynx.sim.plants.model_error:Payload", optional=True
+    "a Payload, or a list of them", list[dict[str, Any]], "dynx.rbd.parameters:Payload", optional=True
 )
 PUSHES = Parts(
     "an ExternalForce, or a list of them", list[dict[str, Any]], "dynx.steppers.forces:ExternalForce"

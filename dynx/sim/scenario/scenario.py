@@ -18,7 +18,7 @@ from dynx.model import Model
 from dynx.model.loading import load
 from dynx.model.model import refuse_other_than_model
 from dynx.model.package_search import StrPath
-from dynx.sim.plants.model_error import Payload
+from dynx.rbd.parameters import Payload
 from dynx.sim.plants.registry import default_integrator
 from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.scenario.documents import (
