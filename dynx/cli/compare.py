@@ -17,7 +17,7 @@ from dynx.cli.shell.output import Entry, check_json, counted, entry_of, present,
 from dynx.cli.shell.tables import MAX_ROWS, Table, print_rest
 from dynx.errors import ArgumentError
 from dynx.model.loading import load
-from dynx.sim.comparison.comparison import TOLERANCE, Cause, RolloutComparison, compare
+from dynx.sim.comparison import TOLERANCE, Cause, RolloutComparison, compare
 from dynx.sim.record.rollout import Rollout
 from dynx.world.separation import Separation
 

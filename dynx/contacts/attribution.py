@@ -2,7 +2,7 @@
 
 An error is attributed to the first candidate that at least halves it at the smallest step, makes it larger
 at no step, and under which it is within the tolerance or falls with the step, or in proportion to which it
-falls, as `dynx.contacts.series` judges. Where the error is within the tolerance at the smallest step, the
+falls, as `dynx.contacts.verdict` judges. Where the error is within the tolerance at the smallest step, the
 step of the largest error counts. Of several settings changed together, those are left out again without
 which the change does the same. The price of a change is measured by running the whole case with it.
 
@@ -20,8 +20,15 @@ from typing import Any
 
 from dynx.contacts.candidates import SUBSTEPS, SettingsChange
 from dynx.contacts.run import Measured, Runner, Unmeasured
-from dynx.contacts.series import FigureSeries, TrialOfEngine, judge
-from dynx.contacts.verdict import Attribution, AttributionOutcome, Price, Verdict
+from dynx.contacts.verdict import (
+    Attribution,
+    AttributionOutcome,
+    FigureSeries,
+    Price,
+    TrialOfEngine,
+    Verdict,
+    judge,
+)
 from dynx.steppers.registry import world_class
 
 Change = Mapping[str, Any]

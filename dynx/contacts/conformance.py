@@ -15,8 +15,7 @@ from dynx.contacts.attribution import Attributor
 from dynx.contacts.candidates import CANDIDATES, SUBSTEPS, SettingsChange
 from dynx.contacts.case import BUILT_IN, ContactCase, find_case, find_cases
 from dynx.contacts.run import CaseRun, Measured, Runner, Unmeasured
-from dynx.contacts.series import FigureSeries, TrialOfEngine, collect, judge
-from dynx.contacts.verdict import VERDICTS, Verdict, VerdictKind
+from dynx.contacts.verdict import VERDICTS, FigureSeries, TrialOfEngine, Verdict, VerdictKind, collect, judge
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model.numbers import positive_seconds, whole_number
 from dynx.steppers.registry import installed_worlds, world_class

@@ -32,7 +32,7 @@ from dynx.spatial.scalar import Array
 from dynx.steppers.registry import world_names
 
 if TYPE_CHECKING:
-    from dynx.world.camera import Camera
+    from dynx.steppers.camera import Camera
     from dynx.world.scene import Scene
     from dynx.world.world import World
 
@@ -462,6 +462,6 @@ def camera_at(position: ArrayLike, target: ArrayLike, **options: Any) -> Camera:
 
     Cameras are imported here, because most environments draw no picture.
     """
-    from dynx.world.camera import Camera
+    from dynx.steppers.camera import Camera
 
     return Camera.look_at(position, target, **options)

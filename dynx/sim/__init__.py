@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from dynx.rbd.parameters import Payload, plant_model
     from dynx.sim.batch import BatchInterrupted, simulate_batch
     from dynx.sim.batch_rollouts import BatchRollouts
-    from dynx.sim.comparison.comparison import RolloutComparison, compare
+    from dynx.sim.comparison import RolloutComparison, compare
     from dynx.sim.noise import Noise
     from dynx.sim.plants.plant import Plant, StepResult
     from dynx.sim.plants.registry import register as register_plant
@@ -30,7 +30,7 @@ _HOME = {
     "Payload": "dynx.rbd.parameters",
     "Plant": "dynx.sim.plants.plant",
     "Rollout": "dynx.sim.record.rollout",
-    "RolloutComparison": "dynx.sim.comparison.comparison",
+    "RolloutComparison": "dynx.sim.comparison",
     "RolloutInterrupted": "dynx.sim.simulation",
     "Scenario": "dynx.sim.scenario.scenario",
     "ScenePlant": "dynx.sim.plants.scene_plant",
@@ -38,7 +38,7 @@ _HOME = {
     "SimulationState": "dynx.sim.simulation",
     "StepResult": "dynx.sim.plants.plant",
     "Summary": "dynx.sim.record.rollout_data",
-    "compare": "dynx.sim.comparison.comparison",
+    "compare": "dynx.sim.comparison",
     "plant_model": "dynx.rbd.parameters",
     "register_plant": "dynx.sim.plants.registry:register",
     "simulate": "dynx.sim.simulation",

@@ -19,16 +19,15 @@ from dynx.model.geometry.links import Colour, link_shapes
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_rpy
-from dynx.steppers.camera import DrawnShape
+from dynx.steppers.camera import Camera, DrawnShape
 from dynx.viewer.browser import standalone
 from dynx.viewer.colours import GREY, SKY_BLUE
 from dynx.viewer.drawn_robot import size_of
 from dynx.viewer.framing import VIEW_DIRECTION, box_around, fitting_distance
 from dynx.viewer.library import Image
-from dynx.viewer.motion import Motion
+from dynx.viewer.motion import MotionFrames
 from dynx.viewer.page import Page
-from dynx.world.camera import Camera, cast_rays
-from dynx.world.camera.picture import png_bytes
+from dynx.world.camera import cast_rays, png_bytes
 
 PICTURES_PER_SECOND = 12.5
 """Rate of the pictures of a film."""
@@ -56,7 +55,7 @@ Progress = Callable[[int], object]
 _OPAQUE_SKY_BLUE: Colour = (SKY_BLUE[0] / 255.0, SKY_BLUE[1] / 255.0, SKY_BLUE[2] / 255.0, 1.0)
 
 
-def picture_of(motions: tuple[Motion, ...], time: float, camera: Camera) -> NDArray[np.uint8]:
+def picture_of(motions: tuple[MotionFrames, ...], time: float, camera: Camera) -> NDArray[np.uint8]:
     """Return colours (height, width, 3) of motions at a time [s]; all but the first are sky blue."""
     rgb, depth = None, np.zeros(0)
     for number, motion in enumerate(motions):
@@ -75,7 +74,7 @@ def picture_of(motions: tuple[Motion, ...], time: float, camera: Camera) -> NDAr
     return np.asarray(rgb).reshape(camera.size[1], camera.size[0], 3)
 
 
-def camera_for(motion: Motion, size: tuple[int, int] = SIZE) -> Camera:
+def camera_for(motion: MotionFrames, size: tuple[int, int] = SIZE) -> Camera:
     """Return a camera that sees the box around a motion, from the direction in which the page begins."""
     low, high = box_around(motion.poses, motion.bodies, motion.robots)
     middle = 0.5 * (low + high)
@@ -89,13 +88,13 @@ def write_picture(path: str | os.PathLike[str], rgb: NDArray[np.uint8]) -> None:
     write_bytes(path, png_bytes(rgb))
 
 
-def film_length(motions: tuple[Motion, ...]) -> int:
+def film_length(motions: tuple[MotionFrames, ...]) -> int:
     """Return the number of pictures of the film of motions that begin together."""
     return min(MAX_PICTURES, max(1, round(_duration(motions) * PICTURES_PER_SECOND)))
 
 
 def write_film(
-    path: str | os.PathLike[str], motions: tuple[Motion, ...], progress: Progress = lambda _: None
+    path: str | os.PathLike[str], motions: tuple[MotionFrames, ...], progress: Progress = lambda _: None
 ) -> None:
     """Write motions as a GIF file that plays in the time of the longest, again and again.
 
@@ -120,11 +119,11 @@ def write_film(
     write_bytes(path, stream.getvalue())
 
 
-def _duration(motions: tuple[Motion, ...]) -> float:
+def _duration(motions: tuple[MotionFrames, ...]) -> float:
     return float(max(each.t[-1] for each in motions) - motions[0].t[0])
 
 
-def _shapes(motion: Motion) -> Iterator[tuple[str, Shape, Colour, Floats]]:
+def _shapes(motion: MotionFrames) -> Iterator[tuple[str, Shape, Colour, Floats]]:
     """Yield the shapes of every part with the name of the part; those of a fixed body in the world."""
     for robot, model in motion.robots.items():
         shapes = [

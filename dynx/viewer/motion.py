@@ -1,4 +1,4 @@
-"""`Motion`: a recorded motion as frames of a film, and how far two of them are apart."""
+"""`MotionFrames`: a recorded motion as frames of a film, and how far two of them are apart."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dynx.rbd.kinematics import link_poses
 from dynx.sim import Rollout, ScenePlant
 from dynx.spatial.scalar import Floats
 from dynx.steppers.state import WorldState
-from dynx.world.camera.drawing import part_poses
+from dynx.world.camera import part_poses
 from dynx.world.comparison import EngineRun
 from dynx.world.record import Record, position_channel
 from dynx.world.scene import Scene, SceneBody
@@ -45,7 +45,7 @@ class Arrows(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class MotionFrames:
     """Poses of parts at n times; a part is a body, or a link as ``robot/link``."""
 
     name: str
@@ -79,7 +79,7 @@ def fixed_bodies(scene: Scene) -> frozenset[str]:
     return frozenset(body.name for body in scene.bodies if body.fixed)
 
 
-def motion_of_rollout(rollout: Rollout, name: str = "") -> Motion:
+def motion_of_rollout(rollout: Rollout, name: str = "") -> MotionFrames:
     """Return the motion of a rollout, with the other robots and the bodies of its scene.
 
     Raises ArgumentError for a state that is not finite, and for times that do not ascend.
@@ -109,10 +109,10 @@ def motion_of_rollout(rollout: Rollout, name: str = "") -> Motion:
         steps = np.minimum(frames, table.n_steps - 1)
         first, end = np.searchsorted(table.step, steps, "left"), np.searchsorted(table.step, steps, "right")
         contacts = tuple(Arrows(point[a:b], force[a:b]) for a, b in zip(first, end, strict=True))
-    return Motion(name or rollout.model.name, rollout.t[frames], poses, robots, bodies, contacts)
+    return MotionFrames(name or rollout.model.name, rollout.t[frames], poses, robots, bodies, contacts)
 
 
-def motion_of_reference(rollout: Rollout) -> Motion | None:
+def motion_of_reference(rollout: Rollout) -> MotionFrames | None:
     """Return the motion that the robot of a rollout should have followed; None without a reference.
 
     Raises ArgumentError for a state that is not finite, and for times that do not ascend.
@@ -124,30 +124,30 @@ def motion_of_reference(rollout: Rollout) -> Motion | None:
     plant = rollout.scenario.plant if rollout.scenario is not None else None
     name = str(plant.robot) if isinstance(plant, ScenePlant) else rollout.model.name
     poses = dict(_poses(name, rollout.model, rollout.reference.q[frames]))
-    return Motion("reference", rollout.t[frames], poses, {name: rollout.model})
+    return MotionFrames("reference", rollout.t[frames], poses, {name: rollout.model})
 
 
-def motion_of_robot(model: Model, q: Floats) -> Motion:
+def motion_of_robot(model: Model, q: Floats) -> MotionFrames:
     """Return the motion of a robot that stands still at the configuration q (nq,)."""
-    return Motion(model.name, np.zeros(1), _poses(model.name, model, q[None]), {model.name: model})
+    return MotionFrames(model.name, np.zeros(1), _poses(model.name, model, q[None]), {model.name: model})
 
 
-def motion_of_state(scene: Scene, state: WorldState) -> Motion:
+def motion_of_state(scene: Scene, state: WorldState) -> MotionFrames:
     """Return the motion of a scene that stands still in a state."""
     poses = {name: T[None] for name, T in part_poses(scene, state)}
-    return Motion(scene.name, np.zeros(1), poses, {r.name: r.model for r in scene.robots}, scene.bodies)
+    return MotionFrames(scene.name, np.zeros(1), poses, {r.name: r.model for r in scene.robots}, scene.bodies)
 
 
-def motion_of_run(scene: Scene, run: EngineRun) -> Motion:
+def motion_of_run(scene: Scene, run: EngineRun) -> MotionFrames:
     """Return the motion of a scene in one engine."""
     frames = [dict(part_poses(scene, state)) for state in run.states]
     fixed = {body.name for body in scene.bodies if body.fixed}
     poses = {name: np.array([frame[name] for frame in frames]) for name in frames[0] if name not in fixed}
     robots = {robot.name: robot.model for robot in scene.robots}
-    return Motion(run.engine, run.times[: len(frames)], poses, robots, scene.bodies)
+    return MotionFrames(run.engine, run.times[: len(frames)], poses, robots, scene.bodies)
 
 
-def motion_separation(a: Motion, b: Motion) -> Separation:
+def motion_separation(a: MotionFrames, b: MotionFrames) -> Separation:
     """Measure how far apart the parts of two motions are, at the times of `a` at which `b` lasts.
 
     Positions of `b` are interpolated linearly between its frames. Raises ArgumentError for motions without a

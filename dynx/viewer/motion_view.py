@@ -26,7 +26,7 @@ from dynx.viewer.drawn_robot import (
 from dynx.viewer.framing import box_around, has_ground
 from dynx.viewer.library import uplot
 from dynx.viewer.marks import NamedParts
-from dynx.viewer.motion import PARTED, Motion, motion_separation
+from dynx.viewer.motion import PARTED, MotionFrames, motion_separation
 from dynx.viewer.page import Page
 
 UPDATES_PER_SECOND = 40.0
@@ -307,8 +307,8 @@ class MotionView:
     def __init__(
         self,
         page: Page,
-        motion: Motion,
-        ghost: Motion | None = None,
+        motion: MotionFrames,
+        ghost: MotionFrames | None = None,
         *,
         curves: Sequence[Series] = (),
         look: Look = AS_DESCRIBED,
@@ -353,7 +353,7 @@ class MotionView:
         page.look_at(low, high, _SHARE)
 
     @property
-    def motions(self) -> tuple[Motion, ...]:
+    def motions(self) -> tuple[MotionFrames, ...]:
         """The motions that are shown at present."""
         seen = self.ghost is not None and self._ghost_drawn is not None and self._ghost_drawn.visible
         return (self.motion, self.ghost) if seen and self.ghost is not None else (self.motion,)
@@ -378,7 +378,7 @@ class MotionView:
         """Show the motions at a time after their start [s]."""
         self.timeline.go_to(time)
 
-    def _draw_ghost(self, ghost: Motion, look: Look) -> DrawnScene:
+    def _draw_ghost(self, ghost: MotionFrames, look: Look) -> DrawnScene:
         # What never moves is the same in both.
         moving = [body for body in ghost.bodies if body.name in ghost.poses]
         seen_through = look._replace(colour=SKY_BLUE, opacity=GHOST_OPACITY, size=GHOST_SIZE)

@@ -33,7 +33,7 @@ from dynx.viewer.triangles import triangles_of
 
 if TYPE_CHECKING:
     from dynx.backends import Backend
-    from dynx.viewer.motion import Motion
+    from dynx.viewer.motion import MotionFrames
 
 
 _DEFAULT_RANGE = {"rad": math.pi, "m": 1.0}
@@ -447,7 +447,7 @@ class RobotView:
         return self.robot.visuals
 
     @property
-    def motions(self) -> tuple[Motion, ...]:
+    def motions(self) -> tuple[MotionFrames, ...]:
         """The robot as it stands."""
         from dynx.viewer.motion import motion_of_robot
 

@@ -24,7 +24,7 @@ from dynx.viewer.triangles import TRIANGLE_BUDGET, has_graphics_processor
 
 if TYPE_CHECKING:
     from dynx.sim import Rollout
-    from dynx.viewer.motion import Motion
+    from dynx.viewer.motion import MotionFrames
     from dynx.viewer.motion_view import Series
 
 
@@ -59,7 +59,7 @@ class View(Protocol):
         """The nodes of the visual shapes of each part."""
 
     @property
-    def motions(self) -> tuple[Motion, ...]:
+    def motions(self) -> tuple[MotionFrames, ...]:
         """The motions that are shown at present; what stands still is a motion of one frame."""
 
     @property

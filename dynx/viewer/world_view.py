@@ -18,10 +18,10 @@ from dynx.spatial.scalar import Floats
 from dynx.viewer.drawn_robot import AS_DESCRIBED, ContactArrows, DrawnScene, FollowingCamera, Look
 from dynx.viewer.framing import box_around, has_ground
 from dynx.viewer.marks import NamedParts
-from dynx.viewer.motion import Motion, fixed_bodies, motion_of_state
+from dynx.viewer.motion import MotionFrames, fixed_bodies, motion_of_state
 from dynx.viewer.page import Page
 from dynx.world import ExternalForce, World
-from dynx.world.camera.drawing import part_poses
+from dynx.world.camera import part_poses
 
 _FREQUENCY = 2.0 * math.pi * 1.0
 """Angular frequency [rad/s] at which a free body of the part's mass would swing on the spring."""
@@ -239,7 +239,7 @@ class WorldView:
         return self.drawn.visuals
 
     @property
-    def motions(self) -> tuple[Motion, ...]:
+    def motions(self) -> tuple[MotionFrames, ...]:
         """The world in its present state."""
         return (motion_of_state(self.world.scene, self.world.state),)
 

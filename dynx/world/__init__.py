@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from dynx.steppers.registry import unregister as unregister_world
     from dynx.steppers.registry import world_names
     from dynx.steppers.state import BodyState, RobotState, WorldState
-    from dynx.world.camera.picture import Picture
+    from dynx.world.camera import Picture
     from dynx.world.comparison import WorldComparison
     from dynx.world.contacts import ClosestPoints, Contact, RayHits
     from dynx.world.motors import Motor, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
@@ -101,7 +101,7 @@ _HOME = {
     "Material": "dynx.steppers.material",
     "Motor": "dynx.world.motors",
     "PDMotor": "dynx.world.motors",
-    "Picture": "dynx.world.camera.picture",
+    "Picture": "dynx.world.camera",
     "PointToPoint": "dynx.world.scene.bodies",
     "PositionMotor": "dynx.world.motors",
     "RayHits": "dynx.world.contacts",

@@ -23,7 +23,7 @@ from dynx.steppers.forces import NO_COMMANDS, EngineCommand, ExternalForce, Forc
 from dynx.steppers.layout import Layout, RobotLayout
 from dynx.steppers.stepper import Stepper
 from dynx.world.motors import JointLaw, Motor, combine
-from dynx.world.notes.divergence import LastLoads, RobotLoad
+from dynx.world.notes import LastLoads, RobotLoad
 
 _FLOAT64 = np.dtype(np.float64)
 

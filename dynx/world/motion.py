@@ -26,7 +26,7 @@ from dynx.steppers.layout import BodyLayout, Layout, RobotLayout
 from dynx.steppers.state import BodyState, PartStates, RobotState, WorldState, has_diverged
 from dynx.steppers.stepper import Stepper
 from dynx.world.commands import Act, Commands
-from dynx.world.notes.divergence import likely_causes
+from dynx.world.notes import likely_causes
 
 Parts = Mapping[str, tuple[ArrayLike, ArrayLike]]
 

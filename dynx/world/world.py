@@ -32,7 +32,7 @@ from dynx.steppers.stepper import Stepper
 from dynx.world.commands import Commands, MotorsOf, with_scene_motors
 from dynx.world.contacts import MAX_RAY_LENGTH, ClosestPoints, Contact, RayHits
 from dynx.world.motion import Motion, apply_state, checked_state
-from dynx.world.notes.start_notes import Overlap, notes_on_engine, notes_on_start, overlaps_of
+from dynx.world.notes import Overlap, notes_on_engine, notes_on_start, overlaps_of
 from dynx.world.preparation import prepare
 from dynx.world.scene.documents import scene_document, scene_from_document
 from dynx.world.scene.paths import ScenePaths
@@ -41,7 +41,8 @@ from dynx.world.snapshot import Snapshot, read_snapshot, write_snapshot
 
 if TYPE_CHECKING:
     from dynx.distance.avoidance import Avoidance
-    from dynx.world.camera import Camera, Picture
+    from dynx.steppers.camera import Camera
+    from dynx.world.camera import Picture
     from dynx.world.queries import Queries
 
 

@@ -21,7 +21,6 @@ DEFINED_MORE_THAN_ONCE = {
     "BuiltScene": PER_ENGINE,
     "Carrier": PER_ENGINE,
     "EngineEntry": OF_A_DOCUMENT,
-    "Motion": "of a world until a closed loop is a world with controllers, and of the viewer",
     "RobotCoordinates": PER_ENGINE,
     "Workspace": PER_ENGINE,
 }

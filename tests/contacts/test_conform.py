@@ -10,7 +10,7 @@ import pytest
 
 from dynx.contacts import Conformance, ContactCase, Figure, FigureResult, SettingsChange, conform
 from dynx.contacts.run import Measured
-from dynx.contacts.series import TrialOfEngine, collect
+from dynx.contacts.verdict import TrialOfEngine, collect
 from dynx.errors import ArgumentError, UnknownBackendError, UnknownNameError
 from dynx.world import Scene, World, register_world, unregister_world
 from tests.contacts.exact_world import ExactWorld

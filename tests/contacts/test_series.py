@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.contacts.series import MIN_ORDER, judge
+from dynx.contacts.verdict import MIN_ORDER, judge
 
 STEPS = (4e-3, 2e-3, 1e-3)
 TOLERANCE = 1e-6

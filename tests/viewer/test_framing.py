@@ -12,12 +12,12 @@ from dynx.model.geometry import Box, Sphere
 from dynx.model.geometry.links import link_shapes
 from dynx.rbd.kinematics import link_poses
 from dynx.spatial.scalar import Floats
+from dynx.steppers.camera import Camera
 from dynx.viewer import view
 from dynx.viewer.drawn_robot import GHOST_SIZE
 from dynx.viewer.framing import VIEW_DIRECTION, box_around, fitting_distance, has_ground, round_length
 from dynx.viewer.triangles import resized, triangles_of
 from dynx.world import World
-from dynx.world.camera import Camera
 from dynx.world.scene import box, ground, read_scene
 from tests.conftest import needs_examples
 

@@ -14,7 +14,7 @@ from dynx.spatial.scalar import Floats
 from dynx.viewer.export import camera_for, film_length, picture_of
 from dynx.viewer.motion import (
     MAX_FRAMES,
-    Motion,
+    MotionFrames,
     motion_of_reference,
     motion_of_rollout,
     motion_of_run,
@@ -75,11 +75,11 @@ def test_a_motion_is_not_apart_from_itself(rollout: dynx.Rollout) -> None:
     assert not motion_separation(motion, motion).distances.any()
 
 
-def accelerated(name: str, t: Floats) -> Motion:
+def accelerated(name: str, t: Floats) -> MotionFrames:
     """Return the motion of a body along x = t^2 [m]."""
     T = np.tile(np.eye(4), (len(t), 1, 1))
     T[:, 0, 3] = t**2
-    return Motion(name, t, {"body": T}, {})
+    return MotionFrames(name, t, {"body": T}, {})
 
 
 def test_frames_at_other_times_and_a_shorter_motion_do_not_part() -> None:
@@ -149,7 +149,7 @@ def test_a_picture_of_two_motions_that_coincide_shows_the_solid_one() -> None:
     cube = box("cube", (0.2, 0.2, 0.2), mass=1.0)
     poses = np.broadcast_to(np.eye(4), (2, 4, 4)).copy()
     poses[1, :3, 3] = [0.3, -0.3, 0.3]
-    motion = Motion("m", np.array([0.0, 1.0]), {"cube": poses}, {}, (cube,))
+    motion = MotionFrames("m", np.array([0.0, 1.0]), {"cube": poses}, {}, (cube,))
     later = replace(motion, poses={"cube": poses[::-1]})
     camera = camera_for(motion, (160, 120))
     alone = picture_of((motion,), 0.0, camera)

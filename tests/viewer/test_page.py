@@ -15,11 +15,12 @@ from dynx.errors import ArgumentError
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
+from dynx.steppers.camera import Camera
 from dynx.steppers.state import RobotState, WorldState
 from dynx.viewer import Viewer, view
 from dynx.viewer.motion import PARTED, motion_separation
 from dynx.world import Scene, World
-from dynx.world.camera import Camera, draw_picture
+from dynx.world.camera import draw_picture
 from dynx.world.scene import SceneRobot, read_scene
 from tests.conftest import needs_examples
 from tests.viewer.conftest import PATIENCE, PICTURE, Opened, OpenPage, antialiased, connected, pixel_of, until

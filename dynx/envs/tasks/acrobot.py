@@ -22,7 +22,7 @@ from dynx.model.loading import load
 from dynx.spatial.scalar import Array
 
 if TYPE_CHECKING:
-    from dynx.world.camera import Camera
+    from dynx.steppers.camera import Camera
 
 MAX_SPEEDS = np.array([4.0 * math.pi, 9.0 * math.pi])
 """Bounds to which the velocities are clamped [rad/s]."""

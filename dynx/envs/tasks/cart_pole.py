@@ -21,7 +21,7 @@ from dynx.model.loading import load
 from dynx.spatial.scalar import Array
 
 if TYPE_CHECKING:
-    from dynx.world.camera import Camera
+    from dynx.steppers.camera import Camera
 
 MAX_POSITION = 2.4
 """Distance of the cart from the middle beyond which an episode ends [m]."""

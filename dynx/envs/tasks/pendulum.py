@@ -22,7 +22,7 @@ from dynx.rbd.integration import Accelerate
 from dynx.spatial.scalar import Array
 
 if TYPE_CHECKING:
-    from dynx.world.camera import Camera
+    from dynx.steppers.camera import Camera
 
 MAX_SPEED = 8.0
 """Bound to which the velocity is clamped [rad/s]."""

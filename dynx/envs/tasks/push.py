@@ -27,7 +27,7 @@ from dynx.spatial.so3 import cross
 from dynx.world import Material, Scene, SceneRobot, VelocityMotor, box, ground
 
 if TYPE_CHECKING:
-    from dynx.world.camera import Camera
+    from dynx.steppers.camera import Camera
 
 ARM, CUBE, TABLE = "arm", "cube", "table"
 HAND, TIP = ("panda_hand", "panda_leftfinger", "panda_rightfinger"), "panda_hand_tcp"

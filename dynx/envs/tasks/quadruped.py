@@ -27,7 +27,7 @@ from dynx.spatial.scalar import Floats
 from dynx.world import Material, PositionMotor, Scene, SceneRobot, ground
 
 if TYPE_CHECKING:
-    from dynx.world.camera import Camera
+    from dynx.steppers.camera import Camera
 
 DOG, GROUND = "dog", "ground"
 START_HEIGHT, STAND_HEIGHT = 0.3, 0.29

@@ -26,7 +26,7 @@ from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import homogeneous, pose_error
 
 if TYPE_CHECKING:
-    from dynx.world.camera import Camera
+    from dynx.steppers.camera import Camera
 
 ACTIONS = ("torque", "velocity")
 

@@ -14,7 +14,7 @@ from dynx import control, trajectory
 from dynx.errors import ArgumentError
 from dynx.model import Model
 from dynx.sim import Noise, Payload, Rollout, Scenario, ScenePlant, compare, simulate
-from dynx.sim.comparison.comparison import rollout_separation
+from dynx.sim.comparison import rollout_separation
 from dynx.world import Material, Scene, SceneRobot, box, ground
 
 ARM = dynx.load("so101")

@@ -14,7 +14,7 @@ from dynx.model import Model
 from dynx.model.geometry import Collision, Geometry, LinkGeometry
 from dynx.model.geometry.shapes import Sphere
 from dynx.sim import Payload, Rollout, Scenario, ScenePlant, compare, simulate
-from dynx.sim.comparison.comparison import RolloutComparison
+from dynx.sim.comparison import RolloutComparison
 from dynx.world import Scene, SceneRobot, box, ground
 
 ARM = dynx.load("ur5")

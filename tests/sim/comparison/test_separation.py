@@ -13,7 +13,7 @@ import dynx
 from dynx import control
 from dynx.errors import ArgumentError
 from dynx.sim import Rollout, compare, simulate, simulate_batch
-from dynx.sim.comparison.comparison import rollout_separation
+from dynx.sim.comparison import rollout_separation
 
 ARM = dynx.load("double_pendulum_continuous")
 OURS = simulate(ARM, None, q0=[0.5, 0.2], plant="compiled", duration=0.2)

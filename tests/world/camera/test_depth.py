@@ -118,7 +118,7 @@ def test_many_triangles_are_drawn_in_parts(tmp_path: Path, monkeypatch: pytest.M
     path.write_text(trimesh.creation.icosphere(subdivisions=2).export(file_type="obj"))
     ball = solid("ball", Mesh(str(path)), Pose((0.0, 0.0, 3.0)))
     whole = see(Camera(size=(64, 48)), ball)
-    monkeypatch.setattr("dynx.world.camera.drawing.MAX_PAIRS", 50)
+    monkeypatch.setattr("dynx.world.camera.MAX_PAIRS", 50)
     parts = see(Camera(size=(64, 48)), ball)
     assert np.array_equal(whole.depth, parts.depth)
     assert np.array_equal(whole.rgb, parts.rgb)

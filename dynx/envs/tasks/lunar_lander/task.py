@@ -48,7 +48,7 @@ from dynx.model.numbers import MAX_MAGNITUDE, is_real
 from dynx.world import Scene
 
 if TYPE_CHECKING:
-    from dynx.world.camera import Camera
+    from dynx.steppers.camera import Camera
 
 FPS = 50
 """Control steps a second."""

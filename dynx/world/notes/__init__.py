@@ -1,1 +1,0 @@
-"""Sentences on a world: what is amiss at its start, and the likely causes where it diverged."""
