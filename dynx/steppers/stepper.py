@@ -72,7 +72,7 @@ class Stepper(ABC):
 
     def effective_materials(self) -> Mapping[str, EffectiveCoefficient]:
         """Return, by name, the coefficients of contact that the engine does not have for every pair of
-        materials as `dynx.steppers.materials.combined` gives them."""
+        materials as `dynx.steppers.material.geometric_means` gives them."""
         return {}
 
     # -- motion -------------------------------------------------------------------------------

@@ -149,7 +149,7 @@ def _followed(found: list[Descended], nq: int) -> Followed:
 
 
 class KernelFollower:
-    """Follower (`dynx.ik.tracking.Follower`) by a kernel; safe to use from several threads."""
+    """`Follower` by a kernel; safe to use from several threads."""
 
     def __init__(
         self,
