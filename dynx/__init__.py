@@ -151,7 +151,7 @@ _HOME = {
     "simulate_batch": "dynx.sim",
 }
 _MOVED = {"compare_rollouts": "dynx.compare", "Push": "dynx.ExternalForce"}
-_SUBPACKAGES = ("control", "errors", "ik", "sim", "trajectory", "world")
+_SUBPACKAGES = ("control", "distance", "errors", "ik", "sim", "trajectory", "world")
 _OF_EXTRAS = ("envs", "testing", "training", "viewer")
 
 

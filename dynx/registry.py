@@ -64,8 +64,9 @@ def moved_names(
     """Return the ``__getattr__`` of a package whose public names have moved, or are imported on use.
 
     `home` has the module of each name, as ``"package.module"`` or ``"package.module:other_name"``: the first
-    look-up imports it. For a name of `moved` ImportError is raised, whose text also reaches the
-    user of ``from package import name``, and AttributeError for any other name.
+    look-up imports it, or a module of the package with that name. For a name of `moved` ImportError is
+    raised, whose text also reaches the user of ``from package import name``, and AttributeError for any other
+    name.
     """
     homes = home or {}
 
@@ -77,6 +78,9 @@ def moved_names(
             return found
         if name in moved:
             raise ImportError(f"{package}.{name} is now {moved[name]}", name=package)
+        # Not what Python itself asks every module for, such as `__path__`.
+        if not name.startswith("_") and find_spec(f"{package}.{name}") is not None:
+            return import_module(f"{package}.{name}")
         raise AttributeError(f"module {package!r} has no attribute {name!r}")
 
     return getattr_of_package

@@ -230,9 +230,11 @@ class LoopStep:
 
     def key(self, purpose: Hashable) -> Hashable | None:
         """Return the content that a kernel for this purpose depends on; None for a controller that is not
-        declared pure, or whose content is not known."""
+        declared pure, that has a class outside dynx, whose code may change, or whose content is not known."""
         controller = self.controller
-        if controller is not None and not all(each.is_pure for each in chain_of(controller)):
+        if controller is not None and any(
+            not each.is_pure or is_foreign(type(each)) for each in chain_of(controller)
+        ):
             return None
         others = [
             getattr(self, each.name) for each in fields(self) if each.name not in ("controller", "plant")

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from types import FrameType
+from types import CodeType, FrameType, FunctionType
 from typing import Any
 
 import numpy as np
 
 from dynx.control.base import Controller, Measurement, chain_of, rebind
-from dynx.control.content import is_foreign, is_foreign_module
+from dynx.control.content import attributes_of, is_foreign, is_foreign_module
 from dynx.control.dynamics import Dynamics, Evaluation
 from dynx.errors import TraceError
 from dynx.sim.controller_checks import ControllerWatch, defect_of_outcome
@@ -69,7 +69,7 @@ def refuse_irreproducible(controller: Controller[Any], repetitions: int = REPETI
     one, other = controller.initial_state(), controller.initial_state()
     if isinstance(one, np.ndarray) and not np.array_equal(one, other, equal_nan=True):
         raise TraceError(f"{controller.name}.initial_state() returns another state in each call")
-    watch = ControllerWatch(controller)
+    watch, variables = ControllerWatch(controller), _variables(controller)
     first = _Trace(controller)
     for _ in range(repetitions):
         again = _Trace(controller)
@@ -78,6 +78,41 @@ def refuse_irreproducible(controller: Controller[Any], repetitions: int = REPETI
             raise TraceError(_difference(controller, *found))
     if watch.changed:
         raise TraceError(f"{watch.changed}: let torque return what changes as its state")
+    after = _variables(controller)
+    changed = next((name for name, value in variables.items() if after.get(name) is not value), None)
+    if changed is not None:
+        file, line = _definition(controller)
+        raise TraceError(
+            f"{controller.name}.torque() changes {changed}, a variable of its module or class "
+            f"({Path(file).name}, line {line})"
+        )
+
+
+def _variables(controller: Controller[Any]) -> dict[str, Any]:
+    """Return the attributes of the user's classes, and the variables of modules that their methods name."""
+    found: dict[str, Any] = {}
+    chain = list(chain_of(controller))
+    waiting = [value for each in chain for value in attributes_of(each).values()]
+    for kind in {kind for each in chain for kind in type(each).__mro__ if is_foreign(kind)}:
+        found |= {f"{kind.__qualname__}.{name}": value for name, value in vars(kind).items()}
+        waiting += vars(kind).values()
+    seen: set[CodeType] = set()
+    while waiting:
+        function = waiting.pop()
+        if not isinstance(function, FunctionType) or function.__code__ in seen:
+            continue
+        seen.add(function.__code__)
+        for name in _names(function.__code__) & function.__globals__.keys():
+            found[name] = value = function.__globals__[name]
+            if is_foreign_module(getattr(value, "__module__", "dynx")):
+                waiting.append(value)
+    return found
+
+
+def _names(code: CodeType) -> set[str]:
+    """Return the names that a code and the functions in it refer to."""
+    inner = (each for each in code.co_consts if isinstance(each, CodeType))
+    return {*code.co_names}.union(*map(_names, inner))
 
 
 class _Trace:

@@ -11,7 +11,7 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -57,6 +57,27 @@ class Snapshot:
     """State of the engine, in the engine's own format; empty for an engine that keeps none."""
     record: Any = None
     """What a simulation recorded until then, and the state of its controller; None for a world."""
+
+    def _content(self) -> tuple[Any, ...]:
+        arrays = tuple((name, x.shape, x.tobytes()) for name, x in self.arrays.items())
+        state = self.time, self.start, self.steps, arrays, self.data
+        return self.engine, self.version, self.identity, *state
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Snapshot):
+            return NotImplemented
+        return self._content() == other._content() and self.record is other.record
+
+    def __hash__(self) -> int:
+        return hash(self._content())
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        if state.keys() != {each.name for each in fields(self)}:
+            raise ArgumentError(
+                "the snapshot was pickled by another version of dynx; World.write writes files that later "
+                "versions read"
+            )
+        vars(self).update(state)
 
     def __repr__(self) -> str:
         what = "world" if self.record is None else "simulation"

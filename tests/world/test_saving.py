@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -63,6 +64,18 @@ def test_a_saved_world_continues_bit_for_bit(engine: str, tmp_path: Path) -> Non
 
 def small(mass: float = 1.0) -> Scene:
     return Scene("s", bodies=(ground(), box("b", (0.1, 0.1, 0.1), mass=mass)))
+
+
+def test_snapshots_are_compared_by_content(engine: str) -> None:
+    with World(crowd(), engine) as world:
+        final(world, 10)
+        one, other = world.save(), world.save()
+        world.step()
+        later = world.save()
+    assert one == other == pickle.loads(pickle.dumps(one))
+    assert len({one, other, later}) == 2
+    with pytest.raises(ArgumentError, match="another version"):
+        one.__setstate__({"memory": {}})
 
 
 def test_a_snapshot_of_another_scene_or_step_is_refused(engine: str) -> None:

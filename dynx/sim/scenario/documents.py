@@ -16,7 +16,7 @@ import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from hashlib import sha256
-from types import CellType, FunctionType
+from types import CellType, CodeType, FunctionType
 from typing import Any
 
 import numpy as np
@@ -353,7 +353,7 @@ def _fingerprint(value: Any, model: Model | None) -> str:
 
 
 def _parts(value: Any) -> Iterable[Any]:
-    """Return the name, defaults and closure of a function; for any other object, all that a copy of it
+    """Return the name, code, defaults and closure of a function; for any other object, all that a copy of it
     gets."""
     if isinstance(value, set | frozenset):
         return value
@@ -367,7 +367,10 @@ def _parts(value: Any) -> Iterable[Any]:
         name = f"{value.__module__}:{value.__qualname__}"
         # A cell is empty until the enclosing function assigns its variable.
         enclosed = [cell.cell_contents for cell in value.__closure__ or () if cell != CellType()]
-        return [name, value.__defaults__, value.__kwdefaults__, enclosed]
+        # Functions of one place, such as lambdas, have equal names.
+        constants = [each for each in value.__code__.co_consts if not isinstance(each, CodeType)]
+        code = [value.__code__.co_code.hex(), value.__code__.co_names, constants]
+        return [name, *code, value.__defaults__, value.__kwdefaults__, enclosed]
     try:
         attributes = attributes_of(value)
         reduced = value.__reduce_ex__(2)

@@ -26,7 +26,7 @@ ARM = dynx.load("ur5").with_gravity((0.0, 0.0, -9.8))
 GOAL = np.array([0.3, -0.5, 0.4, 0.1, 0.2, 0.3])
 ENGINES = [name for name in ("pinocchio", "compiled", "reference") if name in installed_backends()]
 count = 0
-"""Number of torques that `GlobalVariable` computed."""
+"""Number of torques that `global_variable` computed."""
 
 
 class Own(Controller[None]):
@@ -163,6 +163,13 @@ def test_compiled_steps_have_the_bits_of_numpy(law: Callable[..., Any], executor
         np.testing.assert_array_equal(simulation.rollout.tau, whole.tau)
 
 
+def global_variable(self: Own, measurement: Measurement, setpoint: Setpoint) -> Any:
+    """Return a damper's torque, and count."""
+    global count
+    count += 1
+    return -measurement.v
+
+
 def branching(self: Own, measurement: Measurement, setpoint: Setpoint) -> Any:
     """Return a torque that depends on the side on which the robot is."""
     if measurement.q[0] > 0.0:
@@ -186,6 +193,7 @@ REFUSED: dict[str, tuple[Callable[..., Any], str]] = {
         lambda self, m, s: self.dynamics.inverse_dynamics(m.q, m.v, random.random() * m.v),
         "depends on more",
     ),
+    "variable of the module": (global_variable, "changes count, a variable of its module"),
     "if": (branching, r"branches on a traced value .* use np\.where"),
     "engine": (lambda self, m, s: ENGINE.gravity_torque(m.q), r"control\.model_dynamics\(model, backend\)"),
     "array of floats": (lambda self, m, s: np.zeros(6).__setitem__(0, m.v[0]), r"np\.zeros_like"),
