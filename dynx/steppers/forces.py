@@ -99,9 +99,12 @@ class ExternalForce:
             )
         seconds = is_real(self.start) and is_real(self.duration)
         if not seconds or not self.duration > 0.0 or not np.isfinite(self.start):
+            start, duration = (
+                shown(x) if isinstance(x, str) else escaped(x) for x in (self.start, self.duration)
+            )
             raise ArgumentError(
-                f"{what} starts at {escaped(self.start)} and lasts {escaped(self.duration)}; wanted a finite "
-                "and a positive number of seconds"
+                f"{what} starts at {start} and lasts {duration}; wanted a finite and a positive number of "
+                "seconds"
             )
 
     def checked(self, model: Model) -> ExternalForce:

@@ -75,7 +75,7 @@ FLOWS = {
         ("world.camera", "steppers.camera", "world.queries", "distance", "ik", "envs"),
         (),
         216,
-        36600,
+        36700,
     ),
     "step of a box": Flow(
         "from dynx.world import Scene, World, box\n"
@@ -83,7 +83,7 @@ FLOWS = {
         ("ik", "sim", "envs", "doctor"),
         (),
         115,
-        18300,
+        18400,
     ),
     "step of the cart-pole": Flow(
         "import gymnasium, dynx.envs\n"
@@ -92,8 +92,8 @@ FLOWS = {
         "environment.step(environment.action_space.sample())",
         ("distance", "ik", "world.camera", "steppers.camera"),
         (),
-        192,
-        31300,
+        170,
+        27100,
     ),
 }
 

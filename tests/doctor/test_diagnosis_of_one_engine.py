@@ -27,7 +27,7 @@ FRAMES = case_of(
 
 def diagnose_with(monkeypatch: pytest.MonkeyPatch, engine: type[LoadedRobot], text: str) -> DoctorReport:
     """Diagnose a file with that engine alone."""
-    for module in ("examine.examination", "report_assembly"):
+    for module in ("examination", "diagnosis"):
         monkeypatch.setattr(f"dynx.doctor.{module}.loader_class", lambda name: engine)
     return diagnose(text, engines=[NAME], counterexamples=False)
 

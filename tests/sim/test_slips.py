@@ -88,7 +88,7 @@ SIMULATIONS: dict[str, tuple[dict[str, Any], type[DynxError], str]] = {
     "friction_slip='much'": (
         {"friction_slip": "much"},
         ArgumentError,
-        "^friction_slip is 'much'; wanted a number",
+        "^friction_slip is 'much'; wanted a speed: 0, or",
     ),
     "mass_scale=array": ({"mass_scale": np.ones(6)}, ArgumentError, "^mass_scale of .* wanted a positive"),
     "check_reference=1": (
