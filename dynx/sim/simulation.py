@@ -139,7 +139,7 @@ class Simulation:
         effort limits apply to it, and it is held until the next control step. Raises DivergedError and
         ControlError, with the record so far in ``error.rollout``.
         """
-        if n != 1 and (not isinstance(n, int | np.integer) or n < 1):
+        if not isinstance(n, int | np.integer) or n < 1:
             raise ArgumentError(f"n is {shown(n)}; wanted a number of steps, 1 or more")
         given = None
         if tau is not None:
@@ -285,11 +285,12 @@ class Simulation:
         """Extend the buffers to hold the steps until `end`, at least to twice their size."""
         require_memory(f"{end} steps", end * step_bytes(self.scenario.model, self._setup.controller))
         clock = replace(self._loop.clock, n_steps=max(end, 2 * len(self._record)))
-        self._record = self._record.extended(clock.n_steps)
         setpoints = setpoints_of(self._setup.setpoint_of, clock, self._setup.controller)
         sensors = Sensors(self.scenario.model, clock, self.scenario.noise, self._setup.controller)
-        self._loop = replace(self._loop, clock=clock, setpoints=setpoints, sensors=sensors)
-        self._lane_known = False
+        loop = replace(self._loop, clock=clock, setpoints=setpoints, sensors=sensors)
+        record = self._record.extended(clock.n_steps)
+        # Together at the end: the reference is the user's code, and Ctrl-C may come at any time.
+        self._record, self._loop, self._lane_known = record, loop, False
 
     # -- state and record ---------------------------------------------------------------------
 

@@ -218,7 +218,26 @@ def test_an_error_leaves_the_last_whole_step() -> None:
         assert len(diverged.value.rollout) == diverged.value.step
 
 
-@pytest.mark.parametrize("n", [0, -1, 1.5, "2", None])
+@pytest.mark.parametrize("plant", ["pinocchio", "compiled"])
+def test_ctrl_c_while_a_simulation_grows_changes_nothing(plant: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: Any) -> Any:
+        raise KeyboardInterrupt
+
+    scenario = replace(SCENARIOS["passive"], plant=plant, duration=None)
+    with Simulation(scenario) as whole:
+        wanted = whole.step(2000)
+    with Simulation(scenario) as simulation:
+        simulation.step(300)
+        with monkeypatch.context() as patch:
+            patch.setattr("dynx.sim.simulation.setpoints_of", interrupted)
+            with pytest.raises(KeyboardInterrupt):
+                simulation.step(1700)
+        assert simulation.time == pytest.approx(300 * scenario.dt)
+        found = simulation.step(1700)
+    np.testing.assert_array_equal(found.q, wanted.q)
+
+
+@pytest.mark.parametrize("n", [0, -1, 1.5, "2", None, np.zeros(6)])
 def test_steps_are_counted_in_whole_numbers(n: Any) -> None:
     with (
         Simulation(SCENARIOS["passive"]) as simulation,
