@@ -331,7 +331,7 @@ class TaskLanes:
 
     @property
     def end(self) -> dict[str, Floats]:
-        """The same at the end of the step that was evaluated."""
+        """``state``, ``steps`` and ``earlier`` actions (rows, size) at the end of the evaluated step."""
         return self._sets[1 - self._turn]
 
     def evaluate(self) -> None:

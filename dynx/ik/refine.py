@@ -331,7 +331,7 @@ class _ClearStep:
     error: TaskError
     near: list[NearPair]
     lacks: Floats
-    """What the distances of the pairs lack [m]; negative for those that have room."""
+    """Margin and `BUFFER` minus the distance of each pair (n,) [m]; negative for pairs farther apart."""
     squared: float
     done: bool
 

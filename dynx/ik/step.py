@@ -392,7 +392,7 @@ class DescentLayout:
     numbers: tuple[float, ...]
     """Numbers of a new task: distance, angle, success and iterations, then others."""
     results: int
-    """How many of these numbers are results of the task."""
+    """Number of entries of `numbers`, the first ones, that are results of the task."""
     vectors: int = 0
 
     def initial(self, n: int) -> Floats:

@@ -324,7 +324,7 @@ class Factor:
     """A difference of two scenarios, and the values of both in words."""
 
     name: str
-    """Such as ``damping``, ``controller.kp``, ``link hand, inertial`` or ``joint elbow, axis``."""
+    """What differs, as ``damping``, ``controller.kp``, ``link hand, inertial`` or ``joint elbow, axis``."""
     ours: str
     theirs: str
 
