@@ -271,8 +271,8 @@ NAMES = "dynx-names"
 HOVERED = "dynx-hovered"
 """Identifier of the element that shows the name of the part under the pointer."""
 
-NO_SOFTWARE_MESSAGE = "#webgl-software-rendering { display: none; }"
-"""Style that hides the message of viser that software draws."""
+_NO_SOFTWARE_MESSAGE = "<style>#webgl-software-rendering { display: none; }</style>"
+"""Hides the message of viser that software draws: dynx says so itself (a note) and has prepared for it."""
 
 _LEGEND_STYLE = (
     "position: fixed; left: 0.5em; top: 0.5em; max-width: 20em; padding: 0.1em; border-radius: 3px; "
@@ -384,6 +384,8 @@ class Client:
         self.headers = tuple(policy.headers([HANDLER_HASH]))
         """Headers with which the page is served."""
         self._text = _guarded(CLIENT.read_text(encoding="utf-8"), script, policy)
+        if not antialiasing:
+            self._text = self._text.replace("</head>", f"{_NO_SOFTWARE_MESSAGE}</head>", 1)
         self.entitle(title)
 
     def entitle(self, title: str) -> None:
@@ -426,7 +428,7 @@ def standalone(
     if legend:
         added += f'<div style="{_LEGEND_STYLE}">{legend}</div>'
     if software:
-        added += f"<style>{NO_SOFTWARE_MESSAGE}</style>"
+        added += _NO_SOFTWARE_MESSAGE
     return _with_title(f"{page[:body]}{added}{page[body:]}", title)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from dynx.errors import ArgumentError, shown
 from dynx.model.numbers import whole_number
 from dynx.spatial.scalar import Floats
-from dynx.viewer.browser import NO_SOFTWARE_MESSAGE, Access, CheckedMessages, Client, is_loopback
+from dynx.viewer.browser import Access, CheckedMessages, Client, is_loopback
 from dynx.viewer.framing import VIEW_DIRECTION, fitting_distance, round_length
 from dynx.viewer.library import serve, silent
 
@@ -41,15 +41,13 @@ _LINE_COLOUR = {False: (170, 170, 170), True: (70, 70, 70)}
 """Colour of the lines of the ground on a light and on a dark page."""
 
 _STYLE = """<style>
-%s
 @media (max-width: %dpx) {
   .mantine-Notifications-root { --notifications-container-width: calc(100vw - 2em) !important; }
   .mantine-Paper-root[style*="position: fixed"] { width: 100%% !important; max-height: %d%% !important; }
   .mantine-Paper-root[style*="position: fixed"] div[style*="width: 20em"] { width: 100%% !important; }
 }
 </style>"""
-"""Style of viser's page: its panel as wide as a narrow page and lower than viser's, and without the message
-that software draws where dynx says so itself (a note) and has prepared for it."""
+"""Style of viser's page: its panel as wide as a narrow page and lower than viser's."""
 
 NARROW = 576
 """Width of a page up to which viser lays the panel over the lower part of the picture [pixels]."""
@@ -143,8 +141,7 @@ class Page:
         # Beside the picture, not over it.
         self._server.gui.main_panel.dock_right()
         self._server.scene.set_up_direction("+z")
-        style = _STYLE % (NO_SOFTWARE_MESSAGE if self.plain else "", NARROW, round(100.0 * _COVERED))
-        self._server.gui.add_html(style, order=math.inf)
+        self._server.gui.add_html(_STYLE % (NARROW, round(100.0 * _COVERED)), order=math.inf)
         if self.plain:
             scene = self._server.scene
             scene.configure_environment_map(None)

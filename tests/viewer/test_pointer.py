@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from html import escape
 from pathlib import Path
 
@@ -14,19 +13,38 @@ from dynx.viewer import view
 from dynx.viewer.browser import HOVERED
 from dynx.world import World
 from dynx.world.scene import read_scene
-from tests.viewer.conftest import PATIENCE, PICTURE, Opened, OpenPage, antialiased, connected, pixel_of, until
+from tests.viewer.conftest import PICTURE, Opened, OpenPage, antialiased, connected, pixel_of, until
 
 MESSAGE = 160.0
 """Height of the part of a page on which viser tells that software draws [pixels]."""
 
 PIXEL = """path => {
-  const page = __viserMutable, picture = page.scene.__r3f.root.getState();
+  const page = window.__viserMutable, picture = page?.scene?.__r3f?.root?.getState?.();
+  if (!picture || !page.nodeRefFromName[path]) return null;
   const place = picture.camera.position.clone();
   page.nodeRefFromName[path].getWorldPosition(place).project(picture.camera);
   const box = picture.gl.domElement.getBoundingClientRect();
   return [box.left + 0.5 * (place.x + 1) * box.width, box.top + 0.5 * (1 - place.y) * box.height];
 }"""
-"""Script that returns where the page draws the origin of a node [pixels]."""
+"""Script that returns where the page draws the origin of a node [pixels], and null while it does not."""
+
+
+def hover(page: Opened, path: str, part: str, *, shown: bool = True) -> None:
+    """Move the pointer over the origin of a node until the page shows, or no longer shows, a part's name.
+
+    What the page draws comes after what it is told, and a pointer at rest is asked nothing.
+    """
+    label = page.page.locator(f"#{HOVERED}")
+
+    def done() -> bool:
+        pixel = page.page.evaluate(PIXEL, path)
+        if pixel is None:
+            return False
+        page.page.mouse.move(*(np.array(pixel) + np.random.default_rng().uniform(-3.0, 3.0, 2)))
+        page.page.wait_for_timeout(50.0)
+        return (label.is_visible() and label.text_content() == part) == shown
+
+    until(done, f"the name of {part}: {shown}")
 
 
 def test_a_click_names_a_body_of_a_world_and_the_pointer_drags_it(open_page: OpenPage) -> None:
@@ -40,6 +58,7 @@ def test_a_click_names_a_body_of_a_world_and_the_pointer_drags_it(open_page: Ope
             key=lambda each: each[1][1],
         )
         mouse = page.page.mouse
+        hover(page, viewer.view.drawn.parts[name].name, name)
         mouse.move(*held)
         page.page.wait_for_timeout(PICTURE)
         mouse.click(*held)
@@ -78,11 +97,10 @@ def test_the_name_of_the_part_under_the_pointer_is_shown(open_page: OpenPage, tm
         label = page.page.locator(f"#{HOVERED}")
         for part in ("base", name):
             pixel = pixel_of(client, viewer.view.robot.pose(part)[:3, 3])
+            hover(page, viewer.view.robot.links[part].name, part)
             page.page.mouse.move(*pixel)
-            page.page.wait_for_function(
-                "([id, part]) => document.getElementById(id)?.textContent === part", arg=[HOVERED, part]
-            )
-            assert label.is_visible()
+            page.page.wait_for_timeout(PICTURE)
+            assert label.text_content() == part
             left = label.bounding_box()["x"]
             page.page.mouse.move(*(pixel + 4.0))
             page.page.wait_for_function(
@@ -93,26 +111,17 @@ def test_the_name_of_the_part_under_the_pointer_is_shown(open_page: OpenPage, tm
         page.page.mouse.move(20.0, 430.0)
         label.wait_for(state="hidden")
 
-        def hovered(page: Opened, part: str, *, shown: bool) -> None:
-            label, path = page.page.locator(f"#{HOVERED}"), viewer.view.robot.links[part].name
-            end = time.monotonic() + PATIENCE
-            while (label.is_visible() and label.text_content() == part) != shown:
-                assert time.monotonic() < end, (part, shown)
-                # What the page draws comes after what it is told.
-                pixel = np.array(page.page.evaluate(PIXEL, path))
-                page.page.mouse.move(*(pixel + np.random.default_rng().uniform(-3.0, 3.0, 2)))
-                page.page.wait_for_timeout(50.0)
-
+        node = viewer.view.robot.links[name].name
         viewer.view.robot.show(visuals=False, collisions=False)
-        hovered(page, name, shown=False)
+        hover(page, node, name, shown=False)
         viewer.view.robot.show(visuals=False, collisions=True)
-        hovered(page, name, shown=True)
+        hover(page, node, name)
         assert not page.errors
         exported = tmp_path / "page.html"
         viewer.export(exported)
         recorded = open_page(exported.as_uri())
         for part in ("base", name):
-            hovered(recorded, part, shown=True)
+            hover(recorded, viewer.view.robot.links[part].name, part)
         assert not recorded.errors
 
 
