@@ -3,8 +3,8 @@
     python -m docs.public_files MANIFEST.json A=A.jsonl B=B.jsonl ...
 
 The manifest is a list of {repo, path, commit, sha256, half, at}: `half` is the part of a file, `at` its place
-on this machine. The results of a part are those of ``python -m tests.doctor.survey_files``; ``B.raw.json``
-beside ``B.jsonl`` has those of ``python -m tests.doctor.raw_agreement B.jsonl --json B.raw.json``, if any.
+on this machine. The results of a part are those of ``python -m surveys.files``; ``B.raw.json``
+beside ``B.jsonl`` has those of ``python -m surveys.raw_agreement B.jsonl --json B.raw.json``, if any.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from dynx.rules import find_rule
-from tests.doctor.survey_files import SMALL, Entry, differs, read_entries
+from surveys.files import SMALL, Entry, differs, read_entries
 
 PAGE = Path(__file__).with_name("public_files.md")
 

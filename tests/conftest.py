@@ -49,7 +49,7 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 LONGEST = (
     "tests/test_readme.py::test_python_blocks",
     "tests/properties/",
-    "tests/doctor/test_raw_engines.py",
+    "tests/surveys/test_raw_engines.py",
     "tests/test_benchmarks_run.py",
 )
 """Beginnings of the names of tests that take up to a minute each."""

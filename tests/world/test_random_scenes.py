@@ -1,6 +1,6 @@
 """Random scenes on every engine: momentum, energy, rest, equal runs, other orders and other places.
 
-``python -m tests.world.random_scenes --count 300`` prints for more of them how near each bound is, and the
+``python -m surveys.random_scenes --count 300`` prints for more of them how near each bound is, and the
 settings that cause violations.
 """
 

@@ -22,10 +22,10 @@ from dynx.sim import Rollout, Scenario, Simulation, simulate
 from dynx.sim.plants.friction_solver import BLOCK_CORRECTIONS, FrictionSolver
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models
+from surveys import friction_scan
+from surveys.friction_scan import Case
 from tests.backends.robots import mixed_robot
 from tests.oracles.closed_form import MODELS
-from tests.sim import friction_scan
-from tests.sim.friction_scan import Case
 
 MASS, F = 2.0, 3.0
 STEPS = [1e-4, 1e-3, 1e-2]
@@ -186,7 +186,7 @@ RUBBING = {
 
 @pytest.mark.parametrize("name", sorted({each.name for each in robots()} & RUBBING.keys()))
 def test_nothing_oscillates_from_step_to_step(name: str) -> None:
-    """A sample of the cases of `tests.sim.friction_scan`, which searches all robots."""
+    """A sample of the cases of `surveys.friction_scan`, which searches all robots."""
     for friction in ("file", "drawn"):
         finding = friction_scan.run(Case(name, RUBBING[name], friction, batch=False))
         assert finding.rattling == []

@@ -10,8 +10,8 @@ import pytest
 from dynx.agreement.tolerances import BAR
 from dynx.loaded import installed_engines
 from dynx.rules.registry import find_trap
-from tests.doctor.raw_agreement import ENGINES, check_entries
-from tests.doctor.survey_files import Loading, examine, listed, load_alone, make_tasks, summary, survey
+from surveys.files import Loading, examine, listed, load_alone, make_tasks, summary, survey
+from surveys.raw_agreement import ENGINES, check_entries
 
 TRAPS = ("DX105", "DX201", "DX301", "DX304")
 

@@ -1,8 +1,8 @@
-"""Errors of engines' distances over random pairs: ``python -m tests.distance.survey --pairs 10000``.
+"""Errors of engines' distances over random pairs: ``python -m surveys.distances --pairs 10000``.
 
 Pairs of each two kinds of shapes are separated, touching or overlapping in turn. The table has the worst and
 the median error of each engine against `dynx.distance`, as the engine comes, and the worst one after the
-settings have changed that it is attributed to (`tests/distance/survey_engines.py`). Not run in CI.
+settings have changed that it is attributed to (`surveys/distance_engines.py`). Not run in CI.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from typing import NamedTuple
 import numpy as np
 
 from dynx.distance import Distance, distance
+from surveys.distance_engines import CHANGES, ENGINES, Measure, Placed
 from tests.distance.shapes import KINDS, random_pose, random_shape
-from tests.distance.survey_engines import CHANGES, ENGINES, Measure, Placed
 
 PLACEMENTS = ("separated", "touching", "overlapping")
 CASES = [(*kinds, place) for kinds in combinations_with_replacement(KINDS, 2) for place in PLACEMENTS]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.distance.survey import measure, table
-from tests.distance.survey_engines import ENGINES
+from surveys.distance_engines import ENGINES
+from surveys.distances import measure, table
 
 CAUSES = {
     "bullet": (("Box", "Hull", "separated"), 1e-5, 1e-12),
