@@ -19,7 +19,7 @@ import gymnasium
 import numpy as np
 
 from dynx.backends import backend, installed_backends
-from dynx.control.dynamics import EngineDynamics
+from dynx.backends.dynamics import EngineDynamics
 from dynx.envs import RobotTask, State, TaskEnvironment
 from dynx.envs.library import AutoresetMode
 from dynx.envs.tasks.acrobot import Acrobot

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from dynx.registry import moved_names
 
 if TYPE_CHECKING:
+    from dynx.backends.joint_dynamics import JointFriction
     from dynx.control.base import Controller, Measurement, ModelBased, model_dynamics
     from dynx.control.bullet import (
         BulletMotor,
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
         BulletVelocityMotor,
     )
     from dynx.control.computed_torque import ComputedTorque, DiscreteComputedTorque
-    from dynx.control.friction import FrictionCompensation, JointFriction
+    from dynx.control.friction import FrictionCompensation
     from dynx.control.joint_space import PD, PID, FeedForward, GravityCompensatedPD, Velocity
     from dynx.control.motors_and_encoders import Encoders, MotorLag
     from dynx.control.open_loop import OpenLoop
@@ -73,7 +74,7 @@ _HOME = {
     "FrictionCompensation": "dynx.control.friction",
     "GravityCompensatedPD": "dynx.control.joint_space",
     "Impedance": "dynx.control.task_space",
-    "JointFriction": "dynx.control.friction",
+    "JointFriction": "dynx.backends.joint_dynamics",
     "Measurement": "dynx.control.base",
     "ModelBased": "dynx.control.base",
     "MotorLag": "dynx.control.motors_and_encoders",

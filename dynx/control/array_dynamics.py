@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Any
 
+from dynx.backends.dynamics import Dynamics, Evaluation
 from dynx.compiled.kernels import evaluate_quantity
 from dynx.compiled.simplification import simplify_mechanism
-from dynx.control.dynamics import Dynamics, Evaluation
 from dynx.model import Mechanism
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
 from dynx.simd.user_code.arrays import is_traced, symbol_array, traced_array

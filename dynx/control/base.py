@@ -15,8 +15,8 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from dynx.backends import Backend, backend
+from dynx.backends.dynamics import Dynamics, EngineDynamics
 from dynx.control.content import attributes_of, content_of, fields_of
-from dynx.control.dynamics import Dynamics, EngineDynamics
 from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
 from dynx.files.pages import html_grid
 from dynx.model import Model

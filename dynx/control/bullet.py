@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.control.base import Controller, Measurement, gain, parameter, refuse_other_than_controller
-from dynx.control.gains import checked_gain
 from dynx.control.joint_space import JointSpace
 from dynx.control.saturation import checked_limit
 from dynx.engines.pybullet.motors import BulletMotorCommand, refuse_mimic_joints
 from dynx.errors import UnsupportedFeatureError
 from dynx.model import Model
+from dynx.model.numbers import checked_gain
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 

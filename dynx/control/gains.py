@@ -1,33 +1,12 @@
-"""Gains: one number for all coordinates or one for each, checked once when a controller is made."""
+"""Gains of the feedback of an error: given both, or by natural frequency and damping ratio."""
 
 from __future__ import annotations
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, GainError
-from dynx.model.numbers import real_array
+from dynx.errors import GainError
+from dynx.model.numbers import checked_gain
 from dynx.spatial.scalar import Floats
-
-
-def checked_gain(name: str, gain: ArrayLike, length: int, *, per: str = "one for each coordinate") -> Floats:
-    """Return `gain` as an array (length,) of finite numbers that are not negative, or a GainError.
-
-    The array is a read-only copy.
-    """
-    try:
-        array = real_array(name, gain)
-    except ArgumentError as error:
-        raise GainError(str(error)) from None
-    if array.shape not in ((), (length,)):
-        raise GainError(f"{name} has shape {array.shape}; wanted one number, or {length}, {per}")
-    if not np.isfinite(array).all():
-        raise GainError(f"{name} is not finite")
-    if (array < 0.0).any():
-        raise GainError(f"{name} is negative ({float(array.min()):g}); wanted 0 or more")
-    full = np.array(np.broadcast_to(array, (length,)))
-    full.setflags(write=False)
-    return full
 
 
 def feedback_gains(

@@ -18,11 +18,10 @@ from numpy.typing import ArrayLike
 
 from dynx.backends import Backend
 from dynx.control.base import Controller, ControllerState, Measurement, ModelBased, gain, parameter
-from dynx.control.gains import checked_gain
 from dynx.control.saturation import checked_limit
 from dynx.model import Model
 from dynx.model.model import refuse_other_than_model
-from dynx.model.numbers import positive_seconds
+from dynx.model.numbers import checked_gain, positive_seconds
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Array, Floats, clamp
 from dynx.trajectory.base import Setpoint

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.control.base import Controller, Measurement, Wrapper, parameter
-from dynx.control.gains import checked_gain
 from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
-from dynx.model.numbers import is_real, positive_seconds, real_array
+from dynx.model.numbers import checked_gain, is_real, positive_seconds, real_array
 from dynx.spatial.scalar import Array, Floats, arctan2
 from dynx.trajectory.base import Setpoint
 

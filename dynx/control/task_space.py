@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 from dynx.backends import Backend
 from dynx.control.base import ControllerState, Measurement, ModelBased, gain, parameter
 from dynx.control.computed_torque import commanded_acceleration
-from dynx.control.gains import checked_gain, feedback_gains
+from dynx.control.gains import feedback_gains
 from dynx.model import Model
+from dynx.model.numbers import checked_gain
 from dynx.rbd.elimination import solve_mass_matrix
 from dynx.rbd.linear import solve_columns
 from dynx.registry import DEFAULT_ENGINE

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.backends.base import Backend
+from dynx.backends.dynamics import EngineDynamics
 from dynx.backends.registry import backend
-from dynx.control.dynamics import EngineDynamics
 from dynx.envs.library import AutoresetMode, spaces
 from dynx.envs.randomization import Parameter, Randomization
 from dynx.envs.task import (
@@ -256,13 +256,13 @@ class EngineFriction(StepFriction):
 
     def __init__(self, task: RobotTask, dynamics: EngineDynamics, joints: JointCoefficients) -> None:
         # Imported here, because its kernel needs the compiler.
-        from dynx.sim.plants.friction_solver import FrictionSolver
+        from dynx.steppers.implicit_joints import ImplicitJoints
 
         law = FrictionLaw.of(task.model, joints.friction)
         super().__init__(task, law.joints)
         self._dynamics, self._damping = dynamics, joints.damping
         damping = joints.damping if self.damps_implicitly else None
-        self._solver = FrictionSolver(law, joints.friction, task.step_dt, damping=damping)
+        self._solver = ImplicitJoints(law, joints.friction, task.step_dt, damping=damping)
 
     def solve(self, q: Floats, v: Floats, tau: Floats) -> tuple[Floats, Floats]:
         M, bias = self._dynamics.mass_matrix_and_bias(q, v)

@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dynx.backends.dynamics import Dynamics
 from dynx.backends.registry import backend_names
-from dynx.control.dynamics import Dynamics
 from dynx.envs.library import Space
 from dynx.envs.randomization import Parameter, Randomization
 from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError, nearest, shown
@@ -191,7 +191,7 @@ class RobotTask(Task):
     and in a vector environment on symbols, from which one kernel is compiled. So they must not branch on a
     value (write ``np.where``) and must return the same for the same arguments. `robot` evaluates quantities
     of the robot at a configuration: ``robot.forward_kinematics(q, frame)``, ``robot.bias_torque(q, v)`` and
-    the others of `dynx.control.dynamics.Dynamics`.
+    the others of `dynx.backends.dynamics.Dynamics`.
     """
 
     substeps: ClassVar[int] = 1
@@ -262,7 +262,7 @@ class RobotTask(Task):
             raise ArgumentError(f"integrator is {shown(self.integrator)}{nearest(self.integrator, SCHEMES)}")
         if self.integrator == "semi_implicit" and self.model.floating:
             # Its compiled step of a base on floats is imported only where there is one.
-            from dynx.sim.plants.integrators import CompiledBaseEuler
+            from dynx.steppers.integrators import CompiledBaseEuler
 
             return CompiledBaseEuler(self.model, self.step_dt)
         return SCHEMES[self.integrator](self.model, self.step_dt)

@@ -23,11 +23,11 @@ from dynx.envs.variation import VariedRobot
 from dynx.errors import ArgumentError, ShapeError, UnsupportedFeatureError
 from dynx.model.numbers import DIVERGENCE_SPEED
 from dynx.rbd.joint_friction import FrictionLaw, damped_equation
-from dynx.sim.plants.friction_solver import BLOCK_CORRECTIONS, MAX_SOLUTIONS
 from dynx.simd.target import host
 from dynx.simd.user_code.arrays import symbol_array, traced_array
 from dynx.simd.user_code.numbers import select
 from dynx.spatial.scalar import Array, Floats, sign
+from dynx.steppers.implicit_joints import BLOCK_CORRECTIONS, MAX_SOLUTIONS
 
 TERMINATED, TRUNCATED, INVALID, DIVERGED, UNSETTLED = 1, 1 << 8, 1 << 16, 1 << 24, 1 << 32
 """Bits of the output ``flags``, an integer of 64 bits: one byte for each flag, so that the bytes are arrays

@@ -7,7 +7,7 @@ from typing import TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, shown
+from dynx.errors import ArgumentError, DTypeError, GainError, NotFiniteError, ShapeError, shown
 from dynx.spatial.scalar import Floats
 
 _MAX_FLOAT = float(np.finfo(np.float64).max)
@@ -97,6 +97,26 @@ def checked_entries(name: str, array: Floats) -> Floats:
             "in magnitude, since products of larger numbers overflow"
         )
     return array
+
+
+def checked_gain(name: str, gain: ArrayLike, length: int, *, per: str = "one for each coordinate") -> Floats:
+    """Return `gain` as an array (length,) of finite numbers that are not negative, or a GainError.
+
+    The array is a read-only copy.
+    """
+    try:
+        array = real_array(name, gain)
+    except ArgumentError as error:
+        raise GainError(str(error)) from None
+    if array.shape not in ((), (length,)):
+        raise GainError(f"{name} has shape {array.shape}; wanted one number, or {length}, {per}")
+    if not np.isfinite(array).all():
+        raise GainError(f"{name} is not finite")
+    if (array < 0.0).any():
+        raise GainError(f"{name} is negative ({float(array.min()):g}); wanted 0 or more")
+    full = np.array(np.broadcast_to(array, (length,)))
+    full.setflags(write=False)
+    return full
 
 
 def checked_generator(rng: np.random.Generator | int | None) -> np.random.Generator:

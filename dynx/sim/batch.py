@@ -24,10 +24,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.backends import backend
+from dynx.backends.joint_dynamics import coefficients_by_joint, refuse_text
 from dynx.backends.solvability import Solvability
 from dynx.compiled.parametric import ParametricDynamics
 from dynx.compiled.step import BoundSteps, CompiledStep, Status, Stop
-from dynx.control.friction import coefficients_by_joint, refuse_text
 from dynx.errors import ArgumentError, GainError, shown
 from dynx.files.arrays import read_arrays, write_arrays
 from dynx.files.reading import checked_path

@@ -316,7 +316,7 @@ class ClosedLoop:
                         plant.reset(q, v)
             except Exception as error:
                 # This includes the engine's own exceptions, because its hooks are called directly
-                # (`dynx.control.dynamics`).
+                # (`dynx.backends.dynamics`).
                 raise self.engine_failed(k, record, error, in_controller=False) from error
             if diverged:
                 raise self.error_of(Status.DIVERGED, k, record, tau)

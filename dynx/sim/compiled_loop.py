@@ -15,12 +15,12 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
+from dynx.backends.dynamics import EngineDynamics
 from dynx.compiled.backend import CompiledBackend
 from dynx.compiled.step import BoundSteps, CompiledStep, Status, Stop
 from dynx.control.base import Controller, chain_of
 from dynx.control.bullet import BulletMotor
 from dynx.control.content import attributes_of
-from dynx.control.dynamics import EngineDynamics
 from dynx.errors import ArgumentError, CompileError, TraceError, UnsupportedFeatureError
 from dynx.sim.closed_loop import ClosedLoop, LoopState, StateBuffers
 from dynx.sim.loop_step import CONTROLLER, SETPOINT, ArrayDisturbances, LoopStep, cut_step

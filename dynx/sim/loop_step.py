@@ -16,6 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.backends.dynamics import QUANTITIES, Dynamics, EngineDynamics, Evaluation
+from dynx.backends.joint_dynamics import JointFriction
 from dynx.compiled.kernels import evaluate_quantity
 from dynx.compiled.parametric import ParametricDynamics
 from dynx.compiled.simplification import simplify_mechanism
@@ -23,8 +25,6 @@ from dynx.compiled.step import Status, StepText
 from dynx.control.array_dynamics import ArrayDynamics
 from dynx.control.base import Controller, chain_of, gains_of, rebind
 from dynx.control.content import attributes_of, content_of, fields_of, is_foreign
-from dynx.control.dynamics import QUANTITIES, Dynamics, EngineDynamics, Evaluation
-from dynx.control.friction import JointFriction
 from dynx.errors import ArgumentError, TraceError, UnsupportedFeatureError, shown
 from dynx.model import Mechanism, Model
 from dynx.rbd.elimination import factorize_mass_matrix, solve_with_factors

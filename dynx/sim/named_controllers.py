@@ -19,9 +19,10 @@ from dynx import control
 from dynx.backends import Backend, backend
 from dynx.control import registry
 from dynx.control.base import Controller
-from dynx.control.gains import checked_gain, feedback_gains
+from dynx.control.gains import feedback_gains
 from dynx.errors import GainError, UnknownNameError, nearest, shown
 from dynx.model import Model
+from dynx.model.numbers import checked_gain
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 

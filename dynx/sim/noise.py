@@ -10,9 +10,8 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
-from dynx.control.gains import checked_gain
 from dynx.model import Model
-from dynx.model.numbers import whole_number
+from dynx.model.numbers import checked_gain, whole_number
 from dynx.spatial.scalar import Floats
 from dynx.steppers.random import Purpose, stream_normals
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from dynx import control
 from dynx.backends import backend
+from dynx.backends.joint_dynamics import JointFriction
 from dynx.control.base import Controller
 from dynx.control.content import attributes_of, fields_of
-from dynx.control.friction import JointFriction
 from dynx.sim.named_controllers import joint_inertia
 from dynx.spatial.scalar import Floats
 

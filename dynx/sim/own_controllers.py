@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from dynx.backends.dynamics import Dynamics, Evaluation
 from dynx.control.base import Controller, Measurement, chain_of, rebind
 from dynx.control.content import attributes_of, is_foreign, is_foreign_module
-from dynx.control.dynamics import Dynamics, Evaluation
 from dynx.errors import TraceError
 from dynx.sim.controller_checks import ControllerWatch, defect_of_outcome
 from dynx.simd.expr import Symbol

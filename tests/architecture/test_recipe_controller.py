@@ -19,7 +19,7 @@ MODULE = '''
 from dataclasses import dataclass
 
 from dynx.control.base import Controller, gain
-from dynx.control.gains import checked_gain
+from dynx.model.numbers import checked_gain
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from dynx import ExternalForce
 from dynx.backends import backend
+from dynx.backends.joint_dynamics import MIN_SLIP
 from dynx.control import (
     PD,
     PID,
@@ -22,7 +23,6 @@ from dynx.control import (
     Measurement,
     OperationalSpace,
 )
-from dynx.control.friction import MIN_SLIP
 from dynx.control.saturation import checked_limit
 from dynx.model.loading import load
 from dynx.sim import simulate

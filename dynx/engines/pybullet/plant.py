@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.backends import backend
+from dynx.backends.dynamics import EngineDynamics
 from dynx.control.bullet import BulletMotor
-from dynx.control.dynamics import EngineDynamics
 from dynx.engines.pybullet.backend import PyBulletBackend
 from dynx.engines.pybullet.canonical_urdf import ballast_for
 from dynx.engines.pybullet.motors import BulletMotorCommand
@@ -22,11 +22,11 @@ from dynx.engines.pybullet.stepper import BulletStepper
 from dynx.errors import EngineLimitError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.sim.plants.disturbances import Disturbances, DisturbedAcceleration
-from dynx.sim.plants.friction_solver import FrictionSolver
 from dynx.sim.plants.plant import Plant, StepResult
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross, rotate_back, rotation_from_quat
 from dynx.steppers.forces import Forces
+from dynx.steppers.implicit_joints import ImplicitJoints
 from dynx.steppers.layout import Layout, RobotLayout
 
 Mask = NDArray[np.bool_]
@@ -66,8 +66,8 @@ class BulletPlant(Plant):
         return PyBulletBackend(self.model, validate=False)
 
     @cached_property
-    def _friction(self) -> FrictionSolver:
-        return self.disturbances.friction_solver(self._h)
+    def _friction(self) -> ImplicitJoints:
+        return self.disturbances.implicit_joints(self._h)
 
     @cached_property
     def _dynamics(self) -> EngineDynamics:

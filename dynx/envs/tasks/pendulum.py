@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dynx.control.dynamics import Dynamics
+from dynx.backends.dynamics import Dynamics
 from dynx.envs.library import spaces
 from dynx.envs.task import RobotTask, State, camera_at, refuse_unknown_choice, refuse_unphysical
 from dynx.model import Model

@@ -13,24 +13,24 @@ from functools import cached_property
 import numpy as np
 
 from dynx.backends import Backend, backend
+from dynx.backends.dynamics import EngineDynamics
 from dynx.backends.hooks import solve_mass_matrix
-from dynx.backends.joint_dynamics import JointDynamicsTerms
-from dynx.control.dynamics import EngineDynamics
-from dynx.control.friction import (
+from dynx.backends.joint_dynamics import (
     Coefficients,
+    JointDynamicsTerms,
     JointFriction,
     checked_slip,
     coefficients_by_joint,
     refuse_text,
 )
-from dynx.control.gains import checked_gain
 from dynx.errors import ArgumentError
 from dynx.model import Model
+from dynx.model.numbers import checked_gain
 from dynx.rbd.joint_friction import FrictionLaw
-from dynx.sim.plants.friction_solver import FrictionSolver
 from dynx.sim.step import with_disturbances
 from dynx.spatial.scalar import Floats
 from dynx.steppers.forces import ExternalForce
+from dynx.steppers.implicit_joints import ImplicitJoints
 
 STABLE = {"rk4": 2.78, "adaptive": np.inf}
 """Largest h f / (M s) by integrator; 2 for all others."""
@@ -71,10 +71,10 @@ class Disturbances:
         """True if pushes or friction with a slip speed add a torque, a function of time and state."""
         return self.friction.smooth or bool(self.pushes)
 
-    def friction_solver(self, h: float, *, damped: bool = True, armature: bool = True) -> FrictionSolver:
+    def implicit_joints(self, h: float, *, damped: bool = True, armature: bool = True) -> ImplicitJoints:
         """Return the solver of joint friction for steps of `h` [s], with damping and armature or without."""
         dry = self.friction.dry
-        return FrictionSolver(
+        return ImplicitJoints(
             FrictionLaw.of(self.model, dry),
             dry,
             h,
@@ -93,13 +93,13 @@ class Disturbances:
             return np.asarray(v - h * np.linalg.solve(M, self.friction(v)))
         solver = self._solvers.get(h)
         if solver is None:
-            solver = self._solvers[h] = self.friction_solver(h, armature=False)
+            solver = self._solvers[h] = self.implicit_joints(h, armature=False)
         nothing = np.zeros(len(v))
         a, moves = solver.step(M, nothing, nothing, v)
         return np.asarray((v + h * a) * moves)
 
     @cached_property
-    def _solvers(self) -> dict[float, FrictionSolver]:
+    def _solvers(self) -> dict[float, ImplicitJoints]:
         return {}
 
     @property
@@ -151,7 +151,7 @@ class DisturbedAcceleration:
         M, bias = dynamics.mass_matrix_and_bias(q, v)
         return solve_mass_matrix(M + disturbances.armature, tau - bias)
 
-    def with_friction(self, solver: FrictionSolver, q: Floats, v: Floats, tau: Floats, t: float) -> Floats:
+    def with_friction(self, solver: ImplicitJoints, q: Floats, v: Floats, tau: Floats, t: float) -> Floats:
         """Return the acceleration under joint friction that sticks, and 1 for coordinates that move and 0 for
         those that stick, (2, nv)."""
         tau = self.pushed(q, v, tau, t)

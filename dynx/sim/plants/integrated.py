@@ -11,9 +11,9 @@ from dynx.backends import Backend
 from dynx.backends.solvability import singular_coordinates
 from dynx.rbd.integration import MotionState, RungeKutta4, SemiImplicitEuler
 from dynx.sim.plants.disturbances import Disturbances, DisturbedAcceleration
-from dynx.sim.plants.integrators import Adaptive, CompiledBaseEuler
 from dynx.sim.plants.plant import Plant, StepResult
 from dynx.spatial.scalar import Array, Floats
+from dynx.steppers.integrators import Adaptive, CompiledBaseEuler
 
 SCHEMES: dict[str, Callable[..., SemiImplicitEuler | RungeKutta4 | Adaptive]] = {
     "semi_implicit": CompiledBaseEuler,
@@ -50,7 +50,7 @@ class IntegratedPlant(Plant):
         self._undisturbed = self._accelerate.is_undisturbed and not disturbances.sticks
         if disturbances.sticks:
             damped = isinstance(self._scheme, SemiImplicitEuler)
-            self._friction = disturbances.friction_solver(self._h, damped=damped)
+            self._friction = disturbances.implicit_joints(self._h, damped=damped)
             self._dry = list(self._friction.law.joints)
         self._singular = not disturbances.has_armature and bool(singular_coordinates(engine.model))
 

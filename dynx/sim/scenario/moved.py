@@ -8,6 +8,7 @@ from typing import TypeVar
 Field = TypeVar("Field")
 
 MODULES = {
+    "dynx.control.dynamics": "dynx.backends.dynamics",
     "dynx.control.discrete_computed_torque": "dynx.control.computed_torque",
     "dynx.control.engine_motors": "dynx.control.bullet",
     "dynx.control.feed_forward": "dynx.control.joint_space",
@@ -42,6 +43,7 @@ CLASSES = {
     "dynx.control.bullet:PositionMotor": "dynx.control.bullet:BulletPositionMotor",
     "dynx.control.bullet:TorqueMotor": "dynx.control.bullet:BulletTorqueMotor",
     "dynx.control.bullet:VelocityMotor": "dynx.control.bullet:BulletVelocityMotor",
+    "dynx.control.friction:JointFriction": "dynx.backends.joint_dynamics:JointFriction",
     "dynx.sim.plants.disturbances:Push": "dynx.steppers.forces:ExternalForce",
 }
 """Classes by module and name, the module being the present one."""

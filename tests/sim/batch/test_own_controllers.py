@@ -14,8 +14,8 @@ import pytest
 import dynx
 from dynx import control
 from dynx.backends import installed_backends
+from dynx.backends.dynamics import EngineDynamics
 from dynx.control.base import Controller, Measurement, parameter
-from dynx.control.dynamics import EngineDynamics
 from dynx.errors import ArgumentError, ControlError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.sim import Scenario, Simulation, simulate, simulate_batch

@@ -21,5 +21,5 @@ def test_friction_slows_or_stops_a_joint_within_one_step(v: float) -> None:
 
 
 def test_friction_has_no_torque_before_the_first_step() -> None:
-    solver = Disturbances(load("pendulum"), 0.0, 0.5).friction_solver(1e-3)
+    solver = Disturbances(load("pendulum"), 0.0, 0.5).implicit_joints(1e-3)
     np.testing.assert_array_equal(solver.torque, [0.0])

@@ -19,8 +19,8 @@ from dynx.model.library import robots
 from dynx.model.loading import load
 from dynx.rbd.joint_friction import TOLERANCE, FrictionLaw
 from dynx.sim import Rollout, Scenario, Simulation, simulate
-from dynx.sim.plants.friction_solver import BLOCK_CORRECTIONS, FrictionSolver
 from dynx.spatial.scalar import Floats
+from dynx.steppers.implicit_joints import BLOCK_CORRECTIONS, ImplicitJoints
 from dynx.testing.strategies import models
 from surveys import friction_scan
 from surveys.friction_scan import Case
@@ -115,10 +115,10 @@ def test_a_step_obeys_the_law(robot: Model, data: st.DataObject) -> None:
     r = rng.normal(size=nv) * 10.0 ** rng.uniform(-2.0, 2.0)
     friction = np.concatenate([np.zeros(base), 10.0 ** rng.uniform(-3.0, 2.0, nv - base)])
     h = 10.0 ** rng.uniform(-4.0, -2.0)
-    assert_law(FrictionSolver(FrictionLaw.of(robot, friction), friction, h), M, r, v, friction, h)
+    assert_law(ImplicitJoints(FrictionLaw.of(robot, friction), friction, h), M, r, v, friction, h)
 
 
-def assert_law(solver: FrictionSolver, M: Floats, r: Floats, v: Floats, friction: Floats, h: float) -> None:
+def assert_law(solver: ImplicitJoints, M: Floats, r: Floats, v: Floats, friction: Floats, h: float) -> None:
     a, moves = solver.step(M, np.zeros(len(v)), r, v)
     after = moves * (v + h * a)
     force = r - M @ a
@@ -137,9 +137,9 @@ def test_solutions_without_a_kernel_are_the_same(base: str, monkeypatch: pytest.
     rng = np.random.default_rng(0)
     friction = np.concatenate([np.zeros(robot.nv - 7), rng.uniform(0.1, 3.0, 7)])
     law = FrictionLaw.of(robot, friction)
-    compiled = FrictionSolver(law, friction, 1e-3)
-    monkeypatch.setattr("dynx.sim.plants.friction_solver.MAX_COMPILED_OPERATIONS", 0)
-    dense = FrictionSolver(law, friction, 1e-3)
+    compiled = ImplicitJoints(law, friction, 1e-3)
+    monkeypatch.setattr("dynx.steppers.implicit_joints.MAX_COMPILED_OPERATIONS", 0)
+    dense = ImplicitJoints(law, friction, 1e-3)
     with backend("reference", robot) as engine:
         for _ in range(50):
             M, r = engine.mass_matrix(robot.random(rng)), rng.normal(size=robot.nv)
@@ -163,13 +163,13 @@ def test_modes_that_cycle_are_corrected_one_at_a_time(monkeypatch: pytest.Monkey
     cycled = 0
     for _ in range(60):
         friction, r, v = 10.0 ** rng.uniform(-2.0, 1.0, n), 10.0 * rng.normal(size=n), rng.normal(size=n)
-        solver = FrictionSolver(bold, friction, 1e-2)
+        solver = ImplicitJoints(bold, friction, 1e-2)
         assert_law(solver, M, r, v, friction, 1e-2)
         bias = np.zeros(n)
-        right = FrictionSolver(law, friction, 1e-2).step(M, bias, r, v)
+        right = ImplicitJoints(law, friction, 1e-2).step(M, bias, r, v)
         np.testing.assert_array_equal(solver.step(M, bias, r, v), right)
         with monkeypatch.context() as patch:
-            patch.setattr("dynx.sim.plants.friction_solver.MAX_SOLUTIONS", BLOCK_CORRECTIONS)
+            patch.setattr("dynx.steppers.implicit_joints.MAX_SOLUTIONS", BLOCK_CORRECTIONS)
             cycled += not np.array_equal(solver.step(M, bias, r, v), right)
     assert cycled
 

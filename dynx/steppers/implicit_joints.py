@@ -26,7 +26,7 @@ MAX_SOLUTIONS = 256
 """Number of solutions in one step; only a mass matrix that is not positive definite may need more."""
 
 
-class FrictionSolver:
+class ImplicitJoints:
     """Velocities at the end of a step under joint friction, by solutions of the law in a compiled kernel.
 
     The equation of motion is (M + armature) a = tau - bias - damping w - f, where w = v + h a is the velocity

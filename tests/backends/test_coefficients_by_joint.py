@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import dynx
+from dynx.backends.joint_dynamics import JointFriction, coefficients_by_joint
 from dynx.control import PD, FrictionCompensation
-from dynx.control.friction import JointFriction, coefficients_by_joint
 from dynx.control.saturation import checked_limit
 from dynx.errors import GainError, UnknownNameError
 from dynx.model.loading import load

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dynx.backends import backend, installed_backends
-from dynx.control.dynamics import EngineDynamics
+from dynx.backends.dynamics import EngineDynamics
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
 from tests.backends.robots import mixed_robot
