@@ -42,7 +42,7 @@ def hover(page: Opened, path: str, part: str, *, shown: bool = True) -> None:
             return False
         page.page.mouse.move(*(np.array(pixel) + np.random.default_rng().uniform(-3.0, 3.0, 2)))
         page.page.wait_for_timeout(50.0)
-        return (label.is_visible() and label.text_content() == part) == shown
+        return bool((label.is_visible() and label.text_content() == part) == shown)
 
     until(done, f"the name of {part}: {shown}")
 
