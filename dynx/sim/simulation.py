@@ -34,6 +34,7 @@ from dynx.sim.step import at_limit
 from dynx.simd.machine import require_memory
 from dynx.spatial.scalar import Floats
 from dynx.steppers.clock import multiple, refuse_too_many_steps
+from dynx.steppers.state import same_numbers
 from dynx.trajectory.base import Trajectory
 from dynx.world.snapshot import Snapshot
 
@@ -44,6 +45,12 @@ class SimulationState(NamedTuple):
     t: float
     q: Floats
     v: Floats
+
+    def __eq__(self, other: object) -> bool:
+        return same_numbers(self, other)
+
+    def __ne__(self, other: object) -> bool:
+        return not same_numbers(self, other)
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import hypot, isfinite
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -16,11 +16,22 @@ from dynx.spatial.scalar import Floats
 Part = TypeVar("Part")
 
 
+def same_numbers(ours: tuple[Any, ...], theirs: object) -> bool:
+    """Check whether two states of one kind have equal numbers; tuples would raise on arrays."""
+    return type(ours) is type(theirs) and all(map(np.array_equal, ours, theirs))
+
+
 class RobotState(NamedTuple):
     """Configuration q (nq,) and velocity v (nv,) of a robot, in the coordinates of its model."""
 
     q: Floats
     v: Floats
+
+    def __eq__(self, other: object) -> bool:
+        return same_numbers(self, other)
+
+    def __ne__(self, other: object) -> bool:
+        return not same_numbers(self, other)
 
 
 class BodyState(NamedTuple):
@@ -37,6 +48,12 @@ class BodyState(NamedTuple):
         """Origin (3,) of the body frame in the world [m]."""
         return self.T_world_body[:3, 3]
 
+    def __eq__(self, other: object) -> bool:
+        return same_numbers(self, other)
+
+    def __ne__(self, other: object) -> bool:
+        return not same_numbers(self, other)
+
 
 class PartStates(dict[str, Part]):
     """States by name; a name that does not exist is answered with the nearest."""
@@ -45,7 +62,7 @@ class PartStates(dict[str, Part]):
         raise UnknownNameError(f"the world has no state of {shown(name)}{nearest(str(name), self)}")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class WorldState:
     """Time [s], and the state of every robot and body by name."""
 
