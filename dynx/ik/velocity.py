@@ -7,14 +7,17 @@ Velocity dampers bound how fast bodies that are near may approach one another. F
 d' >= -gain (d - margin) lets d fall to the margin no faster than exponentially, and grow back to it where it
 is below (Faverjon and Tournassoud, A local based approach for path planning of manipulators with a high
 number of degrees of freedom, IEEE ICRA 1987; as rows of a quadratic programme: Kanoun, Lamiraux and Wieber,
-IEEE Trans. Robotics 27(4), 2011).
+IEEE Trans. Robotics 27(4), 2011). Where faces meet, several points are nearest, and the rate of one says
+nothing of the others. So the end of the step is examined too: a pair that it brings too close adds a row,
+linearised there, and the programme is solved again (Kelley, The cutting-plane method for solving convex
+programs, J. SIAM 8(4), 1960).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,7 +36,7 @@ from dynx.option_names import checks_field_names, checks_option_names
 from dynx.spatial.scalar import Floats
 
 if TYPE_CHECKING:
-    from dynx.distance.avoidance import AvoidanceSource
+    from dynx.distance.avoidance import Avoidance, AvoidanceSource, NearPair, Pair
 
 
 @checks_field_names()
@@ -155,51 +158,94 @@ def _most(room: Floats, dt: float, acceleration: Floats) -> Floats:
     return found
 
 
+Names = tuple[tuple[str, str], ...]
+"""Names of the two bodies of each pair."""
+
 FREE_SPEED = 1.0
 """Speed of approach [m/s] that the damper of a pair allows where it begins to count."""
 
 
 @dataclass(frozen=True, eq=False)
 class Dampers:
-    """Rows J v >= bound, one for each pair that is near."""
+    """Rows J v >= bound, one or several for each pair that is near."""
 
     J: Floats
     """Derivatives (m, nv) of the distances."""
     bound: Floats
     """Least rates (m,) of the distances [m/s]; positive for a pair that is closer than its margin."""
-    names: tuple[tuple[str, str], ...]
+    is_close: NDArray[np.bool_]
+    """Whether the pair (m,) is closer than its margin."""
+    names: Names
     """Names of the bodies of each pair."""
-    note: str = ""
-    """What the avoidance leaves out (`Avoidance.note`)."""
 
-    def missed(self, v: Floats, tolerance: float) -> tuple[tuple[str, str], ...]:
+    @classmethod
+    def none(cls, nv: int) -> Dampers:
+        """Return no rows."""
+        return cls(np.zeros((0, nv)), np.zeros(0), np.zeros(0, dtype=np.bool_), ())
+
+    def joined(self, other: Dampers) -> Dampers:
+        """Return the rows of both."""
+        J, bound = np.concatenate([self.J, other.J]), np.concatenate([self.bound, other.bound])
+        return Dampers(J, bound, np.append(self.is_close, other.is_close), (*self.names, *other.names))
+
+    def missed(self, v: Floats, tolerance: float) -> Names:
         """Return the pairs that approach faster than they may, by more than `tolerance` [m/s]."""
-        lack = self.bound - self.J @ v
-        return tuple(name for name, x in zip(self.names, lack.tolist(), strict=True) if x > tolerance)
+        return self._names(self.bound - self.J @ v > tolerance)
 
-    def active(self, v: Floats, tolerance: float) -> tuple[tuple[str, str], ...]:
+    def active(self, v: Floats, tolerance: float) -> Names:
         """Return the pairs that approach as fast as they may, or faster."""
-        room = self.J @ v - self.bound
-        return tuple(name for name, x in zip(self.names, room.tolist(), strict=True) if x <= tolerance)
+        return self._names(self.J @ v - self.bound <= tolerance)
+
+    def _names(self, chosen: NDArray[np.bool_]) -> Names:
+        """Return the names of some rows, each once."""
+        return tuple(dict.fromkeys(self.names[k] for k in np.flatnonzero(chosen).tolist()))
 
 
-def dampers(backend: Backend, q: Floats, avoid: AvoidanceSource | None, gain: float, dt: float) -> Dampers:
-    """Return the dampers at q (nq,); `gain` [1/s] is at most 1 / dt, so that a step does not pass the margin.
+CLEARANCE = 1e-8
+"""Distance [m] beyond what is required that a repeated step aims at, so that rounding does not decide."""
 
-    Raises ArgumentError for `avoid` or `gain`.
-    """
-    model = backend.model
-    avoidance = checked_avoidance(model, avoid)
-    if avoidance is None:
-        return Dampers(np.zeros((0, model.nv)), np.zeros(0), ())
-    if not (is_real(gain) and 0.0 < gain * dt <= 1.0):
-        raise ArgumentError(
-            f"avoid_gain is {shown(gain)}; wanted a number above 0, at most 1 / dt = {1.0 / dt:.6g} [1/s]"
-        )
-    near = avoidance.near(backend, q, FREE_SPEED / gain)
-    room = np.array([each.separation.lower - each.pair.margin for each in near])
-    names = tuple(avoidance.names(each.pair) for each in near)
-    return Dampers(avoidance.gradients(backend, q, near), -gain * room, names, avoidance.note)
+DRIFT = 1e-9
+"""Distance [m] by which a step may bring a pair closer that is closer than its margin: rounding."""
+
+
+class SafeStep:
+    """A step from q (nq,) over `dt` [s], which keeps pairs of bodies apart."""
+
+    def __init__(self, backend: Backend, avoidance: Avoidance, q: Floats, gain: float, dt: float) -> None:
+        self._backend, self._avoidance, self._q, self._dt = backend, avoidance, q, dt
+        near = avoidance.near(backend, q, FREE_SPEED / gain)
+        # What is too close already is only not to come closer.
+        self._required = {each.pair: each.separation.lower - DRIFT for each in near if not each.is_clear}
+        room = np.array([each.separation.lower - each.pair.margin for each in near])
+        self.dampers = self._rows(q, near, -gain * room)
+        """Rows of the pairs that are near at q; `gain` [1/s] is at most 1 / dt, so that a step does not pass
+        the margin by its linear rate."""
+
+    def too_close(self, v: Floats) -> list[NearPair]:
+        """Return the pairs that a step of velocity v (nv,) brings too close, at its end."""
+        after = self._avoidance.violated(self._backend, self._end(v))
+        return [each for each in after if each.separation.lower < self._least(each.pair)]
+
+    def cuts(self, v: Floats, violated: Sequence[NearPair]) -> Dampers:
+        """Return rows that keep those pairs apart at the end of a step, linearised at that of v."""
+        lacks = np.array([self._least(each.pair) + CLEARANCE - each.separation.lower for each in violated])
+        found = self._rows(self._end(v), violated, lacks / self._dt)
+        return replace(found, bound=found.bound + found.J @ v)
+
+    def names(self, pairs: Sequence[NearPair]) -> Names:
+        """Return the names of the bodies of pairs."""
+        return tuple(self._avoidance.names(each.pair) for each in pairs)
+
+    def _end(self, v: Floats) -> Floats:
+        return np.asarray(self._backend.model.integrate(self._q, self._dt * v))
+
+    def _least(self, pair: Pair) -> float:
+        return self._required.get(pair, pair.margin)
+
+    def _rows(self, q: Floats, near: Sequence[NearPair], bound: Floats) -> Dampers:
+        is_close = np.array([each.pair in self._required for each in near], dtype=np.bool_)
+        J = self._avoidance.gradients(self._backend, q, near)
+        return Dampers(J, bound, is_close, self.names(near))
 
 
 _UNLIMITED = 1e30
@@ -246,14 +292,90 @@ def solve_programme(
     return np.clip(np.asarray(x), lower, upper) if outcome == _SOLVED else None
 
 
+AT_BOUND = 1e-9
+"""Distance from a bound [rad/s or m/s] below which a velocity is at it."""
+
+
 RELAXED_WEIGHT = 1e4
 """Weight of hard tasks that cannot all be met within the bounds."""
 
 DAMPER_WEIGHT = 1e5
 """Weight of the rates of distances that cannot all be kept within the bounds."""
 
-AT_BOUND = 1e-9
-"""Distance from a bound [rad/s or m/s] below which a velocity is at it."""
+MAX_CUTS = 12
+"""Most times that a step is found again because pairs come too close at its end."""
+
+SHORTENED = (0.5, 0.25, 0.125, 0.0625, 0.0)
+"""Fractions of a step that are tried where that is not enough."""
+
+Rows = list[tuple[Floats, Floats]]
+"""Weighted Jacobians (m, nv) and velocities (m,) of tasks."""
+
+
+@dataclass(frozen=True, eq=False)
+class Programme:
+    """Tasks and bounds of one step."""
+
+    soft: Rows
+    hard: Rows
+    damping: float
+    lower: Floats
+    upper: Floats
+
+    def solve(self, dampers: Dampers) -> tuple[Floats, int]:
+        """Return the best velocity (nv,), and what had to be relaxed: 0 nothing; 1 the hard tasks; 2 also the
+        rates of pairs that are too close, which cannot part as fast as they should; 3 those of all pairs,
+        which are kept as far as the bounds permit."""
+        G, rates, close = dampers.J, dampers.bound, dampers.is_close
+        relaxed = [
+            *self.soft,
+            *((RELAXED_WEIGHT * J, RELAXED_WEIGHT * velocity) for J, velocity in self.hard),
+        ]
+        parting = (DAMPER_WEIGHT * G[close], DAMPER_WEIGHT * rates[close])
+        held = (DAMPER_WEIGHT * G[~close], DAMPER_WEIGHT * np.maximum(rates[~close], 0.0))
+        every = np.ones(len(rates), dtype=np.bool_)
+        stages: tuple[tuple[Rows, Rows, NDArray[np.bool_]], ...] = (
+            (self.soft, self.hard, every),
+            (relaxed, [], every),
+            ([*relaxed, parting], [], ~close),
+            ([*relaxed, parting, held], [], ~every),
+        )
+        nv = len(self.lower)
+        for stage, (soft, hard, kept) in enumerate(stages):
+            J, velocity = _stacked(soft, nv)
+            H, g = J.T @ J + self.damping * np.eye(nv), -J.T @ velocity
+            v = solve_programme(H, g, self.lower, self.upper, *_stacked(hard, nv), G[kept], rates[kept])
+            if v is not None:
+                return v, stage
+        raise AssertionError("bounds alone can be kept")
+
+    def solve_safely(self, step: SafeStep) -> tuple[Floats, int, Names, Names]:
+        """Return the best velocity whose step keeps pairs apart, what had to be relaxed, and the names of the
+        pairs that hold it back and of those that it brings too close because no velocity prevents that."""
+        dampers = step.dampers
+        v, stage = self.solve(dampers)
+        violated = step.too_close(v)
+        first = v, stage, dampers, violated
+        for _ in range(MAX_CUTS):
+            if not violated:
+                break
+            more = dampers.joined(step.cuts(v, violated))
+            again, relaxed = self.solve(more)
+            if relaxed > max(stage, 1):
+                break
+            v, stage, dampers, violated = again, relaxed, more, step.too_close(again)
+        blockers = step.names(violated)
+        for fraction in SHORTENED if violated else ():
+            shorter = np.clip(fraction * v, self.lower, self.upper)
+            violated = step.too_close(shorter)
+            if not violated:
+                v, stage = shorter, max(stage, 1) if self.hard else stage
+                break
+        if violated:
+            v, stage, dampers, violated = first
+        held_back = dict.fromkeys([*dampers.active(v, AT_BOUND), *blockers])
+        too_fast = dict.fromkeys([*dampers.missed(v, AT_BOUND), *step.names(violated)])
+        return v, stage, tuple(held_back), tuple(too_fast)
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,9 +390,9 @@ class VelocityResult:
     """For each task the weighted error J v - velocity (m,), of its components with a weight above 0."""
     limited: NDArray[np.bool_]
     """Coordinates (nv,) whose velocity is at a bound."""
-    held_back: tuple[tuple[str, str], ...] = ()
+    held_back: Names = ()
     """With `avoid` the pairs of bodies that approach one another as fast as they may."""
-    too_fast: tuple[tuple[str, str], ...] = ()
+    too_fast: Names = ()
     """Pairs of bodies that approach faster than they may, because no velocity within the bounds prevents it;
     empty otherwise."""
     note: str = ""
@@ -312,8 +434,10 @@ def velocity_ik(
 
     With `avoid`, a scene or what `Scene.avoidance` returns, the distance d of each pair of bodies that is
     near changes by at least ``-avoid_gain (d - margin)`` [m/s], before all tasks: d does not fall below the
-    margin but by what the linear rate neglects, of the order ``dt^2``, and where it is below, it grows back.
-    `avoid_gain` [1/s] is at most ``1 / dt``. Pairs count from where 1 m/s is allowed (``1 / avoid_gain`` m).
+    margin, and where it is below, it grows back. `avoid_gain` [1/s] is at most ``1 / dt``. Pairs count from
+    where 1 m/s is allowed (``1 / avoid_gain`` m). The distances at ``model.integrate(q, dt v)`` are certified
+    (`dynx.distance`): where a margin is not kept there, the step is found again with that pair as a further
+    constraint, and shortened if that is not enough; `too_fast` names pairs for which no velocity suffices.
 
     If the hard tasks contradict each other or the bounds, they count as soft ones of a large weight, and
     `success` is False. The quadratic programme is solved by DAQP (extra ``qp``). Siciliano et al., section
@@ -358,32 +482,25 @@ def velocity_ik(
         select = np.eye(model.nv)[offset:]
         error = (goal - position)[7 if model.floating else 0 :]
         soft.append((posture_weight * select, posture_weight * posture_gain * error))
-    A, b = _stacked(hard, model.nv)
-    near = dampers(backend, position, avoid, avoid_gain, seconds)
-    G, rates = near.J, near.bound
-    v = solve_programme(*_quadratic(soft, damping, model.nv), lower, upper, A, b, G, rates)
-    success = v is not None
-    if v is None:
-        soft += [(RELAXED_WEIGHT * J, RELAXED_WEIGHT * velocity) for J, velocity in hard]
-        v = solve_programme(*_quadratic(soft, damping, model.nv), lower, upper, A[:0], b[:0], G, rates)
-    if v is None:
-        # Bodies that are too close cannot part as fast as they should: they count before the tasks, and those
-        # that are not are kept as far as the bounds permit.
-        close = rates > 0.0
-        soft.append((DAMPER_WEIGHT * G[close], DAMPER_WEIGHT * rates[close]))
-        H, g = _quadratic(soft, damping, model.nv)
-        v = solve_programme(H, g, lower, upper, A[:0], b[:0], G[~close], rates[~close])
-        if v is None:
-            soft.append((DAMPER_WEIGHT * G[~close], DAMPER_WEIGHT * np.zeros(int((~close).sum()))))
-            H, g = _quadratic(soft, damping, model.nv)
-            v = solve_programme(H, g, lower, upper, A[:0], b[:0], G[:0], rates[:0])
-    assert v is not None
+    programme = Programme(soft, hard, damping, lower, upper)
+    avoidance = checked_avoidance(model, avoid)
+    held_back: Names = ()
+    too_fast: Names = ()
+    if avoidance is None:
+        v, stage = programme.solve(Dampers.none(model.nv))
+    elif not (is_real(avoid_gain) and 0.0 < avoid_gain * seconds <= 1.0):
+        most = f"{1.0 / seconds:.6g} [1/s]"
+        raise ArgumentError(
+            f"avoid_gain is {shown(avoid_gain)}; wanted a number above 0, at most 1 / dt = {most}"
+        )
+    else:
+        step = SafeStep(backend, avoidance, position, avoid_gain, seconds)
+        v, stage, held_back, too_fast = programme.solve_safely(step)
     at_bound = (v <= lower + AT_BOUND) | (v >= upper - AT_BOUND)
     errors = tuple(J @ v - velocity for J, velocity in rows)
-    return VelocityResult(
-        v, success, errors, at_bound, near.active(v, AT_BOUND), near.missed(v, AT_BOUND),
-        "; ".join(filter(None, (joints_outside(model, position), near.note))),
-    )  # fmt: skip
+    notes = joints_outside(model, position), "" if avoidance is None else avoidance.note
+    note = "; ".join(filter(None, notes))
+    return VelocityResult(v, stage == 0, errors, at_bound, held_back, too_fast, note)
 
 
 def _checked_tasks(tasks: VelocityTask | Sequence[VelocityTask]) -> list[VelocityTask]:
@@ -400,13 +517,7 @@ def _checked_tasks(tasks: VelocityTask | Sequence[VelocityTask]) -> list[Velocit
     return wanted
 
 
-def _quadratic(soft: list[tuple[Floats, Floats]], damping: float, nv: int) -> tuple[Floats, Floats]:
-    """Return H (nv, nv) and g (nv,) of the weighted squares."""
-    J, velocity = _stacked(soft, nv)
-    return J.T @ J + damping * np.eye(nv), -J.T @ velocity
-
-
-def _stacked(rows: list[tuple[Floats, Floats]], nv: int) -> tuple[Floats, Floats]:
+def _stacked(rows: Rows, nv: int) -> tuple[Floats, Floats]:
     if not rows:
         return np.zeros((0, nv)), np.zeros(0)
     return np.concatenate([J for J, _ in rows]), np.concatenate([velocity for _, velocity in rows])
