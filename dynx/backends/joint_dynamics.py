@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, GainError, UnknownNameError, shown
 from dynx.model import Model
-from dynx.model.numbers import checked_gain, is_real, real_array
+from dynx.model.numbers import checked_gain, is_real, read_only, real_array
 from dynx.spatial.scalar import Array, Floats, sign, tanh
 
 SLIP = 1e-2
@@ -66,7 +66,7 @@ class JointFriction:
             "to_tree": coupling.matrix() if coupling is not None and through else None,
         }
         for name, value in values.items():
-            object.__setattr__(self, name, value)
+            object.__setattr__(self, name, read_only(value) if isinstance(value, np.ndarray) else value)
 
     @cached_property
     def present(self) -> bool:

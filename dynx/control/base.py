@@ -150,8 +150,12 @@ class Controller(ABC, Generic[ControllerState]):
             self._set(random_size=inner.random_size)
 
     def _set(self, **values: Any) -> None:
-        """Set attributes in the constructor of a frozen dataclass."""
+        """Set attributes in the constructor of a frozen dataclass, arrays as read-only copies: what a record
+        says of a controller must not change."""
         for name, value in values.items():
+            if isinstance(value, np.ndarray):
+                value = value.copy()
+                value.setflags(write=False)
             object.__setattr__(self, name, value)
 
     def __eq__(self, other: object) -> bool:

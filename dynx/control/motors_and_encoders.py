@@ -89,10 +89,9 @@ class MotorLag(_StatefulWrapper, pure=True):
         if abs(delay / dt - round(delay / dt)) > 1e-6:
             raise ArgumentError(f"delay is {delay:g} s; wanted a multiple of control_dt = {dt:g} s")
         nv = inner.model.nv
-        start = np.zeros(nv) if initial is None else real_array("initial", initial).copy()
+        start = np.zeros(nv) if initial is None else real_array("initial", initial)
         if start.shape != (nv,) or not np.isfinite(start).all():
             raise ArgumentError(f"initial is {shown(initial)}; wanted {nv} finite torques")
-        start.setflags(write=False)
         self._set(
             control_dt=dt,
             time_constant=checked_gain("time_constant", time_constant, nv),

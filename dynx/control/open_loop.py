@@ -27,10 +27,9 @@ class OpenLoop(Controller[None], pure=True):
 
     def __init__(self, model: Model, torques: ArrayLike, *, control_dt: float) -> None:
         """`torques` (n, nv), including the wrench on a floating base; `control_dt` [s]."""
-        table = np.array(checked_array("torques", torques, model.nv))
+        table = checked_array("torques", torques, model.nv)
         if table.ndim != 2:
             raise ShapeError(f"torques has shape {table.shape}; wanted (n, {model.nv})")
-        table.setflags(write=False)
         self._set(model=model, torques=table, row_dt=positive_seconds("control_dt", control_dt))
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:

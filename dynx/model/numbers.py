@@ -114,9 +114,14 @@ def checked_gain(name: str, gain: ArrayLike, length: int, *, per: str = "one for
         raise GainError(f"{name} is not finite")
     if (array < 0.0).any():
         raise GainError(f"{name} is negative ({float(array.min()):g}); wanted 0 or more")
-    full = np.array(np.broadcast_to(array, (length,)))
-    full.setflags(write=False)
-    return full
+    return read_only(np.broadcast_to(array, (length,)))
+
+
+def read_only(array: Floats) -> Floats:
+    """Return a read-only copy of `array`."""
+    copy = np.array(array, dtype=np.float64)
+    copy.setflags(write=False)
+    return copy
 
 
 def checked_generator(rng: np.random.Generator | int | None) -> np.random.Generator:

@@ -585,6 +585,7 @@ def simulate_batch(given: BatchArguments) -> BatchRollouts:
     if "q0" in own:
         stand_ins["q0"] = scenario.model.neutral()
     setup = Setup.of(replace(scenario, **stand_ins))
+    recorded = scenario.for_record()
     controller, moved, clock = setup.controller, setup.model, setup.clock
     limit = setup.limit
     assert controller is not None
@@ -693,7 +694,7 @@ def simulate_batch(given: BatchArguments) -> BatchRollouts:
     done: dict[int, PartOutcome] = {}
 
     def outcome() -> BatchRollouts:
-        return _batch_rollouts(scenario, clock, parts, done, record_every)
+        return _batch_rollouts(recorded, clock, parts, done, record_every)
 
     try:
         _run_parts(parts, done, checked_threads(given.threads), executor, store, progress, n)

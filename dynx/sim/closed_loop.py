@@ -23,7 +23,12 @@ from dynx.control.bullet import BulletMotor
 from dynx.errors import ControlError, DivergedError, DynxError, SimulationError, shown
 from dynx.model import Model
 from dynx.model.numbers import DIVERGENCE_SPEED, refuse_mask
-from dynx.sim.controller_checks import ControllerWatch, defect_of_outcome, defect_of_torque
+from dynx.sim.controller_checks import (
+    ControllerWatch,
+    defect_of_outcome,
+    defect_of_torque,
+    refuse_self_changed,
+)
 from dynx.sim.noise import Noise
 from dynx.sim.overshoot import largest_overshoot, overcompensated_friction
 from dynx.sim.plants.integrated import IntegratedPlant
@@ -370,7 +375,7 @@ class ClosedLoop:
             displaced = Measurement(t, beside, v + PROBE_DISPLACEMENT).with_random(measurement.random)
             for each in (measurement, displaced):
                 controller.torque(each, self._setpoint(0), controller.initial_state())
-        watch.refuse_changed()
+        refuse_self_changed(watch.changed)
 
     def recovered_state(self, record: StateBuffers) -> Any:
         """Return the controller's state after the last step of `record`.

@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Hashable, Mapping
 from contextlib import suppress
 from hashlib import sha256
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from dynx.backends import Backend
+from dynx.backends.dynamics import Dynamics
 from dynx.control.base import Controller, chain_of
-from dynx.control.content import attributes_of, entered
+from dynx.control.content import attributes_of, entered, is_foreign
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model
 from dynx.model.numbers import whole_number
 from dynx.steppers.clock import TIME_ROUNDING, Clock
+from dynx.trajectory.base import Trajectory
+
+Part = TypeVar("Part", Controller[Any], Trajectory)
 
 MAX_DEPTH = 4
 """Depth to which objects inside the attributes of a controller are compared."""
 
 MAX_LISTED_NUMBERS = 64
 """Size of the largest array that a record lists; it keeps a checksum of a larger one."""
+
+_SHARED = (Model, Backend, Dynamics)
+"""Classes whose objects a copy of a controller shares with it."""
 
 
 def check_controller(model: Model, controller: Controller[Any], clock: Clock) -> None:
@@ -77,6 +85,32 @@ def controller_numbers(controller: Controller[Any]) -> dict[str, Any]:
     return found
 
 
+def copy_for_record(part: Part) -> Part:
+    """Return a controller or a trajectory that stays as it is if the user changes `part` later.
+
+    One of dynx, which cannot change, is returned itself. A copy shares models and backends with `part`, and
+    attributes that cannot be copied, such as an open file.
+    """
+    inner = getattr(part, "inner", None)
+    if not is_foreign(type(part)) and not isinstance(inner, Controller):
+        return part
+    kept_inner = copy_for_record(inner) if isinstance(inner, Controller) else inner
+    if kept_inner is inner and not is_foreign(type(part)):
+        return part
+    try:
+        twin = copy.copy(part)
+        attributes = attributes_of(part)
+    except TypeError:
+        return part
+    copied = {id(part): twin, id(inner): kept_inner}
+    copied |= {id(each): each for each in attributes.values() if isinstance(each, _SHARED)}
+    for name, value in attributes.items():
+        # The user's classes may raise any exception.
+        with suppress(Exception):
+            object.__setattr__(twin, name, copy.deepcopy(value, copied))
+    return twin
+
+
 def is_row(state: Any) -> bool:
     """Check whether a controller's state is an array (n,) of float64, as kernels require."""
     return isinstance(state, np.ndarray) and state.dtype == np.float64 and state.ndim == 1
@@ -110,28 +144,38 @@ def defect_of_next_state(start: Any, state: Any) -> str | None:
 
 
 class ControllerWatch:
-    """Detector of controllers that change their own attributes, so that their state is hidden."""
+    """Detector of changes of a controller's attributes, by the controller itself, so that its state is
+    hidden, or by the caller."""
 
     def __init__(self, controller: Controller[Any]) -> None:
         self._before = [(each, _contents(each)) for each in chain_of(controller)]
 
     @property
-    def changed(self) -> str | None:
-        """The controller and its attribute that changed, if there is one."""
+    def change(self) -> tuple[str, str] | None:
+        """Names of the controller and of its attribute that changed since this object was made, if any."""
         for each, before in self._before:
             now = _contents(each)
             for name in {**now, **before}:
                 if name not in before or name not in now or before[name][1] != now[name][1]:
-                    return f"{each.name} changes itself (attribute {name}) when its torque is evaluated"
+                    return each.name, name
         return None
 
-    def refuse_changed(self) -> None:
-        """Raise ArgumentError for a controller that changed since this object was made."""
-        if self.changed:
-            raise ArgumentError(
-                f"{self.changed}, so a rollout with it can be neither repeated nor resumed: keep what "
-                "changes in the controller's state, which torque receives and returns"
-            )
+    @property
+    def changed(self) -> str | None:
+        """Statement that the controller changed itself, if any attribute changed."""
+        if self.change is None:
+            return None
+        name, attribute = self.change
+        return f"{name} changes itself (attribute {attribute}) when its torque is evaluated"
+
+
+def refuse_self_changed(changed: str | None) -> None:
+    """Raise ArgumentError for a controller that changed itself, which `ControllerWatch.changed` says."""
+    if changed:
+        raise ArgumentError(
+            f"{changed}, so a rollout with it can be neither repeated nor resumed: keep what changes in the "
+            "controller's state, which torque receives and returns"
+        )
 
 
 def _contents(controller: Controller[Any]) -> dict[str, tuple[Any, Hashable]]:

@@ -21,7 +21,7 @@ from dynx.model.numbers import checked_array
 from dynx.option_names import takes
 from dynx.sim.closed_loop import ClosedLoop, LoopState, Sensors, StateBuffers, Stops
 from dynx.sim.compiled_loop import LaneLoop, cut_loop, lane_loop
-from dynx.sim.controller_checks import ControllerWatch
+from dynx.sim.controller_checks import ControllerWatch, refuse_self_changed
 from dynx.sim.plants.disturbances import refuse_small_slip
 from dynx.sim.plants.plant import plant_errors
 from dynx.sim.plants.registry import make_plant
@@ -97,9 +97,10 @@ class Simulation:
             raise ArgumentError(f"progress is {shown(progress)}; wanted a function of two numbers of steps")
         if not isinstance(scenario, Scenario):
             raise ArgumentError(f"scenario is of type {type(scenario).__name__}; wanted a dynx.Scenario")
-        self.scenario = scenario
-        """The scenario that is simulated."""
         setup = self._setup = Setup.of(scenario)
+        self.scenario = scenario.for_record()
+        """The scenario that is simulated, as it was when the simulation began."""
+        self._present = self.scenario
         bounded = scenario.duration is not None or isinstance(scenario.reference, Trajectory)
         self.n_steps = setup.clock.n_steps if bounded else None
         """Steps to the end of the scenario; None for one without a duration."""
@@ -119,6 +120,7 @@ class Simulation:
         )
         self._dt = clock.dt
         self._watch = None if setup.controller is None else ControllerWatch(setup.controller)
+        self._self_change: str | None = None
         self._loop_state: LoopState | None = None
         self._plant_needs_reset = self._closed = False
         self._lane: LaneLoop | None = None
@@ -186,10 +188,20 @@ class Simulation:
             self._run(end)
         return self.rollout
 
-    def _refuse_changed_controller(self) -> None:
-        """Raise ArgumentError for a controller that changed itself since this simulation was made."""
-        if self._watch is not None:
-            self._watch.refuse_changed()
+    def _note_changes_of_caller(self) -> None:
+        """Note a controller that the caller changed since the last step, which the next step applies."""
+        change = None if self._watch is None or self._self_change else self._watch.change
+        if change is not None and self._setup.controller is not None:
+            name, attribute = change
+            self._note_departure(f"{name} changed by the caller (attribute {attribute})")
+            self._watch = ControllerWatch(self._setup.controller)
+            self._present = self._setup.scenario.for_record()
+            self._lane_known = False
+
+    def _note_change_by_itself(self) -> None:
+        """Note the attribute of a controller that changed during a step."""
+        if self._watch is not None and self._self_change is None:
+            self._self_change = self._watch.changed
 
     def _run(self, end: int) -> None:
         if end > len(self._record):
@@ -214,6 +226,7 @@ class Simulation:
 
     def _advance(self, end: int, given: Floats | None, *, compiled: bool = False) -> LoopState:
         self._refuse_closed()
+        self._note_changes_of_caller()
         record = self._record
         if end > len(record):
             self._extend(end)
@@ -229,25 +242,27 @@ class Simulation:
             if lane is not None:
                 self._note(lane.executor)
                 lane.run(record, loop_state, end, given)
-                return loop_state
-            if not compiled:
+            elif end == record.steps + 1 and not compiled:
                 self._note("plain: stepped by the caller")
-            if end == record.steps + 1 and not compiled:
                 self._loop.advance(record, loop_state, end, given)
-                return loop_state
-            # The loop detects a diverging state, and its error tells more than NumPy's warnings, which are
-            # therefore silenced. Not for a single step, where silencing would add too much time.
-            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-                if compiled:
-                    self._advance_in_pieces(record, loop_state, end)
-                if record.steps < end:
-                    self._loop.advance(record, loop_state, end, given)
+            else:
+                # The loop detects a diverging state, and its error tells more than NumPy's warnings, which
+                # are therefore silenced. Not for a single step, where silencing would add too much time.
+                with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+                    if compiled:
+                        self._advance_in_pieces(record, loop_state, end)
+                    else:
+                        self._note("plain: stepped by the caller")
+                    if record.steps < end:
+                        self._loop.advance(record, loop_state, end, given)
         except BaseException as error:
             # The plant may be in the middle of a step, so it is reset before the next one.
             self._plant_needs_reset = True
+            self._note_change_by_itself()
             if isinstance(error, SimulationError):
                 error.rollout = self.rollout
             raise
+        self._note_change_by_itself()
         return loop_state
 
     def _loop_state_of_record(self) -> LoopState:
@@ -314,8 +329,9 @@ class Simulation:
 
     @property
     def rollout(self) -> Rollout:
-        """The record so far; a controller that changed itself is one of its `departures`."""
-        changed = self._watch.changed if self._watch is not None else None
+        """The record so far; a controller that changed itself, or that the caller changed between steps, is
+        one of its `departures`."""
+        changed = self._self_change
         departures = self._departures if changed is None else (*self._departures, changed)
         record, setup, n = self._record.copy(), self._setup, self._record.steps
         times = self._loop.clock.times()[: n + 1]
@@ -338,9 +354,13 @@ class Simulation:
         )
 
     def reset(self) -> SimulationState:
-        """Return to the start and discard the record. Raises ArgumentError for a controller that changed."""
-        self._refuse_changed_controller()
-        self._record.steps = 0
+        """Return to the start and discard the record; a controller that the caller changed stays so.
+
+        Raises ArgumentError for a controller that changed itself.
+        """
+        self._note_changes_of_caller()
+        refuse_self_changed(self._self_change)
+        self._record.steps, self.scenario = 0, self._present
         self._loop_state, self._executor, self._departures = None, (), ()
         return self.state
 
@@ -350,11 +370,12 @@ class Simulation:
         Raises ArgumentError for a controller that changed itself.
         """
         self._refuse_closed()
-        self._refuse_changed_controller()
+        self._note_changes_of_caller()
+        refuse_self_changed(self._self_change)
         self._loop_state = self._loop_state or self._loop_state_of_record()
         state, plant = self._loop_state, self.scenario.plant
         record = SimulationRecord(
-            self.scenario,
+            self._present,
             self._record.copy(),
             state.command,
             state.controller_state,
@@ -384,10 +405,11 @@ class Simulation:
         self._refuse_closed()
         if not isinstance(snapshot, Snapshot):
             raise ArgumentError(f"snapshot is of type {type(snapshot).__name__}; wanted what `save` returned")
-        record, ours = snapshot.record, self.scenario
+        self._note_changes_of_caller()
+        record, ours = snapshot.record, self._present
         if not isinstance(record, SimulationRecord):
             raise ArgumentError("the snapshot is of a world; wanted one of Simulation.save")
-        self._refuse_changed_controller()
+        refuse_self_changed(self._self_change)
         theirs = record.scenario
         if snapshot.identity != _identity(ours):
             raise ArgumentError(
@@ -434,10 +456,12 @@ class Simulation:
         theirs = StateBuffers(rollout.q, rollout.v, rollout.a, rollout.tau)
         if step:
             self._loop.refuse_self_changing(self._record)
-        refuse_other_scenario(rollout, self.scenario)
+        self._note_changes_of_caller()
+        refuse_other_scenario(rollout, self._present)
         if step > len(self._record):
             self._extend(step)
         self._record.take(theirs, step)
+        self.scenario = self._present
         self._loop_state, self._executor, self._departures = None, (), ()
 
     # -- end ----------------------------------------------------------------------------------

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError
-from dynx.model.numbers import checked_entries, positive_seconds, real_array
+from dynx.model.numbers import checked_entries, positive_seconds, read_only, real_array
 from dynx.spatial.scalar import Floats
 
 
@@ -102,13 +102,6 @@ def checked_duration(duration: float) -> float:
             f"duration is {seconds:g}; wanted between {MIN_DURATION:g} and {MAX_DURATION:g} s"
         )
     return seconds
-
-
-def read_only(array: Floats) -> Floats:
-    """Return a read-only copy of `array`."""
-    copy = np.array(array, dtype=np.float64)
-    copy.setflags(write=False)
-    return copy
 
 
 def read_only_setpoint(q: Floats, v: Floats, a: Floats) -> Setpoint:

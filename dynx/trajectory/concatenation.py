@@ -8,8 +8,9 @@ from itertools import pairwise
 import numpy as np
 
 from dynx.errors import ArgumentError, ShapeError, TrajectoryError
+from dynx.model.numbers import read_only
 from dynx.spatial.scalar import Floats
-from dynx.trajectory.base import Setpoint, Trajectory, read_only
+from dynx.trajectory.base import Setpoint, Trajectory
 
 GAP_TOLERANCE = 1e-9
 """Largest gap [rad, m; rad/s, m/s] between the end of a trajectory and the start of the next one.

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynx.errors import ArgumentError, ShapeError
+from dynx.model.numbers import read_only
 from dynx.spatial.scalar import Floats
-from dynx.trajectory.base import Setpoint, Trajectory, read_only, read_only_setpoint
+from dynx.trajectory.base import Setpoint, Trajectory, read_only_setpoint
 
 
 class Curve(ABC):

@@ -29,10 +29,10 @@ from dynx.backends import backend as make_backend
 from dynx.errors import ArgumentError, ShapeError, TrajectoryError
 from dynx.model import Model
 from dynx.model.model import refuse_other_than_model
-from dynx.model.numbers import whole_number
+from dynx.model.numbers import read_only, whole_number
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
-from dynx.trajectory.base import Trajectory, checked_duration, read_only
+from dynx.trajectory.base import Trajectory, checked_duration
 from dynx.trajectory.curve import Curve
 from dynx.trajectory.displacement import Ends, configuration
 from dynx.trajectory.motion_limits import LIMIT_MARGIN, checked_limit

@@ -23,8 +23,9 @@ from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, TrajectoryError
 from dynx.model import Model
+from dynx.model.numbers import read_only
 from dynx.spatial.scalar import Floats
-from dynx.trajectory.base import MAX_DURATION, MIN_DURATION, Trajectory, checked_duration, read_only
+from dynx.trajectory.base import MAX_DURATION, MIN_DURATION, Trajectory, checked_duration
 from dynx.trajectory.curve import Curve, PiecewisePolynomial, polynomial_from_phases, single_polynomial
 from dynx.trajectory.displacement import Ends, checked_ends
 from dynx.trajectory.motion_limits import (

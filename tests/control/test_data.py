@@ -16,12 +16,14 @@ from dynx.control import (
     ComputedTorque,
     Controller,
     DiscreteComputedTorque,
+    Encoders,
     Impedance,
     Measurement,
+    MotorLag,
     OperationalSpace,
     Saturated,
 )
-from dynx.control.base import gain, gains_of
+from dynx.control.base import chain_of, gain, gains_of
 from dynx.control.open_loop import OpenLoop
 from dynx.model import Model
 from dynx.model.loading import load
@@ -72,6 +74,22 @@ def test_made_again_from_its_fields(name: str) -> None:
         assert replace(law) == law
     with pytest.raises(FrozenInstanceError):
         law.model = ARM
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        *LAWS.values(),
+        Encoders(MotorLag(LAWS["pd"], control_dt=1e-3, initial=np.ones(6)), resolution=1e-3, control_dt=1e-3),
+        BulletPositionMotor(ARM, force=np.ones(6)),
+        OpenLoop(ARM, np.ones((2, 6)), control_dt=1e-3),
+    ],
+    ids=lambda law: law.name,
+)
+def test_numbers_of_a_controller_cannot_be_written(law: Controller[Any]) -> None:
+    owners = [*chain_of(law), *(each.losses for each in chain_of(law) if hasattr(each, "losses"))]
+    arrays = [x for each in owners for x in vars(each).values() if isinstance(x, np.ndarray)]
+    assert not any(each.flags.writeable for each in arrays)
 
 
 @pytest.mark.parametrize("base", ["fixed", "floating"])

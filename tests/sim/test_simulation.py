@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 import dynx
 from dynx import ExternalForce
 from dynx.backends import installed_backends
-from dynx.control import PD, PID, BulletPositionMotor, ComputedTorque, OpenLoop
+from dynx.control import PD, PID, BulletPositionMotor, ComputedTorque, OpenLoop, Saturated
 from dynx.control.base import Controller, Measurement
 from dynx.errors import ArgumentError, ClosedError, ControlError, DivergedError
 from dynx.model.loading import load
-from dynx.sim import Noise, Payload, Scenario, Simulation, compiled_loop, simulate
-from dynx.trajectory.base import Setpoint
+from dynx.sim import Noise, Payload, Scenario, Simulation, compiled_loop, simulate, simulate_batch
+from dynx.trajectory.base import Setpoint, Trajectory
 from tests.sim.bars import tutorial_motion, tutorial_robot
 from tests.sim.test_resume import the_same
 
@@ -372,3 +372,69 @@ def test_what_is_no_record_is_refused() -> None:
         simulate(scenario, resume=not_a_record)
     with Simulation(scenario) as simulation, pytest.raises(ArgumentError, match="snapshot is of type str"):
         simulation.restore(not_a_record)
+
+
+class Brake(Controller[None]):
+    """A damper with an attribute that users change."""
+
+    def __init__(self, d: float) -> None:
+        self.model, self.d, self.rates = ARM, d, np.full(6, 0.5)
+
+    def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> Any:
+        return -self.d * self.rates * measurement.v, None
+
+
+class Ramp(Trajectory):
+    """A trajectory with an attribute that users change."""
+
+    slope = 0.1
+
+    def inside(self, t: Any) -> Setpoint:
+        rates = np.full((len(t), 6), self.slope)
+        return Setpoint(rates * t[:, None], rates, 0.0 * rates)
+
+
+@pytest.mark.parametrize("wrapped", [False, True])
+def test_a_record_says_what_it_said_when_it_was_made(wrapped: bool) -> None:
+    law, ramp = Brake(5.0), Ramp(0.02, *(Setpoint(*np.zeros((3, 6))) for _ in range(2)))
+    ramp.slope = 0.1
+    scenario = Scenario(ARM, Saturated(law, limit=50.0) if wrapped else law, ramp, plant="compiled")
+    rollout, batch = simulate(scenario), simulate_batch(scenario, rollouts=2)
+    text, settings = rollout.scenario.to_json(), rollout.settings  # type: ignore[union-attr]
+    assert batch.scenario.to_json() == text
+    law.d, ramp.slope = 7.0, 0.2
+    law.rates[:] = 1.0
+    for each in (rollout.scenario, batch.scenario):
+        assert each is not None
+        assert each.to_json() == text
+        again = simulate(each)
+        assert np.array_equal(again.q, rollout.q)
+        assert again.settings == settings
+    assert simulate(scenario).settings != settings
+    with pytest.raises(ArgumentError, match="had controller"):
+        simulate(scenario, resume=rollout)
+
+
+@pytest.mark.parametrize("plant", ["pinocchio", "compiled"])
+def test_a_gain_that_the_caller_changes_acts_from_then_on_and_is_a_departure(plant: str) -> None:
+    law = Brake(5.0)
+    scenario = Scenario(ARM, law, np.zeros(6), plant=plant, q0=np.full(6, 0.3), duration=0.02)
+    first = simulate(scenario)
+    second = simulate(replace(scenario, controller=Brake(50.0), q0=first.q[8], v0=first.v[8], duration=0.012))
+    with Simulation(scenario) as simulation:
+        before = simulation.save()
+        simulation.step(8)
+        law.d = 50.0
+        changed = simulation.run()
+        assert changed.departures == ("Brake changed by the caller (attribute d) from step 8",)
+        assert changed.scenario == first.scenario != scenario
+        assert np.array_equal(changed.q[:9], first.q[:9])
+        assert np.array_equal(changed.q[8:], second.q)
+        simulation.restore(simulation.save())
+        simulation.restore(before)
+        assert simulation.rollout.departures == ("another controller from step 0",)
+        simulation.reset()
+        again = simulation.run()
+        assert again.departures == ()
+        assert again.scenario == scenario
+        assert np.array_equal(again.q, simulate(scenario).q)

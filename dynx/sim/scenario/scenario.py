@@ -19,6 +19,7 @@ from dynx.model.loading import load
 from dynx.model.model import refuse_other_than_model
 from dynx.model.package_search import StrPath
 from dynx.rbd.parameters import Payload
+from dynx.sim.controller_checks import copy_for_record
 from dynx.sim.plants.registry import default_integrator
 from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.scenario.documents import (
@@ -142,6 +143,17 @@ class Scenario(SimulationOptions):
             control_dt=self.dt if self.control_dt is None else self.control_dt,
             duration=_simulated(duration, self.dt),
         )
+
+    def for_record(self) -> Scenario:
+        """Return an equal scenario that stays as it is if the user changes a controller or a trajectory of a
+        class of their own later."""
+        parts: dict[str, Any] = {
+            name: copy_for_record(part)
+            for name, part in (("controller", self.controller), ("reference", self.reference))
+            if isinstance(part, Controller | Trajectory)
+        }
+        unchanged = all(copied is getattr(self, name) for name, copied in parts.items())
+        return self if unchanged else replace(self, **parts)
 
     def differences(self, other: Scenario) -> list[Difference]:
         """Return the fields in which `other` differs; empty for an equal scenario."""
