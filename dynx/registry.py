@@ -6,7 +6,7 @@ classes. A name never changes its meaning: `ClassRegistry.register` refuses a na
 point with the name of one of dynx's own classes is ignored.
 
 A class is imported when it is first looked up; listing names imports none. So is the body of a method that
-lies in a room above its class (`door`).
+lies in a module above its class (`door`).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ DEFAULT_ENGINE = "compiled" if find_spec("pinocchio") is None else "pinocchio"
 
 
 def door(target: str) -> Callable[[Method], Method]:
-    """Decorate the stub of a method whose body is a function of a room above: ``"package.module:function"``.
+    """Decorate the stub of a method whose body is a function of a module above: ``"package.module:function"``.
 
     The first look-up of the method imports that function and puts it in the stub's place, so that later calls
     reach the function itself. The stub has its signature, for type checkers; its own body never runs.
@@ -54,6 +54,8 @@ class _Door:
     def __get__(self, instance: object, owner: type) -> Any:
         module, _, name = self.target.partition(":")
         body = getattr(import_module(module), name)
+        if isinstance(self.stub, classmethod):
+            body = classmethod(body)
         setattr(self._owner, self._name, body)
         return body.__get__(instance, owner)
 

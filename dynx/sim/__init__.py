@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from dynx.sim.plants.plant import Plant, StepResult
     from dynx.sim.plants.registry import register as register_plant
     from dynx.sim.plants.scene_plant import ScenePlant
-    from dynx.sim.record.rollout import Rollout
-    from dynx.sim.record.rollout_data import Summary
+    from dynx.sim.record.rollout import Rollout, Summary
     from dynx.sim.scenario.scenario import Scenario
     from dynx.sim.simulation import RolloutInterrupted, Simulation, SimulationState, simulate
 
@@ -37,7 +36,7 @@ _HOME = {
     "Simulation": "dynx.sim.simulation",
     "SimulationState": "dynx.sim.simulation",
     "StepResult": "dynx.sim.plants.plant",
-    "Summary": "dynx.sim.record.rollout_data",
+    "Summary": "dynx.sim.record.rollout",
     "compare": "dynx.sim.comparison",
     "plant_model": "dynx.rbd.parameters",
     "register_plant": "dynx.sim.plants.registry:register",

@@ -1,4 +1,4 @@
-"""Doors: the methods whose bodies lie in a room above their class, and no other."""
+"""Doors: the methods whose bodies lie in a module above their class, and no other."""
 
 from __future__ import annotations
 
@@ -19,6 +19,10 @@ DOORS = {
     "dynx.backends.base:Backend.track": "dynx.ik.tracking.tracker:track",
     "dynx.backends.base:Backend.velocity_ik": "dynx.ik.velocity:velocity_ik",
     "dynx.model.model:Model.view": "dynx.viewer.viewer:view",
+    "dynx.sim.record.rollout:Rollout.columns": "dynx.sim.record.csv_file:columns",
+    "dynx.sim.record.rollout:Rollout.load": "dynx.sim.record.formats:load",
+    "dynx.sim.record.rollout:Rollout.plot": "dynx.sim.record.plot:plot",
+    "dynx.sim.record.rollout:Rollout.save": "dynx.sim.record.formats:save",
     "dynx.sim.record.rollout:Rollout.view": "dynx.viewer.viewer:view",
     "dynx.world.world:World.view": "dynx.viewer.viewer:view",
 }

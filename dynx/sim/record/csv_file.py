@@ -33,62 +33,57 @@ from dynx.errors import ArgumentError, nearest, shown
 from dynx.files.reading import checked_path, irregularity
 from dynx.model import Model
 from dynx.model.configuration import checked_q
-from dynx.sim.record.rollout_data import RolloutData
+from dynx.sim.record.rollout import Rollout
 from dynx.spatial.scalar import Floats
 
 
-def write_csv(rollout: RolloutData, file: BinaryIO) -> None:
+Block = tuple[str, list[str], Any]
+"""Kind of a quantity, the names of its coordinates, and its rows (n, len(names))."""
+
+
+def write_csv(rollout: Rollout, file: BinaryIO) -> None:
     """Write one row for each state, with the torque and acceleration of the step that begins there."""
-    model = rollout.model
-    positions, rates = coordinate_names(model)
-    header = ["t", *_named("q", positions), *_named("v", rates)]
-    blocks = [rollout.t[:, None], rollout.q, rollout.v]
-    if rollout.reference is not None:
-        header += [*_named("q*", positions), *_named("v*", rates), *_named("a*", rates)]
-        header += _named("error", rates)
-        blocks += [*rollout.reference, rollout.error]
-    header += ["energy", *_named("a", rates), *_named("tau", rates), *_named("saturated", rates)]
-    blocks.append(rollout.energy[:, None])
-    states = np.concatenate(blocks, axis=1)
-    acting = np.concatenate([rollout.a, rollout.tau], axis=1)
-    forces = np.zeros((len(rollout), 0))
+    states, steps = _blocks(rollout)
     if rollout.surroundings is not None:
         contacts = rollout.surroundings.contacts
-        header += [f"contact:{name}:{axis}" for name in contacts.touching for axis in "xyz"]
-        each = [contacts.force_on(name) for name in contacts.touching]
-        forces = np.concatenate([forces, *each], axis=1)
-    nothing = [""] * (3 * model.nv + forces.shape[1])
+        steps += [(f"contact:{name}", [*"xyz"], contacts.force_on(name)) for name in contacts.touching]
+    header = ["t", *_header(states), "energy", *_header(steps)]
     file.write((",".join(_quoted(column) for column in header) + "\n").encode())
-    for k, state in enumerate(states):
-        cells = [repr(x) for x in state.tolist()]
-        if k < len(acting):
-            cells += [repr(x) for x in acting[k].tolist()]
-            cells += ["1" if flag else "0" for flag in rollout.saturated[k].tolist()]
-            cells += [repr(x) for x in forces[k].tolist()]
-        else:
-            cells += nothing
+    columns = [rollout.t[:, None], *(rows for *_, rows in states), rollout.energy[:, None]]
+    acting = [rows.tolist() for *_, rows in steps]
+    nothing = [""] * len(_header(steps))
+    for k, state in enumerate(np.concatenate(columns, axis=1).tolist()):
+        cells = [repr(x) for x in state]
+        cells += nothing if k == len(rollout) else [repr(x) for rows in acting for x in rows[k]]
         file.write((",".join(cells) + "\n").encode())
 
 
-def columns(rollout: RolloutData) -> dict[str, Floats]:
+def columns(rollout: Rollout) -> dict[str, Floats]:
     """Return the columns (n + 1,) of states and steps in the table of a rollout, for `pandas.DataFrame`.
 
     The columns of steps (``a:``, ``tau:``, ``saturated:``) end with NaN, because no step begins at the last
     state.
     """
-    model = rollout.model
-    positions, rates = coordinate_names(model)
-    found = {"t": rollout.t}
-    blocks = [("q", positions, rollout.q), ("v", rates, rollout.v)]
+    states, steps = _blocks(rollout)
+    last = np.full((1, rollout.model.nv), np.nan)
+    blocks = [*states, *((kind, names, np.concatenate([rows, last])) for kind, names, rows in steps)]
+    rows = np.concatenate([rollout.t[:, None], *(block for *_, block in blocks)], axis=1)
+    return dict(zip(("t", *_header(blocks)), rows.T, strict=True))
+
+
+def _blocks(rollout: Rollout) -> tuple[list[Block], list[Block]]:
+    """Return the quantities of the states, and those of the steps."""
+    positions, rates = coordinate_names(rollout.model)
+    states: list[Block] = [("q", positions, rollout.q), ("v", rates, rollout.v)]
     if rollout.reference is not None:
-        blocks += [("q*", positions, rollout.reference.q), ("v*", rates, rollout.reference.v)]
-        blocks += [("a*", rates, rollout.reference.a), ("error", rates, rollout.error)]
-    last = np.full((1, model.nv), np.nan)
-    for kind, steps in (("a", rollout.a), ("tau", rollout.tau), ("saturated", rollout.saturated)):
-        blocks.append((kind, rates, np.concatenate([steps, last])))
-    for kind, names, block in blocks:
-        found |= dict(zip(_named(kind, names), block.T, strict=True))
-    return found
+        q, v, a = rollout.reference
+        states += [("q*", positions, q), ("v*", rates, v), ("a*", rates, a), ("error", rates, rollout.error)]
+    flags = rollout.saturated.astype(np.int64)
+    return states, [("a", rates, rollout.a), ("tau", rates, rollout.tau), ("saturated", rates, flags)]
+
+
+def _header(blocks: Sequence[Block]) -> list[str]:
+    return [f"{kind}:{name}" for kind, names, _ in blocks for name in names]
 
 
 def coordinate_names(model: Model) -> tuple[list[str], list[str]]:
@@ -98,19 +93,12 @@ def coordinate_names(model: Model) -> tuple[list[str], list[str]]:
     return [*(positions if model.floating else []), *joints], [*(rates if model.floating else []), *joints]
 
 
-def _named(kind: str, coordinates: list[str]) -> list[str]:
-    return [f"{kind}:{name}" for name in coordinates]
-
-
 def _quoted(text: str) -> str:
     return '"' + text.replace('"', '""') + '"' if any(c in text for c in ',"\n\r') else text
 
 
 TIMES = ("t", "time", "timestamp")
 """Names of the column of times [s]."""
-
-POSE = ("x", "y", "z", "qx", "qy", "qz", "qw")
-TWIST = ("vx", "vy", "vz", "wx", "wy", "wz")
 
 
 def load_csv(path: str | os.PathLike[str], model: Model) -> dict[str, Any]:
@@ -149,11 +137,9 @@ def load_csv(path: str | os.PathLike[str], model: Model) -> dict[str, Any]:
             f"{name}:{body[k + 1][0]}: the time {t[k + 1]:.12g} s follows {t[k]:.12g} s; "
             "wanted times that increase"
         )
-    base = model.floating
-    positions = [*(POSE if base else ()), *model.joint_names]
-    rates = [*(TWIST if base else ()), *model.joint_names]
+    positions, rates = coordinate_names(model)
     try:
-        q = checked_q(model, table.positions(positions, plain=not base))
+        q = checked_q(model, table.positions(positions, plain=not model.floating))
         v = table.filled("v", rates, _rates(model, t, q))
         a = table.filled("a", rates, np.diff(v, axis=0) / np.diff(t)[:, None])
         tau = table.filled("tau", rates, np.full((len(t) - 1, model.nv), math.nan))

@@ -20,7 +20,7 @@ from dynx.model.documents import robot_document, robot_from_document
 from dynx.model.model import refuse_other_than_model
 from dynx.sim.record.csv_file import load_csv, write_csv
 from dynx.sim.record.mcap_file import load_mcap, write_mcap
-from dynx.sim.record.rollout_data import RolloutData
+from dynx.sim.record.rollout import Rollout
 from dynx.sim.scenario.scenario import Scenario
 from dynx.trajectory.base import Setpoint
 from dynx.world.surroundings import from_document, to_document
@@ -32,7 +32,7 @@ ARRAYS = ("t", "q", "v", "a", "tau", "saturated", "rotors")
 REFERENCE = ("reference_q", "reference_v", "reference_a")
 
 
-def save(rollout: RolloutData, path: str | os.PathLike[str]) -> None:
+def save(rollout: Rollout, path: str | os.PathLike[str]) -> None:
     """Write the record to a file atomically, in the format of its suffix.
 
     - ``.npz``: complete; `Rollout.load` reads it, and so does `numpy.load`
@@ -52,13 +52,21 @@ def save(rollout: RolloutData, path: str | os.PathLike[str]) -> None:
         write(rollout, file)
 
 
-def load(path: str | os.PathLike[str], model: Model | None = None) -> dict[str, Any]:
-    """Read the fields of a rollout from a ``.npz`` or a ``.mcap`` of `save`, or of `model` from a ``.csv``.
+def load(kind: type[Rollout], path: str | os.PathLike[str], model: Model | None = None) -> Rollout:
+    """Read a file of `save`: ``.npz`` to the last bit, or ``.mcap``, which has times in whole nanoseconds
+    and neither scenario nor surroundings.
 
-    The model is read from the URDF text in the file; no array is unpickled. A ``.mcap`` has neither the
-    scenario nor what surrounds the robot, and whole nanoseconds (`load_mcap`). Raises ArgumentError for any
-    other file, NotInstalledError for ``.mcap`` without mcap.
+    A ``.csv`` of `save`, or the log of a robot from elsewhere, is read as a rollout of `model`: its columns
+    are ``t`` and ``q:JOINT``, and where they are known ``v:JOINT``, ``a:JOINT`` and ``tau:JOINT``
+    (`dynx.sim.record.csv_file.load_csv`). The model of other files is read from the URDF text in them; no
+    array is unpickled.
+
+    Raises ArgumentError for any other file, NotInstalledError for ``.mcap`` without mcap.
     """
+    return kind(**_fields(path, model))
+
+
+def _fields(path: str | os.PathLike[str], model: Model | None) -> dict[str, Any]:
     suffix = Path(checked_path(path)).suffix.lower()
     if suffix == ".csv":
         if model is None:
@@ -116,7 +124,7 @@ def _reading(part: str, file: ArrayFile) -> Iterator[None]:
         raise ArgumentError(f"{part} in {file.path} cannot be read: {error}") from error
 
 
-def _write_npz(rollout: RolloutData, file: BinaryIO) -> None:
+def _write_npz(rollout: Rollout, file: BinaryIO) -> None:
     model = rollout.model
     robot = {
         **robot_document(model),
@@ -134,7 +142,7 @@ def _write_npz(rollout: RolloutData, file: BinaryIO) -> None:
     np.savez(file, schema=SCHEMA, robot=json.dumps(robot), energy=rollout.energy, **arrays)
 
 
-WRITERS: dict[str, Callable[[RolloutData, BinaryIO], None]] = {
+WRITERS: dict[str, Callable[[Rollout, BinaryIO], None]] = {
     ".npz": _write_npz,
     ".csv": write_csv,
     ".mcap": write_mcap,

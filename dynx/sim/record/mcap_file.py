@@ -20,7 +20,7 @@ from dynx.errors import ArgumentError, DynxError, NotInstalledError, shown
 from dynx.files.reading import checked_path, open_regular, printable
 from dynx.model import Model
 from dynx.model.documents import pose_numbers, robot_from_document
-from dynx.sim.record.rollout_data import RolloutData
+from dynx.sim.record.rollout import Rollout
 from dynx.sim.record.ros_messages import MessageReader, schema_name, schema_text, topics_of
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
@@ -35,7 +35,7 @@ ABOUT_CHANNEL = {"offered_qos_profiles": ""}
 """Entry that the ROS 2 profile of MCAP requires; an empty one leaves the quality of service to the player."""
 
 
-def write_mcap(rollout: RolloutData, file: BinaryIO) -> None:
+def write_mcap(rollout: Rollout, file: BinaryIO) -> None:
     """Write `rollout` as a recording. Raises NotInstalledError without mcap (``dynx[mcap]``)."""
     try:
         from mcap.writer import Writer
@@ -90,7 +90,7 @@ def read_messages(path: str) -> tuple[list[tuple[str, int, bytes]], dict[str, di
     return messages, about
 
 
-def _metadata(rollout: RolloutData) -> dict[str, str]:
+def _metadata(rollout: Rollout) -> dict[str, str]:
     model = rollout.model
     known = {
         "schema": SCHEMA,

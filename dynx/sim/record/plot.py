@@ -16,7 +16,7 @@ import numpy as np
 from dynx.control.base import Controller, chain_of
 from dynx.files.figures import new_figure, save_figure
 from dynx.model import Model
-from dynx.sim.record.rollout_data import RolloutData
+from dynx.sim.record.rollout import Rollout
 from dynx.sim.record.tracking_error import frame_pose_errors
 from dynx.spatial.scalar import Floats
 
@@ -46,7 +46,7 @@ class Column(NamedTuple):
     """True if this is the column of a floating base: position in the world, all else in its own axes."""
 
 
-def plot(rollout: RolloutData, path: str | os.PathLike[str] | None = None) -> Any:
+def plot(rollout: Rollout, path: str | os.PathLike[str] | None = None) -> Any:
     """Plot positions, errors and torques with their limits; return the `matplotlib.figure.Figure`, and save
     it at `path` if that is given.
 
@@ -71,7 +71,7 @@ def plot(rollout: RolloutData, path: str | os.PathLike[str] | None = None) -> An
     return figure
 
 
-def _contact_forces(rollout: RolloutData) -> dict[str, Floats]:
+def _contact_forces(rollout: Rollout) -> dict[str, Floats]:
     """Return the magnitudes (n,) of the contact forces [N], of the bodies and links with the largest."""
     if rollout.surroundings is None:
         return {}
@@ -117,7 +117,7 @@ def _columns(model: Model) -> list[Column]:
     return columns
 
 
-def _controlled_frame(rollout: RolloutData) -> str | None:
+def _controlled_frame(rollout: Rollout) -> str | None:
     """Return the frame that the controller of the rollout controls; None for a controller of joints."""
     controller = None if rollout.scenario is None else rollout.scenario.controller
     if rollout.reference is None or not isinstance(controller, Controller):
@@ -135,7 +135,7 @@ def _draw_frame_error(axis: Any, t: Floats, errors: tuple[Floats, Floats]) -> No
     axis.legend(ncols=2, fontsize=7)
 
 
-def _draw(rollout: RolloutData, column: Column, axes: Any, frame: str | None) -> None:
+def _draw(rollout: Rollout, column: Column, axes: Any, frame: str | None) -> None:
     positions, middle, efforts = axes
     t, (length, force) = rollout.t, column.units
     q = rollout.q[:, column.q]
@@ -189,13 +189,13 @@ def _draw(rollout: RolloutData, column: Column, axes: Any, frame: str | None) ->
         )
 
 
-def _title(rollout: RolloutData) -> str:
+def _title(rollout: Rollout) -> str:
     controller_name, plant = (rollout.settings.get(name, "none") for name in ("controller", "plant"))
     controller = "no controller" if controller_name == "none" else controller_name
     return f"{rollout.model.name}: {controller}" + ("" if plant == "none" else f" on {plant}")
 
 
-def _effort_limits(rollout: RolloutData) -> Floats:
+def _effort_limits(rollout: Rollout) -> Floats:
     """Return the effort limits at which torques were saturated; if there were none, those of the robot."""
     cut = rollout.settings.get("effort_limits")
     return rollout.model.effort_limit if cut is None else np.asarray(cut, dtype=np.float64)

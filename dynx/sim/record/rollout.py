@@ -1,24 +1,222 @@
-"""The record of one simulation, with its files and its plot."""
+"""The record of one simulation, its settings, and a summary in a few numbers."""
 
 from __future__ import annotations
 
 import os
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple
 
+import numpy as np
+
+from dynx.backends import backend
+from dynx.control.base import Controller
+from dynx.errors import ArgumentError
+from dynx.files.pages import html_grid
 from dynx.model import Model
+from dynx.rbd.parameters import plant_model
 from dynx.registry import door
-from dynx.sim.record.csv_file import columns
-from dynx.sim.record.formats import load, save
-from dynx.sim.record.plot import plot
-from dynx.sim.record.rollout_data import RolloutData
+from dynx.sim.controller_checks import controller_numbers
+from dynx.sim.scenario.documents import Unknown
+from dynx.sim.scenario.scenario import Scenario
+from dynx.sim.setup import clock_of, disturbances_of, effort_limits_of, refuse_unknown
+from dynx.spatial.scalar import Floats
+from dynx.trajectory.base import Setpoint
+from dynx.trajectory.limit_check import UNITS
+from dynx.world.record import (
+    Channel,
+    Record,
+    configuration_channel,
+    coordinate_names,
+    coordinate_units,
+    position_channel,
+)
+from dynx.world.surroundings import Surroundings
 
 
-class Rollout(RolloutData):
-    """The record of one simulation: its data (`RolloutData`), columns, files and plot."""
+class Summary(NamedTuple):
+    """Errors, speeds, torques and energy of a rollout; errors (nv,) are NaN without a reference."""
 
-    save = save
-    plot = plot
-    columns = columns
+    rms_error: Floats
+    max_error: Floats
+    max_speed: Floats
+    max_torque: Floats
+    energy_drift: float
+    """Largest change of the energy since the start, divided by the largest kinetic energy."""
+    saturated: float
+    """Share of the steps in which some motor was at its limit."""
+    coordinates: tuple[str, ...] = ()
+    """Names of the coordinates of v: joints, after the six of a floating base."""
+    units: tuple[str, ...] = ()
+    """Unit of each coordinate: rad or m."""
+
+    def __str__(self) -> str:
+        """Return the largest error and torque with joint and unit; without motors, the energy's drift."""
+        sentences = []
+        if not self.has_errors:
+            sentences.append("no reference")
+        elif self.max_error.size:
+            sentences.append(f"largest error {self._largest(self.max_error)}")
+        if self.max_torque.any():
+            sentences.append(f"largest torque {self._largest(self.max_torque, UNITS['effort'])}")
+            sentences.append(f"saturated in {100 * self.saturated:.3g} % of the steps")
+        else:
+            # Where motors do work, the energy changes by that and does not drift.
+            sentences.append(f"energy drift {self.energy_drift:.2g} of the largest kinetic energy")
+        return ", ".join(sentences)
+
+    @property
+    def has_errors(self) -> bool:
+        """False without a reference, where errors are NaN."""
+        return not (self.max_error.size and np.isnan(self.max_error).all())
+
+    def __repr__(self) -> str:
+        return f"<Summary: {self}>"
+
+    def _repr_html_(self) -> str:
+        return self.to_html("summary")
+
+    def to_html(self, title: str) -> str:
+        """Return a table with a row for each coordinate under `title`; without a reference it has no
+        errors."""
+        columns = {"max speed": self.max_speed, "max torque": self.max_torque}
+        if self.has_errors:
+            columns = {"max error": self.max_error, "RMS error": self.rms_error, **columns}
+        rows = (
+            (name, unit, *(f"{x:.3g}" for x in numbers))
+            for name, unit, *numbers in zip(self.coordinates, self.units, *columns.values(), strict=True)
+        )
+        return html_grid(f"{title}: {self}", ("coordinate", "unit", *columns), rows)
+
+    def _largest(self, values: Floats, units: Mapping[str, str] | None = None) -> str:
+        k = int(np.argmax(values))
+        if k >= len(self.coordinates):
+            return f"{values[k]:.3g}"
+        unit = self.units[k]
+        return f"{values[k]:.3g} {unit if units is None else units[unit]} of {self.coordinates[k]}"
+
+
+@dataclass(frozen=True, eq=False)
+class Rollout:
+    """n steps of a robot in motion: states at n + 1 times, and torques and accelerations between them.
+
+    Row k of `a`, `tau` and `saturated` belongs to the step from ``t[k]`` to ``t[k + 1]``: the torque that
+    acted on the plant, the acceleration as the step begins, and whether each motor was at its limit.
+    """
+
+    model: Model
+    """The robot of the plant, with payload and scaled masses."""
+    t: Floats
+    """Times (n + 1,) [s]."""
+    q: Floats
+    """Configurations (n + 1, nq)."""
+    v: Floats
+    """Velocities (n + 1, nv)."""
+    a: Floats
+    """Accelerations (n, nv)."""
+    tau: Floats
+    """Torques of the motors (n, nv) [N m or N]."""
+    saturated: np.ndarray[Any, np.dtype[np.bool_]]
+    """True where a motor was at its limit (n, nv)."""
+    reference: Setpoint | None
+    """The setpoint at each time: (n + 1, nq), (n + 1, nv), (n + 1, nv)."""
+    rotors: Floats
+    """Armature (nv, nv), zero unless the scenario has some."""
+    scenario: Scenario | None = None
+    """The simulation whose record this is; None for a record made in another way."""
+    executor: str = ""
+    """Executor of the steps: ``compiled`` (one kernel), ``compiled pieces`` (between the calls of an
+    engine), or ``plain`` with the reason; semicolons separate several."""
+    departures: tuple[str, ...] = ()
+    """Interventions that make the record differ from its scenario, such as torques given by the caller."""
+    surroundings: Surroundings | None = None
+    """Contacts, bodies and other robots, of a rollout in a scene (`ScenePlant`)."""
+
+    def __len__(self) -> int:
+        """Return the number of steps."""
+        return len(self.tau)
+
+    @cached_property
+    def error(self) -> Floats:
+        """Tracking error, `model.difference(q, q*)` (n + 1, nv); NaN without a reference."""
+        if self.reference is None:
+            return np.full_like(self.v, np.nan)
+        return self.model.difference(self.q, self.reference.q)
+
+    @cached_property
+    def kinetic_energy(self) -> Floats:
+        """Kinetic energy of the links and the armature (n + 1,) [J]."""
+        with backend("reference", self.model) as bodies:
+            turning = 0.5 * np.einsum("ki,ij,kj->k", self.v, self.rotors, self.v)
+            return np.asarray(bodies.kinetic_energy(self.q, self.v) + turning)
+
+    @cached_property
+    def energy(self) -> Floats:
+        """Sum of kinetic and potential energy (n + 1,) [J], computed by dynx for every plant."""
+        with backend("reference", self.model) as bodies:
+            return np.asarray(self.kinetic_energy + bodies.potential_energy(self.q))
+
+    def summary(self) -> Summary:
+        """Summarise errors, speeds, torques and the drift of the energy."""
+        with np.errstate(invalid="ignore"):
+            rms = np.sqrt(np.mean(self.error**2, axis=0))
+        peak = float(np.max(self.kinetic_energy))
+        drift = float(np.max(np.abs(self.energy - self.energy[0])))
+        return Summary(
+            rms_error=rms,
+            max_error=np.max(np.abs(self.error), axis=0),
+            max_speed=np.max(np.abs(self.v), axis=0),
+            max_torque=np.max(np.abs(self.tau), axis=0, initial=0.0),
+            energy_drift=drift / peak if peak else drift,
+            saturated=float(np.mean(self.saturated.any(axis=1))) if len(self) else 0.0,
+            coordinates=coordinate_names(self.model),
+            units=coordinate_units(self.model),
+        )
+
+    def record(self, name: str = "") -> Record:
+        """Return the motion as a record: the configurations of the robot, and the positions of the bodies of
+        its scene."""
+        bodies = {} if self.surroundings is None else self.surroundings.bodies
+        channels: dict[str, Channel] = {"q": configuration_channel(self.model, self.q)}
+        channels |= {f"{body}/pose": position_channel(body, T[:, :3, 3]) for body, T in bodies.items()}
+        return Record(name or self.model.name, self.t, channels)
+
+    @cached_property
+    def settings(self) -> dict[str, Any]:
+        """The main settings of the scenario, as numbers and text; empty without a scenario."""
+        return {} if self.scenario is None else settings_of(self.scenario)
+
+    def first(self, n: int) -> Rollout:
+        """Return the record of its first n steps."""
+        if not 0 <= n <= len(self):
+            raise ArgumentError(f"n is {n}; wanted 0 to {len(self)}, the number of steps")
+        reference = None if self.reference is None else Setpoint(*(x[: n + 1] for x in self.reference))
+        states = {name: getattr(self, name)[: n + 1] for name in ("t", "q", "v")}
+        steps = {name: getattr(self, name)[:n] for name in ("a", "tau", "saturated")}
+        around = None if self.surroundings is None else self.surroundings.first(n)
+        return replace(self, **states, **steps, reference=reference, surroundings=around)
+
+    @door("dynx.sim.record.formats:save")
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the record to a ``.npz``, ``.csv`` or ``.mcap`` file atomically."""
+        raise NotImplementedError
+
+    @door("dynx.sim.record.formats:load")
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], model: Model | None = None) -> Rollout:
+        """Read a file of `save`; a ``.csv``, or the log of a robot from elsewhere, as a rollout of `model`."""
+        raise NotImplementedError
+
+    @door("dynx.sim.record.csv_file:columns")
+    def columns(self) -> dict[str, Floats]:
+        """Return the columns (n + 1,) of the table of a rollout by name, for `pandas.DataFrame`."""
+        raise NotImplementedError
+
+    @door("dynx.sim.record.plot:plot")
+    def plot(self, path: str | os.PathLike[str] | None = None) -> Any:
+        """Plot positions, errors and torques; return the `matplotlib.figure.Figure`."""
+        raise NotImplementedError
 
     @door("dynx.viewer.viewer:view")
     def view(self, **options: Any) -> Any:
@@ -28,15 +226,42 @@ class Rollout(RolloutData):
         """
         raise NotImplementedError
 
-    @classmethod
-    def load(cls, path: str | os.PathLike[str], model: Model | None = None) -> Rollout:
-        """Read a file of `save`: ``.npz`` to the last bit, or ``.mcap``, which has times in whole
-        nanoseconds and neither scenario nor surroundings.
+    def __repr__(self) -> str:
+        return f"<Rollout of {self.model.name}: {len(self)} steps to {self.t[-1]:.6g} s>"
 
-        A ``.csv`` of `save`, or the log of a robot from elsewhere, is read as a rollout of `model`: its
-        columns are ``t`` and ``q:JOINT``, and where they are known ``v:JOINT``, ``a:JOINT`` and ``tau:JOINT``
-        (`dynx.sim.record.csv_file.load_csv`).
+    def _repr_html_(self) -> str:
+        return self.summary().to_html(repr(self)[1:-1])
 
-        Raises ArgumentError for any other file, NotInstalledError for ``.mcap`` without mcap.
-        """
-        return cls(**load(path, model))
+
+def settings_of(scenario: Scenario) -> dict[str, Any]:
+    """Return plant, controller, times, limits, friction, noise and pushes of a scenario, fit for JSON."""
+    refuse_unknown(*scenario.payloads, *scenario.all_pushes)
+    controller, clock, limit = scenario.controller, clock_of(scenario), effort_limits_of(scenario)
+    moved = plant_model(scenario.model, scenario.payloads, scenario.mass_scale)
+    disturbances = disturbances_of(scenario, moved)
+    friction = disturbances.friction
+    return {
+        "plant": str(scenario.plant),
+        "integrator": scenario.with_defaults().integrator,
+        "controller": "none" if controller is None else controller.name,
+        "law": _numbers(controller),
+        "dt": clock.dt,
+        "control_dt": clock.control_dt,
+        "delay": clock.delay_steps * clock.dt,
+        "substeps": scenario.substeps,
+        "effort_limits": None if limit is None else limit.tolist(),
+        "position_limits": scenario.position_limits,
+        "joints": {
+            "damping": friction.damping.tolist(),
+            "friction": friction.friction.tolist(),
+            "slip": friction.slip,
+        },
+        "noise": None if scenario.noise is None else repr(scenario.noise),
+        "pushes": [repr(push) for push in disturbances.pushes],
+    }
+
+
+def _numbers(controller: Controller[Any] | Unknown | None) -> dict[str, Any]:
+    if isinstance(controller, Unknown):
+        return controller.numbers
+    return {} if controller is None else controller_numbers(controller)

@@ -53,7 +53,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.sim.record.rollout_data import RolloutData
+from dynx.sim.record.rollout import Rollout
 from dynx.spatial.scalar import Floats
 
 DEFINITIONS = {
@@ -216,13 +216,13 @@ class Topic(NamedTuple):
         return list(zip(range(begin, end), encode_messages(end - begin, fields), strict=True))
 
 
-def topics_of(rollout: RolloutData) -> list[Topic]:
+def topics_of(rollout: Rollout) -> list[Topic]:
     """Return all topics of `rollout`; one whose layout differs at the last state appears twice."""
     base = _base_topics(rollout) if rollout.model.floating else []
     return [*_joint_topics(rollout), *base, *_contact_topics(rollout)]
 
 
-def _joint_topics(rollout: RolloutData) -> list[Topic]:
+def _joint_topics(rollout: Rollout) -> list[Topic]:
     model, n = rollout.model, len(rollout)
     base_q, base_v = (7, 6) if model.floating else (0, 0)
     names = model.joint_names
@@ -253,7 +253,7 @@ def _joint_topics(rollout: RolloutData) -> list[Topic]:
     return topics
 
 
-def _base_topics(rollout: RolloutData) -> list[Topic]:
+def _base_topics(rollout: Rollout) -> list[Topic]:
     n, base = len(rollout), rollout.model.root
 
     world = "world" if base != "world" else "map"
@@ -280,7 +280,7 @@ def _base_topics(rollout: RolloutData) -> list[Topic]:
     return topics
 
 
-def _contact_topics(rollout: RolloutData) -> list[Topic]:
+def _contact_topics(rollout: Rollout) -> list[Topic]:
     if rollout.surroundings is None:
         return []
     contacts, n = rollout.surroundings.contacts, len(rollout)

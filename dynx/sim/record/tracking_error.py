@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from dynx.backends import backend
-from dynx.sim.record.rollout_data import RolloutData
+from dynx.sim.record.rollout import Rollout
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import pose_error
 from dynx.trajectory.base import Setpoint
@@ -19,7 +19,7 @@ from dynx.trajectory.base import Setpoint
 Entry = dict[str, Any]
 
 
-def joint_error(rollout: RolloutData) -> Entry:
+def joint_error(rollout: Rollout) -> Entry:
     """Summarise the error over all joints and times; numbers are None without a reference or joints."""
     base = 6 if rollout.model.floating else 0
     error = np.abs(rollout.error[:, base:])
@@ -36,21 +36,21 @@ def joint_error(rollout: RolloutData) -> Entry:
     }
 
 
-def base_error(rollout: RolloutData) -> Entry | None:
+def base_error(rollout: Rollout) -> Entry | None:
     """Summarise the error of a floating base; None for a fixed base, or without a reference."""
     if rollout.reference is None or not rollout.model.floating:
         return None
     return _body_error(rollout.t, rollout.error[:, :3], rollout.error[:, 3:6])
 
 
-def frame_error(rollout: RolloutData, frame: str | None) -> Entry | None:
+def frame_error(rollout: Rollout, frame: str | None) -> Entry | None:
     """Summarise the error of a frame of the robot; None without a frame or a reference."""
     if rollout.reference is None or frame is None:
         return None
     return _body_error(rollout.t, *frame_pose_errors(rollout, rollout.reference, frame))
 
 
-def frame_pose_errors(rollout: RolloutData, reference: Setpoint, frame: str) -> tuple[Floats, Floats]:
+def frame_pose_errors(rollout: Rollout, reference: Setpoint, frame: str) -> tuple[Floats, Floats]:
     """Return position errors [m] and rotation vectors [rad] of a frame, each (n + 1, 3), in world axes."""
     with backend("reference", rollout.model) as engine:
         wanted = engine.forward_kinematics(reference.q, frame)
