@@ -29,7 +29,7 @@ DEFAULT_ENGINE = "compiled" if find_spec("pinocchio") is None else "pinocchio"
 
 
 def door(target: str) -> Callable[[Method], Method]:
-    """Decorate the stub of a method whose body is a function of a module above: ``"package.module:function"``.
+    """Decorate the stub of a method whose body is a function of a module above: ``"module:function"``.
 
     The first look-up of the method imports that function and puts it in the stub's place, so that later calls
     reach the function itself. The stub has its signature, for type checkers; its own body never runs.

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from functools import cached_property, partial
 from typing import Any
 
-from dynx.backends import Backend
+from dynx.backends.base import Backend
 from dynx.backends.hooks import untranslated
 from dynx.model import Model
 from dynx.spatial.scalar import Floats

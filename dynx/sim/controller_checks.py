@@ -20,7 +20,7 @@ from dynx.model.numbers import whole_number
 from dynx.steppers.clock import TIME_ROUNDING, Clock
 from dynx.trajectory.base import Trajectory
 
-Part = TypeVar("Part", Controller[Any], Trajectory)
+Part = TypeVar("Part", bound=Controller[Any] | Trajectory)
 
 MAX_DEPTH = 4
 """Depth to which objects inside the attributes of a controller are compared."""

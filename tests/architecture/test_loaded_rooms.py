@@ -74,8 +74,8 @@ FLOWS = {
         "dynx.simulate(robot, law, robot.neutral(), duration=0.01, plant='pinocchio')",
         ("world.camera", "steppers.camera", "world.queries", "distance", "ik", "envs"),
         (),
-        216,
-        36700,
+        206,
+        35500,
     ),
     "step of a box": Flow(
         "from dynx.world import Scene, World, box\n"

@@ -36,7 +36,6 @@ from dynx.model.configuration import checked_q
 from dynx.sim.record.rollout import Rollout
 from dynx.spatial.scalar import Floats
 
-
 Block = tuple[str, list[str], Any]
 """Kind of a quantity, the names of its coordinates, and its rows (n, len(names))."""
 

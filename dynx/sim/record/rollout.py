@@ -205,7 +205,7 @@ class Rollout:
     @door("dynx.sim.record.formats:load")
     @classmethod
     def load(cls, path: str | os.PathLike[str], model: Model | None = None) -> Rollout:
-        """Read a file of `save`; a ``.csv``, or the log of a robot from elsewhere, as a rollout of `model`."""
+        """Read a file of `save`, or the log of a robot from elsewhere as a rollout of `model`."""
         raise NotImplementedError
 
     @door("dynx.sim.record.csv_file:columns")
