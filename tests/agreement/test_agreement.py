@@ -4,16 +4,23 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 
 from dynx.agreement import AgreementReport, agree
+from dynx.agreement.agreement import AgreementTask, measure
+from dynx.agreement.comparison import Comparison
+from dynx.agreement.identities import IdentityCheck
+from dynx.agreement.report import find_suspects
 from dynx.agreement.tolerances import BAR
 from dynx.backends import installed_backends
 from dynx.errors import ArgumentError, ClosedError, UnknownBackendError
 from dynx.model import Model
+from dynx.model.loading import load
 from dynx.model.tree import Base
 from dynx.reference.backend import ReferenceBackend
+from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models
 from tests.agreement.robots import DEFECTS, Broken, arm, massless_chain, massless_finger, pendulum, rock
 
@@ -203,3 +210,123 @@ def test_reference_and_pinocchio_agree_about_random_robots(model: Model) -> None
 def test_a_long_list_of_joints_that_move_nothing_is_cut(n: int, listed: str) -> None:
     report = agree(massless_chain(n), backends=["reference"], samples=1)
     assert any(listed in note for note in report.notes)
+
+
+def test_a_task_is_the_comparison_with_its_options() -> None:
+    report = measure(AgreementTask("ur5", "floating", (("elbow_joint", 0.5),), ("reference",), 2, 7))
+    wanted = agree(load("ur5", base="floating", lock={"elbow_joint": 0.5}), ["reference"], samples=2, seed=7)
+    assert report.quantities == wanted.quantities
+    assert (report.robot, report.base, report.samples, report.seed) == ("ur5", "floating", 2, 7)
+
+
+def test_a_robot_that_cannot_be_used_is_a_report_of_its_error() -> None:
+    report = measure(AgreementTask("nowhere", "fixed", (), None, 2, 0))
+    assert report.error is not None
+    assert not report.agree
+
+
+def row(pair: str, agree: bool) -> Comparison:
+    return Comparison("mass_matrix", pair, 0.0, 0.0 if agree else 1.0, 1e-13, agree)
+
+
+def names(quantities: list[Comparison], identities: list[IdentityCheck], backends: list[str]) -> list[str]:
+    return [suspect.backend for suspect in find_suspects(quantities, identities, backends)]
+
+
+def test_nobody_is_suspected_where_all_agree() -> None:
+    assert not names([row("a~b", True), row("a~referee", True)], [], ["a", "b"])
+
+
+def test_the_referee_outweighs_a_majority() -> None:
+    rows = [row("a~b", False), row("a~c", False), row("b~c", True)]
+    rows += [row("a~referee", True), row("b~referee", False), row("c~referee", False)]
+    assert names(rows, [], ["a", "b", "c"]) == ["b", "c"]
+
+
+def test_without_referee_the_one_that_differs_from_all_others_is_named() -> None:
+    rows = [row("a~b", False), row("a~c", True), row("b~c", False)]
+    assert names(rows, [], ["a", "b", "c"]) == ["b"]
+
+
+def test_without_referee_and_majority_an_identity_or_the_derivation_decides() -> None:
+    rows = [row("a~b", False)]
+    broken = IdentityCheck("mass matrix is symmetric", "b", 1.0, 1e-13, False)
+    assert names(rows, [broken], ["a", "b"]) == ["b"]
+    assert names([*rows, row("a~derived", False)], [], ["a", "b"]) == ["a"]
+
+
+def test_without_evidence_both_backends_are_named() -> None:
+    found = find_suspects([row("a~b", False)], [], ["a", "b"])
+    assert [suspect.backend for suspect in found] == ["a", "b"]
+    assert all("nothing shows" in suspect.evidence[0] for suspect in found)
+
+
+def test_a_failed_identity_names_its_backend_where_nothing_differs() -> None:
+    broken = IdentityCheck("mass matrix is symmetric", "b", 1.0, 1e-13, False)
+    assert names([row("a~b", True)], [broken], ["a", "b"]) == ["b"]
+
+
+MODEL = load("double_pendulum")
+
+
+class Single(ReferenceBackend):
+    """A backend that evaluates one sample at a time, like most engines."""
+
+    vectorized = False
+
+
+class WrongShape(Single):
+    def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        return super()._inverse_dynamics(q, v, a)[..., :-1]
+
+
+class Raises(Single):
+    def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        raise RuntimeError("the engine is on fire")
+
+
+class ReturnsAList(Single):
+    def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Any:
+        return super()._inverse_dynamics(q, v, a).tolist()
+
+
+class NotANumber(Single):
+    def _inverse_dynamics(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        return np.full_like(v, np.nan)
+
+
+class TooFewFrames(Single):
+    def _frame_placements(self, q: Floats) -> Floats:
+        return super()._frame_placements(q)[..., :1, :, :]
+
+
+@pytest.mark.parametrize("kind", [WrongShape, Raises, NotANumber, TooFewFrames])
+def test_a_broken_backend_differs_and_has_a_note(kind: type[Single]) -> None:
+    broken = kind(MODEL)
+    report = agree(MODEL, ["reference", broken], samples=2, referee_samples=1)
+    assert report.error is None
+    assert not report.agree
+    assert all(row.note for row in report.differences if not np.isfinite(row.max_rel_error))
+    assert {suspect.backend for suspect in report.suspects} == set(report.backends[1:])
+
+
+def test_a_list_of_the_right_numbers_is_accepted() -> None:
+    report = agree(MODEL, ["reference", ReturnsAList(MODEL)], samples=2, referee_samples=1)
+    assert report.error is None
+
+
+def test_a_report_prints_its_verdict_and_what_differs() -> None:
+    good = agree(MODEL, ["reference"], samples=2, referee_samples=1)
+    assert str(good).splitlines()[0].endswith("reference agree")
+    bad = str(agree(MODEL, ["reference", NotANumber(MODEL)], samples=2, referee_samples=1))
+    assert "do not agree" in bad
+    assert "inverse_dynamics" in bad
+    assert "suspect" in bad
+    assert len(repr(good)) < 200
+
+
+def test_a_quantity_that_was_not_compared_has_no_worst_error() -> None:
+    report = agree(MODEL, ["reference"], samples=2, referee_samples=1)
+    assert report.worst("mass_matrix") < 1.0
+    with pytest.raises(LookupError, match="mass_matrix"):
+        report.worst("mass matrix")

@@ -4,12 +4,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from dynx.agreement.identities import IDENTITIES, IdentityCheck, check_identities
-from dynx.agreement.magnitudes import Magnitudes
+from dynx.agreement import agree, tolerances
+from dynx.agreement.identities import (
+    IDENTITIES,
+    MAX_REST_FREQUENCY,
+    WEIGHTS,
+    IdentityCheck,
+    check_identities,
+    rotate_world,
+    time_derivative,
+)
+from dynx.agreement.magnitudes import EPS, Magnitudes
 from dynx.agreement.sampling import draw_samples
 from dynx.backends import Backend
-from dynx.model import Inertial, Joint, Link, Model
+from dynx.model import Inertial, Joint, Link, Model, Pose
 from dynx.model.tree import Base
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
@@ -126,3 +137,81 @@ def test_the_identities_hold_at_high_speed() -> None:
     with ReferenceBackend(arm()) as backend:
         for check in check_identities("reference", backend, Magnitudes(fast)):
             assert check.agree, f"{check.identity}: {check.max_error}"
+
+
+def test_gravity_rotates_and_keeps_its_magnitude() -> None:
+    model, _ = rotate_world(arm())
+    assert model.gravity != arm().gravity
+    drift = abs(float(np.linalg.norm(model.gravity)) - float(np.linalg.norm(arm().gravity)))
+    assert drift <= 8 * np.finfo(float).eps * 9.81
+
+
+def test_a_fixed_base_gets_a_rotated_pose_and_a_floating_base_is_rotated() -> None:
+    model, unchanged = rotate_world(arm())
+    assert model.root == arm().root
+    R = model.base_pose.matrix[:3, :3]
+    np.testing.assert_allclose(R @ arm().gravity, model.gravity, rtol=0, atol=1e-14)
+    q = arm().random(0)
+    assert np.array_equal(unchanged(q), q)
+    floating, rotate_base = rotate_world(arm("floating"))
+    assert floating.root == arm().root
+    assert not np.array_equal(rotate_base(arm("floating").neutral()), arm("floating").neutral())
+
+
+def test_a_pose_of_its_own_is_rotated_too() -> None:
+    pose = Pose((1.0, 2.0, 3.0), (0.1, 0.2, 0.3))
+    rotated = rotate_world(arm().with_base_pose(pose))[0].base_pose.matrix
+    R = rotate_world(arm())[0].base_pose.matrix
+    np.testing.assert_allclose(rotated, R @ pose.matrix, rtol=0, atol=1e-14)
+
+
+@given(st.floats(0.0, 50.0), st.floats(-3.0, 3.0), st.floats(0.0, 1.0))
+def test_a_band_limited_function_is_differentiated_to_the_stated_error(
+    frequency: float, phase: float, share: float
+) -> None:
+    lower = share * frequency
+    rate = time_derivative(
+        lambda t: np.sin(frequency * t + phase) + np.cos(lower * t), np.array([frequency, frequency])
+    )
+    exact = frequency * np.cos(phase)
+    assert np.all(np.abs(rate - exact) <= 2.0 * max(frequency, MAX_REST_FREQUENCY) * tolerances.derivative(0))
+
+
+def test_the_weights_differentiate_polynomials_of_their_order_exactly() -> None:
+    for power in (1, 3, 5, 7):
+        total = sum(2.0 * weight * k**power for k, weight in WEIGHTS.items())
+        assert abs(total - (1.0 if power == 1 else 0.0)) <= EPS * 4**power
+
+
+def test_the_stated_cancellation_is_that_of_the_weights() -> None:
+    assert 2.0 * sum(abs(weight) for weight in WEIGHTS.values()) <= tolerances.CANCELLATION
+
+
+def test_shapes() -> None:
+    rate = time_derivative(lambda t: t[..., None, None] * np.ones((3, 2)), np.array([1.0, 2.0]))
+    assert rate.shape == (2, 3, 2)
+
+
+DISPLACEMENT = 1e-3
+
+
+class Displaced(Broken):
+    """All frames displaced by a millimetre; its solutions are right by its own poses only."""
+
+    def _frame_placements(self, q: Floats) -> Floats:
+        T = super()._frame_placements(q)
+        T[..., 0, 3] += DISPLACEMENT
+        return T
+
+    def _frame_placement(self, q: Floats, frame: int) -> Floats:
+        T = super()._frame_placement(q, frame)
+        T[..., 0, 3] += DISPLACEMENT
+        return T
+
+
+def test_a_configuration_that_reaches_the_target_by_its_own_poses_only_is_no_solution() -> None:
+    model = arm()
+    report = agree(model, [ReferenceBackend(model), Displaced(model)], samples=4, referee_samples=0)
+    (row,) = [row for row in report.quantities if row.quantity == "inverse_kinematics"]
+    assert not row.agree
+    assert abs(row.max_abs_error - DISPLACEMENT) < 0.1 * DISPLACEMENT

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import example, given
 from scipy.spatial.transform import Rotation
 
+from dynx.agreement import agree
 from dynx.agreement.identities import time_derivative
 from dynx.errors import UnknownNameError
-from dynx.model import Model, Pose
+from dynx.model import Joint, Link, Model, Pose
 from dynx.model.loading import load
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import Sample, samples
@@ -287,3 +288,47 @@ def test_a_quaternion_almost_of_unit_length_means_the_attitude(make: Make, off: 
     one_by_one = np.stack([engine.gravity_torque(q) for q in given])
     close.check("gravity_torque", one_by_one, engine.gravity_torque(state.q))
     np.testing.assert_array_equal(given, stretched)
+
+
+MOUNT = Pose((0.4, -1.2, 0.7), (1.1, -0.6, 2.3))
+ROBOT = mimicking().with_base_pose(MOUNT)
+MOUNTED = Model.build(
+    "mounted",
+    [Link("ground"), *ROBOT.links],
+    [Joint("mount", "fixed", "ground", ROBOT.root, MOUNT), *ROBOT.joints],
+    gravity=ROBOT.gravity,
+)
+
+
+@each_call
+def test_every_quantity_is_that_of_the_mounted_robot(make: Make, engine_call: EngineCall) -> None:
+    assert ROBOT.frame_names[-1] == MOUNTED.frame_names[-1]
+    state = random_state(ROBOT, 61, (3,))
+    result, wanted = (engine_call.evaluate(make(model), state) for model in (ROBOT, MOUNTED))
+    if engine_call.method == "inertial_regressor":
+        wanted = wanted[..., 10:]  # without the columns of the ground
+    engine_call.check(make(ROBOT), state, result, wanted)
+
+
+def test_every_frame_is_where_the_mount_puts_it(make: Make) -> None:
+    """Against the same robot at the world frame, also for frames on the base itself."""
+    plain, engine = make(mimicking()), make(ROBOT)
+    q = ROBOT.random(62)
+    T = engine.forward_kinematics(q)
+    ErrorBounds(samples_at(ROBOT, q)).check(
+        "forward_kinematics", T, MOUNT.matrix @ plain.forward_kinematics(q)
+    )
+    np.testing.assert_allclose(engine.forward_kinematics(q, ROBOT.root), MOUNT.matrix, rtol=0, atol=1e-14)
+
+
+def test_inverse_kinematics_reaches_a_target_in_the_world(make: Make) -> None:
+    engine = make(ROBOT)
+    T = engine.forward_kinematics(ROBOT.random(63), "beta")
+    found = engine.inverse_kinematics(T, "beta", rng=0)
+    assert found.success
+    np.testing.assert_allclose(engine.forward_kinematics(found.q, "beta"), T, rtol=0, atol=1e-5)
+
+
+def test_the_referee_and_the_laws_of_mechanics_agree() -> None:
+    report = agree(ROBOT, ["reference"], samples=2, referee_samples=1)
+    assert report.agree, report

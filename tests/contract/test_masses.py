@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from dynx.backends import Backend
 from dynx.errors import SingularMassMatrixError
 from dynx.model import Inertial, Joint, Link, Model, Pose
+from dynx.spatial.scalar import Floats
 from tests.contract.conftest import Make
 from tests.contract.engine_calls import EngineCall, each_call, random_state
-from tests.contract.robots import JOINTS, LINKS, body, branched, hinge
+from tests.contract.robots import JOINTS, LINKS, body, branched, hinge, mimicking
 from tests.error_bounds import ErrorBounds, samples_at
 
 MASSLESS = {"no inertial": None, "zero inertial": Inertial()}
@@ -139,3 +142,107 @@ def test_impossible_products_of_inertia(make: Make) -> None:
     moment = tensor @ a[3:] + np.cross(v[3:], tensor @ v[3:])
     tau = engine.inverse_dynamics(state.q, v, a)
     close.check("inverse_dynamics", tau, np.concatenate([force, moment]))
+
+
+FREE_LINK = Model.build(
+    "free link",
+    [Link("base", Inertial(1.0, Pose((0.0, 0.0, 0.125)), ixx=0.0, iyy=0.0, izz=0.125, ixy=0.0625))],
+    [],
+    base="floating",
+)
+"""A link whose mass matrix has a negative eigenvalue of -0.06, and a condition number of 17."""
+
+CROSSED = Model.build(
+    "crossed",
+    [Link("base"), Link("middle"), Link("tip", Inertial(0.0, ixy=0.5))],
+    [
+        Joint("first", "revolute", "base", "middle", axis=(1.0, 0.0, 0.0)),
+        Joint("second", "revolute", "middle", "tip", axis=(0.0, 1.0, 0.0)),
+    ],
+)
+"""Two joints with the mass matrix [[0, 1/2], [1/2, 0]] at rest."""
+
+
+def test_an_indefinite_mass_matrix_of_a_floating_base_is_solved(make: Make) -> None:
+    engine, q, v = make(FREE_LINK), FREE_LINK.neutral(), np.zeros(6)
+    tau = np.arange(1.0, 7.0)
+    expected = [-7.5, 11.75, -6.81, 78.0, 68.0, 48.0]
+    np.testing.assert_allclose(engine.forward_dynamics(q, v, tau), expected, rtol=1e-13)
+    # The next call takes the fast path.
+    np.testing.assert_allclose(engine.forward_dynamics(q, v, tau), expected, rtol=1e-13)
+    batch = engine.forward_dynamics(np.stack([q, q]), v, np.stack([0 * tau, tau]))
+    np.testing.assert_allclose(batch, [[0.0, 0.0, -9.81, 0.0, 0.0, 0.0], expected], rtol=1e-13, atol=1e-13)
+
+
+def test_a_mass_matrix_with_a_diagonal_of_zeros_is_solved(make: Make) -> None:
+    a = make(CROSSED).forward_dynamics(np.zeros(2), np.zeros(2), np.array([1.0, 2.0]))
+    np.testing.assert_allclose(a, [4.0, 2.0], rtol=1e-13)
+
+
+def test_what_is_singular_at_one_configuration_is_refused_in_the_same_words(make: Make) -> None:
+    """A point mass at the end of two links in one line moves neither along the line nor about itself."""
+    links = [Link("base"), Link("upper"), Link("lower", Inertial(1.0, Pose((1.0, 0.0, 0.0))))]
+    joints = [
+        Joint("shoulder", "revolute", "base", "upper", axis=(0.0, 0.0, 1.0)),
+        Joint("elbow", "revolute", "upper", "lower", Pose((1.0, 0.0, 0.0)), axis=(0.0, 0.0, 1.0)),
+    ]
+    engine = make(Model.build("line", links, joints))
+    regular = engine.forward_dynamics(np.array([0.0, 1.0]), np.zeros(2), np.ones(2))
+    assert np.isfinite(regular).all()
+    words = "^the mass matrix of line is singular at this configuration: no unique acceleration exists$"
+    with pytest.raises(SingularMassMatrixError, match=words):
+        engine.forward_dynamics(np.zeros(2), np.zeros(2), np.ones(2))
+    with pytest.raises(SingularMassMatrixError, match=r"is singular at sample \[1\]: "):
+        engine.forward_dynamics(np.array([[0.0, 1.0], [0.0, 0.0]]), np.zeros(2), np.ones(2))
+
+
+MODELS = {
+    "fixed": branched(),
+    "floating": branched().with_base("floating"),
+    "mimicking": mimicking(),
+}
+each_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS.keys())
+
+
+def center_jacobians(model: Model, engine: Backend, q: Floats) -> list[tuple[float, Floats, Floats, Floats]]:
+    """For each body: mass, centre of mass, its Jacobian, and inertia tensor, in the world."""
+    found = []
+    for link in model.links:
+        if link.inertial is None:
+            continue
+        T = engine.forward_kinematics(q, link.name)
+        R = T[:3, :3] @ Rotation.from_euler("xyz", link.inertial.origin.rpy).as_matrix()
+        center = np.array(link.inertial.origin.xyz)
+        J = engine.jacobian(q, link.name, point=center)
+        found.append((link.inertial.mass, T[:3, :3] @ center + T[:3, 3], J, R @ link.inertial.tensor @ R.T))
+    return found
+
+
+@each_model
+def test_mass_matrix_is_the_sum_over_the_links(make: Make, model: Model) -> None:
+    """M = sum of m J_v' J_v + J_w' I J_w (Siciliano et al., Robotics, eq. 7.32)."""
+    engine = make(model)
+    for seed in range(3):
+        state = random_state(model, 90 + seed)
+        close = ErrorBounds(samples_at(model, state.q, state.v))
+        M = np.zeros((model.nv, model.nv))
+        for mass, _, J, tensor in center_jacobians(model, engine, state.q):
+            M += mass * J[:3].T @ J[:3] + J[3:].T @ tensor @ J[3:]
+        close.check("mass_matrix", engine.mass_matrix(state.q), M)
+        energy = 0.5 * state.v @ M @ state.v
+        close.check("kinetic_energy", engine.kinetic_energy(state.q, state.v), energy)
+
+
+@each_model
+def test_centre_of_mass_and_gravity_are_those_of_the_links(make: Make, model: Model) -> None:
+    engine = make(model)
+    for seed in range(3):
+        q = random_state(model, 95 + seed).q
+        close = ErrorBounds(samples_at(model, q))
+        gravity, moment, torque = np.array(model.gravity), np.zeros(3), np.zeros(model.nv)
+        for mass, center, J, _ in center_jacobians(model, engine, q):
+            moment += mass * center
+            torque -= mass * J[:3].T @ gravity
+        close.check("center_of_mass", engine.center_of_mass(q), moment / model.total_mass)
+        close.check("potential_energy", engine.potential_energy(q), -gravity @ moment)
+        close.check("gravity_torque", engine.gravity_torque(q), torque)

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from dynx.backends import installed_backends
 from dynx.envs import Randomization
 from dynx.envs.environment import TaskEnvironment
+from dynx.envs.randomization import Draws, parameters_of, read_distribution
 from dynx.envs.task import State
 from dynx.envs.tasks.cart_pole import CartPole
 from dynx.envs.tasks.pendulum import Pendulum
@@ -23,6 +24,7 @@ from dynx.envs.tasks.stand import Stand
 from dynx.envs.variation import VariedRobot
 from dynx.envs.vector import RobotVectorEnvironment
 from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError
+from dynx.steppers.random import Streams
 
 CART_POLE: dict[str, Any] = {
     "mass_scale": {"pole": (0.5, 2.0), "cart": {"log_uniform": (0.5, 2.0)}},
@@ -306,3 +308,39 @@ def test_parts_of_worlds_are_refused_by_name() -> None:
     ):
         with pytest.raises(UnknownNameError, match=f"did you mean '{nearest}'"):
             TaskEnvironment(Push(), "pybullet", randomize=drawn)
+
+
+@given(
+    seed=st.integers(0, 2**70),
+    count=st.integers(1, 9),
+    first=st.integers(0, 8),
+    block=st.integers(0, 2**40),
+    low=st.floats(0.1, 1.0),
+    high=st.floats(1.0, 3.0),
+)
+@settings(max_examples=40, deadline=None)
+def test_a_draw_depends_on_its_environment_alone(
+    seed: int, count: int, first: int, block: int, low: float, high: float
+) -> None:
+    given_ranges = Randomization(mass_scale={"a": (low, high)}, delay={"log_uniform": (low, high)})
+    alone = Randomization(delay={"log_uniform": (low, high)})
+    draws, fewer = (Draws(parameters_of(each, ("mass_scale", "delay"))) for each in (given_ranges, alone))
+    streams, part = (
+        Streams(*range(seed, seed + first + count)),
+        Streams(*range(seed + first, seed + first + count)),
+    )
+    for row in range(count):
+        values = draws.values(streams, first + row, block)
+        assert np.array_equal(values, draws.values(part, row, block))
+        assert np.array_equal(values[:, 1:], fewer.values(streams, first + row, block))
+        assert (values >= low * (1.0 - 1e-15)).all()
+        assert (values <= high * (1.0 + 1e-15)).all()
+
+
+def test_a_normal_distribution_is_clamped() -> None:
+    found = read_distribution("delay", {"normal": (1.0, 0.1)})
+    numbers = found.numbers(np.random.default_rng(0).standard_normal(20_000))
+    assert found.bounds == pytest.approx((0.7, 1.3))
+    assert numbers.min() >= 0.7 - 1e-12
+    assert numbers.max() <= 1.3 + 1e-12
+    assert numbers.std() == pytest.approx(0.1, rel=0.03)

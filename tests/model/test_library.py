@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import importlib.util
 from collections import Counter
 from importlib import metadata
 from pathlib import Path
 
 import pytest
 
-from dynx.errors import DescriptionError, RobotNotFoundError
+from dynx.errors import DescriptionError, RobotNotFoundError, UnsupportedFeatureError
 from dynx.model import library
 from dynx.model.library import DYNX_MODELS, EXAMPLE_ROBOT_DATA, find, robots
 from dynx.model.loading import load
@@ -140,3 +141,42 @@ def test_robots_of_example_robot_data_come_first_each_group_by_name() -> None:
     assert list(robots()) == sorted(EXAMPLES, key=lambda entry: entry.name) + sorted(
         OWN, key=lambda entry: entry.name
     )
+
+
+SPEC = importlib.util.find_spec("pybullet_data")
+ROOT = Path(SPEC.origin).parent if SPEC is not None and SPEC.origin else None
+
+# File, kind of error, line, and the defect, as an editor shows it.
+DEFECTS = {
+    "bicycle/bike.urdf": (DescriptionError, 103, "'0.07, 0, -0.69'"),
+    "biped/biped2d_pybullet.urdf": (DescriptionError, 115, "'-1.57.'"),
+    "humanoid/humanoid.urdf": (UnsupportedFeatureError, 40, "joint 'chest' is spherical"),
+    "husky/husky.urdf": (DescriptionError, 97, "$(optenv HUSKY_IMU_XYZ"),
+    "quadruped/microtaur/microtaur.urdf": (DescriptionError, 300, "'-3.14159 1.57079 0 0'"),
+    "spherical_joint_limit.urdf": (UnsupportedFeatureError, 28, "joint 'neck' is spherical"),
+    "torus_deform.urdf": (DescriptionError, None, "the robot has no link"),
+}
+
+needs_pybullet_data = pytest.mark.skipif(ROOT is None, reason="pybullet_data is not installed")
+
+
+@needs_pybullet_data
+@pytest.mark.parametrize("file", DEFECTS)
+def test_a_file_with_a_defect_is_refused_for_it(file: str) -> None:
+    assert ROOT is not None
+    kind, line, message = DEFECTS[file]
+    with pytest.raises(kind) as caught:
+        load(ROOT / file)
+    assert message in str(caught.value)
+    assert caught.value.line == line
+
+
+@needs_pybullet_data
+def test_every_other_file_loads_and_is_read_back_equal() -> None:
+    assert ROOT is not None
+    files = sorted(path for path in ROOT.rglob("*.urdf"))
+    assert len(files) > 1000
+    for path in files:
+        if path.relative_to(ROOT).as_posix() not in DEFECTS:
+            model = load(path)
+            assert load(model.to_urdf()) == model, path

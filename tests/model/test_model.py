@@ -12,12 +12,17 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 
-from dynx.errors import ArgumentError, UnknownNameError
+from dynx.errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, UnknownNameError
 from dynx.model import Inertial, Joint, Limits, Link, Model, Pose
+from dynx.model.documents import robot_document, robot_from_document
 from dynx.model.loading import load
 from dynx.model.model import refuse_other_than_model
-from dynx.testing.strategies import models
+from dynx.testing.strategies import configurations, models
+from tests.model.descriptions import joint
+from tests.model.placement import frame_poses, total_inertia
+from tests.spatial.rounding import assert_same_to_rounding
 
 PICKLED_BEFORE_TREE = (
     "eNp9U82O0zAQLuSnabcrVuLEiQMX9tInQHBBqkBLBU8QOcmkNuvEkeN0k0oIOCx7mVvDlefgBk/BS3DhERinaVq0aHNwPN/M"
@@ -129,3 +134,138 @@ def test_a_model_pickled_before_tree_was_split_off_is_read() -> None:
     elbow = Joint("elbow", "revolute", "base", "tip", limits=Limits(-1.0, 1.0))
     assert read == Model.build("arm", [Link("base"), Link("tip", tip)], [elbow])
     assert read.upper.tolist() == [1.0]
+
+
+@given(st.data())
+def test_locking_equals_holding_the_joint(data: st.DataObject) -> None:
+    model = data.draw(models(max_links=6, locks=False))
+    q = data.draw(configurations(model))
+    base = model.nq - len(model.joint_names)
+    held = data.draw(st.sets(st.sampled_from(model.joint_names))) if model.joint_names else set()
+    values = dict(zip(model.joint_names, q[base:].tolist(), strict=True))
+    locked = load(model, lock={name: values[name] for name in held})
+
+    assert locked.joint_names == tuple(name for name in model.joint_names if name not in held)
+    assert locked.frame_names == model.frame_names
+    q_locked = np.concatenate([q[:base], [values[name] for name in locked.joint_names]])
+    size = 4.0 * (1.0 + float(np.max(np.abs(q), initial=0.0)))
+    for now, before in zip(frame_poses(locked, q_locked), frame_poses(model, q), strict=True):
+        assert_same_to_rounding(now, before, 64 * len(model.links), size=size)
+    now_inertia, before_inertia = total_inertia(locked, q_locked), total_inertia(model, q)
+    weight = max(1.0, sum(abs(link.inertial.mass) for link in model.links if link.inertial))
+    reach = size * len(model.links)
+    for field in ("mass", "first_moment", "rotational_inertia"):
+        assert_same_to_rounding(
+            getattr(now_inertia, field),
+            getattr(before_inertia, field),
+            128 * len(model.links),
+            size=weight * reach**2,
+        )
+
+
+@given(st.data())
+def test_locking_in_two_steps_equals_locking_at_once(data: st.DataObject) -> None:
+    model = data.draw(models(max_links=5, locks=False))
+    lock = dict.fromkeys(model.joint_names, 0.5)
+    one_by_one = model
+    for name in model.joint_names:
+        one_by_one = load(one_by_one, lock={name: 0.5})
+    at_once = load(model, lock=lock)
+    assert one_by_one == at_once
+    assert at_once.joint_names == ()
+    assert all(not joint.moves for joint in at_once.joints)
+
+
+def test_followers_of_a_locked_joint_are_fixed() -> None:
+    model = load("romeo")
+    followers = [joint for joint in model.joints if joint.mimic is not None]
+    assert followers
+    for follower in followers:
+        mimic = follower.mimic
+        assert mimic is not None
+        locked = load("romeo", lock={mimic.joint: 0.25})
+        assert locked.joint(follower.name).locked_at == mimic.multiplier * 0.25 + mimic.offset
+        assert len(locked.notes) == len(model.notes)
+
+
+def test_a_follower_may_be_locked_alone() -> None:
+    model = load("romeo")
+    follower = next(joint for joint in model.joints if joint.mimic is not None)
+    locked = load(model, lock={follower.name: 0.125})
+    assert locked.joint_names == model.joint_names
+    assert (locked.joint(follower.name).locked_at, locked.joint(follower.name).mimic) == (0.125, None)
+
+
+@pytest.mark.parametrize("name", ["no_such_joint", "ee_fixed_joint", "tool0"])
+def test_the_error_names_a_joint_that_cannot_be_locked(name: str) -> None:
+    with pytest.raises(UnknownNameError, match=f"cannot lock '{name}'"):
+        load("ur5", lock={name: 0.0})
+
+
+def test_the_error_for_the_coordinate_of_a_locked_joint() -> None:
+    model: Model = load("ur5", lock={"elbow_joint": 0.0})
+    with pytest.raises(UnknownNameError, match="'elbow_joint' of ur5 has no coordinate: it is locked"):
+        model.coordinate_index("elbow_joint")
+
+
+TEXT = joint()
+POSE = Pose((0.1, 0.2, 0.3), (0.4, -0.5, 0.6))
+
+
+def test_it_is_a_pose_or_a_matrix() -> None:
+    assert load(TEXT).base_pose == Pose()
+    assert load(TEXT, base_pose=POSE).base_pose == POSE
+    by_matrix = load(TEXT, base_pose=POSE.matrix).base_pose
+    np.testing.assert_allclose(by_matrix.matrix, POSE.matrix, rtol=0, atol=1e-15)
+    whole: Any = Pose((1, 0, 0))
+    assert load(TEXT, base_pose=whole).base_pose.xyz == (1.0, 0.0, 0.0)
+
+
+def test_a_model_keeps_it_unless_another_is_given() -> None:
+    model = load(TEXT, base_pose=POSE)
+    assert load(model).base_pose == load(model, gravity=(0, 0, 0)).base_pose == POSE
+    assert load(model, lock={"j": 0.1}).base_pose == POSE
+    assert load(model, base_pose=np.eye(4)) == load(TEXT)
+    assert model != load(TEXT)
+    assert hash(model) != hash(load(TEXT))
+    assert pickle.loads(pickle.dumps(model)) == model
+
+
+@given(models())
+def test_a_document_keeps_what_urdf_text_does_not(model: Model) -> None:
+    assert robot_from_document(robot_document(model)) == model
+
+
+@pytest.mark.parametrize(
+    ("pose", "error", "message"),
+    [
+        ([0.0, 0.0, 1.0], ShapeError, r"base_pose has shape \(3,\); wanted a Pose or a matrix \(4, 4\)"),
+        ("up", ArgumentError, "base_pose is 'up'; wanted a Pose or a matrix"),
+        (np.diag([1.0, 1.0, -1.0, 1.0]), ArgumentError, "base_pose is not a rigid transform"),
+        (Pose((float("nan"), 0.0, 0.0)), NotFiniteError, r"xyz of base_pose\[0\] is nan"),
+        (Pose(rpy=(0.0, 0.0, 1e300)), ArgumentError, r"rpy of base_pose\[2\] is 1e\+300"),
+        (Pose(("a", "b", "c")), DTypeError, "xyz of base_pose"),  # type: ignore[arg-type]
+        (Pose((0.0, 1.0)), ShapeError, "xyz of base_pose"),  # type: ignore[arg-type]
+    ],
+)
+def test_anything_else_is_refused(pose: Any, error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
+        load(TEXT, base_pose=pose)
+    with pytest.raises(error, match=message):
+        load(TEXT).with_base_pose(pose)
+
+
+def test_a_floating_base_has_its_pose_in_q() -> None:
+    with pytest.raises(ArgumentError, match=r"a floating base has its pose in q: position q\[:3\]"):
+        load(TEXT, base="floating", base_pose=POSE)
+    with pytest.raises(ArgumentError, match="floating base"):
+        load(TEXT, base="floating").with_base_pose(POSE)
+    assert load(TEXT, base="floating", base_pose=Pose()).floating
+    freed = load(TEXT, base_pose=POSE).with_base("floating")
+    assert freed == load(TEXT, base="floating")
+
+
+def test_urdf_text_is_that_of_the_robot_at_the_world_frame() -> None:
+    model = load(TEXT, base_pose=POSE)
+    assert model.to_urdf() == load(TEXT).to_urdf()
+    assert load(model.to_urdf(), base_pose=model.base_pose) == model

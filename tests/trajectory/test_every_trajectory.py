@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from dynx.errors import DTypeError, DynxError, NotFiniteError
 from dynx.spatial.scalar import Floats
 from dynx.trajectory import Setpoint, Trajectory, cycloidal
+from tests.contract.test_import import ENGINES, modules_after
 from tests.trajectory.motions import Motion, motions, of_a_floating_base, slow_motions, within_limits
 
 EPS = float(np.finfo(np.float64).eps)
@@ -190,3 +191,19 @@ def test_a_user_defined_trajectory() -> None:
 def test_a_motion_prints_in_one_line() -> None:
     motion = cycloidal(np.zeros(6), np.ones(6), duration=2.0)
     assert repr(motion) == f"<{type(motion).__name__} of 6 coordinates, 2 s>"
+
+
+def test_engines_and_planners_are_imported_on_first_use() -> None:
+    program = (
+        "import dynx; dynx.trajectory.s_curve([0.0], [1.0], velocity=1.0, acceleration=1.0, jerk=1.0)(0.5)"
+    )
+    assert modules_after(program).isdisjoint({*ENGINES, "ruckig", "toppra", "matplotlib", "scipy"})
+
+
+def test_modules_of_a_package_are_its_attributes() -> None:
+    """Although the package imports none of them by itself."""
+    program = (
+        "import dynx; dynx.world.scene.read_scene, dynx.world.camera, dynx.control.bullet, "
+        "dynx.trajectory.waypoints, dynx.distance; assert not hasattr(dynx.world, 'scenery')"
+    )
+    assert modules_after(program).isdisjoint(ENGINES)

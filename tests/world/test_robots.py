@@ -1,12 +1,7 @@
-"""Robots with their collision meshes on the ground of every engine: a sample of those that are installed.
-
-``python -m tests.world.test_robots ENGINE`` steps all of them for 1 s, on both bases, and prints a line each.
-"""
+"""Robots with their collision meshes on the ground of every engine: a sample of those that are installed."""
 
 from __future__ import annotations
 
-import sys
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -14,8 +9,6 @@ import pytest
 
 import dynx
 from dynx.backends import backend
-from dynx.errors import DynxError
-from dynx.model.library import robots
 from dynx.model.tree import Base
 from dynx.spatial.scalar import Floats
 from dynx.world import Scene, SceneRobot, World, ground
@@ -53,25 +46,3 @@ def test_robots_with_their_meshes_step_in_every_engine(engine: str, robot: str, 
         world.step(200)
         assert np.isfinite(world.state.robots["robot"].q).all()
         assert world.time == pytest.approx(0.2)
-
-
-def survey(engine: str) -> None:
-    """Step every robot of the library for 1 s on both bases, and print the times or the error."""
-    bases: tuple[Base, ...] = ("fixed", "floating")
-    for entry in robots():
-        for base in bases:
-            began = time.perf_counter()
-            try:
-                with World(on_the_ground(str(entry.path), base), engine) as world:
-                    opened = time.perf_counter()
-                    world.run(1.0)
-                    line = (
-                        f"opened in {opened - began:.2f} s, stepped in {time.perf_counter() - opened:.2f} s"
-                    )
-            except DynxError as error:
-                line = f"{type(error).__name__}: {error}"
-            print(f"{entry.name} {base}: {line}", flush=True)
-
-
-if __name__ == "__main__":
-    survey(sys.argv[1])

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shlex
+import shutil
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -379,3 +381,79 @@ def test_a_file_without_inertial_data_is_copied_unchanged_and_the_report_says_so
     made = json.loads(Path("out.json").read_text())
     assert made["results"][0]["status"] == "massless"
     assert made["summary"]["massless"] == 1
+
+
+@pytest.mark.parametrize("command", [["doctor"], ["agree", "--as-loaded"]])
+def test_robots_in_xacro_below_a_directory_are_named_in_every_output(
+    command: list[str], tmp_path: Path
+) -> None:
+    robots = tmp_path / "robots"
+    robots.mkdir()
+    (robots / "arm.urdf").write_text(SOUND)
+    left_out = robots / "arm.xacro"
+    left_out.write_text(ARM)
+    files = {name: tmp_path / f"out.{name}" for name in ("json", "html", "junit", "sarif")}
+    wanted = ["json"] if len(command) > 1 else list(files)
+    options = [word for name in wanted for word in (f"--{name}", str(files[name]))]
+    engines = ["--backends" if len(command) > 1 else "--engines", *QUICK[1:]]
+    result = CliRunner().invoke(cli, [*command, str(robots), *engines, *options, "--quiet"])
+    assert result.exit_code == 0, result.output
+    assert "dynx: note: 1 robot in xacro was not examined" in result.stderr
+    assert str(left_out) in result.stderr
+    assert json.loads(files["json"].read_text())["left_out"] == [str(left_out)]
+    for name in wanted[1:]:
+        assert str(left_out) in files[name].read_text(), name
+    if "junit" in wanted:
+        assert ElementTree.parse(files["junit"]).getroot().get("skipped") == "1"
+    if "sarif" in wanted:
+        require_valid(json.loads(files["sarif"].read_text()))
+
+
+PAGE = Path(__file__).parents[3] / "docs" / "doctor.md"
+
+needs_mujoco = pytest.mark.skipif("mujoco" not in installed_engines(), reason="joint damping shows in MuJoCo")
+
+
+def commands() -> list[list[str]]:
+    """Return the words of each command of the section."""
+    text = PAGE.read_text(encoding="utf-8").partition("## In continuous integration")[2].partition("\n## ")[0]
+    return [shlex.split(line) for line in re.findall(r"^```sh\n(.*)\n```$", text, flags=re.MULTILINE)]
+
+
+def run(words: list[str]) -> Result:
+    assert words[0] == "dynx"
+    return CliRunner().invoke(cli, [*words[1:], "--jobs", "1"])
+
+
+@needs_mujoco
+def test_the_check_passes_until_something_is_new(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    robots = tmp_path / "robots"
+    robots.mkdir()
+    shutil.copy(find_trap("DX301"), robots / "damped.urdf")
+    record, check = commands()
+    assert run(record).exit_code == 0
+    assert run(check).exit_code == 0
+    assert Path("doctor.xml").is_file()
+    assert Path("doctor.sarif").is_file()
+    shutil.copy(find_trap("DX101"), robots / "other.urdf")
+    found = run(check)
+    assert found.exit_code == 1
+    assert "new: DX101" in found.stdout
+    assert "new: DX301" not in found.stdout
+
+
+@needs_mujoco
+def test_a_mended_file_names_the_causes_that_only_calls_remove(tmp_path: Path) -> None:
+    """Damping is right in the file: without the calls the mended file differs as before."""
+    text = find_trap("DX301").read_text(encoding="utf-8").replace("</robot>", '<link name="extra"/></robot>')
+    joint = '<joint name="mount" type="fixed"><parent link="{}"/><child link="extra"/></joint></robot>'
+    parent = re.findall(r'<child link="([^"]+)"', text)[-1]
+    robot, mended = tmp_path / "robot.urdf", tmp_path / "mended.urdf"
+    robot.write_text(text.replace("</robot>", joint.format(parent)), encoding="utf-8")
+    result = run(["dynx", "doctor", str(robot), "--fix", str(mended)])
+    assert result.exit_code == 1
+    assert f"mended (without the calls above, DX301 remains): {mended}" in result.stdout
+    again = run(["dynx", "doctor", str(mended)])
+    assert again.exit_code == 1
+    assert "engines differ, for 1 cause, all proved" in again.stdout

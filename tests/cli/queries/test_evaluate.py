@@ -21,7 +21,10 @@ from dynx.ik import IKSolutions
 from dynx.model.loading import load
 from dynx.model.numbers import MAX_MAGNITUDE
 from dynx.spatial.so3 import quat_from_rotation, rpy_from_rotation
+from dynx.world.scene import read_scene
+from dynx.world.scene.scene import MARGIN
 from tests.conftest import EXAMPLES_INSTALLED
+from tests.oracles.closed_form import MODELS
 
 Q = [0.1, -1.5, 1.4, 0.2, 0.3, -0.4]
 Q_TEXT = ",".join(map(repr, Q))
@@ -398,3 +401,110 @@ def test_the_list_of_robots_fits_80_columns() -> None:
     lines = CliRunner(env={"COLUMNS": "80"}).invoke(cli, ["robots"]).stdout.splitlines()
     # The folder of a package is wherever that is installed.
     assert max(len(line) for line in lines if ": /" not in line) <= 80
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> Path:
+    """A scene with a box in front of the arm."""
+    file = tmp_path / "cell.toml"
+    file.write_text(
+        'schema = "dynx.scene/1"\nname = "cell"\n[[bodies]]\nname = "box"\n'
+        "shape = { box = [0.2, 0.2, 0.3] }\npose = [0.45, 0.1, 0.1, 0.0, 0.0, 0.0]\n",
+        encoding="utf-8",
+    )
+    return file
+
+
+def test_margins_from_a_scene_are_kept(cell: Path) -> None:
+    """A box is avoided where that is possible, and named where it is not."""
+    options = ["ur5", "--frame", "ee_link", "--backend", "reference", "--avoid", str(cell)]
+    beside = document("ik", *options, "--to-pose", "0.45,0.1,0.35", "--margin", "0.02")
+    assert beside["status"] == "REACHED"
+    avoidance = read_scene(cell).avoidance_for(load("ur5"), margin=0.02)
+    assert avoidance.is_clear(backend("reference", load("ur5")), np.array(beside["q"]))
+    inside = CliRunner().invoke(cli, ["ik", *options, "--to-pose", "0.45,0.1,0.1,3.14159,0,0"])
+    assert inside.exit_code == 1
+    assert "in collision" in inside.stdout
+    assert "box" in inside.stdout
+    refused = CliRunner().invoke(cli, ["ik", *options, "--to-pose", "0.45,0.1,0.35,0,0,0", "--margin", "-1"])
+    assert refused.exit_code == 2
+    assert "margin is" in refused.stderr
+    alone = CliRunner().invoke(cli, ["ik", "ur5", "--to-pose", "0.4,0.1,0.3", "--margin", "0.1"])
+    assert alone.exit_code == 2
+    assert "give the scene" in alone.stderr
+
+
+def test_all_solutions_say_which_are_in_collision(cell: Path) -> None:
+    options = ["ur5", "--frame", "ee_link", "--backend", "reference", "--all-solutions", "--avoid", str(cell)]
+    pose = ["--to-pose", "0.5,0.1,0.4,0,1.57,0"]
+    found = document("ik", *options, *pose)
+    avoidance = read_scene(cell).avoidance_for(load("ur5"), margin=MARGIN)
+    engine = backend("reference", load("ur5"))
+    clear = [avoidance.is_clear(engine, np.array(each["q"])) for each in found["solutions"]]
+    assert [each["collision"] == "" for each in found["solutions"]] == clear
+    assert any(clear)
+    assert not all(clear)
+    assert found["avoid"] == str(cell)
+    shown = CliRunner().invoke(cli, ["ik", *options, *pose])
+    assert shown.exit_code == 0
+    assert f"{sum(clear)} of {len(clear)} keep all margins" in shown.stdout
+    assert shown.stdout.count("  in collision: ") == len(clear) - sum(clear)
+    inside = CliRunner().invoke(cli, ["ik", *options, "--to-pose", "0.45,0.1,0.1,0,1.57,0"])
+    assert inside.exit_code == 1
+    assert "0 of " in inside.stdout
+
+
+def test_ik_states_status_message_and_proof() -> None:
+    options = ["ur5", "--frame", "tool0", "--backend", "reference"]
+    found = document("ik", *options, "--to-pose", "0.4,0.2,0.3,0,0,0")
+    assert (found["status"], found["proof"], found["note"]) == ("REACHED", "", "")
+    assert found["message"].startswith("reached, ")
+    far = CliRunner().invoke(cli, ["ik", *options, "--to-pose", "9,0,0", "--json", "-"])
+    result = json.loads(far.stdout)
+    assert far.exit_code == 1
+    assert result["status"] == "UNREACHABLE"
+    assert "the chain reaches at most" in result["proof"]
+    assert result["message"].endswith(result["proof"])
+    printed = CliRunner().invoke(cli, ["ik", *options, "--to-pose", "9,0,0"]).stdout
+    assert f"out of reach: {result['proof']}" in " ".join(printed.split())
+
+
+@pytest.mark.parametrize("extra", [["--all-solutions"], ["--free", "position"], []])
+def test_angles_beyond_a_full_turn_are_noted(extra: list[str]) -> None:
+    """Angles in degrees are read as radians, with a note."""
+    options = ["ik", "ur5", "--backend", "reference", "--frame", "tool0", *extra, "--to-pose"]
+    hint = "-90 degrees would be -1.5708"
+    noted = CliRunner().invoke(cli, [*options, "0.4,0.2,0.3,-90,0,0"])
+    assert hint in " ".join(noted.stdout.split())
+    assert hint not in " ".join(CliRunner().invoke(cli, [*options, "0.4,0.2,0.3,-6,0,0"]).stdout.split())
+    if "--free" in extra:
+        assert hint in " ".join(CliRunner().invoke(cli, [*options, "0,0,-90"]).stdout.split())
+
+
+@pytest.mark.parametrize(
+    ("robot", "given", "frame", "remedy"),
+    [
+        ("panda", [], "panda_hand_tcp", "panda_joint7=0.5"),
+        ("panda", ["--given", "panda_joint7=0.5"], "panda_hand_tcp", "panda_joint7=0.5"),
+        ("z1", [], "gripperStator", None),
+    ],
+)
+def test_a_frame_before_the_gripper_is_suggested(
+    robot: str, given: list[str], frame: str, remedy: str | None
+) -> None:
+    """The frame that is suggested has a closed form."""
+    options = ["ik", robot, "--backend", "reference", "--all-solutions", "--to-pose", "0.4,0,0.4,3,0,0"]
+    refused = CliRunner().invoke(cli, [*options, *given])
+    assert refused.exit_code == 2
+    assert "was chosen by default; there is a closed form with --frame " + frame in refused.stderr
+    more = [] if remedy is None else ["--given", remedy]
+    assert CliRunner().invoke(cli, [*options, "--frame", frame, *more]).exit_code in (0, 1)
+    named = CliRunner().invoke(cli, [*options, "--frame", "world" if robot == "z1" else "panda_leftfinger"])
+    assert "by default" not in named.stderr
+
+
+def test_no_other_frame_is_suggested_for_seven_joints_of_an_arm() -> None:
+    options = ["--backend", "reference", "--all-solutions", "--to-pose", "0.4,0,0.4,3,0,0"]
+    refused = CliRunner().invoke(cli, ["ik", str(MODELS / "seven_axis_arm.urdf"), *options])
+    assert refused.exit_code == 2
+    assert refused.stderr.rstrip().endswith(" was chosen by default")

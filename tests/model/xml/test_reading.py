@@ -170,9 +170,9 @@ def test_the_content_of_an_opaque_element_is_checked_but_not_stored() -> None:
 
 def test_one_long_attribute_and_many_attributes_are_read_in_linear_time() -> None:
     many = " ".join(f'a{k}="{k}"' for k in range(MAX_ATTRIBUTES - 1))
-    start = time.perf_counter()
+    start = time.process_time()
     root, _ = read(f'<a x="{"y" * 5_000_000}" {many}/>')
-    assert time.perf_counter() - start < 10.0
+    assert time.process_time() - start < 10.0
     assert len(root.attributes) == MAX_ATTRIBUTES
     with pytest.raises(DescriptionError, match="1001 attributes; at most 1000 are read"):
         read(f'<a x="y" {many} last=""/>')
