@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dynx.compiled.array_dynamics import ArrayDynamics
 from dynx.compiled.parametric import ParametricDynamics
 from dynx.compiled.step import BoundSteps, StepText, compiled
-from dynx.control.array_dynamics import ArrayDynamics
 from dynx.envs.library import AutoresetMode, spaces
 from dynx.envs.task import Move, RobotTask, State, StepFriction, control_step, free_move
 from dynx.envs.variation import VariedRobot

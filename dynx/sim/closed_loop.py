@@ -41,6 +41,12 @@ from dynx.trajectory.base import Setpoint
 
 FLOAT64 = np.dtype(np.float64)
 
+MIN_STEPS_TO_COMPILE = 256
+"""Smallest number of steps for which tracing pieces saves time."""
+
+MAX_TRACED_SUBSTEPS = 16
+"""Largest number of sub-steps in one traced step."""
+
 PROGRESS_STEPS = 200
 """Number of steps between two calls of `progress`."""
 
@@ -357,6 +363,27 @@ class ClosedLoop:
         if defect:
             raise self._control_failed(k, record, defect)
         return np.array(array, dtype=np.float64)
+
+    def not_in_pieces(self, left: int) -> str | None:
+        """Return why `left` more steps cannot be compiled in pieces, or are too few; None if they may be."""
+        plant = self.plant
+        if left < MIN_STEPS_TO_COMPILE:
+            return f"fewer than {MIN_STEPS_TO_COMPILE} steps"
+        if isinstance(self.controller, BulletMotor):
+            return f"{self.controller.name} is a motor inside the engine"
+        if not isinstance(plant, IntegratedPlant):
+            return f"{type(plant).__name__} has a stepper of its own"
+        if plant.uncompiled:
+            return f"{plant.uncompiled} not compiled"
+        if plant.substeps > MAX_TRACED_SUBSTEPS:
+            return f"more than {MAX_TRACED_SUBSTEPS} sub-steps"
+        if left < MIN_STEPS_TO_COMPILE * plant.evaluations:
+            return f"fewer than {MIN_STEPS_TO_COMPILE * plant.evaluations} steps"
+        if not plant.model.nv:
+            return "the robot has no coordinates"
+        if plant.model.floating and self.sensors.noise is not None:
+            return "noise on the pose of a floating base is not compiled"
+        return None
 
     def refuse_self_changing(self, record: StateBuffers) -> None:
         """Raise ArgumentError for a controller that changes itself when its torque is evaluated.

@@ -9,6 +9,7 @@ thirds of the time.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from contextlib import suppress
 from dataclasses import replace
 from time import perf_counter
 from typing import Any, Generic, TypeVar
@@ -22,7 +23,7 @@ from dynx.control.base import Controller, chain_of
 from dynx.control.bullet import BulletMotor
 from dynx.control.content import attributes_of
 from dynx.errors import ArgumentError, CompileError, TraceError, UnsupportedFeatureError
-from dynx.sim.closed_loop import ClosedLoop, LoopState, StateBuffers
+from dynx.sim.closed_loop import MIN_STEPS_TO_COMPILE, ClosedLoop, LoopState, StateBuffers
 from dynx.sim.loop_step import CONTROLLER, SETPOINT, ArrayDisturbances, LoopStep, cut_step
 from dynx.sim.own_controllers import refuse_irreproducible
 from dynx.sim.plants.integrated import IntegratedPlant
@@ -30,9 +31,6 @@ from dynx.sim.step_completion import LaneStops, Settling
 from dynx.simd.call_sequence import Integers, StridedRows
 from dynx.simd.cuts import BoundCuts, CutStep, EngineCallFailed
 from dynx.spatial.scalar import Floats, clamp
-
-MIN_STEPS_TO_COMPILE = 256
-"""Smallest number of steps for which tracing pieces saves time."""
 
 MAX_CHUNK_STEPS = 4096
 """Largest number of steps whose kernel calls are prepared together."""
@@ -46,9 +44,6 @@ preparing takes longer than a step. It doubles from chunk to chunk."""
 
 PROGRESS_INTERVAL = 0.1
 """Time between two calls of `progress` [s]."""
-
-MAX_TRACED_SUBSTEPS = 16
-"""Largest number of sub-steps in one traced step."""
 
 MAX_NV_OF_KERNEL = 40
 """Largest number of coordinates for which a whole step is compiled into one kernel, which takes seconds for
@@ -64,36 +59,21 @@ ONE_KERNEL, PIECES = "compiled", "compiled pieces"
 """Names of the executors in a record."""
 
 
-def lane_loop(loop: ClosedLoop) -> LaneLoop | str:
-    """Compile a loop as one lane of a batch's kernel; return the reason where that is impossible."""
+def lane_loop(loop: ClosedLoop) -> LaneLoop | None:
+    """Compile a loop as one lane of a batch's kernel; return None where that is impossible."""
     plant = loop.plant
     if not isinstance(plant, IntegratedPlant) or not is_one_lane(plant, loop.controller):
-        return "another engine takes part"
-    try:
+        return None
+    # A controller is evaluated on numbers too, where its own defects may warn before they are found.
+    with suppress(*NOT_COMPILED), np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         return LaneLoop(loop, _step_of(loop))
-    except NOT_COMPILED as error:
-        return str(error)
+    return None
 
 
-def cut_loop(loop: ClosedLoop, left: int) -> CutLoop | str:
-    """Compile a loop in pieces for `left` more steps; return the reason where that is impossible or slow."""
+def cut_loop(loop: ClosedLoop) -> CutLoop | str:
+    """Compile a loop in pieces; return the reason where that is impossible (`ClosedLoop.not_in_pieces`)."""
     plant = loop.plant
-    if left < MIN_STEPS_TO_COMPILE:
-        return f"fewer than {MIN_STEPS_TO_COMPILE} steps"
-    if isinstance(loop.controller, BulletMotor):
-        return f"{loop.controller.name} is a motor inside the engine"
-    if not isinstance(plant, IntegratedPlant):
-        return f"{type(plant).__name__} has a stepper of its own"
-    if plant.uncompiled:
-        return f"{plant.uncompiled} not compiled"
-    if plant.substeps > MAX_TRACED_SUBSTEPS:
-        return f"more than {MAX_TRACED_SUBSTEPS} sub-steps"
-    if left < MIN_STEPS_TO_COMPILE * plant.evaluations:
-        return f"fewer than {MIN_STEPS_TO_COMPILE * plant.evaluations} steps"
-    if not plant.model.nv:
-        return "the robot has no coordinates"
-    if plant.model.floating and loop.sensors.noise is not None:
-        return "noise on the pose of a floating base is not compiled"
+    assert isinstance(plant, IntegratedPlant)
     try:
         return CutLoop(loop, _step_of(loop), plant)
     except NOT_COMPILED as error:

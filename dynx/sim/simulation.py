@@ -8,7 +8,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass, fields, is_dataclass, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +20,6 @@ from dynx.model import Model
 from dynx.model.numbers import checked_array
 from dynx.option_names import takes
 from dynx.sim.closed_loop import ClosedLoop, LoopState, Sensors, StateBuffers, Stops
-from dynx.sim.compiled_loop import LaneLoop, cut_loop, lane_loop
 from dynx.sim.controller_checks import ControllerWatch, refuse_self_changed
 from dynx.sim.plants.disturbances import refuse_small_slip
 from dynx.sim.plants.plant import plant_errors
@@ -37,6 +36,9 @@ from dynx.steppers.clock import multiple, refuse_too_many_steps
 from dynx.steppers.state import same_numbers
 from dynx.trajectory.base import Trajectory
 from dynx.world.snapshot import Snapshot
+
+if TYPE_CHECKING:
+    from dynx.sim.compiled_loop import CutLoop, LaneLoop
 
 
 class SimulationState(NamedTuple):
@@ -276,15 +278,21 @@ class Simulation:
     def _one_lane(self) -> LaneLoop | None:
         """Return the loop as one lane of a batch's kernel, if its steps are computed so."""
         if not self._lane_known:
-            # A controller is evaluated on numbers too, where its own defects may warn before they are found.
-            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-                found = lane_loop(self._loop)
-            self._lane, self._lane_known = found if isinstance(found, LaneLoop) else None, True
+            lane = None
+            if self.scenario.plant == "compiled":
+                from dynx.sim.compiled_loop import lane_loop
+
+                lane = lane_loop(self._loop)
+            self._lane, self._lane_known = lane, True
         return self._lane
 
     def _advance_in_pieces(self, record: StateBuffers, loop_state: LoopState, end: int) -> None:
         """Take all steps to `end` in pieces between engine calls if possible, and note how they are taken."""
-        pieces = cut_loop(self._loop, end - record.steps)
+        pieces: CutLoop | str | None = self._loop.not_in_pieces(end - record.steps)
+        if pieces is None:
+            from dynx.sim.compiled_loop import cut_loop
+
+            pieces = cut_loop(self._loop)
         if isinstance(pieces, str):
             self._note(f"plain: {pieces}")
             return

@@ -72,10 +72,22 @@ FLOWS = {
         ROBOT + "from dynx import control\n"
         "law = control.ComputedTorque(robot, natural_frequency=20.0)\n"
         "dynx.simulate(robot, law, robot.neutral(), duration=0.01, plant='pinocchio')",
-        ("world.camera", "steppers.camera", "world.queries", "distance", "ik", "envs"),
+        (
+            "world.camera",
+            "steppers.camera",
+            "world.queries",
+            "world.world",
+            "world.scene.documents",
+            "sim.compiled_loop",
+            "sim.record.formats",
+            "compiled.kernels",
+            "distance",
+            "ik",
+            "envs",
+        ),
         (),
-        206,
-        35500,
+        174,
+        27500,
     ),
     "step of a box": Flow(
         "from dynx.world import Scene, World, box\n"

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import dynx
 from dynx.backends import installed_backends
-from dynx.control.array_dynamics import ArrayDynamics
+from dynx.compiled.array_dynamics import ArrayDynamics
 from dynx.envs.environment import TaskEnvironment
 from dynx.envs.task import State
 from dynx.envs.tasks.reach import ROTATION_WEIGHT, SERVO_RATE, Reach

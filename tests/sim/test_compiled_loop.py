@@ -41,6 +41,7 @@ from dynx.sim import (
     RolloutInterrupted,
     Scenario,
     Simulation,
+    closed_loop,
     compiled_loop,
     simulate,
     simulate_batch,
@@ -89,7 +90,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
 def glue(*, on: bool, seen: list[bool] | None = None) -> Iterator[None]:
     """Glue for rollouts of any length, or for none; `seen` is told whether it was used."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(compiled_loop, "MIN_STEPS_TO_COMPILE", 1 if on else 10**9)
+        patch.setattr(closed_loop, "MIN_STEPS_TO_COMPILE", 1 if on else 10**9)
         patch.setattr(compiled_loop, "is_one_lane", lambda plant, controller: False)
         patch.setattr(compiled_loop.CutLoop, "chunk_steps", 32)
         if seen is not None:

@@ -18,7 +18,7 @@ from dynx.control import PD, PID, BulletPositionMotor, ComputedTorque, OpenLoop,
 from dynx.control.base import Controller, Measurement
 from dynx.errors import ArgumentError, ClosedError, ControlError, DivergedError
 from dynx.model.loading import load
-from dynx.sim import Noise, Payload, Scenario, Simulation, compiled_loop, simulate, simulate_batch
+from dynx.sim import Noise, Payload, Scenario, Simulation, closed_loop, simulate, simulate_batch
 from dynx.trajectory.base import Setpoint, Trajectory
 from tests.sim.bars import tutorial_motion, tutorial_robot
 from tests.sim.test_resume import the_same
@@ -85,7 +85,7 @@ def test_simulate_is_a_loop_over_steps(name: str) -> None:
 def test_how_many_steps_at_a_time_changes_no_bit(name: str, parts: list[int], compiled: bool) -> None:
     scenario = replace(SCENARIOS[name], duration=0.1)
     with pytest.MonkeyPatch.context() as patch, Simulation(scenario) as simulation:
-        patch.setattr(compiled_loop, "MIN_STEPS_TO_COMPILE", 1)
+        patch.setattr(closed_loop, "MIN_STEPS_TO_COMPILE", 1)
         for n in parts:
             if compiled:
                 simulation.run(simulation.time + n * scenario.dt)
@@ -334,7 +334,7 @@ def test_the_record_says_how_its_steps_were_computed() -> None:
     assert executor(damping=1.0, friction=0.1, armature=0.1) == "compiled pieces"
     push = ExternalForce("tool0", [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     assert executor(pushes=[push]) == "plain: pushes are not compiled"
-    few = compiled_loop.MIN_STEPS_TO_COMPILE
+    few = closed_loop.MIN_STEPS_TO_COMPILE
     assert executor(dt=0.01) == f"plain: fewer than {few} steps"
     assert executor(integrator="rk4") == f"plain: fewer than {4 * few} steps"
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dynx.backends.dynamics import Dynamics
-from dynx.control.array_dynamics import ArrayDynamics
+from dynx.compiled.array_dynamics import ArrayDynamics
 from dynx.envs.library import spaces
 from dynx.envs.task import RobotTask, State, camera_at, component_names, refuse_unknown_choice
 from dynx.errors import UnsupportedFeatureError

@@ -20,7 +20,6 @@ from dynx.sim.plants.disturbances import Disturbances
 from dynx.sim.plants.integrated import SCHEMES, IntegratedPlant
 from dynx.sim.plants.plant import Plant, plant_errors
 from dynx.sim.plants.scene_plant import ScenePlant
-from dynx.sim.plants.world_plant import WorldPlant
 
 GROUP = "dynx.plants"
 """The entry-point group: ``name = "package.module:PlantClass"``."""
@@ -102,6 +101,8 @@ def make_plant(
                 f"integrator is {shown(integrator)}; a plant in a scene has the engine's own stepper, which "
                 f"is integrator={ENGINE!r}"
             )
+        from dynx.sim.plants.world_plant import WorldPlant
+
         return WorldPlant(name, model, disturbances, dt, substeps=substeps)
     if integrator == ENGINE:
         try:

@@ -32,7 +32,6 @@ from dynx.sim.controller_checks import controller_numbers
 from dynx.sim.scenario.moved import present_fields, present_name
 from dynx.trajectory.base import Trajectory
 from dynx.world.scene import Scene
-from dynx.world.scene.documents import scene_document, scene_from_document
 
 MAX_WORDS_LENGTH = 80
 """Largest number of characters of a value in a message."""
@@ -138,6 +137,8 @@ def encode(value: Any, model: Model | None = None) -> Document:
     if isinstance(value, Unknown):
         return json.loads(value.text)
     if isinstance(value, Scene):
+        from dynx.world.scene.documents import scene_document
+
         return {SCENE: scene_document(value)}
     if isinstance(value, Controller):
         document = _controller(value, model)
@@ -234,6 +235,8 @@ def _decoded(document: Document, model: Model | None) -> Any:
     if document == SAME_MODEL and model is not None:
         return model
     if SCENE in document:
+        from dynx.world.scene.documents import scene_from_document
+
         return scene_from_document(document[SCENE])
     if MODEL in document:
         return robot_from_document(document[MODEL])
