@@ -1,4 +1,5 @@
-"""Figures by matplotlib, without a window or global state. No other module imports matplotlib."""
+"""Figures by matplotlib, without a window or global state, as files or in pages. No other module imports
+matplotlib."""
 
 from __future__ import annotations
 
@@ -7,6 +8,7 @@ from functools import cache
 from io import BytesIO
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 from dynx.errors import ArgumentError, NotInstalledError, shown
 from dynx.files.writing import atomic_file
@@ -62,3 +64,39 @@ def save_figure(figure: Any, path: str | os.PathLike[str]) -> None:
     kind = picture_format(path)
     with atomic_file(path) as file:
         figure.savefig(file, format=kind, dpi=RESOLUTION)
+
+
+def svg_element(figure: Any) -> str:
+    """Return a figure as an SVG element for a page, whose style sheet may decide on colours and fonts.
+
+    What has a ``gid`` has it as its class. Text stays text. The background is that of the page; nothing is
+    clipped, and nothing refers to other files.
+    """
+    from matplotlib import rc_context
+
+    figure.patch.set_visible(False)
+    for axes in figure.axes:
+        axes.patch.set_visible(False)
+    data = BytesIO()
+    with rc_context({"svg.fonttype": "none", "svg.hashsalt": "dynx"}):
+        figure.savefig(data, format="svg", metadata={"Date": None})
+    root = ElementTree.fromstring(data.getvalue())
+    for parent in root.iter():
+        for child in list(parent):
+            if child.tag.endswith(("metadata", "style", "clipPath")):
+                parent.remove(child)
+    width, height = root.attrib["viewBox"].split()[2:]
+    root.attrib = {"viewBox": f"0 0 {width} {height}"}
+    for each in root.iter():
+        each.tag = each.tag.rpartition("}")[2]
+        given = {name.rpartition("}")[2]: value for name, value in each.attrib.items() if name != "clip-path"}
+        # A style sheet overrides attributes, but not styles.
+        styles = [pair.partition(":") for pair in given.pop("style", "").split(";") if pair.strip()]
+        given |= {name.strip(): value.strip() for name, _, value in styles}
+        if each.tag == "g" and "id" in given:
+            given["class"] = given.pop("id")
+        each.attrib = given
+    for marker in root.findall(".//defs/path"):
+        # What uses a marker decides on its colour, since markers of several figures share one name.
+        marker.attrib.pop("stroke", None)
+    return ElementTree.tostring(root, encoding="unicode")

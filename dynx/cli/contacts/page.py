@@ -1,8 +1,8 @@
-"""HTML page of ``dynx contacts`` and the geometry of its plots, made from the JSON document alone.
+"""HTML page of ``dynx contacts`` with its plots, made from the JSON document alone.
 
 The templates beside this module hold the markup of the results, those of `dynx.files.pages` the frame. A plot
-has errors over the step on logarithmic axes, one line for each engine; the template draws it as SVG in the
-page, so that lines and text take the colours of a light or a dark page.
+has errors over the step on logarithmic axes, one line for each engine. It is drawn by matplotlib and stands
+as SVG in the page, so that lines and text take the colours of a light or a dark page.
 """
 
 from __future__ import annotations
@@ -12,8 +12,7 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dynx._version import __version__
 from dynx.cli.contacts import wording
@@ -27,6 +26,7 @@ from dynx.cli.contacts.wording import (
 )
 from dynx.cli.shell.output import Entry
 from dynx.errors import escaped
+from dynx.files.figures import new_figure, svg_element
 from dynx.files.pages import page_environment, page_text
 
 if TYPE_CHECKING:
@@ -161,8 +161,7 @@ def template_environment() -> Environment:
         meanings=wording.VERDICT_MEANINGS,
         single_step=wording.SINGLE_STEP,
         styles=ENGINE_STYLES,
-        width=WIDTH,
-        height=HEIGHT,
+        shapes=MARKER_TEXTS,
     )
     return environment
 
@@ -174,11 +173,8 @@ def _footer(report: Entry) -> str:
     )
 
 
-WIDTH, HEIGHT = 320.0, 210.0
-"""Size of a plot [pixels]."""
-
-LEFT, RIGHT, TOP, BOTTOM = 46.0, 14.0, 8.0, 30.0
-"""Margins beside the axes [pixels]."""
+WIDTH, HEIGHT = 3.4, 2.2
+"""Size of a plot [in]."""
 
 DECADES_BELOW = 2
 """Decades below the tolerance that are drawn: smaller errors lie on the lower edge."""
@@ -186,67 +182,44 @@ DECADES_BELOW = 2
 MAX_ERROR = 1e3
 """Error from which on errors lie on the upper edge, also those that are not finite."""
 
-STEP_AXIS_SHARE = 0.8
-"""Share of the length of the axis of steps that lies between the smallest and the largest step."""
+ENGINE_OFFSET = 0.02
+"""Shift of the line of one engine against the next, so that equal errors do not cover each other, as a share
+of the logarithmic axis of steps."""
 
-ENGINE_OFFSET = 5.0
-"""Shift of the line of one engine against the next, so that equal errors do not cover each other [pixels]."""
+TRIANGLE_DROP = 0.07
+"""Distance of an order triangle below its line, as a share of the logarithmic axis of errors."""
 
-TRIANGLE_OFFSET = 10.0
-"""Distance of an order triangle below its line [pixels]."""
-
-MIN_LABEL_DISTANCE_X, MIN_LABEL_DISTANCE_Y = 40.0, 14.0
-"""Distances between the labels of two order triangles that do not touch [pixels]."""
+MIN_LABEL_DISTANCE = (0.15, 0.08)
+"""Distances between the labels of two order triangles that do not touch, as shares of the axes."""
 
 MAX_LABELS = 6
 """Largest number of labels on the axis of errors."""
 
-
-@dataclass(frozen=True)
-class Triangle:
-    """Triangle below a falling line, whose longest side has the slope of its order."""
-
-    points: str
-    label: str
-    x: float
-    y: float
+MARKERS = "os^D"
+MARKER_TEXTS = "\u25cf\u25a0\u25b2\u25c6"
+"""Shapes of the markers of engines, by matplotlib and in the legend; further engines repeat them."""
 
 
-@dataclass(frozen=True)
-class Line:
-    """Errors of one engine: points in pixels, and the order triangle of a line that falls.
-
-    `changed` has the points with the setting that is the cause of the error.
-    """
-
-    engine: str
-    number: int
-    points: tuple[tuple[float, float], ...]
-    changed: tuple[tuple[float, float], ...] = ()
-    triangle: Triangle | None = None
-
-
-@dataclass(frozen=True)
-class Plot:
-    """One figure of a case: its axes and the line of each engine."""
+class Plot(NamedTuple):
+    """One figure of a case, with the lines of all engines as an SVG element."""
 
     title: str
     exact: str
-    x_ticks: tuple[tuple[float, str], ...]
-    y_ticks: tuple[tuple[float, int], ...]
-    tolerance_y: float
-    lines: tuple[Line, ...]
-
-    left: float = LEFT
-    right: float = WIDTH - RIGHT
-    top: float = TOP
-    bottom: float = HEIGHT - BOTTOM
+    svg: str
 
 
 def plots(case: Entry, steps: Sequence[float], engines: Sequence[str]) -> list[Plot]:
     """Return the plots of a case, one for each figure that is not within the tolerance in every engine."""
     named = figures_by_name(case).values()
-    return [_plot([*found.values()], steps, engines) for found in named if not _is_within(found)]
+    shown = [[*found.values()] for found in named if not _is_within(found)]
+    return [
+        Plot(
+            figure_name(first),
+            quantity_text(first["exact"], first["unit"]),
+            svg_element(draw_errors([first, *others], steps, engines)),
+        )
+        for first, *others in shown
+    ]
 
 
 def all_within(case: Entry) -> list[str]:
@@ -258,105 +231,77 @@ def _is_within(figures: Mapping[str, Entry]) -> bool:
     return all(each["verdict"] == "within" for each in figures.values())
 
 
-def _plot(figures: Sequence[Entry], steps: Sequence[float], engines: Sequence[str]) -> Plot:
-    first = figures[0]
-    axes = _Axes.around(figures, steps)
-    lines: list[Line] = []
-    for figure in figures:
-        number = engines.index(figure["engine"])
-        aside = ENGINE_OFFSET * (number - 0.5 * (len(engines) - 1))
-        points = axes.points(figure["errors"], aside)
-        cause = figure["attribution"]
-        changed = () if cause is None else axes.points(cause["errors"][-1], aside)
-        placed = [each.triangle for each in lines if each.triangle is not None]
-        triangle = None if figure["order"] is None else _triangle(figure["order"], points, axes, placed)
-        lines.append(Line(figure["engine"], number, points, changed, triangle))
-    return Plot(
-        figure_name(first),
-        quantity_text(first["exact"], first["unit"]),
-        tuple((axes.x(dt), step_text(dt)) for dt in steps),
-        axes.labels(),
-        axes.y(first["tolerance"]),
-        tuple(lines),
+def draw_errors(figures: Sequence[Entry], steps: Sequence[float], engines: Sequence[str]) -> Any:
+    """Return a `matplotlib.figure.Figure` of the errors of one figure in each engine over the step.
+
+    What the style sheet colours has its class as ``gid``. A line with the setting that is the cause of an
+    error is named ``changed``, a triangle with the slope of an order ``order``.
+    """
+    tolerance = min(each["tolerance"] for each in figures)
+    causes = [each["attribution"] for each in figures]
+    rows = [
+        *(each["errors"] for each in figures),
+        *(each["errors"][-1] for each in causes if each is not None),
+    ]
+    errors = [min(as_number(error), MAX_ERROR) for row in rows for error in row]
+    low = math.floor(math.log10(max(min([*errors, tolerance]), tolerance * 10.0**-DECADES_BELOW)))
+    high = max(math.ceil(math.log10(max([*errors, 10.0 * tolerance]))), low + 1)
+    span = math.log10(max(steps) / min(steps)) or 1.0
+
+    figure = new_figure(WIDTH, HEIGHT)
+    axes = figure.subplots()
+    axes.set(xscale="log", yscale="log", ylim=(10.0**low, 10.0**high))
+    axes.set_xlim(min(steps) / 10.0 ** (0.13 * span), max(steps) * 10.0 ** (0.13 * span))
+    axes.set_xticks(steps, [step_text(dt) for dt in steps])
+    powers = range(low, high + 1, max(1, math.ceil((high - low) / (MAX_LABELS - 1))))
+    axes.set_yticks(
+        [10.0**power for power in powers], [f"10{str(power).translate(_RAISED)}" for power in powers]
     )
+    axes.minorticks_off()
+    axes.tick_params(length=0, labelsize=8)
+    axes.grid(visible=True, gid="grid")
+    axes.axhspan(10.0**low, tolerance, gid="within")
+    for spine in axes.spines.values():
+        spine.set_gid("frame")
+
+    labels: list[Sequence[float]] = []
+    for each, cause in zip(figures, causes, strict=True):
+        number = engines.index(each["engine"])
+        aside = 10.0 ** (ENGINE_OFFSET * span * (number - 0.5 * (len(engines) - 1)))
+        style = {"marker": MARKERS[number % len(MARKERS)], "clip_on": False, "markersize": 5}
+        for row, kind in ((each["errors"], "line"), (cause and cause["errors"][-1], "line changed")):
+            if row:
+                # Fewer errors than steps belong to the smallest.
+                x = [aside * dt for dt in steps[len(steps) - len(row) :]]
+                y = [min(max(as_number(error), 10.0**low), 10.0**high) for error in row]
+                axes.plot(x, y, gid=f"e{number % ENGINE_STYLES} {kind}", **style)
+                if kind == "line" and each["order"] is not None and each["order"] <= MAX_ORDER:
+                    _draw_triangle(axes, each["order"], x, y, labels)
+    return figure
 
 
-def _triangle(
-    order: float, points: Sequence[tuple[float, float]], axes: _Axes, placed: Sequence[Triangle]
-) -> Triangle | None:
-    """Return the triangle below an interval of a line, the steepest where there is room; None without any."""
-    intervals = sorted(pairwise(points), key=lambda pair: pair[0][1] - pair[1][1])
-    for (right, upper), (left, lower) in intervals if order <= MAX_ORDER else ():
-        half = 0.25 * (right - left)
-        rise = axes.slope(order) * 2.0 * half
-        x, y = 0.5 * (left + right), 0.5 * (upper + lower) + TRIANGLE_OFFSET
-        corners = ((x - half, y + 0.5 * rise), (x + half, y - 0.5 * rise), (x + half, y + 0.5 * rise))
-        found = Triangle(
-            " ".join(f"{a:.1f},{b:.1f}" for a, b in corners), f"{order:.1f}", x + half + 3.0, y + 4.0
-        )
+_RAISED = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
+
+
+def _draw_triangle(
+    axes: Any, order: float, x: Sequence[float], y: Sequence[float], labels: list[Sequence[float]]
+) -> None:
+    """Draw a triangle below an interval of a line, the steepest where its label touches none of `labels`."""
+    place = axes.transScale + axes.transLimits
+    drop = math.prod(axes.get_ylim()[k] ** (TRIANGLE_DROP, -TRIANGLE_DROP)[k] for k in (0, 1))
+    for k in sorted(range(len(x) - 1), key=lambda k: y[k + 1] / y[k]):
+        middle, half = math.sqrt(x[k] * x[k + 1]), (x[k] / x[k + 1]) ** 0.25
+        rise, level = half**order, drop * math.sqrt(y[k] * y[k + 1])
+        corner = middle * half, level / rise
+        at = place.transform((corner[0], level)).tolist()
         free = all(
-            abs(found.x - each.x) > MIN_LABEL_DISTANCE_X or abs(found.y - each.y) > MIN_LABEL_DISTANCE_Y
-            for each in placed
+            any(abs(a - b) > least for a, b, least in zip(at, other, MIN_LABEL_DISTANCE, strict=True))
+            for other in labels
         )
-        if free and corners[0][1] <= HEIGHT - BOTTOM:
-            return found
-    return None
-
-
-@dataclass(frozen=True)
-class _Axes:
-    """Logarithmic axes that span the steps, and powers of ten of the errors."""
-
-    steps: tuple[float, ...]
-    low: int
-    high: int
-
-    @classmethod
-    def around(cls, figures: Sequence[Entry], steps: Sequence[float]) -> _Axes:
-        """Return the axes that show the errors of some figures, and the tolerance."""
-        tolerance = min(each["tolerance"] for each in figures)
-        rows = [each["errors"] for each in figures]
-        rows += [each["attribution"]["errors"][-1] for each in figures if each["attribution"] is not None]
-        errors = [min(as_number(error), MAX_ERROR) for row in rows for error in row]
-        least = tolerance * 10.0**-DECADES_BELOW
-        low = math.floor(math.log10(max(min([*errors, tolerance]), least)))
-        high = math.ceil(math.log10(max([*errors, 10.0 * tolerance])))
-        return cls(tuple(steps), low, max(high, low + 1))
-
-    def x(self, dt: float) -> float:
-        """Return the place of a step, which is the middle where there is only one [pixels]."""
-        return LEFT + (0.5 if self._span == 0.0 else self._part(dt)) * (WIDTH - LEFT - RIGHT)
-
-    def y(self, error: float | None) -> float:
-        """Return the place of an error, on an edge where it lies outside [pixels]."""
-        number = as_number(error)
-        power = self.high if number >= MAX_ERROR else math.log10(max(number, 10.0**self.low))
-        part = (min(power, self.high) - self.low) / (self.high - self.low)
-        return HEIGHT - BOTTOM - part * (HEIGHT - TOP - BOTTOM)
-
-    def points(self, errors: Sequence[float | None], aside: float) -> tuple[tuple[float, float], ...]:
-        """Return the places of the errors, moved aside by some pixels.
-
-        Fewer errors than steps belong to the smallest.
-        """
-        steps = self.steps[len(self.steps) - len(errors) :]
-        return tuple((self.x(dt) + aside, self.y(error)) for dt, error in zip(steps, errors, strict=True))
-
-    def slope(self, order: float) -> float:
-        """Return the pixels by which a line of that order rises for each pixel to the right."""
-        decade_x = STEP_AXIS_SHARE * (WIDTH - LEFT - RIGHT) / self._span
-        decade_y = (HEIGHT - TOP - BOTTOM) / (self.high - self.low)
-        return order * decade_y / decade_x
-
-    def labels(self) -> tuple[tuple[float, int], ...]:
-        """Return the places of powers of ten, and the powers."""
-        every = max(1, math.ceil((self.high - self.low) / (MAX_LABELS - 1)))
-        powers = range(self.low, self.high + 1, every)
-        return tuple((self.y(10.0**power), power) for power in powers)
-
-    @property
-    def _span(self) -> float:
-        return math.log10(max(self.steps) / min(self.steps))
-
-    def _part(self, dt: float) -> float:
-        return 0.5 - 0.5 * STEP_AXIS_SHARE + STEP_AXIS_SHARE * math.log10(dt / min(self.steps)) / self._span
+        if free and corner[1] >= axes.get_ylim()[0]:
+            axes.fill(
+                [middle / half, corner[0], corner[0]], [corner[1], level * rise, corner[1]], gid="order"
+            )
+            axes.text(corner[0], level, f" {order:.1f}", fontsize=8, verticalalignment="center")
+            labels.append(at)
+            return

@@ -62,6 +62,7 @@ from dynx.contacts import (
 )
 from dynx.contacts.candidates import SUBSTEPS
 from dynx.errors import ArgumentError
+from dynx.files.figures import new_figure
 from dynx.files.writing import write_text
 from dynx.steppers.registry import installed_worlds
 from dynx.steppers.settings import Setting
@@ -90,6 +91,8 @@ def contacts(
         check_writable(html_path)
         if html_path == json_path:
             raise ArgumentError(f"two formats would be written to {html_path!r}")
+        # An error of a package that is missing comes before a run of minutes.
+        new_figure(1.0, 1.0)
     chosen = engines or installed_worlds()
     given = settings_by_engine(
         chosen, settings, {SUBSTEPS: Setting(1, "steps of the engine in each step", 1)}

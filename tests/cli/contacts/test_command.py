@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from dataclasses import replace
 from importlib.util import find_spec
 from io import StringIO
@@ -178,3 +179,12 @@ def test_wrong_input_gives_one_line_and_exit_code_2(arguments: list[str], messag
     assert result.exit_code == 2
     assert message in result.output
     assert len(result.output.splitlines()) == 1
+
+
+def test_a_page_without_matplotlib_names_the_extra_before_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    result = run("--engine", ENGINES[0], "--html", str(tmp_path / "c.html"))
+    assert result.exit_code == 2
+    assert "pip install 'dynx[plot]'" in result.output

@@ -3,25 +3,16 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.cli.contacts.page import (
-    BOTTOM,
-    ENGINE_STYLES,
-    HEIGHT,
-    LEFT,
-    RIGHT,
-    TOP,
-    WIDTH,
-    contacts_page,
-    plots,
-)
+from dynx.cli.contacts.page import ENGINE_STYLES, contacts_page, draw_errors, plots
 from dynx.cli.contacts.run import document
-from dynx.cli.contacts.wording import headline
+from dynx.cli.contacts.wording import figures_by_name, headline
 from dynx.files.documents import json_text
 from tests.cli.contacts.documents import ENGINES, STEPS, at_one_step, conformance, example
 from tests.files.page import Page, contrast
@@ -30,7 +21,7 @@ ALLOWED = {
     *("html", "head", "meta", "title", "style", "body", "header", "main", "footer", "section", "div", "span"),
     *("h1", "h2", "h3", "h4", "p", "a", "code", "pre", "details", "summary", "figure", "figcaption"),
     *("table", "thead", "tbody", "tr", "th", "td", "ul", "li", "dl", "dt", "dd"),
-    *("svg", "wbr", "g", "rect", "circle", "path", "polyline", "text", "tspan"),
+    *("svg", "wbr", "b", "g", "defs", "path", "use", "text"),
 }
 """Elements that fetch nothing and run nothing."""
 
@@ -88,20 +79,33 @@ def test_the_page_of_the_written_document_is_the_same() -> None:
     assert contacts_page(json.loads(json_text(document))) == contacts_page(document)
 
 
-def test_points_lie_on_the_axes_and_triangles_have_the_order_of_the_error() -> None:
+def test_lines_hold_the_errors_and_triangles_have_their_order() -> None:
     (case,) = example()["cases"]
-    fast, slow = plots(case, STEPS, ENGINES)
-    for line in (*fast.lines, *slow.lines):
-        for x, y in (*line.points, *line.changed):
-            assert LEFT < x < WIDTH - RIGHT
-            assert TOP <= y <= HEIGHT - BOTTOM
-        assert [x for x, _ in line.points] == sorted((x for x, _ in line.points), reverse=True)
-    line = next(line for line in fast.lines if line.engine == "two")
-    assert line.triangle is not None
-    assert line.triangle.label == "1.0"
-    (ax, ay), (bx, by), _ = (map(float, each.split(",")) for each in line.triangle.points.split())
-    (right, upper), (left, lower) = line.points[0], line.points[-1]
-    assert (ay - by) / (bx - ax) == pytest.approx((lower - upper) / (right - left), rel=1e-2)
+    fast, slow = ([*found.values()] for found in [*figures_by_name(case).values()][:2])
+    for figures in (fast, slow):
+        (axes,) = draw_errors(figures, STEPS, ENGINES).axes
+        (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+        named = {line.get_gid(): line for line in axes.lines}
+        for number, each in enumerate(figures):
+            line = named[f"e{number} line"]
+            assert [left < x < right for x in line.get_xdata()] == [True] * len(STEPS)
+            shown = [max(error, low) if math.isfinite(error) else high for error in each["errors"]]
+            assert line.get_ydata() == pytest.approx(shown)
+            assert (f"e{number} line changed" in named) == (each["attribution"] is not None)
+    (axes,) = draw_errors(fast, STEPS, ENGINES).axes
+    (triangle,) = (patch for patch in axes.patches if patch.get_gid() == "order")
+    (x0, y0), (x1, y1), _ = triangle.get_xy()[:3]
+    assert math.log(y1 / y0) / math.log(x1 / x0) == pytest.approx(1.0)
+    assert [text.get_text().strip() for text in axes.texts] == ["1.0"]
+
+
+def test_a_plot_names_what_it_shows_and_takes_the_colours_of_the_page() -> None:
+    text = contacts_page(example())
+    labels = [value for key, value in Page(text).attributes if key == "aria-label"]
+    (case,) = example()["cases"]
+    assert labels == [f"error of {plot.title} over the step" for plot in plots(case, STEPS, ENGINES)]
+    classes = {value for key, value in Page(text).attributes if key == "class"}
+    assert {"grid", "within", "frame", "order", "e0 line", "e0 line changed"} <= classes
 
 
 def test_lines_can_be_seen_on_either_page() -> None:
