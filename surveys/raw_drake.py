@@ -26,10 +26,7 @@ def loaded(task: dict[str, Any]) -> Any:
         "path": task["path"],
         "root_link": task["root"],
     }
-    load = task["load"]
-    if task["root"] == "world":
-        load = "\n".join(line for line in load.splitlines() if "WeldFrames" not in line)
-    exec("\n".join([load.replace(FINALIZE, ""), *task["calls"], FINALIZE]), names)
+    exec("\n".join([task["load"].replace(FINALIZE, ""), *task["calls"], FINALIZE]), names)
     return names["plant"]
 
 

@@ -40,6 +40,7 @@ from dynx.doctor.mending import (
     mend,
     place_of,
     readable,
+    reading_change,
     remedy_of,
 )
 from dynx.doctor.report import Effect
@@ -388,7 +389,9 @@ def smallest_mending(
     def attempt(omitted: set[Place]) -> tuple[Mending, Examination, set[str]]:
         least = mend(case, rules, all_except(omitted))
         result = examiner.examine(least.case)
-        return least, result, {name for name in examiner.engines if result.max_error(name) > allowed(name)}
+        other = reading_change(case, least) is not None
+        errors = {name: result.max_error(name) for name in examiner.engines}
+        return least, result, {name for name, error in errors.items() if other or error > allowed(name)}
 
     right = {name for name in examiner.engines if full.examination.max_error(name) <= tolerance}
     proofs = full.proofs

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -39,10 +39,12 @@ from dynx.doctor.mending import (
     changed_parts,
     detections,
     differs,
+    left_undone,
     level_of,
     mend,
     place_of,
     readable,
+    reading_change,
     refusal,
     remedy_of,
 )
@@ -67,6 +69,7 @@ from dynx.model.tree import Base, checked_base
 from dynx.model.xml.source import XmlSource
 from dynx.option_names import checks_option_names
 from dynx.rules import LEVELS, CallingRule, Case, Detection, Level, Rule, all_rules
+from dynx.rules.case import end_of
 from dynx.rules.geometry import is_found, is_found_above, named_meshes, parts_with_meshes, reason_unread
 from dynx.rules.registry import checked_choices
 
@@ -163,7 +166,7 @@ def _engine_result(case: Case, name: str, before: Examination) -> EngineResult:
     return EngineResult(
         engine=name,
         version=kind.engine_version(),
-        call=kind.load_call(case.base == "floating"),
+        call=kind.load_call(case.base == "floating", before.reference.model.root),
         refused=output.refused,
         refused_after=output.refused,
         not_used=output.not_used,
@@ -231,6 +234,28 @@ def all_findings(
             )
         findings.append(finding)
     return tuple(sorted(findings, key=lambda finding: finding.kind))
+
+
+def with_original_names(findings: Iterable[Finding], given: XmlSource) -> tuple[Finding, ...]:
+    """Name each link and joint as the `given` text does, where a remedy renamed or added the one that was
+    found: the part that stands at its line."""
+    return tuple(_with_original_names(finding, given) for finding in findings)
+
+
+def _with_original_names(finding: Finding, given: XmlSource) -> Finding:
+    found = {"link": finding.link, "joint": finding.joint}
+    known = {tag: {part.attributes.get("name") for part in given.root.all(tag)} for tag in found}
+    known["link"] |= {end_of(each, end) for each in given.root.all("joint") for end in ("parent", "child")}
+    foreign = [name for tag, name in found.items() if name is not None and name not in known[tag]]
+    if not foreign:
+        return finding
+    above = [part for part in given.root.children if part.line <= (finding.line or 0)]
+    part = above[-1] if above else given.root
+    own, message = part.attributes.get("name"), finding.message
+    for name in foreign if own else ():
+        message = message.replace(name, str(own))
+    link, joint = (own if part.tag == tag else None for tag in found)
+    return replace(finding, link=link, joint=joint, message=message)
 
 
 def _condition(attribution: AttributedCause) -> str:
@@ -390,7 +415,8 @@ def diagnose(
     the search for the smallest robot that shows a difference which no rule explains. `progress` is called
     with the name of each step.
 
-    A robot that cannot be read gives a report with `error` set. Raises ArgumentError,
+    A robot that cannot be read gives a report with `error` set, whose `findings` are the places without a
+    remedy. Raises ArgumentError,
     UnknownBackendError, NotInstalledError and UnknownNameError for arguments that are invalid for any robot.
     """
     started = time.perf_counter()
@@ -400,11 +426,15 @@ def diagnose(
     if level not in LEVELS:
         raise UnknownNameError(f"no level {shown(level)}{nearest(level, LEVELS)}")
     progress = progress or _ignore_progress
+    case = None
     try:
         case = open_case(robot, base, choices)
         report = _diagnosis_of(case, examiner, variants, tolerance, counterexamples, seed, level, progress)
     except DynxError as error:
         report = refused_report(str(_label(robot)), error, base=base)
+        if case is not None:
+            left = all_findings(left_undone(case), [], Mending(case), examiner.engines)
+            report = replace(report, findings=left)
     seconds = time.perf_counter() - started
     tolerance = max(report.tolerance, tolerance)
     return replace(report, samples=samples, seed=seed, tolerance=tolerance, seconds=seconds)
@@ -513,9 +543,10 @@ def _diagnosis_of(
     if level != "physics":
         mended = mend(case, rules, all_except(best.omitted), level)
         last = examiner.examine(mended.case, reference=examiner.reference(readable(mended.case).case))
+    withheld = reading_change(case, mended)
     return replace(
         with_after(report, last, best.examination),
-        findings=all_findings(found, best.proofs, mended, examiner.engines),
+        findings=with_original_names(all_findings(found, best.proofs, mended, examiner.engines), case.source),
         unexplained=unexplained,
         choices=mended.choices,
         calls=run_time_calls(mended.case, examiner),
@@ -530,7 +561,8 @@ def _diagnosis_of(
             variants,
             tolerance,
         ),
-        mended=mended.case.source.text if differs(mended.case, case) else None,
+        mended=mended.case.source.text if differs(mended.case, case) and withheld is None else None,
+        withheld=withheld,
         form=mended.case.source.form,
     )
 

@@ -119,14 +119,14 @@ def _words(element: SourceElement) -> tuple[Any, ...]:
     return element.tag, words, [_words(child) for child in element.children]
 
 
-def _moves_alike(before: Case, after: Case) -> bool:
-    """Check whether the equations of motion are those of before to rounding, also if the base floats."""
+def _moves_alike(before: Case, after: Case, tolerance: float = BAR) -> bool:
+    """Check whether the equations of motion are those of before to `tolerance`, also if the base floats."""
     try:
         one, other = _values(before.source), _values(after.source)
     except DynxError:
         return False
     pairs = zip(_compared(one), _compared(other), strict=True)
-    return all(_near(first, second) for first, second in pairs)
+    return all(_near(first, second, tolerance) for first, second in pairs)
 
 
 def _values(source: XmlSource) -> ReferenceValues:
@@ -138,9 +138,39 @@ def _compared(values: ReferenceValues) -> Iterator[Floats]:
     yield from (values.poses, values.mass_matrix, values.torque)
 
 
-def _near(one: Floats, other: Floats) -> bool:
+def _near(one: Floats, other: Floats, tolerance: float) -> bool:
     size = float(np.max(np.abs(one), initial=0.0))
-    return one.shape == other.shape and bool(np.all(np.abs(one - other) <= BAR * size))
+    return one.shape == other.shape and bool(np.all(np.abs(one - other) <= tolerance * size))
+
+
+_SAME = 1e-9
+"""Largest relative difference of total masses, mass matrices and torques of one robot."""
+
+_ADDED_MASS = 1e-13
+"""Largest mass [kg] that remedies add to a robot whose links may have none."""
+
+
+def reading_change(case: Case, mended: Mending) -> str | None:
+    """Describe how the robot of a mended file differs from that of the file; None where it is the same.
+
+    Numbers of coordinates and total masses are compared, and the equations of motion where no remedy states
+    that it changes them. A file that dynx cannot read without its remedies is compared with its text made
+    readable.
+    """
+    before, after = readable(case).case, mended.case
+    if not (before.readable and after.readable) or before.source.data == after.source.data:
+        return None
+    one, other = before.model, after.model
+    free = [model_without_mimics(each.source, each.base).nv for each in (before, after)]
+    if one.nv != other.nv and free[0] != free[1]:
+        return f"its robot would have {other.nv} coordinates instead of {one.nv}"
+    masses = [sum(link.inertial.mass for link in each.links if link.inertial) for each in (one, other)]
+    if abs(masses[1] - masses[0]) > _SAME * abs(masses[0]) + _ADDED_MASS:
+        return f"its robot would weigh {masses[1]:g} kg instead of {masses[0]:g} kg"
+    stated = any(remedy.changes_physics for _, remedy in mended.applied)
+    if free[0] == free[1] and not stated and not _moves_alike(before, after, _SAME):
+        return "the equations of motion of its robot would be others"
+    return None
 
 
 MAX_ROUNDS = 4
@@ -198,6 +228,22 @@ def refusal(case: Case) -> DynxError | None:
         line = line_map(*texts).get(error.line, error.line)
         return type(error)(error.message, source=error.source, line=line)
     return error if isinstance(error, DynxError) else None
+
+
+def left_undone(case: Case) -> list[tuple[Rule, Detection]]:
+    """List the causes for which dynx refuses the text and that have no remedy, with their lines in the text
+    as it is."""
+    mended = _after_reading_rules(case, "physics").case
+    if mended.readable:
+        return []
+    lines = line_map(*map(_lines, (case, mended)))
+    return [
+        (rule, each if each.line is None else replace(each, line=lines.get(each.line, each.line)))
+        for rule in _rules("reading")
+        if rule.kind == "difference"
+        for each in rule.detect(mended)
+        if remedy_of(mended, rule, [each]) is None
+    ]
 
 
 def _after_reading_rules(case: Case, level: Level) -> Mending:
@@ -307,6 +353,9 @@ def _after_remedy(mended: Mending, rule: Rule, chosen: Sequence[Detection], leve
     if remedy is None:
         return mended
     if not differs(remedy.case, mended.case) and remedy.case.calls == mended.case.calls:
+        return mended
+    if rule.stage == "model" and not remedy.case.readable:
+        # A cause that was left in the text forbids this remedy: mending the text anew makes another robot.
         return mended
     if level == "physics" or _within(level, rule, mended.case, remedy):
         return Mending(remedy.case, (*mended.applied, (rule, remedy)))

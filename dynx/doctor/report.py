@@ -234,6 +234,8 @@ class DoctorReport:
     """Line of the text at which the `error` is, where it is known."""
     mended: str | None = field(default=None, compare=False)
     """URDF text that the engines load alike; None where nothing had to change or no remedy helps."""
+    withheld: str | None = field(default=None, compare=False)
+    """Reason why there is no mended text although the file needs one: it would describe another robot."""
     text: str | None = field(default=None, compare=False)
     """Text that was examined, for excerpts."""
     form: TextForm | None = field(default=None, compare=False)
@@ -398,6 +400,7 @@ class DoctorEntry:
     meshes: int
     unread_meshes: tuple[UnreadMesh, ...]
     error: LoadFailure | None
+    withheld: str | None
     seconds: float
 
 

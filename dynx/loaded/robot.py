@@ -115,8 +115,11 @@ class LoadedRobot(ABC):
 
     @classmethod
     @abstractmethod
-    def load_call(cls, floating: bool) -> str:
-        """Return the documented call that loads a file, as the line or lines of code that users write."""
+    def load_call(cls, floating: bool, root: str | None = None) -> str:
+        """Return the documented call that loads a file, as the line or lines of code that users write.
+
+        `root` is the name of the root link, on which the call may depend.
+        """
 
     @abstractmethod
     def describe(self) -> LoadedModel:

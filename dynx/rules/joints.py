@@ -251,6 +251,8 @@ def joint_split(source: XmlSource, joint: SourceElement) -> Iterator[Edit]:
         yield source.removal(limit)
     elif first.type == "prismatic":
         yield source.insertion(joint, UNLIMITED)
+    dynamics = joint.first("dynamics")
+    loss = "" if dynamics is None else _start_tag(dynamics)
     lines = []
     for own, each, parent, below in zip(names[1:], rest, links, [*links[1:], child], strict=True):
         least = "\n".join(f"{source.unit}{line}" for line in least_inertial().split("\n"))
@@ -259,9 +261,17 @@ def joint_split(source: XmlSource, joint: SourceElement) -> Iterator[Edit]:
         inside.append(f'<axis xyz="{each.axis}"/>')
         if each.type == "prismatic":
             inside.append(UNLIMITED)
+        if loss:
+            inside.append(loss)
         body = "\n".join(f"{source.unit}{line}" for line in inside)
         lines.append(f'<joint name={quoteattr(own)} type="{each.type}">\n{body}\n</joint>')
     yield source.insertion_after(joint, "\n".join(lines))
+
+
+def _start_tag(element: SourceElement) -> str:
+    """Return an element with its attributes alone, in one line."""
+    pairs = (f" {name}={quoteattr(value)}" for name, value in element.attributes.items())
+    return f"<{element.tag}{''.join(pairs)}/>"
 
 
 def _plane(joint: SourceElement) -> tuple[str, str, str]:

@@ -42,6 +42,11 @@ _INFINITE = re.compile(r"([+-]?)inf(?:inity)?", re.IGNORECASE)
 _FORTRAN = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))[dD]([+-]?[0-9]+)")
 _HEXADECIMAL = re.compile(r"[+-]?0[xX](?:[0-9a-fA-F]+\.?[0-9a-fA-F]*|\.[0-9a-fA-F]+)(?:[pP][+-]?[0-9]{1,4})?")
 _MINUS = re.compile("[\u2010-\u2015\u2212\ufe63\uff0d](?=[0-9.])")
+_UNITS = ("m", "kg", "rad", "s", "N", "m/s", "rad/s", "Nm", "N m", "N*m", "kgm^2", "kg m^2", "kg*m^2")
+_MEANINGLESS = frozenset(("", ".", ",", ";", "f", *_UNITS))
+"""Text behind a number that leaves it as it is: a second point, the suffix of a constant in C, a unit of SI.
+Any other, such as the unit of ``25mm`` or the divisor of ``1/5``, would make it another number."""
+
 _BLANKS = " \t\r\n"
 """The white space of XML, which every engine skips in front of a number and not every one behind it."""
 
@@ -129,8 +134,7 @@ def _misspelled_word(word: str) -> Misspelling | None:
     if exponent := _FORTRAN.fullmatch(word):
         return Misspelling("rest", f"{exponent.group(1)}e{exponent.group(2)}")
     front = _NUMBER.match(word)
-    # "1,2,3" or "1.5-2": what follows is a number again, so this is no number with a rest.
-    if front is None or re.match(r"[-+,;]\s*[0-9.]", word[front.end() :]):
+    if front is None or word[front.end() :].strip() not in _MEANINGLESS:
         return None
     return Misspelling("rest", front.group())
 
@@ -322,8 +326,8 @@ class MisspelledNumberRule(EditingRule):
         """Return the corrected text."""
         return misspelling.meant
 
-    def edit(self, case: Case, attribute: NumericAttribute, misspelling: Misspelling) -> Edit:
-        """Return the edit that corrects the attribute."""
+    def edit(self, case: Case, attribute: NumericAttribute, misspelling: Misspelling) -> Edit | None:
+        """Return the edit that corrects the attribute; None where it is left undone."""
         return case.source.attribute_edit(attribute.element, attribute.name, self.text_for(case, misspelling))
 
     def corrections(self, case: Case) -> Iterable[Correction]:
@@ -333,7 +337,11 @@ class MisspelledNumberRule(EditingRule):
                 continue
             end = self.description.format(meant=self.text_for(case, misspelling), count=len(text.split()))
             message = f"{attribute.name} of <{attribute.element.tag}> is {shown(text)}, {end}"
-            yield correction(attribute.element, message, self.edit(case, attribute, misspelling))
+            edit = self.edit(case, attribute, misspelling)
+            if edit is None:
+                yield correction(attribute.element, f"{message}; left undone: the file has no number for it")
+            else:
+                yield correction(attribute.element, message, edit)
 
 
 # Each of the rules examines the same document before the first remedy makes another.

@@ -48,7 +48,7 @@ class FaultyEngine(LoadedRobot):
         return "3.2.7"
 
     @classmethod
-    def load_call(cls, floating: bool) -> str:
+    def load_call(cls, floating: bool, root: str | None = None) -> str:
         """Return a placeholder."""
         return "load(path)"
 

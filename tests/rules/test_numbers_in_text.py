@@ -61,7 +61,7 @@ def test_a_vector_of_another_length_is_cut_or_filled(words: list[str]) -> None:
     assert (found.fault, found.meant.split()) == ("count", [*words, "0", "0"][:3])
 
 
-@given(decimals, st.sampled_from([".", "kg", " m", "rad", "%"]))
+@given(decimals, st.sampled_from([".", "kg", " m", "rad", " kg*m^2"]))
 def test_what_stands_behind_a_number_is_cut_off(text: str, rest: str) -> None:
     found = misspelled_number(text + rest)
     assert found is not None
@@ -102,7 +102,11 @@ def test_single_numbers(written: str, fault: str, meant: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "written", ["heavy", "nan", "\u2212", "\u22121,5,2", "0x1p9999", "1,2,3", "1-2", "--1", "a b"]
+    "written",
+    [
+        *("heavy", "nan", "\u2212", "\u22121,5,2", "0x1p9999", "1,2,3", "1-2", "--1", "a b"),
+        *("25mm", "90deg", "90 \u00b0", "50%", "1/5", "2*pi", "1.5+2", "3 x 4", "1e"),
+    ],
 )
 def test_what_is_no_number_is_a_word(written: str) -> None:
     found = misspelled_number(written)
@@ -116,6 +120,7 @@ def test_what_is_no_number_is_a_word(written: str) -> None:
         ("a b c", "0 0 0"),
         ("1 2 nan", "1 2 0"),
         ("inf 2kg -3", "0 2 -3"),
+        ("1/5 2 90deg", "0 2 0"),
         ("1,2,3,4", ""),
         ("a", ""),
         ("1 2 x 4", ""),

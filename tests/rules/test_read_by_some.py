@@ -4,6 +4,7 @@ DX420, DX530, DX531, DX533."""
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -296,9 +297,13 @@ def test_an_empty_number_of_a_joint_is_removed(written: str, left: str) -> None:
         assert left in mended("DX420", arm(written, type=type))[1].case.source.text
 
 
-def test_an_empty_mass_is_zero() -> None:
-    case = case_of(link("base", mass="", moments=(0.0, 0.0, 0.0)))
-    assert mended("DX420", case)[1].case.model.inertial("base").mass == 0.0
+@pytest.mark.parametrize("mass", ["", "TODO", "inf"])
+def test_a_mass_without_number_is_left_or_zero_by_choice(mass: str) -> None:
+    case = case_of(link("base", mass=mass, moments=(0.0, 0.0, 0.0)))
+    rule = find_rule("DX420")
+    assert rule.remedy(case, rule.detect(case)) is None
+    guess = replace(case, choices={"DX420": "guess"})
+    assert mended("DX420", guess)[1].case.model.inertial("base").mass == 0.0
 
 
 @pytest.mark.parametrize(

@@ -91,7 +91,8 @@ def test_no_engine_refuses_the_mended_file(shape: str, choice: str, tmp_path: Pa
     )
     found, remedy = mended("DX425", replace(case, choices={"DX425": choice}))
     assert [each.link for each in found] == ["arm"]
-    kept = choice == "thicken" and shape in WITHOUT_SIZE
+    negative = "-" in shape
+    kept = shape in WITHOUT_SIZE and (negative or choice == "thicken")
     assert ("<collision>" in remedy.case.source.text) == kept
     assert not any(refused(remedy.case.source.text, engine, tmp_path) for engine in INSTALLED)
 

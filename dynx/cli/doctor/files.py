@@ -230,8 +230,11 @@ def write_mended(path: str, report: DoctorReport, *, over_input: bool) -> bool:
     """Write the mended description of a report; return False where there is none.
 
     A description that needs no change is written as it was read, unless it is the input. Encoding,
-    byte-order mark and line ends are preserved. Raises ArgumentError for an input that changed meanwhile.
+    byte-order mark and line ends are preserved. Raises ArgumentError for an input that changed meanwhile, and
+    for a robot that its remedies would make another one.
     """
+    if report.withheld is not None:
+        raise ArgumentError(f"{shown(path, 300)} is not written: {report.withheld}")
     text = report.mended
     if text is None and not over_input:
         text = report.text

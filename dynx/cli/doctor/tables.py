@@ -64,6 +64,8 @@ def _show(
 ) -> None:
     show_verdict(out, report)
     if report.error is not None:
+        left = [f"line {each.line}: {each.rule} {each.message}" for each in report.findings]
+        _show_list(out, "left undone", left)
         return
     show_engines(out, report)
     show_errors(out, report)

@@ -26,6 +26,7 @@ from dynx.engines.drake.coordinates import DrakeCoordinates
 from dynx.engines.drake.library import (
     DRAKE_FAILURES,
     JacobianWrtVariable,
+    ModelInstanceIndex,
     MultibodyForces,
     MultibodyPlant,
     Parser,
@@ -246,6 +247,15 @@ def _number(element: SourceElement, attribute: str, default: float) -> float:
 
 
 _V = JacobianWrtVariable.kV
+
+_WORLD = "world"
+"""Name of the link that Drake takes for its world."""
+
+_WELD = "plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(root_link))"
+
+_OWN_INSTANCES = 2
+"""Number of model instances of an empty plant: the world and the default one."""
+
 _ORIGIN: Floats = np.zeros(3)
 
 
@@ -258,19 +268,28 @@ class LoadedDrake(LoadedRobot):
     def __init__(self, path: Path, model: Model, calls: Collection[str] = ()) -> None:
         require_harmless(path, model)
         self._model = model
-        self._plant = plant = MultibodyPlant(time_step=0.0)
+        # The lines shown to users are those that are executed.
+        create, read, *weld, finalize = self.load_call(model.floating, model.root).splitlines()
+        names = {
+            "MultibodyPlant": MultibodyPlant,
+            "Parser": Parser,
+            "path": str(path),
+            "root_link": model.root,
+        }
+        exec(create, names)
+        self._plant = plant = names["plant"]
         self._default_gravity: Floats = np.array(plant.gravity_field().gravity_vector())
         with self._convert_errors("load"), captured_log() as log:
-            instances = Parser(plant).AddModels(str(path))
+            exec(read, names)
+            instances = [ModelInstanceIndex(k) for k in range(_OWN_INSTANCES, plant.num_model_instances())]
             plant.mutable_gravity_field().set_gravity_vector(np.array(model.gravity))
             self._bodies = self._find_bodies(instances)
             if model.root not in self._bodies:
                 raise UnusableEngineError(f"drake lacks the root link {shown(model.root)} of {model.name}")
-            if not model.floating and model.root != "world":
-                plant.WeldFrames(plant.world_frame(), self._bodies[model.root].body_frame())
+            exec("\n".join(weld), names)
             self._joints = self._find_joints(instances)
             set_before_finalize(plant, self._joints, path, calls)
-            plant.Finalize()
+            exec(finalize, names)
             self._context = plant.CreateDefaultContext()
             set_in_context(self._context, self._bodies, model, calls)
             self._forces = MultibodyForces(plant)
@@ -285,14 +304,11 @@ class LoadedDrake(LoadedRobot):
         return drake_version()
 
     @classmethod
-    def load_call(cls, floating: bool) -> str:
-        """Return the call: four lines for a fixed base; for a floating one the line with ``WeldFrames`` is
-        omitted."""
-        weld = "plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(root_link))\n"
-        return (
-            "plant = MultibodyPlant(time_step=0.0)\n"
-            f"Parser(plant).AddModels(path)\n{'' if floating else weld}plant.Finalize()"
-        )
+    def load_call(cls, floating: bool, root: str | None = None) -> str:
+        """Return the call: four lines for a fixed base. The line with ``WeldFrames`` is omitted for a
+        floating one, and for a root named ``world``, which is Drake's world itself."""
+        weld = "" if floating or root == _WORLD else f"{_WELD}\n"
+        return f"plant = MultibodyPlant(time_step=0.0)\nParser(plant).AddModels(path)\n{weld}plant.Finalize()"
 
     # -- quantities ------------------------------------------------------------------------------
 

@@ -40,6 +40,7 @@ DiagramBuilder: Any = _framework.DiagramBuilder
 DiscreteContactApproximation: Any = _plant.DiscreteContactApproximation
 FixedOffsetFrame: Any = _tree.FixedOffsetFrame
 JacobianWrtVariable: Any = _tree.JacobianWrtVariable
+ModelInstanceIndex: Any = _tree.ModelInstanceIndex
 MultibodyForces: Any = _tree.MultibodyForces
 MultibodyPlant: Any = _plant.MultibodyPlant
 Parser: Any = _parsing.Parser
@@ -64,6 +65,7 @@ __all__ = [
     "DiscreteContactApproximation",
     "FixedOffsetFrame",
     "JacobianWrtVariable",
+    "ModelInstanceIndex",
     "MultibodyForces",
     "MultibodyPlant",
     "Parser",

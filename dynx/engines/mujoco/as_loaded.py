@@ -286,7 +286,7 @@ class LoadedMujoco(LoadedRobot):
         return str(mujoco.__version__)
 
     @classmethod
-    def load_call(cls, floating: bool) -> str:
+    def load_call(cls, floating: bool, root: str | None = None) -> str:
         """Return the call: one line for a fixed base, three for a floating one."""
         return loading_lines(floating=floating)
 
@@ -435,6 +435,6 @@ class BalancedMujoco(LoadedMujoco):
     name: ClassVar[str] = "mujoco:balanceinertia"
 
     @classmethod
-    def load_call(cls, floating: bool) -> str:
+    def load_call(cls, floating: bool, root: str | None = None) -> str:
         """Return the call: three lines for a fixed base, four for a floating one."""
         return loading_lines(floating=floating, options="spec.compiler.balanceinertia = True")

@@ -71,7 +71,7 @@ class LoadedPinocchio(LoadedRobot):
         return str(pin.__version__)
 
     @classmethod
-    def load_call(cls, floating: bool) -> str:
+    def load_call(cls, floating: bool, root: str | None = None) -> str:
         """Return the call: one line; the joint of a floating base is its second argument."""
         root = ", pinocchio.JointModelFreeFlyer()" if floating else ""
         return f"model = pinocchio.buildModelFromUrdf(path{root})"

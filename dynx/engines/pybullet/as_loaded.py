@@ -266,7 +266,7 @@ class LoadedPyBullet(LoadedRobot):
             return "unknown"
 
     @classmethod
-    def load_call(cls, floating: bool) -> str:
+    def load_call(cls, floating: bool, root: str | None = None) -> str:
         """Return the call: one line, after ``import pybullet as p`` and ``p.connect(p.DIRECT)``."""
         return f"robot = p.loadURDF(path, useFixedBase={not floating}, flags=p.URDF_USE_INERTIA_FROM_FILE)"
 
@@ -467,7 +467,7 @@ class PlainPyBullet(LoadedPyBullet):
         return (USE_INERTIA,) if USE_FILE_INERTIA in calls else ()
 
     @classmethod
-    def load_call(cls, floating: bool) -> str:
+    def load_call(cls, floating: bool, root: str | None = None) -> str:
         """Return the call: one line, after ``import pybullet as p`` and ``p.connect(p.DIRECT)``."""
         return "robot = p.loadURDF(path)" if floating else "robot = p.loadURDF(path, useFixedBase=True)"
 
@@ -486,6 +486,6 @@ class MergingPyBullet(LoadedPyBullet):
         return (USE_INERTIA,) if KEEP_FIXED_LINKS in calls else (USE_INERTIA, _MERGE)
 
     @classmethod
-    def load_call(cls, floating: bool) -> str:
+    def load_call(cls, floating: bool, root: str | None = None) -> str:
         """Return the call: one line, after ``import pybullet as p`` and ``p.connect(p.DIRECT)``."""
-        return super().load_call(floating)[:-1] + f" | p.{_MERGE})"
+        return super().load_call(floating, root)[:-1] + f" | p.{_MERGE})"

@@ -212,8 +212,13 @@ def require_harmless(path: Path, model: Model) -> None:
         )
     except ModelError as error:
         raise EngineError(f"pybullet cannot load {model.name}: {error}") from error
-    for reason in _hazards(root, model):
+    for reason in _hazards(root):
         raise UnusableEngineError(f"pybullet would crash on {model.name}: {reason}")
+    if tag := _other_tree(root, model):
+        raise UnusableEngineError(
+            f"pybullet is not compared on {model.name}: the {tag} elements of the file are not those of the "
+            "tree that dynx reads"
+        )
     for joint in root.all("joint"):
         axis = next(iter(joint.all("axis")), None)
         if (
@@ -232,7 +237,7 @@ def require_harmless(path: Path, model: Model) -> None:
         )
 
 
-def _hazards(root: Element, model: Model) -> Iterator[str]:
+def _hazards(root: Element) -> Iterator[str]:
     named = {"robot": [root], "link": root.all("link"), "joint": root.all("joint")}
     for kind, elements in named.items():
         for element in elements:
@@ -246,15 +251,26 @@ def _hazards(root: Element, model: Model) -> Iterator[str]:
     for joint in named["joint"]:
         if "type" not in joint.attributes:
             yield f"line {joint.line}: joint {shown(joint.attributes['name'])} has no type"
+    ends = list(map(_ends, named["joint"]))
+    children = {child for _, _, child in ends}
+    if len({name for name, _, _ in ends}) < len(ends):
+        yield "two joints have the same name"
+    if len(children) < len(ends):
+        yield "a link is the child of two joints"
+    if len({element.attributes["name"] for element in named["link"]} - children) > 1:
+        yield "several links are the child of no joint"
+
+
+def _other_tree(root: Element, model: Model) -> str | None:
+    """Name the elements of the file that are not those of the tree which dynx reads, if any are."""
     # Each added frame is a link on a fixed joint in the file, and the joint has a generated name.
     added = {frame.name for frame in model.extra_frames}
-    links = [element.attributes["name"] for element in named["link"]]
+    links = [element.attributes["name"] for element in root.all("link")]
     if sorted(links) != sorted(added.union(link.name for link in model.links)):
-        yield "its <link> elements are not those of the tree that dynx read"
-    joints = sorted(map(_ends, named["joint"]))
+        return "<link>"
+    joints = sorted(map(_ends, root.all("joint")))
     wanted = {(joint.name, joint.parent, joint.child) for joint in model.joints}
-    if sorted(wanted) != [each for each in joints if each[2] not in added]:
-        yield "its <joint> elements are not those of the tree that dynx read"
+    return None if sorted(wanted) == [each for each in joints if each[2] not in added] else "<joint>"
 
 
 def _ends(joint: Element) -> tuple[str, str, str]:

@@ -340,6 +340,8 @@ class _TreeBuilder:
             self._texts.append(text)
 
     def _doctype(self, name: str, system: str | None, public: str | None, internal: bool) -> None:
+        if system is None and public is None and not internal:
+            return  # a name alone defines and fetches nothing
         line = self._lines_before + self._parser.CurrentLineNumber
         raise self._error(
             f"has a document type (<!DOCTYPE {escaped(name)}>), which is not allowed: "

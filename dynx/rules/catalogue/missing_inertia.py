@@ -215,21 +215,28 @@ class MasslessLinkWithInertia(Rule):
 
     def remedy(self, case: Case, detections: Sequence[Detection]) -> Remedy:
         """Return the case with each tensor moved to a link with mass, or with the least mass added."""
+        moved, removed, invented = 0, 0, 0
         for name in links_of(detections):
             inertial, group = case.model.inertial(name), rigid_groups(case)[name]
             if group.static:
                 case = with_inertials(case, {name: Inertial(0.0, inertial.origin)})
+                removed += 1
                 continue
             parent = group.parents.get(name)
             near = [*([parent] if parent else []), *group.children(name), *group.links]
             heavy = [each for each in near if (body := case.inertials[each]) is not None and body.mass > 0.0]
             if heavy:
                 case = with_inertials(case, merged_inertials(case, group, (heavy[0], name), heavy[0]))
+                moved += 1
             else:
                 case = with_inertials(case, {name: replace(inertial, mass=2.0 * MIN_MASS)})
-        return Remedy(
-            case, "added tensors of links without mass to links with mass rigidly connected to them"
+                invented += 1
+        done = (
+            (moved, "added tensors of links without mass to links with mass rigidly connected to them"),
+            (removed, "removed tensors of links without mass that cannot move"),
+            (invented, f"gave links with a tensor and without mass {2.0 * MIN_MASS:g} kg"),
         )
+        return Remedy(case, "; ".join(sentence for count, sentence in done if count))
 
 
 class MasslessMovingLink(Rule):

@@ -105,10 +105,10 @@ class TextAfterNumber(MisspelledNumberRule):
     The effect ranges from none (a limit that is not used) to a link without mass. Of the files that come with
     PyBullet, ``biped/biped2d_pybullet.urdf`` has ``-1.57.``.
 
-    What to do: write the number alone, in SI units. ``dynx doctor --fix`` keeps the number at the beginning;
-    a Fortran exponent is rewritten with ``e``, a hexadecimal number in decimals. It never converts units:
-    ``25mm`` would become 25, so check its changes. Words with no number at the beginning (``heavy``) are
-    DX420.
+    What to do: write the number alone, in SI units. ``dynx doctor --fix`` keeps the number where a point or
+    the name of its SI unit follows (``1.57.``, ``2.5 kg``); a Fortran exponent is rewritten with ``e``, a
+    hexadecimal number in decimals. Text that would make another number of it (``25mm``, ``90deg``, ``1/5``)
+    and words with no number at the beginning (``heavy``) are DX420.
     """
 
     advice = "Write the number alone, in SI units."
@@ -119,7 +119,7 @@ class TextAfterNumber(MisspelledNumberRule):
 
     def decision(self, case: Case) -> str | None:
         """Write the decision: there is one reading, and it is a guess."""
-        return f"{self.id}: the number at the beginning was kept, and no unit was converted"
+        return f"{self.id}: the number at the beginning was kept"
 
 
 class VectorOfWrongLength(MisspelledNumberRule):
@@ -153,7 +153,7 @@ class VectorOfWrongLength(MisspelledNumberRule):
     description = "which has {count} numbers where three are wanted"
     elements = ("origin", "axis")
 
-    def edit(self, case: Case, attribute: NumericAttribute, misspelling: Misspelling) -> Edit:
+    def edit(self, case: Case, attribute: NumericAttribute, misspelling: Misspelling) -> Edit | None:
         """Correct or remove the vector, by the user's choice."""
         if self.chosen(case) == "first":
             return super().edit(case, attribute, misspelling)
@@ -298,13 +298,18 @@ class AttributeWithoutNumber(MisspelledNumberRule):
     empty ``xyz`` or ``rpy`` is DX408, an infinite limit DX407. Expressions of xacro, ``${mass}``, are not
     corrected: the file has to be expanded.
 
-    What to do: write the numbers. The file does not contain them, so ``dynx doctor --fix`` can only guess,
-    and the report says so: it writes 0 for a mass, an entry of a tensor and a word of a vector, and removes
-    any other attribute, so that its default holds.
+    What to do: write the numbers. The file does not contain them, so ``dynx doctor --fix`` leaves them as
+    they are and lists each with its line; it removes only an empty attribute that has a default, and one that
+    no engine needs. ``--choose DX420=guess`` writes 0 for a mass, an entry of a tensor and a word of a
+    vector, and removes any other attribute, so that its default holds.
     """
 
     advice = "Write the numbers, or remove the attribute."
     engines = measured_on("pinocchio", "mujoco", "drake")
+    choices = {
+        "leave": "leave what is no number as it is, and list it",
+        "guess": "write 0 for a mass, a moment and a word of a vector, and remove any other attribute",
+    }
     changed = "removed attributes without a number, or wrote 0 for what is none"
     fault = "word"
     description = "which is no number that every engine reads"
@@ -315,20 +320,22 @@ class AttributeWithoutNumber(MisspelledNumberRule):
             return attribute.element.tag != "limit"
         return misspelling.fault == "word" or (misspelling.fault == "empty" and attribute.count == 1)
 
-    def edit(self, case: Case, attribute: NumericAttribute, misspelling: Misspelling) -> Edit:
-        """Return the edit that removes the attribute, or writes 0 where one is required."""
+    def edit(self, case: Case, attribute: NumericAttribute, misspelling: Misspelling) -> Edit | None:
+        """Return the edit that removes the attribute, or writes 0 where one is required; by default only the
+        removal of an attribute that is empty or that dynx does not read."""
         element = attribute.element
-        if element.tag in _ELEMENTS_THAT_NEED_NUMBERS:
+        required = element.tag in _ELEMENTS_THAT_NEED_NUMBERS
+        if self.chosen(case) == "leave":
+            kind = None if element.parent is None else element.parent.attributes.get("type")
+            if required or not (misspelling.fault == "empty" or _is_unread(attribute, kind)):
+                return None
+        if required:
             return case.source.attribute_edit(element, attribute.name, "0")
         if misspelling.fault == "word" and misspelling.meant:
             return case.source.attribute_edit(element, attribute.name, misspelling.meant)
         if element.tag == "axis":
             return case.source.removal(element)
         return case.source.attribute_removal(element, attribute.name)
-
-    def decision(self, case: Case) -> str | None:
-        """Return a sentence on the guess, which has no alternative."""
-        return f"{self.id}: no number could be read in an attribute; 0 or its default was used"
 
 
 class MinusNotAscii(MisspelledNumberRule):

@@ -127,10 +127,10 @@ class CollisionShapeWithoutSize(EditingRule):
 
     The dynamics of a link that states its inertia does not depend on shapes; whether the file loads does.
 
-    What to do: remove the shape, or give it its size. ``dynx doctor --fix`` removes the ``<collision>``.
-    ``--choose DX425=thicken`` writes 1e-6 m for each size of zero and positive sizes for negative ones
-    instead, which keeps the contacts of a plate (a shape of which a size or the file is missing is removed
-    all the same); ``--choose DX425=keep`` keeps the file, and MuJoCo refuses it.
+    What to do: remove the shape, or give it its size. ``dynx doctor --fix`` removes the sign of a negative
+    size, and the ``<collision>`` where a size is zero or missing. ``--choose DX425=thicken`` writes 1e-6 m
+    for each size of zero instead, which keeps the contacts of a plate (a shape of which a size or the file is
+    missing is removed all the same); ``--choose DX425=keep`` keeps the file, and MuJoCo refuses it.
     """
 
     stage = "reading"
@@ -154,7 +154,9 @@ class CollisionShapeWithoutSize(EditingRule):
 
     def _edits(self, case: Case, collision: SourceElement, shape: SourceElement) -> tuple[Edit, ...]:
         sizes = {name: _sizes_in(shape, name) for name in _SIZES_OF_SHAPES.get(shape.tag, ())}
-        if self.chosen(case) == "remove" or not sizes or None in sizes.values():
+        found = [size for size in sizes.values() if size is not None]
+        is_lacking = not sizes or None in sizes.values()
+        if is_lacking or (self.chosen(case) == "remove" and any(0.0 in size for size in found)):
             return (case.source.removal(collision),)
         return tuple(
             case.source.attribute_edit(

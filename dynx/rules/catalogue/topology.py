@@ -77,7 +77,9 @@ class FloatingJointAtRoot(EditingRule):
 
     dynx reads the joint as fixed and leaves the decision to ``base=``.
 
-    What to do: specify the base in one place. ``dynx doctor --fix`` makes the joint fixed.
+    What to do: specify the base in one place. ``dynx doctor --fix`` makes the joint fixed. Engines that read
+    a floating base from the file then fix the robot to the world unless the call says otherwise, so that this
+    counts as a change of the physics (``--level physics``).
     """
 
     # Before the rules about inertia, which may give the empty root a body.
@@ -85,6 +87,7 @@ class FloatingJointAtRoot(EditingRule):
     advice = "Make the joint fixed, and specify in the loading call whether the base floats."
     engines = measured_on("mujoco", "drake")
     changed = "made the floating joint below the root fixed: the loading call says whether the base floats"
+    changes_physics = True
 
     def corrections(self, case: Case) -> Iterable[Correction]:
         """Yield the joint, of which there is at most one."""

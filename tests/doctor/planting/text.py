@@ -95,11 +95,11 @@ def empty_vector(site: Site) -> PlantedDefect:
 
 
 def without_number(site: Site) -> PlantedDefect:
-    """A lower limit that was not filled in, or is a word."""
+    """A lower limit that was not filled in; words have no remedy."""
     ranges = {each.name: each.limits for each in site.model.joints}
     lower = [each for each in _limits(site) if each.name == "lower" and float(each.text) < 0.0]
     wide = [each for each in lower if each.joint is not None and ranges[each.joint].upper > 0.0]
-    return _rewrite(site, "DX420", _pick(site, wide), site.rng.choice(["", " ", "none", "nan"]))
+    return _rewrite(site, "DX420", _pick(site, wide), site.rng.choice(["", " "]))
 
 
 def typographic_minus(site: Site) -> PlantedDefect:

@@ -127,7 +127,6 @@ BILLION_LAUGHS = (
         BILLION_LAUGHS,
         '\n<!DOCTYPE robot SYSTEM "file:///etc/passwd">\n<robot/>',
         '\n<!DOCTYPE robot [<!ENTITY x SYSTEM "http://localhost/">]>\n<robot name="&x;"/>',
-        "\n<!DOCTYPE robot>\n<robot/>",
     ],
 )
 def test_a_document_type_is_refused_with_its_line(text: str) -> None:
