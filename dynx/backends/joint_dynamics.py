@@ -174,25 +174,37 @@ def refuse_text(name: str, given: object, joints: int, own: str = "True") -> Non
 
 
 class JointDynamicsTerms:
-    """The `<dynamics>` of all moving joints: `damping` and `friction` in coordinates of the tree, the rest in
-    those of the model."""
+    """The `<dynamics>` of all moving joints: `damping`, `friction` and `rotors`, the armature, in coordinates
+    of the tree, the rest in those of the model."""
 
     def __init__(self, model: Model) -> None:
         moving = [joint.dynamics for joint in model.joints if joint.moves]
         base = [0.0] * (6 if model.floating else 0)
         self.damping = np.array(base + [d.damping for d in moving])
         self.friction = np.array(base + [d.friction for d in moving])
-        armature = np.array(base + [d.armature for d in moving])
+        self.rotors = np.array(base + [d.armature for d in moving])
         coupling = model.mechanism.coupling
-        self._S = np.eye(len(armature)) if coupling is None else coupling.matrix()
-        self.armature: Floats = self._S.T @ np.diag(armature) @ self._S
-        self.has_armature = bool(np.any(armature != 0.0))
+        self._to_tree = None if coupling is None else coupling.matrix()
+        self.has_armature = bool(np.any(self.rotors != 0.0))
+
+    @cached_property
+    def armature(self) -> Floats:
+        """What the armature adds to the mass matrix (nv, nv)."""
+        if self._to_tree is None:
+            return np.diag(self.rotors)
+        return np.asarray(self._to_tree.T @ (self.rotors[:, None] * self._to_tree))
 
     def friction_torque(self, v: Any) -> Floats:
         """Return the torque (..., nv) of damping and Coulomb friction at velocity v (..., nv)."""
-        tree = np.asarray(v) @ self._S.T
-        return np.asarray((self.damping * tree + self.friction * np.sign(tree)) @ self._S)
+        tree = self._in_tree(v)
+        return self._in_model(self.damping * tree + self.friction * np.sign(tree))
 
     def armature_torque(self, a: Any) -> Floats:
         """Return the torque (..., nv) of the armature at acceleration a (..., nv)."""
-        return np.asarray(np.asarray(a) @ self.armature)
+        return self._in_model(self.rotors * self._in_tree(a))
+
+    def _in_tree(self, rates: Any) -> Floats:
+        return np.asarray(rates if self._to_tree is None else np.asarray(rates) @ self._to_tree.T)
+
+    def _in_model(self, torque: Floats) -> Floats:
+        return torque if self._to_tree is None else np.asarray(torque @ self._to_tree)

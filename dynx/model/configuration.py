@@ -14,9 +14,8 @@ from dynx.model.numbers import (
     checked_size,
 )
 from dynx.model.tree import Tree
+from dynx.spatial import branchless
 from dynx.spatial.scalar import Floats
-from dynx.spatial.se3 import se3_exp, se3_log
-from dynx.spatial.so3 import quat_product, rotate, rotate_back, rotation_from_quat
 
 
 def checked_q(tree: Tree, q: ArrayLike, name: str = "q") -> Floats:
@@ -30,7 +29,7 @@ def checked_q(tree: Tree, q: ArrayLike, name: str = "q") -> Floats:
         return array
     quat = array[..., 3:7]
     unit = checked_quaternion(name, quat, "3:7")
-    return array if unit is quat else _join(array[..., :3], unit, array[..., 7:])
+    return array if unit is quat else np.concatenate([array[..., :3], unit, array[..., 7:]], axis=-1)
 
 
 def neutral(tree: Tree) -> Floats:
@@ -71,25 +70,26 @@ def integrate(tree: Tree, q: ArrayLike, v: ArrayLike) -> Floats:
     """
     q, v = checked_q(tree, q), checked_array("v", v, tree.nv)
     if not tree.floating:
-        return np.asarray(q + v)
-    position, quat = se3_exp(v[..., :3], v[..., 3:6])
-    position = q[..., :3] + rotate(rotation_from_quat(q[..., 3:7]), position)
-    quat = quat_product(q[..., 3:7], quat)
-    quat = quat / np.linalg.norm(quat, axis=-1, keepdims=True)
-    joints = q[..., 7:] + v[..., 6:]
-    return _join(position, quat, joints)
+        return q + v
+    if q.ndim == v.ndim == 1:
+        moved = np.empty(tree.nq)
+        moved[:7] = branchless.moved(q[:7].tolist(), v[:6].tolist(), branchless.FLOATS)
+        np.add(q[7:], v[6:], out=moved[7:])
+        return moved
+    return branchless.integrate(*_broadcast(q, v))
 
 
 def difference(tree: Tree, q0: ArrayLike, q1: ArrayLike) -> Floats:
     """Return the velocity v (..., nv) with integrate(q0, v) = q1, whose rotation angle is at most pi."""
     q0, q1 = checked_q(tree, q0, "q0"), checked_q(tree, q1, "q1")
     if not tree.floating:
-        return np.asarray(q1 - q0)
-    conjugate = q0[..., 3:7] * np.array([-1.0, -1.0, -1.0, 1.0])
-    quat = quat_product(conjugate, q1[..., 3:7])
-    position = rotate_back(rotation_from_quat(q0[..., 3:7]), q1[..., :3] - q0[..., :3])
-    linear, angular = se3_log(position, quat)
-    return _join(linear, angular, q1[..., 7:] - q0[..., 7:])
+        return q1 - q0
+    if q0.ndim == q1.ndim == 1:
+        found = np.empty(tree.nv)
+        found[:6] = branchless.twist_between(q0[:7].tolist(), q1[:7].tolist(), branchless.FLOATS)
+        np.subtract(q1[7:], q0[7:], out=found[6:])
+        return found
+    return branchless.difference(*_broadcast(q0, q1))
 
 
 def clip(tree: Tree, q: ArrayLike) -> Floats:
@@ -114,6 +114,7 @@ def sampling_range(low: float, high: float, default_range: float) -> tuple[float
     return (low, low + 2.0 * default_range) if bounded_below else (high - 2.0 * default_range, high)
 
 
-def _join(*parts: Floats) -> Floats:
-    shape = np.broadcast_shapes(*(part.shape[:-1] for part in parts))
-    return np.concatenate([np.broadcast_to(part, (*shape, part.shape[-1])) for part in parts], axis=-1)
+def _broadcast(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """Return two arrays with the same leading axes."""
+    shape = np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
+    return np.broadcast_to(a, (*shape, a.shape[-1])), np.broadcast_to(b, (*shape, b.shape[-1]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TypeGuard
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike
 from dynx.errors import ArgumentError, DTypeError, GainError, NotFiniteError, ShapeError, shown
 from dynx.spatial.scalar import Floats
 
+_FLOAT64 = np.dtype(np.float64)
 _MAX_FLOAT = float(np.finfo(np.float64).max)
 
 MAX_MAGNITUDE = 1e60
@@ -31,6 +33,14 @@ def checked_array(name: str, value: ArrayLike, length: int) -> Floats:
 
     Raises DTypeError, ShapeError, NotFiniteError or ArgumentError, naming the argument `name`.
     """
+    # One vector of floats, by far the most frequent argument: a norm below the bound has entries below it.
+    if (
+        type(value) is np.ndarray
+        and value.dtype is _FLOAT64
+        and value.shape == (length,)
+        and math.hypot(*value.tolist()) < MAX_MAGNITUDE
+    ):
+        return value
     array = real_array(name, value)
     if array.ndim == 0 or array.shape[-1] != length:
         raise ShapeError(f"{name} has shape {array.shape}; wanted (..., {length})")
@@ -146,6 +156,8 @@ def checked_quaternion(name: str, quat_xyzw: Floats, part: str = "") -> Floats:
     Raises ArgumentError for a norm that differs from 1 by more than 1e-6; `part` is the index of the
     quaternion on the last axis of `name`.
     """
+    if quat_xyzw.ndim == 1 and abs(math.hypot(*quat_xyzw.tolist()) - 1.0) <= UNIT_NORM_TOLERANCE:
+        return quat_xyzw
     norm = np.linalg.norm(quat_xyzw, axis=-1, keepdims=True)
     off = np.abs(norm - 1.0)
     if np.any(off > 1e-6):

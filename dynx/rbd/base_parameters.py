@@ -42,15 +42,16 @@ def align_frames(mechanism: Mechanism) -> Mechanism:
     identity, zero = np.eye(3, dtype=int) + 0 * mechanism.gravity, 0 * mechanism.gravity
     # Pose (Q, o) of the new frame of each body in its old one.
     frames: dict[int, tuple[Array, Array]] = {ROOT: (identity, zero)}
+    children: dict[int, list[Body]] = {}
+    for body in mechanism.bodies:
+        children.setdefault(body.parent, []).append(body)
     bodies = []
     for index, body in enumerate(mechanism.bodies):
         Q_parent, o_parent = frames[body.parent]
         # Pose of the joint in the parent's new frame.
         R, p = Q_parent.T @ body.R, Q_parent.T @ (body.p - o_parent)
         if body.revolute:
-            child_offsets = [
-                np.sum(child.p * body.axis) for child in mechanism.bodies if child.parent == index
-            ]
+            child_offsets = [np.sum(child.p * body.axis) for child in children.get(index, ())]
             Q, o = _rotation_to_axis(R, body.axis), _origin_shift(R, p, body.axis, child_offsets)
         else:
             Q, o = R.T, -R.T @ p

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from dynx.spatial.branchless import rotation_log
-from dynx.spatial.scalar import Array, Floats
-from dynx.spatial.so3 import quat_exp, quat_from_rotation, quat_log, rotate, skew
+from dynx.spatial.scalar import Array
+from dynx.spatial.so3 import quat_from_rotation, quat_log, rotate
 
 
 def homogeneous(R: Array, p: Array) -> Array:
@@ -30,38 +30,6 @@ def inverse(T: Array) -> Array:
     """Return the inverse of a rigid transform T (..., 4, 4), by transposing its rotation."""
     R_T = np.swapaxes(T[..., :3, :3], -1, -2)
     return homogeneous(R_T, -rotate(R_T, T[..., :3, 3]))
-
-
-def se3_exp(linear: Floats, angular: Floats) -> tuple[Floats, Floats]:
-    """Return the displacement reached by a constant body twist in unit time.
-
-    `linear` [m] and `angular` [rad] are (..., 3). Returns (position (..., 3), quat_xyzw (..., 4)) in the
-    initial frame (Murray, Li and Sastry, A Mathematical Introduction to Robotic Manipulation, eq. 2.36).
-    """
-    theta2 = np.sum(angular * angular, axis=-1)[..., None, None]
-    theta = np.sqrt(theta2)
-    small = theta < 1e-2
-    safe = np.where(small, 1.0, theta)
-    b = 0.5 * np.sinc(0.5 * theta / np.pi) ** 2
-    series = 1.0 / 6.0 - theta2 / 120.0 + theta2**2 / 5040.0
-    c = np.where(small, series, (safe - np.sin(safe)) / safe**3)
-    W = skew(angular)
-    V = np.eye(3) + b * W + c * (W @ W)
-    return rotate(V, linear), quat_exp(angular)
-
-
-def se3_log(position: Floats, quat_xyzw: Floats) -> tuple[Floats, Floats]:
-    """Return the body twist (linear (..., 3), angular (..., 3)) that `se3_exp` maps to this displacement."""
-    angular = quat_log(quat_xyzw)
-    theta2 = np.sum(angular * angular, axis=-1)[..., None, None]
-    theta = np.sqrt(theta2)
-    small = theta < 1e-2
-    half = np.where(small, 1.0, 0.5 * theta)
-    series = 1.0 / 12.0 + theta2 / 720.0 + theta2**2 / 30240.0
-    d = np.where(small, series, (1.0 - half / np.tan(half)) / (2.0 * half) ** 2)
-    W = skew(angular)
-    V_inverse = np.eye(3) - 0.5 * W + d * (W @ W)
-    return rotate(V_inverse, position), angular
 
 
 def pose_error(T_world_target: Array, T_world_frame: Array) -> tuple[Array, Array]:

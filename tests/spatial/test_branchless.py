@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from dynx.model import Model
 from dynx.model.loading import load
-from dynx.spatial import branchless, se3, so3
+from dynx.spatial import branchless, so3
 from dynx.spatial.scalar import Array, Floats
 from tests.oracles.closed_form import MODELS
 
@@ -47,10 +47,12 @@ def test_rotations_and_poses(angle: float, rng: np.random.Generator) -> None:
     ):
         error = np.max(np.abs(found - expected))
         assert min(error, np.max(np.abs(found + expected)) if angle > 3.1415 else np.inf) < ROUNDING
-    for own, other in ((branchless.se3_exp, se3.se3_exp), (branchless.se3_log, se3.se3_log)):
-        rotation = angular if own is branchless.se3_exp else quats
-        for found, expected in zip(own(linear, rotation), other(linear, rotation), strict=True):
-            np.testing.assert_allclose(found, expected, rtol=0.0, atol=ROUNDING)
+    for function, rotation in ((branchless.exponential, angular), (branchless.logarithm, quats)):
+        of_arrays = function(list(linear.T), list(rotation.T), branchless.ARRAYS)
+        found = np.concatenate([np.stack(part, axis=-1) for part in of_arrays], axis=-1)
+        for row, a, b in zip(found, linear, rotation, strict=True):
+            of_floats = function(a.tolist(), b.tolist(), branchless.FLOATS)
+            np.testing.assert_allclose(row, np.concatenate(of_floats), rtol=0.0, atol=ROUNDING)
 
 
 @given(SEEDS)
@@ -68,12 +70,13 @@ def test_every_largest_component_and_ties_between_them(rng: np.random.Generator)
 def test_configurations(rng: np.random.Generator) -> None:
     model: Model = BODY
     q, v = model.random(rng, 20), rng.uniform(-2.0, 2.0, (20, 6))
-    other = model.integrate(q, v)
+    other = np.array([model.integrate(*each) for each in zip(q, v, strict=True)])
     np.testing.assert_allclose(branchless.integrate(q, v), other, rtol=0.0, atol=ROUNDING)
     other[::2, 3:7] *= -1.0
     found = branchless.difference(q, other)
     # Both configurations are rounded numbers of order 1; the displacement comes from their difference.
-    np.testing.assert_allclose(found, model.difference(q, other), rtol=0.0, atol=4 * ROUNDING)
+    each = [model.difference(*pair) for pair in zip(q, other, strict=True)]
+    np.testing.assert_allclose(found, each, rtol=0.0, atol=4 * ROUNDING)
     np.testing.assert_allclose(branchless.difference(q, q), np.zeros((20, 6)), rtol=0.0, atol=ROUNDING)
 
 
@@ -85,6 +88,7 @@ def test_in_many_digits() -> None:
         linear, angular = exact([1.0, 2.0, 3.0]), exact([0.3, -0.4, 1.2])
         quat = branchless.quat_exp(angular)
         assert max(abs(branchless.quat_log(quat) - angular)) < mpmath.mpf(10) ** -48
-        linear_back, angular_back = branchless.se3_log(*branchless.se3_exp(linear, angular))
+        there = branchless.exponential(list(linear), list(angular), branchless.ARRAYS)
+        linear_back, angular_back = map(np.array, branchless.logarithm(*there, branchless.ARRAYS))
         assert max(abs(angular_back - angular)) < mpmath.mpf(10) ** -48
         assert max(abs(linear_back - linear)) < mpmath.mpf(10) ** -47
