@@ -3,8 +3,9 @@
     python -m docs.public_files MANIFEST.json A=A.jsonl B=B.jsonl ...
 
 The manifest is a list of {repo, path, commit, sha256, half, at}: `half` is the part of a file, `at` its place
-on this machine. The results of a part are those of ``python -m surveys.files``; ``B.raw.json``
-beside ``B.jsonl`` has those of ``python -m surveys.raw_agreement B.jsonl --json B.raw.json``, if any.
+on this machine. The results of a part are those of ``python -m benchmarks.surveys.files``; ``B.raw.json``
+beside ``B.jsonl`` has those of
+``python -m benchmarks.surveys.raw_agreement B.jsonl --json B.raw.json``, if any.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from benchmarks.surveys.files import SMALL, Entry, differs, read_entries
 from dynx.rules import find_rule
-from surveys.files import SMALL, Entry, differs, read_entries
 
 PAGE = Path(__file__).with_name("public_files.md")
 

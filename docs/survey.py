@@ -2,7 +2,7 @@
 
     python -m docs.survey [--only erd|pybullet] [--engines a,b] [--jobs N] [--json OUT] [--mended FOLDER]
 
-Each file is examined on a fixed and on a floating base; see surveys/files.py for the options. The
+Each file is examined on a fixed and on a floating base; see benchmarks/surveys/files.py for the options. The
 results are written as tables of causes and effects by robot.
 """
 
@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import dynx
-from surveys.files import Entry, add_options, counts, make_tasks, remarks, survey
+from benchmarks.surveys.files import Entry, add_options, counts, make_tasks, remarks, survey
 
 _NO_ANSWER, _PRESENT = "no answer", "present"
 

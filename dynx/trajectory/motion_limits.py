@@ -29,7 +29,7 @@ def checked_limit(name: str, bound: ArrayLike, nv: int) -> Floats:
     wrong = np.flatnonzero(~(array >= 0.0))
     if wrong.size:
         k = int(wrong[0])
-        raise ArgumentError(f"{name}[{k}] is {array[k]:g}; wanted a limit above 0")
+        raise ArgumentError(f"{name}[{k}] is {array[k]:g}; wanted 0 or more, or infinity for no limit")
     return array
 
 

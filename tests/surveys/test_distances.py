@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from surveys.distance_engines import ENGINES
-from surveys.distances import measure, table
+from benchmarks.surveys.distance_engines import ENGINES
+from benchmarks.surveys.distances import measure, table
 
 CAUSES = {
     "bullet": (("Box", "Hull", "separated"), 1e-5, 1e-12),

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.surveys.files import Loading, examine, listed, load_alone, make_tasks, summary, survey
+from benchmarks.surveys.raw_agreement import ENGINES, check_entries
 from dynx.agreement.tolerances import BAR
 from dynx.loaded import installed_engines
 from dynx.rules.registry import find_trap
-from surveys.files import Loading, examine, listed, load_alone, make_tasks, summary, survey
-from surveys.raw_agreement import ENGINES, check_entries
 
 TRAPS = ("DX105", "DX201", "DX301", "DX304")
 

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.surveys.raw_agreement import beside, difference, run_script, task
 from dynx.agreement.tolerances import BAR
 from dynx.doctor import diagnose
 from dynx.loaded import installed_engines
 from dynx.model.library import find
 from dynx.model.tree import Base
-from surveys.raw_agreement import beside, difference, run_script, task
 
 ROBOTS = [
     "allegro_left_hand",
@@ -34,7 +34,7 @@ pytestmark = pytest.mark.skipif("pybullet" not in installed_engines(), reason="n
 
 @pytest.mark.parametrize(("base", "robots"), [("fixed", ROBOTS[::2]), ("floating", ROBOTS[1::2])])
 def test_mended_files_are_loaded_alike_by_raw_engines(base: Base, robots: list[str], tmp_path: Path) -> None:
-    """A sample of what `python -m surveys.raw_agreement` examines."""
+    """A sample of what `python -m benchmarks.surveys.raw_agreement` examines."""
     tasks = []
     for name in robots:
         report = diagnose(

@@ -99,8 +99,8 @@ def test_models() -> None:
 @pytest.mark.parametrize(
     ("options", "error", "message"),
     [
-        ({"velocity": -1.0}, ArgumentError, r"velocity\[0\] is -1; wanted a limit above 0"),
-        ({"acceleration": NAN}, ArgumentError, r"acceleration\[0\] is nan; wanted a limit above 0"),
+        ({"velocity": -1.0}, ArgumentError, r"velocity\[0\] is -1; wanted 0 or more"),
+        ({"acceleration": NAN}, ArgumentError, r"acceleration\[0\] is nan; wanted 0 or more"),
         ({"jerk": [1.0, -2.0]}, ArgumentError, r"jerk\[1\] is -2"),
         (
             {"velocity": [1.0, 0.0]},

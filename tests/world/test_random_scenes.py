@@ -1,7 +1,7 @@
 """Random scenes on every engine: momentum, energy, rest, equal runs, other orders and other places.
 
-``python -m surveys.random_scenes --count 300`` prints for more of them how near each bound is, and the
-settings that cause violations.
+``python -m benchmarks.surveys.random_scenes --count 300`` prints for more of them how near each bound is,
+and the settings that cause violations.
 """
 
 from __future__ import annotations

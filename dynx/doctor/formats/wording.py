@@ -63,7 +63,7 @@ def size(error: float) -> str:
     if error < _PERCENT or error >= 1e4:
         return "0" if error == 0.0 else f"{error:.0e}"
     percent = 100.0 * error
-    return f"{percent:.2g} %" if percent < 100.0 else f"{percent:.0f} %"
+    return f"{percent:.2g} %" if percent < 99.5 else f"{percent:.0f} %"
 
 
 def effect(each: Effect | None) -> str:

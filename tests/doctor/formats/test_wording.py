@@ -18,7 +18,15 @@ from tests.doctor.formats.reports import alike, differing, refused
 @pytest.mark.parametrize(
     ("error", "said"),
     [
-        *((0.0, "0"), (3e-11, "3e-11"), (1.3e-2, "1.3 %"), (0.943, "94 %"), (19.0, "1900 %"), (1e9, "1e+09")),
+        *(
+            (0.0, "0"),
+            (3e-11, "3e-11"),
+            (1.3e-2, "1.3 %"),
+            (0.943, "94 %"),
+            (0.999, "100 %"),
+            (19.0, "1900 %"),
+            (1e9, "1e+09"),
+        ),
         *((math.inf, "no value"), (math.nan, "no value")),
     ],
 )

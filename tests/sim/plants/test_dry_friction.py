@@ -10,6 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from benchmarks.surveys import friction_scan
+from benchmarks.surveys.friction_scan import Case
 from dynx.backends import backend, installed_backends
 from dynx.control import PD, BulletPositionMotor, OpenLoop
 from dynx.errors import ArgumentError, UnsupportedFeatureError
@@ -22,8 +24,6 @@ from dynx.sim import Rollout, Scenario, Simulation, simulate
 from dynx.spatial.scalar import Floats
 from dynx.steppers.implicit_joints import BLOCK_CORRECTIONS, ImplicitJoints
 from dynx.testing.strategies import models
-from surveys import friction_scan
-from surveys.friction_scan import Case
 from tests.backends.robots import mixed_robot
 from tests.oracles.closed_form import MODELS
 
@@ -186,7 +186,7 @@ RUBBING = {
 
 @pytest.mark.parametrize("name", sorted({each.name for each in robots()} & RUBBING.keys()))
 def test_nothing_oscillates_from_step_to_step(name: str) -> None:
-    """A sample of the cases of `surveys.friction_scan`, which searches all robots."""
+    """A sample of the cases of `benchmarks.surveys.friction_scan`, which searches all robots."""
     for friction in ("file", "drawn"):
         finding = friction_scan.run(Case(name, RUBBING[name], friction, batch=False))
         assert finding.rattling == []

@@ -1,8 +1,8 @@
-"""Errors of engines' distances over random pairs: ``python -m surveys.distances --pairs 10000``.
+"""Errors of engines' distances over random pairs: ``python -m benchmarks.surveys.distances --pairs 10000``.
 
 Pairs of each two kinds of shapes are separated, touching or overlapping in turn. The table has the worst and
 the median error of each engine against `dynx.distance`, as the engine comes, and the worst one after the
-settings have changed that it is attributed to (`surveys/distance_engines.py`). Not run in CI.
+settings have changed that it is attributed to (`benchmarks/surveys/distance_engines.py`). Not run in CI.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.surveys.distance_engines import CHANGES, ENGINES, Measure, Placed
 from dynx.distance import Distance, distance
-from surveys.distance_engines import CHANGES, ENGINES, Measure, Placed
 from tests.distance.shapes import KINDS, random_pose, random_shape
 
 PLACEMENTS = ("separated", "touching", "overlapping")

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.surveys.files import Entry, read_entries
 from dynx.agreement.tolerances import BAR
 from dynx.doctor.examination import TILTED_GRAVITY, draw_states, model_without_mimics, without_meshes
 from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
-from surveys.files import Entry, read_entries
 
 ENGINES = ("pinocchio", "pybullet", "mujoco", "drake")
 SCRIPTS = {name: Path(__file__).with_name(f"raw_{name}.py") for name in ENGINES}
@@ -144,7 +144,7 @@ def check_entries(entries: Sequence[Entry], folder: Path) -> list[dict[str, tupl
 
 
 def main() -> None:
-    """Check every file that ``surveys.files --json RESULTS --mended FOLDER`` mended."""
+    """Check every file that ``benchmarks.surveys.files --json RESULTS --mended FOLDER`` mended."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("results", type=Path, help="results of the survey")
     parser.add_argument("--json", type=Path, help="file for the differences")

@@ -1,4 +1,4 @@
-"""``python -m surveys.random_scenes --count 300``: the laws of mechanics on many random scenes.
+"""``python -m benchmarks.surveys.random_scenes --count 300``: the laws of mechanics on many random scenes.
 
 Prints for each engine and law the number of scenes and the quantiles of error / bound, the distances of runs
 in another order and at another place, and every violation of a law with the setting that causes it: the scene

@@ -1,12 +1,12 @@
 """Survey of URDF files: the doctor's report on each, and the engines that load a file which dynx refuses.
 
-    python -m surveys.files FOLDER_OR_LIST [--base fixed] [--engines a,b] [--jobs N]
+    python -m benchmarks.surveys.files FOLDER_OR_LIST [--base fixed] [--engines a,b] [--jobs N]
         [--json OUT.jsonl] [--mended FOLDER] [--seconds LIMIT]
 
 A list is a text file with one path per line. Each file is examined in a worker process with a time limit, so
 that an engine that crashes costs one file. One line of JSON per file and base is appended to ``--json``, and
 files that it already has are not examined again. ``--mended`` keeps the corrected files, which
-``python -m surveys.raw_agreement OUT.jsonl`` compares in engines without dynx.
+``python -m benchmarks.surveys.raw_agreement OUT.jsonl`` compares in engines without dynx.
 """
 
 from __future__ import annotations
@@ -272,6 +272,6 @@ def main() -> None:
 
 if __name__ == "__main__":
     # By its own name, so that worker processes find what they are to run.
-    from surveys.files import main as run
+    from benchmarks.surveys.files import main as run
 
     run()

@@ -1,4 +1,6 @@
-"""Search for joints that rattle under dry friction, over all robots: ``python -m surveys.friction_scan``.
+"""Search for joints that rattle under dry friction, over all robots::
+
+    python -m benchmarks.surveys.friction_scan
 
 Each robot falls without motors from a random state, at three steps, with the friction, damping and armature
 of its description and with friction drawn over six decades, in single runs and in batches. A joint rattles if
