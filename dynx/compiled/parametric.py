@@ -19,11 +19,12 @@ from dynx.compiled.robot_kernel import RobotKernels
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.errors import ArgumentError, shown
 from dynx.model import Mechanism, Model
+from dynx.model.elements import JointCoefficients
 from dynx.model.model import refuse_other_than_model
 from dynx.model.numbers import checked_array
 from dynx.rbd import crba, rnea
 from dynx.rbd.elimination import factorize_mass_matrix, solve_with_factors
-from dynx.rbd.parameters import JointCoefficients, Parameters
+from dynx.rbd.parameters import Parameters
 from dynx.simd.program import Program
 from dynx.simd.trace import trace
 from dynx.spatial.inertia import RigidInertia

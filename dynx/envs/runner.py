@@ -35,9 +35,9 @@ from dynx.envs.task import (
 )
 from dynx.envs.variation import VariedRobot, VariedScene
 from dynx.errors import DivergedError, ShapeError, UnsupportedFeatureError
+from dynx.model.elements import JointCoefficients
 from dynx.model.numbers import DIVERGENCE_SPEED
 from dynx.rbd.joint_friction import FrictionLaw
-from dynx.rbd.parameters import JointCoefficients
 from dynx.spatial.scalar import Array, Floats
 from dynx.steppers.state import RobotState, WorldState
 
@@ -304,13 +304,9 @@ class WorldEpisodes(Episodes):
         return self._episode
 
     def vary(self, randomization: Randomization) -> tuple[Parameter, ...]:
-        """Return the parameters of the scene that episodes draw, and the delay.
-
-        Raises the error of the engine for what it does not have, such as dry friction of joints in Drake.
-        """
+        """Return the parameters of the scene that episodes draw, and the delay. Raises the error of the
+        engine for a scene that it cannot represent."""
         varied = self._varied = VariedScene(self._task.scene(), randomization, self._task.control_dt)
-        if varied.joint_friction:
-            self._options["joint_friction"] = True
         if varied.changes_scene:
             greatest = np.array([each.distribution.bounds[1] for each in varied.parameters])
             self._open(varied.scene(self._task.scene(), greatest)).close()

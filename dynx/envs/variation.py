@@ -139,8 +139,6 @@ class VariedScene:
         """Parameters that change the motion; a delay is rounded to whole control steps."""
         self.changes_scene = any(each.field in SCENE_FIELDS for each in self.parameters)
         """True if episodes differ in more than noise and delay."""
-        self.joint_friction = any(each.field == "joint_friction" for each in self.parameters)
-        """True if the joints have dry friction."""
 
     def delayed_actions(self, values: Floats, control_dt: float) -> int:
         """Return the number of control steps by which actions act later."""

@@ -10,14 +10,14 @@ import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, shown
 from dynx.model.numbers import checked_vector, refuse_mask
-from dynx.spatial.scalar import Floats
+from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_rpy, rpy_from_rotation
 
@@ -147,6 +147,14 @@ class JointDynamics:
     damping: float = 0.0
     friction: float = 0.0
     armature: float = 0.0
+
+
+class JointCoefficients(NamedTuple):
+    """Damping, dry friction and armature (..., nv) of the model's coordinates, 0 for a floating base."""
+
+    damping: Array
+    friction: Array
+    armature: Array
 
 
 @dataclass(frozen=True)

@@ -97,9 +97,9 @@ class ExplicitEuler:
             raise UnsupportedFeatureError("the integrator euler is for robots with a fixed base")
         self._h = h
 
-    def __call__(self, accelerate: Accelerate, q: Array, v: Array) -> MotionState:
+    def __call__(self, accelerate: Accelerate, q: Array, v: Array, *given: Any) -> MotionState:
         """Return q and v after the step, and the acceleration at its beginning."""
-        a = accelerate(q, v)
+        a = accelerate(q, v, *given)
         return q + self._h * v, v + self._h * a, a
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
-from dynx.model.elements import Inertial, Joint, JointDynamics, Link, Pose
+from dynx.model.elements import Inertial, Joint, JointCoefficients, JointDynamics, Link, Pose
 from dynx.model.geometry import Geometry
 from dynx.model.mechanism import ROOT, Mechanism, build_mechanism
 from dynx.model.model import Model
@@ -32,14 +32,6 @@ POINT = ("mass", "cx", "cy", "cz")
 
 JOINT = ("damping", "friction", "armature")
 """Parameters of a joint: [N m s] or [N s/m], [N m] or [N], [kg m^2] or [kg]."""
-
-
-class JointCoefficients(NamedTuple):
-    """Coefficients (..., nv) of the model's coordinates, 0 for a floating base."""
-
-    damping: Array
-    friction: Array
-    armature: Array
 
 
 @dataclass(frozen=True)

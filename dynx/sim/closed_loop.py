@@ -11,7 +11,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from math import isfinite
-from operator import le
 from typing import Any
 
 import numpy as np
@@ -33,9 +32,10 @@ from dynx.sim.noise import Noise
 from dynx.sim.overshoot import largest_overshoot, overcompensated_friction
 from dynx.sim.plants.integrated import IntegratedPlant
 from dynx.sim.plants.plant import Plant, is_own, plant_errors
-from dynx.sim.step import held_at_limits, is_diverged, measure, torque_sum
-from dynx.spatial.scalar import Array, Floats, clamp
+from dynx.sim.step import is_diverged, measure, torque_sum
+from dynx.spatial.scalar import Floats, clamp
 from dynx.steppers.clock import Clock
+from dynx.steppers.joint_stops import JointStops
 from dynx.steppers.random import Purpose
 from dynx.trajectory.base import Setpoint
 
@@ -135,66 +135,12 @@ class Sensors:
         return measure(self._model, step * clock.dt, q[seen], v[seen], noise, random)
 
 
-class Stops:
-    """Inelastic impact, after each step of the plant, of the joints that passed their limits.
-
-    The joint is set to its limit. An impulse in that joint alone makes its outward velocity zero and changes
-    the velocities of the other joints according to the mass matrix: v+ = v - M^-1 E (E' M^-1 E)^-1 E' v. An
-    impulse only pushes inwards, so a joint that already moves away from its limit gets none. Steps in which
-    no joint is beyond its limits cost one comparison for each limit.
-    """
-
-    def __init__(self, model: Model, mass_matrix: Callable[[Floats], Floats]) -> None:
-        """`mass_matrix` returns M (nv, nv) of the plant with its armature."""
-        base_q, base_v = (7, 6) if model.floating else (0, 0)
-        self._q_joints, self._base = slice(base_q, None), base_v
-        self._lower, self._upper = model.lower[self._q_joints], model.upper[self._q_joints]
-        self._lowest, self._highest = self._lower.tolist(), self._upper.tolist()
-        self._unit_impulses: Floats = np.eye(model.nv)
-        self._mass_matrix = mass_matrix
-
-    @classmethod
-    def of(cls, plant: Plant, armature: Floats) -> Stops:
-        """Make the stops of a plant with `armature` (nv, nv), by its engine's mass matrix if it has one."""
-        if isinstance(plant, IntegratedPlant):
-            mass_matrix = plant.dynamics.mass_matrix
-        else:
-            mass_matrix = _MassMatrix(plant.model)
-        return cls(plant.model, lambda q: mass_matrix(q) + armature)
-
-    def excess(self, q: Array) -> Any:
-        """Return a number that is positive if a joint is beyond a limit at q (nq,), for symbols."""
-        found: Any = 0.0
-        for x, low, high in zip(q[self._q_joints].tolist(), self._lowest, self._highest, strict=True):
-            beyond = [low - x] if isfinite(low) else []
-            beyond += [x - high] if isfinite(high) else []
-            for each in beyond:
-                found = each.maximum(found)
-        return found
-
-    def __call__(self, q: Floats, v: Floats) -> tuple[Floats, Floats] | None:
-        """Return the state after the impact, or None if no joint is beyond its limits."""
-        values = q[self._q_joints].tolist()
-        if all(map(le, self._lowest, values)) and all(map(le, values, self._highest)):
-            return None
-        held, impacts = held_at_limits(q[self._q_joints], v[self._base :], self._lower, self._upper)
-        q = q.copy()
-        q[self._q_joints] = held
-        struck = np.flatnonzero(impacts)
-        outward, columns = impacts[struck], struck + self._base
-        if not columns.size:
-            return q, v
-        # Velocities after unit impulses on these joints.
-        effects = np.linalg.solve(self._mass_matrix(q), self._unit_impulses[:, columns])
-        while columns.size:
-            impulse = np.linalg.solve(effects[columns], -v[columns])
-            pushing = impulse * outward <= 0.0
-            if pushing.all():
-                v = v + effects @ impulse
-                v[columns] = 0.0
-                break
-            outward, columns, effects = outward[pushing], columns[pushing], effects[:, pushing]
-        return q, v
+def stops_of(plant: Plant, armature: Floats) -> JointStops:
+    """Return the stops of a plant with `armature` (nv, nv), by its engine's mass matrix if it has one."""
+    mass_matrix: Callable[[Floats], Floats] = _MassMatrix(plant.model)
+    if isinstance(plant, IntegratedPlant):
+        mass_matrix = plant.dynamics.mass_matrix
+    return JointStops(plant.model, lambda q: mass_matrix(q) + armature)
 
 
 class _MassMatrix:
@@ -235,7 +181,7 @@ class ClosedLoop:
     clock: Clock
     sensors: Sensors
     limit: Floats | None
-    stops: Stops | None
+    stops: JointStops | None
     progress: Callable[[int], object] | None = None
     """Called now and then with the number of steps taken."""
 

@@ -19,7 +19,7 @@ from dynx.errors import ArgumentError, ClosedError, SimulationError, shown
 from dynx.model import Model
 from dynx.model.numbers import checked_array
 from dynx.option_names import takes
-from dynx.sim.closed_loop import ClosedLoop, LoopState, Sensors, StateBuffers, Stops
+from dynx.sim.closed_loop import ClosedLoop, LoopState, Sensors, StateBuffers, stops_of
 from dynx.sim.controller_checks import ControllerWatch, refuse_self_changed
 from dynx.sim.plants.disturbances import refuse_small_slip
 from dynx.sim.plants.plant import plant_errors
@@ -133,7 +133,7 @@ class Simulation:
             self._plant.refuse(setup.controller)
             step = clock.dt / scenario.substeps
             refuse_small_slip(setup.disturbances, setup.integrator, step, setup.start[0])
-            stops = Stops.of(self._plant, setup.disturbances.armature) if scenario.position_limits else None
+            stops = stops_of(self._plant, setup.disturbances.armature) if scenario.position_limits else None
             self._loop = ClosedLoop(
                 self._plant, setup.controller, setpoints, clock, sensors, setup.limit, stops
             )
@@ -630,7 +630,7 @@ def simulate(given: SimulateArguments) -> Rollout:
     motion beyond (`dynx.rbd.joint_friction`), at any step; with `friction_slip` [rad/s or m/s] above 0
     it is smoothed over that speed instead, so that loaded joints creep (`JointFriction`).
     `effort_limits`, True for the model's, saturate torques and are recorded; `position_limits` are inelastic
-    stops (`Stops`); `pushes` are external wrenches.
+    stops (`dynx.steppers.joint_stops`); `pushes` are external wrenches.
 
     **Model error.** The plant has a `payload` and masses scaled by `mass_scale` (all links, or some) that the
     controller does not know; `noise` is added to the measurements.

@@ -85,13 +85,3 @@ def with_disturbances(tau: Array, friction: Array | None, pushes: Iterable[tuple
     for J, wrench in pushes:
         tau = tau + J.T @ wrench
     return tau
-
-
-def held_at_limits(joints: Floats, speeds: Floats, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
-    """Return the positions of joints (..., n), set to limits that they passed, and the impacts on them.
-
-    An impact is the outward sign, 1 or -1, of a joint that passed a limit and moves outwards, otherwise 0.
-    """
-    held = np.clip(joints, lower, upper)
-    outward = np.sign(joints - held)
-    return held, outward * (outward * speeds > 0.0)

@@ -22,10 +22,10 @@ from dynx.compiled.simplification import simplify_mechanism
 from dynx.compiled.step import BoundSteps, Status, StepText, compiled
 from dynx.rbd.joint_friction import FrictionLaw
 from dynx.sim.loop_step import LoopStep
-from dynx.sim.step import held_at_limits
 from dynx.simd.kernel import Kernel
 from dynx.spatial.scalar import Array, Floats
 from dynx.steppers.implicit_joints import BLOCK_CORRECTIONS, MAX_SOLUTIONS
+from dynx.steppers.joint_stops import held_at_limits
 
 Rows = NDArray[np.signedinteger[Any]]
 """Numbers of rollouts."""

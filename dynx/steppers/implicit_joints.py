@@ -1,4 +1,8 @@
-"""The law of joint friction (`dynx.rbd.joint_friction`) for one robot and one step at a time."""
+"""Damping, dry friction and armature of joints in one step of a robot, which `ImplicitJoints` solves.
+
+`OutsideJoints` are those of a robot in an engine that does not have them: a torque that the engine applies
+has their effect.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from dynx.backends import Backend
 from dynx.rbd.joint_friction import TOLERANCE, FrictionLaw, damped_equation
 from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.emit import Settings
@@ -15,6 +20,7 @@ from dynx.simd.simplify import STRICT
 from dynx.simd.target import host
 from dynx.simd.trace import trace
 from dynx.spatial.scalar import Array, Floats
+from dynx.steppers.layout import RobotLayout
 
 MAX_COMPILED_OPERATIONS = 8000
 """Number of products in one solution above which NumPy takes less time than compilation is worth."""
@@ -158,6 +164,51 @@ class ImplicitJoints:
         self.net_torque = tau - self._damping * (v + h * a) - self._armature * a
         self.net_torque[joints] -= self.torque
         return np.array([a, moves])
+
+
+class OutsideJoints:
+    """Joint dynamics of a robot that its engine does not have, as a torque in each of the engine's steps.
+
+    The torque is exact where nothing but it acts on the robot. Forces that the engine alone knows, of
+    contacts, constraints and joint limits, count as those of the step before, as they do for motors at the
+    end of a step.
+    """
+
+    def __init__(
+        self, robot: RobotLayout, in_engine: RobotLayout, dynamics: Backend, h: float, *, touched: bool
+    ) -> None:
+        """`in_engine` is the robot with the coefficients that the engine has, `dynamics` computes its mass
+        matrix, `h` [s] is the step of the engine; with `touched` it may have forces that only it knows."""
+        own, has = robot.coefficients(), in_engine.coefficients()
+        self._dynamics, self._h, self._touched = dynamics, h, touched
+        self._inertia = np.diag(has.armature)
+        self._damping = has.damping
+        friction = own.friction - has.friction
+        law = FrictionLaw.of(robot.model, friction)
+        # The equation is solved with all coefficients; what the engine has is not in the torque.
+        self._solver = ImplicitJoints(law, friction, h, damping=own.damping, armature=own.armature)
+        self._friction_only = all(
+            map(np.array_equal, (has.damping, has.armature), (own.damping, own.armature))
+        )
+        self._joints = list(law.joints)
+        self.memory: tuple[Floats, Floats] | None = None
+        """Velocity and torque (nv,) of the step before; None if there was no such step."""
+
+    def torque(self, q: Floats, v: Floats, tau: Floats) -> Floats:
+        """Return what the engine is to apply (nv,) in a step from q, v in place of `tau` (nv,)."""
+        M = self._dynamics.mass_matrix(q)
+        if self.memory is None or not self._touched:
+            bias = self._dynamics.bias_torque(q, v)
+        else:
+            before, applied = self.memory
+            bias = applied - (M + self._inertia).dot((v - before) / self._h) - self._damping * v
+        self._solver.step(M, bias, tau, v)
+        total: Floats = (tau if self._friction_only else self._solver.net_torque).copy()
+        if self._friction_only:
+            total[self._joints] -= self._solver.torque
+        if self._touched:
+            self.memory = v, total
+        return total
 
 
 @cache

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.model import Model
+from dynx.model.elements import JointCoefficients
 from dynx.model.geometry import Shape
 from dynx.spatial.scalar import Floats
 from dynx.steppers.material import Material
@@ -69,6 +70,20 @@ class RobotLayout:
     """Viscous damping (n,) of the joints [N m s/rad or N s/m]."""
     friction: Floats
     """Coulomb friction (n,) of the joints [N m or N]."""
+    armature: Floats
+    """Armature (n,) of the joints [kg m^2 or kg]."""
+
+    def coefficients(self) -> JointCoefficients:
+        """Return damping, dry friction and armature (nv,) of the model's coordinates: those of a mimic joint
+        act on its driver through its multiplier."""
+        base = np.zeros(6 if self.model.floating else 0)
+        tree = (np.concatenate([base, each]) for each in (self.damping, self.friction, self.armature))
+        damping, friction, armature = tree
+        coupling = self.model.mechanism.coupling
+        if coupling is None:
+            return JointCoefficients(damping, friction, armature)
+        S = coupling.matrix()
+        return JointCoefficients((S**2).T @ damping, abs(S).T @ friction, (S**2).T @ armature)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,3 +145,7 @@ class Layout:
         if owner.robot is not None:
             return owner.body == WORLD and not self.robots[owner.robot].model.floating
         return owner.body == WORLD or self.bodies[owner.body].fixed
+
+
+EMPTY = Layout("empty", np.zeros(3), (), (), (), np.zeros((0, 0), dtype=np.bool_), ())
+"""A scene of nothing."""

@@ -14,8 +14,9 @@ from dynx.errors import (
     shown,
 )
 from dynx.registry import ClassRegistry
+from dynx.steppers.layout import EMPTY
 from dynx.steppers.native_queries import native_queries_of
-from dynx.steppers.stepper import Stepper
+from dynx.steppers.stepper import Feature, Stepper
 
 if TYPE_CHECKING:
     from dynx.steppers.camera import Draw
@@ -29,6 +30,7 @@ BUILT_IN = {
     "pybullet": "dynx.engines.pybullet.stepper:BulletStepper",
     "mujoco": "dynx.engines.mujoco.stepper:MujocoStepper",
     "drake": "dynx.engines.drake.stepper:DrakeStepper",
+    "dynx": "dynx.engines.own.stepper:OwnStepper",
 }
 """Engines of dynx itself."""
 
@@ -56,16 +58,18 @@ def world_class(name: str) -> type[Stepper]:
 
 
 def installed_worlds() -> tuple[str, ...]:
-    """Return the names of the engines that are installed. Raises NotInstalledError if none is."""
+    """Return the names of the installed engines that have contacts; NotInstalledError if none is."""
     found = []
     for name in world_names():
         try:
-            world_class(name).require_engine()
+            kind = world_class(name)
+            kind.require_engine()
         except BackendError:
             continue
-        found.append(name)
+        if Feature.CONTACTS in kind.provides(EMPTY):
+            found.append(name)
     if not found:
-        raise NotInstalledError("no engine for worlds is installed: pip install 'dynx[mujoco]'")
+        raise NotInstalledError("no engine for worlds with contacts is installed: pip install 'dynx[mujoco]'")
     return tuple(found)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
+from enum import Enum
 from typing import Any, ClassVar, NamedTuple
 
 from dynx.spatial.scalar import Floats
@@ -17,6 +18,21 @@ from dynx.steppers.layout import Layout
 from dynx.steppers.materials import EffectiveCoefficient
 from dynx.steppers.settings import Setting
 from dynx.steppers.state import BodyState, RobotState
+
+
+class Feature(Enum):
+    """Something that a stepper may have of its own; each value names it in messages."""
+
+    CONTACTS = "contacts"
+    """Contacts between the colliders that may touch."""
+    LIMITS = "joint limits"
+    """Joints that stop at `RobotLayout.lower` and `upper`."""
+    DAMPING = "joint damping"
+    DRY_FRICTION = "joint dry friction"
+    ARMATURE = "joint armature"
+    MIMICS = "mimic joints"
+    CONSTRAINTS = "welds and point-to-point constraints"
+    """`Layout.constraints`."""
 
 
 class TouchingPoint(NamedTuple):
@@ -64,6 +80,16 @@ class Stepper(ABC):
     def require_engine(cls) -> None:
         """Raise NotInstalledError where the engine is not installed."""
         return
+
+    @classmethod
+    @abstractmethod
+    def provides(cls, layout: Layout) -> frozenset[Feature]:
+        """Return what the engine has for this scene.
+
+        The constructor gets a layout without damping, dry friction and armature of joints that the engine
+        does not have: `dynx.world.World` computes them outside of it. It refuses a scene that needs any other
+        feature which is missing.
+        """
 
     @classmethod
     def settings_in_effect(cls, settings: Mapping[str, Any], dt: float) -> Mapping[str, Any]:

@@ -4,10 +4,10 @@ evaluated before each step of the engine, or torques that it holds."""
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from math import hypot, isfinite
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy import ndarray
@@ -24,6 +24,10 @@ from dynx.steppers.layout import Layout, RobotLayout
 from dynx.steppers.stepper import Stepper
 from dynx.world.motors import JointLaw, Motor, combine
 from dynx.world.notes import LastLoads, RobotLoad
+from dynx.world.preparation import may_be_touched
+
+if TYPE_CHECKING:
+    from dynx.steppers.implicit_joints import OutsideJoints
 
 _FLOAT64 = np.dtype(np.float64)
 
@@ -31,15 +35,18 @@ _FLOAT64 = np.dtype(np.float64)
 class RobotLoads:
     """The generalised force on one robot: given torques, external forces on its links, and its motors."""
 
-    def __init__(self, robot: RobotLayout, h: float) -> None:
-        """`h` is the step of the engine [s]."""
+    def __init__(self, robot: RobotLayout, in_engine: RobotLayout, h: float, *, touched: bool) -> None:
+        """`in_engine` is the robot with the joint dynamics that the engine has, `h` its step [s]; with
+        `touched` contacts, constraints or joint limits may act on the robot."""
         self.name = robot.name
+        self._robot, self._in_engine, self._touched = robot, in_engine, touched
+        self._armature = np.diag(robot.coefficients().armature) if robot.armature.any() else None
         self.model = robot.model
         self._base = 6 if robot.model.floating else 0
         self._h = h
         self._nothing = np.zeros(robot.model.nv)
         self._motors: tuple[Motor, ...] = ()
-        self.memory: tuple[Floats, Floats] | None = None
+        self.motor_memory: tuple[Floats, Floats] | None = None
         """Velocity and generalised force (nv,) of the step before, on which motors at the end of a step
         depend; None if there was no such step."""
 
@@ -47,6 +54,30 @@ class RobotLoads:
     def dynamics(self) -> Backend:
         """The backend that computes mass matrices and Jacobians."""
         return backend(DEFAULT_ENGINE, self.model, validate=False)
+
+    @cached_property
+    def joints(self) -> OutsideJoints | None:
+        """Joint dynamics that the engine does not have; None where it has all."""
+        if self._robot is self._in_engine:
+            return None
+        # Imported here, because engines have most joint dynamics.
+        from dynx.steppers.implicit_joints import OutsideJoints
+
+        return OutsideJoints(self._robot, self._in_engine, self.dynamics, self._h, touched=self._touched)
+
+    @property
+    def note(self) -> str | None:
+        """Sentence on the joint dynamics that act outside of the engine and are not exact; None without."""
+        if self.joints is None or not self._touched:
+            return None
+        ours, theirs = self._robot, self._in_engine
+        names = ("damping", "friction", "armature")
+        outside = [name for name in names if (getattr(ours, name) != getattr(theirs, name)).any()]
+        return (
+            f"{' and '.join(outside)} of the joints of {shown(self.name)} {'act' if outside[1:] else 'acts'} "
+            "outside of the engine, which does not have all of it, with the forces of contacts, "
+            "constraints and joint limits as they were in the step before"
+        )
 
     @property
     def has_motors(self) -> bool:
@@ -62,6 +93,25 @@ class RobotLoads:
     def law(self) -> tuple[JointLaw | None, Floats | None]:
         """Law of the motors, and 1 for the joints where it holds at the end of a step, else 0."""
         return (self._law, self._implicit_joints) if self._motors else (None, None)
+
+    @property
+    def memory(self) -> Floats | None:
+        """All that is kept of the step before: `motor_memory` (2, nv), NaN without it, and (4, nv) with that
+        of joint dynamics outside of the engine; None for nothing."""
+        kept = None if self.motor_memory is None else np.array(self.motor_memory)
+        outside = None if self.joints is None else self.joints.memory
+        if outside is None:
+            return kept
+        absent = np.full((2, len(self._nothing)), np.nan)
+        return np.concatenate([absent if kept is None else kept, np.array(outside)])
+
+    @memory.setter
+    def memory(self, rows: Floats | None) -> None:
+        known = rows is not None and not np.isnan(rows[0]).any()
+        self.motor_memory = None if rows is None or not known else (rows[0].copy(), rows[1].copy())
+        if self.joints is not None:
+            outside = None if rows is None or len(rows) < 4 else (rows[2].copy(), rows[3].copy())
+            self.joints.memory = outside
 
     def set_motors(self, motors: Sequence[Motor]) -> None:
         """Use these motors in the next calls of `torque`."""
@@ -87,9 +137,9 @@ class RobotLoads:
         for frame, force, share in forces:
             J, wrench = force.at_frame(self.dynamics, frame, q, share)
             total = total + J.T @ wrench
-        if not self._motors:
-            return total
-        return self._with_motors(q, v, total)
+        if self._motors:
+            total = self._with_motors(q, v, total)
+        return total if self.joints is None else self.joints.torque(q, v, total)
 
     def torque_of_joints(self, positions: Floats, rates: Floats, tau: Floats | None) -> Floats:
         """Return `torque` without external forces where the motors depend on the joints alone.
@@ -117,7 +167,7 @@ class RobotLoads:
         total: Floats = tau.copy()
         total[base:] += self._saturated(motor)
         if self._law.implicit:
-            self.memory = (v, total)
+            self.motor_memory = (v, total)
         return total
 
     def _implicit(self, q: Floats, v: Floats, tau: Floats, motor: Floats) -> Floats:
@@ -127,10 +177,12 @@ class RobotLoads:
         (M + K) a = motor + all other forces. The other forces, except `tau`, are those of the step before.
         """
         M = self.dynamics.mass_matrix(q)
-        if self.memory is None:
+        if self._armature is not None:
+            M = M + self._armature
+        if self.motor_memory is None:
             others = -self.dynamics.bias_torque(q, v)
         else:
-            v_before, tau_before = self.memory
+            v_before, tau_before = self.motor_memory
             others = M.dot((v - v_before) / self._h) - tau_before
         others += tau
         others[self._base :] += motor
@@ -198,16 +250,21 @@ class Commands:
     def __init__(
         self,
         layout: Layout,
+        in_engine: Layout,
         robots: Mapping[str, int],
         bodies: Mapping[str, int],
         h: float,
         engine: type[Stepper],
     ) -> None:
+        """`in_engine` is the layout that the engine has (`layout_for`)."""
         self._engine, self._h = engine, h
         self._layout = layout
         self._robots = robots
         self._bodies = bodies
-        self._loads = [RobotLoads(robot, h) for robot in layout.robots]
+        pairs = enumerate(zip(layout.robots, in_engine.robots, strict=True))
+        self._loads = [RobotLoads(*pair, h, touched=may_be_touched(layout, k)) for k, pair in pairs]
+        self._outside = frozenset(k for k, loads in enumerate(self._loads) if loads.joints is not None)
+        """Robots with joint dynamics that the engine does not have."""
         shapes: list[tuple[int]] = [(robot.model.nv,) for robot in layout.robots]
         self._torques = {name: (k, shapes[k]) for name, k in robots.items()}
         self._floating = [robot.model.floating for robot in layout.robots]
@@ -219,7 +276,13 @@ class Commands:
     def forget(self) -> None:
         """Forget all earlier steps: the engine is new, or its state was set."""
         self._more_than_torques = True
-        self._forget_steps(frozenset())
+        self.remember({})
+
+    def notes(self) -> Iterator[str]:
+        """Yield one sentence for each robot with joint dynamics that are not exact."""
+        for loads in self._loads:
+            if loads.note is not None:
+                yield loads.note
 
     def last(self) -> LastLoads:
         """Return the loads of the last step."""
@@ -235,16 +298,15 @@ class Commands:
         )
 
     def memory(self) -> dict[str, Floats]:
-        """Return velocity and generalised force (2, nv) of the step before, by the robots whose motors depend
-        on them."""
+        """Return velocities and generalised forces (2 or 4, nv) of the step before, by the robots whose
+        motors or joint dynamics depend on them."""
         kept = {name: self._loads[k].memory for name, k in self._robots.items()}
-        return {name: np.array(rows) for name, rows in kept.items() if rows is not None}
+        return {name: rows for name, rows in kept.items() if rows is not None}
 
     def remember(self, memory: Mapping[str, Floats]) -> None:
         """Restore what `memory` returned."""
         for name, k in self._robots.items():
-            rows = memory.get(name)
-            self._loads[k].memory = None if rows is None else (rows[0].copy(), rows[1].copy())
+            self._loads[k].memory = memory.get(name)
         self._more_than_torques = True
 
     def hold(self, torques: Mapping[str, ArrayLike] | None, count: int) -> Forces | None:
@@ -253,6 +315,8 @@ class Commands:
         Returns None, and does nothing, where the engine must get them again before each of the steps.
         """
         held = _NOTHING if torques is None else checked_torques(torques, self._torques)
+        if self._outside:
+            return None
         if count > 1 and any(self._floating[k] and any(tau[:6].tolist()) for k, tau in held):
             return None
         self._held = held
@@ -277,8 +341,8 @@ class Commands:
         commands = self._set_motors(motors or {})
         frames, pushes = self._sort_forces(forces)
         motored = frozenset(k for k, loads in enumerate(self._loads) if loads.has_motors)
-        repeated = motored | frames.keys()
-        of_joints = {k for k in motored - frames.keys() if self._loads[k].depends_on_joints}
+        repeated = motored | frames.keys() | self._outside
+        of_joints = {k for k in motored - frames.keys() - self._outside if self._loads[k].depends_on_joints}
         constant = [(k, tau) for k, tau in self._held if k not in repeated]
         self._forget_steps(motored)
         steps = itertools.count()
@@ -385,7 +449,7 @@ class Commands:
         """Forget the step before, of robots without motors in the next one."""
         for k, loads in enumerate(self._loads):
             if k not in motored:
-                loads.memory = None
+                loads.motor_memory = None
 
 
 def with_scene_motors(

@@ -7,8 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from dynx.backends.joint_dynamics import JointDynamicsTerms
-from dynx.errors import EngineLimitError
+from dynx.errors import EngineLimitError, UnsupportedFeatureError, shown
 from dynx.model.elements import Pose
 from dynx.model.geometry import Collision, Mesh
 from dynx.spatial.scalar import Floats
@@ -23,6 +22,7 @@ from dynx.steppers.layout import (
     PlacedShape,
     RobotLayout,
 )
+from dynx.steppers.stepper import Feature, Stepper
 from dynx.world.scene import Material, PointToPoint, Scene, SceneBody, SceneRobot, Weld
 from dynx.world.scene.robots import LinkFrames
 
@@ -33,16 +33,21 @@ _IDENTITY = np.eye(4)
 
 
 def prepare(
-    scene: Scene, *, collisions: bool, joint_limits: bool, joint_damping: bool, joint_friction: bool
+    scene: Scene,
+    *,
+    collisions: bool,
+    joint_limits: bool,
+    joint_damping: bool,
+    joint_friction: bool,
+    joint_armature: bool,
 ) -> Layout:
     """Return the layout of a scene.
 
     Raises DescriptionError for a fault in a collision shape or its mesh, EngineLimitError for more than
     `MAX_COLLIDERS` colliders.
     """
-    robots = tuple(
-        _robot(robot, scene.gravity, joint_limits, joint_damping, joint_friction) for robot in scene.robots
-    )
+    switches = joint_limits, joint_damping, joint_friction, joint_armature
+    robots = tuple(_robot(robot, scene.gravity, *switches) for robot in scene.robots)
     parts = _PartLookup(scene, robots)
     colliders = parts.colliders() if collisions else ()
     return Layout(
@@ -57,11 +62,15 @@ def prepare(
 
 
 def _robot(
-    robot: SceneRobot, gravity: tuple[float, float, float], limits: bool, damping: bool, friction: bool
+    robot: SceneRobot,
+    gravity: tuple[float, float, float],
+    limits: bool,
+    damping: bool,
+    friction: bool,
+    armature: bool,
 ) -> RobotLayout:
     model = robot.model if robot.model.gravity == gravity else replace(robot.model, gravity=gravity)
     moving = [joint for joint in model.joints if joint.moves]
-    terms, base = JointDynamicsTerms(model), 6 if model.floating else 0
     n = len(moving)
     lower, upper = np.full(n, -np.inf), np.full(n, np.inf)
     if limits:
@@ -74,8 +83,9 @@ def _robot(
         np.array(robot.v),
         lower,
         upper,
-        terms.damping[base:] if damping else np.zeros(n),
-        terms.friction[base:] if friction else np.zeros(n),
+        np.array([joint.dynamics.damping for joint in moving]) if damping else np.zeros(n),
+        np.array([joint.dynamics.friction for joint in moving]) if friction else np.zeros(n),
+        np.array([joint.dynamics.armature for joint in moving]) if armature else np.zeros(n),
     )
 
 
@@ -89,6 +99,52 @@ def _body(body: SceneBody) -> BodyLayout:
         body.pose.matrix.copy(),
         np.array(body.twist),
     )
+
+
+def layout_for(kind: type[Stepper], layout: Layout) -> Layout:
+    """Return the layout that an engine gets: that of the scene, without joint dynamics which it does not have
+    and which are therefore computed outside of it.
+
+    Raises UnsupportedFeatureError, naming the engine, for another feature that the scene needs and the engine
+    does not have.
+    """
+    provided = kind.provides(layout)
+    limited = any(np.isfinite([*robot.lower, *robot.upper]).any() for robot in layout.robots)
+    needed = {
+        Feature.CONTACTS: layout.collides.any(),
+        Feature.LIMITS: limited,
+        Feature.MIMICS: any(robot.model.mechanism.coupling is not None for robot in layout.robots),
+        Feature.CONSTRAINTS: bool(layout.constraints),
+    }
+    for feature, is_needed in needed.items():
+        if is_needed and feature not in provided:
+            raise UnsupportedFeatureError(
+                f"the scene {shown(layout.name)} has {feature.value}, which {kind.name!r} does not have"
+            )
+    return replace(layout, robots=tuple(_with_provided_joints(robot, provided) for robot in layout.robots))
+
+
+def _with_provided_joints(robot: RobotLayout, provided: frozenset[Feature]) -> RobotLayout:
+    """Return a robot without the joint dynamics that are computed outside; the same object if none are."""
+    present = {
+        Feature.DAMPING: robot.damping,
+        Feature.DRY_FRICTION: robot.friction,
+        Feature.ARMATURE: robot.armature,
+    }
+    missing = {feature for feature, values in present.items() if values.any()} - provided
+    nothing = np.zeros(len(robot.damping))
+    if missing & {Feature.DAMPING, Feature.ARMATURE}:
+        # Both change the acceleration for which an engine computes the others.
+        return replace(robot, damping=nothing, friction=nothing, armature=nothing)
+    return replace(robot, friction=nothing) if missing else robot
+
+
+def may_be_touched(layout: Layout, robot: int) -> bool:
+    """Check whether contacts, constraints or joint limits may act on a robot."""
+    own = [k for k, collider in enumerate(layout.colliders) if collider.owner.robot == robot]
+    tied = any(robot in (each.a.owner.robot, each.b.owner.robot) for each in layout.constraints)
+    limits = layout.robots[robot].lower, layout.robots[robot].upper
+    return tied or bool(layout.collides[own].any() or np.isfinite(limits).any())
 
 
 class _PartLookup:

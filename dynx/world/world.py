@@ -23,7 +23,7 @@ from dynx.option_names import checks_option_names, refuse_options, right_name
 from dynx.registry import door
 from dynx.spatial.scalar import Floats
 from dynx.steppers.forces import ExternalForce
-from dynx.steppers.layout import Layout
+from dynx.steppers.layout import Layout, RobotLayout
 from dynx.steppers.materials import InexactMaterial, inexact_materials, open_engine
 from dynx.steppers.registry import renderer_of, world_class
 from dynx.steppers.settings import changed_settings, checked_settings, checked_switches
@@ -33,7 +33,7 @@ from dynx.world.commands import Commands, MotorsOf, with_scene_motors
 from dynx.world.contacts import MAX_RAY_LENGTH, ClosestPoints, Contact, RayHits
 from dynx.world.motion import Motion, apply_state, checked_state
 from dynx.world.notes import Overlap, notes_on_engine, notes_on_start, overlaps_of
-from dynx.world.preparation import prepare
+from dynx.world.preparation import layout_for, prepare
 from dynx.world.scene.documents import scene_document, scene_from_document
 from dynx.world.scene.paths import ScenePaths
 from dynx.world.scene.scene import MARGIN, Scene
@@ -119,7 +119,9 @@ def _feed(digest: Any, value: Any) -> None:
         _feed(digest, value.hull)
     elif is_dataclass(value):
         for field in fields(value):
-            if field.compare:
+            # Files of earlier versions have robots without armature.
+            absent = isinstance(value, RobotLayout) and field.name == "armature" and not value.armature.any()
+            if field.compare and not absent:
                 _feed(digest, getattr(value, field.name))
     elif isinstance(value, tuple | list):
         digest.update(repr(len(value)).encode())
@@ -139,9 +141,10 @@ LoadsOf = Callable[["World"], Mapping[str, Any]]
 class World:
     """The robots and bodies of a scene in motion, with contacts, in steps of `dt` [s].
 
-    Each step consists of `substeps` steps of the engine. `joint_limits`, `joint_damping` and
-    `joint_friction` are those of the robots' descriptions; without `collisions` nothing touches. `settings`
-    are those of the engine (`World.settings`); docs/world.md lists them.
+    Each step consists of `substeps` steps of the engine. `joint_limits`, `joint_damping`, `joint_friction`
+    and `joint_armature` are those of the robots' descriptions; joint dynamics that the engine does not have
+    are computed outside of it. Without `collisions` nothing touches. `settings` are those of the engine
+    (`World.settings`); docs/world.md lists them.
 
     A world is closed by `close` or at the end of a ``with`` block. Arguments are checked before the engine
     gets them, and a call that raises an error leaves the state as it was.
@@ -157,7 +160,8 @@ class World:
         collisions: bool = True,
         joint_limits: bool = True,
         joint_damping: bool = True,
-        joint_friction: bool = False,
+        joint_friction: bool = True,
+        joint_armature: bool = True,
         **settings: object,
     ) -> None:
         """Raises UnknownBackendError and NotInstalledError for an engine, UnknownNameError and ArgumentError
@@ -180,6 +184,7 @@ class World:
             joint_limits=joint_limits,
             joint_damping=joint_damping,
             joint_friction=joint_friction,
+            joint_armature=joint_armature,
         )
         self.settings: Mapping[str, Any] = checked_settings(engine, self._kind.settings, settings)
         """The engine's settings in use, by name."""
@@ -189,14 +194,18 @@ class World:
         self._scene_motors = {robot.name: robot.motors for robot in scene.robots if robot.motors}
         robots = {robot.name: k for k, robot in enumerate(self._layout.robots)}
         bodies = {body.name: k for k, body in enumerate(self._layout.bodies)}
-        self._commands = Commands(self._layout, robots, bodies, self.dt / self.substeps, self._kind)
+        self._in_engine = layout_for(self._kind, self._layout)
+        self._commands = Commands(
+            self._layout, self._in_engine, robots, bodies, self.dt / self.substeps, self._kind
+        )
         self._identity: str | None = None
         self._motion = Motion(self._layout, self._commands, self._build, self.dt, self.substeps)
         at_start = notes_on_start(self._motion.engine, self._motion.state)
         self.notes: tuple[str, ...] = (*at_start, *self._lasting_notes(settings))
         """Parts that overlap at the start, constraints that it violates, joints beyond their limits, robots
-        whose accelerations have no bound, coefficients of contact that the engine does not have, a step that
-        is long, and settings given that the engine changes, one sentence each."""
+        whose accelerations have no bound, coefficients of contact that the engine does not have, joint
+        dynamics that are not exact, a step that is long, and settings given that the engine changes, one
+        sentence each."""
 
     @property
     def version(self) -> str:
@@ -355,7 +364,9 @@ class World:
         """
         snapshot, given = read_snapshot(path)
         scene = scene_from_document(given["scene"], ScenePaths(None, package_dirs))
-        world = cls(scene, given["engine"], **given["options"], **given["settings"])
+        # Worlds of earlier versions had no armature.
+        options = {"joint_armature": False, **given["options"]}
+        world = cls(scene, given["engine"], **options, **given["settings"])
         try:
             world.restore(snapshot)
             defaults = {name: setting.default for name, setting in world._kind.settings.items()}
@@ -371,7 +382,11 @@ class World:
         """Hash of the scene, the options and the settings: worlds of one engine with the same identity take
         the same steps."""
         if self._identity is None:
-            self._identity = identity(self._layout, {**self.options, **self.settings})
+            options = {**self.options, **self.settings}
+            if not self.options["joint_armature"]:
+                # Files of earlier versions do not have the option.
+                del options["joint_armature"]
+            self._identity = identity(self._layout, options)
         return self._identity
 
     # -- queries ------------------------------------------------------------------------------
@@ -474,8 +489,9 @@ class World:
     def _lasting_notes(self, given: Mapping[str, object]) -> Iterator[str]:
         """Yield the notes that hold at every state, with those on the settings `given`."""
         yield from notes_on_engine(self._motion.engine)
+        yield from self._commands.notes()
         in_effect = self._kind.settings_in_effect(self.settings, self.dt / self.substeps)
         yield from changed_settings(given, self.settings, in_effect)
 
     def _build(self) -> Stepper:
-        return open_engine(self._kind, self._layout, self.dt / self.substeps, self.settings)
+        return open_engine(self._kind, self._in_engine, self.dt / self.substeps, self.settings)

@@ -41,6 +41,10 @@ class ExactFlight(Stepper):
     name = "exact_flight"
     settings = {"drag": Setting(0.0, "linear drag of the air [1/s]")}
 
+    @classmethod
+    def provides(cls, layout):
+        return frozenset()
+
     def __init__(self, layout, dt, settings):
         super().__init__(layout, dt, settings)
         if layout.robots or layout.constraints:

@@ -21,7 +21,7 @@ from dynx.steppers.forces import NO_FORCES, Forces
 from dynx.steppers.layout import Collider, Layout
 from dynx.steppers.settings import Setting
 from dynx.steppers.state import BodyState, RobotState
-from dynx.steppers.stepper import Stepper, TouchingPoint
+from dynx.steppers.stepper import Feature, Stepper, TouchingPoint
 
 TINY = 1e-9
 """Distance [m], speed [m/s] and time [s] that count as zero."""
@@ -67,6 +67,10 @@ class ExactWorld(Stepper):
         "leak": Setting(0.0, "share of the momentum that a collision of two balls loses", most=1.0),
         "pyramid": Setting(False, "whether friction is limited along each axis of the plane by itself"),
     }
+
+    @classmethod
+    def provides(cls, layout: Layout) -> frozenset[Feature]:
+        return frozenset(Feature)
 
     def __init__(self, layout: Layout, dt: float, settings: Mapping[str, Any]) -> None:
         super().__init__(layout, dt, settings)

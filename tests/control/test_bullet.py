@@ -40,6 +40,7 @@ def stepper_of(robot: Model) -> BulletStepper:
         joint_limits=False,
         joint_damping=False,
         joint_friction=False,
+        joint_armature=False,
     )
     return BulletStepper(
         layout, 1e-3, {name: setting.default for name, setting in BulletStepper.settings.items()}

@@ -12,15 +12,12 @@ from hypothesis import strategies as st
 from dynx.model.numbers import DIVERGENCE_SPEED
 from dynx.sim.step import (
     MAX_SQUARED_SPEED,
-    held_at_limits,
     is_diverged,
     squared_speed,
     torque_sum,
     with_disturbances,
 )
 from dynx.steppers.clock import Clock
-
-NUMBERS = st.floats(-4.0, 4.0)
 
 
 @given(st.integers(0, 40), st.integers(1, 7), st.integers(0, 9))
@@ -33,15 +30,6 @@ def test_control_steps(step: int, per: int, delay: int) -> None:
     assert clock.is_control_step(np.arange(41)).tolist() == [k in control_steps for k in range(41)]
     assert clock.n_controls == 1 + clock.control_number(40)
     assert clock.measured_step(step) == max(0, step - delay)
-
-
-@given(st.lists(st.tuples(NUMBERS, NUMBERS), min_size=1, max_size=5))
-def test_joints_beyond_limits_are_struck_only_outwards(states: list[tuple[float, float]]) -> None:
-    joints, speeds = np.array(states).T
-    held, impacts = held_at_limits(joints, speeds, np.full(len(joints), -1.0), np.full(len(joints), 2.0))
-    for q, v, at, impact in zip(joints, speeds, held, impacts, strict=True):
-        assert at == min(max(q, -1.0), 2.0)
-        assert impact == (1.0 if q > 2.0 and v > 0.0 else -1.0 if q < -1.0 and v < 0.0 else 0.0)
 
 
 @pytest.mark.parametrize(

@@ -115,7 +115,8 @@ def test_a_motor_at_the_end_of_a_step_acts_where_another_joint_moves_no_mass() -
         Joint("wrist", "revolute", "arm", "tip", axis=(0.0, 0.0, 1.0)),
     )
     model = Model("m", links, joints)
-    loads = RobotLoads(prepare_robot(model), 1e-3)
+    robot = prepare_robot(model)
+    loads = RobotLoads(robot, robot, 1e-3, touched=False)
     loads.set_motors([PositionMotor(0.5, 100.0, 1.0, joints=["shoulder"])])
     tau = loads.torque(np.zeros(2), np.zeros(2), None, ())
     # kp (q* - q - h v) - kd v at the end of the step, where v = h tau / I.
@@ -123,10 +124,8 @@ def test_a_motor_at_the_end_of_a_step_acts_where_another_joint_moves_no_mass() -
 
 
 def prepare_robot(model: Model) -> RobotLayout:
-    scene = Scene(robots=(SceneRobot("r", model),))
-    return prepare(
-        scene, collisions=False, joint_limits=False, joint_damping=False, joint_friction=False
-    ).robots[0]
+    off = ("collisions", "joint_limits", "joint_damping", "joint_friction", "joint_armature")
+    return prepare(Scene(robots=(SceneRobot("r", model),)), **dict.fromkeys(off, False)).robots[0]
 
 
 @pytest.mark.parametrize("engine", WORLDS)

@@ -319,6 +319,9 @@ def _add_robot(
         kind = RevoluteJoint if moving.revolute else PrismaticJoint
         limits = robot.lower[index], robot.upper[index], robot.damping[index]
         joints.append(plant.AddJoint(kind(name, before, body.body_frame(), np.array(moving.axis), *limits)))
+        if robot.armature[index]:
+            actuator = plant.AddJointActuator(name, joints[-1])
+            actuator.set_default_rotor_inertia(robot.armature[index])
         carriers[Owner(number, index)] = Carrier(body, np.eye(4))
     _couple_mimics(plant, robot, joints)
     return base, joints

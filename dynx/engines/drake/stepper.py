@@ -22,7 +22,7 @@ from dynx.steppers.layout import Layout
 from dynx.steppers.materials import EffectiveCoefficient
 from dynx.steppers.settings import Setting
 from dynx.steppers.state import BodyState, RobotState
-from dynx.steppers.stepper import Stepper, TouchingPoint
+from dynx.steppers.stepper import Feature, Stepper, TouchingPoint
 
 
 def read_contacts(results: Any, query: Any, collider_of: Mapping[int, int]) -> list[TouchingPoint]:
@@ -148,6 +148,10 @@ class DrakeStepper(Stepper):
         for number, body in built.bodies.items():
             body.write(layout.bodies[number].T, layout.bodies[number].twist, q, v)
         self._set_state(q, v)
+
+    @classmethod
+    def provides(cls, layout: Layout) -> frozenset[Feature]:
+        return frozenset(Feature) - {Feature.DRY_FRICTION}
 
     def effective_materials(self) -> Mapping[str, EffectiveCoefficient]:
         return effective_materials()

@@ -517,7 +517,7 @@ def _write_inertias(model: Any, layout: Layout) -> None:
 
 
 def _write_joints(model: Any, layout: Layout, settings: Mapping[str, Any], dt: float) -> None:
-    """Write limits, damping and dry friction of all joints into the compiled model."""
+    """Write limits, damping, dry friction and armature of all joints into the compiled model."""
     model.jnt_limited[:] = False
     model.jnt_solref[:] = limit_reference(settings, dt)
     model.jnt_solimp[:] = settings["impedance"]
@@ -534,6 +534,7 @@ def _write_joints(model: Any, layout: Layout, settings: Mapping[str, Any], dt: f
             model.jnt_range[joint] = lower, upper
             model.dof_damping[dof] = robot.damping[index] if damped else 0.0
             model.dof_frictionloss[dof] = robot.friction[index]
+            model.dof_armature[dof] = robot.armature[index]
 
 
 def _first_indices(model: Any, number: int, robot: RobotLayout) -> tuple[int, int]:

@@ -29,7 +29,7 @@ from dynx.steppers.forces import NO_FORCES, Forces
 from dynx.steppers.layout import Layout, RobotLayout
 from dynx.steppers.materials import EffectiveCoefficient
 from dynx.steppers.state import BodyState, RobotState
-from dynx.steppers.stepper import Stepper, TouchingPoint
+from dynx.steppers.stepper import Feature, Stepper, TouchingPoint
 
 
 class CoupledRobot:
@@ -142,6 +142,10 @@ class MujocoStepper(Stepper):
         for number, moving in self._bodies.items():
             moving.write(layout.bodies[number].T, layout.bodies[number].twist)
         self._moved()
+
+    @classmethod
+    def provides(cls, layout: Layout) -> frozenset[Feature]:
+        return frozenset(Feature)
 
     @classmethod
     def settings_in_effect(cls, settings: Mapping[str, Any], dt: float) -> Mapping[str, Any]:

@@ -21,13 +21,14 @@ from dynx.engines.pybullet.motors import BulletMotorCommand
 from dynx.engines.pybullet.stepper import BulletStepper
 from dynx.errors import EngineLimitError, UnsupportedFeatureError
 from dynx.model import Model
-from dynx.sim.plants.disturbances import Disturbances, DisturbedAcceleration
+from dynx.sim.plants.disturbances import Disturbances
 from dynx.sim.plants.plant import Plant, StepResult
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross, rotate_back, rotation_from_quat
 from dynx.steppers.forces import Forces
 from dynx.steppers.implicit_joints import ImplicitJoints
 from dynx.steppers.layout import Layout, RobotLayout
+from dynx.steppers.robot_step import RobotStep
 
 Mask = NDArray[np.bool_]
 
@@ -75,8 +76,9 @@ class BulletPlant(Plant):
         return EngineDynamics(backend("compiled", self.model, validate=False))
 
     @cached_property
-    def _accelerate(self) -> DisturbedAcceleration:
-        return DisturbedAcceleration(self._engine, self.disturbances)
+    def _accelerate(self) -> RobotStep:
+        load = self.disturbances.load_on(self._engine)
+        return RobotStep(self._engine, self.disturbances.joints, self._h, add_load=load)
 
     def reset(self, q: Floats, v: Floats) -> None:
         self._q, self._v = q, v
@@ -131,7 +133,7 @@ class BulletPlant(Plant):
             # The torque that Bullet's own dynamics need for this acceleration.
             tau = self._friction.net_torque
         elif self.disturbances.has_armature:
-            tau = self._engine.inverse_dynamics(q, v, self._accelerate(q, v, tau, t))
+            tau = self._engine.inverse_dynamics(q, v, self._accelerate.acceleration(q, v, tau, t))
         elif self.disturbances.has_torque:
             tau = tau + self.disturbances.torque(self._engine, t, q, v)
         return self._advance(Forces([(0, tau)]), moves)
@@ -206,6 +208,7 @@ def _scene_of_one(model: Model) -> Layout:
         np.zeros(model.nv),
         -unlimited,
         unlimited,
+        np.zeros(n),
         np.zeros(n),
         np.zeros(n),
     )

@@ -40,7 +40,7 @@ from dynx.steppers.layout import WORLD, Anchor, Collider, ConstraintLayout, Layo
 from dynx.steppers.materials import EffectiveCoefficient
 from dynx.steppers.settings import Setting
 from dynx.steppers.state import BodyState, RobotState
-from dynx.steppers.stepper import Stepper, TouchingPoint
+from dynx.steppers.stepper import Feature, Stepper, TouchingPoint
 
 NO_BODY = -1
 """Bullet's number of the world as the second body of a constraint."""
@@ -145,6 +145,10 @@ class BulletStepper(Stepper):
     @classmethod
     def require_engine(cls) -> None:
         bullet()
+
+    @classmethod
+    def provides(cls, layout: Layout) -> frozenset[Feature]:
+        return frozenset(Feature) - {Feature.ARMATURE}
 
     def __init__(self, layout: Layout, dt: float, settings: Mapping[str, Any]) -> None:
         super().__init__(layout, dt, settings)

@@ -13,8 +13,6 @@ from functools import cached_property
 import numpy as np
 
 from dynx.backends import Backend, backend
-from dynx.backends.dynamics import EngineDynamics
-from dynx.backends.hooks import solve_mass_matrix
 from dynx.backends.joint_dynamics import (
     Coefficients,
     JointDynamicsTerms,
@@ -25,12 +23,14 @@ from dynx.backends.joint_dynamics import (
 )
 from dynx.errors import ArgumentError
 from dynx.model import Model
+from dynx.model.elements import JointCoefficients
 from dynx.model.numbers import checked_gain
 from dynx.rbd.joint_friction import FrictionLaw
 from dynx.sim.step import with_disturbances
 from dynx.spatial.scalar import Floats
 from dynx.steppers.forces import ExternalForce
 from dynx.steppers.implicit_joints import ImplicitJoints
+from dynx.steppers.robot_step import AddLoad
 
 STABLE = {"rk4": 2.78, "adaptive": np.inf}
 """Largest h f / (M s) by integrator; 2 for all others."""
@@ -112,6 +112,23 @@ class Disturbances:
         }
         return [name for name, is_present in present.items() if is_present]
 
+    @property
+    def joints(self) -> JointCoefficients:
+        """Coefficients (nv,) that are solved for in each step: armature, and damping and dry friction without
+        a slip speed."""
+        # Each joint depends on at most one coordinate, so the armature matrix is diagonal.
+        armature = self.armature.diagonal().copy()
+        if not self.sticks:
+            return JointCoefficients(0.0 * armature, 0.0 * armature, armature)
+        return JointCoefficients(self.friction.viscous, self.friction.dry, armature)
+
+    def load_on(self, engine: Backend) -> AddLoad | None:
+        """Return the function that adds the torque of pushes, and subtracts that of friction with a slip
+        speed, on a robot in `engine`; None without both."""
+        if not self.has_torque:
+            return None
+        return lambda tau, q, v, t: self.added_to(tau, engine, t, q, v)
+
     def torque(self, engine: Backend, t: float, q: Floats, v: Floats) -> Floats:
         """Return the torque (nv,) of pushes in a step that began at `t`, minus that of friction with a slip
         speed."""
@@ -125,43 +142,6 @@ class Disturbances:
             self.friction(v) if self.friction.smooth else None,
             (push.at_frame(engine, push.on, q, share) for push, share in shares if share),
         )
-
-
-class DisturbedAcceleration:
-    """Acceleration of a plant under a torque: forward dynamics of a backend, with the disturbances."""
-
-    def __init__(self, engine: Backend, disturbances: Disturbances) -> None:
-        self.dynamics = EngineDynamics(engine)
-        self._engine = engine
-        self._disturbances = disturbances
-
-    @property
-    def is_undisturbed(self) -> bool:
-        """True if there are no disturbances, so that it is the backend's forward dynamics alone."""
-        return not (self._disturbances.has_torque or self._disturbances.has_armature)
-
-    def __call__(self, q: Floats, v: Floats, tau: Floats, t: float = 0.0) -> Floats:
-        """Return the acceleration (nv,) at state q, v under `tau`, in a step that began at `t`, without
-        friction that sticks."""
-        disturbances, dynamics = self._disturbances, self.dynamics
-        tau = self.pushed(q, v, tau, t)
-        if not disturbances.has_armature:
-            a: Floats = dynamics.forward_dynamics(q, v, tau)
-            return a
-        M, bias = dynamics.mass_matrix_and_bias(q, v)
-        return solve_mass_matrix(M + disturbances.armature, tau - bias)
-
-    def with_friction(self, solver: ImplicitJoints, q: Floats, v: Floats, tau: Floats, t: float) -> Floats:
-        """Return the acceleration under joint friction that sticks, and 1 for coordinates that move and 0 for
-        those that stick, (2, nv)."""
-        tau = self.pushed(q, v, tau, t)
-        return solver.step(*self.dynamics.mass_matrix_and_bias(q, v), tau, v)
-
-    def pushed(self, q: Floats, v: Floats, tau: Floats, t: float) -> Floats:
-        """Return `tau` plus the torque of pushes, minus that of friction with a slip speed (nv,)."""
-        if not self._disturbances.has_torque:
-            return tau
-        return self._disturbances.added_to(tau, self._engine, t, q, v)
 
 
 def _armature_matrix(model: Model, armature: Coefficients) -> Floats:

@@ -17,7 +17,7 @@ from dynx.model import Model
 from dynx.model.numbers import whole_number
 from dynx.registry import ClassRegistry
 from dynx.sim.plants.disturbances import Disturbances
-from dynx.sim.plants.integrated import SCHEMES, IntegratedPlant
+from dynx.sim.plants.integrated import IntegratedPlant
 from dynx.sim.plants.plant import Plant, plant_errors
 from dynx.sim.plants.scene_plant import ScenePlant
 
@@ -30,7 +30,7 @@ BUILT_IN = {"pybullet": "dynx.engines.pybullet.plant:BulletPlant"}
 ENGINE = "engine"
 """Name of the integrator that stands for the engine's own stepper."""
 
-INTEGRATORS = (*SCHEMES, ENGINE)
+INTEGRATORS = ("semi_implicit", "rk4", "adaptive", ENGINE)
 """Names that `dynx.simulate` takes as `integrator`."""
 
 _steppers = ClassRegistry(

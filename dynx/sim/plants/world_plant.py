@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dynx.errors import EngineError, UnsupportedFeatureError
+from dynx.errors import EngineError
 from dynx.model import Model
 from dynx.model.elements import JointDynamics
 from dynx.model.geometry import Geometry
@@ -33,20 +33,16 @@ class Memory(NamedTuple):
 class WorldPlant(Plant):
     """A robot of a scene in `dynx.world.World`.
 
-    Joint damping, and dry friction without a slip speed, are those of the engine; friction with a slip speed
-    is a torque, as in the other plants. Pushes act in each step of the engine. Contacts and the motion of the
-    surroundings are recorded.
+    Armature, joint damping, and dry friction without a slip speed, are those of the world; friction with a
+    slip speed is a torque, as in the other plants. Pushes act in each step of the engine. Contacts and the
+    motion of the surroundings are recorded.
     """
 
     def __init__(
         self, place: ScenePlant, model: Model, disturbances: Disturbances, dt: float, *, substeps: int = 1
     ) -> None:
-        """Raises UnsupportedFeatureError for armature, otherwise as `World` does."""
+        """Raises the errors of `World`."""
         super().__init__(model, disturbances, dt, substeps=substeps)
-        if disturbances.has_armature:
-            raise UnsupportedFeatureError(
-                "a world has no armature: simulate with another plant, or write the inertia into the links"
-            )
         assert place.robot is not None
         self._robot = place.robot
         self._world = World(
@@ -114,7 +110,7 @@ class WorldPlant(Plant):
 
 
 def _scene_of(place: ScenePlant, model: Model, disturbances: Disturbances) -> Scene:
-    """Return the scene with the robot's masses and joint friction as the simulation has them."""
+    """Return the scene with the robot's masses and joint dynamics as the simulation has them."""
     friction, base = disturbances.friction, 6 if model.floating else 0
     own = place.scene_robot.model
     joints = [joint for joint in model.joints if joint.moves]
@@ -125,6 +121,9 @@ def _scene_of(place: ScenePlant, model: Model, disturbances: Disturbances) -> Sc
         joint.name: JointDynamics(damping=damping, friction=dry)
         for joint, (damping, dry) in zip(owners, pairs, strict=True)
     }
+    rotors = zip(model.coordinate_joints, disturbances.armature.diagonal()[base:].tolist(), strict=True)
+    for joint, armature in rotors:
+        laws[joint.name] = replace(laws.get(joint.name, JointDynamics()), armature=armature)
     moved = tuple(replace(joint, dynamics=laws.get(joint.name, JointDynamics())) for joint in model.joints)
     # A payload is a link more, without shapes.
     geometry = Geometry(own.geometry.links).for_links(link.name for link in model.links)

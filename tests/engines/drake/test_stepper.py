@@ -18,7 +18,13 @@ from dynx.world import Material, PointToPoint, Scene, SceneBody, SceneRobot, Wel
 from dynx.world.preparation import prepare
 
 G = 9.81
-SWITCHES = {"collisions": True, "joint_limits": True, "joint_damping": True, "joint_friction": False}
+SWITCHES = {
+    "collisions": True,
+    "joint_limits": True,
+    "joint_damping": True,
+    "joint_friction": False,
+    "joint_armature": True,
+}
 DEFAULTS = {name: setting.default for name, setting in DrakeStepper.settings.items()}
 
 

@@ -11,7 +11,7 @@ import pytest
 
 import dynx
 from dynx import control
-from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError
+from dynx.errors import ArgumentError, UnknownNameError
 from dynx.sim import Scenario, ScenePlant, Simulation
 from dynx.world import Material, Scene, SceneRobot, box, ground
 from tests.world.engines import WORLDS
@@ -119,7 +119,7 @@ def test_joint_friction_and_pushes_act_as_in_other_plants(engine: str) -> None:
     slider = dynx.load(SLIDER)
     plant = ScenePlant(Scene("free", robots=(SceneRobot("slider", slider),)), engine=engine)
     push = dynx.ExternalForce("pusher", [4.0, 0, 0, 0, 0, 0], duration=0.25)
-    given = {"duration": 0.5, "damping": True, "friction": True, "pushes": push}
+    given = {"duration": 0.5, "damping": True, "friction": True, "armature": 0.5, "pushes": push}
     inside, alone = (dynx.simulate(slider, plant=each, **given) for each in (plant, "reference"))  # type: ignore[arg-type]
     np.testing.assert_allclose(inside.q, alone.q, atol=2e-3)
     assert 0.0 < inside.v[-1, 0] < inside.v.max()
@@ -192,7 +192,5 @@ def test_a_scene_refuses_what_it_cannot_do(engine: str) -> None:
         replace(scenario, position_limits=True)
     with pytest.raises(ArgumentError, match="own stepper"):
         dynx.simulate(replace(scenario, integrator="rk4"))
-    with pytest.raises(UnsupportedFeatureError, match="armature"):
-        dynx.simulate(replace(scenario, armature=0.1))
     with pytest.raises(ArgumentError, match="cannot be resumed"):
         dynx.simulate(scenario, resume=dynx.simulate(scenario), step=10)

@@ -15,19 +15,20 @@ from dynx.errors import DivergedError
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.sim import Rollout, Scenario, Simulation, simulate
-from dynx.sim.closed_loop import Stops
 from dynx.spatial.scalar import Floats
+from dynx.steppers.joint_stops import JointStops, held_at_limits
 from tests.sim.bars import tutorial_robot
 from tests.sim.test_compiled_loop import both
 from tests.sim.test_resume import the_same
 
 ARM = tutorial_robot()
+NUMBERS = st.floats(-4.0, 4.0)
 MASS = backend("reference", ARM)
 
 
 def stopped(q: Floats, v: Floats) -> tuple[Floats, Floats] | None:
     """Return the state of the arm after its stops."""
-    return Stops(ARM, MASS.mass_matrix)(q, v)
+    return JointStops(ARM, MASS.mass_matrix)(q, v)
 
 
 @given(
@@ -64,7 +65,7 @@ def test_steps_without_a_joint_at_its_limit_need_no_mass_matrix() -> None:
     def refused(q: Floats) -> Floats:
         raise AssertionError("the mass matrix was computed")
 
-    stops = Stops(ARM, refused)
+    stops = JointStops(ARM, refused)
     inside = 0.5 * (ARM.lower + ARM.upper)
     assert stops(inside, np.ones(6)) is None
     assert stops(ARM.upper, np.ones(6)) is None
@@ -125,3 +126,12 @@ def test_a_stop_hides_no_divergence(plant: str) -> None:
         with pytest.raises(DivergedError) as caught:
             simulation.step(tau=np.array([1e15, 0.0, 0.0, 0.0, 0.0, 0.0]))
     assert caught.value.step == 1
+
+
+@given(st.lists(st.tuples(NUMBERS, NUMBERS), min_size=1, max_size=5))
+def test_joints_beyond_limits_are_struck_only_outwards(states: list[tuple[float, float]]) -> None:
+    joints, speeds = np.array(states).T
+    held, impacts = held_at_limits(joints, speeds, np.full(len(joints), -1.0), np.full(len(joints), 2.0))
+    for q, v, at, impact in zip(joints, speeds, held, impacts, strict=True):
+        assert at == min(max(q, -1.0), 2.0)
+        assert impact == (1.0 if q > 2.0 and v > 0.0 else -1.0 if q < -1.0 and v < 0.0 else 0.0)
