@@ -1,4 +1,4 @@
-"""Joint dynamics: damping, Coulomb friction and armature, the same for every backend and for what moves.
+"""Joint dynamics: damping, Coulomb friction and armature of the description, the same for every backend.
 
 They add ``armature a + damping v + friction sign(v)`` to the torque of each moving joint. Those of a mimic
 joint act on its driver through its multiplier.
@@ -6,171 +6,12 @@ joint act on its driver through its multiplier.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, GainError, UnknownNameError, shown
 from dynx.model import Model
-from dynx.model.numbers import checked_gain, is_real, read_only, real_array
-from dynx.spatial.scalar import Array, Floats, sign, tanh
-
-SLIP = 1e-2
-"""Default speed [rad/s or m/s] at which compensation of dry friction has 76 % of its magnitude."""
-
-MIN_SLIP = 1e-9
-"""Smallest slip speed above 0 [rad/s or m/s]; the division overflows for smaller ones."""
-
-Coefficients = bool | ArrayLike | Mapping[str, ArrayLike]
-"""Coefficients: True for the description's, False for zero, one number, one per joint coordinate, or numbers
-by the name of the joint (`coefficients_by_joint`)."""
-
-
-@dataclass(frozen=True, eq=False)
-class JointFriction:
-    """Torque of damping and dry friction, which opposes the motion of each joint: d v + f tanh(v / slip).
-
-    With `slip` 0 it is d v + f sign(v), as with ``joint_dynamics=True`` in every backend. A joint at rest
-    then has any torque between -f and f, whichever keeps it at rest; a function of the velocity cannot tell
-    it, so plants solve for it (`dynx.rbd.joint_friction`). A mimic joint's coefficients act on its
-    driver through its multiplier.
-    """
-
-    model: Model
-    damping: Floats
-    friction: Floats
-    slip: float
-    to_tree: Floats | None
-    """Matrix from the model's coordinates to those of the tree, to which the coefficients then belong."""
-
-    def __init__(
-        self, model: Model, damping: Coefficients = True, friction: Coefficients = True, slip: float = SLIP
-    ) -> None:
-        """`damping` [N m s/rad or N s/m] and `friction` [N m or N] of the joints; see `Coefficients`.
-
-        Raises GainError for invalid coefficients, ArgumentError for an invalid slip speed.
-        """
-        own, of_model = JointDynamicsTerms(model), (damping is True, friction is True)
-        coupling = model.mechanism.coupling
-        # The coefficients of the description belong to the joints of the tree, given ones to the coordinates.
-        through = coupling is not None and any(of_model)
-        values = {
-            "model": model,
-            "damping": self._coefficients("damping", damping, own.damping, model, through),
-            "friction": self._coefficients("friction", friction, own.friction, model, through),
-            "slip": checked_slip("slip", slip),
-            "to_tree": coupling.matrix() if coupling is not None and through else None,
-        }
-        for name, value in values.items():
-            object.__setattr__(self, name, read_only(value) if isinstance(value, np.ndarray) else value)
-
-    @cached_property
-    def present(self) -> bool:
-        """True if any coefficient is not zero."""
-        return bool(self.damping.any()) or self._dry
-
-    @property
-    def sticks(self) -> bool:
-        """True if joints stick: there is friction and no slip speed, so that each step is solved for it."""
-        return self.present and not self.slip
-
-    @property
-    def smooth(self) -> bool:
-        """True if there is friction with a slip speed, whose torque is a function of the velocity."""
-        return self.present and bool(self.slip)
-
-    @cached_property
-    def _dry(self) -> bool:
-        return bool(self.friction.any())
-
-    @property
-    def viscous(self) -> Floats:
-        """Damping (nv,) of the model's coordinates [N m s/rad or N s/m]."""
-        return np.asarray(self.viscous_for(self.damping))
-
-    @property
-    def dry(self) -> Floats:
-        """Dry friction (nv,) of the model's coordinates [N m or N]."""
-        return np.asarray(self.dry_for(self.friction))
-
-    def viscous_for(self, damping: Array) -> Array:
-        """Return the damping (nv,) of the model's coordinates, with other coefficients of the same shape."""
-        return damping if self.to_tree is None else (self.to_tree**2).T @ damping
-
-    def dry_for(self, friction: Array) -> Array:
-        """Return the dry friction (nv,) of the model's coordinates, with other coefficients of the same
-        shape: each joint of the tree depends on one of them."""
-        return friction if self.to_tree is None else abs(self.to_tree).T @ friction
-
-    def __call__(self, v: Array) -> Array:
-        """Return the torque (..., nv) of friction at velocity `v` (..., nv), arrays of any scalar."""
-        return self.torque_for(v, self.damping, self.friction)
-
-    def torque_for(self, v: Array, damping: Array, friction: Array) -> Array:
-        """Return the torque (..., nv) of friction with other coefficients, of the same shapes."""
-        speed = v if self.to_tree is None else v @ self.to_tree.T
-        torque = damping * speed
-        if self._dry:
-            torque = torque + friction * (tanh(speed / self.slip) if self.slip else sign(speed))
-        return np.asarray(torque if self.to_tree is None else torque @ self.to_tree)
-
-    @staticmethod
-    def _coefficients(name: str, given: Coefficients, own: Floats, model: Model, through: bool) -> Floats:
-        if isinstance(given, bool):
-            return own if given else np.zeros(model.mechanism.nv if through else model.nv)
-        base = 6 if model.floating else 0
-        refuse_text(name, given, model.nv - base)
-        numbers = coefficients_by_joint(model, name, given)
-        coefficients = checked_gain(name, numbers, model.nv - base, per="one for each joint")
-        # Given coefficients apply to joints that own a coordinate, not to the base or to mimic joints.
-        owners = [joint.mimic is None for joint in model.joints if joint.moves]
-        joints = np.zeros(len(owners) if through else len(coefficients))
-        joints[owners if through else slice(None)] = coefficients
-        return np.concatenate([np.zeros(base), joints])
-
-
-def checked_slip(name: str, slip: object) -> float:
-    """Return a slip speed as a float. Raises ArgumentError unless it is 0 or at least `MIN_SLIP`."""
-    if is_real(slip) and (slip == 0.0 or MIN_SLIP <= float(slip) < np.inf):
-        return float(slip)
-    raise ArgumentError(f"{name} is {shown(slip)}; wanted a speed: 0, or {MIN_SLIP:g} or more")
-
-
-def coefficients_by_joint(
-    model: Model, name: str, given: ArrayLike | Mapping[str, ArrayLike], others: float = 0.0
-) -> ArrayLike:
-    """Return numbers by the name of the joint as an array (joints,) or, with a number for each of n rollouts,
-    (n, joints); joints that are not named have `others`. Anything but a mapping is returned unchanged.
-
-    Raises UnknownNameError for a joint without a coordinate, GainError for numbers of different lengths.
-    """
-    if not isinstance(given, Mapping):
-        return given
-    base = 6 if model.floating else 0
-    columns = [np.asarray(others) for _ in range(model.nv - base)]
-    for joint, value in given.items():
-        try:
-            column = model.coordinate_index(joint) - base
-        except UnknownNameError as error:
-            raise UnknownNameError(f"{name}: {error}") from None
-        columns[column] = real_array(f"{name} of {shown(joint)}", value)
-    lengths = {column.shape for column in columns if column.shape}
-    if len(lengths) > 1 or any(len(shape) > 1 for shape in lengths):
-        raise GainError(f"{name} by joint: wanted one number for each joint, or one for each rollout")
-    return np.stack(np.broadcast_arrays(*columns), axis=-1) if columns else np.zeros(0)
-
-
-def refuse_text(name: str, given: object, joints: int, own: str = "True") -> None:
-    """Raise GainError for coefficients that are a text; `own` stands for the description's."""
-    if isinstance(given, str):
-        raise GainError(
-            f"{name} is {shown(given)}; wanted one number, an array ({joints},) in the order of the joints, "
-            f"numbers by joint as in {{joint: number}}, or {own} for the values of the description"
-        )
+from dynx.spatial.scalar import Floats
 
 
 class JointDynamicsTerms:

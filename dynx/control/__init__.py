@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from dynx.registry import moved_names
 
 if TYPE_CHECKING:
-    from dynx.backends.joint_dynamics import JointFriction
+    from dynx.backends.joint_friction import JointFriction
     from dynx.control.base import Controller, Measurement, ModelBased, model_dynamics
     from dynx.control.bullet import (
         BulletMotor,
@@ -74,7 +74,7 @@ _HOME = {
     "FrictionCompensation": "dynx.control.friction",
     "GravityCompensatedPD": "dynx.control.joint_space",
     "Impedance": "dynx.control.task_space",
-    "JointFriction": "dynx.backends.joint_dynamics",
+    "JointFriction": "dynx.backends.joint_friction",
     "Measurement": "dynx.control.base",
     "ModelBased": "dynx.control.base",
     "MotorLag": "dynx.control.motors_and_encoders",

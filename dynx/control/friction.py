@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from dynx.backends.joint_dynamics import SLIP, Coefficients, JointFriction, coefficients_by_joint
+from dynx.backends.joint_friction import SLIP, Coefficients, JointFriction, coefficients_by_joint
 from dynx.control.base import Controller, ControllerState, Measurement, Wrapper, parameter
 from dynx.errors import ArgumentError, shown
 from dynx.model import Model

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.backends.joint_dynamics import coefficients_by_joint, refuse_text
+from dynx.backends.joint_friction import coefficients_by_joint, refuse_text
 from dynx.control.base import Controller, ControllerState, Measurement, Wrapper, parameter
 from dynx.errors import GainError, LimitError, shown
 from dynx.model import Model

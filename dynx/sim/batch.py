@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.backends import backend
-from dynx.backends.joint_dynamics import coefficients_by_joint, refuse_text
+from dynx.backends.joint_friction import coefficients_by_joint, refuse_text
 from dynx.backends.solvability import Solvability
 from dynx.compiled.parametric import ParametricDynamics
 from dynx.compiled.step import BoundSteps, CompiledStep, Status, Stop

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.backends.dynamics import QUANTITIES, Dynamics, EngineDynamics, Evaluation
-from dynx.backends.joint_dynamics import JointFriction
+from dynx.backends.joint_friction import JointFriction
 from dynx.compiled.array_dynamics import ArrayDynamics
 from dynx.compiled.kernels import evaluate_quantity
 from dynx.compiled.parametric import ParametricDynamics

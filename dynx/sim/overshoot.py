@@ -9,7 +9,7 @@ import numpy as np
 
 from dynx import control
 from dynx.backends import backend
-from dynx.backends.joint_dynamics import JointFriction
+from dynx.backends.joint_friction import JointFriction
 from dynx.control.base import Controller
 from dynx.control.content import attributes_of, fields_of
 from dynx.sim.named_controllers import joint_inertia

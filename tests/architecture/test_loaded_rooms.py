@@ -66,7 +66,7 @@ FLOWS = {
         ("world", "sim", "ik.closed_forms"),
         (),
         110,
-        19000,
+        19100,
     ),
     "simulate": Flow(
         ROBOT + "from dynx import control\n"
@@ -86,8 +86,8 @@ FLOWS = {
             "envs",
         ),
         (),
-        174,
-        27500,
+        177,
+        27700,
     ),
     "step of a box": Flow(
         "from dynx.world import Scene, World, box\n"

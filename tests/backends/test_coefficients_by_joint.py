@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import dynx
-from dynx.backends.joint_dynamics import JointFriction, coefficients_by_joint
+from dynx.backends.joint_friction import JointFriction, coefficients_by_joint
 from dynx.control import PD, FrictionCompensation
 from dynx.control.saturation import checked_limit
 from dynx.errors import GainError, UnknownNameError

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from dynx import ExternalForce
 from dynx.backends import backend
-from dynx.backends.joint_dynamics import MIN_SLIP
+from dynx.backends.joint_friction import MIN_SLIP
 from dynx.control import (
     PD,
     PID,

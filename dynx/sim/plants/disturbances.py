@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from dynx.backends import Backend, backend
-from dynx.backends.joint_dynamics import (
+from dynx.backends.joint_friction import (
     Coefficients,
     JointDynamicsTerms,
     JointFriction,

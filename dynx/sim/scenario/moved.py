@@ -43,7 +43,7 @@ CLASSES = {
     "dynx.control.bullet:PositionMotor": "dynx.control.bullet:BulletPositionMotor",
     "dynx.control.bullet:TorqueMotor": "dynx.control.bullet:BulletTorqueMotor",
     "dynx.control.bullet:VelocityMotor": "dynx.control.bullet:BulletVelocityMotor",
-    "dynx.control.friction:JointFriction": "dynx.backends.joint_dynamics:JointFriction",
+    "dynx.control.friction:JointFriction": "dynx.backends.joint_friction:JointFriction",
     "dynx.sim.plants.disturbances:Push": "dynx.steppers.forces:ExternalForce",
 }
 """Classes by module and name, the module being the present one."""

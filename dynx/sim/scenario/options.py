@@ -22,7 +22,7 @@ from dynx.registry import DEFAULT_ENGINE
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from dynx.backends.joint_dynamics import Coefficients
+    from dynx.backends.joint_friction import Coefficients
     from dynx.model import Model
     from dynx.rbd.parameters import MassScale, Payload
     from dynx.sim.noise import Noise
@@ -73,8 +73,8 @@ class SlipSpeed(Number):
     """The speed up to which a friction law is smoothed."""
 
     def checked(self, name: str, value: Any, model: Model) -> float:
-        """Return a float that is 0 or at least `dynx.backends.joint_dynamics.MIN_SLIP`."""
-        from dynx.backends.joint_dynamics import checked_slip
+        """Return a float that is 0 or at least `dynx.backends.joint_friction.MIN_SLIP`."""
+        from dynx.backends.joint_friction import checked_slip
 
         return checked_slip(name, value)
 
@@ -143,7 +143,7 @@ class JointNumbers(Kind):
 
     def checked(self, name: str, value: Any, model: Model) -> Any:
         """Return a bool, a number or a read-only array (joints,)."""
-        from dynx.backends.joint_dynamics import coefficients_by_joint
+        from dynx.backends.joint_friction import coefficients_by_joint
 
         if value is None:
             raise ArgumentError(f"{name} is None; wanted True (those of the model), False or numbers")
