@@ -95,7 +95,7 @@ FLOWS = {
         ("ik", "sim", "envs", "doctor"),
         (),
         115,
-        18400,
+        18600,
     ),
     "step of the cart-pole": Flow(
         "import gymnasium, dynx.envs\n"
