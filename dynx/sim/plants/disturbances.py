@@ -13,9 +13,9 @@ from functools import cached_property
 import numpy as np
 
 from dynx.backends import Backend, backend
+from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.backends.joint_friction import (
     Coefficients,
-    JointDynamicsTerms,
     JointFriction,
     checked_slip,
     coefficients_by_joint,
