@@ -6,6 +6,7 @@ joint act on its driver through its multiplier.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
