@@ -59,14 +59,14 @@ FLOWS = {
         ),
         (),
         75,
-        11600,
+        11700,
     ),
     "inverse kinematics": Flow(
         ENGINE + "engine.inverse_kinematics(engine.forward_kinematics(q, 'tool0'), 'tool0', q)",
         ("world", "sim", "ik.closed_forms"),
         (),
         110,
-        19100,
+        19200,
     ),
     "simulate": Flow(
         ROBOT + "from dynx import control\n"
@@ -87,7 +87,7 @@ FLOWS = {
         ),
         (),
         177,
-        27700,
+        27800,
     ),
     "step of a box": Flow(
         "from dynx.world import Scene, World, box\n"
@@ -95,7 +95,7 @@ FLOWS = {
         ("ik", "sim", "envs", "doctor"),
         (),
         115,
-        18600,
+        18700,
     ),
     "step of the cart-pole": Flow(
         "import gymnasium, dynx.envs\n"
@@ -105,7 +105,7 @@ FLOWS = {
         ("distance", "ik", "world.camera", "steppers.camera"),
         (),
         170,
-        27100,
+        27200,
     ),
 }
 
