@@ -255,7 +255,7 @@ def joint_split(source: XmlSource, joint: SourceElement) -> Iterator[Edit]:
     loss = "" if dynamics is None else _start_tag(dynamics)
     lines = []
     for own, each, parent, below in zip(names[1:], rest, links, [*links[1:], child], strict=True):
-        least = "\n".join(f"{source.unit}{line}" for line in least_inertial().split("\n"))
+        least = "\n".join(f"  {line}" for line in least_inertial().split("\n"))
         lines.append(f"<link name={quoteattr(parent)}>\n{least}\n</link>")
         inside = [f"<parent link={quoteattr(parent)}/>", f"<child link={quoteattr(below)}/>"]
         inside.append(f'<axis xyz="{each.axis}"/>')
@@ -263,7 +263,7 @@ def joint_split(source: XmlSource, joint: SourceElement) -> Iterator[Edit]:
             inside.append(UNLIMITED)
         if loss:
             inside.append(loss)
-        body = "\n".join(f"{source.unit}{line}" for line in inside)
+        body = "\n".join(f"  {line}" for line in inside)
         lines.append(f'<joint name={quoteattr(own)} type="{each.type}">\n{body}\n</joint>')
     yield source.insertion_after(joint, "\n".join(lines))
 

@@ -27,6 +27,7 @@ from dynx.files.documents import json_text
 from dynx.files.reading import read_file
 from dynx.files.writing import write_bytes, write_text
 from dynx.model.expansion import RobotInput, is_library_name
+from dynx.model.tree import Base
 from dynx.model.xacro_reading import split_arguments
 from dynx.model.xml.source import XmlSource
 
@@ -161,29 +162,33 @@ def _file_name(text: str) -> str:
 
 
 def planned_targets(
-    inputs: Sequence[RobotInput], out: str | None, *, in_place: bool, bases: int
+    inputs: Sequence[RobotInput], out: str | None, *, in_place: bool, bases: Sequence[Base]
 ) -> list[str | None]:
-    """Return the file for each input's mended description, or None."""
+    """Return the file for the mended description of each input on each base, or None."""
     if out is not None and in_place:
         raise ArgumentError("--fix and --in-place exclude each other")
-    if (out is not None or in_place) and bases > 1:
-        raise ArgumentError("a file is mended for one base; choose --base fixed or --base floating")
+    if in_place and len(bases) > 1:
+        raise ArgumentError("--in-place mends a file for one base; choose --base fixed or --base floating")
     if in_place:
         return [*in_place_targets(inputs)]
-    return [None] * len(inputs) if out is None else [*targets(inputs, out)]
+    if out is None:
+        return [None] * (len(inputs) * len(bases))
+    return [*targets(inputs, out, bases)]
 
 
-def targets(inputs: Sequence[RobotInput], out: str) -> list[str]:
-    """Return the file in `out` for each input; ArgumentError where it is an input or not writable.
+def targets(inputs: Sequence[RobotInput], out: str, bases: Sequence[Base] = ("fixed",)) -> list[str]:
+    """Return the file in `out` for each input on each base; ArgumentError where it is an input or not
+    writable.
 
     A single robot goes to the file `out`, or into it where it is a directory; several go into the
-    directory `out`, those found below a directory under the same relative path.
+    directory `out`, those found below a directory under the same relative path. Inputs of the same name go
+    into folders named as theirs. With several bases the name of a file ends in that of the base.
     """
     several = len(inputs) > 1 or any(each.folder is not None for each in inputs)
     if several or os.path.isdir(out) or out.endswith(("/", os.sep)):
         if os.path.lexists(out) and not os.path.isdir(out):
             raise ArgumentError(f"--fix {shown(out, 300)} is a file; several robots need a directory")
-        paths = [os.path.join(out, _name(each)) for each in inputs]
+        paths = [os.path.join(out, name) for name in _distinct_names(inputs)]
     else:
         paths = [out]
         check_writable(out)
@@ -197,7 +202,12 @@ def targets(inputs: Sequence[RobotInput], out: str) -> list[str]:
         require_apart(paths, (each.robot for each in inputs), "the file that is read")
     except ArgumentError as error:
         raise ArgumentError(f"--fix: {error}; --in-place overwrites it") from None
-    return paths
+    if len(bases) == 1:
+        return paths
+    ends = map(os.path.splitext, paths)
+    found = [f"{stem}-{base}{suffix}" for stem, suffix in ends for base in bases]
+    require_apart(found, (each.robot for each in inputs), "the file that is read")
+    return found
 
 
 def in_place_targets(inputs: Sequence[RobotInput]) -> list[str]:
@@ -254,6 +264,22 @@ def _require_unchanged(path: str, report: DoctorReport) -> None:
         raise ArgumentError(
             f"{shown(path, 300)} was changed by another program during the examination and is not overwritten"
         )
+
+
+def _distinct_names(inputs: Sequence[RobotInput]) -> list[str]:
+    """Return the path of each input in the output directory; robots of the same name keep as many of the
+    folders above them as tell them apart."""
+    names = [_name(each) for each in inputs]
+    folders = [PurePath(os.path.realpath(split_arguments(each.robot)[0])).parent.parts for each in inputs]
+    depth = 0
+    while (twice := {k for k, name in enumerate(names) if names.count(name) > 1}) and depth < max(
+        map(len, folders)
+    ):
+        depth += 1
+        for k in twice:
+            if inputs[k].folder is None:
+                names[k] = os.path.join(*folders[k][-depth:], _name(inputs[k])).lstrip(os.sep)
+    return names
 
 
 def _name(each: RobotInput) -> str:

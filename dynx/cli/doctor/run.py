@@ -58,7 +58,7 @@ def doctor(
     found = expand(robots)
     inputs = found.robots
     bases: tuple[Base, ...] = ("fixed", "floating") if base == "both" else (base,)
-    targets = planned_targets(inputs, fix, in_place=in_place, bases=len(bases))
+    targets = planned_targets(inputs, fix, in_place=in_place, bases=bases)
     outputs.keep_apart((each.robot for each in inputs), () if in_place else targets, baseline_path)
     examined = [(each, one) for each in inputs for one in bases]
     run = doctor_run(
@@ -102,8 +102,8 @@ _MAX_DIFFERENCES = 6
 class Conclusion:
     """The reports of a run, and the paths of their files.
 
-    `targets` has the file for the mended description of each input, or None where none is wanted. Where any
-    is wanted, each input has one task. `folder` is for counterexamples, `engines` are those that the user
+    `targets` has the file for the mended description of each task, or None where none is wanted. `folder` is
+    for counterexamples, `engines` are those that the user
     chose.
     """
 

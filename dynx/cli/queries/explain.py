@@ -10,7 +10,10 @@ from typing import Any
 from rich.markdown import Markdown
 
 from dynx.cli.shell.output import console, counted, write_json
+from dynx.errors import RobotNotFoundError
+from dynx.model.library import TRAPS
 from dynx.rules import Rule, all_rules, find_rule
+from dynx.rules.registry import find_trap
 
 _MAX_WIDTH = 100
 """Width of prose on a terminal and of the list of rules, at most [columns]."""
@@ -36,7 +39,7 @@ def _as_dict(rule: Rule) -> dict[str, Any]:
         "engines": dict(rule.engines),
         "advice": rule.advice,
         "choices": dict(rule.choices),
-        "trap": rule.trap(),
+        "trap": None if _trap(rule) is None else rule.trap(),
         "page": rule.page(),
     }
 
@@ -84,4 +87,17 @@ def _facts(rule: Rule) -> Iterator[tuple[str, str]]:
     yield "advice", rule.advice
     for name, meaning in rule.choices.items():
         yield f"--choose {rule.id}={name}", meaning
-    yield "shown by", f"models/traps/{rule.trap()}"
+    if (trap := _trap(rule)) is not None:
+        yield "shown by", trap
+
+
+def _trap(rule: Rule) -> str | None:
+    """Return the file that shows the cause: below dynx's models, or beside the module of another package.
+
+    None where there is none.
+    """
+    try:
+        path = find_trap(rule)
+    except RobotNotFoundError:
+        return None
+    return f"models/{TRAPS}/{path.name}" if type(rule).__module__.startswith("dynx.") else str(path)

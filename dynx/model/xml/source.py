@@ -275,7 +275,13 @@ class XmlSource:
         return b"\r" if b"\r" in self.data else b"\n"
 
     def _indented(self, text: str, indent: str) -> str:
-        return text.replace("\n", f"\n{indent}")
+        """Indent the lines of a text after the first as the document is: two blanks of theirs are a level."""
+        first, *rest = text.split("\n")
+        bare = [line.lstrip(" ") for line in rest]
+        levels = [(len(line) - len(own)) // 2 for line, own in zip(rest, bare, strict=True)]
+        return "\n".join(
+            [first, *(indent + n * self.unit + own for n, own in zip(levels, bare, strict=True))]
+        )
 
 
 class _SourceParser:

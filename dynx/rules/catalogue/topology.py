@@ -300,8 +300,8 @@ class SeveralRootLinks(EditingRule):
         taken.add(name)
         lines = [
             f'<joint name={quoteattr(name)} type="fixed">',
-            f"{source.unit}<parent link={quoteattr(main)}/>",
-            f"{source.unit}<child link={quoteattr(root)}/>",
+            f"  <parent link={quoteattr(main)}/>",
+            f"  <child link={quoteattr(root)}/>",
             "</joint>",
         ]
         yield source.insertion_after(case.links[root], "\n".join(lines))

@@ -30,6 +30,7 @@ from dynx.doctor.task import DoctorTask, examine, missing_engines
 from dynx.errors import ArgumentError, NotInstalledError
 from dynx.model.expansion import RobotInput
 from dynx.model.loading import load
+from dynx.model.tree import Base
 from tests.doctor.formats.reports import HOSTILE, MENDED, SMALL, TEXT, alike, differing, hostile, refused
 from tests.workers.targets import interrupt_at_a_pipe
 
@@ -263,7 +264,7 @@ def test_an_interrupted_run_writes_what_is_done(
 
 def targets_of(out: str, *robots: RobotInput) -> list[str | None]:
     """Return the files for these inputs."""
-    return planned_targets(robots, out, in_place=False, bases=1)
+    return planned_targets(robots, out, in_place=False, bases=("fixed",))
 
 
 def test_one_robot_goes_to_a_file_and_several_to_a_folder(tmp_path: Path) -> None:
@@ -281,7 +282,7 @@ def test_one_robot_goes_to_a_file_and_several_to_a_folder(tmp_path: Path) -> Non
 
 def test_no_two_robots_share_a_file_and_none_is_its_input(tmp_path: Path) -> None:
     with pytest.raises(ArgumentError, match="both"):
-        targets_of(str(tmp_path / "out"), RobotInput("a/arm.urdf"), RobotInput("b/arm.urdf"))
+        targets_of(str(tmp_path / "out"), RobotInput("a.xacro side:=left"), RobotInput("a.xacro side:=right"))
     path = tmp_path / "arm.urdf"
     path.write_text(TEXT)
     for out in (str(path), f"{tmp_path}/./arm.urdf", str(tmp_path)):
@@ -289,6 +290,22 @@ def test_no_two_robots_share_a_file_and_none_is_its_input(tmp_path: Path) -> Non
             targets_of(out, RobotInput(str(path)))
     with pytest.raises(ArgumentError, match="directory"):
         targets_of(str(path), RobotInput("a"), RobotInput("b"))
+
+
+def test_robots_of_one_name_go_into_folders_named_as_theirs(tmp_path: Path) -> None:
+    robots = [RobotInput(name) for name in ("a/u/arm.urdf", "b/u/arm.urdf", "b/leg.urdf")]
+    expected = [str(tmp_path / name) for name in ("a/u/arm.urdf", "b/u/arm.urdf", "leg.urdf")]
+    assert targets_of(str(tmp_path), *robots) == expected
+
+
+def test_each_base_has_a_file_of_its_own(tmp_path: Path) -> None:
+    robots = [RobotInput("ur5"), RobotInput("ur3")]
+    bases: tuple[Base, ...] = ("fixed", "floating")
+    found = planned_targets(robots, str(tmp_path), in_place=False, bases=bases)
+    assert found == [str(tmp_path / f"{each.robot}-{base}.urdf") for each in robots for base in bases]
+    one = planned_targets(robots[:1], str(tmp_path / "out.urdf"), in_place=False, bases=bases)
+    assert one == [str(tmp_path / f"out-{base}.urdf") for base in bases]
+    assert planned_targets(robots, None, in_place=False, bases=bases) == [None] * 4
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "ISO-8859-1", "UTF-16", "cp1252", "Shift_JIS"])
