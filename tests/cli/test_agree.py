@@ -188,16 +188,15 @@ def test_a_directory_of_xacro_files_says_why_none_is_taken(tmp_path: Path) -> No
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to a child")
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_an_interrupted_run_writes_what_is_done(number: int, code: int, tmp_path: Path) -> None:
+def test_an_interrupted_run_writes_what_is_done(tmp_path: Path) -> None:
     target = tmp_path / "out.json"
     command = [sys.executable, "-m", "dynx", "agree", *["six_axis_arm"] * 5000, *QUICK, "--json", str(target)]
     for patience in (4.0, 16.0, 64.0):
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         time.sleep(patience)
-        process.send_signal(number)
+        process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=60.0)
-        assert process.returncode == code
+        assert process.returncode == 130
         assert "Traceback" not in err
         assert "of 5000 robots not done" in err
         assert "not done" in out
@@ -214,10 +213,8 @@ def test_quiet_prints_nothing() -> None:
     assert (result.exit_code, result.output) == (0, "")
 
 
-@pytest.mark.parametrize("width", [60, 80, 120])
-def test_numbers_and_words_stay_whole_on_a_narrow_terminal(
-    width: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_numbers_and_words_stay_whole_on_a_narrow_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    width = 60
     full = agree("ur5").stdout
     monkeypatch.setenv("COLUMNS", str(width))
     narrow = agree("ur5").stdout

@@ -133,7 +133,7 @@ def test_a_bad_argument_is_named() -> None:
         made(model).mass_matrix(unscaled)
 
 
-@pytest.mark.parametrize("n", [101, 1000])
+@pytest.mark.parametrize("n", [101, 300])
 def test_nothing_is_compiled_for_a_large_tree(n: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its matrices had compiled for minutes."""
     model = tree(n)

@@ -42,6 +42,11 @@ BAD_ARRAYS: dict[str, tuple[Callable[[np.ndarray], Any], type[DynxError], str]] 
     "ragged": (lambda x: [x.tolist(), [1.0]], ShapeError, "ragged"),
     "NaN": (lambda x: np.append(x[:-1], np.nan), NotFiniteError, r"\[\d+\] is nan"),
     "infinity": (lambda x: np.append(x[:-1], np.inf), NotFiniteError, r"\[\d+\] is inf"),
+    "infinities that cancel": (
+        lambda x: np.append([np.inf, -np.inf], x[2:]),
+        NotFiniteError,
+        r"\[0\] is inf",
+    ),
     "too large": (lambda x: np.append(x[:-1], -1e160), ArgumentError, r"is -1e\+160; wanted less"),
     "NaN in a batch": (
         lambda x: np.stack([x, np.append(x[:-1], np.nan)]),

@@ -97,10 +97,17 @@ def test_several_threads_at_once(make: Make) -> None:
             results[k] = result(engines[calls[k][0]], calls[k])
         return results
 
-    with ThreadPoolExecutor(4) as pool:
-        for results in pool.map(call_all, range(4)):
-            for got, want in zip(results, wanted, strict=True):
-                np.testing.assert_array_equal(got, want)
+    interval = sys.getswitchinterval()
+    # So short that Python switches threads within calls.
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(8) as pool:
+            found = list(pool.map(call_all, range(8)))
+    finally:
+        sys.setswitchinterval(interval)
+    for results in found:
+        for got, want in zip(results, wanted, strict=True):
+            np.testing.assert_array_equal(got, want)
 
 
 @pytest.mark.parametrize("model", MODELS, ids=("fixed", "other", "floating", "mimicking"))

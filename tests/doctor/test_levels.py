@@ -74,16 +74,8 @@ def values(text: str) -> Iterator[Floats]:
     yield from (found.poses, found.mass_matrix, found.torque, found.bias, *found.jacobians.values())
 
 
-few = settings(max_examples=min(PROFILE, max(25, PROFILE // 2)))
-
-
-@needs_all_engines
-@few
-@given(st.data(), st.sampled_from(LEVELS))
-def test_every_changed_element_is_named_and_no_level_is_exceeded(data: st.DataObject, level: Level) -> None:
-    trial = data.draw(st.sampled_from(trials()))
-    text = plant_defects(trial)[-1].source.text
-    report = diagnose(text, base=trial.base, level=level, counterexamples=False)
+def check_changes(report: DoctorReport, text: str, trial: Trial, level: Level) -> None:
+    """Every changed element is named, and no change exceeds the level."""
     assert report.level == level
     assert changed(report) <= named(report)
     assert all(LEVELS.index(each.level) <= LEVELS.index(level) for each in report.changes if each.made)
@@ -97,13 +89,16 @@ def test_every_changed_element_is_named_and_no_level_is_exceeded(data: st.DataOb
 
 
 @needs_all_engines
-@few
+@settings(max_examples=min(PROFILE, max(14, PROFILE // 2)))
 @given(st.data())
-def test_what_a_lower_level_leaves_undone_is_what_the_highest_does(data: st.DataObject) -> None:
+def test_changes_are_named_keep_to_their_level_and_are_all_done_at_the_highest(data: st.DataObject) -> None:
     trial = data.draw(st.sampled_from(trials()))
     text = plant_defects(trial)[-1].source.text
-    safe = diagnose(text, base=trial.base, level="safe", counterexamples=False)
-    physics = diagnose(text, base=trial.base, counterexamples=False)
+    safe, rounding, physics = (
+        diagnose(text, base=trial.base, level=level, counterexamples=False) for level in LEVELS
+    )
+    for level, report in zip(LEVELS, (safe, rounding, physics), strict=True):
+        check_changes(report, text, trial, level)
     assert all(each.made for each in physics.changes)
     assert {each.rule for each in safe.changes} == {each.rule for each in physics.changes}
     assert [each.effects.keys() for each in safe.findings] == [

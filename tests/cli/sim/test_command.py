@@ -514,8 +514,7 @@ def test_a_plot_without_matplotlib_names_the_extra(tmp_path: Path, monkeypatch: 
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to a child")
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_an_interrupted_run_keeps_what_is_done(number: int, code: int, tmp_path: Path) -> None:
+def test_a_run_that_is_ended_keeps_what_is_done(tmp_path: Path) -> None:
     target = tmp_path / "out.npz"
     # A slow plant, so that the run is not complete when the signal arrives.
     start = [sys.executable, "-m", "dynx", "sim", "six_axis_arm", "--to", "joint3=1", "--plant", "reference"]
@@ -523,11 +522,11 @@ def test_an_interrupted_run_keeps_what_is_done(number: int, code: int, tmp_path:
     for patience in (4.0, 16.0, 64.0):
         process = subprocess.Popen(start, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         time.sleep(patience)
-        process.send_signal(number)
+        process.send_signal(signal.SIGTERM)
         out, err = process.communicate(timeout=60.0)
         if target.exists() and len(Rollout.load(target)):
             break
-    assert process.returncode == code
+    assert process.returncode == 143
     assert "Traceback" not in err
     assert err.count("\n") == 1
     assert "interrupted after " in err

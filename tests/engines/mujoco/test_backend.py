@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -10,19 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynx.backends import DerivedBackend, native_quantities
+from dynx.backends import native_quantities
 from dynx.backends.quantities import QUANTITIES
-from dynx.errors import ClosedError, EngineError, EngineLimitError, SingularMassMatrixError
+from dynx.errors import EngineError, EngineLimitError, SingularMassMatrixError
 from dynx.model import Inertial, Joint, Link, Model, Pose
 from dynx.model.loading import load
 from dynx.model.tree import Base
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.scalar import Floats
-from tests.backends.independence import (
-    check_pickle_round_trip,
-    check_results_belong_to_the_caller,
-    check_threads_get_equal_results,
-)
 from tests.backends.robots import (
     BASES,
     BOX,
@@ -47,32 +41,6 @@ from dynx.engines.mujoco.library import MAX_DEPTH
 def test_what_the_engine_computes() -> None:
     derived = {"bias_torque", "coriolis_matrix", "inertial_regressor"}
     assert native_quantities(MujocoBackend) == set(QUANTITIES) - derived
-
-
-@pytest.mark.parametrize("mimic", [False, True])
-@pytest.mark.parametrize("base", BASES)
-def test_native_answers_are_those_derived_and_those_of_the_reference(base: Base, mimic: bool) -> None:
-    model = mixed_robot(base, mimic=mimic)
-    native = MujocoBackend(model)
-    sample = motion(model, size=(5,))
-    results = all_quantities(native, *sample)
-    for other in (DerivedBackend(native), ReferenceBackend(model)):
-        for quantity, expected in all_quantities(other, *sample).items():
-            # An acceleration amplifies rounding by the condition number of the mass matrix.
-            size = float(np.linalg.cond(native.mass_matrix(sample[0])).max())
-            assert_close(
-                results[quantity], expected, size if quantity == "forward_dynamics" else 1.0, quantity
-            )
-
-
-@pytest.mark.parametrize("base", BASES)
-@pytest.mark.parametrize("n", [0, 1])
-def test_a_robot_with_one_joint_or_none_has_arrays_of_the_usual_shapes(base: Base, n: int) -> None:
-    model = chain(n).with_base(base)
-    sample = motion(model)
-    results = all_quantities(MujocoBackend(model), *sample)
-    for quantity, expected in all_quantities(ReferenceBackend(model), *sample).items():
-        assert_close(results[quantity], expected, what=quantity)
 
 
 # -- inertias as they stand ------------------------------------------------------------------------
@@ -203,17 +171,6 @@ def test_answers_are_those_of_mujoco_on_the_file(tmp_path: Path) -> None:
         assert_close(ours.inverse_dynamics(q, v, a), np.array(data.qfrc_inverse))
 
 
-def test_names_of_the_engine_are_free_for_robots() -> None:
-    joints = [Joint("world", "revolute", "world", "0"), Joint("", "revolute", "0", "1")]
-    model = Model.build(
-        "names", [Link("world", BOX), Link("0", BOX), Link("1", BOX)], joints, base="floating"
-    )
-    sample = motion(model)
-    results = all_quantities(MujocoBackend(model), *sample)
-    for quantity, expected in all_quantities(ReferenceBackend(model), *sample).items():
-        assert_close(results[quantity], expected, what=quantity)
-
-
 # -- limits --------------------------------------------------------------------------------------------
 
 
@@ -242,11 +199,6 @@ def test_the_longest_chain_that_it_takes_in_a_small_stack() -> None:
 # -- state, threads, life ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("base", BASES)
-def test_answers_belong_to_the_caller(base: Base) -> None:
-    check_results_belong_to_the_caller(MujocoBackend(mixed_robot(base)))
-
-
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_what_is_not_finite_leaves_nothing_behind(bad: float) -> None:
     model = mixed_robot("floating")
@@ -259,36 +211,6 @@ def test_what_is_not_finite_leaves_nothing_behind(bad: float) -> None:
         with pytest.raises(ArithmeticError):
             engine.forward_dynamics(np.full_like(q, bad), v, x)
     assert_same(all_quantities(engine, q, v, x), before)
-
-
-def test_eight_threads_get_what_one_gets() -> None:
-    check_threads_get_equal_results(MujocoBackend(mixed_robot("floating")), samples=32)
-
-
-def test_pickle_makes_the_same_backend() -> None:
-    check_pickle_round_trip(MujocoBackend(mixed_robot("floating"), validate=False))
-
-
-@pytest.mark.parametrize("validate", [True, False])
-def test_a_closed_backend_refuses(validate: bool) -> None:
-    model = chain(2)
-    q, v, a = motion(model)
-    with MujocoBackend(model, validate=validate) as engine:
-        engine.inverse_dynamics(q, v, a)
-    engine.close()
-    calls: tuple[Callable[[], Floats], ...] = (
-        lambda: engine.forward_kinematics(q, "link1"),
-        lambda: engine.jacobian(q, "link1"),
-        lambda: engine.inverse_dynamics(q, v, a),
-        lambda: engine.mass_matrix(q),
-        lambda: engine.potential_energy(q),
-    )
-    for call in calls:
-        with pytest.raises(ClosedError, match="chain"):
-            call()
-    assert not hasattr(engine, "_engine")
-    with pytest.raises(ClosedError, match="during a call"):
-        engine._mass_matrix(q)
 
 
 @pytest.mark.parametrize("raised", [ValueError, RuntimeError, MemoryError, mujoco.FatalError])
@@ -306,13 +228,3 @@ def test_what_the_engine_raises_becomes_an_engine_error(
     monkeypatch.setattr(mujoco, "MjData", fail)
     with pytest.raises(EngineError, match="mujoco cannot represent chain"):
         MujocoBackend(chain(2))
-
-
-def test_without_validation_a_wrong_shape_is_still_an_engine_error() -> None:
-    engine = MujocoBackend(chain(2), validate=False)
-    with pytest.raises(EngineError, match="mujoco failed on chain: ValueError"):
-        engine.inverse_dynamics(np.zeros(3), np.zeros(2), np.zeros(2))
-
-
-def test_engine_version_names_the_library() -> None:
-    assert MujocoBackend(chain(1)).engine_version == f"mujoco {mujoco.__version__}"

@@ -6,19 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from dynx.engines.pybullet.backend import PyBulletBackend
 from dynx.engines.pybullet.client import MAX_JOINTS
 from dynx.errors import EngineLimitError
-from dynx.model import JointDynamics, Limits, Link, Model, Pose
+from dynx.model import JointDynamics, Limits
 from dynx.model.loading import load
 from dynx.model.tree import Base
 from dynx.reference.backend import ReferenceBackend
 from dynx.spatial.so3 import quat_from_rotation, rotation_from_rpy
-from dynx.testing.strategies import models
-from tests.backends.robots import BASES, BOX, all_quantities, assert_close, chain, mixed_robot, motion, pair
+from tests.backends.robots import BASES, BOX, assert_close, chain, mixed_robot, motion, pair
 from tests.engines.pybullet.robots import assert_agrees, assert_solves
 from tests.error_bounds import ErrorBounds, samples_at
 
@@ -26,39 +23,6 @@ pytest.importorskip("pybullet")
 
 
 # -- the same results ------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("mimic", [False, True])
-@pytest.mark.parametrize("base", BASES)
-def test_every_quantity_is_that_of_the_reference(base: Base, mimic: bool) -> None:
-    model = mixed_robot(base, mimic=mimic)
-    sample = motion(model, size=(5,))
-    engine = PyBulletBackend(model)
-    results = all_quantities(engine, *sample)
-    assert not engine.ballast
-    for quantity, expected in all_quantities(ReferenceBackend(model), *sample).items():
-        size = float(np.linalg.cond(engine.mass_matrix(sample[0])).max())
-        assert_close(results[quantity], expected, size if quantity == "forward_dynamics" else 1.0, quantity)
-
-
-@given(models(), st.integers(0, 9))
-def test_random_robots_agree(model: Model, seed: int) -> None:
-    assert_agrees(model, seed, samples=1)
-
-
-@given(models(physical=False), st.integers(0, 9))
-def test_inertias_that_no_body_can_have_agree(model: Model, seed: int) -> None:
-    # In the max norm: axes exist about which such a body has moments that cancel to nothing.
-    q, v, a = motion(model, seed)
-    reference = ReferenceBackend(model)
-    with PyBulletBackend(model) as engine:
-        assert_close(engine.inverse_dynamics(q, v, a), reference.inverse_dynamics(q, v, a))
-        assert_close(engine.mass_matrix(q), reference.mass_matrix(q))
-
-
-@given(models(solvable=True), st.integers(0, 9))
-def test_forward_dynamics_of_random_robots_agrees(model: Model, seed: int) -> None:
-    assert_solves(model, seed)
 
 
 @pytest.mark.parametrize("base", BASES)
@@ -98,11 +62,6 @@ def test_the_stepper_has_no_clamp_limits_motors_or_damping(base: Base) -> None:
     assert_solves(model, faster=1e3)
 
 
-def test_jacobian_of_a_frame_off_its_link() -> None:
-    model = load("ur5").with_frame("tip", "tool0", Pose((0.1, -0.2, 0.3), (0.4, 0.5, 0.6)))
-    assert_agrees(model)
-
-
 # -- size --------------------------------------------------------------------------------------------
 
 
@@ -125,12 +84,3 @@ def test_as_many_joints_as_bullet_answers_for(base: Base) -> None:
 def test_more_joints_are_refused(n: int) -> None:
     with pytest.raises(EngineLimitError, match=f"chain has {n} moving joints"):
         PyBulletBackend(chain(n))
-
-
-@pytest.mark.parametrize("base", BASES)
-def test_a_robot_without_joints(base: Base) -> None:
-    model = Model.build("stone", [Link("stone", BOX)], [], base=base)
-    sample = motion(model)
-    with PyBulletBackend(model) as engine:
-        for quantity, expected in all_quantities(ReferenceBackend(model), *sample).items():
-            assert_close(all_quantities(engine, *sample)[quantity], expected, what=quantity)
