@@ -229,6 +229,7 @@ class Motion:
         if self._engine is not None:
             self._engine.close()
             self._engine = self.ready = None
+        self._interrupted = False
 
     # -- failures -----------------------------------------------------------------------------
 

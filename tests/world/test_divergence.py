@@ -13,7 +13,7 @@ import pytest
 
 import dynx
 from dynx import Pose
-from dynx.errors import DivergedError, EngineError, SingularMassMatrixError
+from dynx.errors import ClosedError, DivergedError, EngineError, SingularMassMatrixError
 from dynx.steppers.forces import Forces
 from dynx.world import ExternalForce, PDMotor, PositionMotor, Scene, SceneRobot, Weld, World, box, ground
 from tests.world.engines import FAST_WORLDS, WORLDS
@@ -100,6 +100,16 @@ def test_an_interrupted_step_leaves_a_world_that_continues(
             rtol=0,
             atol=1e-12,
         )
+
+
+def test_a_world_that_is_closed_after_an_interruption_stays_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = World(Scene("s", bodies=(ground(),)), WORLDS[0])
+    monkeypatch.setattr(world._motion.engine, "step", interrupting(world, 3))
+    with pytest.raises(KeyboardInterrupt):
+        world.step(10)
+    world.close()
+    with pytest.raises(ClosedError):
+        world.step(1)
 
 
 def test_a_long_run_that_is_interrupted_keeps_what_was_simulated() -> None:
