@@ -13,13 +13,12 @@ so an interrupted run continues where it stopped; use it with one state of the s
 from __future__ import annotations
 
 import argparse
-import json
 import multiprocessing
 import os
 import resource
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from math import ceil
 from pathlib import Path
@@ -30,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.every_quantity import serial_arm, tree
-from benchmarks.progress import tell
+from benchmarks.progress import Record, tell
 from dynx import ExternalForce, control
 from dynx.backends import backend
 from dynx.backends.quantities import QUANTITIES
@@ -246,11 +245,11 @@ def _compile(model: Model, kind: str, limit: float, results: Any) -> None:
         try:
             KINDS[kind](model)
             seconds = process_time() - start
-        except DynxError as error:
-            # The robot has no such quantity, a unique acceleration for example.
-            seconds, problem = process_time() - start, f"{type(error).__name__}: {error}"
         except Exception as error:
             problem = f"{type(error).__name__}: {error}"
+            if isinstance(error, DynxError):
+                # The robot has no such quantity, a unique acceleration for example.
+                seconds = process_time() - start
     results.send((seconds, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, problem))
 
 
@@ -281,14 +280,6 @@ def _has_a_robot(name: str) -> bool:
     return True
 
 
-def recorded(path: Path | None) -> dict[tuple[str, str], Compilation]:
-    """Return the rows of a file, if there is one."""
-    if path is None or not path.exists():
-        return {}
-    rows = [Compilation(**json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()]
-    return {(row.robot, row.kind): row for row in rows}
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table; return 1 if a compilation takes longer than `MAX_SECONDS` or fails."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.compile_times", description=__doc__)
@@ -304,18 +295,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     chosen = parser.parse_args(arguments)
     kinds = [kind for kind in KINDS if not chosen.kinds or any(text in kind for text in chosen.kinds)]
     models = chosen_robots(usable_robots() if chosen.robots == ["all"] else chosen.robots, chosen.bases)
-    known = recorded(chosen.record)
+    record = Record(Compilation, lambda row: (row.robot, row.kind), chosen.record)
     done: list[Compilation] = []
     print(f"{'seconds':>8} {'MiB':>6}  {'robot':36}kind")
     for name, model in models:
         for kind in kinds:
             tell(f"{len(done)} of {len(models) * len(kinds)} rows; {name}: {kind}")
-            row = known.get((name, kind))
-            if row is None:
-                row = measure(name, model, kind, chosen.limit)
-                if chosen.record is not None:
-                    with chosen.record.open("a", encoding="utf-8") as file:
-                        print(json.dumps(asdict(row)), file=file)
+            row = record.get((name, kind), partial(measure, name, model, kind, chosen.limit))
             tell("")
             print(row, flush=True)
             done.append(row)

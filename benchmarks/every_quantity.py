@@ -12,17 +12,17 @@ so an interrupted run continues where it stopped. ``--markdown`` prints the tabl
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.progress import tell
+from benchmarks.progress import Record, tell
 from dynx.backends import Backend, backend, installed_backends
 from dynx.backends.derived import native_quantities
 from dynx.backends.quantities import QUANTITIES
@@ -135,7 +135,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--record", type=Path, metavar="FILE", help="rows measured so far, one in a line")
     parser.add_argument("--markdown", action="store_true", help="print the table as Markdown at the end")
     chosen = parser.parse_args(arguments)
-    known = recorded(chosen.record)
+    record = Record(Row, lambda row: (row.robot, row.quantity, row.samples), chosen.record)
     rows: list[Row] = []
     print(f"{'robot':20}{'quantity':26}{'samples':>8}{'compiled':>12}{'best other':>12}  {'':10}{'ratio':>7}")
     models = {name: chosen_robot(name) for name in chosen.robot or robots()}
@@ -146,26 +146,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 tell(
                     f"{len(rows)} of {2 * len(models) * len(quantities)} rows; {name}, {quantity}, {samples}"
                 )
-                row = known.get((name, quantity, samples))
-                if row is None:
-                    row = measure(name, model, quantity, samples, chosen.repetitions)
-                    if chosen.record is not None:
-                        with chosen.record.open("a", encoding="utf-8") as file:
-                            print(json.dumps(asdict(row)), file=file)
+                call = partial(measure, name, model, quantity, samples, chosen.repetitions)
+                row = record.get((name, quantity, samples), call)
                 tell("")
                 print(row, flush=True)
                 rows.append(row)
     if chosen.markdown:
         print(markdown(rows))
     return 1 if any(row.ratio < 1.0 for row in rows) else 0
-
-
-def recorded(path: Path | None) -> dict[tuple[str, str, int], Row]:
-    """Return the rows of a file, if there is one."""
-    if path is None or not path.exists():
-        return {}
-    rows = [Row(**json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines()]
-    return {(row.robot, row.quantity, row.samples): row for row in rows}
 
 
 def batch_size(model: Model, quantity: str, wanted: int) -> int:

@@ -11,7 +11,7 @@ from typing import Any
 
 import gymnasium
 
-from benchmarks.environments.speed import SIZES, VECTOR, Case, Timing
+from benchmarks.environments.speed import SIZES, VECTOR, Case, fastest
 
 MASSES = {"mass_scale": {"pole": (0.5, 2.0), "cart": (0.8, 1.2)}}
 FRICTION = {"joint_damping": (0.0, 0.1), "joint_friction": (0.0, 0.1), "delay": (0.0, 0.04)}
@@ -32,21 +32,14 @@ def main(given: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--repetitions", type=int, default=5)
     repetitions = parser.parse_args(given).repetitions
-    timings = {
-        (task, name, n): Timing(Case(task, name, n, _maker(task, n, drawn)))
-        for (task, name), drawn in CASES.items()
-        for n in SIZES
-    }
-    for _ in range(repetitions):
-        for timing in timings.values():
-            timing.repeat()
+    cases = [
+        Case(task, name, n, _maker(task, n, drawn)) for (task, name), drawn in CASES.items() for n in SIZES
+    ]
+    speeds = iter(fastest(cases, repetitions))
     print(f"| task | drawn | {' | '.join(f'{n:,} environments' for n in SIZES)} |")
     print("|---|---|" + "---|" * len(SIZES))
     for task, name in CASES:
-        speeds = [f"{1e-6 / timings[task, name, n].best:.3g}" for n in SIZES]
-        print(f"| {task} | {name} | {' | '.join(speeds)} |")
-    for timing in timings.values():
-        timing.close()
+        print(f"| {task} | {name} | {' | '.join(f'{next(speeds):.3g}' for _ in SIZES)} |")
 
 
 def _maker(task: str, n: int, drawn: Mapping[str, Any] | None) -> Any:

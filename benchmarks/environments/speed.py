@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, closing
 from importlib.util import find_spec
 from typing import Any, NamedTuple
 
@@ -18,6 +19,7 @@ import gymnasium
 import numpy as np
 
 import dynx.envs  # noqa: F401  (registers the environments)
+from dynx.bench.timing import interleaved
 
 SIZES = (1024, 16384)
 MIN_SECONDS = 0.2
@@ -74,35 +76,26 @@ def _envpool(env_id: str, n: int) -> Callable[[], Any]:
     return make
 
 
-class Timing:
-    """Repeated measurements of one case."""
+def fastest(chosen: Sequence[Case], repetitions: int) -> list[float]:
+    """Return the million steps a second of each case, all cases in turn."""
+    with ExitStack() as closing_all:
+        calls = [_steps(case, closing_all.enter_context(closing(case.make()))) for case in chosen]
+        times = interleaved(calls, repetitions, time.process_time, least_seconds=MIN_SECONDS)
+    return [1e-6 * DRAWN * case.n / each.least for case, each in zip(chosen, times, strict=True)]
 
-    def __init__(self, case: Case) -> None:
-        self.case = case
-        self._env = case.make()
-        single = getattr(self._env, "single_action_space", self._env.action_space)
-        rng = np.random.default_rng(0)
-        self._actions: list[Any] = [_draw(single, case.n, rng) for _ in range(DRAWN)]
-        self._env.reset()
-        self._take(DRAWN)
-        self._steps, self.best = DRAWN, np.inf
-        while self._take(self._steps) < MIN_SECONDS:
-            self._steps *= 2
 
-    def repeat(self) -> None:
-        """Measure once more."""
-        self.best = min(self.best, self._take(self._steps) / (self._steps * self.case.n))
+def _steps(case: Case, env: Any) -> Callable[[], None]:
+    """Return a call that makes a step with each of the drawn actions."""
+    single = getattr(env, "single_action_space", env.action_space)
+    rng = np.random.default_rng(0)
+    actions: list[Any] = [_draw(single, case.n, rng) for _ in range(DRAWN)]
+    env.reset()
 
-    def _take(self, steps: int) -> float:
-        env, actions = self._env, self._actions
-        started = time.process_time()
-        for k in range(steps):
-            env.step(actions[k % DRAWN])
-        return time.process_time() - started
+    def call() -> None:
+        for action in actions:
+            env.step(action)
 
-    def close(self) -> None:
-        """Close the environments."""
-        self._env.close()
+    return call
 
 
 def _draw(space: Any, n: int, rng: np.random.Generator) -> Any:
@@ -117,16 +110,12 @@ def main(given: Sequence[str] | None = None) -> None:
     parser.add_argument("--repetitions", type=int, default=5)
     parser.add_argument("--task", action="append", help="name of a task; by default all")
     chosen = parser.parse_args(given)
-    timings = [Timing(case) for case in cases() if not chosen.task or case.task in chosen.task]
-    for _ in range(chosen.repetitions):
-        for timing in timings:
-            timing.repeat()
+    wanted = [case for case in cases() if not chosen.task or case.task in chosen.task]
+    speeds = fastest(wanted, chosen.repetitions)
     print("| task | implementation | environments | million steps a second |")
     print("|---|---|---|---|")
-    for timing in timings:
-        task, name, n, _ = timing.case
-        print(f"| {task} | {name} | {n:,} | {1e-6 / timing.best:.3g} |")
-        timing.close()
+    for (task, name, n, _), speed in zip(wanted, speeds, strict=True):
+        print(f"| {task} | {name} | {n:,} | {speed:.3g} |")
 
 
 if __name__ == "__main__":

@@ -59,13 +59,14 @@ def interleaved(
     clock: Clock = time.perf_counter,
     *,
     calls_per_timing: int | None = None,
+    least_seconds: float = MIN_TIMING_SECONDS,
 ) -> list[Times]:
     """Time each call. Every repetition makes all calls, starting with a different one each time.
 
-    `calls_per_timing` None repeats a call within a timing until that takes `MIN_TIMING_SECONDS`, after trials
+    `calls_per_timing` None repeats a call within a timing until that takes `least_seconds`, after trials
     that warm it up.
     """
-    rounds = [calls_per_timing or _rounds(call, clock) for call in calls]
+    rounds = [calls_per_timing or _rounds(call, clock, least_seconds) for call in calls]
     found: list[list[float]] = [[] for _ in calls]
     for repetition in range(repetitions):
         for turn in range(len(calls)):
@@ -79,14 +80,14 @@ def once(call: Call, clock: Clock = time.perf_counter) -> float:
     return _timed(call, 1, clock)
 
 
-def _rounds(call: Call, clock: Clock) -> int:
+def _rounds(call: Call, clock: Clock, least_seconds: float) -> int:
     """Return the repetitions of the call within one timing. Determining it also warms up the call."""
     rounds = 1
     while True:
         taken = rounds * _timed(call, rounds, clock)
-        if taken >= MIN_TIMING_SECONDS:
+        if taken >= least_seconds:
             return rounds
-        rounds = 2 * rounds if taken <= 0.0 else max(rounds + 1, int(rounds * MIN_TIMING_SECONDS / taken) + 1)
+        rounds = 2 * rounds if taken <= 0.0 else max(rounds + 1, int(rounds * least_seconds / taken) + 1)
 
 
 def _timed(call: Call, rounds: int, clock: Clock) -> float:
