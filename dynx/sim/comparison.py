@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from inspect import signature
-from typing import Any, overload
+from typing import Any, TypeVar, overload
 
 import numpy as np
 
@@ -40,6 +40,8 @@ from dynx.steppers.clock import Clock
 from dynx.world.comparison import WorldComparison, compare_engines
 from dynx.world.scene.scene import Scene
 from dynx.world.separation import Separation, separation
+
+Whole = TypeVar("Whole", Model, ScenePlant)
 
 DIGITS = (6, 17)
 """Significant digits of numbers; the second are all that a float has, for numbers that the first do not tell
@@ -99,11 +101,28 @@ def _told_apart(describe: Callable[[Any, int], str], ours: Any, theirs: Any) -> 
     return next((pair for pair in pairs if pair[0] != pair[1]), pairs[-1])
 
 
-RobotEdit = Callable[[Model], Model]
-"""Function that takes a difference over into a robot."""
+Edit = tuple[tuple[str | int, ...], Any]
+"""Path to a part of a robot or a plant, by fields and indices, and the value that it gets."""
 
-RobotFactor = tuple[str, tuple[str, str], RobotEdit]
-"""Name, values in words, and edit of a difference."""
+PartFactor = tuple[str, tuple[str, str], Sequence[Edit]]
+"""Name, values in words, and edits of a difference."""
+
+
+def edited(whole: Whole, edits: Iterable[Edit]) -> Whole:
+    """Return a copy of a robot or a plant with the parts at some paths replaced."""
+    for path, value in edits:
+        whole = _with_value(whole, path, value)
+    return whole
+
+
+def _with_value(whole: Any, path: Sequence[str | int], value: Any) -> Any:
+    if not path:
+        return value
+    name, *rest = path
+    if isinstance(name, int):
+        return (*whole[:name], _with_value(whole[name], rest, value), *whole[name + 1 :])
+    return replace(whole, **{name: _with_value(getattr(whole, name), rest, value)})
+
 
 JOINT_PARTS = ("type", "origin", "axis", "limits", "dynamics", "mimic", "locked_at")
 MODEL_PARTS = ("gravity", "base_pose", "extra_frames")
@@ -122,27 +141,27 @@ def same_tree(one: Model, other: Model) -> bool:
     return trees[0] == trees[1]
 
 
-def robot_factors(ours: Model, theirs: Model) -> Iterator[RobotFactor]:
-    """Yield the name, the values in words, and the edit of each difference of two robots of one tree."""
+def robot_factors(ours: Model, theirs: Model) -> Iterator[PartFactor]:
+    """Yield the name, the values in words, and the edits of each difference of two robots of one tree."""
     for k, (one, other) in enumerate(zip(ours.links, theirs.links, strict=True)):
         if (one.inertial or Inertial()) != (other.inertial or Inertial()):
-            edit = _item_edit("links", k, "inertial", other.inertial)
-            yield f"link {one.name}, inertial", words_apart(one.inertial, other.inertial), edit
+            edit = ("links", k, "inertial"), other.inertial
+            yield f"link {one.name}, inertial", words_apart(one.inertial, other.inertial), [edit]
     for k, (joint, twin) in enumerate(zip(ours.joints, theirs.joints, strict=True)):
         for part in JOINT_PARTS:
             mine, its = getattr(joint, part), getattr(twin, part)
             if mine != its:
-                edit = _item_edit("joints", k, part, its)
-                yield f"joint {joint.name}, {part}", words_apart(mine, its), edit
+                edit = ("joints", k, part), its
+                yield f"joint {joint.name}, {part}", words_apart(mine, its), [edit]
     for part in MODEL_PARTS:
         mine, its = getattr(ours, part), getattr(theirs, part)
         if mine != its:
-            yield part, words_apart(mine, its), _field_edit(part, its)
+            yield part, words_apart(mine, its), [((part,), its)]
 
 
-def grouped(found: Iterable[RobotFactor]) -> Iterator[RobotFactor]:
+def grouped(found: Iterable[PartFactor]) -> Iterator[PartFactor]:
     """Yield one difference for each part of all links and of all joints, such as ``links, inertial``."""
-    groups: dict[str, list[RobotFactor]] = {}
+    groups: dict[str, list[PartFactor]] = {}
     for each in found:
         item, _, part = each[0].rpartition(", ")
         groups.setdefault(f"{item.partition(' ')[0]}s, {part}" if item else part, []).append(each)
@@ -154,43 +173,13 @@ def grouped(found: Iterable[RobotFactor]) -> Iterator[RobotFactor]:
             f"{len(members)}: " + "; ".join(f"{_item_of(each[0])} {each[1][side]}" for each in members)
             for side in (0, 1)
         )
-        yield name, (mine, its), _all_edits([each[2] for each in members])
+        yield name, (mine, its), [edit for each in members for edit in each[2]]
 
 
 def _item_of(name: str) -> str:
     """Return the link or joint in the name of a difference."""
     return name.rpartition(", ")[0].partition(" ")[2]
 
-
-def _all_edits(edits: Sequence[RobotEdit]) -> RobotEdit:
-    def edit(model: Model) -> Model:
-        for each in edits:
-            model = each(model)
-        return model
-
-    return edit
-
-
-def _item_edit(kind: str, k: int, field: str, value: object) -> RobotEdit:
-    def edit(model: Model) -> Model:
-        items = list(getattr(model, kind))
-        items[k] = replace(items[k], **{field: value})
-        return _replaced(model, kind, tuple(items))
-
-    return edit
-
-
-def _field_edit(field: str, value: object) -> RobotEdit:
-    return lambda model: _replaced(model, field, value)
-
-
-def _replaced(model: Model, field: str, value: Any) -> Model:
-    changes: dict[str, Any] = {field: value}
-    return replace(model, **changes)
-
-
-SceneEdit = Callable[[ScenePlant], ScenePlant]
-"""Function that takes a difference over into a plant."""
 
 PARTS = ("bodies", "robots")
 
@@ -206,25 +195,23 @@ def divisible(ours: Any, theirs: Any) -> bool:
     return names[0] == names[1]
 
 
-def scene_factors(ours: ScenePlant, theirs: ScenePlant) -> Iterator[tuple[str, tuple[str, str], SceneEdit]]:
-    """Yield the name, the values in words, and the edit of each difference of two plants that are divisible.
+def scene_factors(ours: ScenePlant, theirs: ScenePlant) -> Iterator[PartFactor]:
+    """Yield the name, the values in words, and the edits of each difference of two plants that are divisible.
 
     The model of the simulated robot is that of the scenario, and not among them; its shapes are, because
     models that differ in them alone are equal.
     """
     if ours.engine != theirs.engine:
         both = (_engine(ours), _engine(theirs))
-        yield (
-            "plant.engine",
-            both,
-            lambda plant: replace(plant, engine=theirs.engine, settings=theirs.settings),
-        )
+        # An engine does not take the settings of another.
+        settings = [(("settings",), each) for each in ((), theirs.settings)]
+        yield "plant.engine", both, [settings[0], (("engine",), theirs.engine), settings[1]]
     elif ours.settings != theirs.settings:
         both = (str(dict(ours.settings)), str(dict(theirs.settings)))
-        yield "plant.settings", both, lambda plant: replace(plant, settings=theirs.settings)
+        yield "plant.settings", both, [(("settings",), theirs.settings)]
     if ours.joint_limits != theirs.joint_limits:
         both = (str(ours.joint_limits), str(theirs.joint_limits))
-        yield "plant.joint_limits", both, lambda plant: replace(plant, joint_limits=theirs.joint_limits)
+        yield "plant.joint_limits", both, [(("joint_limits",), theirs.joint_limits)]
     for kind in PARTS:
         for k, (one, other) in enumerate(
             zip(getattr(ours.scene, kind), getattr(theirs.scene, kind), strict=True)
@@ -233,15 +220,16 @@ def scene_factors(ours: ScenePlant, theirs: ScenePlant) -> Iterator[tuple[str, t
             for each in fields(one):
                 mine, its = getattr(one, each.name), getattr(other, each.name)
                 if each.name == "model" and _same_links(mine, its) and _shapes(mine) != _shapes(its):
-                    yield f"robot {one.name}, shapes", _shapes_in_words(mine, its), _shapes_edit(k, its)
+                    edit = ("scene", kind, k, "model", "geometry"), its.geometry
+                    yield f"robot {one.name}, shapes", _shapes_in_words(mine, its), [edit]
                 if mine == its or (own and each.name == "model"):
                     continue
                 name = f"{'body' if kind == 'bodies' else 'robot'} {one.name}, {each.name}"
-                yield name, words_apart(mine, its), _part_edit(kind, k, each.name, its)
+                yield name, words_apart(mine, its), [(("scene", kind, k, each.name), its)]
     for each in fields(ours.scene):
         mine, its = getattr(ours.scene, each.name), getattr(theirs.scene, each.name)
         if each.name not in ("name", *PARTS) and mine != its:
-            yield f"scene, {each.name}", words_apart(mine, its), _scene_edit(each.name, its)
+            yield f"scene, {each.name}", words_apart(mine, its), [(("scene", each.name), its)]
 
 
 def with_model(plant: ScenePlant, model: Model) -> ScenePlant:
@@ -250,10 +238,8 @@ def with_model(plant: ScenePlant, model: Model) -> ScenePlant:
     known = plant.scene_robot.model
     if _same_links(model, known):
         model = replace(model, geometry=known.geometry)
-    robots = tuple(
-        replace(each, model=model) if each.name == plant.robot else each for each in plant.scene.robots
-    )
-    return replace(plant, scene=replace(plant.scene, robots=robots))
+    k = [each.name for each in plant.scene.robots].index(str(plant.robot))
+    return edited(plant, [(("scene", "robots", k, "model"), model)])
 
 
 def _same_links(one: Model, other: Model) -> bool:
@@ -277,32 +263,8 @@ def _shapes_in_words(ours: Model, theirs: Model) -> tuple[str, str]:
     return described(mine), described(its)
 
 
-def _shapes_edit(k: int, theirs: Model) -> SceneEdit:
-    def edit(plant: ScenePlant) -> ScenePlant:
-        robots = list(plant.scene.robots)
-        model = replace(robots[k].model, geometry=theirs.geometry)
-        robots[k] = replace(robots[k], model=model)
-        return replace(plant, scene=replace(plant.scene, robots=tuple(robots)))
-
-    return edit
-
-
 def _engine(plant: ScenePlant) -> str:
     return plant.engine + "".join(f", {name}={value}" for name, value in dict(plant.settings).items())
-
-
-def _part_edit(kind: str, k: int, field: str, value: Any) -> SceneEdit:
-    def edit(plant: ScenePlant) -> ScenePlant:
-        parts = list(getattr(plant.scene, kind))
-        parts[k] = replace(parts[k], **{field: value})
-        changes: dict[str, Any] = {kind: tuple(parts)}
-        return replace(plant, scene=replace(plant.scene, **changes))
-
-    return edit
-
-
-def _scene_edit(field: str, value: Any) -> SceneEdit:
-    return lambda plant: replace(plant, scene=replace(plant.scene, **{field: value}))
 
 
 IRRELEVANT = ("duration", "check_reference")
@@ -334,8 +296,8 @@ class Mixture:
 
     def __init__(self, ours: Scenario, theirs: Scenario) -> None:
         self.ours, self.theirs = ours.with_defaults(), theirs.with_defaults()
-        self._robot_edits: dict[str, RobotEdit] = {}
-        self._scene_edits: dict[str, SceneEdit] = {}
+        self._robot_edits: dict[str, Sequence[Edit]] = {}
+        self._scene_edits: dict[str, Sequence[Edit]] = {}
         self._parts: dict[str, tuple[str, tuple[str, ...]]] = {}
         """Field and path of parts of a field, by factor."""
         self._fields: dict[str, tuple[str, ...]] = {}
@@ -347,10 +309,7 @@ class Mixture:
 
         Raises ArgumentError where a part cannot be rebuilt, such as a controller that is not registered.
         """
-        model = self.ours.model
-        for name in taken:
-            if name in self._robot_edits:
-                model = self._robot_edits[name](model)
+        model = edited(self.ours.model, [edit for name in taken for edit in self._robot_edits.get(name, ())])
         whole = {field for name in taken for field in self._fields.get(name, ())}
         if "model" in whole:
             model = self.theirs.model
@@ -367,9 +326,7 @@ class Mixture:
         plant = (self.theirs if "plant" in whole else self.ours).plant
         if isinstance(plant, str):
             return plant
-        for name in taken:
-            if name in self._scene_edits:
-                plant = self._scene_edits[name](plant)
+        plant = edited(plant, [edit for name in taken for edit in self._scene_edits.get(name, ())])
         if "model" in whole and isinstance(self.theirs.plant, ScenePlant):
             # A scenario from a file has the shapes of its robot in the scene alone.
             model = self.theirs.plant.scene_robot.model
@@ -451,15 +408,15 @@ class Mixture:
         found = list(robot_factors(ours, theirs))
         if len(found) > MAX_PARTS:
             found = list(grouped(found))
-        for name, both, edit in found:
-            self._robot_edits[name] = edit
+        for name, both, edits in found:
+            self._robot_edits[name] = edits
             yield Factor(name, *both)
 
     def _of_scene(self) -> Iterator[Factor]:
         ours, theirs = self.ours.plant, self.theirs.plant
         if isinstance(ours, ScenePlant) and isinstance(theirs, ScenePlant):
-            for name, both, edit in scene_factors(ours, theirs):
-                self._scene_edits[name] = edit
+            for name, both, edits in scene_factors(ours, theirs):
+                self._scene_edits[name] = edits
                 yield Factor(name, *both)
 
 
