@@ -41,3 +41,14 @@ def batch_and_one(
             np.testing.assert_array_equal(many.v_record[row], one.v[1:])
             np.testing.assert_array_equal(many.tau_record[row], one.tau)
     return many, one
+
+
+def batch_and_each(
+    model: Model, law: Controller[Any], reference: Any, each: dict[str, Any], **options: Any
+) -> BatchRollouts:
+    """Simulate a batch whose rollouts differ in `each`, and assert that every one is that of `simulate`."""
+    many = simulate_batch(model, law, reference, record_every=1, **each, **options)
+    for row in range(len(many.q)):
+        own = {name: values[row] for name, values in each.items()}
+        assert_same(many, row, simulate(model, law, reference, plant="compiled", **own, **options))
+    return many

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +18,7 @@ from dynx.control.base import Controller, Measurement
 from dynx.errors import DivergedError
 from dynx.model import Model
 from dynx.rbd.integration import floating_step
-from dynx.sim import BatchRollouts, Noise, Payload, simulate, simulate_batch
-from dynx.sim import batch as batch_module
-from dynx.sim.batch import BatchPart, PartOutcome
+from dynx.sim import Noise, Payload, simulate, simulate_batch
 from dynx.spatial import so3
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models
@@ -147,52 +143,6 @@ def test_noise_displaces_the_base_along_its_own_axes() -> None:
     for step in range(20):
         seen = body.integrate(states[:, step], displaced[:, step])
         assert apart(many.tau_record[:, step], seen[:, :6]) < EXACT_ON_DYNX
-
-
-def test_who_computes_it_and_a_stop_on_the_way_change_nothing(
-    solo: Model, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    """With what is new in a part: several sets of states for the delay, kernels with and without a push."""
-    monkeypatch.setattr(batch_module, "PART", 4)
-    asked: dict[str, Any] = {
-        "duration": 0.03,
-        "delay": 3e-3,
-        "control_dt": 2e-3,
-        "effort_limits": 1.0,
-        "damping": np.linspace(0.0, 0.02, 10),
-        "pushes": [ExternalForce("base_link", np.ones(6), 0.01, 0.01)],
-        "noise": Noise(1e-3, 1e-2, seed=1),
-        "record_every": 10,
-        "check_reference": False,
-        **falling(solo),
-    }
-    law = PD(solo, kp=3.0, kd=0.1)
-
-    def run(**options: Any) -> BatchRollouts:
-        return simulate_batch(solo, law, solo.neutral(), **{**asked, **options})
-
-    def same(one: BatchRollouts, other: BatchRollouts) -> bool:
-        names = ("q", "v", "max_error", "rms_error", "saturated", "q_record", "tau_record")
-        return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in names)
-
-    one = run(threads=1)
-    assert same(one, run(threads=3, keep=tmp_path))
-    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        assert same(one, run(executor=pool))
-    computed: list[int] = []
-    does = BatchPart.__call__
-
-    def counted(part: BatchPart) -> PartOutcome:
-        computed.append(part.count)
-        return does(part)
-
-    monkeypatch.setattr(BatchPart, "__call__", counted)
-    assert same(one, run(keep=tmp_path))
-    assert computed == []
-    for other in ({"delay": 2e-3}, {"pushes": [ExternalForce("base_link", np.full(6, 2.0), 0.01, 0.01)]}):
-        found = run(keep=tmp_path, **other)
-        assert not np.array_equal(found.q, one.q)
-    assert computed == [4, 4, 2, 4, 4, 2]
 
 
 def test_the_centre_of_mass_and_the_spin_take_the_step_along_the_axes_of_the_world() -> None:

@@ -24,7 +24,7 @@ from dynx.sim.batch_rollouts import BatchRollouts
 from dynx.sim.loop_step import LoopStep
 from tests.backends.robots import mixed_robot
 from tests.sim.bars import apart
-from tests.sim.batch.batches import assert_same, batch_and_one
+from tests.sim.batch.batches import assert_same, batch_and_each, batch_and_one
 
 POSTURE = np.array([0.3, -1.2, 1.0, 0.2, 0.4, 0.1])
 TOOL = Payload("tool0", 2.0, (0.0, 0.0, 0.1), np.diag([0.01, 0.02, 0.015]))
@@ -106,69 +106,31 @@ def test_pushes_need_no_second_kernel_for_a_large_robot(
 def test_mimic_joints_feel_what_they_feel_alone(base: str, through: bool) -> None:
     robot = mixed_robot(base, mimic=True)
     rng = np.random.default_rng(3)
-    joints = len(robot.joint_names)
     law = dynx.control.PD(robot, kp=2.0, kd=0.2)
-    start: dict[str, Any] = {"q0": robot.random(rng), "v0": rng.uniform(-1.0, 1.0, robot.nv)}
-    friction = True if through else 0.3
     options: dict[str, Any] = {
-        "friction": friction,
+        "q0": robot.random(rng),
+        "v0": rng.uniform(-1.0, 1.0, robot.nv),
+        "friction": True if through else 0.3,
         "armature": True,
         "pushes": [ExternalForce("tip", np.ones(6))],
+        "duration": 0.03,
+        "check_reference": False,
     }
-    batch_and_one(
-        robot, law, robot.neutral(), duration=0.03, check_reference=False, damping=True, **start, **options
-    )
-    rows = rng.uniform(0.1, 0.5, (2, joints))
-    many = simulate_batch(
-        robot,
-        law,
-        robot.neutral(),
-        duration=0.03,
-        check_reference=False,
-        damping=rows,
-        record_every=1,
-        **start,
-        **options,
-    )
-    for row, damping in enumerate(rows):
-        one = simulate(
-            robot,
-            law,
-            robot.neutral(),
-            plant="compiled",
-            duration=0.03,
-            check_reference=False,
-            damping=damping,
-            **start,
-            **options,
-        )
-        assert_same(many, row, one)
+    batch_and_one(robot, law, robot.neutral(), damping=True, **options)
+    rows = rng.uniform(0.1, 0.5, (2, len(robot.joint_names)))
+    batch_and_each(robot, law, robot.neutral(), {"damping": rows}, **options)
 
 
 def test_each_rollout_has_coefficients_of_its_own(arm: Model) -> None:
     rng = np.random.default_rng(4)
-    damping, friction, armature = (
-        rng.uniform(0.1, 0.5, 3),
-        rng.uniform(0.1, 0.5, (3, 6)),
-        rng.uniform(0.05, 0.1, (3, 1)),
-    )
+    each = {"damping": rng.uniform(0.1, 0.5, 3), "friction": rng.uniform(0.1, 0.5, (3, 6))}
     law = GravityCompensatedPD(arm, kp=60, kd=6)
     options: dict[str, Any] = {"q0": POSTURE + 0.05, "duration": 0.05, "friction_slip": 0.05}
-    many = simulate_batch(
-        arm, law, POSTURE, damping=damping, friction=friction, armature=armature, record_every=1, **options
-    )
-    for row in range(3):
-        one = simulate(
-            arm,
-            law,
-            POSTURE,
-            plant="compiled",
-            damping=damping[row],
-            friction=friction[row],
-            armature=armature[row, 0],
-            **options,
-        )
-        assert_same(many, row, one)
+    many = batch_and_each(arm, law, POSTURE, {**each, "armature": rng.uniform(0.05, 0.1, 3)}, **options)
+    column = simulate_batch(arm, law, POSTURE, **each, armature=np.full((3, 1), 0.07), **options)
+    row = simulate_batch(arm, law, POSTURE, **each, armature=0.07, **options)
+    np.testing.assert_array_equal(column.q, row.q)
+    assert apart(many.q, row.q) > 1e-6
 
 
 def test_parameters_of_a_plant_with_a_payload_scaled_masses_and_rotors(arm: Model) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import fields, replace
 from functools import cache
 from typing import Any
@@ -18,7 +16,7 @@ from dynx.compiled import step as step_module
 from dynx.control import PID, FrictionCompensation
 from dynx.errors import ArgumentError
 from dynx.model.loading import load
-from dynx.sim import BatchRollouts, Noise, simulate, simulate_batch
+from dynx.sim import BatchRollouts, Noise, simulate_batch
 from dynx.sim import batch as batch_module
 from dynx.sim.closed_loop import Sensors
 from dynx.simd.cache import load_kernel
@@ -26,7 +24,6 @@ from dynx.simd.emit import Settings
 from dynx.spatial.scalar import Floats
 from dynx.steppers.clock import Clock
 from dynx.steppers.random import BLOCK_STEPS
-from tests.sim.batch.batches import assert_same
 
 ARM = load("ur5")
 POSTURE = np.array([0.3, -1.2, 1.0, 0.2, 0.4, 0.1])
@@ -100,24 +97,6 @@ def test_rows_of_a_batch_do_not_depend_on_its_partition(
             step_module, "load_kernel", lambda *given: load_kernel(*given, settings=Settings(lanes))
         )
         assert_rows(batch(rows, noise=replace(NOISE, rollout=first), threads=threads), rows)
-
-
-def test_processes_give_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole()
-    monkeypatch.setattr(batch_module, "PART", 7)
-    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
-        assert_rows(batch(executor=pool), slice(None))
-
-
-@pytest.mark.parametrize("row", [0, 17, ROLLOUTS - 1])
-def test_a_rollout_of_a_batch_simulated_alone(row: int) -> None:
-    law = PID(ARM, kp=60, ki=20, kd=6, control_dt=1e-3)
-    options: dict[str, Any] = {"q0": POSTURE + 0.05, "duration": 0.1}
-    many = simulate_batch(ARM, law, POSTURE, rollouts=ROLLOUTS, noise=NOISE, record_every=1, **options)
-    for plant in ("compiled", "pinocchio"):
-        own = replace(NOISE, rollout=row)
-        assert_same(many, row, simulate(ARM, law, POSTURE, plant=plant, noise=own, **options))
-    assert not np.array_equal(many.q[row], many.q[row - 1])
 
 
 def noise_rows(noise: Noise, n_controls: int) -> Floats:

@@ -82,16 +82,8 @@ def test_parameters_of_the_plant_count_in_the_impact() -> None:
     law, goal = PD(ARM, kp=50, kd=2), ARM.upper + 0.3
     options: dict[str, Any] = {"duration": 0.05, "position_limits": True, "check_reference": False}
     masses = np.linspace(0.0, 3.0, ROLLOUTS)
-    batch = simulate_batch(
-        ARM,
-        law,
-        goal,
-        q0=q0,
-        v0=v0,
-        parametric=plant,
-        parameters=np.pad(masses[:, None], ((0, 0), (0, 3))),
-        **options,
-    )
+    parameters = np.pad(masses[:, None], ((0, 0), (0, 3)))
+    batch = simulate_batch(ARM, law, goal, q0=q0, v0=v0, parametric=plant, parameters=parameters, **options)
     for k, mass in enumerate(masses.tolist()):
         payload = Payload("tool0", mass)
         alone = simulate(ARM, law, goal, plant="compiled", q0=q0[k], v0=v0[k], payload=payload, **options)
