@@ -1,16 +1,26 @@
-"""Closed forms of boxes and robots, against equations of motion that are integrated."""
+"""Closed forms of boxes and robots, against equations of motion that are integrated; cases on engines."""
 
 from __future__ import annotations
 
 import math
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import dynx
+from dynx.contacts import case_names, conform, find_case
 from dynx.contacts.cases import friction, resting
 from dynx.contacts.motion import G
+from dynx.contacts.run import CaseRun, Measured, carry_out
+from dynx.errors import ArgumentError
 from dynx.spatial.scalar import Floats
+from dynx.steppers.registry import installed_worlds
+from dynx.world import Material
+from tests.cli.contacts.documents import Sliding
+from tests.world.engines import WORLDS
 
 
 def tip(b: float, h: float, force: Floats, push: Floats | None, angle: float) -> tuple[float, float]:
@@ -105,3 +115,112 @@ def test_forces_on_feet_balance_the_weight_of_the_robot_that_is_simulated() -> N
     gravity = dynx.backend("reference", robot).gravity_torque(q)
     moment = gravity[4] - resting.REACH * gravity[2]
     assert math.isclose(-moment, front * 2.0 * resting.REACH, rel_tol=1e-12)
+
+
+RIGID = {"contact_erp": 0.0, "contact_slop": 0.0, "rebound_time_constant": 1e6}
+"""Settings with which Bullet does not push apart what penetrates."""
+
+TRIALS = [(name, trial) for name in case_names() for trial in find_case(name).trials]
+
+IMPACTS = [
+    each
+    for each in TRIALS
+    if each[0] in ("collision", "newtons_cradle", "restitution_pairs", "spinning_ball")
+]
+
+
+def measured(engine: str, name: str, trial: str, dt: float, **settings: float) -> Measured:
+    outcome = carry_out(CaseRun(engine, find_case(name), trial, dt, settings))
+    assert isinstance(outcome, Measured), outcome
+    return outcome
+
+
+@pytest.mark.skipif("mujoco" not in installed_worlds(), reason="needs the engine mujoco")
+@pytest.mark.parametrize(("name", "trial"), TRIALS)
+def test_every_case_has_finite_figures_of_different_names(name: str, trial: str) -> None:
+    figures = measured("mujoco", name, trial, 4e-3).figures
+    assert figures
+    assert all(math.isfinite(figure.error) and figure.tolerance > 0.0 for figure in figures)
+    assert len({figure.name for figure in figures}) == len(figures)
+
+
+@pytest.mark.skipif("pybullet" not in installed_worlds(), reason="needs the engine pybullet")
+@pytest.mark.parametrize(("name", "trial"), IMPACTS)
+def test_impacts_of_bullet_are_exact_without_its_corrections(name: str, trial: str) -> None:
+    for figure in measured("pybullet", name, trial, 4e-3, **RIGID).figures:
+        assert figure.error <= 1e-7, figure
+
+
+@pytest.mark.skipif("pybullet" not in installed_worlds(), reason="needs the engine pybullet")
+@pytest.mark.parametrize(("name", "trial"), IMPACTS)
+def test_impacts_tell_another_restitution_from_the_right_one(
+    name: str, trial: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Elastic(Material):
+        """A material whose restitution is another one than the scene asks for."""
+
+        def __post_init__(self) -> None:
+            super().__post_init__()
+            object.__setattr__(self, "restitution", 0.3)
+
+    case = find_case(name)
+    monkeypatch.setattr(import_module(type(case).__module__), "Material", Elastic)
+    assert any(figure.error > 0.01 for figure in measured("pybullet", name, trial, 4e-3, **RIGID).figures)
+
+
+ENGINES = [name for name in WORLDS if find_spec(name) is not None]
+
+needs_engine = pytest.mark.skipif(not ENGINES, reason="needs an engine for worlds")
+
+PAGE = Path(__file__).parents[2] / "docs" / "contacts.md"
+
+
+@needs_engine
+def test_a_case_of_the_program_that_runs_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Sliding, "__module__", "__main__")
+    with pytest.raises(ArgumentError, match="a module of its own"):
+        conform(ENGINES[:1], cases=[Sliding()])
+
+
+@needs_engine
+def test_the_case_of_the_documentation_falls_with_the_step(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    code = PAGE.read_text(encoding="utf-8").partition("## A case of your own")[2]
+    (tmp_path / "falling_ball.py").write_text(code.split("```python\n")[1].split("```")[0])
+    monkeypatch.syspath_prepend(tmp_path)
+    import falling_ball  # type: ignore[import-not-found]
+
+    found = conform(ENGINES[:1], (4e-3, 2e-3), [falling_ball.FreeFall()], jobs=1)
+    assert [result.verdict.kind for result in found.results] == ["falls", "falls"]
+    assert found.results[0].verdict.order == pytest.approx(1.0, abs=1e-6)
+
+
+def interrupt(done: int, total: int) -> None:
+    """Interrupt after two runs."""
+    if done == 2:
+        raise KeyboardInterrupt
+
+
+@needs_engine
+def test_an_interruption_keeps_the_trials_that_are_done() -> None:
+    found = conform(
+        ENGINES[:1],
+        (4e-3,),
+        ["resting_force", "slope"],
+        jobs=0,
+        progress=interrupt,
+        interruptible=True,
+    )
+    # Of one trial of the first case and two of the second, the last is left out. What stays is not judged,
+    # because no setting could be tried.
+    assert {each.case for each in found.results} == {"resting_force"}
+    assert found.not_done >= 1
+    assert not found.failures
+    assert not found.unexplained
+    assert found.versions[ENGINES[0]]
+
+
+def test_an_interruption_is_raised_where_nobody_asks_for_the_results() -> None:
+    with pytest.raises(KeyboardInterrupt):
+        conform(ENGINES[:1], (4e-3,), ["resting_force", "slope"], jobs=0, progress=interrupt)

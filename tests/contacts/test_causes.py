@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import pytest
 
 from dynx.contacts import Attribution, ContactCase, Figure, FigureResult, SettingsChange, conform
-from dynx.world import Scene, World, register_world, unregister_world
-from tests.contacts.exact_world import ExactWorld
+from dynx.world import Scene, World
 
 STEPS = (4e-3, 2e-3, 1e-3)
 REASON = "A factor that this engine has for the tests."
 FRICTION, INERTIA = "friction_factor", "inertia_factor"
 
 
-@pytest.fixture(autouse=True)
-def exact() -> Iterator[None]:
-    register_world("exact", lambda: ExactWorld)
-    yield
-    unregister_world("exact")
+pytestmark = pytest.mark.usefixtures("exact")
 
 
 class Planned(ContactCase):

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
 from dynx.contacts import ContactCase, Figure, find_case
-from dynx.world import World, register_world, unregister_world
-from tests.contacts.exact_world import ExactWorld
+from dynx.world import World
 
 CASES = (
     "resting_force",
@@ -42,11 +40,7 @@ FAULTS = (
 """Cases, and settings of `ExactWorld` that they have to notice."""
 
 
-@pytest.fixture(autouse=True)
-def exact() -> Iterator[None]:
-    register_world("exact", lambda: ExactWorld)
-    yield
-    unregister_world("exact")
+pytestmark = pytest.mark.usefixtures("exact")
 
 
 def figures(case: ContactCase, trial: str, dt: float, **settings: Any) -> list[Figure]:

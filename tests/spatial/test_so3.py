@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from dynx.spatial.scalar import Array, jacobi_eigen, longdouble
 from dynx.spatial.so3 import (
     cross,
     quat_exp,
@@ -199,3 +200,23 @@ def test_one_rotation_has_the_quaternion_of_a_batch() -> None:
     single = np.array([quat_from_rotation(each) for each in R])
     assert single.tobytes() == quat_from_rotation(R).tobytes()
     assert np.isnan(quat_from_rotation(np.full((3, 3), np.nan))).all()
+
+
+EPS = float(np.finfo(np.longdouble).eps)
+
+entries = st.floats(-1.0, 1.0, allow_subnormal=False)
+
+
+def _size(A: Array) -> float:
+    return float(np.max(np.abs(A)))
+
+
+@given(st.tuples(*[entries] * 6))
+def test_eigenvectors_rebuild_the_matrix_and_are_orthonormal(six: tuple[float, ...]) -> None:
+    xx, xy, xz, yy, yz, zz = six
+    A = longdouble([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    values, vectors = jacobi_eigen(A)
+    # Jacobi rounds once per rotation, nine rotations a sweep, some six sweeps.
+    bound = 3 * 9 * 6 * EPS
+    assert _size(vectors @ np.diag(values) @ vectors.T - A) <= bound * _size(A)
+    assert _size(vectors.T @ vectors - np.eye(3)) <= bound

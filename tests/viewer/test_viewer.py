@@ -16,6 +16,7 @@ import pytest
 import dynx
 from dynx.errors import ArgumentError
 from dynx.model import Model
+from dynx.model.tree import Base
 from dynx.viewer import Viewer, view
 from dynx.world import World
 from dynx.world.scene import read_scene
@@ -387,3 +388,57 @@ def test_notes_on_a_motion_name_the_robot_once() -> None:
     with rollout.view(whole_meshes=False) as viewer:
         (note,) = viewer.notes
         assert note.startswith("ur5 is drawn with ")
+
+
+SAMPLE = ("double_pendulum", "hyq", "tiago", "icub_reduced")
+
+
+@needs_examples
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+@pytest.mark.parametrize("name", SAMPLE)
+def test_real_robots_open_with_everything_switched_on(name: str, base: Base) -> None:
+    model = dynx.load(name, base=base)
+    with view(model) as viewer:
+        for kind in viewer.view._marks.kinds:
+            viewer.view._marks.show(kind, True)
+        viewer.view.robot.show(visuals=True, collisions=True)
+        viewer.view._torques.shown = viewer.view._ellipsoid.shown = True
+        q = model.random(0)
+        viewer.view.put(q)
+        assert np.array_equal(viewer.view.q, q)
+
+
+def test_a_joint_with_equal_limits_has_a_slider_of_few_digits() -> None:
+    text = (
+        '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="revolute"><parent link="a"/>'
+        '<child link="b"/><axis xyz="0 0 1"/><limit lower="0.3" upper="0.3" effort="1" velocity="1"/></joint>'
+        "</robot>"
+    )
+    with view(dynx.load(text)) as viewer:
+        (slider,) = viewer.view._sliders._handles
+        assert slider.disabled
+        assert (slider.min, slider.value, slider.max) == (17.19, 17.19, 17.19)
+        assert viewer.view.q == [0.3]
+        viewer.view.put([0.5])
+        assert (slider.min, slider.value, slider.max) == (17.19, 28.65, 28.65)
+
+
+def test_the_handle_has_what_its_target_moves() -> None:
+    with view(dynx.load("six_axis_arm")) as viewer:
+        handle = viewer.view._handle
+        node = handle._node
+        expected = {None: (False, False), "rotation": (False, True), "position": (True, False)}
+        for free, (no_arrows, no_rings) in expected.items():
+            handle.free = free
+            assert node.disable_axes == node.disable_sliders == no_arrows
+            assert node.disable_rotations == no_rings
+
+
+def test_all_curves_of_a_rollout_have_the_axis_of_the_whole_motion() -> None:
+    arm = dynx.load("six_axis_arm")
+    motion = dynx.trajectory.cycloidal(np.zeros(arm.nq), np.full(arm.nq, 1e-3), duration=0.001)
+    rollout = dynx.simulate(arm, dynx.control.ComputedTorque(arm, kp=100.0, kd=20.0), motion)
+    assert len(rollout.t) == 2  # There is one torque.
+    with rollout.view() as viewer:
+        ranges = [curves._plot.scales["x"]["range"] for curves in viewer.view._curves]
+        assert ranges == [(0.0, 0.001)] * 3
