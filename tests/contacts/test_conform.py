@@ -291,7 +291,7 @@ def late(world: World) -> list[Figure]:
         (lambda world: [*still(world), *still(world)], "two figures of the name 'speed'"),
         (lambda world: [Figure("speed", float("nan"), 0.0, "m/s", 1.0)], "the figure 'speed' is nan"),
         (lambda world: [Figure("speed", 0.0, float("nan"), "m/s", 1.0)], "exact value of the figure 'speed'"),
-        (oops, r"test_arguments\.py:\d+: ValueError: oops"),
+        (oops, r"test_conform\.py:\d+: ValueError: oops"),
     ],
 )
 def test_what_a_case_measures_is_checked(figures: Callable[[World], Any], message: str) -> None:

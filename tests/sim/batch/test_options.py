@@ -123,7 +123,7 @@ def test_mimic_joints_feel_what_they_feel_alone(base: str, through: bool) -> Non
 
 def test_each_rollout_has_coefficients_of_its_own(arm: Model) -> None:
     rng = np.random.default_rng(4)
-    each = {"damping": rng.uniform(0.1, 0.5, 3), "friction": rng.uniform(0.1, 0.5, (3, 6))}
+    each: dict[str, Any] = {"damping": rng.uniform(0.1, 0.5, 3), "friction": rng.uniform(0.1, 0.5, (3, 6))}
     law = GravityCompensatedPD(arm, kp=60, kd=6)
     options: dict[str, Any] = {"q0": POSTURE + 0.05, "duration": 0.05, "friction_slip": 0.05}
     many = batch_and_each(arm, law, POSTURE, {**each, "armature": rng.uniform(0.05, 0.1, 3)}, **options)
