@@ -27,7 +27,7 @@ from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.so3 import rotate
 
 MAX_COORDINATES = 24
-"""Most coordinates for which a step is compiled."""
+"""Most coordinates for which a step, or a whole descent, is compiled."""
 
 MAX_KERNELS = 64
 """Most kernels, and most kinds of workspaces, that are kept."""

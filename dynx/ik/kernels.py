@@ -31,6 +31,7 @@ from dynx.backends.base import Backend
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.files.cache import keep, read_cached
 from dynx.ik.coordinates import FrameCoordinates
+from dynx.ik.descent import MAX_COORDINATES
 from dynx.ik.iterations import (
     MAX_STEPS,
     POSTURE,
@@ -347,9 +348,6 @@ def _settings(problem: Problem, max_restarts: int) -> Floats:
     return np.array([float(getattr(limits, name)) for name in SETTINGS])
 
 
-MAX_JOINTS = 24
-"""Most joints between root and frame for which a kernel is compiled, in some seconds."""
-
 MAX_POSE_CALLS = 16
 """Most combinations of a frame and options for which single poses have a call of their own."""
 
@@ -369,11 +367,11 @@ SolverKey = tuple[str, TargetKind, bytes]
 
 def kernel_applies(backend: Backend, problem: Problem) -> bool:
     """Check whether a kernel solves a problem: on a backend that compiles, for one frame that 1 to
-    `MAX_JOINTS` joints move, on a fixed base."""
+    `MAX_COORDINATES` joints move, on a fixed base."""
     coordinates = problem.coordinates
     if not backend.compiles or coordinates.floating or len(problem.requirements) > 1:
         return False
-    return 0 < coordinates.count <= MAX_JOINTS and problem.limits.max_restarts <= MAX_RESTARTS
+    return 0 < coordinates.count <= MAX_COORDINATES and problem.limits.max_restarts <= MAX_RESTARTS
 
 
 def solver_key(problem: Problem) -> SolverKey:

@@ -267,12 +267,16 @@ class Options:
 
     def checked_rng(self) -> np.random.Generator | int | None:
         """Return the seed or generator. Raises ArgumentError."""
-        rng = self.rng
-        if rng is None or isinstance(rng, np.random.Generator):
-            return rng
-        if isinstance(rng, int | np.integer) and not isinstance(rng, bool) and rng >= 0:
-            return int(rng)
-        raise ArgumentError(f"rng is {shown(rng)}; wanted a generator, a seed (at least 0) or None")
+        return None if self.rng is None else checked_rng(self.rng)
+
+
+def checked_rng(rng: object) -> np.random.Generator | int:
+    """Return a seed or generator. Raises ArgumentError."""
+    if isinstance(rng, np.random.Generator):
+        return rng
+    if isinstance(rng, int | np.integer) and not isinstance(rng, bool) and rng >= 0:
+        return int(rng)
+    raise ArgumentError(f"rng is {shown(rng)}; wanted a generator or a seed (at least 0)")
 
 
 _NAMES = tuple(field.name for field in fields(Options))

@@ -212,7 +212,7 @@ def checked_problem(
     coordinates = stored_coordinates(model, frames, None if margin is None else tuple(margin.tolist()))
     secondary = _secondary(model, options)
     goal = None if secondary is None else secondary.nearest
-    start = _start(model, goal if q0 is None else q0)
+    start = start_within_limits(model, goal if q0 is None else q0)
     if margin is not None:
         start = coordinates.clipped(start)
     shapes = [requirement.targets.batch for requirement in requirements]
@@ -312,7 +312,20 @@ def checked_margin(model: Model, margin: ArrayLike) -> Floats | None:
     return np.broadcast_to(array, (model.nq,)).copy() if array.any() else None
 
 
-def _start(model: Model, q0: ArrayLike | None) -> Floats:
+def checked_velocity_limit(name: str, bound: ArrayLike, model: Model) -> Floats:
+    """Return a bound (nv,) on velocities or accelerations, given as one number or (nv,), at least 0.
+
+    Raises ShapeError, DTypeError or ArgumentError.
+    """
+    array = real_array(name, bound)
+    if array.shape not in ((), (model.nv,)):
+        raise ShapeError(f"{name} has shape {array.shape}; wanted one number, or ({model.nv},)")
+    if not (array >= 0.0).all():
+        raise ArgumentError(f"{name} has the least entry {np.min(array):g}; wanted at least 0")
+    return np.array(np.broadcast_to(array, (model.nv,)))
+
+
+def start_within_limits(model: Model, q0: ArrayLike | None) -> Floats:
     """Return q0, or the neutral configuration, moved into the limits and with a unit quaternion."""
     q = model.neutral() if q0 is None else checked_q(model, q0, "q0")
     q = np.minimum(np.maximum(q, model.lower), model.upper)

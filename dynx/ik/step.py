@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 
 from dynx.backends.hooks import cholesky_solver
-from dynx.ik.options import AxisRequirement
+from dynx.ik.options import AxisRequirement, SearchLimits
 from dynx.model.targets import Targets
 from dynx.rbd.linear import solve_positive_definite
 from dynx.simd.iteration import GIVEN_UP, REACHED, RUNNING
@@ -383,6 +383,12 @@ SETTINGS = ("position_tolerance", "rotation_tolerance", "max_iterations", "max_r
 TRACKING_SETTINGS = ("position_tolerance", "rotation_tolerance", "max_iterations", "stops", "abandons")
 """Settings of a tracking, in order: the last two are 1 to return at a target that is not reached, and to
 abandon descents without progress."""
+
+
+def tracking_settings(limits: SearchLimits, *, stops: bool = False, abandons: bool = False) -> list[float]:
+    """Return the settings of a tracking, in the order of `TRACKING_SETTINGS`."""
+    tolerances = limits.position_tolerance, limits.rotation_tolerance
+    return [*tolerances, float(limits.max_iterations), float(stops), float(abandons)]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from dynx.backends.base import Backend
 from dynx.errors import ArgumentError, NotInstalledError, ShapeError, shown
 from dynx.ik.descent import ErrorCall, KernelTarget
-from dynx.ik.problem import checked_avoidance
+from dynx.ik.problem import checked_avoidance, checked_velocity_limit
 from dynx.ik.step import TargetKind
 from dynx.model import Model
 from dynx.model.configuration import checked_q
@@ -461,9 +461,9 @@ def velocity_ik(
             raise ArgumentError(f"{name} is {shown(number)}; wanted a number {least or 'of at least 0'}")
     speed, acceleration = model.velocity_limit, np.full(model.nv, math.inf)
     if velocity_limit is not None:
-        speed = _limit("velocity_limit", velocity_limit, model)
+        speed = checked_velocity_limit("velocity_limit", velocity_limit, model)
     if acceleration_limit is not None:
-        acceleration = _limit("acceleration_limit", acceleration_limit, model)
+        acceleration = checked_velocity_limit("acceleration_limit", acceleration_limit, model)
     if v0 is not None and acceleration_limit is None:
         raise ArgumentError("v0 is given without acceleration_limit, with which alone it has an effect")
     before = None if v0 is None else checked_array("v0", v0, model.nv)
@@ -521,12 +521,3 @@ def _stacked(rows: Rows, nv: int) -> tuple[Floats, Floats]:
     if not rows:
         return np.zeros((0, nv)), np.zeros(0)
     return np.concatenate([J for J, _ in rows]), np.concatenate([velocity for _, velocity in rows])
-
-
-def _limit(name: str, bound: ArrayLike, model: Model) -> Floats:
-    array = real_array(name, bound)
-    if array.shape not in ((), (model.nv,)):
-        raise ShapeError(f"{name} has shape {array.shape}; wanted one number, or ({model.nv},)")
-    if not (array >= 0.0).all():
-        raise ArgumentError(f"{name} has the least entry {np.min(array):g}; wanted at least 0")
-    return np.array(np.broadcast_to(array, (model.nv,)))

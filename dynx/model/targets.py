@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import repeat
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from dynx.errors import ArgumentError, ShapeError, nearest, shown
 from dynx.model.numbers import MAX_MAGNITUDE, checked_entries, real_array
@@ -45,16 +45,29 @@ class Targets:
         assert self.rotations is not None
         return self.rotations.shape[:-2]
 
+    def __getitem__(self, of: int | slice | NDArray[np.intp]) -> Targets:
+        """Return some of the targets, by their index on the first leading axis."""
+        return Targets(
+            None if self.positions is None else self.positions[of],
+            None if self.rotations is None else self.rotations[of],
+        )
+
+    def flattened(self, batch: tuple[int, ...], *kept: int) -> Targets:
+        """Return the targets broadcast to the leading axes (*batch, *kept), those of `batch` as one axis."""
+        parts: list[Floats | None] = []
+        for array, shape in ((self.positions, (3,)), (self.rotations, (3, 3))):
+            if array is not None:
+                array = np.broadcast_to(array, (*batch, *kept, *shape))
+                array = array.reshape(math.prod(batch), *kept, *shape)
+            parts.append(array)
+        return Targets(*parts)
+
     def rows(self, batch: tuple[int, ...]) -> Iterator[tuple[Floats | None, Floats | None]]:
         """Yield position and rotation of each target, broadcast to the leading axes `batch`."""
-        count = math.prod(batch)
-        found: list[Iterable[Floats | None]] = []
-        for array, shape in ((self.positions, (3,)), (self.rotations, (3, 3))):
-            if array is None:
-                found.append(repeat(None, count))
-            else:
-                found.append(np.broadcast_to(array, (*batch, *shape)).reshape(count, *shape))
-        return zip(*found, strict=True)
+        flat, none = self.flattened(batch), repeat(None, math.prod(batch))
+        positions: Iterable[Floats | None] = none if flat.positions is None else flat.positions
+        rotations: Iterable[Floats | None] = none if flat.rotations is None else flat.rotations
+        return zip(positions, rotations, strict=True)
 
 
 def checked_targets(target: ArrayLike, free: str | None = None) -> Targets:

@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 
 from dynx.backends.base import Backend
 from dynx.ik.coordinates import FrameCoordinates
-from dynx.ik.descent import Descended
+from dynx.ik.descent import MAX_COORDINATES, Descended
 from dynx.ik.iterations import tracking_iteration
-from dynx.ik.kernels import MAX_JOINTS, frame_kernel
+from dynx.ik.kernels import frame_kernel
 from dynx.ik.options import SearchLimits
 from dynx.ik.problem import Requirement
 from dynx.ik.search import SearchTask
-from dynx.ik.step import TRACKING, TargetKind
+from dynx.ik.step import TRACKING, TargetKind, tracking_settings
 from dynx.model.targets import Targets
 from dynx.simd.image import COMPILE_LOCK
 from dynx.simd.iteration import IterationKernel
@@ -79,14 +79,6 @@ class Followed:
         return cls(*(np.concatenate([getattr(piece, each.name) for piece in pieces]) for each in fields(cls)))
 
 
-def part_of(targets: Targets, of: slice) -> Targets:
-    """Return some of the targets (n,)."""
-    return Targets(
-        None if targets.positions is None else targets.positions[of],
-        None if targets.rotations is None else targets.rotations[of],
-    )
-
-
 class Follower(Protocol):
     """Solver of targets, one after the other or each on its own."""
 
@@ -132,9 +124,7 @@ class SampleFollower:
             error = task.error(q)
             return Descended(q, error.position, error.rotation, error.reached, 0)
         lower, upper = bounds.around(np.array(coordinates.values(q)))
-        settings = (
-            limits.position_tolerance, limits.rotation_tolerance, limits.max_iterations, 0.0, float(abandons)
-        )  # fmt: skip
+        settings = tracking_settings(limits, abandons=abandons)
         return task.descend(TRACKING, q, settings, (lower.tolist(), upper.tolist()))
 
 
@@ -182,15 +172,9 @@ class KernelFollower:
         self, x: Floats, targets: Targets, rows: Floats, bounds: StepBounds, *, stop: bool, abandons: bool
     ) -> int:
         """Fill the results of tasks that start at x; return the number of completed ones."""
-        limits, memory = self._limits, TRACKING.initial(x.shape[1])
-        settings = [
-            limits.position_tolerance,
-            limits.rotation_tolerance,
-            limits.max_iterations,
-            stop,
-            abandons,
-        ]
-        parts = [np.array(settings, dtype=np.float64), bounds.lower, bounds.upper, bounds.reach]
+        memory = TRACKING.initial(x.shape[1])
+        settings = tracking_settings(self._limits, stops=stop, abandons=abandons)
+        parts = [np.array(settings), bounds.lower, bounds.upper, bounds.reach]
         if self._point is not None:
             parts.append(self._point)
         tasks = [
@@ -218,8 +202,8 @@ def path_follower(
     limits: SearchLimits,
 ) -> KernelFollower | None:
     """Return a follower of targets of this kind; None for a floating base, a frame that no joint or more than
-    `MAX_JOINTS` joints move, or a backend that compiles nothing."""
-    if not backend.compiles or coordinates.floating or not 0 < coordinates.count <= MAX_JOINTS:
+    `MAX_COORDINATES` joints move, or a backend that compiles nothing."""
+    if not backend.compiles or coordinates.floating or not 0 < coordinates.count <= MAX_COORDINATES:
         return None
     kind = TargetKind(targets.positions is not None, targets.rotations is not None, point is not None)
 
@@ -254,7 +238,7 @@ class AvoidingFollower:
         n, done = targets.batch[0], 0
         pieces: list[Followed] = []
         while done < n:
-            part = part_of(targets, slice(done, min(n, done + CHUNK)))
+            part = targets[done : min(n, done + CHUNK)]
             found = self._base.follow(q, part, bounds, stop=True)
             clear = 0
             while clear < len(found) and found.reached[clear] and self._is_clear(found.q[clear]):
@@ -266,7 +250,7 @@ class AvoidingFollower:
                 # The other follower ends with a sample that it does not reach.
                 sample = found.part(slice(clear, clear + 1))
                 if sample.reached[0] or not self._is_clear(sample.q[0]):
-                    sample = self._avoid(q, part_of(part, slice(clear, clear + 1)), bounds)
+                    sample = self._avoid(q, part[clear : clear + 1], bounds)
                 pieces.append(sample)
                 q, done = sample.q[0], done + 1
                 if stop and not sample.reached[0]:

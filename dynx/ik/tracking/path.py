@@ -24,7 +24,7 @@ from dynx.files.pages import html_table
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.problem import Requirement
 from dynx.ik.step import rotation_between
-from dynx.ik.tracking.followers import Followed, Follower, StepBounds, part_of
+from dynx.ik.tracking.followers import Followed, Follower, StepBounds
 from dynx.model.targets import Targets
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_exp, quat_from_rotation, quat_log, rotation_from_quat
@@ -207,7 +207,7 @@ class PathTracker:
         stop = jumps or limits.divisible
         done = 0
         while done < n:
-            found = self._follower.follow(q, part_of(targets, slice(done, n)), bounds, stop=stop)
+            found = self._follower.follow(q, targets[done:n], bounds, stop=stop)
             path.fill(done, found)
             failed = done + np.flatnonzero(~found.reached)
             for k in failed.tolist():
@@ -226,7 +226,7 @@ class PathTracker:
         """Return configurations (k, nq) that reach a target (1,), each once; other joints are those of q."""
         starts = np.tile(q, (len(self._starts) + 1, 1))
         starts[1:, self.coordinates.indices] = self._starts
-        copies = _repeated(target, len(starts))
+        copies = target[np.zeros(len(starts), dtype=np.intp)]
         found = self._follower.descend(starts, copies, self._limits.unbounded_steps)
         within: list[Floats] = []
         for solution in found.q[found.reached]:
@@ -237,7 +237,7 @@ class PathTracker:
 
     def _recover(self, path: TrackedPath, k: int, q: Floats, targets: Targets, jumps: bool) -> bool:
         """Reach sample k from q over poses between, or by a jump; return whether that succeeded."""
-        target = part_of(targets, slice(k, k + 1))
+        target = targets[k : k + 1]
         limits = self._limits
         if limits.divisible and (path.is_ok_before(k) or self._is_out_of_reach(q, path.q[k])):
             found = self._divided(q, target)
@@ -277,7 +277,7 @@ class PathTracker:
     def limiting(self, q: Floats, before: Floats, targets: Targets, k: int) -> NDArray[np.bool_]:
         """Return the coordinates (n,) that the error at q presses against a limit."""
         coordinates, limits = self.coordinates, self._limits
-        (position, rotation), *_ = part_of(targets, slice(k, k + 1)).rows((1,))
+        ((position, rotation),) = targets[k : k + 1].rows((1,))
         task = self._requirement.task(self._backend, coordinates, position, rotation)
         at_q = task.error(q)
         error, J = np.array(at_q.vector), task.jacobian(q, at_q)
@@ -334,11 +334,3 @@ class _Between:
             rotations = self._rotation @ rotation_from_quat(quat_exp(s * self._vector))
             rotations[-1] = self._target.rotations[0]
         return Targets(positions, rotations)
-
-
-def _repeated(target: Targets, count: int) -> Targets:
-    """Return a target (1,) this many times."""
-    return Targets(
-        None if target.positions is None else np.repeat(target.positions, count, axis=0),
-        None if target.rotations is None else np.repeat(target.rotations, count, axis=0),
-    )

@@ -15,14 +15,20 @@ from numpy.typing import ArrayLike
 from dynx.backends.base import Backend
 from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.ik.coordinates import FrameCoordinates
-from dynx.ik.options import SearchLimits, checked_axes
-from dynx.ik.problem import Requirement, argument_note, checked_avoidance, checked_margin
+from dynx.ik.options import SearchLimits, checked_axes, checked_rng
+from dynx.ik.problem import (
+    Requirement,
+    argument_note,
+    checked_avoidance,
+    checked_margin,
+    checked_velocity_limit,
+    start_within_limits,
+)
 from dynx.ik.reach import proof_of
-from dynx.ik.tracking.followers import AvoidingFollower, Follower, SampleFollower, part_of, path_follower
+from dynx.ik.tracking.followers import AvoidingFollower, Follower, SampleFollower, path_follower
 from dynx.ik.tracking.path import AT_BOUND, PathTracker, TrackedPath, TrackLimits, TrackResult, TrackStatus
 from dynx.model import Model
-from dynx.model.configuration import checked_q
-from dynx.model.numbers import checked_vector, is_real, positive_seconds, real_array, whole_number
+from dynx.model.numbers import checked_vector, is_real, positive_seconds, whole_number
 from dynx.model.targets import Targets, checked_targets
 from dynx.option_names import checks_option_names
 from dynx.spatial.scalar import Floats
@@ -99,7 +105,7 @@ class FailureExplainer:
         """Say which bodies are too close where the target would be reached, or return an empty text."""
         if self.avoidance is None:
             return ""
-        target = part_of(self.requirement.targets, slice(k, k + 1))
+        target = self.requirement.targets[k : k + 1]
         found = self.follower.follow(before, target, self.limits.direct, stop=True)
         if not found.reached[0]:
             found = self.follower.descend(before[None], target, self.limits.unbounded_steps)
@@ -114,7 +120,7 @@ class FailureExplainer:
     def _singularity(self, q: Floats) -> str:
         """Say how close q is to a singular configuration, where no motion of the joints reduces the error."""
         coordinates, targets = self.tracker.coordinates, self.requirement.targets
-        (position, rotation), *_ = part_of(targets, slice(1)).rows((1,))
+        ((position, rotation),) = targets[:1].rows((1,))
         task = self.requirement.task(self.backend, coordinates, position, rotation)
         J = task.jacobian(q, task.error(q))
         if J.shape[1] < J.shape[0]:
@@ -231,14 +237,14 @@ def track(
     plain, avoidance = follower, checked_avoidance(model, avoid)
     if avoidance is not None:
         follower = AvoidingFollower(follower, backend, requirement, coordinates, avoidance)
-    draws = coordinates.starts(_generator(rng), max_starts)
+    draws = coordinates.starts(np.random.default_rng(checked_rng(rng)), max_starts)
     offset = coordinates.count - len(coordinates.indices)
     starts = np.clip(draws, limits.lower[offset:], limits.upper[offset:])
     tracker = PathTracker(backend, follower, requirement, coordinates, limits, starts)
     explainer = FailureExplainer(backend, tracker, plain, requirement, limits, avoidance)
 
     n = path.batch[-1]
-    start = _start(model, q0, coordinates)
+    start = coordinates.clipped(start_within_limits(model, q0))
     try:
         batch = np.broadcast_shapes(path.batch[:-1], start.shape[:-1])
     except ValueError:
@@ -247,16 +253,10 @@ def track(
         ) from None
     count = math.prod(batch)
     flat_starts = np.broadcast_to(start, (*batch, model.nq)).reshape(count, model.nq)
-    positions, rotations = path.positions, path.rotations
-    if positions is not None:
-        positions = np.broadcast_to(positions, (*batch, n, 3)).reshape(count, n, 3)
-    if rotations is not None:
-        rotations = np.broadcast_to(rotations, (*batch, n, 3, 3)).reshape(count, n, 3, 3)
+    paths = path.flattened(batch, n)
     found: list[TrackedPath] = []
     for k in range(count):
-        of_path = Targets(
-            None if positions is None else positions[k], None if rotations is None else rotations[k]
-        )
+        of_path = paths[k]
         if q0 is None:
             found.append(_from_best_start(tracker, flat_starts[k], of_path, limits, may_jump))
         else:
@@ -278,19 +278,11 @@ def track(
     )
 
 
-def _generator(rng: np.random.Generator | int) -> np.random.Generator:
-    if isinstance(rng, np.random.Generator):
-        return rng
-    if isinstance(rng, int | np.integer) and not isinstance(rng, bool) and rng >= 0:
-        return np.random.default_rng(int(rng))
-    raise ArgumentError(f"rng is {shown(rng)}; wanted a generator or a seed (at least 0)")
-
-
 def _from_best_start(
     tracker: PathTracker, q: Floats, targets: Targets, limits: TrackLimits, jumps: bool
 ) -> TrackedPath:
     """Track from the solution of the first target from which most samples are OK."""
-    starts = tracker.solutions(q, part_of(targets, slice(1)))
+    starts = tracker.solutions(q, targets[:1])
     indices = tracker.coordinates.indices
     offset = len(limits.lower) - len(indices)
     low, high = limits.lower[offset:], limits.upper[offset:]
@@ -351,22 +343,8 @@ def _limits(
     if dt is None and velocity_limit is not None:
         raise ArgumentError("velocity_limit is given without dt, the time between two samples [s]")
     if dt is not None:
-        bound = real_array(
-            "velocity_limit", model.velocity_limit if velocity_limit is None else velocity_limit
-        )
-        if bound.shape not in ((), (model.nv,)):
-            raise ShapeError(f"velocity_limit has shape {bound.shape}; wanted one number, or ({model.nv},)")
-        if not (bound >= 0.0).all():
-            raise ArgumentError(f"velocity_limit has the least entry {np.min(bound):g}; wanted at least 0")
-        per_sample = np.array(np.broadcast_to(bound, (model.nv,))[coordinates.columns]) * dt
+        speed = model.velocity_limit if velocity_limit is None else velocity_limit
+        per_sample = checked_velocity_limit("velocity_limit", speed, model)[coordinates.columns] * dt
     steps = np.full(n, float(max_step))
     steps[:offset] = np.inf
     return TrackLimits(lower, upper, steps, per_sample)
-
-
-def _start(model: Model, q0: ArrayLike | None, coordinates: FrameCoordinates) -> Floats:
-    """Return q0, or the neutral configuration, moved into the limits and with a unit quaternion."""
-    q = coordinates.clipped(model.clip(model.neutral() if q0 is None else checked_q(model, q0, "q0")))
-    if model.floating:
-        q[..., 3:7] /= np.linalg.norm(q[..., 3:7], axis=-1, keepdims=True)
-    return q
