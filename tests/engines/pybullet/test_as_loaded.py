@@ -16,29 +16,21 @@ import dynx
 from dynx.engines.pybullet.as_loaded import LoadedPyBullet
 from dynx.errors import EngineError
 from dynx.loaded.difference import model_difference
-from dynx.model import Inertial, Joint, Limits, Link, Model, Pose
+from dynx.model import Inertial, Joint, Link, Model, Pose
 from dynx.model.tree import Base
 from tests.backends.robots import chain, motion
+from tests.loaded import fork
 from tests.loaded.files import TILTED, assert_alike, clean, clean_robots, loaded
+from tests.loaded.fork import BASES, BODY
 
 bullet = pytest.importorskip("pybullet")
 
-BASES: tuple[Base, ...] = ("fixed", "floating")
 UNHINDERED = ("pybullet.no_limits", "pybullet.no_damping")
-BODY = Inertial(1.5, Pose((0.1, 0.2, 0.3), (0.3, 0.2, 0.1)), ixx=0.3, iyy=0.4, izz=0.5)
 
 
 def forked(base: Base) -> Model:
-    """Return two arms, one of them continuous, and a welded tool; the root's inertia is off its frame."""
-    links = [Link(name, BODY) for name in ("trunk", "z", "a", "tool")]
-    joints = [
-        Joint(
-            "a_joint", "prismatic", "trunk", "a", Pose((0.0, 0.4, 0.1)), limits=Limits(-0.3, 0.7, 2.0, 9.0)
-        ),
-        Joint("z_joint", "continuous", "trunk", "z", Pose((0.5, 0.0, 0.1), (0.1, 0.2, 0.3)), (0.0, 0.6, 0.8)),
-        Joint("weld", "fixed", "z", "tool", Pose((0.1, 0.2, 0.3), (0.4, 0.5, 0.6))),
-    ]
-    return clean(Model.build("forked", links, joints, base=base, gravity=TILTED))
+    """Return the fork with principal inertias, which PyBullet reads as they stand."""
+    return clean(fork.forked(base))
 
 
 @given(st.data())
