@@ -21,7 +21,7 @@ from dynx.backends.registry import backend_class
 from dynx.bench.timing import Call
 from dynx.engines.pinocchio.library import pin
 from dynx.model import Model
-from dynx.sim import Scenario, Simulation, simulate
+from dynx.sim import simulate
 from dynx.spatial.scalar import Floats
 
 TUTORIAL = "tutorial's loop, PyBullet alone"
@@ -37,8 +37,6 @@ LOOPS = (
     TUTORIAL_SUBSTEPS,
     TUTORIAL_NUMPY,
     BARE,
-    "dynx, Simulation.step, plant pinocchio",
-    "dynx, Simulation.step, plant pybullet",
 )
 
 
@@ -87,24 +85,6 @@ class DynxLoop(ClosedLoop):
     def _simulated(self, duration: float) -> Floats:
         task = self.task
         return simulate(task.model, self._law, task.motion, plant=self._plant, dt=DT, duration=duration).q
-
-
-class SteppedLoop(ClosedLoop):
-    """`dynx.Simulation` that the caller advances, one step at a time."""
-
-    def __init__(self, name: str, task: Task, *, plant: str) -> None:
-        super().__init__(name, task)
-        backend_class(plant)
-        self._scenario = Scenario(
-            task.model, task.law(), task.motion, plant=plant, dt=DT, duration=task.duration
-        )
-
-    def call(self) -> Floats:
-        """All steps."""
-        with Simulation(self._scenario) as simulation:
-            for _ in range(self.steps):
-                simulation.step()
-            return simulation.rollout.q
 
 
 class TutorialLoop(ClosedLoop):
@@ -178,7 +158,5 @@ def closed_loop(name: str, task: Task) -> ClosedLoop:
         TUTORIAL_SUBSTEPS: partial(TutorialLoop, name, task, substeps=10),
         TUTORIAL_NUMPY: partial(TutorialLoop, name, task, numpy=True),
         BARE: partial(LoopByHand, task),
-        LOOPS[-2]: partial(SteppedLoop, name, task, plant="pinocchio"),
-        LOOPS[-1]: partial(SteppedLoop, name, task, plant="pybullet"),
     }
     return makers[name]()

@@ -1,8 +1,7 @@
-"""Inverse kinematics: share solved, time of single poses and of a batch, bad targets.
+"""Inverse kinematics in compiled kernels: share solved, time of single poses and of a batch, bad targets.
 
 ``python -m benchmarks.inverse_kinematics`` solves 10,000 random poses of each arm to 1e-6 m and 1e-6 rad,
-reachable within limits and without a start, on one thread in compiled kernels, or on another ``--backend``.
-Every solution is checked by Pinocchio (those of Pinocchio by `reference`). Then come
+reachable within limits and without a start, on one thread. Every solution is checked by Pinocchio. Then come
 1,000 targets out of reach, and targets of configurations at limits and with joints at zero. Beside it stands
 the C++ solver ``ik_LM`` of roboticstoolbox-python (the extra ``benchmark``), single poses.
 """
@@ -12,16 +11,13 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
-from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.test_inverse_kinematics import TOLERANCE, Arm, toolbox_solver
 from dynx.backends import Backend, backend
 from dynx.bench.timing import interleaved, once
 from dynx.ik import IKResult
@@ -29,21 +25,6 @@ from dynx.model import Model
 from dynx.model.loading import load
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import pose_error
-
-TOLERANCE = 1e-6  # [m], [rad]
-
-Solve = Callable[[Floats], Floats]
-"""From a pose (4, 4) to a configuration; NaN where none was found."""
-
-
-@dataclass(frozen=True)
-class Arm:
-    """A robot of the library or a file of pybullet_data, the frame to place, and joints to lock."""
-
-    source: str
-    frame: str
-    lock: tuple[str, ...] = ()
-
 
 ARMS = {
     "ur5": Arm("ur5", "ee_link"),
@@ -55,9 +36,6 @@ ARMS = {
     "talos_arm": Arm("talos_arm", "gripper_left_base_link"),
     "tiago": Arm("tiago", "arm_7_link"),
 }
-TOOLBOX_ARMS = ("ur5", "panda", "kuka_iiwa")
-"""Arms that `ik_LM` solves too, where roboticstoolbox-python is installed."""
-
 REPEATS = 3
 """Times that a single pose is solved; the shortest time counts."""
 
@@ -102,54 +80,11 @@ def edge_targets(engine: Backend, frame: str, count: int, rng: np.random.Generat
     return engine.forward_kinematics(np.concatenate([at_limits, straight]), frame)
 
 
-def toolbox_solver(model: Model, frame: str) -> Solve:
-    """Return the C++ solver of roboticstoolbox-python for the same chain of transforms and limits."""
-    toolbox: Any = import_module("roboticstoolbox")
-    chain = toolbox.ETS()
-    by_child = {joint.child: joint for joint in model.joints}
-    elements: list[Any] = []
-    while frame in by_child:
-        joint = by_child[frame]
-        if joint.moves:
-            # An elementary transform turns about z: go there from the joint's axis, and come back.
-            z_to_axis = _turning_z_to(np.array(joint.axis))
-            limits = np.array([joint.limits.lower, joint.limits.upper])
-            elements += [
-                toolbox.ET.SE3(z_to_axis.T),
-                toolbox.ET.Rz(qlim=limits),
-                toolbox.ET.SE3(z_to_axis),
-            ]
-        elements.append(toolbox.ET.SE3(joint.origin.matrix))
-        frame = joint.parent
-    for element in reversed(elements):
-        chain *= element
-
-    def solve(target: Floats) -> Floats:
-        # tol bounds half the squared error.
-        answer = chain.ik_LM(target, tol=0.5e-12, joint_limits=True, method="chan")
-        return np.asarray(answer.q) if answer.success else np.full(chain.n, np.nan)
-
-    return solve
-
-
-def _turning_z_to(axis: Floats) -> Floats:
-    """A rotation, as (4, 4), that takes z to `axis`."""
-    T = np.eye(4)
-    aside = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    x = np.cross(aside, axis)
-    T[:3, 0] = x / np.linalg.norm(x)
-    T[:3, 1] = np.cross(axis, T[:3, 0])
-    T[:3, 2] = axis
-    return T
-
-
-def measure(name: str, count: int, engine_name: str, toolbox: bool) -> None:
+def measure(name: str, count: int, toolbox: bool) -> None:
     """Print the figures of one arm."""
     arm, rng = ARMS[name], np.random.default_rng(2026)
     model = model_of(arm)
-    referee = "reference" if engine_name == "pinocchio" else "pinocchio"
-    threads = {"threads": 1} if engine_name == "compiled" else {}
-    with backend(engine_name, model, **threads) as engine, backend(referee, model) as other:
+    with backend("compiled", model, threads=1) as engine, backend("pinocchio", model) as other:
         neutral = engine.forward_kinematics(model.neutral(), arm.frame)
         first = once(partial(engine.inverse_kinematics, neutral, arm.frame))
         targets = engine.forward_kinematics(model.random(rng, count), arm.frame)
@@ -199,14 +134,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("arms", nargs="*", metavar="arm", help="arms to measure")
     parser.add_argument("--poses", type=int, default=10_000, help="number of poses of each arm")
-    parser.add_argument("--backend", default="compiled", help="backend of dynx")
     options = parser.parse_args()
     unknown = set(options.arms) - set(ARMS)
     if unknown:
         parser.error(f"no arm {', '.join(sorted(unknown))}; known are {', '.join(ARMS)}")
-    toolbox = TOOLBOX_ARMS if find_spec("roboticstoolbox") else ()
     for name in options.arms or ARMS:
-        measure(name, options.poses, options.backend, name in toolbox)
+        measure(name, options.poses, toolbox=name in ("ur5", "panda", "kuka_iiwa"))
 
 
 if __name__ == "__main__":

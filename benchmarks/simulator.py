@@ -55,3 +55,9 @@ class Simulator(ABC):
 
     def __str__(self) -> str:
         return f"{self.name}, threads {self.threads}"
+
+
+def assert_right(simulator: Simulator) -> None:
+    """Fail where a result is wrong."""
+    for check in simulator.checks():
+        assert check.right, f"{simulator}: {check}"

@@ -50,7 +50,7 @@ LONGEST = (
     "tests/test_readme.py::test_python_blocks",
     "tests/properties/",
     "tests/surveys/test_raw_engines.py",
-    "tests/benchmarks/test_commands.py",
+    "tests/test_benchmarks_run.py",
 )
 """Beginnings of the names of tests that take up to a minute each."""
 

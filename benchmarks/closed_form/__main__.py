@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 
 from benchmarks.closed_form.peers import Solver, installed_solvers
-from benchmarks.inverse_kinematics import TOLERANCE, shortest
 from dynx.backends import Backend, backend
+from dynx.bench.timing import interleaved
 from dynx.ik.closed_forms.chain import chain_to
 from dynx.model import Model
 from dynx.model.loading import load
@@ -30,6 +31,9 @@ ARMS = {
     "six_axis_arm": (load(MODELS / "six_axis_arm.urdf"), "flange"),
 }
 """Three parallel axes; spherical wrists, in a file with rounded angles and in an exact one."""
+
+TOLERANCE = 1e-6
+"""Error [m], [rad] up to which a pose counts as reached."""
 
 SAME = 1e-5
 """Difference of all angles [rad] up to which two solutions are one."""
@@ -63,6 +67,11 @@ def checked(model: Model, engine: Backend, frame: str, T: Floats, q: Floats) -> 
     return len(kept), float(error[good].max(initial=0.0))
 
 
+def shortest(call: Callable[[], object]) -> float:
+    """Return the least processor time of a call [us]."""
+    return 1e6 * interleaved([call], REPEATS, time.process_time, calls_per_timing=1)[0].least
+
+
 def row(
     name: str, solver: Solver, T: Floats, batch: Floats, model: Model, engine: Backend, frame: str
 ) -> str:
@@ -74,11 +83,10 @@ def row(
         for pose in T:
             solver.solve(pose)
 
-    single = shortest(all_poses, REPEATS, time.process_time) / len(T)
+    single = shortest(all_poses) / len(T)
     together = ""
     if solver.batch is not None:
-        call = partial(solver.batch, batch)
-        together = f"{shortest(call, REPEATS, time.process_time) / len(batch):.2f}"
+        together = f"{shortest(partial(solver.batch, batch)) / len(batch):.2f}"
     return (
         f"| {name} | {solver.name} | {counts.mean():.3f} | {(counts > 0).mean():.1%} | {errors.max():.1e} "
         f"| {single:.1f} | {together} |"

@@ -14,7 +14,8 @@ import time
 
 import numpy as np
 
-from benchmarks.inverse_kinematics import ARMS, TOLERANCE, Arm, model_of
+from benchmarks.inverse_kinematics import ARMS, model_of
+from benchmarks.test_inverse_kinematics import TOLERANCE, Arm
 from dynx.backends import Backend, backend
 from dynx.ik.tracking import TrackResult, TrackStatus
 from dynx.ik.tracking.path import MAX_DIVISIONS
