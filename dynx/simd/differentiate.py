@@ -5,9 +5,8 @@ graph, and the derivative of an output by an input is the sum, over all paths be
 of the labels (Griewank and Walther, Evaluating Derivatives, 2008, chapter 9). The nodes in between are
 eliminated one after the other: each edge into a node is combined with each edge out of it. The elimination
 order changes the cost, not the result. From the inputs onwards it is forward mode; from the outputs backwards
-it is reverse mode (the gradient of a scalar for the cost of a few evaluations); Markowitz's rule eliminates
-next the node with the fewest paths through it. Only actual dependencies have edges, so a derivative that is
-identically zero is never computed; it is a constant.
+it is reverse mode (the gradient of a scalar for the cost of a few evaluations). Only actual dependencies have
+edges, so a derivative that is identically zero is never computed; it is a constant.
 
 Where a derivative does not exist:
 
@@ -20,7 +19,6 @@ Where a derivative does not exist:
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from heapq import heapify, heappop, heappush
 from typing import Literal
 
 from dynx.errors import CompileError, nearest, shown
@@ -28,22 +26,21 @@ from dynx.simd.expr import Graph, Node, Simplify
 from dynx.simd.program import Port, Program, extract_program, scalar_ranges
 from dynx.simd.simplify import FAST
 
-Order = Literal["forward", "reverse", "markowitz"]
+Order = Literal["forward", "reverse"]
 
 
 def differentiate(
     program: Program,
     pairs: Sequence[tuple[str, str]],
     *,
-    values: Sequence[str] = (),
-    order: Order = "markowitz",
+    order: Order = "reverse",
     simplify: Simplify | None = FAST,
 ) -> Program:
     """Return the program that computes the derivative of an output by an input, for each of `pairs`.
 
     A pair is (output, input). The derivative of ``y`` by ``x`` is an output ``dy_dx`` of the shape of y
-    followed by that of x. The outputs named in `values` come first, unchanged. The inputs are those of
-    `program`. `order` is the order in which the nodes are eliminated.
+    followed by that of x. The inputs are those of `program`. `order` is the order in which the nodes are
+    eliminated.
 
     Raises CompileError for an output or input that the program does not have.
     """
@@ -56,10 +53,6 @@ def differentiate(
 
     zero = graph.constant(0.0)
     ports, found = [], []
-    for name in values:
-        places = _lookup(results, name, "output")
-        ports.append(Port(name, _port(program.outputs, name).shape))
-        found += [nodes[program.results[place]] for place in places]
     for y, x in pairs:
         ports.append(Port(f"d{y}_d{x}", (*_port(program.outputs, y).shape, *_port(program.inputs, x).shape)))
         columns = [graph.input(slot) for slot in slots[x]]
@@ -102,11 +95,8 @@ class _Elimination:
     def run(self, order: Order) -> dict[int, dict[int, int]]:
         """Eliminate all inner nodes; return for each sink the non-zero derivatives by the sources."""
         inner = [index for index in self._successors if index not in self._sources]
-        if order == "markowitz":
-            self._by_markowitz(inner)
-        else:
-            for index in sorted(inner, reverse=order == "reverse"):
-                self._eliminate(index)
+        for index in sorted(inner, reverse=order == "reverse"):
+            self._eliminate(index)
         return {sink: self._predecessors.get(-1 - sink, {}) for sink in self._sinks}
 
     def _active_nodes(self) -> set[int]:
@@ -144,28 +134,6 @@ class _Elimination:
         for end, last in after.items():
             for start, first in before.items():
                 self._add_edge(start, end, self._graph.apply("mul", last, first))
-
-    def _by_markowitz(self, inner: list[int]) -> None:
-        """Eliminate the node with the fewest products next; among equals the one created first."""
-        waiting = set(inner)
-        queue = [(self._markowitz_degree(index), index) for index in inner]
-        heapify(queue)
-        while queue:
-            degree, index = heappop(queue)
-            if index not in waiting:
-                continue
-            if degree != self._markowitz_degree(index):
-                heappush(queue, (self._markowitz_degree(index), index))
-                continue
-            waiting.remove(index)
-            around = (*self._predecessors.get(index, ()), *self._successors.get(index, ()))
-            neighbours = [node for node in around if node in waiting]
-            self._eliminate(index)
-            for neighbour in neighbours:
-                heappush(queue, (self._markowitz_degree(neighbour), neighbour))
-
-    def _markowitz_degree(self, index: int) -> int:
-        return len(self._predecessors.get(index, ())) * len(self._successors.get(index, ()))
 
 
 _ZERO = Node("constant", value=0.0)

@@ -12,11 +12,11 @@ import pytest
 from dynx.model.mechanism import Body, BodyFrame, Mechanism
 from dynx.rbd import aba, coriolis, crba, derivatives, regressor, rnea
 from dynx.rbd.loops import PythonLoops
-from dynx.simd.interp import interpret
 from dynx.simd.trace import trace
 from dynx.spatial.scalar import Array, Floats
 from tests.backends.robots import mixed_robot
 from tests.rbd.exact import distance, exact_mechanism, exactly, fifty_digits, tree_q
+from tests.simd.interp import interpret
 
 FRAMES = (0, 3, 7)
 

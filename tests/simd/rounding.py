@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dynx.simd.interp import interpret
 from dynx.simd.program import Port, Program
 from dynx.spatial.scalar import Floats
+from tests.simd.interp import interpret
 
 UNIT = 2.0**-53
 TINY = 2.0**-1074

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from dynx.errors import CompileError
 from dynx.simd.differentiate import Order, differentiate
 from dynx.simd.expr import Graph, Op
-from dynx.simd.interp import interpret
 from dynx.simd.program import Port, Program, extract_program
 from dynx.simd.trace import inline, trace
 from dynx.spatial.scalar import Array, Floats, arctan, cos, exp, sin, sqrt, tanh
+from tests.simd.interp import interpret
 from tests.simd.programs import RANDOM, SPECIAL, doubles
 
 DIGITS = 50
@@ -27,7 +27,7 @@ STEP = 15
 CLOSE = 1e-20
 TAME = 1e3
 
-ORDERS: tuple[Order, ...] = ("forward", "reverse", "markowitz")
+ORDERS: tuple[Order, ...] = ("forward", "reverse")
 
 
 @pytest.fixture(autouse=True)
@@ -167,14 +167,13 @@ def test_the_product_rule(program: Program, rng: np.random.Generator) -> None:
     assert_close(row, df * g + dg * f)
 
 
-def test_values_come_first_and_are_unchanged() -> None:
+def test_outputs_have_the_shape_of_the_function_and_then_of_the_argument() -> None:
     program = trace(lambda x: {"s": sin(x), "c": cos(x)}, {"x": (2, 3)})
-    found = differentiate(program, [("c", "x")], values=["s"])
+    found = differentiate(program, [("c", "x")])
     assert found.inputs == program.inputs
-    assert found.outputs == (Port("s", (2, 3)), Port("dc_dx", (2, 3, 2, 3)))
+    assert found.outputs == (Port("dc_dx", (2, 3, 2, 3)),)
     x = np.linspace(-2.0, 2.0, 6)[None]
-    s, dc = interpret(found, [x])
-    np.testing.assert_array_equal(s, interpret(program, [x])[0])
+    (dc,), (s, _) = interpret(found, [x]), interpret(program, [x])
     np.testing.assert_array_equal(dc.reshape(6, 6), np.diag(-s[0]))
 
 
@@ -273,5 +272,3 @@ def test_unknown_names_raise() -> None:
         differentiate(program, [("torq", "x")])
     with pytest.raises(CompileError, match="no input 'y'"):
         differentiate(program, [("torque", "y")])
-    with pytest.raises(CompileError, match="no output 'z'"):
-        differentiate(program, [], values=["z"])

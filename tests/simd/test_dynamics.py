@@ -29,12 +29,12 @@ from dynx.rbd.jacobians import REFERENCES, Reference, frame_jacobian, frame_jaco
 from dynx.rbd.kinematics import body_poses, frame_placements
 from dynx.rbd.rnea import inverse_dynamics
 from dynx.simd.emit import Settings
-from dynx.simd.interp import interpret
 from dynx.simd.simplify import FAST
 from dynx.simd.target import host
 from dynx.simd.trace import trace
 from dynx.spatial.scalar import Array, Floats
 from dynx.testing.strategies import models
+from tests.simd.interp import interpret
 from tests.simd.machine import Machine
 from tests.simd.programs import RANDOM
 from tests.simd.rounding import agree, bounds

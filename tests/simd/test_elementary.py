@@ -25,10 +25,10 @@ from dynx.simd.elementary import (
     UNDERFLOW,
 )
 from dynx.simd.emit import Settings
-from dynx.simd.interp import interpret
 from dynx.simd.target import Processor
 from dynx.simd.trace import trace
 from dynx.spatial.scalar import Array, Floats, arctan, exp, tanh
+from tests.simd.interp import interpret
 from tests.simd.machine import LANES, TARGETS, Machine, same_bits
 
 MAX_ERROR = 2.0

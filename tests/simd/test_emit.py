@@ -13,11 +13,11 @@ from llvmlite import binding
 
 from dynx.simd.emit import Settings, emit
 from dynx.simd.expr import ARITY, Graph, Op, Simplify
-from dynx.simd.interp import Function, interpret
 from dynx.simd.program import Port, Program, extract_program
 from dynx.simd.simplify import FAST, STRICT
 from dynx.simd.target import Processor
 from dynx.spatial.scalar import Floats
+from tests.simd.interp import Function, interpret
 from tests.simd.machine import LANES, TARGETS, X86, Machine, same_bits
 from tests.simd.programs import (
     OPERATIONS,

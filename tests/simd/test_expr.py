@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dynx.simd.expr import Graph, Symbol, constant_key
-from dynx.simd.interp import interpret
 from dynx.simd.program import Port, extract_program
+from tests.simd.interp import interpret
 from tests.simd.machine import same_bits
 
 FUNCTIONS: dict[str, Callable[[Any, Any], Any]] = {

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from dynx.simd.expr import ARITY, Graph, Op
-from dynx.simd.interp import interpret
 from dynx.simd.program import Port, extract_program
+from tests.simd.interp import interpret
 from tests.simd.machine import same_bits
 
 NAN, INF = math.nan, math.inf

@@ -11,10 +11,10 @@ from hypothesis import given
 
 from dynx.simd import simplify
 from dynx.simd.expr import ARITY, Graph, Op
-from dynx.simd.interp import interpret
 from dynx.simd.program import Port, Program, extract_program
 from dynx.simd.simplify import EXACT, FAST, FINITE, ROUNDED, STRICT, Args, RewriteRule, simplifier
 from dynx.spatial.scalar import Floats
+from tests.simd.interp import interpret
 from tests.simd.machine import same_bits
 from tests.simd.programs import (
     CONSTANTS,

@@ -13,13 +13,13 @@ import pytest
 from dynx.errors import CompileError, TraceError
 from dynx.simd.emit import Settings
 from dynx.simd.expr import Symbol
-from dynx.simd.interp import interpret
 from dynx.simd.kernel import Kernel
 from dynx.simd.program import Port, Program
 from dynx.simd.simplify import FAST, STRICT
 from dynx.simd.target import host
 from dynx.simd.trace import trace
 from dynx.spatial.scalar import Array, clamp, cos, sin, sqrt
+from tests.simd.interp import interpret
 
 
 def test_a_function_of_arrays() -> None:

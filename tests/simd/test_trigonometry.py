@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from dynx.simd.emit import Settings
-from dynx.simd.interp import cosine, sine
 from dynx.simd.target import Processor
 from dynx.simd.trace import trace
 from dynx.simd.trigonometry import COS, HALF_PI, HALF_PI_SHORT, LIMIT, SIN
 from dynx.spatial.scalar import Array, Floats, cos, sin
 from tests.simd.exact import errors
+from tests.simd.interp import cosine, sine
 from tests.simd.machine import LANES, TARGETS, Machine, same_bits
 
 MAX_ERROR = 2.0

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from dynx.errors import TraceError
 from dynx.simd.cache import load_kernel, program_recipe
-from dynx.simd.interp import interpret
 from dynx.simd.trace import trace
 from dynx.simd.user_code.arrays import MAX_SOLVED_SIZE, symbol_array, traced_array
 from dynx.spatial.scalar import Floats
+from tests.simd.interp import interpret
 
 N = 4
 TABLE = np.array([-1.0, 0.0, 0.5]), np.array([2.0, 1.0, -3.0])
