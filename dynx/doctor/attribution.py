@@ -46,8 +46,9 @@ from dynx.doctor.mending import (
 from dynx.doctor.report import Effect
 from dynx.errors import DescriptionError
 from dynx.loaded import engine_of
-from dynx.model.xml.source import XmlSource
+from dynx.model.xml.source import SourceElement, XmlSource
 from dynx.rules import CallingRule, Case, Detection, Remedy, Rule
+from dynx.rules.numbers_in_text import LARGEST, decimal, is_number, numeric_attributes
 from dynx.spatial.scalar import FLOAT64_EPS
 
 # Reinsertion of one cause into a mended file that dynx cannot read with that cause.
@@ -424,6 +425,94 @@ def _with_minor(each: AttributedCause, bound: float, right: Collection[str]) -> 
     larger = {name: minor for name, minor in (each.minor or {}).items() if minor.relative_error > bound}
     effects = {**each.effects, **larger}
     return replace(each, effects=effects, proved=effects.keys() <= set(right)) if larger else each
+
+
+def coarsest_mending(
+    case: Case,
+    rules: Sequence[Rule],
+    best: SelectedPlaces,
+    examiner: Examiner,
+    tolerance: float,
+) -> tuple[SelectedPlaces, str | None]:
+    """Leave also the places whose effects are at most `tolerance` as they are, and write new numbers with the
+    fewest digits with which every engine stays within a tenth of it; also return a sentence on what was left.
+
+    `best` is the mending without any effect above the tolerance of the examination.
+    """
+    bound = NEGLIGIBLE_SHARE * tolerance
+    chosen, left = best, set[Place]()
+    for share in _LARGE_SHARES:
+        left = {
+            place_of(each.rule, each.detection)
+            for each in best.proofs
+            if each.effects
+            and not isinstance(each.rule, CallingRule)
+            and all(effect.relative_error <= share * tolerance for effect in each.effects.values())
+        }
+        attempt = mend(case, rules, all_except(best.omitted | left)) if left else best.mending
+        if not left or reading_change(case, attempt) is not None:
+            continue
+        result = examiner.examine(attempt.case)
+        if _is_within(result, best.examination, examiner, bound):
+            chosen = SelectedPlaces(attempt, result, best.proofs, best.omitted | left)
+            break
+    kept = sorted({rule for rule, _, _ in left}) if chosen is not best else []
+    sentence = f"left {', '.join(kept)} where the effect is at most {tolerance:g}" if kept else None
+    return _with_fewest_digits(case, chosen, examiner, bound), sentence
+
+
+_LARGE_SHARES = (1.0, 0.1, 0.01)
+"""Effects, as shares of the tolerance of a mended file, up to which places are left as they are."""
+
+_DIGITS = range(6, 17)
+"""Numbers of significant digits that are tried for a new number; 17 are exact."""
+
+
+def _is_within(result: Examination, other: Examination, examiner: Examiner, bound: float) -> bool:
+    """Check that no engine has an error above the bound, unless it has that in the other examination."""
+    return all(result.max_error(name) <= max(bound, other.max_error(name)) for name in examiner.engines)
+
+
+def _with_fewest_digits(
+    case: Case, chosen: SelectedPlaces, examiner: Examiner, bound: float
+) -> SelectedPlaces:
+    mended = chosen.mending
+    if any(rule.kind == "practice" for rule, _ in mended.applied):
+        return chosen  # the user chose the number of digits, too
+    for digits in _DIGITS:
+        source = _with_digits(case.source, mended.case.source, digits)
+        trial = mended.case.with_source(source)
+        if source.data == mended.case.source.data or not trial.readable:
+            continue
+        result = examiner.examine(trial, reference=chosen.examination.reference)
+        if _is_within(result, chosen.examination, examiner, bound):
+            return replace(chosen, mending=Mending(trial, mended.applied), examination=result)
+    return chosen
+
+
+def _with_digits(given: XmlSource, mended: XmlSource, digits: int) -> XmlSource:
+    """Write the numbers that only the mended text has with so many significant digits."""
+    known: dict[tuple[str, str | None], set[str]] = {}
+    for each in numeric_attributes(given):
+        known.setdefault(_part_of(each.element), {LARGEST}).update(each.text_in(given).split())
+    edits = []
+    for each in numeric_attributes(mended):
+        words = each.text_in(mended).split()
+        old = known.get(_part_of(each.element), {LARGEST})
+        short = [
+            word if word in old or not is_number(word) else decimal(float(f"{float(word):.{digits}g}"))
+            for word in words
+        ]
+        if short != words:
+            edits.append(mended.attribute_edit(each.element, each.name, " ".join(short)))
+    return mended.apply(*edits)
+
+
+def _part_of(element: SourceElement) -> tuple[str, str | None]:
+    """Return the tag and the name of the link or joint that an element belongs to."""
+    while element.parent is not None and element.parent.parent is not None:
+        element = element.parent
+    return element.tag, element.attributes.get("name")
 
 
 RARE_STATES = 40

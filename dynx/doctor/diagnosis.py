@@ -16,6 +16,7 @@ from dynx.doctor.attribution import (
     CauseAttributor,
     Proofs,
     SelectedPlaces,
+    coarsest_mending,
     smallest_mending,
     with_refusals,
 )
@@ -397,6 +398,7 @@ def diagnose(
     samples: int = DEFAULT_SAMPLES,
     seed: int = 0,
     tolerance: float = BAR,
+    fix_tolerance: float | None = None,
     choose: Mapping[str, str] | None = None,
     level: Level = "physics",
     counterexamples: bool = True,
@@ -409,27 +411,33 @@ def diagnose(
     call and is compared with reference values at `samples` random states that follow from `seed`, in tilted
     gravity; a relative error above `tolerance` is a difference. By default common variants are examined too
     (`DoctorReport.variants`); they differ by the user's call, which no file can mend, so they count as
-    differences only if `engines` names them. `choose` maps rule ids to one of the rule's `choices`. `level`
-    is the largest change of the mended file: ``safe`` changes nothing that a reader notices, ``rounding`` the
+    differences only if `engines` names them. The mended file has no effect above `fix_tolerance`, with which
+    its new numbers have the fewest digits that keep every engine within a tenth of it (default: no effect
+    above `tolerance`, and all digits). `choose` maps rule ids to one of the rule's `choices`. `level` is the
+    largest change of the mended file: ``safe`` changes nothing that a reader notices, ``rounding`` the
     equations of motion by rounding only, ``physics`` whatever the causes require. `counterexamples` selects
     the search for the smallest robot that shows a difference which no rule explains. `progress` is called
     with the name of each step.
 
     A robot that cannot be read gives a report with `error` set, whose `findings` are the places without a
-    remedy. Raises ArgumentError,
-    UnknownBackendError, NotInstalledError and UnknownNameError for arguments that are invalid for any robot.
+    remedy. Raises ArgumentError, UnknownBackendError, NotInstalledError and UnknownNameError for arguments
+    that are invalid for any robot.
     """
     started = time.perf_counter()
     examiner, variants = _examiners(engines, samples, seed, tolerance)
     choices = checked_choices((choose or {}).items())
     checked_base(base)
+    if fix_tolerance is not None and not 0.0 < fix_tolerance < 1.0:
+        raise ArgumentError(f"fix_tolerance is {fix_tolerance!r}; wanted a relative error between 0 and 1")
     if level not in LEVELS:
         raise UnknownNameError(f"no level {shown(level)}{nearest(level, LEVELS)}")
     progress = progress or _ignore_progress
     case = None
     try:
         case = open_case(robot, base, choices)
-        report = _diagnosis_of(case, examiner, variants, tolerance, counterexamples, seed, level, progress)
+        report = _diagnosis_of(
+            case, examiner, variants, tolerance, fix_tolerance, counterexamples, seed, level, progress
+        )
     except DynxError as error:
         report = refused_report(str(_label(robot)), error, base=base)
         if case is not None:
@@ -500,6 +508,7 @@ def _diagnosis_of(
     examiner: Examiner,
     variants: Examiner,
     tolerance: float,
+    fix_tolerance: float | None,
     counterexamples: bool,
     seed: int,
     level: Level,
@@ -539,19 +548,22 @@ def _diagnosis_of(
         unexplained = _with_counterexamples(
             best.mending.case, unexplained, examiner, tolerance, seed, progress
         )
-    mended, last = best.mending, best.examination
+    written, sentence = best, None
+    if fix_tolerance is not None:
+        written, sentence = coarsest_mending(case, rules, best, examiner, fix_tolerance)
+    mended, last = written.mending, written.examination
     if level != "physics":
-        mended = mend(case, rules, all_except(best.omitted), level)
+        mended = mend(case, rules, all_except(written.omitted), level)
         last = examiner.examine(mended.case, reference=examiner.reference(readable(mended.case).case))
     withheld = reading_change(case, mended)
     return replace(
         with_after(report, last, best.examination),
         findings=with_original_names(all_findings(found, best.proofs, mended, examiner.engines), case.source),
         unexplained=unexplained,
-        choices=mended.choices,
+        choices=(*mended.choices, *filter(None, [sentence])),
         calls=run_time_calls(mended.case, examiner),
         level=level,
-        changes=changes_of(case, best.mending, mended),
+        changes=changes_of(case, written.mending, mended),
         variants=diagnosed_variants(
             case,
             reference,

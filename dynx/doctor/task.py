@@ -30,6 +30,7 @@ class DoctorTask:
     choose: tuple[tuple[str, str], ...] = ()
     level: Level = "physics"
     causes: bool = True
+    fix_tolerance: float | None = None
 
 
 def examine(task: DoctorTask) -> DoctorReport:
@@ -41,7 +42,13 @@ def examine(task: DoctorTask) -> DoctorReport:
         chosen["tolerance"] = task.tolerance
     try:
         if task.causes:
-            report = diagnose(task.robot, choose=dict(task.choose), level=task.level, **chosen)
+            report = diagnose(
+                task.robot,
+                choose=dict(task.choose),
+                level=task.level,
+                fix_tolerance=task.fix_tolerance,
+                **chosen,
+            )
         else:
             report = compare_as_loaded(task.robot, **chosen)
     except DynxError as error:

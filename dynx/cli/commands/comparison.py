@@ -95,9 +95,8 @@ def agree() -> None:
 @click.option(
     "--tolerance",
     type=FiniteRange(min=0.0),
-    default=1e-12,
-    show_default=True,
-    help="Relative error above which engines differ; 1e-6 ignores rounding.",
+    help="Relative error above which engines differ, 1e-12 by default; 1e-6 ignores rounding. With --fix "
+    "also the largest effect that the mended file may keep, 1e-9 by default.",
 )
 @click.option(
     "--choose",

@@ -32,7 +32,7 @@ def doctor(
     engines: tuple[str, ...] | None,
     samples: int | None,
     seed: int,
-    tolerance: float,
+    tolerance: float | None,
     choose: tuple[tuple[str, str], ...],
     fix: str | None,
     level: Level,
@@ -63,7 +63,17 @@ def doctor(
     examined = [(each, one) for each in inputs for one in bases]
     run = doctor_run(
         [
-            DoctorTask(each.robot, one, engines, samples, seed, tolerance, choices, level)
+            DoctorTask(
+                each.robot,
+                one,
+                engines,
+                samples,
+                seed,
+                tolerance,
+                choices,
+                level,
+                fix_tolerance=(tolerance or FIX_TOLERANCE) if fix or in_place else None,
+            )
             for each, one in examined
         ],
         refusals=refusals([each for each, _ in examined]),
@@ -92,6 +102,9 @@ def _problem(report: DoctorReport) -> str | None:
         return "refused"
     return None if report.alike else "differ"
 
+
+FIX_TOLERANCE = 1e-9
+"""Largest effect that a mended file keeps by default: nobody merges changes of digits for less."""
 
 DoctorRun = TaskRun[DoctorTask, DoctorReport]
 

@@ -16,6 +16,7 @@ from click.testing import CliRunner, Result
 
 from dynx.agreement.tolerances import BAR
 from dynx.cli.doctor.files import write_mended
+from dynx.cli.doctor.run import FIX_TOLERANCE
 from dynx.cli.shell.main import cli
 from dynx.doctor.diagnosis import DEFAULT_SAMPLES, diagnose
 from dynx.errors import ArgumentError
@@ -233,7 +234,7 @@ def test_several_robots_and_bases(arm: Path, tmp_path: Path) -> None:
         (["--choose", "DX000=keep"], "DX000"),
         (["--choose", "DX103=nosuch"], "nosuch"),
         (["--choose", "DX105=keep"], "leaves no choice"),
-        (["--base", "both", "--fix", "x.urdf"], "--base fixed or"),
+        (["--base", "both", "--in-place"], "--base fixed or"),
         (["--in-place", "--fix", "x.urdf"], "exclude"),
         (["--baseline", "none.json"], "none.json"),
         (["--baseline", "arm.urdf"], "arm.urdf"),
@@ -301,7 +302,8 @@ def test_a_file_that_changed_meanwhile_is_left_as_it_is(arm: Path) -> None:
 def test_the_help_states_the_defaults_of_the_library() -> None:
     text = " ".join(CliRunner().invoke(cli, ["doctor", "--help"]).stdout.split())
     assert f"Number of random states per robot (default: {DEFAULT_SAMPLES})" in text
-    assert f"[default: {BAR:g};" in text
+    assert f"{BAR:g} by default" in text
+    assert f"{FIX_TOLERANCE:.0e} by default".replace("e-0", "e-") in text
 
 
 def test_in_place_never_touches_the_library(arm: Path) -> None:
