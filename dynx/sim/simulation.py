@@ -610,7 +610,8 @@ def simulate(given: SimulateArguments) -> Rollout:
     The plant and the controller can use different engines (``controller_backend`` replaces the controller's
     own), so that the effect of an error in one of them can be studied.
 
-    **Plant.** ``plant="pybullet"`` is PyBullet's own stepper. Any other name is a backend whose forward
+    **Plant.** ``plant="pybullet"`` is PyBullet's own stepper, as is that of MuJoCo or Drake with
+    ``integrator="engine"``. Any other name is a backend whose forward
     dynamics an `integrator` of dynx integrates: ``semi_implicit`` (the default: v then q, the scheme of
     Bullet), ``rk4``, or ``adaptive`` (SciPy's `method` with `rtol`, `atol`). ``plant="pybullet",
     integrator="rk4"`` is PyBullet's forward dynamics under RK4. Without a controller (None) the robot has no

@@ -273,7 +273,8 @@ class BulletStepper(Stepper):
 
     def _touch(self) -> None:
         """Find the contacts of a state that was set."""
-        self.client.call(self.client.engine.performCollisionDetection)
+        if self.layout.colliders:
+            self.client.call(self.client.engine.performCollisionDetection)
         self.contact_reader.fresh = True
 
     def dump(self) -> bytes:

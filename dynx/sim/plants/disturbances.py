@@ -71,16 +71,15 @@ class Disturbances:
         """True if pushes or friction with a slip speed add a torque, a function of time and state."""
         return self.friction.smooth or bool(self.pushes)
 
-    def implicit_joints(self, h: float, *, damped: bool = True, armature: bool = True) -> ImplicitJoints:
-        """Return the solver of joint friction for steps of `h` [s], with damping and armature or without."""
-        dry = self.friction.dry
+    def implicit_joints(self, h: float, *, armature: bool = True) -> ImplicitJoints:
+        """Return the solver of `joints` for steps of `h` [s], with armature or without."""
+        joints = self.joints
         return ImplicitJoints(
-            FrictionLaw.of(self.model, dry),
-            dry,
+            FrictionLaw.of(self.model, joints.friction),
+            joints.friction,
             h,
-            damping=self.friction.viscous if damped else None,
-            # Each joint depends on at most one coordinate, so the armature matrix is diagonal.
-            armature=self.armature.diagonal() if armature else None,
+            damping=joints.damping,
+            armature=joints.armature if armature else None,
         )
 
     def slowed(self, M: Floats, v: Floats, h: float) -> Floats:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 from dynx.control.bullet import BulletMotor, BulletMotorCommand
 from dynx.errors import DynxError, EngineError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.sim.plants.disturbances import Disturbances
 from dynx.spatial.scalar import Floats
+from dynx.steppers.forces import EngineCommand
 from dynx.world.surroundings import Surroundings
 
 
@@ -38,7 +39,7 @@ class Plant(ABC):
     name, and a package offers it by an entry point in the group ``dynx.plants``.
     """
 
-    motor_commands: ClassVar[tuple[type, ...]] = ()
+    motor_commands: tuple[type[EngineCommand], ...] = ()
     """Types of the motor commands that `step_motors` takes (see `dynx.control.bullet`)."""
 
     def __init__(self, model: Model, disturbances: Disturbances, dt: float, *, substeps: int = 1) -> None:
@@ -58,7 +59,7 @@ class Plant(ABC):
     def step(self, t: float, tau: Floats) -> StepResult:
         """Advance by `dt` from time `t` [s] under the torque `tau` (nv,) of the motors."""
 
-    def step_motors(self, t: float, command: BulletMotorCommand) -> StepResult:
+    def step_motors(self, t: float, command: EngineCommand) -> StepResult:
         """Advance by `dt` under the engine's own motors; the result has their torque."""
         raise UnsupportedFeatureError(f"{type(self).__name__} has no motors of its own")
 

@@ -1,8 +1,8 @@
-"""Plants by name: engines with a stepper of their own, and every backend under an integrator of dynx.
+"""Plants by name: every backend under an integrator of dynx, engines' own steppers, and plants of others.
 
-Plants with a stepper of their own are found as backends are (`dynx.registry`): in a table here, by
-`register`, or by entry points in the group ``dynx.plants`` of installed packages. Their class is called as
-``Class(model, disturbances, dt, substeps=n)``.
+Plants of others are found as backends are (`dynx.registry`): by `register`, or by entry points in the
+group ``dynx.plants`` of installed packages. Their class is called as ``Class(model, disturbances, dt,
+substeps=n)``.
 """
 
 from __future__ import annotations
@@ -20,12 +20,17 @@ from dynx.sim.plants.disturbances import Disturbances
 from dynx.sim.plants.integrated import IntegratedPlant
 from dynx.sim.plants.plant import Plant, plant_errors
 from dynx.sim.plants.scene_plant import ScenePlant
+from dynx.steppers.registry import BUILT_IN as STEPPERS
+from dynx.steppers.registry import world_class
 
 GROUP = "dynx.plants"
 """The entry-point group: ``name = "package.module:PlantClass"``."""
 
-BUILT_IN = {"pybullet": "dynx.engines.pybullet.plant:BulletPlant"}
-"""Plants of dynx itself with a stepper of their own."""
+STEPPED_BY_DEFAULT = "pybullet"
+"""Backend whose engine's own stepper is its default integrator."""
+
+ENGINES = tuple(name for name in STEPPERS if name in BACKENDS)
+"""Backends whose engines have a stepper of their own."""
 
 ENGINE = "engine"
 """Name of the integrator that stands for the engine's own stepper."""
@@ -33,9 +38,7 @@ ENGINE = "engine"
 INTEGRATORS = ("semi_implicit", "rk4", "adaptive", ENGINE)
 """Names that `dynx.simulate` takes as `integrator`."""
 
-_steppers = ClassRegistry(
-    "plant", GROUP, BUILT_IN, lambda: Plant, error=BackendError, unknown=UnknownBackendError
-)
+_steppers = ClassRegistry("plant", GROUP, {}, lambda: Plant, error=BackendError, unknown=UnknownBackendError)
 plant_names = _steppers.names
 plant_class = _steppers.find
 unregister = _steppers.unregister
@@ -68,10 +71,10 @@ def register(name: str, loader: Callable[[], type[Plant]]) -> None:
 
 
 def default_integrator(name: str | ScenePlant) -> str:
-    """Return ``engine`` for a plant with a stepper of its own, otherwise ``semi_implicit``."""
+    """Return ``engine`` for PyBullet and for plants of others, otherwise ``semi_implicit``."""
     if isinstance(name, ScenePlant):
         return ENGINE
-    has_stepper = name in BUILT_IN if name in BACKENDS else name in plant_names()
+    has_stepper = name == STEPPED_BY_DEFAULT if name in BACKENDS else name in plant_names()
     return ENGINE if has_stepper else "semi_implicit"
 
 
@@ -105,10 +108,14 @@ def make_plant(
 
         return WorldPlant(name, model, disturbances, dt, substeps=substeps)
     if integrator == ENGINE:
+        if name in ENGINES:
+            from dynx.sim.plants.stepper_plant import StepperPlant
+
+            return StepperPlant(world_class(name), model, disturbances, dt, substeps=substeps)
         try:
             kind = plant_class(name)
         except UnknownBackendError:
-            known = ", ".join(plant_names())
+            known = ", ".join((*ENGINES, *plant_names()))
             raise ArgumentError(
                 f"the engine {shown(name)} has no stepper here; those that have one: {known}"
             ) from None
