@@ -610,14 +610,14 @@ def simulate(given: SimulateArguments) -> Rollout:
     The plant and the controller can use different engines (``controller_backend`` replaces the controller's
     own), so that the effect of an error in one of them can be studied.
 
-    **Plant.** ``plant="pybullet"`` is PyBullet's own stepper, as is that of MuJoCo or Drake with
-    ``integrator="engine"``. Any other name is a backend whose forward
-    dynamics an `integrator` of dynx integrates: ``semi_implicit`` (the default: v then q, the scheme of
-    Bullet), ``rk4``, or ``adaptive`` (SciPy's `method` with `rtol`, `atol`). ``plant="pybullet",
-    integrator="rk4"`` is PyBullet's forward dynamics under RK4. Without a controller (None) the robot has no
-    motors. A `ScenePlant` is the robot in a scene, with contacts; the rollout then has `surroundings`.
-    `reference` is a trajectory, one configuration (nq,) to hold, or None. The initial state is `q0`,
-    `v0`; by default that of the scene, the start of the reference, or the neutral configuration.
+    **Plant.** ``plant="pybullet"`` is PyBullet's own stepper; with ``integrator="engine"`` MuJoCo and Drake
+    are theirs. Any other name is a backend whose forward dynamics an `integrator` of dynx integrates:
+    ``semi_implicit`` (the default: v then q, the scheme of Bullet), ``rk4``, or ``adaptive`` (SciPy's
+    `method` with `rtol`, `atol`). ``plant="pybullet", integrator="rk4"`` is PyBullet's forward dynamics under
+    RK4. Without a controller (None) the robot has no motors. A `ScenePlant` is the robot in a scene, with
+    contacts; the rollout then has `surroundings`. `reference` is a trajectory, one configuration (nq,) to
+    hold, or None. The initial state is `q0`, `v0`; by default that of the scene, the start of the reference,
+    or the neutral configuration.
 
     **Time** [s]. `dt` is the step of the record; the plant takes `substeps` steps in each. The controller
     runs every `control_dt` (by default `dt`), and its torque is held in between. It measures the state as it

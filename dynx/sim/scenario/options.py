@@ -341,7 +341,7 @@ class SimulationOptions:
     )
     integrator: str | None = option(
         None,
-        "Integrator: `semi_implicit`, `rk4`, `adaptive`, or `engine` (the stepper of PyBullet, MuJoCo or Drake)",
+        "Integrator: `semi_implicit`, `rk4`, `adaptive`, or `engine` (PyBullet's, MuJoCo's or Drake's own)",
         kind=INTEGRATOR,
         group=CLOCK,
         default_words="`engine` for the plant pybullet, else `semi_implicit`",
