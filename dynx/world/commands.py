@@ -55,6 +55,11 @@ class RobotLoads:
         """The backend that computes mass matrices and Jacobians."""
         return backend(DEFAULT_ENGINE, self.model, validate=False)
 
+    def mass_matrix(self, q: Floats) -> Floats:
+        """Return M (nv, nv) at q with the armature of the joints."""
+        M = self.dynamics.mass_matrix(q)
+        return M if self._armature is None else M + self._armature
+
     @cached_property
     def joints(self) -> OutsideJoints | None:
         """Joint dynamics that the engine does not have; None where it has all."""
@@ -74,7 +79,7 @@ class RobotLoads:
         names = ("damping", "friction", "armature")
         outside = [name for name in names if (getattr(ours, name) != getattr(theirs, name)).any()]
         return (
-            f"{' and '.join(outside)} of the joints of {shown(self.name)} {'act' if outside[1:] else 'acts'} "
+            f"{', '.join(outside)} of the joints of {shown(self.name)} {'act' if outside[1:] else 'acts'} "
             "outside of the engine, which does not have all of it, with the forces of contacts, "
             "constraints and joint limits as they were in the step before"
         )
@@ -176,9 +181,7 @@ class RobotLoads:
         With the torque `motor` for the acceleration 0, that for the acceleration a is motor - K a, where
         (M + K) a = motor + all other forces. The other forces, except `tau`, are those of the step before.
         """
-        M = self.dynamics.mass_matrix(q)
-        if self._armature is not None:
-            M = M + self._armature
+        M = self.mass_matrix(q)
         if self.motor_memory is None:
             others = -self.dynamics.bias_torque(q, v)
         else:
@@ -290,7 +293,7 @@ class Commands:
         held = dict(self._held)
         return LastLoads(
             [
-                RobotLoad(k, loads.dynamics, held.get(k), *loads.law)
+                RobotLoad(k, loads.mass_matrix, held.get(k), *loads.law)
                 for k, loads in enumerate(self._loads)
                 if loads.has_motors or k in held
             ],

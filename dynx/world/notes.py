@@ -8,16 +8,14 @@ torques, forces, overlaps and light parts.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
 
-from dynx.backends import Backend
 from dynx.backends.solvability import main_joints, singular_direction
 from dynx.errors import DynxError, shown
-from dynx.model import Model
 from dynx.model.mechanism import ROOT, Mechanism
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation, quat_log
@@ -205,7 +203,8 @@ class RobotLoad(NamedTuple):
     """Loads on a robot in the last step: the caller's torque, and the law of its motors."""
 
     robot: int
-    dynamics: Backend
+    mass_matrix: Callable[[Floats], Floats]
+    """From q (nq,) to M (nv, nv), with armature."""
     torque: Floats | None
     law: JointLaw | None
     implicit: Floats | None
@@ -257,7 +256,7 @@ def _gravity(layout: Layout, h: float) -> Iterator[str]:
 def _gains_and_torques(layout: Layout, state: WorldState, loads: LastLoads, h: float) -> Iterator[str]:
     for load in loads.robots:
         robot = layout.robots[load.robot]
-        mobility = _mobility(load.dynamics, robot.model, state.robots[robot.name].q)
+        mobility = _mobility(load.mass_matrix(state.robots[robot.name].q))
         names = robot.model.joint_names
         base = len(mobility) - len(names)
         if load.law is not None and load.implicit is not None and len(names):
@@ -304,7 +303,7 @@ def _implicit_gains(layout: Layout, state: WorldState, loads: LastLoads, h: floa
         names = robot.model.joint_names
         if load.law is None or load.implicit is None or not len(names):
             continue
-        mobility = _mobility(load.dynamics, robot.model, state.robots[robot.name].q)[-len(names) :]
+        mobility = _mobility(load.mass_matrix(state.robots[robot.name].q))[-len(names) :]
         ratio = load.implicit * h * (load.law.kd + h * load.law.kp) * mobility
         k = int(np.argmax(ratio))
         if ratio[k] > MIN_IMPLICIT_RATIO:
@@ -355,7 +354,6 @@ def _mass(layout: Layout, owner: Owner) -> float | None:
     return layout.robots[owner.robot].model.total_mass
 
 
-def _mobility(dynamics: Backend, model: Model, q: Floats) -> Floats:
+def _mobility(M: Floats) -> Floats:
     """Return the acceleration of each coordinate (nv,) for a unit of its own torque."""
-    M = dynamics.mass_matrix(q)
     return np.asarray(np.linalg.pinv(M, hermitian=True).diagonal().copy() if len(M) else np.zeros(0))
