@@ -17,6 +17,7 @@ IDEAS = {
     "distance of two motions": r"^class Separation\b",
     "force from outside": r"def share\(self, t: float",
     "joint friction": r"^class FrictionLaw\b",
+    "a step of a robot by a backend": r"^class RobotStep\b",
     "parameters in which robots differ": r"^class Parameters\b|^def plant_model\b",
 }
 """Text that only the module of an idea contains, by the name of the idea."""
