@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from contextlib import suppress
 from hashlib import sha256
 from typing import Any, TypeVar
@@ -30,6 +30,9 @@ MAX_LISTED_NUMBERS = 64
 
 _SHARED = (Model, Backend, Dynamics)
 """Classes whose objects a copy of a controller shares with it."""
+
+_UNCHANGING = (bool, int, float, str, bytes, type(None), *_SHARED)
+"""Classes whose objects have the same content as long as they are the same object."""
 
 
 def check_controller(model: Model, controller: Controller[Any], clock: Clock) -> None:
@@ -149,10 +152,22 @@ class ControllerWatch:
 
     def __init__(self, controller: Controller[Any]) -> None:
         self._before = [(each, _contents(each)) for each in chain_of(controller)]
+        self._shortcuts = [
+            (each, len(vars(each)), *_by_kind_of_value(contents)) for each, contents in self._before
+        ]
+
+    @classmethod
+    def of(cls, controller: Controller[Any] | None) -> ControllerWatch | None:
+        """Watch a controller; return None for controllers of dynx alone, which cannot change."""
+        if controller is None or not any(is_foreign(type(each)) for each in chain_of(controller)):
+            return None
+        return cls(controller)
 
     @property
     def change(self) -> tuple[str, str] | None:
         """Names of the controller and of its attribute that changed since this object was made, if any."""
+        if all(_is_unchanged(*each) for each in self._shortcuts):
+            return None
         for each, before in self._before:
             now = _contents(each)
             for name in {**now, **before}:
@@ -182,6 +197,31 @@ def _contents(controller: Controller[Any]) -> dict[str, tuple[Any, Hashable]]:
     """Return the attributes of a controller with their contents. Keeping the attributes prevents that
     Python reuses their identity."""
     return {name: (value, _content(value)) for name, value in attributes_of(controller).items()}
+
+
+def _by_kind_of_value(
+    contents: Mapping[str, tuple[Any, Hashable]],
+) -> tuple[list[tuple[str, Any]], list[tuple[str, Hashable]]]:
+    """Return the attributes whose values stay the same objects unless they change, and the contents of the
+    others."""
+    same = [(name, value) for name, (value, _) in contents.items() if isinstance(value, _UNCHANGING)]
+    names = {name for name, _ in same}
+    return same, [(name, content) for name, (_, content) in contents.items() if name not in names]
+
+
+def _is_unchanged(
+    controller: Controller[Any],
+    count: int,
+    same: Iterable[tuple[str, Any]],
+    contents: Iterable[tuple[str, Hashable]],
+) -> bool:
+    """Return True if a controller has so many attributes, the same objects in some, and the same contents in
+    the others; reading all attributes as a copy would get them takes longer than a step of the loop."""
+    return (
+        len(vars(controller)) == count
+        and all(getattr(controller, name, None) is value for name, value in same)
+        and all(_content(getattr(controller, name, None)) == kept for name, kept in contents)
+    )
 
 
 def _content(value: Any, depth: int = 0) -> Hashable:

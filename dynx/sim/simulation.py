@@ -121,7 +121,7 @@ class Simulation:
             options={"method": scenario.method, "rtol": scenario.rtol, "atol": scenario.atol},
         )
         self._dt = clock.dt
-        self._watch = None if setup.controller is None else ControllerWatch(setup.controller)
+        self._watch = ControllerWatch.of(setup.controller)
         self._self_change: str | None = None
         self._loop_state: LoopState | None = None
         self._plant_needs_reset = self._closed = False
@@ -193,10 +193,10 @@ class Simulation:
     def _note_changes_of_caller(self) -> None:
         """Note a controller that the caller changed since the last step, which the next step applies."""
         change = None if self._watch is None or self._self_change else self._watch.change
-        if change is not None and self._setup.controller is not None:
+        if change is not None:
             name, attribute = change
             self._note_departure(f"{name} changed by the caller (attribute {attribute})")
-            self._watch = ControllerWatch(self._setup.controller)
+            self._watch = ControllerWatch.of(self._setup.controller)
             self._present = self._setup.scenario.for_record()
             self._lane_known = False
 
