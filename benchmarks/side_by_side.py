@@ -246,7 +246,8 @@ def _inverse_kinematics(robot: str, engine: str, samples: int) -> tuple[Call, An
 
     model = _robot(robot)
     backend = dynx.backend(engine, model)
-    frame = model.frame_names[-1]
+    # The last frame may be one that no joint moves.
+    frame = [joint.child for joint in model.joints if joint.moves][-1]
     rng = np.random.default_rng(2)
     count = samples or 16
     targets = backend.forward_kinematics(model.random(rng, (count,)), frame)
