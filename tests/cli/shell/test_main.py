@@ -21,10 +21,12 @@ def test_version() -> None:
 
 
 @pytest.mark.parametrize("name", [None, *COMMANDS])
-def test_help_of_every_command_has_examples(name: str | None) -> None:
-    result = CliRunner().invoke(cli, ["--help"] if name is None else [name, "--help"])
+def test_help_of_every_command_has_examples_and_fits_80_columns(name: str | None) -> None:
+    arguments = ["--help"] if name is None else [name, "--help"]
+    result = CliRunner().invoke(cli, arguments, terminal_width=80)
     assert result.exit_code == 0
     assert "Examples:" in result.output
+    assert max(map(len, result.output.splitlines())) <= 80
 
 
 def test_no_argument_gives_help() -> None:

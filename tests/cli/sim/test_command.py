@@ -206,14 +206,6 @@ def test_joints_that_are_not_named_stay() -> None:
     assert made["motion"]["to"] == [0.0, 0.0, 0.01, 0.3, 0.0, 0.0]
 
 
-def test_hold_is_a_step_of_the_reference() -> None:
-    made = document(
-        "ur5", "--from", "elbow_joint=0.1", "--to", "elbow_joint=0", "--profile", "hold", "--duration", "0.5"
-    )
-    assert made["max_error"] == pytest.approx(0.1)
-    assert made["final_error"] < 0.01
-
-
 def test_a_frame_moves_on_a_straight_line(tmp_path: Path) -> None:
     target = tmp_path / "line.npz"
     start = "0.2,-1.4,1.2,0.1,0.5,0.2"

@@ -14,7 +14,6 @@ from dynx import control
 from dynx.cli.sim.report import column_text, percent_text
 from dynx.sim import simulate
 from dynx.sim.named_controllers import CONTROLLERS
-from dynx.sim.overshoot import largest_overshoot
 from tests.cli.sim.command import SHORT, document, sim
 
 ELBOW = ["ur5", "--to", "elbow_joint=1"]
@@ -60,6 +59,7 @@ def test_a_step_begins_where_every_profile_begins() -> None:
     made = document("ur5", "--to", "elbow_joint=0.2", "--profile", "hold", "--duration", "0.5")
     assert made["motion"]["from"] == [0.0] * 6
     assert made["max_error"] == pytest.approx(0.2)
+    assert made["final_error"] < 0.02
     assert made["max_error_time"] == 0.0
     assert made["joints"][2]["max_speed"] > 0.5
 
@@ -232,18 +232,6 @@ def test_gains_too_large_for_the_step_are_named(arguments: list[str], name: str)
     made = document(*arguments, code=1)
     assert made["overshoot"]["joint"] == name
     assert made["overshoot"]["ratio"] > 2.0
-
-
-def test_the_ratio_is_that_of_the_mass_matrix() -> None:
-    arm = dynx.load("ur5")
-    inertia = np.diag(dynx.backend("reference", arm).mass_matrix(arm.neutral()))
-    found = largest_overshoot(control.PD(arm, kp=1.0, kd=40.0), arm.neutral(), 2e-3)
-    assert found is not None
-    assert found.ratio == pytest.approx(40.0 * 2e-3 / inertia.min(), rel=1e-12)
-    assert found.joint == arm.joint_names[int(np.argmin(inertia))]
-    slow = control.ComputedTorque(arm, kp=400, kd=40)
-    for controller in (control.PD(arm, kp=1.0, kd=0.01), slow, None):
-        assert largest_overshoot(controller, arm.neutral(), 1e-3) is None
 
 
 def test_divergence_for_another_reason_has_no_overshoot() -> None:
