@@ -5,16 +5,18 @@ the next task, so that all lanes stay busy; between those events nothing but the
 also restart its task: then the lane loads a row of a table of starts.
 
 The step is a program with these ports. Inputs: ``x`` (m,), which a start overwrites; ``memory`` (s,), the
-other variables; *tasks*, arrays with a row for each task, which stay in the lane while the task lasts; and
+other variables; *task inputs*, with a row for each task, which stay in the lane while the task lasts; and
 *constants*, the same for all tasks. Outputs: ``x`` and ``memory`` after the step, ``status`` (`RUNNING`,
 `GIVEN_UP` or `REACHED`), and ``restart``, the number of a row of the table of starts, or a negative number.
-The first `n_results` entries of the memory are the result of the task.
+The first `n_results` entries of the memory, after the step that ends the task, are its result. A task first
+starts from its rows of x and memory; a row of the table of starts replaces x at a restart only. ``restart``
+has no effect in a step that ends the task. A step that never ends a task never returns.
 
 Lanes do not exchange values, and products and sums are contracted as in routines. So the result of a task
 depends neither on the other tasks nor on the number of lanes.
 
 The entry function takes the address of 64-bit words: the number of tasks; an address and a row stride in
-bytes for each array, which are ``x``, ``memory``, the tasks and the result; then the addresses of the
+bytes for each array, which are ``x``, ``memory``, the task inputs and the result; then the addresses of the
 constants and of the table of starts, each followed by a zero; and 1 to stop at the first task that is
 reached, otherwise 0. In that case all earlier tasks are completed, and the results of later ones are
 undefined; the first word is then the number of completed tasks. A row stride of 0 repeats a row.
@@ -60,7 +62,11 @@ class Iteration:
     n_results: int
 
     def __post_init__(self) -> None:
-        """Raises CompileError for a step with other ports than those of an iteration."""
+        """Raises CompileError unless the outputs are x, memory, status and restart, in this order, and x and
+        memory have the shape of the inputs of that name.
+
+        The names of the constants, `n_results` and the shapes of status and restart are not checked.
+        """
         shapes = {port.name: port.shape for port in self.step.outputs}
         inputs = {port.name: port.shape for port in self.step.inputs}
         if tuple(shapes) != _OUTPUTS or any(inputs.get(name) != shapes[name] for name in _OUTPUTS[:2]):
@@ -68,7 +74,7 @@ class Iteration:
 
     @property
     def arrays(self) -> tuple[Port, ...]:
-        """Inputs with a row for each task: x, memory and the tasks."""
+        """Inputs with a row for each task: x, memory and the task inputs."""
         by_name = {port.name: port for port in self.step.inputs if port.name not in self.constants}
         return (by_name.pop("x"), by_name.pop("memory"), *by_name.values())
 
@@ -331,12 +337,15 @@ class IterationKernel:
         *,
         threads: int = 1,
     ) -> None:
-        """Fill `result` (n, n_results) for `tasks`, arrays (n, size) of the ports x, memory and the tasks.
+        """Fill `result` (n, n_results), one row for each task, from `tasks`: arrays (n, size) of x, memory
+        and the task inputs, in this order.
 
         All arrays are float64 with contiguous rows; rows of tasks may have a stride of 0. `constants` holds
         the constants in the order of their ports, `starts` (k, m) the rows at which tasks are restarted. The
-        result of a task does not depend on the other tasks or on the number of threads. Raises ArgumentError,
-        DTypeError or ShapeError for arrays that do not fit, and writes nothing then.
+        result of a task does not depend on the other tasks or on the number of threads. Raises ArgumentError
+        for a wrong number of arrays or a read-only result, DTypeError for another dtype than float64 and
+        ShapeError for a wrong shape, all before anything is written. Only `tasks` and `result` are checked:
+        `constants` and `starts` must have the size and layout given here, or memory beyond them is read.
         """
         n = check_arrays(self.image.inputs, self.image.outputs, tasks, [result])
         if n == 0:
@@ -364,6 +373,8 @@ class IterationKernel:
         alive; it holds Python's global lock, and is not safe to use from several threads at a time.
         """
         n = check_arrays(self.image.inputs, self.image.outputs, tasks, [result])
+        if n == 0:
+            return lambda: 0
         words = np.array(self._words(n, tasks, result, constants, starts, stop=True), dtype=np.int64)
         run, count, kept = self._code.locked_entry, words.data, (self._code, tasks, result, constants, starts)
         address = words.ctypes.data

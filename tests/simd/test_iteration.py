@@ -119,7 +119,12 @@ def test_a_race_ends_with_the_first_start_that_reaches_the_target(first: list[fl
 
 
 def test_no_tasks() -> None:
-    assert roots(np.empty(0), np.ones((1, 1))).shape == (0, 4)
+    starts = np.ones((1, 1))
+    assert roots(np.empty(0), starts).shape == (0, 4)
+    empty = [np.empty((0, 1)), np.empty((0, 4)), np.empty((0, 1))]
+    for kernel in KERNELS.values():
+        race = kernel.bind_race(empty, np.empty((0, 4)), np.array([TOLERANCE, 1.0]), starts)
+        assert race() == 0
 
 
 def test_arrays_that_do_not_fit_are_refused() -> None:

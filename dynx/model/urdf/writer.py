@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterator
 
@@ -25,7 +26,7 @@ from dynx.model.urdf.reader import FRAME_TAG, LOCKED_TAG
 from dynx.model.urdf.values import name_fault
 from dynx.model.xml.text import quoteattr
 
-# Writer of the visual and collision shapes of a link as URDF text.
+# -- visual and collision shapes of a link --------------------------------------------------------
 
 
 INDENT = "    "
@@ -54,7 +55,7 @@ def write_shapes(geometry: Geometry, link: str, origin: WriteOrigin) -> Iterator
 
 def _shape(shape: Shape, link: str) -> str:
     if isinstance(shape, Box):
-        return f'<box size="{_numbers(shape.size)}"/>'
+        return f'<box size="{_finite_numbers(shape.size)}"/>'
     if isinstance(shape, Sphere):
         return f'<sphere radius="{shape.radius!r}"/>'
     if isinstance(shape, Cylinder | Capsule):
@@ -64,29 +65,35 @@ def _shape(shape: Shape, link: str) -> str:
         return '<plane normal="0 0 1"/>'
     if isinstance(shape, Mesh):
         # A mesh that was not found keeps the name that it has in the description, and is not found again.
-        return f'<mesh filename={quoteattr(shape.file)} scale="{_numbers(shape.scale)}"/>'
+        return f'<mesh filename={quoteattr(shape.file)} scale="{_finite_numbers(shape.scale)}"/>'
     raise DescriptionError(f"URDF cannot express the {type(shape).__name__} of link {shown(link)}")
 
 
 def _material(material: Appearance) -> str:
-    colour = "" if material.rgba is None else f'<color rgba="{_numbers(material.rgba)}"/>'
+    colour = "" if material.rgba is None else f'<color rgba="{_finite_numbers(material.rgba)}"/>'
     texture = "" if material.texture is None else f"<texture filename={quoteattr(material.texture)}/>"
     return f"<material name={quoteattr(material.name)}>{colour}{texture}</material>"
 
 
-def _numbers(numbers: tuple[float, ...]) -> str:
+def _finite_numbers(numbers: tuple[float, ...]) -> str:
     return " ".join(repr(float(x)) for x in numbers)
 
 
-def write_urdf(tree: Tree, *, geometry: bool = False) -> str:
-    """Return the robot as URDF text in canonical form; `dynx.load` of it returns an equal model.
+# -- the robot ------------------------------------------------------------------------------------
 
-    URDF cannot express the base, its pose and gravity, so the same must be given to ``load`` again. A locked
-    joint is written as fixed, with its position in the extension ``<dynx_locked>``; an added frame as a
-    massless link on a fixed joint, marked by ``<dynx_frame>``; other readers ignore both marks. An infinite
-    limit is written as the largest double, which every engine can read; limits of `MAX_MAGNITUDE` or more are
-    read back as infinite. With `geometry` the visual and collision shapes are written too. Raises
-    DescriptionError for a name that URDF cannot express, and with `geometry` as `write_shapes` does.
+
+def write_urdf(tree: Tree, *, geometry: bool = False) -> str:
+    """Return the robot as URDF text in canonical form: one element a line, and nothing that has its default.
+
+    With the same base, base pose and gravity, which URDF cannot express, `dynx.load` of the text returns an
+    equal model; equality ignores shapes. A locked joint is written as fixed, with its position in the
+    extension ``<dynx_locked>``; an added frame as a massless link on a fixed joint, marked by
+    ``<dynx_frame>``; other readers ignore both marks. An infinite limit is written as the largest double,
+    which every engine can read; limits of 1e60 (`dynx.model.numbers.MAX_MAGNITUDE`) or more are read back as
+    infinite. With `geometry` the visual and collision shapes are written too.
+
+    Raises DescriptionError for a name that URDF cannot express and for a number that is NaN, and with
+    `geometry` as `write_shapes` does.
     """
     lines = ['<?xml version="1.0"?>', f"<robot name={_name(tree.name)}>"]
     for link in tree.links:
@@ -162,6 +169,8 @@ def _vector(vector: Vector) -> str:
 
 
 def _number(value: float) -> str:
+    if math.isnan(value):
+        raise DescriptionError("a number of the robot is NaN, which URDF cannot express")
     # `float` first: the repr of a NumPy scalar names its type.
     return repr(max(-sys.float_info.max, min(sys.float_info.max, float(value))))
 

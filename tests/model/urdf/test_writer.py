@@ -79,6 +79,15 @@ def test_limits_of_infinity_are_written_as_a_number_that_every_engine_reads() ->
     assert read_back(model) == model
 
 
+def test_a_number_that_is_nan_is_refused() -> None:
+    joint = Joint("j", "revolute", "a", "b", limits=Limits(-1.0, 2.0, 1.0, 1.0))
+    model = Model.build("r", [Link("a"), Link("b")], [joint])
+    # Bypasses the checks of the model.
+    object.__setattr__(model.joints[0].limits, "upper", math.nan)
+    with pytest.raises(DescriptionError, match="NaN"):
+        model.to_urdf()
+
+
 def test_frames_that_were_added_stay_frames_and_are_links_to_others() -> None:
     model = load("ur5").with_frame("tip", "tool0", Pose((0.0, 0.0, 0.1))).with_frame("tip_frame", "tool0")
     assert read_back(model) == model
