@@ -19,7 +19,7 @@ from dynx.rbd.kinematics import ancestry
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import pose_error
 
-# Results of one backend (or the referee) at one set of samples, each quantity evaluated once.
+# -- results of one backend, or of the referee, at one set of samples ----------------------------
 
 
 REFEREE = "referee"
@@ -113,7 +113,10 @@ class Comparison:
 
 @dataclass(frozen=True)
 class ErrorVerdict:
-    """The largest absolute and relative error, and the position of the latter in the array."""
+    """The largest absolute error and the largest relative error, which may be at different entries.
+
+    `position` is that of the relative one in the array; None without entries.
+    """
 
     absolute: float
     relative: float
@@ -121,7 +124,10 @@ class ErrorVerdict:
 
 
 def judge(error: Array, scale: Floats) -> ErrorVerdict:
-    """Return the largest error relative to `scale`, which broadcasts against it; NaN counts as infinite."""
+    """Return the largest error relative to `scale`, which broadcasts against it.
+
+    Where the scale is 0, an error of 0 counts as 0 and any other as infinite. NaN counts as infinite.
+    """
     absolute = np.abs(error).astype(np.float64)
     if not absolute.size:
         return ErrorVerdict(0.0, 0.0, None)
@@ -135,7 +141,11 @@ def judge(error: Array, scale: Floats) -> ErrorVerdict:
 def compare(
     quantity: ComparedQuantity, first: BackendResults, second: BackendResults, magnitudes: Magnitudes
 ) -> Comparison:
-    """Compare the results of two backends by their difference."""
+    """Compare the results of two backends by their difference. Derived results are `second`.
+
+    An error that a backend raises counts as its result: the comparison then fails with infinite errors and a
+    note, unless both report a singular mass matrix. Results of different shapes fail too.
+    """
     samples = first.samples
     tolerance = quantity.tolerance(magnitudes)
     results = [each.of(quantity.name, quantity.evaluate) for each in (first, second)]
@@ -193,7 +203,7 @@ def compare_refusals(
         note = f"refused alike: {refused[0].error}"
         return concluded(name, first, second, ErrorVerdict(0.0, 0.0, None), tolerance, note=note)
     note = "; ".join(
-        f"{each.name} refuses: {result}"
+        f"{each.name}: {result}"
         for each, result in zip((first, second), results, strict=False)
         if isinstance(result, Refusal)
     )
@@ -234,10 +244,11 @@ def _difference(one: Array, other: Array) -> Array:
         return np.asarray(one - other)
 
 
-# Quantities that solve equations: the solution of each engine is verified by the other engine.
+# -- quantities that solve equations --------------------------------------------------------------
 #
-# Two accelerations, or two configurations that reach one target, may differ while both are right. So each
-# engine checks that the other's solution satisfies the equation.
+# The solution of each engine is verified by the other engine. Two accelerations, or two configurations that
+# reach one target, may differ while both are right. So each engine checks that the other's solution satisfies
+# the equation.
 
 
 TARGETS = 2
@@ -280,7 +291,7 @@ def compare_forward_dynamics(
         assert not isinstance(a, Refusal)
         tau = other.attempt(partial(_required_torque, a=a, chosen=chosen))
         if isinstance(tau, Refusal):
-            return failed_comparison(name, solver, verifier, tolerance, f"{other.name} refuses: {tau}")
+            return failed_comparison(name, solver, verifier, tolerance, f"{other.name}: {tau}")
         not_finite = not_finite_note((one, a), (other, tau))
         notes += [not_finite] if not_finite else []
         verdict = _backward_error(a, tau, chosen, magnitudes)
@@ -335,7 +346,7 @@ def compare_inverse_kinematics(
         found = np.isfinite(q).all(axis=-1)
         reached = verifier.attempt(partial(_poses, q=q[found], frame=frame))
         if isinstance(reached, Refusal):
-            return failed_comparison(name, first, second, tolerance, f"{verifier.name} refuses: {reached}")
+            return failed_comparison(name, first, second, tolerance, f"{verifier.name}: {reached}")
         errors.append(_distance(target[found], reached))
     searches = 2 * len(q_target)
     missed = searches - sum(len(error) for error in errors)

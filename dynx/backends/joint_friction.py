@@ -26,12 +26,14 @@ MIN_SLIP = 1e-9
 
 Coefficients = bool | ArrayLike | Mapping[str, ArrayLike]
 """Coefficients: True for the description's, False for zero, one number, one per joint coordinate, or numbers
-by the name of the joint (`coefficients_by_joint`)."""
+by the name of the joint (`coefficients_by_joint`), where joints that are not named have 0."""
 
 
 @dataclass(frozen=True, eq=False)
 class JointFriction:
-    """Torque of damping and dry friction, which opposes the motion of each joint: d v + f tanh(v / slip).
+    """Torque that overcomes damping and dry (Coulomb) friction: d v + f tanh(v / slip), with the sign of v.
+
+    Inverse dynamics adds it to the joint torque; the friction that acts on the joint is its negative.
 
     With `slip` 0 it is d v + f sign(v), as with ``joint_dynamics=True`` in every backend. A joint at rest
     then has any torque between -f and f, whichever keeps it at rest; a function of the velocity cannot tell
@@ -51,18 +53,20 @@ class JointFriction:
     ) -> None:
         """`damping` [N m s/rad or N s/m] and `friction` [N m or N] of the joints; see `Coefficients`.
 
-        Raises GainError for invalid coefficients, ArgumentError for an invalid slip speed.
+        Raises GainError for coefficients that are negative, not finite or of a wrong length; UnknownNameError
+        for a joint of a mapping without a coordinate; DTypeError or ShapeError for a value of a mapping that
+        is no real number or array; ArgumentError for a slip speed that is neither 0 nor at least `MIN_SLIP`.
         """
         own, of_model = JointDynamicsTerms(model), (damping is True, friction is True)
         coupling = model.mechanism.coupling
         # The coefficients of the description belong to the joints of the tree, given ones to the coordinates.
-        through = coupling is not None and any(of_model)
+        in_tree_coordinates = coupling is not None and any(of_model)
         values = {
             "model": model,
-            "damping": self._coefficients("damping", damping, own.damping, model, through),
-            "friction": self._coefficients("friction", friction, own.friction, model, through),
+            "damping": self._coefficients("damping", damping, own.damping, model, in_tree_coordinates),
+            "friction": self._coefficients("friction", friction, own.friction, model, in_tree_coordinates),
             "slip": checked_slip("slip", slip),
-            "to_tree": coupling.matrix() if coupling is not None and through else None,
+            "to_tree": coupling.matrix() if coupling is not None and in_tree_coordinates else None,
         }
         for name, value in values.items():
             object.__setattr__(self, name, read_only(value) if isinstance(value, np.ndarray) else value)
@@ -70,20 +74,22 @@ class JointFriction:
     @cached_property
     def present(self) -> bool:
         """True if any coefficient is not zero."""
-        return bool(self.damping.any()) or self._dry
+        return bool(self.damping.any()) or self._has_dry
 
     @property
     def sticks(self) -> bool:
-        """True if joints stick: there is friction and no slip speed, so that each step is solved for it."""
+        """True if any coefficient is not zero, of damping too, and `slip` is 0: each step is then solved for
+        the torque."""
         return self.present and not self.slip
 
     @property
     def smooth(self) -> bool:
-        """True if there is friction with a slip speed, whose torque is a function of the velocity."""
+        """True if any coefficient is not zero and `slip` is above 0: the torque is then a smooth function of
+        the velocity."""
         return self.present and bool(self.slip)
 
     @cached_property
-    def _dry(self) -> bool:
+    def _has_dry(self) -> bool:
         return bool(self.friction.any())
 
     @property
@@ -113,22 +119,24 @@ class JointFriction:
         """Return the torque (..., nv) of friction with other coefficients, of the same shapes."""
         speed = v if self.to_tree is None else v @ self.to_tree.T
         torque = damping * speed
-        if self._dry:
+        if self._has_dry:
             torque = torque + friction * (tanh(speed / self.slip) if self.slip else sign(speed))
         return np.asarray(torque if self.to_tree is None else torque @ self.to_tree)
 
     @staticmethod
-    def _coefficients(name: str, given: Coefficients, own: Floats, model: Model, through: bool) -> Floats:
+    def _coefficients(
+        name: str, given: Coefficients, own: Floats, model: Model, in_tree_coordinates: bool
+    ) -> Floats:
         if isinstance(given, bool):
-            return own if given else np.zeros(model.mechanism.nv if through else model.nv)
+            return own if given else np.zeros(model.mechanism.nv if in_tree_coordinates else model.nv)
         base = 6 if model.floating else 0
         refuse_text(name, given, model.nv - base)
         numbers = coefficients_by_joint(model, name, given)
         coefficients = checked_gain(name, numbers, model.nv - base, per="one for each joint")
         # Given coefficients apply to joints that own a coordinate, not to the base or to mimic joints.
         owners = [joint.mimic is None for joint in model.joints if joint.moves]
-        joints = np.zeros(len(owners) if through else len(coefficients))
-        joints[owners if through else slice(None)] = coefficients
+        joints = np.zeros(len(owners) if in_tree_coordinates else len(coefficients))
+        joints[owners if in_tree_coordinates else slice(None)] = coefficients
         return np.concatenate([np.zeros(base), joints])
 
 
@@ -144,6 +152,7 @@ def coefficients_by_joint(
 ) -> ArrayLike:
     """Return numbers by the name of the joint as an array (joints,) or, with a number for each of n rollouts,
     (n, joints); joints that are not named have `others`. Anything but a mapping is returned unchanged.
+    `JointFriction` takes one number for each joint.
 
     Raises UnknownNameError for a joint without a coordinate, GainError for numbers of different lengths.
     """

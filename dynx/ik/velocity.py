@@ -56,7 +56,9 @@ class VelocityTask:
     gain: float = 1.0
     """Velocity per error [1/s]: the error falls by exp(-gain t)."""
     weights: ArrayLike = 1.0
-    """Weight of each component of the velocity, one number or (6,): at least 0."""
+    """Weight of each component of the velocity, one number or (6,), at least 0. For a hard task a weight
+    above 0 only selects the component. With a position as the target and no `velocity`, the angular
+    components have weight 0."""
     hard: bool = False
     """Whether components with a weight above 0 are met exactly, before all tasks that are not hard."""
     point: ArrayLike | None = None
@@ -112,7 +114,7 @@ def velocity_bounds(
     them: after a step of velocity v at a distance d from the limit, v^2 / (2 a) <= d - v dt, so that
     v <= sqrt((a dt)^2 + 2 a d) - a dt. With `v0` the change of velocity is at most a dt. A joint outside its
     limits returns as fast as these bounds allow, and arrives at the limit. Where bounds contradict each
-    other, those of position and velocity count more than that of the change.
+    other, those of position and velocity count more than that of the change. Arguments are not checked.
     """
     offset = 6 if model.floating else 0
     room_below, room_above = np.full(model.nv, np.inf), np.full(model.nv, np.inf)
@@ -142,11 +144,11 @@ def joints_outside(model: Model, q: Floats) -> str:
 
 def _towards(room: Floats, dt: float, velocity_limit: Floats, acceleration_limit: Floats) -> Floats:
     """Return the largest velocity in the direction of a limit at the signed distance `room`."""
-    most = np.minimum(_most(np.abs(room), dt, acceleration_limit), velocity_limit)
+    most = np.minimum(_largest_speed(np.abs(room), dt, acceleration_limit), velocity_limit)
     return np.where(room < 0.0, -most, most)
 
 
-def _most(room: Floats, dt: float, acceleration: Floats) -> Floats:
+def _largest_speed(room: Floats, dt: float, acceleration: Floats) -> Floats:
     """Return the largest velocity towards a limit at the distance `room`, for each coordinate."""
     found: Floats = room / dt
     brakes = np.isfinite(acceleration) & np.isfinite(room)
@@ -380,12 +382,14 @@ class Programme:
 
 @dataclass(frozen=True, eq=False)
 class VelocityResult:
-    """Velocity of one step; `success` says whether all hard tasks are met."""
+    """Velocity of one step; `success` says whether the bounds, the dampers and the hard tasks are all
+    kept."""
 
     v: Floats
     """Velocity (nv,) [rad/s or m/s], within the bounds."""
     success: bool
-    """False if the hard tasks cannot all be met within the bounds; they are then met as well as possible."""
+    """False if no velocity satisfies the bounds, the dampers of `avoid` and the hard tasks together, even if
+    no task is hard. Hard tasks are then met as well as possible."""
     errors: tuple[Floats, ...]
     """For each task the weighted error J v - velocity (m,), of its components with a weight above 0."""
     limited: NDArray[np.bool_]
@@ -400,7 +404,7 @@ class VelocityResult:
     `avoid` keeps nothing from; empty without them."""
 
     def __bool__(self) -> bool:
-        """Return whether all hard tasks are met."""
+        """Return `success`."""
         return self.success
 
 
@@ -429,19 +433,20 @@ def velocity_ik(
     |v| within `velocity_limit` (one number or (nv,), by default the model's), and with `acceleration_limit`
     [rad/s^2 or m/s^2] the joints can stop before their limits; with `v0` (nv,), the velocity before, the
     change is at most ``acceleration_limit dt``. A joint outside its position limits returns to them as fast
-    as the other bounds allow, before all tasks, and `note` names it. A base that floats has no bounds but
-    those given.
+    as the other bounds allow, and `note` names it. A base that floats has no bounds but those given.
 
     With `avoid`, a scene or what `Scene.avoidance` returns, the distance d of each pair of bodies that is
-    near changes by at least ``-avoid_gain (d - margin)`` [m/s], before all tasks: d does not fall below the
-    margin, and where it is below, it grows back. `avoid_gain` [1/s] is at most ``1 / dt``. Pairs count from
+    near changes by at least ``-avoid_gain (d - margin)`` [m/s], its damper: d does not fall below the margin,
+    and where it is below, it grows back. `avoid_gain` [1/s] is at most ``1 / dt``. Pairs count from
     where 1 m/s is allowed (``1 / avoid_gain`` m). The distances at ``model.integrate(q, dt v)`` are certified
     (`dynx.distance`): where a margin is not kept there, the step is found again with that pair as a further
     constraint, and shortened if that is not enough; `too_fast` names pairs for which no velocity suffices.
 
-    If the hard tasks contradict each other or the bounds, they count as soft ones of a large weight, and
-    `success` is False. The quadratic programme is solved by DAQP (extra ``qp``). Siciliano et al., section
-    3.5, with inequalities as in Kanoun, Lamiraux and Wieber, IEEE Trans. Robotics 27(4), 2011.
+    The bounds always hold. Next come the dampers, then the hard tasks, then the others. If the hard tasks
+    contradict each other, the bounds or the dampers, they count as soft ones of a large weight, and `success`
+    is False; so it is if the dampers contradict the bounds. The quadratic programme is solved by DAQP (extra
+    ``qp``). Siciliano et al., section 3.5, with inequalities as in Kanoun, Lamiraux and Wieber, IEEE Trans.
+    Robotics 27(4), 2011.
 
     Raises NotInstalledError without the extra; UnknownNameError for a frame; ArgumentError (ShapeError,
     DTypeError, NotFiniteError) for an invalid argument.
@@ -452,13 +457,14 @@ def velocity_ik(
     if position.ndim != 1:
         raise ShapeError(f"q has shape {position.shape}; wanted ({model.nq},)")
     wanted = _checked_tasks(tasks)
-    for name, number, least in (
-        ("damping", damping, "above 0"),
-        ("posture_weight", posture_weight, ""),
-        ("posture_gain", posture_gain, ""),
+    for name, number, positive in (
+        ("damping", damping, True),
+        ("posture_weight", posture_weight, False),
+        ("posture_gain", posture_gain, False),
     ):
-        if not (is_real(number) and 0.0 <= number < math.inf and (number > 0.0 or not least)):
-            raise ArgumentError(f"{name} is {shown(number)}; wanted a number {least or 'of at least 0'}")
+        if not (is_real(number) and 0.0 <= number < math.inf and (number > 0.0 or not positive)):
+            least = "above 0" if positive else "of at least 0"
+            raise ArgumentError(f"{name} is {shown(number)}; wanted a number {least}")
     speed, acceleration = model.velocity_limit, np.full(model.nv, math.inf)
     if velocity_limit is not None:
         speed = checked_velocity_limit("velocity_limit", velocity_limit, model)

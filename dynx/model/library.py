@@ -1,8 +1,9 @@
 """Library of robots: names and files of example-robot-data and of the small models that come with dynx.
 
 Only the data files of example-robot-data are used, not its Python loaders, which import an engine. Its robots
-have the names of those loaders; a file without a loader is named by its stem, as are the robots of dynx. If a
-name is taken already, the name of the folder is prepended.
+have the names of those loaders; a file without a loader is named by its stem, as are the robots of dynx. If
+that name is taken, the first folder of its path in the library is prepended (``FOLDER_NAME``), or the source
+(``dynx_NAME``) for a file in no folder; if that is taken too, the source and all folders.
 """
 
 from __future__ import annotations
@@ -67,9 +68,11 @@ class LibraryRobot:
 
 @lru_cache(maxsize=1)
 def robots() -> tuple[LibraryRobot, ...]:
-    """List every robot of the library: example-robot-data, then dynx's own, each sorted by name.
+    """List the robots of the library, without the traps: example-robot-data, then dynx's own, each sorted by
+    name. They are searched for once for a process.
 
-    Names are unique, and no alias equals the name or an alias of another robot.
+    Names are unique. An alias is the stem of the file, where no robot has it as its name and no other file
+    has this stem.
     """
     files = [(path, EXAMPLE_ROBOT_DATA, root) for root in example_roots() for path in _urdf_files(root)]
     files += [(path, DYNX_MODELS, root) for root in own_roots() for path in _urdf_files(root)]
@@ -94,7 +97,7 @@ def robots() -> tuple[LibraryRobot, ...]:
 
 
 def find(name: str) -> Path:
-    """Return the file of a robot of the library, by its name or an alias.
+    """Return the path of the description of a robot, by its name or an alias.
 
     Raises RobotNotFoundError, listing the nearest names.
     """

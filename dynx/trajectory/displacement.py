@@ -2,10 +2,10 @@
 
     q(t) = q0 (+) x(t),  v = dx/dt,  a = d2x/dt2
 
-where (+) is `model.integrate`, a sum for joints. For a floating base the first six components of x are always
-a multiple s(t) of one body twist d: the base moves along the screw exp(s d), and its velocity in its own axes
-is then exactly ds/dt d (Murray, Li and Sastry, A Mathematical Introduction to Robotic Manipulation, section
-2.3).
+where (+) is `model.integrate`, a sum for joints. For a floating base the first six components of x must be a
+multiple s(t) of one body twist d, which the caller ensures: the base moves along the screw exp(s d), and its
+velocity in its own axes is then exactly ds/dt d (Murray, Li and Sastry, A Mathematical Introduction to
+Robotic Manipulation, section 2.3). Outside the duration the robot is at rest (`Trajectory`).
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ from dynx.trajectory.curve import Curve
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DisplacementTrajectory(Trajectory):
-    """`start.q` displaced along a curve that begins at 0; `floating` is the model if its base floats."""
+    """`start.q` displaced along a curve that begins at 0; `floating` is the model if its base floats,
+    else None."""
 
     curve: Curve
     floating: Model | None = None
@@ -85,7 +86,9 @@ class Ends:
     def trajectory(
         self, duration: float, curve: Curve, start: tuple[Floats, Floats], end: tuple[Floats, Floats]
     ) -> DisplacementTrajectory:
-        """Return the motion along `curve`, with (v, a) at its ends."""
+        """Return the motion along `curve`, which lasts `duration` and leads from 0 to `displacement` (not
+        checked). Its setpoints at the times 0 and `duration` have the (v, a) given; those between have the
+        derivatives of the curve."""
         q1 = self.q1
         if self.floating is not None:
             # A quaternion and its negative are one orientation: take the one that the motion reaches.
@@ -97,7 +100,7 @@ class Ends:
         )
 
     def rest_to_rest(self, duration: float, curve: Curve) -> DisplacementTrajectory:
-        """Return the motion along `curve`, with v and a zero at both ends."""
+        """Return the motion along `curve`, as `trajectory` does, with v and a zero at both ends."""
         rest = np.zeros(self.nv), np.zeros(self.nv)
         return self.trajectory(duration, curve, rest, rest)
 
@@ -105,7 +108,8 @@ class Ends:
 def checked_ends(q0: ArrayLike, q1: ArrayLike, model: Model | None) -> Ends:
     """Check two configurations (nq,); without a model every coordinate is a joint's.
 
-    Raises ShapeError, DTypeError, NotFiniteError, and ArgumentError for a quaternion not of unit norm.
+    Raises ShapeError, DTypeError or NotFiniteError for a configuration, and ArgumentError for a quaternion
+    not of unit norm, an entry of 1e60 or more, and a model that is no Model.
     """
     first, last = (configuration(name, q, model) for name, q in (("q0", q0), ("q1", q1)))
     if first.shape != last.shape:

@@ -20,7 +20,8 @@ SCALAR_LIMIT_RANGE = 1e-100, 1e100
 def checked_limit(name: str, bound: ArrayLike, nv: int) -> Floats:
     """Return a limit (nv,) from one number for all coordinates or one for each; infinity means no limit.
 
-    Raises ArgumentError for a negative number or NaN, ShapeError for a wrong shape.
+    Raises ArgumentError for a negative number or NaN, ShapeError for a wrong shape, DTypeError for anything
+    but real numbers.
     """
     array = real_array(name, bound)
     if array.shape not in ((), (nv,)):
@@ -34,7 +35,10 @@ def checked_limit(name: str, bound: ArrayLike, nv: int) -> Floats:
 
 
 def velocity_limits(bound: ArrayLike | None, ends: Ends) -> Floats:
-    """Return the velocity limits (nv,): those given, or the model's."""
+    """Return the velocity limits (nv,): those given, or the model's.
+
+    Raises ArgumentError with neither, and the errors of `checked_limit`.
+    """
     if bound is not None:
         return checked_limit("velocity", bound, ends.nv)
     if ends.model is None:
@@ -43,10 +47,12 @@ def velocity_limits(bound: ArrayLike | None, ends: Ends) -> Floats:
 
 
 def scalar_limit(name: str, bound: Floats, ends: Ends) -> float:
-    """Return the limit of a path parameter s of which every coordinate is a multiple.
+    """Return the limit of the path parameter s, from 0 to 1.
 
-    It is the least of |limit / displacement|, infinite if no moving coordinate has a limit. Raises
-    TrajectoryError if a coordinate has to move but its limit is 0.
+    Each coordinate moves by s times its displacement. The limit is the least limit / |displacement| of the
+    coordinates that move, clamped to `SCALAR_LIMIT_RANGE` and less the relative margin `LIMIT_MARGIN`;
+    infinite if none of them has a limit. Raises TrajectoryError if a coordinate has to move but its limit is
+    0.
     """
     distance = np.abs(ends.displacement)
     moving = distance > 0.0

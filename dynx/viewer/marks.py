@@ -30,7 +30,8 @@ CORNERS = {
     "top-right": (-1.0, 0.0),
     "bottom-right": (-1.0, -1.0),
 }
-"""Corner of a label that lies on its point -> its upper left corner from there, in its widths and heights."""
+"""Offset from the point to the upper left corner of its label, in widths and heights of the label, by the
+corner of the label that lies on the point: with ``top-left`` the label is right of the point and below it."""
 
 Rectangle = tuple[float, float, float, float]
 """Left, top, right and bottom [pixels], downward."""
@@ -51,7 +52,8 @@ def overlap(a: Rectangle, b: Rectangle) -> bool:
 
 def arranged(points: Floats, texts: Sequence[str]) -> list[str | None]:
     """Return for the label at each of the points (n, 2) [pixels] the corner that lies on the point, such that
-    no label overlaps one before it; None where there is no room, or a point is not finite."""
+    no label overlaps one before it; None where there is no room, or a point is not finite. Corners are tried
+    in the order of `CORNERS`; rectangles that only touch do not overlap."""
     taken: list[Rectangle] = []
     found: list[str | None] = []
     for point, text in zip(points.tolist(), texts, strict=True):
@@ -174,10 +176,12 @@ class EquivalentSolid(NamedTuple):
 
 
 def equivalent_solid(inertial: Inertial, moment_factor: float) -> EquivalentSolid:
-    """Return the solid whose moment about each axis is ``mass (a^2 + b^2) / moment_factor``.
+    """Return the uniform box or ellipsoid with the mass, above 0, and the principal moments of a link.
 
-    The factor is 12 for the edges a, b of a box, and 20 for the diameters of an ellipsoid. A negative square
-    counts as zero.
+    Each moment is ``mass (a^2 + b^2) / moment_factor``, with a and b the lengths along the other two
+    principal axes. The factor is 12 for the edges of a box, and 20 for the diameters of an ellipsoid. Axes
+    are in the order of ascending moments, so that the longest length is first. Where the moments are
+    impossible, the square of a length would be negative: that length is 0, and `possible` False.
     """
     moments, axes = np.linalg.eigh(inertial.tensor)
     if np.linalg.det(axes) < 0.0:

@@ -1,4 +1,4 @@
-"""Motion of a world: its engine, its time, and the last finite state, to which it returns from a failure."""
+"""Motion of a world: its engine, its time, and the state kept last, to which it returns after a failure."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def apply_state(engine: Stepper, state: WorldState) -> None:
 
 def _pair(what: str, parts: str, pair: object) -> tuple[ArrayLike, ArrayLike]:
     if not isinstance(pair, tuple) or len(pair) != 2:
-        raise ArgumentError(f"the state of {what} is {shown(pair)}; wanted a pair {parts}")
+        raise ArgumentError(f"the state of {what} is {shown(pair)}; wanted a tuple {parts}")
     return pair
 
 
@@ -104,8 +104,9 @@ STEPS_BETWEEN_CHECKS = 1000
 class Motion:
     """An engine in steps of `dt` [s], each of `substeps` steps of the engine.
 
-    Where an engine fails, a state is not finite, or a call is interrupted, the world is at the last state
-    that was read or checked.
+    Setting or reading the state keeps it if it is finite; so does a check at least every
+    `STEPS_BETWEEN_CHECKS` steps of the engine. Where an engine fails, a state is not finite, or a call is
+    interrupted, the world returns to the state kept last.
     """
 
     def __init__(
@@ -125,9 +126,9 @@ class Motion:
         self.ready: Stepper | None = engine
         """The engine, or None where `engine` must be called: after an interruption, and after `close`."""
         self._kind = engine.name
-        self._good = self._read(engine), 0, 0.0
-        self._state: WorldState | None = self._good[0]
-        self._begun = self._good[0]
+        self._kept = self._read(engine), 0, 0.0
+        self._state: WorldState | None = self._kept[0]
+        self._state_at_start = self._kept[0]
         """State in which the motion began: that of the scene, or the last one that was set."""
 
     @property
@@ -143,13 +144,13 @@ class Motion:
     def time(self) -> float:
         """Time [s]."""
         if self._interrupted:
-            _, steps, start = self._good
+            _, steps, start = self._kept
             return start + steps * self._dt
         return self._start + self._steps * self._dt
 
     @property
     def clock(self) -> tuple[float, int]:
-        """Time [s] at which the steps were counted from, and their number since."""
+        """The time [s] from which steps of `dt` are counted, and their number since then."""
         return self._start, self._steps
 
     @property
@@ -157,15 +158,16 @@ class Motion:
         """State, read from the engine once after each change; DivergedError where it is not finite."""
         _ = self.engine
         if self._state is None:
-            self._note()
+            self._read_and_keep()
         assert self._state is not None
         return self._state
 
     def advance(self, engine: Stepper, n: int, forces: Forces = NO_FORCES, act: Act | None = None) -> None:
-        """Take `n` steps of `dt` in `engine`, the present one, in which `forces` act; or those that `act`
-        returns before each step of the engine.
+        """Take `n` steps of `dt` in which `forces` act, or those that `act` returns before each step of the
+        engine.
 
-        Raises DivergedError and the errors of the engine.
+        `engine` is `ready`, or `engine` where that is None: the caller has looked it up for its commands.
+        Raises DivergedError, and the errors of the engine with the likely causes appended.
         """
         try:
             while n:
@@ -180,7 +182,7 @@ class Motion:
                 self._unchecked += count
                 n -= part
                 if self._unchecked >= STEPS_BETWEEN_CHECKS:
-                    self._note()
+                    self._read_and_keep()
         except BaseException as error:
             self._fail(error)
             raise
@@ -203,8 +205,8 @@ class Motion:
             if clock is not None:
                 self._start, self._steps = clock
             self._state = None
-            self._note()
-            self._begun = self._good[0]
+            self._read_and_keep()
+            self._state_at_start = self._kept[0]
         except BaseException as error:
             self._fail(error)
             raise
@@ -218,8 +220,8 @@ class Motion:
             before.close()
             self._commands.forget()
             self._start, self._steps, self._state = 0.0, 0, None
-            self._note()
-            self._begun = self._good[0]
+            self._read_and_keep()
+            self._state_at_start = self._kept[0]
         except BaseException as error:
             self._fail(error)
             raise
@@ -234,7 +236,7 @@ class Motion:
     # -- failures -----------------------------------------------------------------------------
 
     def _fail(self, error: BaseException) -> None:
-        """Return to the last finite state after an error; after an interruption not before the next call, so
+        """Return to the state kept last after an error; after an interruption not before the next call, so
         that Ctrl-C ends a program at once."""
         if isinstance(error, DivergedError):
             return
@@ -243,8 +245,9 @@ class Motion:
             raise type(error)(f"{error}{causes}") from error.__cause__
         self._interrupted, self.ready = True, None
 
-    def _note(self) -> None:
-        """Read the state; keep it if it is finite, otherwise go back to the one kept before."""
+    def _read_and_keep(self) -> None:
+        """Read the state and keep it if it is finite; otherwise return to the one kept before, and raise
+        DivergedError."""
         assert self._engine is not None
         state = self._read(self._engine)
         bad = [name for name, robot in state.robots.items() if has_diverged(*robot)]
@@ -253,7 +256,7 @@ class Motion:
             names = " and ".join(bad[:3])
             self._diverge(f"the state of {names} is not finite, or its velocity above {DIVERGENCE_SPEED:g}")
         self._state = state
-        self._good = state, self._steps, self._start
+        self._kept = state, self._steps, self._start
         self._unchecked = 0
 
     def _read(self, engine: Stepper) -> WorldState:
@@ -262,10 +265,10 @@ class Motion:
         return WorldState(self.time, PartStates(robots), PartStates(bodies))
 
     def _diverge(self, reason: str) -> NoReturn:
-        """Return to the last state that was finite, and raise DivergedError."""
+        """Return to the state kept last, and raise DivergedError."""
         failed_at, step = self.time, self._steps
         causes = self._recover_and_explain()
-        first = next(iter(self._good[0].robots.values()), None)
+        first = next(iter(self._kept[0].robots.values()), None)
         raise DivergedError(
             f"the world of {self._layout.name} diverged in {self._kind} at {failed_at:.6g} s: "
             f"{reason}{causes}; "
@@ -276,22 +279,22 @@ class Motion:
         )
 
     def _recover_and_explain(self) -> str:
-        """Return to the last finite state; return the likely causes of the failure as part of a message."""
+        """Return to the state kept last; return the likely causes of the failure as part of a message."""
         loads = self._commands.last()
         self._recover()
         begun = self._build()
         try:
-            apply_state(begun, self._begun)
-            causes = likely_causes(begun, self._begun, self.engine, loads, self._dt / self._substeps)
+            apply_state(begun, self._state_at_start)
+            causes = likely_causes(begun, self._state_at_start, self.engine, loads, self._dt / self._substeps)
         finally:
             begun.close()
         return f"; likely cause: {'; '.join(causes)}" if causes else ""
 
     def _recover(self) -> None:
-        """Rebuild the engine at the last state that was finite."""
+        """Rebuild the engine at the state kept last."""
         self._interrupted, self.ready = True, None
         engine = self._build()
-        state, steps, start = self._good
+        state, steps, start = self._kept
         apply_state(engine, state)
         self._commands.forget()
         before, self._engine, self.ready = self._engine, engine, engine

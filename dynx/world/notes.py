@@ -223,7 +223,7 @@ def likely_causes(
 ) -> list[str]:
     """Return what probably made a world diverge in steps of `h` [s], the most likely first.
 
-    `begun` is at the state `start` in which the motion began, `engine` at the last finite state, in which
+    `begun` is at the state `start` in which the motion began, `engine` at the state kept last, in which
     overlaps and positions beyond limits may be consequences. Where nothing is conspicuous, a shorter step is
     recommended.
     """

@@ -289,7 +289,8 @@ class World:
     def state(self) -> WorldState:
         """Time, q and v of each robot, pose and twist of each body.
 
-        Raises DivergedError where they are not finite: the world is then at the last state that was.
+        Raises DivergedError where they are not finite: the world is then at the state that was set, read or
+        checked last.
         """
         return self._motion.state
 

@@ -69,5 +69,5 @@ def test_another_shape_is_a_difference() -> None:
 def test_a_refusal_by_one_is_a_difference_that_names_it() -> None:
     row = compare(MASS, *pair(Refusing))
     assert not row.agree
-    assert row.note == "broken refuses: EngineError: out of order"
+    assert row.note == "broken: EngineError: out of order"
     assert row.worst_sample is None

@@ -138,7 +138,7 @@ CALLS: dict[str, tuple[Callable[[World], object], type[DynxError], str]] = {
     ),
     "forces in a set": (lambda w: w.step(forces={1}), ArgumentError, "list of ExternalForce"),  # type: ignore[arg-type]
     "state with NaN": (lambda w: w.set_state(robots={"arm": ([NAN, 0], [0, 0])}), ArgumentError, "q of arm"),
-    "no pair": (lambda w: w.set_state(robots={"arm": NO_PAIR}), ArgumentError, r"wanted a pair \(q, v\)"),
+    "no pair": (lambda w: w.set_state(robots={"arm": NO_PAIR}), ArgumentError, r"wanted a tuple \(q, v\)"),
     "no state": (lambda w: w.set_state(), ArgumentError, "robots= or bodies="),
     "state of a removed body": (
         lambda w: w.set_state(bodies={"gone": (np.eye(4), [0] * 6)}),

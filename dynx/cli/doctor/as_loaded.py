@@ -35,7 +35,12 @@ def compare(
     json_path: str | None,
     quiet: bool,
 ) -> int:
-    """Compare the engines on each robot; return the exit code of ``dynx agree``."""
+    """Compare the engines on each robot, and print or write the result.
+
+    Returns 0 if all engines load every robot alike, 1 if any differ, 2 if a robot cannot be read or a report
+    cannot be written, and 130 or 143 after an interruption (`dynx.cli.shell.exits`). Raises ArgumentError for
+    an output path and the errors of `check_engines`.
+    """
     outputs = ReportFiles(json=json_path)
     outputs.check()
     check_engines(engines)
@@ -139,7 +144,7 @@ def _show_many(out: Console, reports: Sequence[DoctorReport], seconds: float, no
 def vote_lines(report: DoctorReport, found: Vote) -> list[str]:
     """Write the vote as sentences: which engines agree, which stand alone, and which match the file."""
     if not found.groups:
-        return ["no engine loads the file"]
+        return ["no engine has results on the file"]
     lines = [f"{_and(group)} agree with each other" for group in found.groups if len(group) > 1]
     if len(found.alone) == len(found.groups) > 1:
         lines.append("no two engines agree")
@@ -161,7 +166,7 @@ def vote_lines(report: DoctorReport, found: Vote) -> list[str]:
             off = f"is off by up to {wording.size(error)} ({wording.quantity(quantity)})"
             lines.append(f"{engine.engine} {off if math.isfinite(error) else missing}")
     if largest_error(report) <= report.tolerance:
-        lines.append(f"nothing differs by more than {report.tolerance:g}")
+        lines.append(f"no engine that loads the file is off by more than {report.tolerance:g}")
     for variant in report.variants_off:
         lines += [f"another common call, {variant.engine}: {line}" for line in wording.variant(variant)]
     return lines

@@ -58,7 +58,8 @@ class EpisodeEntry(TypedDict):
 class PairEntry(TypedDict):
     """Two engines: how many episodes part, the first and the median step of those, and each episode.
 
-    `first_entry` names the entry of the observation that differs most at the first step.
+    `first_entry` names the entry of the observation that differs most at the first step; it is null if no
+    episode parts, or if an engine only ends the episode earlier.
     """
 
     engines: list[str]
@@ -103,21 +104,22 @@ class EnvDistanceDocument(TypedDict):
 
 
 def distance_document(
-    task: str, options: dict[str, Any], found: EngineDistance, policies: list[PolicyEntry]
+    task: str, options: dict[str, Any], measurement: EngineDistance, policies: list[PolicyEntry]
 ) -> EnvDistanceDocument:
-    """Return the distance_document of a measurement."""
+    """Return the JSON document of ``dynx env``: for each two engines how many episodes part, when, and by how
+    much. The measurement has at least one episode."""
     return {
         "schema": DISTANCE_SCHEMA,
         "task": task,
         "options": options,
-        "engines": list(found.engines),
-        "tolerance": found.tolerance,
-        "pairs": [_pair(found, found.of(a, b)) for a, b in combinations(found.engines, 2)],
+        "engines": list(measurement.engines),
+        "tolerance": measurement.tolerance,
+        "pairs": [_pair(measurement, measurement.of(a, b)) for a, b in combinations(measurement.engines, 2)],
         "policies": policies,
     }
 
 
-def _pair(found: EngineDistance, episodes: Sequence[EpisodeDifference]) -> PairEntry:
+def _pair(measurement: EngineDistance, episodes: Sequence[EpisodeDifference]) -> PairEntry:
     steps = [each.step for each in episodes if each.step is not None]
     first = min((each.step, k) for k, each in enumerate(episodes) if each.step is not None)[1] if steps else 0
     returns = np.array([each.returns for each in episodes])
@@ -125,18 +127,19 @@ def _pair(found: EngineDistance, episodes: Sequence[EpisodeDifference]) -> PairE
         "engines": list(episodes[0].engines),
         "parted": len(steps),
         "first_step": min(steps, default=None),
-        "first_entry": found.entry_name(episodes[first].entry),
+        "first_entry": measurement.entry_name(episodes[first].entry),
         "median_step": float(np.median(steps)) if steps else None,
         "largest": max(each.largest for each in episodes),
         "mean_returns": returns.mean(axis=0).tolist(),
         "episodes": [
-            entry_of(EpisodeEntry, each, entry_name=found.entry_name(each.entry)) for each in episodes
+            entry_of(EpisodeEntry, each, entry_name=measurement.entry_name(each.entry)) for each in episodes
         ],
     }
 
 
 def policy_entry(path: str, engines: Sequence[str], options: dict[str, Any], episodes: int) -> PolicyEntry:
-    """Judge a policy on each engine."""
+    """Load a policy, run `episodes` of its task on each engine, and return its returns as an entry of the
+    document of ``dynx env``."""
     # Imports PyTorch.
     from dynx.training import TaskSpec, load_policy
     from dynx.training.file_tasks import task_of_file
@@ -150,9 +153,9 @@ def policy_entry(path: str, engines: Sequence[str], options: dict[str, Any], epi
         trained_on = task.engine
         task = TaskSpec(task.id, engine, task.options)
         policy = load_policy(path, task)
-        found = judge(policy, task, episodes)
-        low, high = found.interval
-        rows.append(entry_of(ReturnEntry, found, engine=engine, low=low, high=high))
+        evaluation = judge(policy, task, episodes)
+        low, high = evaluation.interval
+        rows.append(entry_of(ReturnEntry, evaluation, engine=engine, low=low, high=high))
     return {"file": path, "trained_on": trained_on, "episodes": episodes, "engines": rows}
 
 
@@ -179,8 +182,8 @@ class RunEntry(TypedDict):
 class TrainDocument(TypedDict):
     """Runs of one task with several seeds.
 
-    `mean` is that of the runs, each counted once; it lies between `low` and `high` with 95 % confidence,
-    which are null for a single run.
+    `mean` is that of the runs, each counted once; it lies between `low` and `high` with 95 % confidence.
+    These are infinite for a single run, which JSON writes as null.
     """
 
     schema: Literal["dynx.train/1"]
@@ -199,25 +202,26 @@ class TrainDocument(TypedDict):
 
 def run_entry(trained: Trained, seconds: float) -> RunEntry:
     """Return the entry of a finished run."""
-    found = trained.evaluation
-    low, high = found.interval
+    evaluation = trained.evaluation
+    low, high = evaluation.interval
     return entry_of(
         RunEntry,
-        found,
+        evaluation,
         seed=trained.policy.spec.seed,
         folder=str(trained.folder),
         steps=trained.policy.steps_done,
         resumed_at=trained.resumed_at,
-        episodes=len(found.returns),
+        episodes=len(evaluation.returns),
         low=low,
         high=high,
-        least=found.returns.min(),
+        least=evaluation.returns.min(),
         seconds=seconds,
     )
 
 
 def train_document(spec: TrainingSpec, trained: list[Trained], seconds: list[float]) -> TrainDocument:
-    """Return the train_document of the runs of a specification, which differ in the seed."""
+    """Return the JSON document of ``dynx train``: one entry for each run, and the mean over the runs with its
+    95 % interval. The runs differ in the seed; `trained` and `seconds` have one item for each."""
     # Imported here, because schemas are written without the extra ``train``.
     from dynx.training.evaluation import mean_of_runs
 
@@ -266,8 +270,11 @@ class PlayDocument(TypedDict):
     engines: list[JudgementEntry]
 
 
-def play_document(path: str, policy: Policy, found: Sequence[tuple[TaskSpec, Evaluation]]) -> PlayDocument:
-    """Return the play_document of the judgements of a policy."""
+def play_document(
+    path: str, policy: Policy, judgements: Sequence[tuple[TaskSpec, Evaluation]]
+) -> PlayDocument:
+    """Return the JSON document of ``dynx play``: one entry for each task and its evaluation in `judgements`,
+    of which there is at least one."""
     return {
         "schema": "dynx.play/1",
         "file": path,
@@ -275,13 +282,18 @@ def play_document(path: str, policy: Policy, found: Sequence[tuple[TaskSpec, Eva
         "trained_on": policy.spec.task.engine,
         "algorithm": policy.spec.algorithm,
         "steps": policy.steps_done,
-        "seed": found[0][1].seed,
-        "engines": [_judgement_entry(task, each) for task, each in found],
+        "seed": judgements[0][1].seed,
+        "engines": [_judgement_entry(task, each) for task, each in judgements],
     }
 
 
-def _judgement_entry(task: TaskSpec, found: Evaluation) -> JudgementEntry:
-    low, high = found.interval
+def _judgement_entry(task: TaskSpec, evaluation: Evaluation) -> JudgementEntry:
+    low, high = evaluation.interval
     return entry_of(
-        JudgementEntry, found, engine=task.engine, low=low, high=high, mean_length=found.lengths.mean()
+        JudgementEntry,
+        evaluation,
+        engine=task.engine,
+        low=low,
+        high=high,
+        mean_length=evaluation.lengths.mean(),
     )

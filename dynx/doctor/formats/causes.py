@@ -120,7 +120,8 @@ class Vote:
     """Groups of engines that load the file alike, the largest first.
 
     Two engines are alike where no quantity differs by more than the tolerance; such pairs connect a group.
-    `right` are the engines without an error against the reference values.
+    `right` are the engines without an error against the reference values, `refused` those without results:
+    they refuse the file, or are not used on it.
     """
 
     groups: tuple[tuple[str, ...], ...]

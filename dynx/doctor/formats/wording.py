@@ -50,14 +50,15 @@ def quantity(key: str) -> str:
 
 
 def relative(error: float) -> str:
-    """Write a relative error in two digits; ``no value`` where there is none."""
+    """Write a relative error in two digits as a power of ten; ``no value`` where it is not finite."""
     if not math.isfinite(error):
         return "no value"
     return "0" if error == 0.0 else f"{error:.1e}"
 
 
 def size(error: float) -> str:
-    """Write a relative error for readers: ``1900 %``, ``6e-06``, ``no value``."""
+    """Write a relative error in per cent from 1e-3 to below 1e4, otherwise as a power of ten: ``1900 %``,
+    ``6e-06``; ``no value`` where it is not finite."""
     if not math.isfinite(error):
         return "no value"
     if error < _PERCENT or error >= 1e4:
@@ -70,7 +71,7 @@ def effect(each: Effect | None) -> str:
     """Write ``mass matrix off by 1900 %``, ``the file is refused``, or that a cause changes nothing."""
     if each is None:
         return "no effect on this base"
-    if _has_no_size(each):
+    if _only_present(each):
         return f"{quantity(each.quantity)} present"
     if not math.isfinite(each.relative_error):
         return "the file is refused" if each.quantity == "loading" else f"no valid {quantity(each.quantity)}"
@@ -104,18 +105,19 @@ def effects(finding: Finding) -> str:
 def _at_place(each: Effect) -> str:
     if math.isfinite(each.relative_error):
         return f"{size(each.relative_error)} in"
-    if _has_no_size(each):
+    if _only_present(each):
         return f"{quantity(each.quantity)} in"
     return "refused by" if each.quantity == "loading" else f"no valid {quantity(each.quantity)} in"
 
 
-def _has_no_size(each: Effect) -> bool:
-    """Check whether an effect is present or not, whatever its size."""
+def _only_present(each: Effect) -> bool:
+    """Check whether an effect is only said to be present, whatever its size."""
     return any(each.quantity == rule.present_as for rule in all_rules())
 
 
 def difference(key: str, error: float) -> str:
-    """Write an error of one engine: ``mass matrix off by 6e-06``, ``no valid mass matrix``, ``refused``."""
+    """Write an error of one engine: ``mass matrix off by 6e-06``, ``no valid mass matrix``; ``refused`` for
+    the quantity ``loading``, whatever the error."""
     return "refused" if key == "loading" else effect(Effect(key, error))
 
 
@@ -215,7 +217,8 @@ def part(finding: Finding) -> str:
 
 
 def values(several: Sequence[Any]) -> list[str]:
-    """Write values of one property in the fewest digits in which different values differ.
+    """Write values of one property in the fewest digits of `_DIGITS` in which all different values look
+    different; with 17 digits where none does (1 and 1.0).
 
     A value is a number, a text, None or a nested list of them.
     """

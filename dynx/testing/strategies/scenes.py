@@ -49,7 +49,11 @@ COLUMN_SPACING = 0.02
 def in_columns(
     parts: Sequence[SceneRobot | SceneBody], gaps: Sequence[float], columns: int, ground: GroundHeight
 ) -> list[SceneRobot | SceneBody]:
-    """Return the parts in `columns` columns along x, each part above the one before it in its column."""
+    """Return the parts, in the order given, placed in columns along x: part k in column k mod `columns`.
+
+    `gaps` holds for each part the gap [m] between its box and what is below it, the ground or the part
+    before it in the column. Columns are `COLUMN_SPACING` apart.
+    """
     boxes = [_box(part) for part in parts]
     placed = []
     left = 0.0
@@ -70,9 +74,10 @@ def in_columns(
 
 @dataclass(frozen=True)
 class GroundHeight:
-    """Heights of a ground: a plane through the origin, or anything below z = 0."""
+    """Height of the ground: that of a plane, or at most 0."""
 
     normal: Vector | None
+    """Normal of a plane through the origin; None for no ground, or one that is nowhere above z = 0."""
 
     def highest(self, x: float, half: float) -> float:
         """Return the height of the highest point within `half` of (x, 0) on both axes."""
@@ -82,15 +87,15 @@ class GroundHeight:
         return (-a * x + (abs(a) + abs(b)) * half) / c
 
 
-def ground_height(earth: tuple[SceneBody, ...]) -> GroundHeight:
-    if earth and isinstance(earth[0].shapes[0].shape, Plane):
-        x, y, z = earth[0].pose.matrix[:3, 2].tolist()
+def ground_height(ground_bodies: tuple[SceneBody, ...]) -> GroundHeight:
+    if ground_bodies and isinstance(ground_bodies[0].shapes[0].shape, Plane):
+        x, y, z = ground_bodies[0].pose.matrix[:3, 2].tolist()
         return GroundHeight((x, y, z))
     return GroundHeight(None)
 
 
 def _box(part: SceneRobot | SceneBody) -> Corners:
-    """Return the corners of the box around a part at its pose; a point where it has no shape."""
+    """Return the corners of the box around a part at its pose; the world's origin if it has no shape."""
     if isinstance(part, SceneBody):
         placed = [(each.shape, part.pose.matrix @ each.origin.matrix) for each in part.shapes]
     else:
@@ -179,7 +184,8 @@ def scenes(
     fixed_bodies: bool = True,
     meshes: Iterable[Mesh] = (),
 ) -> Strategy[Scene]:
-    """Draw a scene of up to `max_bodies` bodies and `max_robots` robots that every engine can represent.
+    """Return a strategy of scenes that every engine can represent: 1 to `max_bodies` bodies, not counting the
+    ground, and 0 to `max_robots` robots.
 
     Bodies of one shape or several, of any attitude, with their own centre of mass or that of their shapes,
     masses from 0.1 to 10 kg, and materials; fixed bodies; robots from `models` with shapes on their links, on
@@ -194,7 +200,10 @@ def scenes(
     - `fixed_bodies`: whether bodies other than the ground may be fixed
     - `meshes`: meshes that bodies may have, besides primitive shapes
 
-    Shrinks to a plane and one ball at rest above it.
+    Shrinks towards a plane (where `ground` allows it) and one ball at rest above it; a shorter search may
+    stop at another small scene. Raises, at the call, DTypeError for a count that is no int or a flag that is
+    no bool, ArgumentError for a count outside 1 to 20 (of robots, 0 to 20) or a mesh that is no Mesh, and
+    UnknownNameError for another ground.
     """
     for name, value, least in (("max_bodies", max_bodies, 1), ("max_robots", max_robots, 0)):
         if isinstance(value, bool) or not isinstance(value, int):
@@ -236,21 +245,21 @@ def _scenes(options: _SceneOptions) -> Strategy[Scene]:
 
     @st.composite
     def scene(draw: st.DrawFn) -> Scene:
-        earth = draw(grounds)
+        ground_bodies = draw(grounds)
         bodies = draw(st.lists(body, min_size=1, max_size=options.max_bodies))
         robots = draw(st.lists(robot, max_size=options.max_robots))
         columns = draw(st.integers(1, 3))
         gaps = [draw(st.sampled_from((0.01, 0.0, 0.1))) for _ in range(len(bodies) + len(robots))]
         named_robots = [replace(each, name=f"robot{k}") for k, each in enumerate(robots)]
         named_bodies = [replace(each, name=f"body{k}") for k, each in enumerate(bodies)]
-        placed = in_columns([*named_robots, *named_bodies], gaps, columns, ground_height(earth))
+        placed = in_columns([*named_robots, *named_bodies], gaps, columns, ground_height(ground_bodies))
         moved_robots = tuple(each for each in placed if isinstance(each, SceneRobot))
         moved_bodies = tuple(each for each in placed if isinstance(each, SceneBody))
         found = Scene(
             "random_scene",
             robots=moved_robots,
-            bodies=(*earth, *moved_bodies),
-            gravity=draw(_gravities(bool(earth))),
+            bodies=(*ground_bodies, *moved_bodies),
+            gravity=draw(_gravities(bool(ground_bodies))),
         )
         if options.filters:
             found = _with_filters(draw, found)

@@ -49,7 +49,8 @@ def split_name(name: str) -> tuple[str, str | None]:
 
 
 class LinkFrames:
-    """The frames of a robot's links: the body of the mechanism that each is fixed to, and its pose there."""
+    """The frames of a model, its links and added frames: the body of the mechanism that each is fixed to, and
+    its pose there. KeyError for another name."""
 
     def __init__(self, model: Model) -> None:
         self._mechanism = model.mechanism
@@ -71,10 +72,15 @@ class LinkFrames:
 class SceneRobot:
     """A robot: its `model`, and its configuration `q` (nq,) and velocity `v` (nv,) at the start.
 
-    `q` is the neutral configuration and `v` zero where they are None. A fixed base is at `model.base_pose`, a
-    floating one where `q` places it; `at` places either. `materials` are those of single links, by name; the
-    others have `material`. Links of one robot collide with one another only with `self_collision`, and never
-    where a joint connects them. `motors` act in every step of a world that is given none for this robot.
+    None means the neutral configuration for `q` and zero for `v`; after construction both are tuples. A fixed
+    base is at `model.base_pose`, a floating one where `q` places it; `at` places either. `materials` are
+    those of single links, by name; the others have `material`. Links of one robot collide with one another
+    only with `self_collision`, and never where a joint connects them. `motors` act in each step of a world,
+    unless the step is given other motors for this robot.
+
+    Raises ArgumentError for a name, model, material, motor or flag of a wrong kind and for two motors on one
+    joint; ShapeError, DTypeError or NotFiniteError for `q` and `v`, ArgumentError for a quaternion not of
+    unit norm; UnknownNameError for a link in `materials`.
     """
 
     name: str

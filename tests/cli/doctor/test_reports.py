@@ -355,7 +355,7 @@ def test_the_vote_names_engines_alone_and_engines_that_are_right() -> None:
     lines = vote_lines(voters(0.5, 0.5, 0.0), vote(voters(0.5, 0.5, 0.0)))
     assert "a and b agree with each other" in lines
     assert "c matches the reference values of the file" in lines
-    assert vote_lines(DoctorReport("r"), vote(DoctorReport("r"))) == ["no engine loads the file"]
+    assert vote_lines(DoctorReport("r"), vote(DoctorReport("r"))) == ["no engine has results on the file"]
 
 
 @given(st.lists(st.sampled_from([0.0, 1e-15, 0.25, 0.5, float("inf"), float("nan")]), max_size=5))
