@@ -29,7 +29,7 @@ from dynx.model.numbers import MAX_MAGNITUDE, is_real
 from dynx.rbd.integration import Accelerate, ExplicitEuler, RungeKutta4, SemiImplicitEuler
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Array
-from dynx.steppers.registry import world_names
+from dynx.steppers.registry import WITHOUT_CONTACTS, world_names
 
 if TYPE_CHECKING:
     from dynx.steppers.camera import Camera
@@ -410,8 +410,9 @@ class WorldTask(Task):
 
     @classmethod
     def engines(cls) -> tuple[str, ...]:
-        """Return the names of the engines that run worlds, the default first."""
-        return tuple(dict.fromkeys((DEFAULT_WORLD_ENGINE, *world_names())))
+        """Return the names of the engines that run worlds with contacts, the default first."""
+        names = (name for name in world_names() if name not in WITHOUT_CONTACTS)
+        return tuple(dict.fromkeys((DEFAULT_WORLD_ENGINE, *names)))
 
     def open(self, engine: str) -> Episodes:
         """Return the episodes of this task in a world of an engine."""
