@@ -7,11 +7,12 @@ are exact, because nothing touches the robot.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.backends import backend
+from dynx.backends import Backend, backend
 from dynx.backends.dynamics import EngineDynamics
 from dynx.control.bullet import BulletMotor
 from dynx.errors import UnsupportedFeatureError
@@ -45,13 +46,20 @@ class StepperPlant(Plant):
         self._outside = disturbances.sticks or disturbances.has_armature
         if self._outside:
             self._joints = disturbances.implicit_joints(self._h)
-        # Mass matrix and bias by dynx, because some engines take longer for them than for a step.
-        self._backend = backend("compiled", model, validate=False)
-        self._dynamics = EngineDynamics(self._backend)
         x, y, z = model.mechanism.root_center.tolist()
         self._center: Vector3 = (float(x), float(y), float(z))
         self._joints_of_q = slice(7 if model.floating else 0, None)
         self._joints_of_v = slice(6 if model.floating else 0, None)
+
+    @cached_property
+    def _backend(self) -> Backend:
+        """Mass matrix, bias and Jacobians by dynx, because some engines take longer for them than for a step;
+        opened when it is first needed, which a robot without disturbances never does."""
+        return backend("compiled", self.model, validate=False)
+
+    @cached_property
+    def _dynamics(self) -> EngineDynamics:
+        return EngineDynamics(self._backend)
 
     def reset(self, q: Floats, v: Floats) -> None:
         self._q, self._v = q, v
@@ -92,7 +100,8 @@ class StepperPlant(Plant):
 
     def close(self) -> None:
         self._stepper.close()
-        self._backend.close()
+        if "_backend" in vars(self):
+            self._backend.close()
 
     # -- one step -----------------------------------------------------------------------------
 
