@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 from dynx.errors import ArgumentError, DescriptionError, DynxError, shown
 from dynx.files.reading import checked_path, printable, read_file
 from dynx.model.elements import Vector
-from dynx.model.geometry.formats.collada import collada_triangles
 from dynx.model.geometry.formats.facets import obj_triangles, stl_triangles
-from dynx.model.geometry.formats.gltf import gltf_triangles
 from dynx.model.numbers import MAX_MAGNITUDE, finite_vector
 from dynx.spatial.scalar import Floats
 
@@ -121,8 +119,13 @@ def _parsed(path: str, data: bytes, suffix: str) -> Triangles:
             return stl_triangles(data)
         if suffix == ".obj":
             return obj_triangles(data)
+        # Imported here, because most robots have no such meshes, or nobody asks for them.
         if suffix == ".dae":
+            from dynx.model.geometry.formats.collada import collada_triangles
+
             return collada_triangles(data)
+        from dynx.model.geometry.formats.gltf import gltf_triangles
+
         return gltf_triangles(data, partial(_read_beside, path))
     except DynxError:
         raise
