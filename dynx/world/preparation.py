@@ -101,6 +101,12 @@ def _body(body: SceneBody) -> BodyLayout:
     )
 
 
+def _first_pair(layout: Layout) -> str:
+    """Name two parts that may touch, and what lets them pass."""
+    a, b = (shown(layout.colliders[k].name) for k in np.argwhere(layout.collides)[0])
+    return f": {a} and {b} may touch; with collisions=False everything passes through everything"
+
+
 def layout_for(kind: type[Stepper], layout: Layout) -> Layout:
     """Return the layout that an engine gets: that of the scene, without joint dynamics which it does not have
     and which are therefore computed outside of it.
@@ -120,6 +126,7 @@ def layout_for(kind: type[Stepper], layout: Layout) -> Layout:
         if is_needed and feature not in provided:
             raise UnsupportedFeatureError(
                 f"the scene {shown(layout.name)} has {feature.value}, which {kind.name!r} does not have"
+                + (_first_pair(layout) if feature is Feature.CONTACTS else "")
             )
     return replace(layout, robots=tuple(_with_provided_joints(robot, provided) for robot in layout.robots))
 
