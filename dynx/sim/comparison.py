@@ -13,6 +13,7 @@ from typing import Any, TypeVar, overload
 
 import numpy as np
 
+from dynx.control.base import Controller, chain_of
 from dynx.errors import ArgumentError, DynxError, shown
 from dynx.files.pages import html_grid
 from dynx.model import Model
@@ -34,7 +35,7 @@ from dynx.sim.scenario.documents import (
     encode,
     in_words,
 )
-from dynx.sim.scenario.scenario import Scenario, field_names
+from dynx.sim.scenario.scenario import Difference, Scenario, document_differences, field_names
 from dynx.sim.simulation import simulate
 from dynx.steppers.clock import Clock
 from dynx.world.comparison import WorldComparison, compare_engines
@@ -296,6 +297,7 @@ class Mixture:
 
     def __init__(self, ours: Scenario, theirs: Scenario) -> None:
         self.ours, self.theirs = ours.with_defaults(), theirs.with_defaults()
+        self._own_models = _controllers_have_own_models(ours, theirs)
         self._robot_edits: dict[str, Sequence[Edit]] = {}
         self._scene_edits: dict[str, Sequence[Edit]] = {}
         self._parts: dict[str, tuple[str, tuple[str, ...]]] = {}
@@ -336,16 +338,17 @@ class Mixture:
         value = getattr(source, field)
         if isinstance(value, Unknown):
             raise ArgumentError(f"the {field} cannot be rebuilt from the file")
-        if not paths and (field != "controller" or model == source.model):
+        own = field == "controller" and self._own_models
+        if not paths and (field != "controller" or own or model == source.model):
             return value
-        document = encode(value, source.model)
-        theirs = encode(getattr(self.theirs, field), self.theirs.model)
+        document = self._document(field, source)
+        theirs = self._document(field, self.theirs)
         for path in paths:
             document = _with_part(document, theirs, path)
-        if model == self.theirs.model and document == theirs:
+        if document == theirs and (own or model == self.theirs.model):
             # The object itself does not have to be rebuilt, which may be impossible.
             return getattr(self.theirs, field)
-        found = decode(document, model)
+        found = decode(document, self.ours.model if own else model)
         if isinstance(found, Unknown):
             raise ArgumentError(
                 f"the {field} cannot be rebuilt with another robot or other gains: it is no frozen "
@@ -353,13 +356,28 @@ class Mixture:
             )
         return found
 
+    def _document(self, field: str, scenario: Scenario) -> Document:
+        """Return the document of a field, in which a controller that keeps its model has it relative to our
+        robot."""
+        own = field == "controller" and self._own_models
+        return encode(getattr(scenario, field), (self.ours if own else scenario).model)
+
+    def _differences(self) -> list[Difference]:
+        """Return the fields that differ; a model that both controllers have is no difference."""
+        found = self.ours.differences(self.theirs)
+        if not self._own_models:
+            return found
+        pair = (self._document("controller", each) for each in (self.ours, self.theirs))
+        rest = [each for each in found if each.field.partition(".")[0] != "controller"]
+        return [*document_differences("controller", *pair), *rest]
+
     def _find(self) -> Iterator[Factor]:
         yield from self._of_robot()
         divided = divisible(self.ours.plant, self.theirs.plant)
         if divided:
             yield from self._of_scene()
         tied = _tied_times(self.ours, self.theirs)
-        for found in self.ours.differences(self.theirs):
+        for found in self._differences():
             field, *path = found.field.split(".")
             if field in ("model", *IRRELEVANT, *tied[1:]) or (field == "plant" and divided):
                 continue
@@ -377,7 +395,7 @@ class Mixture:
         """Return True if a part of a field can be taken over without the rest."""
         if field not in DIVIDED or any(part.startswith(("class ", "code ")) for part in path):
             return False
-        both = (encode(getattr(each, field), each.model) for each in (self.ours, self.theirs))
+        both = (self._document(field, each) for each in (self.ours, self.theirs))
         return not any(FINGERPRINT in each for each in both)
 
     def _in_words(self, field: str, tied: Collection[str]) -> tuple[str, str]:
@@ -418,6 +436,20 @@ class Mixture:
             for name, both, edits in scene_factors(ours, theirs):
                 self._scene_edits[name] = edits
                 yield Factor(name, *both)
+
+
+def _controllers_have_own_models(ours: Scenario, theirs: Scenario) -> bool:
+    """Return True if the robots differ, and a controller is not made for that of its scenario: then both
+    controllers keep their models where the robot changes, else they follow it."""
+    both = [(each.controller, each.model) for each in (ours, theirs)]
+    if ours.model == theirs.model or any(isinstance(controller, Unknown) for controller, _ in both):
+        return False
+    return any(
+        each.model != model
+        for controller, model in both
+        if isinstance(controller, Controller)
+        for each in chain_of(controller)
+    )
 
 
 def _tied_times(ours: Scenario, theirs: Scenario) -> tuple[str, ...]:

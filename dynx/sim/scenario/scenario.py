@@ -82,7 +82,7 @@ def innermost(difference: Difference) -> Difference:
     if not any(isinstance(each, dict) for each in ours) and in_words(ours) != in_words(theirs):
         return difference
     k = next(k for k, entries in enumerate(zip(ours, theirs, strict=True)) if not _same(*entries))
-    return innermost(_differences(f"{name}[{k}]", ours[k], theirs[k])[0])
+    return innermost(document_differences(f"{name}[{k}]", ours[k], theirs[k])[0])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -166,7 +166,7 @@ class Scenario(SimulationOptions):
                     found.append(Difference(name, mine, its))
                 continue
             pair = encode(mine, self.model), encode(its, other.model)
-            found += _differences(name, *pair)
+            found += document_differences(name, *pair)
         return found
 
     def __eq__(self, other: object) -> bool:
@@ -295,14 +295,14 @@ def _simulated(duration: float | None, dt: float) -> float | None:
     return duration if abs(simulated - duration) <= TIME_ROUNDING * simulated else simulated
 
 
-def _differences(name: str, ours: Document, theirs: Document) -> list[Difference]:
+def document_differences(name: str, ours: Document, theirs: Document) -> list[Difference]:
     """Yield the innermost entries in which two documents differ."""
     if _same(ours, theirs):
         return []
     one, other = _parts_of(ours), _parts_of(theirs)
     if one is None or other is None or one.keys() != other.keys():
         return [Difference(name, ours, theirs)]
-    inner = [found for key in one for found in _differences(f"{name}.{key}", one[key], other[key])]
+    inner = [found for key in one for found in document_differences(f"{name}.{key}", one[key], other[key])]
     return inner or [Difference(name, ours, theirs)]
 
 

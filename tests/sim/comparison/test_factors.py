@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -62,15 +63,45 @@ def test_the_model_of_a_controller_is_a_difference_of_its_own() -> None:
     assert model.alone == pytest.approx(np.abs(direct.q - found.ours.q).max(), rel=1e-9)
 
 
-def test_a_robot_that_its_controller_does_not_know() -> None:
-    found = compared(START, replace(START, model=ARM.with_gravity([0.0, 0.0, -1.6])))
+CONTROLLERS: dict[str, Callable[[Model], control.Controller[Any]]] = {
+    "computed torque": lambda robot: control.ComputedTorque(robot, kp=100.0, kd=20.0),
+    "PD with gravity": lambda robot: control.GravityCompensatedPD(robot, kp=500.0, kd=20.0),
+    "limited": lambda robot: control.Saturated(
+        control.GravityCompensatedPD(robot, kp=500.0, kd=20.0), limit=50.0
+    ),
+    "not registered": lambda robot: Own(robot, 1.0),
+}
+
+
+@pytest.mark.parametrize("make", CONTROLLERS.values(), ids=CONTROLLERS)
+@pytest.mark.parametrize("change", ["mass", "gravity"])
+def test_a_change_of_the_robot_that_its_controller_does_not_know_is_one_cause(
+    make: Callable[[Model], control.Controller[Any]], change: str
+) -> None:
+    other = heavier(ARM, "forearm_link") if change == "mass" else ARM.with_gravity([0.0, 0.0, -1.6])
+    ours = replace(START, controller=make(ARM))
+    found = compared(ours, replace(ours, model=other))
     assert found.proved
-    # A robot with its controller moves alike under any gravity; only both together are a cause.
-    assert names(found) == {"gravity", "controller.model"}
+    (cause,) = found.causes
+    assert cause.factor.name == ("link forearm_link, inertial" if change == "mass" else "gravity")
+    assert cause.alone == cause.without == found.separation.largest > found.tolerance
+
+
+def test_a_controller_with_a_third_robot_is_a_cause_beside_the_robot() -> None:
+    known = control.ComputedTorque(heavier(ARM, "wrist_1_link"), kp=90.0, kd=20.0)
+    theirs = replace(START, model=heavier(ARM, "forearm_link"), controller=known)
+    found = compared(START, theirs)
+    assert found.proved
+    assert names(found) == {"link forearm_link, inertial", "controller.model", "controller.kp"}
+    direct = {
+        "link forearm_link, inertial": replace(START, model=theirs.model),
+        "controller.model": replace(START, controller=control.ComputedTorque(known.model, kp=100.0, kd=20.0)),
+    }
     for cause in found.causes:
-        assert cause.alone is not None
-        assert cause.alone < 1e-9
-        assert cause.without == pytest.approx(found.separation.largest, rel=1e-6)
+        assert cause.acts(found.tolerance)
+        if cause.factor.name in direct:
+            alone = simulate(direct[cause.factor.name])
+            assert cause.alone == pytest.approx(np.abs(alone.q - found.ours.q).max(), rel=1e-9)
 
 
 def test_gains_of_a_controller_inside_another() -> None:
