@@ -35,7 +35,11 @@ SOURCES = {
 }
 """Room of dynx -> its folder, or its file where it is a single module."""
 TESTS = tuple(
-    sorted(f"tests/{path.name}" for path in (ROOT / "tests").iterdir() if (path / "__init__.py").exists())
+    sorted(
+        f"tests/{path.name}"
+        for path in (ROOT / "tests").iterdir()
+        if (path / "__init__.py").exists() or path.match("test_*.py")
+    )
 )
 MIN_PER_ROOM = 12
 """Least number of mutants of a room in the sample, if the room has as many places."""
@@ -45,7 +49,7 @@ def main() -> None:
     arguments = parser().parse_args()
     arguments.results.mkdir(parents=True, exist_ok=True)
     map_file = arguments.results / "coverage.json"
-    coverage = CoverageMap.load(map_file)
+    coverage = CoverageMap.load(map_file).moved(ROOT)
     if arguments.record is not None:
         os.environ.setdefault("HYPOTHESIS_PROFILE", "coverage")
         tests = arguments.record or list(TESTS)

@@ -1,7 +1,8 @@
 """Which tests execute a line of dynx, and how long each takes.
 
 Recorded by coverage.py, whose dynamic contexts name the test that runs. Recording again replaces what is
-known of the files of tests that ran, and keeps the rest.
+known of the files of tests that ran, and keeps the rest. The lines are those of the sources as they were
+then; `CoverageMap.moved` finds them in the sources as they stand.
 """
 
 from __future__ import annotations
@@ -10,7 +11,9 @@ import json
 from collections import defaultdict
 from collections.abc import Generator
 from dataclasses import dataclass, field
+from difflib import SequenceMatcher
 from pathlib import Path
+from zlib import crc32
 
 import coverage
 import pytest
@@ -24,6 +27,8 @@ class CoverageMap:
     """Test -> time that it took, with its fixtures [s]."""
     lines: dict[str, dict[int, set[str]]] = field(default_factory=dict)
     """Path of a source file -> line -> tests."""
+    texts: dict[str, list[int]] = field(default_factory=dict)
+    """Path of a source file -> checksums of the lines that it had."""
 
     def tests(self, path: str, first: int, last: int) -> set[str]:
         """Return the tests that execute one of these lines, or for lines of imports any line of the file."""
@@ -42,7 +47,7 @@ class CoverageMap:
             file: {int(line): {names[number] for number in numbers} for line, numbers in found.items()}
             for file, found in document["lines"].items()
         }
-        return cls(document["durations"], lines)
+        return cls(document["durations"], lines, document["texts"])
 
     def save(self, path: Path) -> None:
         numbers = {name: number for number, name in enumerate(self.durations)}
@@ -50,19 +55,44 @@ class CoverageMap:
             file: {line: sorted(numbers[test] for test in tests) for line, tests in found.items()}
             for file, found in self.lines.items()
         }
-        path.write_text(json.dumps({"durations": self.durations, "lines": lines}), encoding="utf-8")
+        document = {"durations": self.durations, "lines": lines, "texts": self.texts}
+        path.write_text(json.dumps(document), encoding="utf-8")
+
+    def moved(self, root: Path) -> CoverageMap:
+        """Return this map for the sources as they stand: a line keeps its tests where edits move it, and
+        changed lines have the tests of all that they replace."""
+        texts = {path: checksums(root / path) for path in self.lines if (root / path).exists()}
+        moved = CoverageMap(self.durations, {}, texts)
+        for path, text in texts.items():
+            before = self.lines[path]
+            after: dict[int, set[str]] = {}
+            blocks = SequenceMatcher(None, self.texts[path], text, autojunk=False).get_opcodes()
+            for kind, first, last, new_first, new_last in blocks:
+                replaced = {test for line in range(first, last) for test in before.get(line + 1, ())}
+                for line in range(new_first, new_last):
+                    tests = before.get(first + line - new_first + 1) if kind == "equal" else replaced
+                    if tests:
+                        after[line + 1] = tests
+            moved.lines[path] = after
+        return moved
 
     def replace(self, other: CoverageMap) -> None:
         """Take over what `other` recorded, and forget what was known of the files of its tests."""
         files = {name.partition("::")[0] for name in other.durations}
         kept = {name: time for name, time in self.durations.items() if name.partition("::")[0] not in files}
         self.durations = kept | other.durations
+        self.texts |= other.texts
         for file in {*self.lines, *other.lines}:
             merged: defaultdict[int, set[str]] = defaultdict(set)
             for tests_by_line, names in ((self.lines, kept), (other.lines, other.durations)):
                 for line, tests in tests_by_line.get(file, {}).items():
                     merged[line] |= {test for test in tests if test in names}
             self.lines[file] = dict(merged)
+
+
+def checksums(source: Path) -> list[int]:
+    """Return a checksum of each line of a file."""
+    return [crc32(line) for line in source.read_bytes().splitlines()]
 
 
 class ContextSwitcher:
@@ -102,4 +132,4 @@ def record(root: Path, tests: list[str], scratch: Path) -> CoverageMap:
             line: {context for context in contexts if context in passed}
             for line, contexts in data.contexts_by_lineno(file).items()
         }
-    return CoverageMap(passed, found)
+    return CoverageMap(passed, found, {path: checksums(root / path) for path in found})

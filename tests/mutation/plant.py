@@ -1,7 +1,9 @@
 """A pytest plugin that imports one module of dynx from other source than that on the disk.
 
 ``pytest -p tests.mutation.plant`` with DYNX_PLANT naming a JSON file ``{"module": ..., "source": ...}``.
-It is a plugin, because pytest puts its own finder first as it starts, and that one reads the disk.
+It is a plugin, because pytest puts its own finder first as it starts, and that one reads the disk. A copy of
+this file named ``sitecustomize.py`` does the same in every process of Python that has its folder in
+PYTHONPATH.
 """
 
 from __future__ import annotations

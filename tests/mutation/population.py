@@ -18,7 +18,8 @@ from libcst.metadata import MetadataWrapper, ParentNodeProvider, PositionProvide
 from mutmut.mutation.mutators import mutation_operators
 
 SKIPPED = (cst.Annotation, cst.Decorator, cst.Import, cst.ImportFrom, cst.Raise, cst.Assert)
-SKIPPED_CALLS = ("cast", "TypeVar", "NewType", "warn", "error")
+TYPE_VARIABLES = ("TypeVar", "ParamSpec", "NewType")
+SKIPPED_CALLS = ("cast", "warn", "error", *TYPE_VARIABLES)
 """Names of functions whose arguments only say a type or the text of a message; likewise ``...Error``."""
 
 TYPE_CHECKING = cst.Name("TYPE_CHECKING")
@@ -187,7 +188,7 @@ def _skipped(node: cst.CSTNode, parents: Parents) -> bool:
             return True
         if isinstance(each, cst.Expr) and isinstance(each.value, cst.SimpleString | cst.ConcatenatedString):
             return True
-        if isinstance(each, cst.Assign) and (_target(each) == "__all__" or _is_type(each.value)):
+        if isinstance(each, cst.Assign) and (_target(each) == "__all__" or _is_alias(each)):
             return True
         if isinstance(each, cst.If) and each.test.deep_equals(TYPE_CHECKING):
             return True
@@ -206,9 +207,17 @@ def _target(assign: cst.Assign) -> str:
     return target.value if isinstance(target, cst.Name) else ""
 
 
-def _is_type(value: cst.BaseExpression) -> bool:
-    """Return whether a value is a generic type, as in ``Vector = npt.NDArray[np.float64]``."""
+def _is_alias(assign: cst.Assign) -> bool:
+    """Return whether this names a type for annotations: ``Vector = npt.NDArray[np.float64]``, ``A | B``."""
+    value = assign.value
+    if isinstance(value, cst.BinaryOperation):
+        name = _target(assign).lstrip("_")
+        return isinstance(value.operator, cst.BitOr) and name[:1].isupper() and not name.isupper()
+    if isinstance(value, cst.Call):
+        return isinstance(value.func, cst.Name) and value.func.value in TYPE_VARIABLES
     if not isinstance(value, cst.Subscript):
         return False
-    name = value.value.attr if isinstance(value.value, cst.Attribute) else value.value
-    return isinstance(name, cst.Name) and (name.value[0].isupper() or name.value in ("dict", "list", "tuple"))
+    generic = value.value.attr if isinstance(value.value, cst.Attribute) else value.value
+    return isinstance(generic, cst.Name) and (
+        generic.value[0].isupper() or generic.value in ("dict", "list", "tuple", "type")
+    )

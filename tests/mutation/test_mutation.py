@@ -10,19 +10,21 @@ import pytest
 pytest.importorskip("mutmut", reason="mutation runs need the extra 'mutation'")
 
 from tests.mutation.__main__ import MIN_PER_ROOM, SOURCES
-from tests.mutation.coverage_map import CoverageMap
+from tests.mutation.coverage_map import CoverageMap, checksums
 from tests.mutation.population import places, sample
-from tests.mutation.trial import BROKEN, CAUGHT, SURVIVED, ordered, verdict
-from tests.mutation.warm import ROOT
+from tests.mutation.trial import BROKEN, CAUGHT, SURVIVED, ordered, own_tests, verdict
+from tests.mutation.warm import ROOT, Change, Runner
 
 SOURCE = '''"""Docstring."""
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 if TYPE_CHECKING:
     LIMIT = 1
 
 __all__ = ["f"]
 Pair = dict[str, "int"]
+Kind = TypeVar("Kind", bound=int)
+Real = int | float
 
 def f(x: "int") -> "int":
     """Docstring."""
@@ -43,7 +45,7 @@ def root(tmp_path: Path) -> Path:
 
 def test_the_population_is_what_decides_behaviour(root: Path) -> None:
     found = {(place.function, place.text, place.line) for place in places(root, "dynx/f.py")}
-    assert found == {("f", "== 1", 13), ("f", "1", 13), ("f", 'cast("int", x) + 2', 15), ("f", "2", 15)}
+    assert found == {("f", "== 1", 15), ("f", "1", 15), ("f", 'cast("int", x) + 2', 17), ("f", "2", 17)}
 
 
 SMALL_ROOMS = {"safe_path"}
@@ -103,6 +105,12 @@ def test_each_test_comes_once_before_any_with_other_parameters() -> None:
     assert ordered(set(durations), durations, "rbd") == ["t::f[a]", "tests/rbd/t::own", "t::slow", "t::f[b]"]
 
 
+def test_a_module_has_its_own_tests_at_the_mirrored_path() -> None:
+    assert own_tests("dynx/errors.py") == "tests/test_errors.py"
+    assert own_tests("dynx/rbd/aba.py") == "tests/rbd/test_aba.py"
+    assert own_tests("dynx/model/xml/text.py") == "tests/model/xml/test_text.py"
+
+
 def test_a_verdict_names_the_test_that_failed() -> None:
     assert verdict(0, "") == (SURVIVED, "")
     assert verdict(1, "FAILED tests/t.py::a[1] - AssertionError\n") == (CAUGHT, "tests/t.py::a[1]")
@@ -125,3 +133,33 @@ def test_a_map_is_what_was_saved_and_replaced_by_folder(tmp_path: Path) -> None:
     assert loaded.durations == {"b.py::t": 2.0, "a.py::u": 3.0}
     assert loaded.tests("x.py", 2, 2) == {"b.py::t", "a.py::u"}
     assert loaded.tests("x.py", 7, 7) == {"b.py::t", "a.py::u"}
+
+
+def test_lines_keep_their_tests_where_edits_move_them(tmp_path: Path) -> None:
+    source = tmp_path / "x.py"
+    source.write_text("a\nb\nc\nd\n")
+    lines = {1: {"t::a"}, 2: {"t::b"}, 3: {"t::c"}, 4: {"t::d"}}
+    recorded = CoverageMap(
+        {}, {"x.py": lines, "gone.py": {1: {"t::a"}}}, {"x.py": checksums(source), "gone.py": [0]}
+    )
+    source.write_text("new\na\nother\nd\n")
+    moved = recorded.moved(tmp_path)
+    assert moved.lines == {"x.py": {2: {"t::a"}, 3: {"t::b", "t::c"}, 4: {"t::d"}}}
+    assert moved.moved(tmp_path) == moved
+
+
+def test_a_change_reaches_the_tests_and_the_processes_that_they_start(tmp_path: Path) -> None:
+    test = tmp_path / "test_changed.py"
+    test.write_text(
+        "import subprocess, sys\n"
+        "PROGRAM = 'import dynx.safe_path; print(dynx.safe_path.changed)'\n"
+        "def test_here():\n"
+        "    import dynx.safe_path\n"
+        "    assert dynx.safe_path.changed == 'yes'\n"
+        "def test_in_a_child():\n"
+        "    assert subprocess.check_output([sys.executable, '-c', PROGRAM], text=True) == 'yes\\n'\n"
+    )
+    with Runner() as runner:
+        assert runner.run([str(test)], Change("dynx.safe_path", "changed = 'yes'"))[0] == 0
+        assert runner.run([f"{test}::test_here"])[0] == 1
+        assert runner.run([f"{test}::test_in_a_child"])[0] == 1

@@ -61,7 +61,7 @@ def ordered(tests: set[str], durations: dict[str, float], room: str) -> list[str
 def own_tests(path: str) -> str:
     """Return the file of the tests of a module, which may look at its constants and execute no line of it."""
     folder, _, name = path.removeprefix("dynx/").rpartition("/")
-    return f"tests/{folder}/test_{name}"
+    return "/".join(filter(None, ("tests", folder, f"test_{name}")))
 
 
 def attempt(mutant: Mutant, coverage: CoverageMap, runner: Runner) -> Outcome:

@@ -12,6 +12,7 @@ import contextlib
 import gc
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -120,6 +121,8 @@ def serve() -> None:
             # Later runs read the bytecode that one run writes, which halves the time of most. A changed
             # module never writes any (`tests.mutation.plant`).
             sys.pycache_prefix, sys.dont_write_bytecode = folder, False
+        # Processes that the tests start import the changed module too: Python runs a module of this name.
+        shutil.copy(Path(__file__).with_name("plant.py"), Path(folder, "sitecustomize.py"))
         for line in sys.stdin:
             request = json.loads(line)
             if request["change"] is not None:
@@ -168,6 +171,8 @@ def run_here(request: dict[str, Any], output: int) -> int:
     os.environ["HYPOTHESIS_PROFILE"] = "mutation"
     if request["change"] is not None:
         os.environ["DYNX_PLANT"] = request["change"]
+        others = filter(None, [os.environ.get("PYTHONPATH")])
+        os.environ["PYTHONPATH"] = os.pathsep.join([str(Path(request["change"]).parent), *others])
         # Kernels are compiled anew: those in the cache are from the source on the disk.
         os.environ["DYNX_CACHE"] = "0"
     import pytest
