@@ -260,15 +260,17 @@ def located(message: str, source: str | None, line: int | None) -> str:
 def shown(text: object, limit: int = 80) -> str:
     """Quote `text` for a message, with control characters escaped and at most `limit` characters."""
     written = _written(text)
-    quoted = repr(written)
-    return quoted if len(quoted) <= limit else f"{quoted[: limit - 20]}...' ({len(written)} characters)"
+    return _shortened(repr(written), f"...' ({len(written)} characters)", limit)
 
 
 def escaped(text: object, limit: int = 80) -> str:
     """Escape and shorten `text` as `shown` does, without quotes: for a tag, or a message of an engine."""
     written = _written(text)
-    inside = repr(written)[1:-1]
-    return inside if len(inside) <= limit else f"{inside[: limit - 20]}... ({len(written)} characters)"
+    return _shortened(repr(written)[1:-1], f"... ({len(written)} characters)", limit)
+
+
+def _shortened(text: str, ending: str, limit: int) -> str:
+    return text if len(text) <= limit else text[: limit - len(ending)] + ending
 
 
 def _written(value: object) -> str:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
 
 import dynx
 from dynx.errors import ArgumentError, UnknownNameError
-from dynx.option_names import checks_option_names
+from dynx.option_names import checks_option_names, takes
+from dynx.sim.scenario.options import option
 from dynx.steppers.forces import ExternalForce
 from dynx.world import Scene, World, box
 
@@ -75,3 +77,52 @@ def test_compare_with_wrong_arguments_names_itself_alone(given: tuple[Any, ...])
             dynx.compare(*pair, *extra, *given)
         with pytest.raises(UnknownNameError, match=r"^compare has no option 'tolerence'"):
             dynx.compare(*pair, tolerence=1.0)
+
+
+@dataclass(frozen=True)
+class ThrowArguments:
+    """Arguments of `throw`."""
+
+    target: str
+    speed: float = option(2.5, "Speed of release", unit="m/s", group="Throw")
+    tags: list[str] = field(default_factory=list)
+
+
+@takes(ThrowArguments)
+def throw(arguments: ThrowArguments) -> float:
+    """Throw.
+
+    At a target.
+    """
+    return arguments.speed * len(arguments.target)
+
+
+def test_a_function_that_takes_a_dataclass_has_its_signature_and_documents_its_options() -> None:
+    assert throw("door") == throw(target="door", speed=2.5) == 10.0
+    assert throw("door", 1.0, ["high"]) == 4.0
+    signature = inspect.signature(throw)
+    assert list(signature.parameters) == ["target", "speed", "tags"]
+    assert signature.return_annotation in (float, "float")
+    text = inspect.getdoc(throw)
+    assert text is not None
+    before, options = text.split("Options:\n")
+    assert before.strip().endswith("At a target.")
+    lines = [line for line in options.splitlines() if line.strip()]
+    assert len(lines) == 1
+    assert lines[0].startswith("    speed: Speed of release")
+    assert "m/s" in lines[0]
+
+
+def test_arguments_that_do_not_fit_a_dataclass_are_refused_in_the_name_of_the_function() -> None:
+    with pytest.raises(UnknownNameError, match="throw has no option 'sped'; did you mean 'speed'"):
+        throw("door", sped=1.0)  # type: ignore[call-arg]
+    for arguments, options in (((), {}), (("door", 1.0, [], 2), {}), (("door",), {"target": "wall"})):
+        with pytest.raises(TypeError, match=r"^throw: "):
+            throw(*arguments, **options)  # type: ignore[arg-type]
+
+
+def test_a_field_that_is_missing_or_unknown_names_the_class() -> None:
+    with pytest.raises(UnknownNameError, match="ExternalForce has no option 'at_time'"):
+        ExternalForce(on="tip", wrench=[0.0] * 6, at_time=1.0)  # type: ignore[call-arg]
+    with pytest.raises(UnknownNameError, match="'self'"):
+        act(self=1, duration=1.0)  # type: ignore[call-arg]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from itertools import pairwise
 
@@ -11,7 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import dynx
-from dynx.backends.solvability import condition_bound, mass_matrix_of_floats, singular_direction
+from dynx.backends.solvability import (
+    condition_bound,
+    mass_matrix_of_floats,
+    singular_coordinates,
+    singular_direction,
+)
 from dynx.model import Inertial, Joint, Link, Model, Pose
 from dynx.model.tree import Base
 from dynx.rbd.crba import mass_matrix
@@ -78,6 +84,41 @@ def pointed() -> Model:
         for k, (parent, child) in enumerate(pairwise(names))
     ]
     return Model.build("pointed", links, joints)
+
+
+@pytest.mark.parametrize("share", [1e-10, 1e-11, 1e-12])
+def test_the_condition_of_two_hinges_of_one_axis_is_the_closed_form(share: float) -> None:
+    def wheel(name: str, moment: float) -> Link:
+        return Link(name, Inertial(1.0, ixx=1.0, iyy=1.0, izz=moment))
+
+    joints = [
+        Joint(f"to_{child}", "continuous", parent, child, Pose(), (0.0, 0.0, 1.0))
+        for parent, child in (("base", "light"), ("light", "heavy"))
+    ]
+    model = Model.build("coaxial", [Link("base"), wheel("light", share), wheel("heavy", 1.0)], joints)
+    found = singular_direction(model, np.zeros(2))
+    # M is [[1 + share, 1], [1, 1]], and scaled [[1, c], [c, 1]] with c^2 = 1 / (1 + share).
+    c = 1.0 / np.sqrt(1.0 + share)
+    condition = (1.0 + c) ** 2 * (1.0 + share) / share
+    assert found is not None
+    assert found.condition == pytest.approx(condition, rel=8.0 * np.finfo(float).eps * condition)
+    assert not found.to_rounding
+    assert abs(found.direction) == pytest.approx(np.sqrt([0.5, 0.5]))
+    assert found.direction[0] * found.direction[1] < 0.0
+
+
+@pytest.mark.parametrize("count", [1, 6, 7, 9])
+def test_joints_without_inertia_are_named_or_counted(count: int) -> None:
+    names = [f"massless_{number}" for number in range(count)]
+    joints = [Joint(name, "continuous", "base", f"tip_{name}", Pose(), (0.0, 0.0, 1.0)) for name in names]
+    model = Model.build("massless", [Link("base"), *(Link(f"tip_{name}") for name in names)], joints)
+    found = singular_coordinates(model)
+    assert found.alone == tuple(names)
+    named = re.findall(r"'(massless_\d)'", found.reason)
+    more = [int(each) for each in re.findall(r"and (\d+) more", found.reason)]
+    assert named == names[: len(named)]
+    assert len(named) + sum(more) == count
+    assert len(named) == min(count, 6)
 
 
 def test_results_that_are_kept_are_of_the_configuration_and_the_robot() -> None:

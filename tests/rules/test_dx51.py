@@ -245,3 +245,18 @@ def test_a_mesh_that_is_missing_is_named_once(tmp_path: Path) -> None:
     assert "'there.stl'" in each.message
     assert "did you mean 'here.stl'" in each.message
     assert find_rule("DX516").detect(case_of(link("base", *shapes))) == []
+
+
+def test_a_missing_mesh_that_pybullet_finds_above_the_description_is_said_to_be_there(tmp_path: Path) -> None:
+    (tmp_path / "urdf").mkdir()
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes" / "above.stl").write_bytes(b"")
+    robot = tmp_path / "urdf" / "robot.urdf"
+    robot.write_text("<robot/>")
+    shapes = [
+        f'<visual><geometry><mesh filename="meshes/{name}.stl"/></geometry></visual>'
+        for name in ("above", "nowhere")
+    ]
+    above, nowhere = find_rule("DX516").detect(case_of(link("base", *shapes), source=robot))
+    assert above.message.endswith("PyBullet alone finds '../meshes/above.stl'")
+    assert nowhere.message == "no file 'meshes/nowhere.stl'"

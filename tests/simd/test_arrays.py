@@ -12,7 +12,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from dynx.simd.arrays import ACCEPTED, DESCRIBED, REFUSED, UNSUITABLE
+from dynx.simd.arrays import ACCEPTED, DESCRIBED, REFUSED, UNSUITABLE, extent_of, is_disjoint
 from dynx.simd.kernel import Kernel
 from dynx.simd.trace import trace
 from dynx.spatial.scalar import Floats
@@ -112,6 +112,32 @@ def test_an_output_over_an_input_is_not_used(first: int) -> None:
     out = memory[first : first + 2 * n].reshape(n, 2)
     shared = np.shares_memory(y, out)
     assert call(np.zeros((n, 2)), y, out) == (UNSUITABLE if shared else ACCEPTED)
+
+
+@given(st.data())
+def test_arrays_of_the_same_memory_are_disjoint_where_they_share_no_number(data: st.DataObject) -> None:
+    memory = np.arange(60.0)
+
+    def view() -> Floats:
+        """Return a view of some rows, in either order, and some columns."""
+        rows, width = data.draw(st.sampled_from([(6, 10), (12, 5), (60, 1)]))
+        table = memory.reshape(rows, width)
+        first, end = sorted(data.draw(st.tuples(*[st.integers(0, rows)] * 2)))
+        left, right = sorted(data.draw(st.tuples(*[st.integers(0, width)] * 2)))
+        assume(first < end and left < right)
+        return table[first:end, left:right][:: data.draw(st.sampled_from([1, 2, -1, -2]))]
+
+    one, other = view(), view()
+    extents = [extent_of(one), extent_of(other)]
+    for array, (first, end) in zip((one, other), extents, strict=True):
+        addresses = [entry.ctypes.data for row in array for entry in np.split(row, len(row))]
+        assert (first, end) == (min(addresses), max(addresses) + 8)
+    apart = extents[0][1] <= extents[1][0] or extents[1][1] <= extents[0][0]
+    for own, array in enumerate((one, other)):
+        # Rows that repeat memory are seen too; here a row is one of a table, and none does.
+        assert is_disjoint(extents, own, array) == apart
+    assert not (apart and np.shares_memory(one, other))
+    assert not is_disjoint(extents, 0, np.broadcast_to(one[:1], (2, one.shape[1])))
 
 
 def test_zero_columns() -> None:

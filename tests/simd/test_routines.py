@@ -62,6 +62,14 @@ def test_a_table_of_calls_is_evaluated_for_every_sample(n: int, threads: int) ->
     np.testing.assert_array_equal(found, whole[:n])
 
 
+def test_a_row_of_the_table_is_as_long_as_its_longest_call() -> None:
+    routines = _scan()
+    assert routines.table_width == 1 + len(("c", "x", "total", "sum"))
+    table = CallTable(routines)
+    table.call("zero", table.reserve(1))
+    assert table.calls.shape == (1, routines.table_width)
+
+
 def test_a_workspace_evaluates_one_sample_or_several() -> None:
     kernel, samples = _kernel([0.5, -2.0]), host().lanes + 3
     x = np.random.default_rng(1).uniform(-3.0, 3.0, (samples, 2))

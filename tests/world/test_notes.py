@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import dynx
 from dynx import Pose
+from dynx.model import Inertial, Joint, Link, Model
+from dynx.model.elements import JointType
 from dynx.world import (
     PointToPoint,
     Scene,
@@ -95,6 +98,39 @@ def test_joints_beyond_their_limits_at_the_start_are_noted(engine: str) -> None:
         assert note.startswith("'arm/elbow' is at -3, beyond its limits -2.6 to 2.6, at the start")
     with World(Scene("s", robots=(robot,)), engine, joint_limits=False) as world:
         assert world.notes == ()
+
+
+@pytest.mark.parametrize(
+    ("kinds", "masses", "ends"),
+    [
+        ("rrr", "001", ("j0", "j2")),
+        ("rrr", "011", None),
+        ("rrr", "101", None),
+        ("prrr", "0001", ("j1", "j3")),
+        ("rrrr", "1001", ("j1", "j3")),
+        ("rrpr", "0011", None),
+        ("rpr", "001", None),
+    ],
+)
+def test_three_hinges_without_mass_between_them_are_noted(
+    kinds: str, masses: str, ends: tuple[str, str] | None
+) -> None:
+    links = [Link("base")]
+    joints = []
+    for k, (kind, mass) in enumerate(zip(kinds, masses, strict=True)):
+        body = Inertial(1.0, Pose((0.1, 0.2, 0.3)), ixx=0.1, iyy=0.2, izz=0.15)
+        links.append(Link(f"l{k}", body if mass == "1" else None))
+        axis = tuple(np.eye(3)[(2 - k) % 3].tolist())
+        type_: JointType = "continuous" if kind == "r" else "prismatic"
+        joints.append(Joint(f"j{k}", type_, links[k].name, f"l{k}", Pose((0.0, 0.1, 0.05)), axis))
+    robot = SceneRobot("wrist", Model.build("wrist", links, joints), q=(0.1, 0.3, -0.2, 0.4)[: len(kinds)])
+    with World(Scene("s", robots=(robot,)), "pybullet" if "pybullet" in WORLDS else WORLDS[0]) as world:
+        found = [note for note in world.notes if "no bound" in note]
+    if ends is None:
+        assert found == []
+    else:
+        (note,) = found
+        assert all(f"'wrist/{name}'" in note for name in ends)
 
 
 @pytest.mark.parametrize("engine", WORLDS)

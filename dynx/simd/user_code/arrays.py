@@ -286,8 +286,8 @@ Sine, cosine, exp, tanh and arctan are operations of the graph, by which their r
 _BY_ENTRIES = frozenset({"add", "subtract", "multiply", "divide", "negative", "absolute", "matmul"})
 """Functions that NumPy evaluates by the operators of the entries."""
 
-_SUMS = frozenset({"dot", "inner", "vdot", "tensordot", "einsum", "mean", "average", "sum", "prod", "cumsum"})
-"""Functions that add floats in an order of their own."""
+_SUMS = frozenset({"dot", "inner", "vdot", "tensordot", "einsum"})
+"""Functions that add floats in an order of their own, besides those that reduce by np.add or np.multiply."""
 
 _REDUCED: dict[str, Callable[[Any, Any], Any]] = {
     "maximum": maximum,

@@ -92,6 +92,26 @@ def test_a_solid_body_gives_no_cause(inertial: Inertial) -> None:
     assert not tree_may_reject(inertial, on_fixed_joint=False)
 
 
+points = st.tuples(coordinates, coordinates, coordinates)
+
+
+@given(points, points, st.tuples(*[st.floats(0.01, 0.02)] * 3), st.floats(-4.0, 0.0))
+def test_on_a_fixed_joint_a_heavy_point_is_refused_and_a_solid_body_of_any_size_is_not(
+    center: tuple[float, float, float],
+    rpy: tuple[float, float, float],
+    moments: tuple[float, float, float],
+    power: float,
+) -> None:
+    size = 10.0**power
+    pose = Pose(tuple((size * np.array(center)).tolist()), rpy)
+    ixx, iyy, izz = (size * size * np.array(moments)).tolist()
+    assert not tree_may_reject(Inertial(1.0, pose, ixx=ixx, iyy=iyy, izz=izz), on_fixed_joint=True)
+    # A point has no moment about the line through the origin: its tensor there is singular. Bullet tolerates
+    # the rounding of a light one.
+    if np.linalg.norm(center) > 0.3:
+        assert tree_may_reject(Inertial(100.0, Pose(center, rpy)), on_fixed_joint=True)
+
+
 def test_the_diagonalisation_is_roughest_where_moments_are_nearly_equal() -> None:
     rough = Inertial(1.0, ixx=0.025, iyy=0.022, izz=0.025, ixy=-3e-5, ixz=-1e-5)
     assert 1e-6 < diagonalisation_error(rough) < 3e-6

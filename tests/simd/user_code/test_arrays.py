@@ -158,3 +158,36 @@ def test_what_has_no_traced_form_is_refused_with_its_line(name: str) -> None:
     with pytest.raises(TraceError, match=message) as caught:
         traced(function, np.ones(N), np.ones(N))
     assert f"{__file__}:" in str(caught.value)
+
+
+SUMMED: dict[str, Function] = {
+    "sum": lambda a, b: np.sum(a) + b,
+    "mean": lambda a, b: np.mean(a) + b,
+    "average": lambda a, b: np.average(a) + b,
+    "prod": lambda a, b: np.prod(a) + b,
+    "cumsum": lambda a, b: np.cumsum(a),
+    "dot": lambda a, b: np.dot(a, MATRIX),
+    "inner": lambda a, b: np.inner(np.ones(N), b) + a,
+    "vdot": lambda a, b: np.vdot(a, b) + a,
+    "einsum": lambda a, b: np.einsum("i,i", a, b) + a,
+    "tensordot": lambda a, b: np.tensordot(a, b, 1) + a,
+    "linalg.norm": lambda a, b: np.linalg.norm(a) * b,
+    "linalg.solve": lambda a, b: np.linalg.solve(MATRIX, a),
+    "interp": lambda a, b: np.interp(a, *TABLE),
+    "sinh": lambda a, b: np.sinh(a),
+    "": lambda a, b: np.where(a > b, np.maximum(a, b), np.clip(b, -1.0, 1.0)) * np.sin(a) + b / 3.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SUMMED)
+def test_a_function_that_a_kernel_may_round_otherwise_is_noted(name: str) -> None:
+    noted: list[str] = []
+
+    def function(a: Any, b: Any) -> Any:
+        found = symbol_array(SUMMED[name](traced_array(a), traced_array(b)))
+        noted.append(a[0].graph.reordered)
+        return found
+
+    trace(function, {"a": (N,), "b": (N,)})
+    # A sum is noted by the name of what it reduces by: np.add.
+    assert [bool(each) for each in noted] == [bool(name)]
