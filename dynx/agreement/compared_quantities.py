@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from dynx.agreement.magnitudes import (
     Scale,
     frame_samples,
     largest,
+    wrench_scale,
 )
 from dynx.agreement.sampling import Samples
 from dynx.backends.quantities import QUANTITIES, Quantity
@@ -122,15 +124,20 @@ def _at_point_scale(magnitudes: Magnitudes) -> Floats:
     return np.stack((([linear] * 3) + [magnitudes.angular_column] * 3) * 2, axis=1)
 
 
-def _with_forces(backend: Any, samples: Samples) -> Array:
-    forces = {samples.wrench_frame: samples.wrench}
+def _with_forces(quantity: str, backend: Any, samples: Samples) -> Array:
+    forces, method = {samples.wrench_frame: samples.wrench}, getattr(backend, quantity)
     by_reference = [
-        backend.inverse_dynamics(
-            samples.q, samples.v, samples.a, external_forces=forces, force_reference=reference
-        )
+        method(samples.q, samples.v, samples.a, external_forces=forces, force_reference=reference)
         for reference in ("local_world_aligned", "local", "world")
     ]
     return np.concatenate(by_reference, axis=-1)
+
+
+def _wrenches_with_forces_scale(magnitudes: Magnitudes) -> Floats:
+    """Return the bound (n, 18) on wrenches with an external one, which is given in three references."""
+    force = np.linalg.norm(magnitudes.samples.wrench[:, :3], axis=-1)
+    moment = np.linalg.norm(magnitudes.samples.wrench[:, 3:], axis=-1) + force * magnitudes.length
+    return np.tile(wrench_scale(magnitudes) + np.stack([force] * 3 + [moment] * 3, axis=-1), 3)
 
 
 def _with_joint_dynamics(backend: Any, samples: Samples) -> Array:
@@ -160,12 +167,28 @@ _VARIANTS = {
         ),
         ComparedQuantity(
             "inverse_dynamics_external_forces",
-            _with_forces,
+            partial(_with_forces, "inverse_dynamics"),
             lambda s: largest(s.torque) + largest(s.wrench_torque),
             _rounding,
         ),
         ComparedQuantity(
             "inverse_dynamics_joint_dynamics", _with_joint_dynamics, _joint_dynamics_scale, _rounding
+        ),
+    ),
+    "joint_wrenches": (
+        ComparedQuantity(
+            "joint_wrenches_external_forces",
+            partial(_with_forces, "joint_wrenches"),
+            lambda s: _wrenches_with_forces_scale(s)[:, None],
+            _rounding,
+        ),
+    ),
+    "base_wrench": (
+        ComparedQuantity(
+            "base_wrench_external_forces",
+            partial(_with_forces, "base_wrench"),
+            _wrenches_with_forces_scale,
+            _rounding,
         ),
     ),
 }

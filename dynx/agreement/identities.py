@@ -14,7 +14,7 @@ import numpy as np
 
 from dynx.agreement import tolerances
 from dynx.agreement.comparison import BackendResults, WorstSample, compare_forward_dynamics, judge, state
-from dynx.agreement.magnitudes import Magnitudes, coriolis_scale, largest, mass_scale
+from dynx.agreement.magnitudes import Magnitudes, coriolis_scale, largest, mass_scale, wrench_scale
 from dynx.agreement.sampling import Samples
 from dynx.agreement.tolerances import STEP
 from dynx.backends import Backend
@@ -163,6 +163,28 @@ def _sum_of_torques(backend: Backend, samples: Samples, magnitudes: Magnitudes) 
     return total - tau, largest(magnitudes.torque + inertial)
 
 
+def _wrenches_along_axes(backend: Backend, samples: Samples, magnitudes: Magnitudes) -> tuple[Floats, Floats]:
+    """Compare the torques with the components of the joint wrenches along the axes, and with the wrench on a
+    floating base."""
+    model, state = samples.model, (samples.q, samples.v, samples.a)
+    wrenches, size = backend.joint_wrenches(*state), wrench_scale(magnitudes)
+    along, sizes = list[Floats](), list[Floats]()
+    if model.floating:
+        along, sizes = list(backend.base_wrench(*state).T), list(size.T)
+    for number, joint in enumerate(model.joints):
+        if joint.moves:
+            rows = slice(0, 3) if joint.type == "prismatic" else slice(3, 6)
+            along.append(wrenches[:, number, rows] @ np.array(joint.axis))
+            sizes.append(size[:, rows.start])
+    if not along:
+        return np.zeros((len(samples), 0)), np.ones(1)
+    coupling = model.mechanism.coupling
+    S = np.eye(len(along)) if coupling is None else coupling.matrix()
+    tau = backend.inverse_dynamics(*state)
+    residual = np.stack(along, axis=-1) @ S - tau
+    return residual, largest(magnitudes.torque) + np.stack(sizes, axis=-1) @ np.abs(S)
+
+
 def _sum_of_bias(backend: Backend, samples: Samples, magnitudes: Magnitudes) -> tuple[Floats, Floats]:
     products = apply_matrix(backend.coriolis_matrix(samples.q, samples.v), samples.v)
     total = products + backend.gravity_torque(samples.q)
@@ -307,6 +329,7 @@ IDENTITIES: tuple[Identity, ...] = (
     Identity("mass matrix is symmetric", _symmetry, _rounding),
     Identity("mass matrix is positive", _positivity, _eigenvalue, _unphysical_link),
     Identity("M a + bias = inverse dynamics", _sum_of_torques, _rounding),
+    Identity("joint wrenches along the axes = inverse dynamics", _wrenches_along_axes, _rounding),
     Identity("C v + gravity = bias", _sum_of_bias, _rounding),
     Identity("linear momentum = mass * velocity of its centre", _momentum_of_center, _rounding),
     Identity("momentum = base rows of M v", _momentum_of_base, _rounding, _only_floating),

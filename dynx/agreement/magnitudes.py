@@ -385,6 +385,17 @@ def _momentum_scale(magnitudes: Magnitudes) -> Floats:
     return np.stack([linear] * 3 + [angular] * 3, axis=-1)
 
 
+def wrench_scale(magnitudes: Magnitudes) -> Floats:
+    """Return a bound (n, 6) on the wrench that moves all links, about any point within the robot's length of
+    the world's origin."""
+    links = [link.inertial for link in magnitudes.samples.model.links if link.inertial is not None]
+    mass = sum(abs(inertial.mass) for inertial in links)
+    force = mass * (_linear_acceleration(magnitudes) + magnitudes.gravity)
+    spin = _angular_acceleration(magnitudes) + _angular_velocity(magnitudes) ** 2
+    moment = force * magnitudes.length + magnitudes.rotational_inertia * spin
+    return np.stack([force] * 3 + [moment] * 3, axis=-1)
+
+
 def _twist(layout: Layout, linear: Scale, angular: Scale) -> NaturalMagnitude:
     """Return the bounds (entries, samples, 6 [, nv]) from bounds (n [, nv]) of linear and angular rows."""
 
@@ -424,6 +435,8 @@ NATURAL_MAGNITUDES: dict[str, NaturalMagnitude] = {
     "inertia": NaturalMagnitude(mass_scale, derived_scale=_derived_mass_scale),
     "coriolis": NaturalMagnitude(coriolis_scale),
     "regressor": NaturalMagnitude(_regressor_scale),
+    "joint wrenches": NaturalMagnitude(lambda s: wrench_scale(s)[:, None]),
+    "base wrench": NaturalMagnitude(wrench_scale),
     "momentum": NaturalMagnitude(_momentum_scale),
     "kinetic energy": NaturalMagnitude(lambda s: s.kinetic_energy, derived_scale=_derived_energy_scale),
     "potential energy": NaturalMagnitude(lambda s: s.potential_energy),

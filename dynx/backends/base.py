@@ -6,6 +6,7 @@ Arguments are checked, and one sample goes straight to the engine's hook, in `Qu
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 import numpy as np
@@ -15,7 +16,8 @@ from dynx.backends.evaluation import common_batch
 from dynx.backends.hooks import apply_matrix, solution_or_nan
 from dynx.backends.quantity_calls import ALL_FRAMES, ONE_FRAME, Forces, QuantityCalls
 from dynx.errors import ArgumentError
-from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, shift_jacobian
+from dynx.rbd.jacobians import LOCAL, LOCAL_WORLD_ALIGNED, shift_jacobian
+from dynx.rbd.joint_wrenches import AppliedWrench, LinkWrenches
 from dynx.registry import door
 from dynx.spatial.scalar import Floats
 
@@ -376,6 +378,56 @@ class Backend(QuantityCalls):
         """
         return self._evaluate("inertial_regressor", (q, v, a))
 
+    def joint_wrenches(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        *,
+        frame: str | None = None,
+        reference: str = LOCAL,
+        external_forces: Forces | None = None,
+        force_reference: str = LOCAL_WORLD_ALIGNED,
+    ) -> Floats:
+        """Return the wrenches (..., n_joints, 6) [N, N m] that the parent of each joint exerts on its child:
+        force, then moment, in the order of `model.joints`, fixed joints included.
+
+        By default each is at the origin of the joint, in the axes of its child link: the frame of that link
+        in the reference ``local``. `frame` names another frame for all, whose point and axes `reference`
+        chooses as for a Jacobian. The component along the axis of a joint is its torque of
+        `inverse_dynamics`; with mimic joints, a torque is the sum of these of the driver and, times their
+        multipliers, of its followers. What a joint's damping, friction and armature need is not part of it:
+        they act on the side of the motor.
+
+        Featherstone 2008, table 5.1. Elsewhere: Pinocchio `computeSupportedForceByFrame`, Drake
+        `get_reaction_forces_output_port`, MuJoCo `cfrc_int` (of each body, about the centre of mass of the
+        tree), PyBullet `getJointState` (of a sensor, after a step).
+        """
+        links = range(1, len(self.model.links))
+        wrenches = self._evaluate("joint_wrenches", (q, v, a))
+        return self._wrenches(wrenches, q, links, frame, reference, external_forces, force_reference)
+
+    def base_wrench(
+        self,
+        q: ArrayLike,
+        v: ArrayLike,
+        a: ArrayLike,
+        *,
+        frame: str | None = None,
+        reference: str = LOCAL,
+        external_forces: Forces | None = None,
+        force_reference: str = LOCAL_WORLD_ALIGNED,
+    ) -> Floats:
+        """Return the wrench (..., 6) [N, N m] that the world exerts on the root link: force, then moment.
+
+        With a fixed base it is what the robot's foundation must bear, with a floating base the first six
+        entries of `inverse_dynamics`. The options are those of `joint_wrenches`; by default it is at the
+        origin of the base frame, in its axes. Featherstone 2008, table 5.1.
+        """
+        wrench = self._evaluate("base_wrench", (q, v, a))[..., None, :]
+        found = self._wrenches(wrench, q, range(1), frame, reference, external_forces, force_reference)
+        return np.asarray(found[..., 0, :])
+
     # -- the whole body -----------------------------------------------------------------------
 
     def center_of_mass(self, q: ArrayLike) -> Floats:
@@ -435,6 +487,40 @@ class Backend(QuantityCalls):
             J = self.jacobian(q, frame, reference=reference)
             total = total + apply_matrix(np.swapaxes(J, -1, -2), wrench)
         return np.asarray(total)
+
+    def _wrenches(
+        self,
+        wrenches: Floats,
+        q: Any,
+        links: range,
+        frame: str | None,
+        reference: str,
+        forces: Forces | None,
+        force_reference: str,
+    ) -> Floats:
+        """Return wrenches on links, which are given in the frames of the links, without external forces and
+        in the reference of a frame."""
+        axes = self._arguments.reference(reference)
+        if forces is None and frame is None and axes == LOCAL:
+            return wrenches
+        q = self._checked_q(q)
+        T = self.forward_kinematics(q)
+        found = LinkWrenches(self._mechanism, links, T[..., : len(self.model.links), :, :], wrenches)
+        if forces is not None:
+            given = self._arguments.wrenches(forces)
+            common_batch(wrenches[..., 0], q, *given.values())
+            axes_of_forces = self._arguments.reference(force_reference)
+            applied = [(self._index(name), wrench) for name, wrench in given.items()]
+            found.subtract(
+                AppliedWrench.of(self._link_of_frame[index], T[..., index, :, :], wrench, axes_of_forces)
+                for index, wrench in applied
+            )
+        return found.expressed(axes, None if frame is None else T[..., self._index(frame), :, :])
+
+    @cached_property
+    def _link_of_frame(self) -> list[int]:
+        """Number of the link that carries each frame."""
+        return [self.model.frame_index(frame.link) for frame in self.model.frames]
 
     def _at_point(
         self, J: Floats, dJ: Floats | None, q: Any, v: Any, frame: str, reference: str, point: Any

@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from dynx.model import Mechanism, Model
-from dynx.rbd import aba, centroidal, coriolis, crba, jacobians, kinematics, regressor, rnea
+from dynx.rbd import aba, centroidal, coriolis, crba, jacobians, joint_wrenches, kinematics, regressor, rnea
 from dynx.spatial.scalar import Array
 
 Algorithm = Callable[..., Array]
@@ -27,8 +27,9 @@ Growth = Literal["joints", "pairs", "cubic"]
 """Growth of the number of operations of an algorithm: with the number of joints; with the number of pairs of
 joints on one path to the root; or with the number of bodies times nv squared."""
 
-Extent = int | Literal["nv", "10 n_links", "n_frames"]
-"""Length of an axis of a result: a number, nv, ten for every link of the model, or one for every frame."""
+Extent = int | Literal["nv", "10 n_links", "n_frames", "n_joints"]
+"""Length of an axis of a result: a number, nv, ten for every link of the model, or one for every frame or
+every joint, fixed ones included."""
 
 
 def no_details(model: Model) -> tuple[Any, ...]:
@@ -114,6 +115,7 @@ class Quantity:
             "nv": model.nv if nv is None else nv,
             "10 n_links": 10 * len(model.links),
             "n_frames": len(model.frame_names),
+            "n_joints": len(model.joints),
         }
         return tuple(n if isinstance(n, int) else extents[n] for n in self.shape)
 
@@ -134,6 +136,7 @@ def _elsewhere(*names: str | None) -> dict[str, str]:
 
 _AT_POINT = ("reference", "point")
 _FORCES = ("external_forces", "force_reference", "joint_dynamics")
+_OF_WRENCHES = ("frame", "reference", "external_forces", "force_reference")
 
 _TABLE = (
     Quantity(
@@ -286,6 +289,29 @@ _TABLE = (
         refereed=False,
         # The frames of the links come first.
         implied_details=lambda model: (range(len(model.links)),),
+    ),
+    Quantity(
+        "joint_wrenches",
+        ("q", "v", "a"),
+        ("n_joints", 6),
+        "N, N m",
+        joint_wrenches.joint_wrenches,
+        "joint wrenches",
+        "Featherstone 2008, table 5.1",
+        _elsewhere(
+            "computeSupportedForceByFrame", "get_reaction_forces_output_port", "cfrc_int", "getJointState"
+        ),
+        options=_OF_WRENCHES,
+    ),
+    Quantity(
+        "base_wrench",
+        ("q", "v", "a"),
+        (6,),
+        "N, N m",
+        joint_wrenches.base_wrench,
+        "base wrench",
+        "Featherstone 2008, table 5.1",
+        options=_OF_WRENCHES,
     ),
     Quantity(
         "center_of_mass",

@@ -74,6 +74,9 @@ SECONDS_OF_OPERATION, SECONDS_OF_RESULT = 1.5e-4, 3e-4
 OPERATIONS_OF_BODY = {"forward_dynamics": 460, "mass_matrix": 150, "coriolis_matrix": 350}
 """Operations for each body of some quantities; 250 of all others."""
 
+OPERATIONS_OF_LINK = {"joint_wrenches": 350, "base_wrench": 320}
+"""Operations for each link of quantities that count links one by one."""
+
 SEGMENT_OF_CUBIC_CODE = 600
 """Length of the segments (`dynx.simd.emit`) of code that grows with the cube of the number of joints.
 Shorter segments save a third of the compile time and cost at most an eighth of the speed."""
@@ -119,9 +122,16 @@ def code_size(mechanism: Mechanism, name: str) -> tuple[float, int]:
     base = 6 if mechanism.floating else 0
     pairs = sum(len(ancestry(mechanism, body)) + base for body in range(bodies))
     frames = len(mechanism.frames)
-    extents = {"nv": mechanism.nv, "10 n_links": 10 * frames, "n_frames": frames}
+    extents = {
+        "nv": mechanism.nv,
+        "10 n_links": 10 * frames,
+        "n_frames": frames,
+        "n_joints": len(mechanism.links) - 1,
+    }
     results = prod(n if isinstance(n, int) else extents[n] for n in quantity.shape)
     operations, dense = 300.0 + OPERATIONS_OF_BODY.get(name, 250) * bodies, _pose_density(mechanism)
+    if name in OPERATIONS_OF_LINK:
+        operations = 300.0 + OPERATIONS_OF_LINK[name] * len(mechanism.links)
     if name == "frame_placements":
         operations += 60 * frames
     if quantity.growth == "cubic":

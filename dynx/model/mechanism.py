@@ -67,6 +67,15 @@ class BodyFrame:
 
 
 @dataclass(frozen=True)
+class RigidLink:
+    """A link as it is described: the number of its parent (ROOT for the root link), and its own inertia about
+    the origin of its frame, in the axes of its frame."""
+
+    parent: int
+    inertia: RigidInertia
+
+
+@dataclass(frozen=True)
 class Coupling:
     """Mimic joints as an affine map: tree position = scale * model position[index] + offset.
 
@@ -112,7 +121,11 @@ class Coupling:
 
 @dataclass(frozen=True)
 class Mechanism:
-    """Bodies in depth-first order (a parent precedes its children), frames, gravity and coupling."""
+    """Bodies in depth-first order (a parent precedes its children), frames, gravity and coupling.
+
+    `links` are those of the description before merging, in depth-first order: joint k of the description, of
+    any type, carries link k + 1, and the frame of link k is frame k.
+    """
 
     name: str
     floating: bool
@@ -121,6 +134,7 @@ class Mechanism:
     bodies: tuple[Body, ...]
     frames: tuple[BodyFrame, ...]
     coupling: Coupling | None
+    links: tuple[RigidLink, ...] = ()
 
     @cached_property
     def body_frames(self) -> tuple[int, ...]:
@@ -186,8 +200,13 @@ def build_mechanism(tree: Tree, convert: ScalarConverter = float64) -> Mechanism
 
     massless = RigidInertia(convert(0.0), convert(np.zeros(3)), convert(np.zeros((3, 3))))
     merged = dict.fromkeys(range(ROOT, len(moving)), massless)
+    numbers = {link.name: number for number, link in enumerate(tree.links)}
+    parents = {joint.child: numbers[joint.parent] for joint in tree.joints}
+    links = []
     for link in tree.links:
+        parent = parents.get(link.name, ROOT)
         if link.inertial is None:
+            links.append(RigidLink(parent, massless))
             continue
         body, R, p = placed[link.name]
         R_inertial, p_inertial = pose_arrays(link.inertial.origin, convert)
@@ -195,6 +214,7 @@ def build_mechanism(tree: Tree, convert: ScalarConverter = float64) -> Mechanism
             convert(link.inertial.mass), p_inertial, R_inertial, convert(link.inertial.tensor)
         )
         merged[body] = merged[body] + own.transform(R, p)
+        links.append(RigidLink(parent, own))
 
     frames = []
     for frame in tree.frames:
@@ -210,6 +230,7 @@ def build_mechanism(tree: Tree, convert: ScalarConverter = float64) -> Mechanism
         bodies=tuple(Body(*fields, inertia=merged[k]) for k, fields in enumerate(moving)),
         frames=tuple(frames),
         coupling=_coupling(tree),
+        links=tuple(links),
     )
 
 

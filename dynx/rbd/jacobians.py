@@ -18,6 +18,7 @@ from dynx.spatial.so3 import cross, rotate, skew
 
 Reference = Literal["local_world_aligned", "local", "world"]
 LOCAL_WORLD_ALIGNED: Reference = "local_world_aligned"
+LOCAL: Reference = "local"
 REFERENCES: dict[str, Reference] = {
     "local_world_aligned": "local_world_aligned",
     "local": "local",

@@ -65,6 +65,13 @@ class BodyKinematics:
     acceleration: Array
     alpha: Array
 
+    def acceleration_at(self, p: Array) -> Array:
+        """Return the proper acceleration of the point of the body that is at `p` in the world."""
+        lever = p - self.p
+        return np.asarray(
+            self.acceleration + cross(self.alpha, lever) + cross(self.omega, cross(self.omega, lever))
+        )
+
 
 @dataclass(frozen=True)
 class FrameMotion:
@@ -96,12 +103,19 @@ class FrameMotion:
 
 
 def _regressor(loops: Loops, poses: Sequence[BodyPose], v: Array, a: Array, frames: Sequence[int]) -> Array:
-    states, axes = loops.outward(_move, loops.root(_root_state, poses[0], v, a), poses, v, a)
+    states, axes = body_states(loops, poses, v, a)
     Y = loops.matrices(1, like=v, blocks=len(frames), width=10)
     loops.frames_to_root(
         Y, frames, _frame_motion, _row, _base_rows, own=(states,), here=(states, axes), at_base=(states[0],)
     )
     return loops.assembled(Y)[0]
+
+
+def body_states(
+    loops: Loops, poses: Sequence[BodyPose], v: Array, a: Array
+) -> tuple[Sequence[BodyKinematics], Sequence[Array]]:
+    """Return the state of every body, the root's first, and the axes (..., 3) of the joints in the world."""
+    return loops.outward(_move, loops.root(_root_state, poses[0], v, a), poses, v, a)
 
 
 def _root_state(mechanism: Mechanism, pose: BodyPose, v: Array, a: Array) -> BodyKinematics:
@@ -121,7 +135,7 @@ def _move(
     R, p = pose
     axis = rotate(R, body.axis)
     speed, joint_acceleration = axis * append_axis(v), axis * append_axis(a)
-    acceleration = parent.acceleration + _fixed_point_acceleration(parent, p - parent.p)
+    acceleration = parent.acceleration_at(p)
     across = cross(parent.omega, speed)
     if body.revolute:
         alpha = parent.alpha + joint_acceleration + across
@@ -131,14 +145,9 @@ def _move(
     ), axis
 
 
-def _fixed_point_acceleration(body: BodyKinematics, lever: Array) -> Array:
-    """Return the acceleration of a point of a body relative to its origin, from which it is `lever` away."""
-    return cross(body.alpha, lever) + cross(body.omega, cross(body.omega, lever))
-
-
 def _frame_motion(frame: BodyFrame, body: BodyKinematics) -> FrameMotion:
     R, p = body.R @ frame.R, body.p + rotate(body.R, frame.p)
-    d = rotate_back(R, body.acceleration + _fixed_point_acceleration(body, p - body.p))
+    d = rotate_back(R, body.acceleration_at(p))
     d, omega, alpha = np.broadcast_arrays(d, rotate_back(R, body.omega), rotate_back(R, body.alpha))
     W = skew(omega)
     moments = _tensor_columns(alpha) + W @ _tensor_columns(omega)

@@ -58,15 +58,15 @@ FLOWS = {
             "viewer",
         ),
         (),
-        72,
-        11300,
+        73,
+        11700,
     ),
     "inverse kinematics": Flow(
         ENGINE + "engine.inverse_kinematics(engine.forward_kinematics(q, 'tool0'), 'tool0', q)",
         ("world", "sim", "ik.closed_forms"),
         (),
-        107,
-        18800,
+        108,
+        19200,
     ),
     "simulate": Flow(
         ROBOT + "from dynx import control\n"
@@ -86,16 +86,16 @@ FLOWS = {
             "envs",
         ),
         (),
-        175,
-        27400,
+        176,
+        27800,
     ),
     "step of a box": Flow(
         "from dynx.world import Scene, World, box\n"
         "World(Scene('box', bodies=(box('box', (0.1, 0.1, 0.1), mass=1.0),)), 'mujoco').step()",
         ("ik", "sim", "envs", "doctor"),
         (),
-        112,
-        18300,
+        113,
+        18700,
     ),
     "step of the cart-pole": Flow(
         "import gymnasium, dynx.envs\n"
@@ -104,8 +104,8 @@ FLOWS = {
         "environment.step(environment.action_space.sample())",
         ("distance", "ik", "world.camera", "steppers.camera"),
         (),
-        167,
-        26700,
+        168,
+        27100,
     ),
 }
 

@@ -105,6 +105,8 @@ def all_quantities(
         "gravity_torque": backend.gravity_torque(q),
         "coriolis_matrix": backend.coriolis_matrix(q, v),
         "inertial_regressor": backend.inertial_regressor(q, v, x),
+        "joint_wrenches": backend.joint_wrenches(q, v, x),
+        "base_wrench": backend.base_wrench(q, v, x),
         "center_of_mass": backend.center_of_mass(q),
         "center_of_mass_jacobian": backend.center_of_mass_jacobian(q),
         "centroidal_momentum": backend.centroidal_momentum(q, v),

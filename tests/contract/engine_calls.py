@@ -57,8 +57,9 @@ class EngineCall:
         """Return the last axes of the result."""
         return self.quantity.shape_of(model)
 
-    def evaluate(self, engine: Backend, state: State) -> Floats:
-        """Return the result at a state; for a quantity of a frame, that of the model's last one."""
+    def evaluate(self, engine: Backend, state: State, method: str | None = None) -> Floats:
+        """Return the result at a state, by another `method` if given; for a quantity of a frame, that of the
+        model's last one."""
         values = [getattr(state, argument) for argument in self.arguments]
         options = dict(self.options)
         if self.quantity.of_frame:
@@ -66,7 +67,18 @@ class EngineCall:
         if options.pop("with_force", False):
             force = np.array([1.0, -2.0, 0.5, 0.1, 0.2, -0.3])
             options["external_forces"] = {engine.model.frame_names[-1]: force}
-        result: Floats = getattr(engine, self.method)(*values, **options)
+        result: Floats = getattr(engine, method or self.method)(*values, **options)
+        return result
+
+    def of_shared_parts(self, result: Floats, model: Model, part: Model) -> Floats:
+        """Return those entries of a result of `model` that belong to links and joints of `part`."""
+        if self.method == "inertial_regressor":
+            links = [model.links.index(link) for link in part.links]
+            by_link = result.reshape(*result.shape[:-1], len(model.links), 10)
+            return by_link[..., links, :].reshape(*result.shape[:-1], -1)
+        if self.method == "joint_wrenches":
+            names = [joint.name for joint in model.joints]
+            return result[..., [names.index(joint.name) for joint in part.joints], :]
         return result
 
     def check(self, engine: Backend, state: State, got: Floats, wanted: Floats) -> None:
@@ -76,7 +88,8 @@ class EngineCall:
             for a in (got, wanted):
                 close.check_solves(a, engine.inverse_dynamics(state.q, state.v, a), state.tau)
         elif self.options.get("with_force"):
-            close.check(f"{self.method}_external_forces", np.tile(got, 3), np.tile(wanted, 3))
+            in_three_references = [np.concatenate([result] * 3, axis=-1) for result in (got, wanted)]
+            close.check(f"{self.method}_external_forces", *in_three_references)
         elif self.options.get("joint_dynamics"):
             close.check(f"{self.method}_joint_dynamics", got, wanted)
         else:
@@ -90,8 +103,8 @@ def engine_calls() -> tuple[EngineCall, ...]:
     for quantity in QUANTITIES.values():
         if "reference" in quantity.options:
             calls += [EngineCall(quantity, {"reference": reference}) for reference in REFERENCES]
-            continue
-        calls.append(EngineCall(quantity))
+        else:
+            calls.append(EngineCall(quantity))
         if f"{quantity.name}_external_forces" in compared:
             calls.append(EngineCall(quantity, {"with_force": True}))
         if f"{quantity.name}_joint_dynamics" in compared:

@@ -16,7 +16,8 @@ later subtracted (`mj_crb`, `mj_rne`). On robots with hands the entries of its m
 should be zero, is a rounding error of the largest torque. Here M is the sum of m Jp' Jp + Jr' I Jr over the
 bodies (Siciliano et al., Robotics, eq. 7.32) and the torque the sum of Jp' m (a - g) + Jr' (I dw + w x I w)
 (Newton and Euler, projected as in Kane's method), with lever arms from joint to body, not from a distant
-point.
+point. The wrench at a joint is the sum of the same forces and moments over the links that it carries, instead
+of MuJoCo's `cfrc_int`, which is about that distant point.
 
 Arrays are of all bodies and coordinates at once, and cross products are products with skew matrices, because
 a call of NumPy takes longer than its arithmetic here.
@@ -24,7 +25,8 @@ a call of NumPy takes longer than its arithmetic here.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import cached_property
 from threading import local
 from typing import Any, ClassVar
 
@@ -53,10 +55,9 @@ class ProjectedDynamics:
 
     def __init__(self, engine: Any, *, floating: bool) -> None:
         self._floating = floating
-        has_inertia = (engine.body_mass != 0.0) | engine.body_inertia.any(axis=1)
-        self._bodies = np.flatnonzero(has_inertia & (engine.body_weldid != 0))
+        self._bodies = np.flatnonzero(_has_inertia(engine) & (engine.body_weldid != 0))
+        self._inertia = _moments_and_masses(engine, self._bodies)
         mass, moments = engine.body_mass[self._bodies], engine.body_inertia[self._bodies]
-        self._inertia: Floats = np.stack([moments, np.repeat(mass[:, None], 3, axis=1)], axis=1)
         self._weights: Floats = np.concatenate([np.repeat(mass, 3), moments.ravel()])
         self._revolute: Floats = np.array(
             [0.0] * 3 * floating
@@ -116,18 +117,7 @@ class ProjectedDynamics:
 
     def torque(self, data: Any, R_root: Floats, p_root: Floats) -> Floats:
         """Return the torque (nv,), after `mj_rnePostConstraint` (accelerations without gravity) on `data`."""
-        bodies = self._bodies
-        # MuJoCo's velocities and spatial accelerations (w, v, dw, a) are about the robot's centre of mass, in
-        # world axes; here they are converted to those of the body's centre of mass, in principal axes.
-        both = np.concatenate((data.cvel, data.cacc), 1).take(bodies, 0, None, "clip").reshape(-1, 4, 3)
-        from_center = data.xipos.take(bodies, 0, None, "clip") - data.subtree_com[ROOT_BODY]
-        both[:, 1::2] += np.matmul(both[:, 0::2], _skew(from_center))
-        to_principal = data.ximat.take(bodies, 0, None, "clip").reshape(-1, 3, 3)
-        both = np.matmul(both, to_principal)
-        # Moment and force of each body, from the classical acceleration a + w x v.
-        load = self._inertia * both[:, 2:]
-        load -= np.matmul(self._inertia * both[:, :2], _skew(both[:, 0]))
-        load = np.matmul(load, to_principal.transpose(0, 2, 1))
+        load = _loads(data, self._bodies, self._inertia)
         axes, lever = self._axes(data, R_root, p_root)
         n, count = self._moves_vector.shape
         moment_and_force = self._moves.dot(load.reshape(-1, 6))
@@ -145,6 +135,59 @@ class ProjectedDynamics:
             axes = np.concatenate((R_root.T, R_root.T, axes[1:]))
             anchors = np.concatenate((p_root[None].repeat(6, 0), anchors[1:]))
         return axes, data.xipos.take(self._bodies, 0, None, "clip") - anchors[:, None]
+
+
+class ProjectedWrenches:
+    """Wrenches on the links of one model and on all that is beyond them, from its bodies with inertia."""
+
+    def __init__(self, engine: Any, links: Sequence[int]) -> None:
+        """`links` are MuJoCo's bodies of the links."""
+        self._links = np.array(links)
+        self._bodies = np.flatnonzero(_has_inertia(engine))
+        self._inertia = _moments_and_masses(engine, self._bodies)
+        # For each link, the bodies that it carries.
+        number = {body: row for row, body in enumerate(links)}
+        self._carries: Floats = np.zeros((len(links), len(self._bodies)))
+        for column, body in enumerate(self._bodies):
+            while body:
+                self._carries[number[int(body)], column] = 1.0
+                body = engine.body_parentid[body]
+
+    def __call__(self, data: Any, rows: slice) -> Floats:
+        """Return the wrenches (n, 6) at the origins of some links in their axes, force first, after
+        `mj_rnePostConstraint` (accelerations without gravity) on `data`."""
+        load = _loads(data, self._bodies, self._inertia)
+        links, carries = self._links[rows], self._carries[rows]
+        lever = data.xipos[self._bodies] - data.xpos[links][:, None]
+        moments = load[:, 0] + np.cross(lever, load[:, 1])
+        wrenches = np.stack([carries.dot(load[:, 1]), (carries[:, :, None] * moments).sum(1)], axis=1)
+        return np.asarray(np.matmul(wrenches, data.xmat[links].reshape(-1, 3, 3)).reshape(-1, 6))
+
+
+def _has_inertia(engine: Any) -> NDArray[np.bool_]:
+    return np.asarray((engine.body_mass != 0.0) | engine.body_inertia.any(axis=1))
+
+
+def _moments_and_masses(engine: Any, bodies: NDArray[np.intp]) -> Floats:
+    """Return the factors (n, 2, 3) of angular and linear accelerations in principal axes."""
+    mass = np.repeat(engine.body_mass[bodies][:, None], 3, axis=1)
+    return np.stack([engine.body_inertia[bodies], mass], axis=1)
+
+
+def _loads(data: Any, bodies: NDArray[np.intp], inertia: Floats) -> Floats:
+    """Return the moment and the force (n, 2, 3) that move each body, about its centre of mass in world axes,
+    after `mj_rnePostConstraint` (accelerations without gravity)."""
+    # MuJoCo's velocities and spatial accelerations (w, v, dw, a) are about the robot's centre of mass, in
+    # world axes; here they are converted to those of the body's centre of mass, in principal axes.
+    both = np.concatenate((data.cvel, data.cacc), 1).take(bodies, 0, None, "clip").reshape(-1, 4, 3)
+    from_center = data.xipos.take(bodies, 0, None, "clip") - data.subtree_com[ROOT_BODY]
+    both[:, 1::2] += np.matmul(both[:, 0::2], _skew(from_center))
+    to_principal = data.ximat.take(bodies, 0, None, "clip").reshape(-1, 3, 3)
+    both = np.matmul(both, to_principal)
+    # Moment and force of each body, from the classical acceleration a + w x v.
+    load = inertia * both[:, 2:]
+    load -= np.matmul(inertia * both[:, :2], _skew(both[:, 0]))
+    return np.asarray(np.matmul(load, to_principal.transpose(0, 2, 1)))
 
 
 def _skew(vectors: Floats) -> Floats:
@@ -287,6 +330,20 @@ class MujocoBackend(Backend):
         work = self._set_state(q, v)
         self._set_acceleration(work, v, a)
         return self._dynamics.torque(work.data, work.R[ROOT_BODY], work.p[ROOT_BODY])
+
+    def _joint_wrenches(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        work = self._set_state(q, v)
+        self._set_acceleration(work, v, a)
+        return self._wrenches_of_links(work.data, slice(1, None))
+
+    def _base_wrench(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        work = self._set_state(q, v)
+        self._set_acceleration(work, v, a)
+        return np.asarray(self._wrenches_of_links(work.data, slice(1))[0])
+
+    @cached_property
+    def _wrenches_of_links(self) -> ProjectedWrenches:
+        return ProjectedWrenches(self._engine, self._bodies[: len(self.model.links)])
 
     def _forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
         work = self._workspace

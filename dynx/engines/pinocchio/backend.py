@@ -23,7 +23,7 @@ import numpy as np
 from dynx.backends.base import Backend
 from dynx.backends.engine_errors import engine_errors
 from dynx.backends.straight import BindingCall
-from dynx.engines.pinocchio.engine_model import WORLD, LinkRegressor, engine_model, error_message
+from dynx.engines.pinocchio.engine_model import WORLD, LinkForces, LinkRegressor, engine_model, error_message
 from dynx.engines.pinocchio.library import pin
 from dynx.model import Model
 from dynx.rbd.jacobians import Reference
@@ -223,6 +223,20 @@ class PinocchioBackend(Backend):
         return self._link_regressor(
             pin.computeJointTorqueRegressor(self._engine, self._workspace.data, q, v, a)
         )
+
+    @cached_property
+    def _link_forces(self) -> LinkForces:
+        return LinkForces(self._engine, self.model, self._frame_ids[: len(self.model.links)])
+
+    def _joint_wrenches(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        data = self._workspace.data
+        pin.rnea(self._engine, data, q, v, a)
+        return self._link_forces(data, range(1, len(self.model.links)))
+
+    def _base_wrench(self, q: Floats, v: Floats, a: Floats) -> Floats:
+        data = self._workspace.data
+        pin.rnea(self._engine, data, q, v, a)
+        return np.asarray(self._link_forces(data, range(1))[0])
 
     # -- the whole body -----------------------------------------------------------------------
 

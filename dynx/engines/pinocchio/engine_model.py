@@ -146,6 +146,60 @@ class LinkRegressor:
         return result
 
 
+class LinkForces:
+    """The wrench on each link and on all links beyond it, from the engine's recursive Newton-Euler.
+
+    The engine keeps the wrench on the body that each joint moves. A link that is fixed to another has no
+    joint of the engine: what moves it and the fixed links behind it is added to the wrenches of the joints
+    that they carry.
+    """
+
+    def __init__(self, engine: Any, model: Model, links: Sequence[int]) -> None:
+        """`links` are the engine's numbers of the links' frames."""
+        frames = [engine.frames[link] for link in links]
+        self._engine = engine
+        self._carriers = [int(frame.parentJoint) for frame in frames]
+        self._placements = [frame.placement for frame in frames]
+        self._inertias = [
+            None
+            if link.inertial is None
+            else (frame.placement * _placement(link.inertial.origin)).act(_inertia(link.inertial))
+            for link, frame in zip(model.links, frames, strict=True)
+        ]
+        numbers = {link.name: number for number, link in enumerate(model.links)}
+        self._children: list[list[int]] = [[] for _ in links]
+        for child, joint in enumerate(model.joints, 1):
+            self._children[numbers[joint.parent]].append(child)
+        moved = {numbers[joint.child] for joint in model.joints if joint.moves}
+        self._has_joint = [number in moved for number in range(len(links))]
+
+    def __call__(self, data: Any, links: range) -> Floats:
+        """Return the wrenches (n, 6) on some links at the origins of their frames in their axes, after
+        `rnea` on `data`."""
+        found = np.empty((len(links), 6))
+        for row, link in enumerate(links):
+            found[row] = self._placements[link].actInv(self._on_carrier(data, link)).vector
+        return found
+
+    def _on_carrier(self, data: Any, link: int) -> Any:
+        """Return the wrench on a link and all links beyond it, in the frame of the joint that carries it."""
+        carrier = self._carriers[link]
+        if self._has_joint[link]:
+            return data.f[carrier]
+        total, pending = pin.Force.Zero(), [link]
+        while pending:
+            part = pending.pop()
+            if self._has_joint[part]:
+                joint = self._carriers[part]
+                total += data.liMi[joint].act(data.f[joint])
+                continue
+            inertia = self._inertias[part]
+            if inertia is not None:
+                total += inertia * data.a_gf[carrier] + inertia.vxiv(data.v[carrier])
+            pending += self._children[part]
+        return total
+
+
 _ENGINE_ORDER = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]
 """Pinocchio's order of the ten parameters: it lists the upper triangle of the tensor column by column."""
 
@@ -182,10 +236,7 @@ def _add_inertia(engine: Any, carrier: int, T_carrier_link: Any, inertial: Inert
             f"link {shown(link)} has mass {inertial.mass}; "
             "the backend 'pinocchio' cannot represent a negative one"
         )
-    # The constructor refuses a tensor that no body can have; the attributes accept it.
-    own = pin.Inertia.Zero()
-    own.mass, own.inertia = inertial.mass, inertial.tensor
-    placed = (T_carrier_link * _placement(inertial.origin)).act(own)
+    placed = (T_carrier_link * _placement(inertial.origin)).act(_inertia(inertial))
     present = engine.inertias[carrier]
     if _is_zero(placed):
         return
@@ -194,6 +245,14 @@ def _add_inertia(engine: Any, carrier: int, T_carrier_link: Any, inertial: Inert
         return
     _refuse_light_sum(present.mass + placed.mass, link)
     engine.appendBodyToJoint(carrier, placed, pin.SE3.Identity())
+
+
+def _inertia(inertial: Inertial) -> Any:
+    """Return the engine's inertia about the centre of mass."""
+    # The constructor refuses a tensor that no body can have; the attributes accept it.
+    own = pin.Inertia.Zero()
+    own.mass, own.inertia = inertial.mass, inertial.tensor
+    return own
 
 
 def _is_zero(inertia: Any) -> bool:
