@@ -1,12 +1,13 @@
 """Survey of URDF files: the doctor's report on each, and the engines that load a file which dynx refuses.
 
     python -m benchmarks.surveys.files FOLDER_OR_LIST [--base fixed] [--engines a,b] [--jobs N]
-        [--json OUT.jsonl] [--mended FOLDER] [--seconds LIMIT]
+        [--json OUT.jsonl] [--mended FOLDER] [--fix-tolerance 1e-9] [--seconds LIMIT]
 
 A list is a text file with one path per line. Each file is examined in a worker process with a time limit, so
 that an engine that crashes costs one file. One line of JSON per file and base is appended to ``--json``, and
-files that it already has are not examined again. ``--mended`` keeps the corrected files, which
-``python -m benchmarks.surveys.raw_agreement OUT.jsonl`` compares in engines without dynx.
+files that it already has are not examined again. ``--mended`` keeps the corrected files, mended as by
+``dynx doctor --fix`` with ``--fix-tolerance``. ``python -m benchmarks.surveys.raw_agreement OUT.jsonl``
+compares them in engines without dynx, ``python -m benchmarks.surveys.same_robot OUT.jsonl`` with the files.
 """
 
 from __future__ import annotations
@@ -45,12 +46,13 @@ Entry = dict[str, Any]
 
 @dataclass(frozen=True)
 class Task:
-    """One file on one base; `mended` is the folder of corrected files."""
+    """One file on one base; `mended` is the folder of corrected files, for `fix_tolerance` of `diagnose`."""
 
     path: str
     base: Base
     engines: tuple[str, ...] | None = None
     mended: str | None = None
+    fix_tolerance: float | None = None
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,13 @@ class Loading:
 
 def examine(task: Task) -> Entry:
     """Make the entry of a file: its report, its path, and the path of the corrected file."""
-    report = diagnose(task.path, base=task.base, engines=task.engines, counterexamples=False)
+    report = diagnose(
+        task.path,
+        base=task.base,
+        engines=task.engines,
+        counterexamples=False,
+        fix_tolerance=task.fix_tolerance,
+    )
     entry = report.to_dict()
     entry["path"] = task.path
     for bulky in ("pairs", "model_difference"):
@@ -236,13 +244,17 @@ def listed(source: Path) -> list[str]:
 
 
 def make_tasks(
-    paths: Iterable[str], bases: Iterable[Base], engines: str | None, mended: str | None
+    paths: Iterable[str],
+    bases: Iterable[Base],
+    engines: str | None,
+    mended: str | None,
+    fix_tolerance: float | None = None,
 ) -> list[Task]:
     """Make the tasks of all files on all bases, and the folder of corrected files."""
     if mended:
         Path(mended).mkdir(parents=True, exist_ok=True)
     chosen = tuple(engines.split(",")) if engines else None
-    return [Task(path, base, chosen, mended) for path in paths for base in bases]
+    return [Task(path, base, chosen, mended, fix_tolerance) for path in paths for base in bases]
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -259,11 +271,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("source", type=Path, help="folder, or text file with one path per line")
     parser.add_argument("--base", choices=["fixed", "floating", "both"], default="both")
+    parser.add_argument("--fix-tolerance", type=float, help="largest effect that a corrected file keeps")
     add_options(parser)
     options = parser.parse_args()
     bases: list[Base] = ["fixed", "floating"] if options.base == "both" else [options.base]
     paths = listed(options.source)
-    tasks = make_tasks(paths, bases, options.engines, options.mended)
+    tasks = make_tasks(paths, bases, options.engines, options.mended, options.fix_tolerance)
     entries = survey(tasks, options.jobs, options.seconds, options.json)
     root = Path(os.path.commonpath(paths)) if len(paths) > 1 else Path(paths[0]).parent
     for line in summary(entries, root):

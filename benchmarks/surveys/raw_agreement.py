@@ -147,6 +147,7 @@ def main() -> None:
     """Check every file that ``benchmarks.surveys.files --json RESULTS --mended FOLDER`` mended."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("results", type=Path, help="results of the survey")
+    parser.add_argument("--within", type=float, default=BAR, help="largest relative difference")
     parser.add_argument("--json", type=Path, help="file for the differences")
     options = parser.parse_args()
     entries = [entry for entry in read_entries(options.results) if entry.get("mended")]
@@ -160,7 +161,7 @@ def main() -> None:
         messages = {
             engine: message or f"{gap:.1e}"
             for engine, (gap, message) in of_engines.items()
-            if engine not in refusing and not gap <= BAR
+            if engine not in refusing and not gap <= options.within
         }
         verdicts.append(
             {"path": entry["path"], "base": entry["base"], "refusing": refusing, "apart": messages}
@@ -170,7 +171,8 @@ def main() -> None:
     for whole in (True, False):
         of = [each for each in verdicts if whole == (not each["refusing"])]
         what = "that all engines load" if whole else "on which an engine is of no use, as the report states"
-        print(f"files {what}: {sum(not each['apart'] for each in of)} of {len(of)} alike within {BAR:g}")
+        alike = sum(not each["apart"] for each in of)
+        print(f"files {what}: {alike} of {len(of)} alike within {options.within:g}")
     if options.json:
         options.json.write_text(json.dumps(verdicts), encoding="utf-8")
 

@@ -14,11 +14,12 @@ from urllib.parse import unquote, urlsplit
 
 import numpy as np
 
-from dynx.errors import DescriptionError, DynxError, shown
+from dynx.errors import ArgumentError, DescriptionError, DynxError, shown
 from dynx.files.reading import read_file
 from dynx.model import Link
 from dynx.model.geometry.formats.collada import collada_points
 from dynx.model.geometry.formats.facets import STL_FACET, STL_HEAD, STL_VERTEX
+from dynx.model.geometry.mesh import convex_hull
 from dynx.model.geometry.mesh_files import (
     MeshNotFoundError,
     find_by_bullet,
@@ -50,7 +51,7 @@ class Extent:
     @classmethod
     def of_points(cls, points: Iterable[Iterable[float]], radius: float = 0.0) -> Extent:
         """Return the balls of one radius about the points."""
-        array = np.array([list(point) for point in points], dtype=np.float64).reshape(-1, 3)
+        array = np.array(list(points), dtype=np.float64).reshape(-1, 3)
         return cls(array, np.full(len(array), radius))
 
     @classmethod
@@ -80,6 +81,11 @@ class Extent:
         """Return the length of the diagonal of `box` [m]."""
         low, high = self.box()
         return float(np.linalg.norm(high - low))
+
+    def range_along(self, directions: Floats) -> tuple[Floats, Floats]:
+        """Return the least and the greatest coordinate (n,) [m] along each unit vector (n, 3)."""
+        along, radii = self.points @ directions.T, self.radii[:, None]
+        return (along - radii).min(axis=0), (along + radii).max(axis=0)
 
     def reach_from_axis(self, origin: Floats, direction: Floats) -> float:
         """Return the largest distance [m] of a point of the region from the line through `origin` (3,) along
@@ -135,6 +141,18 @@ def mesh_box(path: Path, *, by_bullet: bool = False) -> Box | None:
     return _box(path, by_bullet, status.st_mtime_ns, status.st_size)
 
 
+def mesh_hull(path: Path) -> Floats | None:
+    """Return the vertices (n, 3) of the convex hull of a mesh in its own frame, unscaled.
+
+    They are the corners of its box where its points are on one line; None if it is unreadable.
+    """
+    try:
+        status = path.stat()
+    except (OSError, ValueError):
+        return None
+    return _hull(path, status.st_mtime_ns, status.st_size)
+
+
 def is_mesh_format(path: Path) -> bool:
     """Check whether the suffix of a file is that of a format that `mesh_box` reads."""
     return path.suffix.lower() in _READERS
@@ -143,6 +161,26 @@ def is_mesh_format(path: Path) -> bool:
 # Cached, because detection runs again after every remedy, and remedies change no mesh.
 @lru_cache(maxsize=4096)
 def _box(path: Path, by_bullet: bool, changed: int, size: int) -> Box | None:
+    points = _points(path, by_bullet)
+    if points is None:
+        return None
+    low, high = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    return (low[0], low[1], low[2]), (high[0], high[1], high[2])
+
+
+@lru_cache(maxsize=1024)
+def _hull(path: Path, changed: int, size: int) -> Floats | None:
+    points = _points(path, by_bullet=False)
+    if points is None:
+        return None
+    try:
+        return convex_hull(points)[0]
+    except ArgumentError:
+        return np.array(list(product(*zip(points.min(axis=0), points.max(axis=0), strict=True))))
+
+
+def _points(path: Path, by_bullet: bool) -> Floats | None:
+    """Return the vertices of a mesh file; None if it is unreadable."""
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
         return None
@@ -151,10 +189,7 @@ def _box(path: Path, by_bullet: bool, changed: int, size: int) -> Box | None:
             points = reader(read_file(str(path)), by_bullet)
     except (DynxError, ValueError):
         return None
-    if points is None or len(points) == 0 or not np.isfinite(points).all():
-        return None
-    low, high = points.min(axis=0).tolist(), points.max(axis=0).tolist()
-    return (low[0], low[1], low[2]), (high[0], high[1], high[2])
+    return points if points is not None and len(points) and np.isfinite(points).all() else None
 
 
 def _stl_points(data: bytes, by_bullet: bool) -> Floats | None:
@@ -256,11 +291,10 @@ def _mesh(element: SourceElement, source: str) -> Extent | None:
         path = find_mesh(element.attributes.get("filename", ""), source)
     except MeshNotFoundError:
         return None
-    box = None if path is None else mesh_box(path)
-    if box is None:
+    vertices = None if path is None else mesh_hull(path)
+    if vertices is None:
         return None
-    scale = np.array(vector_of(element, "scale") or (1.0, 1.0, 1.0))
-    return _box_of_corners(np.array(box[0]) * scale, np.array(box[1]) * scale)
+    return Extent.of_points(vertices * np.array(vector_of(element, "scale") or (1.0, 1.0, 1.0)))
 
 
 def _box_of_corners(low: Floats, high: Floats) -> Extent:

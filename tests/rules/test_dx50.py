@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -59,12 +61,46 @@ EDGE = 2.0 * (0.1**2 + 0.2**2)
 
 @pytest.mark.parametrize(("factor", "found"), [(0.99, 0), (1.01, 1)])
 def test_the_bound_on_a_moment_is_that_of_mass_in_the_corners(factor: float, found: int) -> None:
-    moments = (0.9 * factor * EDGE, 0.9 * factor * EDGE, factor * EDGE)
+    # All in the plane z = 0, so that the mass is spread along x and y as in the corners.
+    moments = (0.8 * factor * EDGE, 0.2 * factor * EDGE, factor * EDGE)
     detections = BEYOND.detect(case_of(link("base", BOX, mass=2.0, moments=moments)))
     assert len(detections) == found
     if found:
         assert detections[0].link == "base"
         assert "1.01 times the 0.1 " in detections[0].message
+
+
+@pytest.mark.parametrize(
+    ("z", "spread", "found"),
+    [(0.0, 0.29, 0), (0.0, 0.32, 1), (0.25, 0.15, 0), (0.25, 0.2, 1), (-0.29, 0.09, 0), (-0.29, 0.13, 1)],
+)
+def test_the_spread_along_a_line_is_bounded_by_its_ends(z: float, spread: float, found: int) -> None:
+    # From the centre of mass the box reaches 0.3 - z up and 0.3 + z down, widened by 0.0075 m.
+    square, across = spread**2, 1e-4
+    moments = (across + square, across + square, 2.0 * across)
+    case = case_of(link("base", BOX, mass=1.0, moments=moments, center=(0.0, 0.0, z)))
+    detections = BEYOND.detect(case)
+    assert len(detections) == found
+    if found and abs(z) > 0.0:
+        assert f"the mass is spread by {spread:.3g} m (root mean square) along 0 0 1" in detections[0].message
+
+
+def test_a_mesh_counts_as_its_hull(tmp_path: Path) -> None:
+    # A pyramid, seen from half its height along a line that ends in the empty corner of its box.
+    corners = [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0), (0, 0, 1)]
+    lines = [f"v {x} {y} {z}" for x, y, z in corners]
+    faces = ["f 1 3 2", "f 1 4 3", "f 1 2 5", "f 2 3 5", "f 3 4 5", "f 4 1 5"]
+    (tmp_path / "pyramid.obj").write_text("\n".join((*lines, *faces)))
+    shape = visual('<mesh filename="pyramid.obj"/>')
+    for square, found in ((0.36, 0), (0.48, 1)):
+        half = square / 2.0
+        part = link("base", shape, moments=(half, square, half), center=(0.0, 0.0, 0.5))
+        path = tmp_path / "robot.urdf"
+        case = case_of(part.replace('ixz="0"', f'ixz="{-half}"'), source=path)
+        path.write_bytes(case.source.data)
+        detections = BEYOND.detect(case)
+        assert len(detections) == found
+        assert all("along 0.71 0 0.71" in each.message for each in detections)
 
 
 def test_a_sphere_of_a_shell_has_the_bound_itself() -> None:
