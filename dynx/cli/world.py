@@ -47,7 +47,8 @@ from dynx.world.comparison import (
     WorldComparison,
     compare_engines,
 )
-from dynx.world.scene import Scene, body_to_urdf, read_scene, scene_to_mjcf, write_scene
+from dynx.world.mjcf import scene_to_mjcf
+from dynx.world.scene import Scene, body_to_urdf, read_scene, write_scene
 from dynx.world.separation import Separation
 from dynx.world.snapshot import check_world_suffix
 
@@ -71,7 +72,7 @@ def world(
         for option, path in (("--json", json_path), ("--plot", plot_path), ("--save", save_path)):
             if path is not None:
                 raise ArgumentError(f"{option} is given with --export, which runs nothing")
-        return _export(scene, export_path, quiet=quiet)
+        return _export(scene, export_path, dt, substeps, settings, quiet=quiet)
     check_json(json_path)
     for path in (plot_path, save_path):
         if path is not None:
@@ -115,10 +116,13 @@ def world(
     return code if ended is None else interruption.code or INTERRUPTED
 
 
-def _export(scene: str, path: str, *, quiet: bool) -> int:
+def _export(
+    scene: str, path: str, dt: float, substeps: int, settings: Sequence[tuple[str, str]], *, quiet: bool
+) -> int:
     check_suffix(path)
     check_writable(path)
-    for file in export(read_scene(scene), path):
+    given = settings_by_engine(("mujoco",), settings)["mujoco"] if settings else {}
+    for file in export(read_scene(scene), path, dt, substeps=substeps, **given):
         if not quiet:
             console().print(f"wrote {one_line(file)}")
     return DONE
@@ -443,11 +447,12 @@ def check_suffix(path: str) -> None:
         )
 
 
-def export(scene: Scene, path: str) -> list[str]:
+def export(scene: Scene, path: str, dt: float, **options: Any) -> list[str]:
     """Write a scene in the format of the suffix of a file; return the files written.
 
-    In URDF each robot and body has a file of its own, whose name stands before the suffix unless it is the
-    only one. Raises the errors of `scene_to_mjcf`, `body_to_urdf`, `Model.to_urdf` and `write_scene`.
+    MJCF has the step [s] and the options of `scene_to_mjcf`. In URDF each robot and body has a file of its
+    own, whose name stands before the suffix unless it is the only one. Raises the errors of `scene_to_mjcf`,
+    `body_to_urdf`, `Model.to_urdf` and `write_scene`.
     """
     check_suffix(path)
     suffix = Path(path).suffix.lower()
@@ -455,7 +460,7 @@ def export(scene: Scene, path: str) -> list[str]:
         write_scene(scene, path)
         return [path]
     if suffix != ".urdf":
-        write_bytes(path, scene_to_mjcf(scene).encode())
+        write_bytes(path, scene_to_mjcf(scene, dt, **options).encode())
         return [path]
     texts = {robot.name: robot.model.to_urdf(geometry=True) for robot in scene.robots}
     texts |= {body.name: body_to_urdf(body) for body in scene.bodies}

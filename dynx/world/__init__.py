@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from dynx.world.camera import Picture
     from dynx.world.comparison import WorldComparison
     from dynx.world.contacts import ClosestPoints, Contact, RayHits
+    from dynx.world.mjcf import scene_to_mjcf
     from dynx.world.motors import Motor, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
     from dynx.world.record import Record
     from dynx.world.scene.bodies import (
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
         sphere,
     )
     from dynx.world.scene.files import read_scene, write_scene
-    from dynx.world.scene.mjcf import scene_to_mjcf
     from dynx.world.scene.robots import SceneRobot
     from dynx.world.scene.scene import Scene
     from dynx.world.snapshot import Snapshot
@@ -128,7 +128,7 @@ _HOME = {
     "read_scene": "dynx.world.scene.files",
     "register_world": "dynx.steppers.registry:register",
     "scene_names": "dynx.model.library",
-    "scene_to_mjcf": "dynx.world.scene.mjcf",
+    "scene_to_mjcf": "dynx.world.mjcf",
     "sphere": "dynx.world.scene.bodies",
     "unregister_world": "dynx.steppers.registry:unregister",
     "world_names": "dynx.steppers.registry",

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from dynx.errors import EngineLimitError, UnsupportedFeatureError, shown
+from dynx.errors import ArgumentError, EngineLimitError, UnsupportedFeatureError, shown
 from dynx.model.elements import Pose
 from dynx.model.geometry import Collision, Mesh
+from dynx.model.numbers import positive_seconds, whole_number
 from dynx.spatial.scalar import Floats
 from dynx.steppers.layout import (
     WORLD,
@@ -22,6 +24,7 @@ from dynx.steppers.layout import (
     PlacedShape,
     RobotLayout,
 )
+from dynx.steppers.settings import checked_switches
 from dynx.steppers.stepper import Feature, Stepper
 from dynx.world.scene import Material, PointToPoint, Scene, SceneBody, SceneRobot, Weld
 from dynx.world.scene.robots import LinkFrames
@@ -30,6 +33,20 @@ MAX_COLLIDERS = 10_000
 """Largest number of links and bodies with shapes; the filter has an entry for each pair."""
 
 _IDENTITY = np.eye(4)
+
+
+SHORTEST_STEP = 1e-9
+"""Shortest step of an engine [s]."""
+
+
+def checked_options(dt: float, substeps: int, **switches: bool) -> dict[str, Any]:
+    """Return the options of a world by name; ArgumentError for an invalid one."""
+    seconds, steps = positive_seconds("dt", dt), whole_number("substeps", substeps, 1)
+    if seconds / steps < SHORTEST_STEP:
+        raise ArgumentError(
+            f"dt is {dt} in {substeps} substeps; wanted steps of at least {SHORTEST_STEP:g} s"
+        )
+    return {"dt": seconds, "substeps": steps, **checked_switches(**switches)}
 
 
 def prepare(

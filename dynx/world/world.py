@@ -26,14 +26,14 @@ from dynx.steppers.forces import ExternalForce
 from dynx.steppers.layout import Layout, RobotLayout
 from dynx.steppers.materials import InexactMaterial, inexact_materials, open_engine
 from dynx.steppers.registry import renderer_of, world_class
-from dynx.steppers.settings import changed_settings, checked_settings, checked_switches
+from dynx.steppers.settings import changed_settings, checked_settings
 from dynx.steppers.state import BodyState, RobotState, WorldState
 from dynx.steppers.stepper import Stepper
 from dynx.world.commands import Commands, MotorsOf, with_scene_motors
 from dynx.world.contacts import MAX_RAY_LENGTH, ClosestPoints, Contact, RayHits
 from dynx.world.motion import Motion, apply_state, checked_state
 from dynx.world.notes import Overlap, notes_on_engine, notes_on_start, overlaps_of
-from dynx.world.preparation import layout_for, prepare
+from dynx.world.preparation import checked_options, layout_for, prepare
 from dynx.world.scene.documents import scene_document, scene_from_document
 from dynx.world.scene.paths import ScenePaths
 from dynx.world.scene.scene import MARGIN, Scene
@@ -131,9 +131,6 @@ def _feed(digest: Any, value: Any) -> None:
         digest.update(repr(value).encode())
 
 
-SHORTEST_STEP = 1e-9
-"""Shortest step of an engine [s]."""
-
 TorquesOf = Mapping[str, ArrayLike]
 LoadsOf = Callable[["World"], Mapping[str, Any]]
 
@@ -173,23 +170,19 @@ class World:
         self.scene = scene
         self.engine = engine
         """Name of the engine."""
-        self.dt = positive_seconds("dt", dt)
-        self.substeps = whole_number("substeps", substeps, 1)
-        if self.dt / self.substeps < SHORTEST_STEP:
-            raise ArgumentError(
-                f"dt is {dt} in {substeps} substeps; wanted steps of at least {SHORTEST_STEP:g} s"
-            )
-        switches = checked_switches(
-            collisions=collisions,
-            joint_limits=joint_limits,
-            joint_damping=joint_damping,
-            joint_friction=joint_friction,
-            joint_armature=joint_armature,
-        )
+        switches = {
+            "collisions": collisions,
+            "joint_limits": joint_limits,
+            "joint_damping": joint_damping,
+            "joint_friction": joint_friction,
+            "joint_armature": joint_armature,
+        }
+        self.options: Mapping[str, Any] = checked_options(dt, substeps, **switches)
+        """Options of the world other than the engine's settings."""
+        self.dt: float = self.options["dt"]
+        self.substeps: int = self.options["substeps"]
         self.settings: Mapping[str, Any] = checked_settings(engine, self._kind.settings, settings)
         """The engine's settings in use, by name."""
-        self.options: Mapping[str, Any] = {"dt": self.dt, "substeps": self.substeps, **switches}
-        """Options of the world other than the engine's settings."""
         self._layout = prepare(scene, **switches)
         self._scene_motors = {robot.name: robot.motors for robot in scene.robots if robot.motors}
         robots = {robot.name: k for k, robot in enumerate(self._layout.robots)}
@@ -354,6 +347,17 @@ class World:
         """
         given = {"engine": self.engine, "options": dict(self.options), "settings": dict(self.settings)}
         write_snapshot(path, self.save(), {"scene": scene_document(self.scene), **given})
+
+    def to_mjcf(self) -> str:
+        """Return the world at the start of its scene as an MJCF document (`scene_to_mjcf`), with its options.
+
+        For a world in MuJoCo it is the model that runs; for one in another engine that of MuJoCo with its
+        default settings. Raises the errors of `scene_to_mjcf`.
+        """
+        from dynx.world.mjcf import layout_to_mjcf
+
+        settings = self.settings if self.engine == "mujoco" else {}
+        return layout_to_mjcf(self.scene, self._layout, self.options, settings)
 
     @classmethod
     def read(cls, path: StrPath, *, package_dirs: Iterable[StrPath] = ()) -> World:

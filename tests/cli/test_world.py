@@ -156,6 +156,10 @@ def test_a_scene_is_exported_by_the_suffix_and_not_run(overlapping: str, tmp_pat
         assert "wrote" in result.output
         assert "bodies at the end" not in result.output
     assert 'name="kugel α"' in (tmp_path / "out.xml").read_text(encoding="utf-8")
+    options = ("--dt", "0.004", "--substeps", "2", "--set", "impratio=7", "--set", "mujoco.cone=pyramidal")
+    assert run(overlapping, "--export", str(tmp_path / "set.xml"), *options).exit_code == 0
+    text = (tmp_path / "set.xml").read_text(encoding="utf-8")
+    assert all(each in text for each in ('timestep="0.002"', 'impratio="7.0"', 'cone="pyramidal"'))
     assert read_scene(tmp_path / "out.json") == read_scene(overlapping)
     assert dynx.load(tmp_path / "out.kugel α.urdf", base="floating").total_mass == 1.0
     assert (tmp_path / "out.b.urdf").is_file()

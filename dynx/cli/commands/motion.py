@@ -71,8 +71,9 @@ from dynx.errors import shown
         "--export",
         "export_path",
         metavar="FILE",
-        help="File to which the scene is written in another format, instead of a run: .xml or .mjcf (MJCF), "
-        ".toml, .json, or .urdf, with a file for each robot and body, whose name stands before the suffix.",
+        help="File to which the scene is written in another format, instead of a run: .xml or .mjcf (MJCF, "
+        "with the step and the settings of MuJoCo), .toml, .json, or .urdf, with a file for each robot and "
+        "body, whose name stands before the suffix.",
     ),
     quiet_option,
 )

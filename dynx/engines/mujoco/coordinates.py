@@ -13,18 +13,13 @@ from typing import Any
 import numpy as np
 
 from dynx.engines.mujoco.library import mujoco
+from dynx.engines.mujoco.mjcf import body_coordinates, robot_coordinates
 from dynx.model import Model
 from dynx.spatial.plain import minus_cross, rotate, rotate_back, rotation_rows
-from dynx.spatial.scalar import Array, Floats
-from dynx.spatial.so3 import cross, quat_from_rotation, rotation_from_quat
+from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import cross
 from dynx.steppers.layout import BodyLayout
 from dynx.steppers.state import BodyState, RobotState
-
-
-def quat_wxyz(R: Array) -> Floats:
-    """Return the quaternion (w, x, y, z) of a rotation matrix (3, 3)."""
-    x, y, z, w = quat_from_rotation(np.asarray(R, dtype=np.float64))
-    return np.array([w, x, y, z])
 
 
 class RobotCoordinates:
@@ -33,6 +28,7 @@ class RobotCoordinates:
     def __init__(self, data: Any, model: Model, first: tuple[int, int]) -> None:
         """`first` are the indices in q and v at which the robot begins."""
         mechanism = model.mechanism
+        self._model = model
         self._floating = model.floating
         self._center = np.asarray(mechanism.root_center, dtype=float)
         self._coupling = mechanism.coupling
@@ -42,7 +38,6 @@ class RobotCoordinates:
         self.applied: Floats = data.qfrc_applied[first[1] : first[1] + mechanism.nv]
         """Generalised forces of MuJoCo that act in the next steps, of the tree."""
         if self._coupling is not None:
-            self._S = self._coupling.matrix()
             moving = [joint for joint in model.joints if joint.moves]
             owners = [k for k, joint in enumerate(moving) if joint.mimic is None]
             base_q, base_v = (7, 6) if model.floating else (0, 0)
@@ -73,15 +68,7 @@ class RobotCoordinates:
 
     def write(self, q: Floats, v: Floats) -> None:
         """Set the state from q, v in the coordinates of the model."""
-        if self._coupling is not None:
-            q, v = self._coupling.expand_q(q), self._S @ v
-        self._q[:] = q
-        self._v[:] = v
-        if self._floating:
-            R = rotation_from_quat(q[3:7])
-            self._q[:3] += R @ self._center
-            self._q[3], self._q[4:7] = q[6], q[3:6]
-            self._v[:3] = R @ (v[:3] + cross(v[3:6], self._center))
+        self._q[:], self._v[:] = robot_coordinates(self._model, q, v)
 
     def forces(self, tau: Floats) -> Floats:
         """Return a torque with the wrench on a floating base, `tau[:6]` at its origin in its axes, converted
@@ -125,9 +112,4 @@ class BodyCoordinates:
 
     def write(self, T: Floats, twist: Floats) -> None:
         """Set the pose and the twist."""
-        R = T[:3, :3]
-        lever = R @ self._center
-        self._q[:3] = T[:3, 3] + lever
-        self._q[3:] = quat_wxyz(R)
-        self._v[:3] = twist[:3] + cross(twist[3:], lever)
-        self._v[3:] = twist[3:] @ R
+        self._q[:], self._v[:] = body_coordinates(T, twist, self._center)

@@ -21,7 +21,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.engines.mujoco.library import mujoco
 from dynx.spatial.scalar import Floats
 from dynx.steppers.contact_springs import damping_ratio, restitution_of
 from dynx.steppers.layout import Layout
@@ -65,7 +64,7 @@ SETTINGS: Mapping[str, Setting] = {
     ),
     "constraint_impedance": Setting(
         (0.95, 0.99, 0.001, 0.5, 2.0),
-        "MuJoCo's solimp of welds, point-to-point constraints and mimic joints",
+        "MuJoCo's solimp of welds and point-to-point constraints",
     ),
     "joint_friction_impedance": Setting(
         0.999,
@@ -77,36 +76,24 @@ SETTINGS: Mapping[str, Setting] = {
 }
 """Settings by name; the defaults are dynx's canonical ones."""
 
-_INTEGRATORS = {
-    "euler": mujoco.mjtIntegrator.mjINT_EULER,
-    "implicitfast": mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
-    "implicit": mujoco.mjtIntegrator.mjINT_IMPLICIT,
-}
-_SOLVERS = {
-    "newton": mujoco.mjtSolver.mjSOL_NEWTON,
-    "cg": mujoco.mjtSolver.mjSOL_CG,
-    "pgs": mujoco.mjtSolver.mjSOL_PGS,
-}
-_CONES = {"elliptic": mujoco.mjtCone.mjCONE_ELLIPTIC, "pyramidal": mujoco.mjtCone.mjCONE_PYRAMIDAL}
+MIMIC_IMPEDANCE = (0.9999, 0.9999)
+"""MuJoCo's solimp of mimic joints, its largest: what impedance is missing from 1 is the share of a force that
+the coupling leaves on one joint."""
+
+_MJCF_NAMES = {"euler": "Euler", "newton": "Newton", "cg": "CG", "pgs": "PGS"}
+"""Settings whose names in MJCF are not those in lower case."""
+
+_OPTIONS = (
+    *("integrator", "solver", "cone", "iterations", "tolerance"),
+    *("impratio", "noslip_iterations", "ccd_iterations"),
+)
+"""Settings that are options of an MJCF document."""
 
 
-def set_options(option: Any, settings: Mapping[str, Any], gravity: Floats, dt: float) -> None:
-    """Write gravity, the step and the settings of the solver into MuJoCo's options.
-
-    MuJoCo's reset after a divergence is disabled, because it would replace the state by another one, and so
-    is its filter of parent and child, because the scene decides what collides.
-    """
-    option.timestep = dt
-    option.gravity = gravity
-    option.integrator = _INTEGRATORS[settings["integrator"]]
-    option.solver = _SOLVERS[settings["solver"]]
-    option.cone = _CONES[settings["cone"]]
-    option.iterations = settings["iterations"]
-    option.tolerance = settings["tolerance"]
-    option.impratio = settings["impratio"]
-    option.noslip_iterations = settings["noslip_iterations"]
-    option.ccd_iterations = settings["ccd_iterations"]
-    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET | mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
+def option_attributes(settings: Mapping[str, Any], gravity: Floats, dt: float) -> dict[str, Any]:
+    """Return the attributes of MJCF's options: gravity, the step and the settings of the solver."""
+    chosen = {name: _MJCF_NAMES.get(settings[name], settings[name]) for name in _OPTIONS}
+    return {"timestep": dt, "gravity": gravity, **chosen}
 
 
 LEAST_STEPS = {"time_constant": 2.0, "slip_time_constant": 1.0, "constraint_time_constant": 2.0}
@@ -189,6 +176,10 @@ class ContactMaterials:
         """True if every pair of colliders that may touch is an explicit one."""
         self._geoms = [self._geom_options(row) for row in rows.tolist()]
         self._combination, self._priority = found.combination, found.priority
+        self.common = {"priority": 0, **self._spring_options(0.0, slips=True)}
+        """Options that most geoms have."""
+        self.common_of_pairs = self._spring_options(0.0, slips=False)
+        """Options that most explicit pairs have."""
         of_pair = [self._pair_options(row) for row in rows.tolist()]
         self.pairs = [
             (i, j, of_pair[combination[numbers[i], numbers[j]]])
@@ -202,21 +193,27 @@ class ContactMaterials:
 
     def _geom_options(self, row: list[float]) -> dict[str, Any]:
         *friction, restitution = row
-        return {
-            "condim": contact_directions(*friction),
-            "friction": friction,
-            "solref": contact_reference(self._settings, restitution, self._dt, slips=True),
-            "solimp": self._settings["impedance"],
-            "margin": self._settings["margin"],
-        }
+        spring = self._spring_options(restitution, slips=True)
+        return {"condim": contact_directions(*friction), "friction": friction, **spring}
 
     def _pair_options(self, row: list[float]) -> dict[str, Any]:
         sliding, torsional, rolling, restitution = row
-        return self._geom_options(row) | {
+        return {
+            "condim": contact_directions(sliding, torsional, rolling),
             "friction": [sliding, sliding, torsional, rolling, rolling],
-            "solref": contact_reference(self._settings, restitution, self._dt),
-            "solreffriction": slip_reference(self._settings, self._dt),
+            **self._spring_options(restitution, slips=False),
         }
+
+    def _spring_options(self, restitution: float, *, slips: bool) -> dict[str, Any]:
+        """Return the options of the spring of a contact; one that does not slip by it has another damping of
+        slip."""
+        settings, dt = self._settings, self._dt
+        spring = {
+            "solref": contact_reference(settings, restitution, dt, slips=slips),
+            "solimp": settings["impedance"],
+            "margin": settings["margin"],
+        }
+        return spring if slips else {**spring, "solreffriction": slip_reference(settings, dt)}
 
     def effective(self) -> Mapping[str, EffectiveCoefficient]:
         """Return the coefficients in effect."""

@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from dynx.engines.mujoco.build import FIELD_GROUP
 from dynx.engines.mujoco.library import mujoco
+from dynx.engines.mujoco.mjcf import FIELD_GROUP
 from dynx.engines.mujoco.stepper import MujocoStepper, engine_errors
 from dynx.model.geometry import HeightField
 from dynx.model.geometry.ray_casting import cast_on_shape

@@ -91,8 +91,9 @@ def read_contacts(
     return found
 
 
-STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
-"""Part of MuJoCo's state that determines the later steps; the physics state alone lacks the warm start."""
+_PARTS = mujoco.mjtState
+STATE = int(_PARTS.mjSTATE_TIME | _PARTS.mjSTATE_QPOS | _PARTS.mjSTATE_QVEL | _PARTS.mjSTATE_WARMSTART)
+"""Part of MuJoCo's state that determines the later steps; forces of earlier ones do not act in them."""
 
 CONTACTS_LOST = int(mujoco.mjtWarning.mjWARN_CONTACTFULL)
 CONSTRAINTS_LOST = int(mujoco.mjtWarning.mjWARN_CNSTRFULL)
@@ -137,10 +138,6 @@ class MujocoStepper(Stepper):
             if not body.fixed
         }
         self._body_numbers = np.array(built.bodies, dtype=np.intp)
-        for number, robot in enumerate(layout.robots):
-            self._robots[number].write(robot.q, robot.v)
-        for number, moving in self._bodies.items():
-            moving.write(layout.bodies[number].T, layout.bodies[number].twist)
         self._moved()
 
     @classmethod
@@ -222,7 +219,9 @@ class MujocoStepper(Stepper):
 
     @engine_errors
     def load(self, data: bytes) -> None:
-        mujoco.mj_setState(self.model, self.data, np.frombuffer(data), STATE)
+        # Files of earlier versions go on with the forces of the last step.
+        state = np.frombuffer(data)[: mujoco.mj_stateSize(self.model, STATE)]
+        mujoco.mj_setState(self.model, self.data, state, STATE)
         self._loaded = self._pushed = True
         self._moved()
 

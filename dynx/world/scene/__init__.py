@@ -23,7 +23,6 @@ if TYPE_CHECKING:
         sphere,
     )
     from dynx.world.scene.files import read_scene, write_scene
-    from dynx.world.scene.mjcf import scene_to_mjcf
     from dynx.world.scene.robots import SceneRobot
     from dynx.world.scene.scene import Scene
 
@@ -43,7 +42,6 @@ __all__ = [
     "mesh",
     "read_scene",
     "scene_names",
-    "scene_to_mjcf",
     "sphere",
     "write_scene",
 ]
@@ -64,14 +62,13 @@ _HOME = {
     "mesh": "dynx.world.scene.bodies",
     "read_scene": "dynx.world.scene.files",
     "scene_names": "dynx.model.library",
-    "scene_to_mjcf": "dynx.world.scene.mjcf",
     "sphere": "dynx.world.scene.bodies",
     "write_scene": "dynx.world.scene.files",
 }
 
 # Hidden from type checkers, which would take any name for an attribute: they know the imports above.
 if not TYPE_CHECKING:
-    __getattr__ = moved_names(__name__, {}, _HOME)
+    __getattr__ = moved_names(__name__, {"scene_to_mjcf": "dynx.world.scene_to_mjcf"}, _HOME)
 
 
 def __dir__() -> list[str]:

@@ -10,7 +10,9 @@ from numpy.testing import assert_allclose
 
 import dynx
 from dynx import Pose
-from dynx.engines.mujoco.build import build_scene, collision_masks, pairs_to_exclude
+from dynx.engines.mujoco.build import build_scene
+from dynx.engines.mujoco.library import mujoco
+from dynx.engines.mujoco.mjcf import collision_masks, pairs_to_exclude
 from dynx.engines.mujoco.stepper import MujocoStepper
 from dynx.errors import SingularMassMatrixError
 from dynx.model.geometry import Collision, HeightField, Sphere
@@ -157,3 +159,17 @@ def test_references_are_of_one_format_which_mujoco_does_not_replace(
         ):
             first, second = getattr(model, name).reshape(-1, 2).T
             assert ((first > 0.0) == (second > 0.0)).all(), name
+
+
+def test_a_state_with_the_forces_of_its_last_step_as_files_of_earlier_versions_have_it_is_loaded() -> None:
+    layout = layout_of(two_arms())
+    engine = MujocoStepper(layout, 1e-3, DEFAULTS)
+    engine.step(20, Forces([(0, np.ones(layout.robots[0].model.nv))]))
+    whole = int(mujoco.mjtState.mjSTATE_INTEGRATION)
+    state = np.zeros(mujoco.mj_stateSize(engine.model, whole))
+    mujoco.mj_getState(engine.model, engine.data, state, whole)
+    engine.step(20)
+    expected = engine.dump()
+    engine.load(state.tobytes())
+    engine.step(20)
+    assert engine.dump() == expected

@@ -1,0 +1,600 @@
+"""A scene as an MJCF document: the model that MuJoCo's world compiles, and that dynx exports.
+
+A robot is a body named as it is, in which each link is a body ``robot/link``. Links that move are nested as
+their joints are, and have the merged inertia of the links that fixed joints connect to them; those links are
+bodies without inertia in them. What does not move has no inertia either.
+
+The body of a robot with a fixed base is at the origin of the world. A free body is at the centre of mass,
+where MuJoCo's Euler conserves momentum: that of a floating base, and, for a body of the scene whose origin is
+elsewhere, the body ``name/center``, to which the body ``name`` is fixed.
+
+MuJoCo refuses negative masses and moments, principal moments of which one exceeds the sum of the others, and
+bodies that move without a mass and three moments. Such bodies have substitutes in the document, which a world
+replaces in the compiled model, and which are not exported.
+
+**Filters**: MuJoCo tests a pair of geoms if the type of one and the affinity of the other share a bit, unless
+their bodies are an excluded pair. A set of colliders that never touch each other, such as the links of a
+robot, shares a bit of its own that is missing in its affinity; the other pairs that may not touch are
+excluded one by one.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from itertools import groupby, product
+from typing import Any, NamedTuple
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+import numpy as np
+
+from dynx.engines.mujoco.materials import (
+    MIMIC_IMPEDANCE,
+    ContactMaterials,
+    constraint_reference,
+    limit_reference,
+    option_attributes,
+)
+from dynx.errors import EngineLimitError, UnsupportedFeatureError, shown
+from dynx.model import Model
+from dynx.model.elements import Joint
+from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
+from dynx.model.mechanism import ROOT
+from dynx.spatial.inertia import RigidInertia
+from dynx.spatial.scalar import FLOAT64_EPS, Array, Floats, jacobi_eigen, longdouble
+from dynx.spatial.so3 import cross, quat_from_rotation, rotation_from_quat, skew
+from dynx.steppers.layout import WORLD, BodyLayout, Layout, Owner, RobotLayout
+
+# -- numbers ------------------------------------------------------------------------------------------------
+
+
+def quat_wxyz(R: Array) -> Floats:
+    """Return the quaternion (w, x, y, z) of a rotation matrix (3, 3)."""
+    x, y, z, w = quat_from_rotation(np.asarray(R, dtype=np.float64))
+    return np.array([w, x, y, z])
+
+
+def text(value: Any) -> str:
+    """Return an attribute as text: a word, or numbers, each the shortest that reads back exactly."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, int | np.integer):
+        return str(value)
+    if isinstance(value, Iterable):
+        return " ".join(repr(float(each)) for each in value)
+    return repr(float(value))
+
+
+def attributes(values: Mapping[str, Any], defaults: Mapping[str, Any] | None = None) -> dict[str, str]:
+    """Return attributes as text, without those that are equal to the defaults."""
+    written = {name: text(value) for name, value in values.items()}
+    absent = {} if defaults is None else attributes(defaults)
+    return {name: value for name, value in written.items() if absent.get(name) != value}
+
+
+def placement(R: Array, p: Array) -> dict[str, str]:
+    """Return the attributes of a pose, with the rotation R (3, 3) and the position p (3,)."""
+    return attributes({"pos": np.asarray(p, dtype=np.float64), "quat": quat_wxyz(R)})
+
+
+def robot_coordinates(model: Model, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+    """Return MuJoCo's q and v of a robot with the state q, v in the coordinates of the model."""
+    coupling = model.mechanism.coupling
+    q, v = (q.copy(), v.copy()) if coupling is None else (coupling.expand_q(q), coupling.matrix() @ v)
+    if model.floating:
+        center = np.asarray(model.mechanism.root_center, dtype=float)
+        R = rotation_from_quat(q[3:7])
+        q[:3] += R @ center
+        q[3:7] = q[[6, 3, 4, 5]]
+        v[:3] = R @ (v[:3] + cross(v[3:6], center))
+    return q, v
+
+
+def body_coordinates(T: Floats, twist: Floats, center: Floats) -> tuple[Floats, Floats]:
+    """Return MuJoCo's q and v of a body with its pose (4, 4), its twist (6,) in world axes and its centre of
+    mass (3,) in its own frame."""
+    R = T[:3, :3]
+    lever = R @ center
+    q = np.concatenate([T[:3, 3] + lever, quat_wxyz(R)])
+    return q, np.concatenate([twist[:3] + cross(twist[3:], lever), twist[3:] @ R])
+
+
+# -- inertias -----------------------------------------------------------------------------------------------
+
+LEAST_INERTIA = 1e-15
+"""Mass [kg] and principal moment [kg m^2] that MuJoCo requires of bodies that move (mjMINVAL)."""
+
+ROUNDING = 1e-9
+"""Excess of the largest principal moment over the sum of the others, relative to it, that counts as
+rounding."""
+
+SUBSTITUTE = {"mass": 1.0, "pos": (0.25, 0.5, 0.75), "quat": (0.5, 0.5, 0.5, 0.5), "diaginertia": (1.0,) * 3}
+"""Inertia that MuJoCo accepts, in another pose than the frame of the body, so that nothing is simplified."""
+
+
+@dataclass(frozen=True, eq=False)
+class PrincipalInertia:
+    """A mass, its centre (3,) and principal moments (3,), whose axes are the columns of `axes` (3, 3)."""
+
+    mass: float
+    center: Floats
+    moments: Floats
+    axes: Array
+
+    @classmethod
+    def of(cls, mass: float, center: Array, tensor: Array, scale: float = 0.0) -> PrincipalInertia:
+        """Return the inertia with this tensor (3, 3) about the centre of mass.
+
+        `scale` is the magnitude of the moments from which the tensor was computed.
+        """
+        principal, axes = jacobi_eigen(longdouble(tensor))
+        moments = np.asarray(principal, dtype=np.float64)
+        largest = int(np.argmax(moments))
+        size = float(moments[largest])
+        moments[np.abs(moments) <= 4.0 * FLOAT64_EPS * max(scale, float(np.max(np.abs(moments))))] = 0.0
+        others = float(np.delete(moments, largest).sum())
+        if others < moments[largest] <= others + ROUNDING * size:
+            moments[largest] = others
+        return cls(float(mass), np.asarray(center, dtype=np.float64), moments, axes)
+
+    @classmethod
+    def of_rigid(cls, inertia: RigidInertia, robot: str) -> PrincipalInertia:
+        """Return the inertia of a body of a robot.
+
+        Raises EngineLimitError for a first moment without a mass, which MuJoCo cannot represent.
+        """
+        mass, center = longdouble(inertia.mass), longdouble(np.zeros(3))
+        if mass != 0.0:
+            center = longdouble(inertia.first_moment) / mass
+        elif np.any(inertia.first_moment != 0.0):
+            raise EngineLimitError(
+                f"a body of {shown(robot)} has a first moment and no mass, because masses of its links "
+                "cancel; 'mujoco' cannot represent that"
+            )
+        arm = skew(center)
+        tensor = longdouble(inertia.rotational_inertia) + mass * (arm @ arm)
+        # Merging leaves a point mass with rounding errors of either sign.
+        scale = float(np.max(np.abs(inertia.rotational_inertia)))
+        return cls.of(float(mass), center, tensor, scale)
+
+    def at_center(self) -> PrincipalInertia:
+        """Return the inertia in a frame at the centre of mass."""
+        return replace(self, center=np.zeros(3))
+
+    @property
+    def fault(self) -> str | None:
+        """Reason for which MuJoCo refuses the inertia of a body that moves."""
+        if self.mass < 0.0 or self.moments.min() < 0.0:
+            return f"has the mass {self.mass:.4g} kg and the least moment {self.moments.min():.4g} kg m^2"
+        if 2.0 * self.moments.max() > self.moments.sum() * (1.0 + FLOAT64_EPS):
+            numbers = ", ".join(f"{moment:.4g}" for moment in self.moments)
+            return f"has the principal moments {numbers} kg m^2, of which one exceeds the others' sum"
+        if self.mass < LEAST_INERTIA or self.moments.min() < LEAST_INERTIA:
+            numbers = ", ".join(f"{moment:.4g}" for moment in self.moments)
+            return (
+                f"moves with a mass of {self.mass:.4g} kg and the principal moments {numbers} kg m^2, links "
+                "fixed to it included"
+            )
+        return None
+
+    def add_to(self, body: Element) -> None:
+        """Add the inertia to a body."""
+        moments = attributes({"mass": self.mass, "diaginertia": self.moments})
+        SubElement(body, "inertial", placement(self.axes, self.center) | moments)
+
+
+class RefusedInertia(NamedTuple):
+    """An inertia that MuJoCo's compiler refuses, of the body with this name in the document."""
+
+    body: str
+    inertia: PrincipalInertia
+    error: UnsupportedFeatureError
+
+
+# -- shapes and filters -------------------------------------------------------------------------------------
+
+FIELD_GROUP = 2
+"""MuJoCo's geom group of height fields, which `mj_ray` can leave out; others are in group 0. Viewers show
+both."""
+
+MIN_HEIGHT_RANGE = 1e-6
+"""Range of heights [m] that a level height field is given, because MuJoCo requires one above zero."""
+
+
+class ShapeWriter:
+    """Adds shapes to bodies; equal meshes and height fields become one asset."""
+
+    def __init__(self, asset: Element) -> None:
+        self._asset = asset
+        self._names: dict[Shape, str] = {}
+
+    def add(self, body: Element, name: str, shape: Shape, T: Floats, options: Mapping[str, str]) -> None:
+        """Add a shape at a pose (4, 4) of the body, with attributes of its own."""
+        position = T[:3, 3]
+        given = {"name": name, **self._form(shape)}
+        if isinstance(shape, HeightField):
+            position = position + T[:3, 2] * np.min(shape.heights)
+            given["group"] = str(FIELD_GROUP)
+        SubElement(body, "geom", {**given, **placement(T[:3, :3], position), **options})
+
+    def _form(self, shape: Shape) -> dict[str, str]:
+        if isinstance(shape, Box):
+            return {"type": "box", "size": text(0.5 * np.array(shape.size))}
+        if isinstance(shape, Sphere):
+            return {"type": "sphere", "size": text(shape.radius)}
+        if isinstance(shape, Cylinder | Capsule):
+            kind = "cylinder" if isinstance(shape, Cylinder) else "capsule"
+            return {"type": kind, "size": text([shape.radius, 0.5 * shape.length])}
+        if isinstance(shape, Plane):
+            return {"type": "plane", "size": "0 0 1"}
+        if isinstance(shape, HeightField):
+            return {"type": "hfield", "hfield": self._field(shape)}
+        return {"type": "mesh", "mesh": self._hull(shape)}
+
+    def _field(self, shape: HeightField) -> str:
+        if shape not in self._names:
+            heights = np.array(shape.heights)
+            span = max(float(np.ptp(heights)), MIN_HEIGHT_RANGE)
+            # MuJoCo reads the rows of a document from the highest y to the lowest.
+            rows = heights[::-1] - heights.min()
+            SubElement(
+                self._asset,
+                "hfield",
+                name=self._new_name("heights", shape),
+                nrow=str(heights.shape[0]),
+                ncol=str(heights.shape[1]),
+                size=text([0.5 * shape.size[0], 0.5 * shape.size[1], span, shape.DEPTH]),
+                elevation=text(rows.ravel()),
+            )
+        return self._names[shape]
+
+    def _hull(self, shape: Mesh) -> str:
+        if shape not in self._names:
+            vertices, _ = shape.hull
+            name = self._new_name("mesh", shape)
+            # The moments of a shell need no volume, so that a tiny mesh is accepted too.
+            SubElement(self._asset, "mesh", name=name, vertex=text(vertices.ravel()), inertia="shell")
+        return self._names[shape]
+
+    def _new_name(self, kind: str, shape: Shape) -> str:
+        return self._names.setdefault(shape, f"{kind}{len(self._names)}")
+
+
+BITS = 31
+"""Bits of a mask; a signed integer of 32 has no more."""
+
+ALL = 2**BITS - 1
+
+Mask = tuple[int, int]
+"""MuJoCo's contype and conaffinity."""
+
+
+def collision_masks(layout: Layout) -> list[Mask]:
+    """Return the masks of every collider. Bit 0 is that of colliders which may touch others of their set."""
+    masks = [(1, ALL)] * len(layout.colliders)
+    bit = 1
+    for robot, numbers in _by_robot(layout):
+        apart = robot is not None and not layout.collides[np.ix_(numbers, numbers)].any()
+        if apart and len(numbers) > 1 and bit < BITS:
+            for number in numbers:
+                masks[number] = (1 << bit, ALL ^ (1 << bit))
+            bit += 1
+    return masks
+
+
+def pairs_to_exclude(layout: Layout, masks: list[Mask]) -> list[tuple[int, int]]:
+    """Return the pairs of colliders that must not touch and that neither masks nor MuJoCo's own rules filter:
+    it tests no bodies that are rigidly connected, or both fixed."""
+    pairs = []
+    fixed = [layout.is_fixed(collider.owner) for collider in layout.colliders]
+    for a, b in np.argwhere(np.triu(~layout.collides, 1)).tolist():
+        tested = masks[a][0] & masks[b][1] or masks[b][0] & masks[a][1]
+        connected = layout.colliders[a].owner == layout.colliders[b].owner
+        if tested and not connected and not (fixed[a] and fixed[b]):
+            pairs.append((a, b))
+    return pairs
+
+
+def _by_robot(layout: Layout) -> list[tuple[int | None, list[int]]]:
+    numbers = range(len(layout.colliders))
+    groups = groupby(numbers, key=lambda number: layout.colliders[number].owner.robot)
+    return [(robot, list(group)) for robot, group in groups]
+
+
+# -- the document -------------------------------------------------------------------------------------------
+
+MAX_DEPTH = 490
+"""Largest number of links in a row; MuJoCo's reader refuses elements that are nested 500 deep."""
+
+UNLIMITED = 1e10
+"""Joint limit [rad or m] that stands for an absent one beside one that is stated."""
+
+RANGE_GAP = 1e-12
+"""Range given to a joint whose limits are equal, which MuJoCo refuses, relative to the limit and at least in
+rad or m."""
+
+
+class Carrier(NamedTuple):
+    """The body of an owner in the document, and the origin (3,) of its frame in that of the owner."""
+
+    body: Element
+    origin: Floats
+
+    def placement(self, R: Array, p: Array) -> dict[str, str]:
+        """Return the attributes of a pose (R, p) in the owner's frame."""
+        return placement(R, p - self.origin)
+
+
+class SceneDocument:
+    """A scene as an MJCF document, with the step [s] and the settings of the engine."""
+
+    def __init__(self, layout: Layout, dt: float, settings: Mapping[str, Any]) -> None:
+        """Raises EngineLimitError for a robot with more than `MAX_DEPTH` links in a row and one whose masses
+        cancel, UnsupportedFeatureError for a ground that moves."""
+        self._layout = layout
+        self._settings, self._dt = settings, dt
+        self.materials = ContactMaterials(layout, settings, dt)
+        self.refused: list[RefusedInertia] = []
+        """Inertias for which the document has substitutes."""
+        self.free: dict[str, str] = {}
+        """The free body of each robot and body of the scene that moves freely."""
+        self._colliders = {each.name: number for number, each in enumerate(layout.colliders)}
+        self._root = root = Element("mujoco", model=layout.name)
+        flags = {"angle": "radian", "autolimits": "true", "inertiafromgeom": "false", "fusestatic": "false"}
+        SubElement(root, "compiler", flags)
+        option = SubElement(root, "option", attributes(option_attributes(settings, layout.gravity, dt)))
+        # MuJoCo's reset after a divergence would replace the state by another one, and its filter of parents
+        # and children is replaced by that of the scene.
+        SubElement(option, "flag", autoreset="disable", filterparent="disable")
+        # Explicit pairs are tested whatever the masks.
+        explicit = self.materials.complete
+        self._masks = [(0, 0)] * len(layout.colliders) if explicit else collision_masks(layout)
+        masks = {"contype": 0, "conaffinity": 0} if explicit else {}
+        self._geom_defaults = {**self.materials.common, **masks}
+        self._add_defaults()
+        self._shapes = ShapeWriter(SubElement(root, "asset"))
+        world = SubElement(root, "worldbody")
+        self._carriers = {Owner(None, WORLD): Carrier(world, np.zeros(3))}
+        self._contact, self._equality, self._actuator = (
+            SubElement(root, name) for name in ("contact", "equality", "actuator")
+        )
+        q: list[Floats] = []
+        v: list[Floats] = []
+        for k, robot in enumerate(layout.robots):
+            self._add_robot(k, robot)
+            _append_state(q, v, robot_coordinates(robot.model, robot.q, robot.v))
+        for k, body in enumerate(layout.bodies):
+            self._add_scene_body(k, body)
+            if not body.fixed:
+                _append_state(q, v, body_coordinates(body.T, body.twist, body.center))
+        self._add_contacts()
+        self._add_constraints()
+        if q:
+            state = {"name": "start", "qpos": np.concatenate(q), "qvel": np.concatenate(v)}
+            SubElement(SubElement(root, "keyframe"), "key", attributes(state))
+        for empty in [part for part in root if len(part) == 0 and not part.attrib]:
+            root.remove(empty)
+        indent(root)
+
+    def text(self, remarks: Iterable[str] = ()) -> str:
+        """Return the document, with remarks as comments at its beginning."""
+        # A comment cannot have two hyphens in a row.
+        lines = [f"<!-- {re.sub('-(?=-)', '- ', remark)} -->\n" for remark in remarks]
+        return "".join(lines) + tostring(self._root, encoding="unicode") + "\n"
+
+    def _add_defaults(self) -> None:
+        settings, dt = self._settings, self._dt
+        loss = settings["joint_friction_impedance"]
+        default = SubElement(self._root, "default")
+        joint = {
+            "solreflimit": limit_reference(settings, dt),
+            "solimplimit": settings["impedance"],
+            "solreffriction": constraint_reference(settings, dt),
+            "solimpfriction": (loss, loss),
+        }
+        equality = {
+            "solref": constraint_reference(settings, dt),
+            "solimp": settings["constraint_impedance"],
+        }
+        SubElement(default, "joint", attributes(joint))
+        SubElement(default, "geom", attributes(self._geom_defaults))
+        SubElement(default, "pair", attributes(self.materials.common_of_pairs))
+        SubElement(default, "equality", attributes(equality))
+
+    # -- robots and bodies --------------------------------------------------------------------
+
+    def _add_robot(self, number: int, robot: RobotLayout) -> None:
+        model = robot.model
+        mechanism = model.extended_mechanism
+        frames = {frame.name: frame for frame in mechanism.frames}
+        center = np.asarray(model.mechanism.root_center, dtype=float)
+        root = SubElement(self._carriers[Owner(None, WORLD)].body, "body", name=robot.name)
+        carriers = {ROOT: Carrier(root, center)}
+        if model.floating:
+            q, _ = robot_coordinates(model, robot.q, robot.v)
+            self._set_free(root, robot.name, q)
+            inertia = PrincipalInertia.of_rigid(mechanism.root, model.name)
+            self._add_inertia(root, f"{robot.name}/{model.root}", inertia.at_center(), model, model.root)
+        depths = {ROOT: 0}
+        moving = {joint.child: joint for joint in model.joints if joint.moves}
+        for link in (model.root, *(joint.child for joint in model.joints)):
+            name, frame = f"{robot.name}/{link}", frames[link]
+            index = frame.body
+            if link in moving:
+                each = mechanism.bodies[index]
+                parent = carriers[each.parent]
+                body = SubElement(parent.body, "body", {"name": name, **parent.placement(each.R, each.p)})
+                carriers[index], depths[index] = Carrier(body, np.zeros(3)), depths[each.parent] + 1
+                if depths[index] > MAX_DEPTH:
+                    raise EngineLimitError(
+                        f"robot {shown(robot.name)} has more than {MAX_DEPTH} moving links in a row; MuJoCo "
+                        "reads no deeper document"
+                    )
+                inertia = PrincipalInertia.of_rigid(each.inertia, model.name)
+                self._add_inertia(body, name, inertia, model, link)
+                _add_joint(body, robot, index, moving[link])
+            else:
+                carrier = carriers[index]
+                pose = carrier.placement(frame.R, frame.p)
+                body = SubElement(carrier.body, "body", {"name": name, **pose})
+            self._add_link_shapes(robot, link, body, moves=model.floating or index != ROOT)
+        self._carriers |= {Owner(number, index): carrier for index, carrier in carriers.items()}
+        self._couple(robot)
+
+    def _add_link_shapes(self, robot: RobotLayout, link: str, body: Element, *, moves: bool) -> None:
+        name = f"{robot.name}/{link}"
+        if name not in self._colliders:
+            return
+        geometry = robot.model.geometry
+        placed = geometry.collisions(link)
+        grounds = [each for each in placed if isinstance(each.shape, Plane | HeightField)]
+        if grounds and moves:
+            raise UnsupportedFeatureError(
+                f"{shown(name)} moves with a {type(grounds[0].shape).__name__}, which MuJoCo refuses",
+                source=robot.model.source,
+                line=grounds[0].line,
+            )
+        drawn = (each.material.rgba for each in geometry.visuals(link) if each.material is not None)
+        colour = next((each for each in drawn if each is not None), None)
+        self._add_shapes(body, name, ((each.shape, each.origin.matrix) for each in placed), colour)
+
+    def _couple(self, robot: RobotLayout) -> None:
+        """Add a motor for each joint with a coordinate of its own, and the coupling of the mimic joints."""
+        moving = [joint for joint in robot.model.joints if joint.moves]
+        own = [joint for joint in moving if joint.mimic is None]
+        for joint in own:
+            name = f"{robot.name}/{joint.name}"
+            SubElement(self._actuator, "motor", name=name, joint=name)
+        coupling = robot.model.mechanism.coupling
+        if coupling is None:
+            return
+        for joint, driver, scale, offset in zip(
+            moving, coupling.index, coupling.scale, coupling.offset, strict=True
+        ):
+            if joint.mimic is not None:
+                ends = {
+                    "joint1": f"{robot.name}/{joint.name}",
+                    "joint2": f"{robot.name}/{own[driver].name}",
+                }
+                numbers = {"polycoef": (offset, scale, 0.0, 0.0, 0.0), "solimp": MIMIC_IMPEDANCE}
+                SubElement(self._equality, "joint", ends | attributes(numbers))
+
+    def _add_scene_body(self, number: int, body: BodyLayout) -> None:
+        world = self._carriers[Owner(None, WORLD)].body
+        if body.fixed:
+            pose = placement(body.T[:3, :3], body.T[:3, 3])
+            element = SubElement(world, "body", {"name": body.name, **pose})
+            carrier = Carrier(element, np.zeros(3))
+        else:
+            offset = bool(body.center.any())
+            name = self.free[body.name] = f"{body.name}/center" if offset else body.name
+            element = SubElement(world, "body", name=name)
+            q, _ = body_coordinates(body.T, body.twist, body.center)
+            self._set_free(element, body.name, q)
+            inertia = PrincipalInertia.of(body.mass, np.zeros(3), body.inertia)
+            self._add_inertia(element, body.name, inertia)
+            carrier = Carrier(element, body.center)
+            if offset:
+                element = SubElement(element, "body", name=body.name, pos=text(-body.center))
+        self._carriers[Owner(None, number)] = carrier
+        if body.name in self._colliders:
+            shapes = self._layout.colliders[self._colliders[body.name]].shapes
+            self._add_shapes(element, body.name, ((each.shape, each.T) for each in shapes), None)
+
+    @staticmethod
+    def _set_free(body: Element, joint: str, q: Floats) -> None:
+        """Let a body move freely, with its coordinates first in MuJoCo's q at the start."""
+        body.attrib.update(attributes({"pos": q[:3], "quat": q[3:7]}))
+        # Aligning would turn the frame to the principal axes.
+        SubElement(body, "freejoint", name=joint, align="false")
+
+    def _add_inertia(
+        self,
+        body: Element,
+        name: str,
+        inertia: PrincipalInertia,
+        model: Model | None = None,
+        link: str | None = None,
+    ) -> None:
+        """Add the inertia of a body that moves, or a substitute."""
+        fault = inertia.fault
+        if fault is None:
+            inertia.add_to(body)
+            return
+        error = UnsupportedFeatureError(
+            f"{shown(name)} {fault}; MuJoCo refuses that: wanted a positive mass and three positive moments, "
+            "none above the sum of the others",
+            source=self._layout.name if model is None else model.source,
+            line=None if model is None or link is None else model.link(link).line,
+        )
+        self.refused.append(RefusedInertia(body.attrib["name"], inertia, error))
+        SubElement(body, "inertial", attributes(SUBSTITUTE))
+
+    # -- contacts and constraints -------------------------------------------------------------
+
+    def _add_shapes(
+        self,
+        body: Element,
+        name: str,
+        placed: Iterable[tuple[Shape, Floats]],
+        colour: Iterable[float] | None,
+    ) -> None:
+        """Add the shapes of a link or body, named by it and their number."""
+        number = self._colliders[name]
+        rgba = self._layout.colliders[number].material.rgba if colour is None else colour
+        contype, conaffinity = self._masks[number]
+        options = {**self.materials.geom(number), "contype": contype, "conaffinity": conaffinity}
+        given = {**attributes(options, self._geom_defaults), "rgba": text(rgba)}
+        for k, (shape, T) in enumerate(placed):
+            self._shapes.add(body, f"{name}/{k}", shape, T, given)
+
+    def _add_contacts(self) -> None:
+        """Add the pairs that have coefficients of their own, and those that may not touch."""
+        colliders = self._layout.colliders
+        excluded = () if self.materials.complete else pairs_to_exclude(self._layout, self._masks)
+        for a, b in excluded:
+            SubElement(self._contact, "exclude", body1=colliders[a].name, body2=colliders[b].name)
+        for a, b, options in self.materials.pairs:
+            given = attributes(options, self.materials.common_of_pairs)
+            for i, j in product(range(len(colliders[a].shapes)), range(len(colliders[b].shapes))):
+                ends = {"geom1": f"{colliders[a].name}/{i}", "geom2": f"{colliders[b].name}/{j}"}
+                SubElement(self._contact, "pair", ends | given)
+
+    def _add_constraints(self) -> None:
+        """Add welds and point-to-point constraints, between sites at their anchors."""
+        tags = {"weld": "weld", "point": "connect"}
+        for number, constraint in enumerate(self._layout.constraints):
+            sites = [f"constraint{number}/{end}" for end in "ab"]
+            for name, anchor in zip(sites, (constraint.a, constraint.b), strict=True):
+                carrier = self._carriers[anchor.owner]
+                # A site of group 3 is not drawn unless it is asked for.
+                pose = carrier.placement(anchor.T[:3, :3], anchor.T[:3, 3])
+                SubElement(carrier.body, "site", {"name": name, "group": "3", **pose})
+            SubElement(self._equality, tags[constraint.kind], site1=sites[0], site2=sites[1])
+
+
+def _append_state(q: list[Floats], v: list[Floats], state: tuple[Floats, Floats]) -> None:
+    q.append(state[0])
+    v.append(state[1])
+
+
+def _add_joint(body: Element, robot: RobotLayout, index: int, joint: Joint) -> None:
+    values: dict[str, Any] = {
+        "name": f"{robot.name}/{joint.name}",
+        "type": "slide" if joint.type == "prismatic" else "hinge",
+        "axis": joint.axis,
+    }
+    lower, upper = float(robot.lower[index]), float(robot.upper[index])
+    if np.isfinite(lower) or np.isfinite(upper):
+        lower, upper = max(lower, -UNLIMITED), min(upper, UNLIMITED)
+        values["range"] = lower, max(upper, lower + RANGE_GAP * max(1.0, abs(lower)))
+    # The damping of coupled joints is part of the torque that couples them (`stepper`).
+    damped = robot.model.mechanism.coupling is None
+    losses = {
+        "damping": robot.damping[index] if damped else 0.0,
+        "frictionloss": robot.friction[index],
+        "armature": robot.armature[index],
+    }
+    values |= {name: value for name, value in losses.items() if value}
+    SubElement(body, "joint", attributes(values))

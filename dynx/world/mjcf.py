@@ -1,0 +1,90 @@
+"""A scene as an MJCF document: the world of dynx in MuJoCo, which MuJoCo and its tools run without dynx."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from dynx.engines.mujoco.materials import SETTINGS
+from dynx.engines.mujoco.mjcf import SceneDocument
+from dynx.errors import ArgumentError
+from dynx.steppers.layout import Layout
+from dynx.steppers.settings import checked_settings
+from dynx.world.preparation import checked_options, prepare
+from dynx.world.scene.scene import Scene
+
+
+def scene_to_mjcf(
+    scene: Scene,
+    dt: float = 1e-3,
+    *,
+    substeps: int = 1,
+    collisions: bool = True,
+    joint_limits: bool = True,
+    joint_damping: bool = True,
+    joint_friction: bool = True,
+    joint_armature: bool = True,
+    **settings: object,
+) -> str:
+    """Return a scene as an MJCF document, complete in itself: the model of its world in MuJoCo.
+
+    The options are those of `World`, with the settings of MuJoCo; `World.to_mjcf` has those of a world. The
+    step of the document is that of the engine, dt / substeps [s].
+
+    Links are bodies named ``robot/link``, bodies as in the scene, joints ``robot/joint``, free joints as the
+    robot or body that they move, geoms by their part and number. A motor ``robot/joint`` applies its ctrl
+    [N m or N] to each joint that is no mimic joint. The keyframe ``start`` is the start of the scene. Free
+    joints are at centres of mass; meshes are written as their convex hulls. Links that move have the inertia
+    of the links that fixed joints connect to them; what does not move has none. Comments at the beginning
+    name what the document cannot carry. Limits of velocity and effort, added frames and visual shapes are
+    left out; geoms of a link have its first colour.
+
+    Raises UnsupportedFeatureError for an inertia that MuJoCo refuses, such as that of a link that moves
+    without mass, and for a ground that moves; DescriptionError for a fault in a collision shape or its mesh;
+    EngineLimitError for a robot with too many links in a row; ArgumentError and UnknownNameError for options.
+    """
+    if not isinstance(scene, Scene):
+        raise ArgumentError(f"scene is of type {type(scene).__name__}; wanted a Scene")
+    switches = {
+        "collisions": collisions,
+        "joint_limits": joint_limits,
+        "joint_damping": joint_damping,
+        "joint_friction": joint_friction,
+        "joint_armature": joint_armature,
+    }
+    options = checked_options(dt, substeps, **switches)
+    return layout_to_mjcf(scene, prepare(scene, **switches), options, settings)
+
+
+def layout_to_mjcf(
+    scene: Scene, layout: Layout, options: Mapping[str, Any], settings: Mapping[str, object]
+) -> str:
+    """Return the document of a prepared scene, with the options of a world and settings of MuJoCo.
+
+    Raises the errors of `scene_to_mjcf`.
+    """
+    h = options["dt"] / options["substeps"]
+    document = SceneDocument(layout, h, checked_settings("mujoco", SETTINGS, settings))
+    for refused in document.refused:
+        raise refused.error
+    return document.text(_remarks(scene, options))
+
+
+def _remarks(scene: Scene, options: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what a reader of the document must know, and what it cannot carry."""
+    yield (
+        "The world of dynx in MuJoCo. The ctrl of a motor is the torque that World.step takes for its joint; "
+        "the keyframe 'start' is the start of the world; free joints are at centres of mass."
+    )
+    if options["substeps"] > 1:
+        yield f"A step of the world, {options['dt']!r} s, is {options['substeps']} steps of the document."
+    for robot in scene.robots:
+        if robot.model.mechanism.coupling is not None:
+            yield (
+                f"{robot.name}: equality constraints couple its mimic joints softly. dynx applies torques to "
+                "all of its joints by which they follow exactly; the damping of its joints is part of these "
+                "torques, and is not in the document."
+            )
+        if robot.motors:
+            kinds = ", ".join(dict.fromkeys(type(motor).__name__ for motor in robot.motors))
+            yield f"{robot.name}: the laws of its motors ({kinds}) are not in the document."
