@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from dynx.backends import Backend
+from dynx.backends.dynamics import EngineDynamics
 from dynx.rbd.joint_friction import TOLERANCE, FrictionLaw, damped_equation
 from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.emit import Settings
@@ -57,7 +57,7 @@ class ImplicitJoints:
         self._friction: Floats = friction[self._joints]
         self._h = h
         self._inertia = np.array(law.inertia)
-        self._damping: Floats = np.zeros(nv) if damping is None else damping
+        self.damping: Floats = np.zeros(nv) if damping is None else damping
         self._armature: Floats = np.zeros(nv) if armature is None else armature
         self.torque: Floats = np.zeros(len(law.joints))
         """Torque (n,) of dry friction on the joints of the law in the last step."""
@@ -71,7 +71,7 @@ class ImplicitJoints:
             slices = space.input_slices
             self._M, self._bias, self._tau, self._v, self._shift, self._single = slices[:6]
             self._inputs: Any = space.inputs
-            constants = (self._friction, self._inertia, self._damping, self._armature, np.array([h]))
+            constants = (self._friction, self._inertia, self.damping, self._armature, np.array([h]))
             for rows, value in zip(space.input_rows[6:], constants, strict=True):
                 rows[:] = value
             self._motion: Floats = space.results[0]
@@ -129,7 +129,7 @@ class ImplicitJoints:
     ) -> tuple[Floats, Floats]:
         """Return the acceleration (nv,) for given modes (n,), and what is left of the torque (nv,)."""
         joints, h = self._joints, self._h
-        A, rest = damped_equation(M, tau - bias, v, h, self._damping, self._armature)
+        A, rest = damped_equation(M, tau - bias, v, h, self.damping, self._armature)
         rest[joints] -= modes * self._friction
         stuck = np.zeros(len(v), dtype=bool)
         stuck[joints] = modes == 0.0
@@ -161,7 +161,7 @@ class ImplicitJoints:
             if single:
                 corrected[wrong[:-1]] = modes[wrong[:-1]]
             modes = corrected
-        self.net_torque = tau - self._damping * (v + h * a) - self._armature * a
+        self.net_torque = tau - self.damping * (v + h * a) - self._armature * a
         self.net_torque[joints] -= self.torque
         return np.array([a, moves])
 
@@ -170,17 +170,19 @@ class OutsideJoints:
     """Joint dynamics of a robot that its engine does not have, as a torque in each of the engine's steps.
 
     The torque is exact where nothing but it acts on the robot. Forces that the engine alone knows, of
-    contacts, constraints and joint limits, count as those of the step before, as they do for motors at the
-    end of a step.
+    contacts, constraints, and of joint limits where a joint reaches one, count as those of the step before,
+    as they do for motors at the end of a step.
     """
 
     def __init__(
-        self, robot: RobotLayout, in_engine: RobotLayout, dynamics: Backend, h: float, *, touched: bool
+        self, robot: RobotLayout, in_engine: RobotLayout, dynamics: EngineDynamics, h: float, *, reached: bool
     ) -> None:
         """`in_engine` is the robot with the coefficients that the engine has, `dynamics` computes its mass
-        matrix, `h` [s] is the step of the engine; with `touched` it may have forces that only it knows."""
+        matrix and bias, `h` [s] is the step of the engine; with `reached` contacts or constraints may act on
+        the robot."""
         own, has = robot.coefficients(), in_engine.coefficients()
-        self._dynamics, self._h, self._touched = dynamics, h, touched
+        self._dynamics, self._h, self._reached = dynamics, h, reached
+        self._robot, self._limited = robot, bool(np.isfinite([robot.lower, robot.upper]).any())
         self._inertia = np.diag(has.armature)
         self._damping = has.damping
         friction = own.friction - has.friction
@@ -191,24 +193,43 @@ class OutsideJoints:
             map(np.array_equal, (has.damping, has.armature), (own.damping, own.armature))
         )
         self._joints = list(law.joints)
+        self.moves: Floats = np.ones(len(own.damping))
+        """1 for the coordinates that moved in the last step, 0 for those that stuck (nv,)."""
         self.memory: tuple[Floats, Floats] | None = None
         """Velocity and torque (nv,) of the step before; None if there was no such step."""
 
     def torque(self, q: Floats, v: Floats, tau: Floats) -> Floats:
         """Return what the engine is to apply (nv,) in a step from q, v in place of `tau` (nv,)."""
-        M = self._dynamics.mass_matrix(q)
-        if self.memory is None or not self._touched:
-            bias = self._dynamics.bias_torque(q, v)
-        else:
+        M, bias = self._dynamics.mass_matrix_and_bias(q, v)
+        if self.memory is not None and self._is_touched(q, v):
             before, applied = self.memory
             bias = applied - (M + self._inertia).dot((v - before) / self._h) - self._damping * v
-        self._solver.step(M, bias, tau, v)
+        _, self.moves = self._solver.step(M, bias, tau, v)
         total: Floats = (tau if self._friction_only else self._solver.net_torque).copy()
         if self._friction_only:
             total[self._joints] -= self._solver.torque
-        if self._touched:
+        if self._reached or self._limited:
             self.memory = v, total
         return total
+
+    def explicit_damping(self, v: Floats) -> Floats:
+        """Return the torque (nv,) of damping at velocity `v`, beside motors whose torque is not known before
+        the step."""
+        return (self._damping - self._solver.damping) * v
+
+    def _is_touched(self, q: Floats, v: Floats) -> bool:
+        """Check whether the engine may have forces in a step from q, v that only it knows."""
+        return self._reached or (self._limited and self._is_at_limit(q, v))
+
+    def _is_at_limit(self, q: Floats, v: Floats) -> bool:
+        """Check whether a joint is at a limit or beyond it, or reaches one in a step with its velocity."""
+        robot, base = self._robot, 6 if self._robot.model.floating else 0
+        ahead = q.copy()
+        ahead[len(q) - len(v) + base :] += self._h * v[base:]
+        tree_q, first = robot.model.mechanism.tree_q, 7 if base else 0
+        now, then = tree_q(q)[first:], tree_q(ahead)[first:]
+        below, above = np.minimum(now, then) <= robot.lower, np.maximum(now, then) >= robot.upper
+        return bool(below.any() or above.any())
 
 
 @cache

@@ -66,6 +66,12 @@ class Stepper(ABC):
     commands: ClassVar[tuple[type[EngineCommand], ...]] = ()
     """Classes of the commands that the engine's own motors take (`Forces.commands`)."""
 
+    inexact: ClassVar[Mapping[Feature, str]] = {}
+    """Damping, dry friction and armature of joints, and joint limits, that the engine has with an error, each
+    with the kind of the error as a clause. Of a robot that neither contacts nor constraints can reach,
+    `dynx.world.World` computes these joint dynamics outside of the engine, where they are exact; otherwise
+    its notes name them."""
+
     native_queries: ClassVar[str] = ""
     """Class of the engine's own queries (`dynx.steppers.native_queries`), as "package.module:Class"; imported
     when it is used."""

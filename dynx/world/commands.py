@@ -14,6 +14,7 @@ from numpy import ndarray
 from numpy.typing import ArrayLike
 
 from dynx.backends import Backend, backend
+from dynx.backends.dynamics import EngineDynamics
 from dynx.backends.hooks import cholesky_solver
 from dynx.errors import ArgumentError, ShapeError, UnknownNameError, UnsupportedFeatureError, nearest, shown
 from dynx.model.numbers import checked_entries, real_array
@@ -21,10 +22,10 @@ from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.steppers.forces import NO_COMMANDS, EngineCommand, ExternalForce, Forces
 from dynx.steppers.layout import Layout, RobotLayout
-from dynx.steppers.stepper import Stepper
+from dynx.steppers.stepper import Feature, Stepper
 from dynx.world.motors import JointLaw, Motor, combine
 from dynx.world.notes import LastLoads, RobotLoad
-from dynx.world.preparation import may_be_touched
+from dynx.world.preparation import may_be_reached
 
 if TYPE_CHECKING:
     from dynx.steppers.implicit_joints import OutsideJoints
@@ -35,11 +36,11 @@ _FLOAT64 = np.dtype(np.float64)
 class RobotLoads:
     """The generalised force on one robot: given torques, external forces on its links, and its motors."""
 
-    def __init__(self, robot: RobotLayout, in_engine: RobotLayout, h: float, *, touched: bool) -> None:
+    def __init__(self, robot: RobotLayout, in_engine: RobotLayout, h: float, *, reached: bool) -> None:
         """`in_engine` is the robot with the joint dynamics that the engine has, `h` its step [s]; with
-        `touched` contacts, constraints or joint limits may act on the robot."""
+        `reached` contacts or constraints may act on the robot."""
         self.name = robot.name
-        self._robot, self._in_engine, self._touched = robot, in_engine, touched
+        self._robot, self._in_engine, self._reached = robot, in_engine, reached
         self._armature = np.diag(robot.coefficients().armature) if robot.armature.any() else None
         self.model = robot.model
         self._base = 6 if robot.model.floating else 0
@@ -68,21 +69,35 @@ class RobotLoads:
         # Imported here, because engines have most joint dynamics.
         from dynx.steppers.implicit_joints import OutsideJoints
 
-        return OutsideJoints(self._robot, self._in_engine, self.dynamics, self._h, touched=self._touched)
+        dynamics = EngineDynamics(self.dynamics)
+        return OutsideJoints(self._robot, self._in_engine, dynamics, self._h, reached=self._reached)
 
-    @property
-    def note(self) -> str | None:
-        """Sentence on the joint dynamics that act outside of the engine and are not exact; None without."""
-        if self.joints is None or not self._touched:
-            return None
+    def notes(self, engine: type[Stepper]) -> Iterator[str]:
+        """Yield one sentence for joint dynamics outside of the engine that are not exact, and for each of the
+        engine's own that has an error."""
         ours, theirs = self._robot, self._in_engine
-        names = ("damping", "friction", "armature")
-        outside = [name for name in names if (getattr(ours, name) != getattr(theirs, name)).any()]
-        return (
-            f"{', '.join(outside)} of the joints of {shown(self.name)} {'act' if outside[1:] else 'acts'} "
-            "outside of the engine, which does not have all of it, with the forces of contacts, "
-            "constraints and joint limits as they were in the step before"
-        )
+        limited = bool(np.isfinite([ours.lower, ours.upper]).any())
+        if self.joints is not None and (self._reached or limited):
+            names = ("damping", "friction", "armature")
+            outside = [name for name in names if (getattr(ours, name) != getattr(theirs, name)).any()]
+            acts = "act" if outside[1:] else "acts"
+            forces = (
+                "contacts, constraints and reached joint limits" if self._reached else "reached joint limits"
+            )
+            yield (
+                f"{', '.join(outside)} of the joints of {shown(self.name)} {acts} outside of the engine, "
+                f"which does not have all of it exactly, with the forces of {forces} as they were in the "
+                "step before"
+            )
+        present = {
+            Feature.DAMPING: theirs.damping.any(),
+            Feature.DRY_FRICTION: theirs.friction.any(),
+            Feature.ARMATURE: theirs.armature.any(),
+            Feature.LIMITS: limited,
+        }
+        for feature, error in engine.inexact.items():
+            if present[feature]:
+                yield f"{feature.value} of {shown(self.name)} in {engine.name}: {error}"
 
     @property
     def has_motors(self) -> bool:
@@ -138,13 +153,43 @@ class RobotLoads:
     ) -> Floats:
         """Return the generalised force (nv,) in a step from q, v: `tau`, external forces on frames with their
         shares of the step, motors."""
+        total = self._pushed(q, tau, forces)
+        if self._motors:
+            total = self._with_motors(q, v, total)
+        return total if self.joints is None else self.joints.torque(q, v, total)
+
+    def torque_beside_motors(
+        self,
+        q: Floats,
+        v: Floats,
+        tau: Floats | None,
+        forces: Sequence[tuple[str, ExternalForce, float]],
+    ) -> Floats:
+        """Return `torque` beside the engine's own motors, whose torque is known after the step only."""
+        total = self._pushed(q, tau, forces)
+        return total if self.joints is None else total + self.joints.explicit_damping(v)
+
+    def refuse_engine_motors(self, motors: str) -> None:
+        """Raise UnsupportedFeatureError for joint dynamics that the engine's own motors cannot have."""
+        if self.joints is not None and self._robot.armature.any():
+            raise UnsupportedFeatureError(
+                f"{motors} is a motor inside the engine, without armature; use a torque controller"
+            )
+        if self._robot.friction.any():
+            raise UnsupportedFeatureError(
+                f"{motors} is a motor inside the engine, whose torque is unknown before the step, so that "
+                "joints cannot stick: give friction_slip above 0, or use a torque controller"
+            )
+
+    def _pushed(
+        self, q: Floats, tau: Floats | None, forces: Sequence[tuple[str, ExternalForce, float]]
+    ) -> Floats:
+        """Return the torque `tau` plus that of external forces on frames."""
         total = self._nothing if tau is None else tau
         for frame, force, share in forces:
             J, wrench = force.at_frame(self.dynamics, frame, q, share)
             total = total + J.T @ wrench
-        if self._motors:
-            total = self._with_motors(q, v, total)
-        return total if self.joints is None else self.joints.torque(q, v, total)
+        return total
 
     def torque_of_joints(self, positions: Floats, rates: Floats, tau: Floats | None) -> Floats:
         """Return `torque` without external forces where the motors depend on the joints alone.
@@ -265,7 +310,7 @@ class Commands:
         self._robots = robots
         self._bodies = bodies
         pairs = enumerate(zip(layout.robots, in_engine.robots, strict=True))
-        self._loads = [RobotLoads(*pair, h, touched=may_be_touched(layout, k)) for k, pair in pairs]
+        self._loads = [RobotLoads(*pair, h, reached=may_be_reached(layout, k)) for k, pair in pairs]
         self._outside = frozenset(k for k, loads in enumerate(self._loads) if loads.joints is not None)
         """Robots with joint dynamics that the engine does not have."""
         shapes: list[tuple[int]] = [(robot.model.nv,) for robot in layout.robots]
@@ -276,16 +321,19 @@ class Commands:
         self._wrenches: Floats = self._no_wrench
         self.forget()
 
+    def of_robot(self, robot: int) -> RobotLoads:
+        """Return the loads on a robot."""
+        return self._loads[robot]
+
     def forget(self) -> None:
         """Forget all earlier steps: the engine is new, or its state was set."""
         self._more_than_torques = True
         self.remember({})
 
     def notes(self) -> Iterator[str]:
-        """Yield one sentence for each robot with joint dynamics that are not exact."""
+        """Yield one sentence for each feature of a robot's joints that is not exact."""
         for loads in self._loads:
-            if loads.note is not None:
-                yield loads.note
+            yield from loads.notes(self._engine)
 
     def last(self) -> LastLoads:
         """Return the loads of the last step."""
@@ -358,7 +406,8 @@ class Commands:
                     tau = loads.torque_of_joints(*engine.joint_state(k), given)
                 else:
                     on_frames = [(name, force, force.share(t, self._h)) for name, force in frames.get(k, ())]
-                    tau = loads.torque(*engine.robot_state(k), given, on_frames)
+                    torque = loads.torque_beside_motors if k in commands else loads.torque
+                    tau = torque(*engine.robot_state(k), given, on_frames)
                 # A finite sum has finite entries; of few numbers, Python's is the fastest.
                 if not isfinite(sum(tau.tolist())) and not np.isfinite(tau).all():
                     return None
@@ -382,6 +431,7 @@ class Commands:
                     raise UnsupportedFeatureError(
                         f"the engine {self._engine.name!r} has no motors of its own; use those of dynx.world"
                     )
+                self._loads[k].refuse_engine_motors(type(listed).__name__)
                 commands[k] = command
                 continue
             several: Sequence[object] = listed if isinstance(listed, tuple | list) else [listed]

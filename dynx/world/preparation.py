@@ -125,8 +125,9 @@ def _first_pair(layout: Layout) -> str:
 
 
 def layout_for(kind: type[Stepper], layout: Layout) -> Layout:
-    """Return the layout that an engine gets: that of the scene, without joint dynamics which it does not have
-    and which are therefore computed outside of it.
+    """Return the layout that an engine gets: that of the scene, without joint dynamics that are computed
+    outside of it: those which it does not have, and of robots that nothing can reach those which it has with
+    an error (`Stepper.inexact`).
 
     Raises UnsupportedFeatureError, naming the engine, for another feature that the scene needs and the engine
     does not have.
@@ -145,7 +146,11 @@ def layout_for(kind: type[Stepper], layout: Layout) -> Layout:
                 f"the scene {shown(layout.name)} has {feature.value}, which {kind.name!r} does not have"
                 + (_first_pair(layout) if feature is Feature.CONTACTS else "")
             )
-    return replace(layout, robots=tuple(_with_provided_joints(robot, provided) for robot in layout.robots))
+    robots = []
+    for k, robot in enumerate(layout.robots):
+        exact = provided if may_be_reached(layout, k) else provided - kind.inexact.keys()
+        robots.append(_with_provided_joints(robot, exact))
+    return replace(layout, robots=tuple(robots))
 
 
 def _with_provided_joints(robot: RobotLayout, provided: frozenset[Feature]) -> RobotLayout:
@@ -163,12 +168,11 @@ def _with_provided_joints(robot: RobotLayout, provided: frozenset[Feature]) -> R
     return replace(robot, friction=nothing) if missing else robot
 
 
-def may_be_touched(layout: Layout, robot: int) -> bool:
-    """Check whether contacts, constraints or joint limits may act on a robot."""
+def may_be_reached(layout: Layout, robot: int) -> bool:
+    """Check whether contacts or constraints may act on a robot."""
     own = [k for k, collider in enumerate(layout.colliders) if collider.owner.robot == robot]
     tied = any(robot in (each.a.owner.robot, each.b.owner.robot) for each in layout.constraints)
-    limits = layout.robots[robot].lower, layout.robots[robot].upper
-    return tied or bool(layout.collides[own].any() or np.isfinite(limits).any())
+    return tied or bool(layout.collides[own].any())
 
 
 class _PartLookup:

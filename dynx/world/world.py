@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from dynx.distance.avoidance import Avoidance
     from dynx.steppers.camera import Camera
     from dynx.world.camera import Picture
+    from dynx.world.lone_robot import LoneRobot
     from dynx.world.queries import Queries
 
 
@@ -275,6 +276,14 @@ class World:
             None if loads is None else lambda: loads(self),
             real_time=real_time,
         )
+
+    def lone_robot(self) -> LoneRobot:
+        """Return the only robot of a world without bodies, collisions and joint limits, for a loop that steps
+        it without the checks of `step`; the clock of the world does not follow."""
+        # Imported here, because it imports compiled code, and few worlds have such a loop.
+        from dynx.world.lone_robot import LoneRobot
+
+        return LoneRobot(self._motion.engine, self._commands.of_robot(0))
 
     # -- state --------------------------------------------------------------------------------
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -21,10 +23,13 @@ from dynx.control.bullet import BulletMotorCommand
 from dynx.engines.pybullet.stepper import BulletStepper
 from dynx.errors import ArgumentError, ControlError, GainError, UnsupportedFeatureError
 from dynx.model import Model
+from dynx.model.elements import JointDynamics
 from dynx.model.loading import load
+from dynx.model.tree import Base
 from dynx.sim import simulate
 from dynx.spatial.scalar import Floats
 from dynx.steppers.forces import Forces
+from dynx.world import World
 from dynx.world.preparation import prepare
 from dynx.world.scene import Scene, SceneRobot
 from tests.backends.robots import mixed_robot
@@ -177,3 +182,32 @@ def test_former_names_are_answered_with_those_of_today(name: str) -> None:
     if name in ("PositionMotor", "VelocityMotor"):
         found = control.controller_from_document(tutorial_robot(), {"controller": name, "force": 5.0})
         assert type(found).__name__ == f"Bullet{name}"
+
+
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+@pytest.mark.parametrize(("n", "substeps"), [(10, 1), (1, 10)])
+def test_torque_commands_act_in_every_engine_step_of_a_call(base: Base, n: int, substeps: int) -> None:
+    model = load("ur5", base=base)
+    forces = [1.0, -2.0, 3.0, 0.1, 0.2, -0.3]
+    command = BulletMotorCommand("TORQUE_CONTROL", forces=forces)
+    tau = np.concatenate([np.zeros(model.nv - 6), forces])
+    scene, found = Scene(robots=(SceneRobot("arm", model),)), []
+    for given in ({"motors": {"arm": command}}, {"torques": {"arm": tau}}):
+        with World(scene, "pybullet", 1e-2 / n, substeps=substeps, collisions=False) as world:
+            world.step(n, **given)
+            found.append(world.state.robots["arm"].q)
+    np.testing.assert_allclose(found[0], found[1], rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("law", ["armature", "friction"])
+def test_worlds_refuse_motors_of_bullet_for_joint_dynamics_that_they_cannot_have(law: str) -> None:
+    model = load("ur5")
+    joints = tuple(replace(joint, dynamics=JointDynamics(**{law: 0.1})) for joint in model.joints)
+    robot = SceneRobot("arm", replace(model, joints=joints))
+    command = BulletMotorCommand("VELOCITY_CONTROL", velocities=[0.1] * 6)
+    with World(Scene(robots=(robot,)), "pybullet") as world:
+        with pytest.raises(UnsupportedFeatureError, match="inside the engine"):
+            world.step(motors={"arm": command})
+        assert world.time == 0.0
+    with World(Scene(robots=(robot,)), "pybullet", **{f"joint_{law}": False}) as world:
+        world.step(motors={"arm": command})

@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 import dynx
+from dynx.model.elements import JointDynamics
+from dynx.model.tree import Base
 from dynx.world import PDMotor, PositionMotor, Scene, SceneRobot, World, ground
 from tests.backends.robots import mixed_robot
 from tests.world.engines import WORLDS
@@ -110,3 +112,61 @@ def test_a_saved_world_continues_bit_for_bit(engine: str, tmp_path: Path) -> Non
         again.step(50, motors=motors)
         found = again.state.robots["robot"]
     assert (found.q.tobytes(), found.v.tobytes()) == (expected.q.tobytes(), expected.v.tobytes())
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+@pytest.mark.parametrize("name", ["mixed", "ur5"])
+def test_joint_dynamics_are_exact_where_nothing_reaches_the_robot(name: str, base: Base, engine: str) -> None:
+    """Each alone and all together, with joint limits that no joint is at: the steps are those of dynx."""
+    model = mixed_robot(base, mimic=engine != "drake") if name == "mixed" else dynx.load(name, base=base)
+    laws = {"damping": 0.4, "friction": 0.6, "armature": 0.05}
+    if name == "mixed":
+        limits = (-50.0, 50.0)
+        joints = [
+            replace(each, limits=replace(each.limits, lower=limits[0], upper=limits[1]))
+            for each in model.joints
+        ]
+        model = replace(model, joints=tuple(joints))
+    rng = np.random.default_rng(8)
+    q, v = 0.3 * model.random(rng) if base == "fixed" else model.random(rng), rng.standard_normal(model.nv)
+    for chosen in (*([law] for law in laws), list(laws)):
+        given: dict[str, Any] = {law: laws[law] for law in chosen}
+        exact = dynx.simulate(model, plant="pinocchio", q0=q, v0=v, duration=0.1, **given)
+        dynamics = JointDynamics(**given)
+        joints = [
+            replace(joint, dynamics=dynamics if joint.mimic is None else JointDynamics())
+            for joint in model.joints
+        ]
+        robot = SceneRobot("robot", replace(model, joints=tuple(joints)), q=tuple(q), v=tuple(v))
+        with World(Scene("free", robots=(robot,), gravity=model.gravity), engine, collisions=False) as world:
+            world.step(100)
+            found = world.state.robots["robot"]
+        # Drake integrates a floating base by another scheme.
+        tolerance = 1e-5 if engine == "drake" and base == "floating" else 1e-11
+        assert np.abs(model.difference(exact.q[-1], found.q)).max() < tolerance, chosen
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+@pytest.mark.parametrize("law", ["damping", "friction", "armature"])
+def test_joint_dynamics_that_are_not_exact_are_noted(engine: str, law: str) -> None:
+    """Exact where nothing reaches the robot; beside a floor that it may touch the note names what is not."""
+    exact = {"mujoco": ("damping", "armature"), "drake": ("damping", "armature"), "pybullet": ()}[engine]
+    with world_of(TURNTABLE, engine, f'{law}="0.5"') as world:
+        assert bool(world.notes) == (law not in exact)
+        assert all("'robot'" in note for note in world.notes)
+    with world_of(TURNTABLE, engine, f'{law}="0.5"', collisions=False) as world:
+        assert world.notes == ()
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+def test_a_joint_held_at_its_limit_stays_there_under_friction_and_armature(engine: str) -> None:
+    """Torque presses it against the limit with 3 N m for a second, then 3 N m the other way move it off."""
+    text = PENDULUM.replace("continuous", "revolute").replace(
+        "<dynamics", '<limit lower="-1" upper="1" effort="99" velocity="99"/><dynamics'
+    )
+    with world_of(text, engine, 'armature="0.4" friction="0.5"', 0.99, collisions=False) as world:
+        world.step(1000, {"robot": [8.25 + 3.0]})
+        assert world.state.robots["robot"].q[0] == pytest.approx(1.0, abs=5e-3)
+        world.step(300, {"robot": [-3.0]})
+        assert world.state.robots["robot"].q[0] < 0.9

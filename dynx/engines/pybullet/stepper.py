@@ -140,6 +140,11 @@ class BulletStepper(Stepper):
     name = "pybullet"
     settings: ClassVar[Mapping[str, Setting]] = SETTINGS
     commands: ClassVar[tuple[type[EngineCommand], ...]] = (BulletMotorCommand,)
+    inexact: ClassVar[Mapping[Feature, str]] = {
+        Feature.DAMPING: "that of the velocity when a step begins, an error of first order in the step",
+        Feature.DRY_FRICTION: "solved by iterations, before mimic joints are coupled",
+        Feature.LIMITS: "a joint that passed one rebounds with up to a fifth of its speed, at any step",
+    }
     native_queries: ClassVar[str] = "dynx.engines.pybullet.native_queries:BulletQueries"
 
     @classmethod
@@ -171,6 +176,7 @@ class BulletStepper(Stepper):
         self._apply = [robot.apply for robot in self.robots]
         self._before = [robot.before_step for robot in self._corrected]
         self._commands: Mapping[int, EngineCommand] = NO_COMMANDS
+        self._motor_torques: list[Callable[[], object]] = []
         self._touch()
 
     def _load(self, folder: Path, settings: Mapping[str, Any]) -> None:
@@ -231,6 +237,7 @@ class BulletStepper(Stepper):
                 )
                 for k in np.flatnonzero(forces.wrenches.any(axis=1)).tolist()
             ]
+        applied += self._motor_torques
         applied += self._before
         try:
             while n:
@@ -247,8 +254,17 @@ class BulletStepper(Stepper):
         """Set Bullet's motors of the robots that have a command, and release those that had one."""
         for k in self._commands.keys() - commands.keys():
             self.robots[k].command(None)
+        self._motor_torques = []
         for k, command in commands.items():
-            if isinstance(command, BulletMotorCommand):
+            if not isinstance(command, BulletMotorCommand):
+                continue
+            if command.mode == "TORQUE_CONTROL":
+                # Bullet forgets a torque after each step, unlike the targets of the other modes.
+                self.robots[k].command(None)
+                base = [0.0] * (6 if self.layout.robots[k].model.floating else 0)
+                torque = base + (command.forces or [0.0] * len(self.robots[k].object.links))
+                self._motor_torques.append(partial(self._apply[k], torque))
+            else:
                 self.robots[k].command(command)
         self._commands = commands
 

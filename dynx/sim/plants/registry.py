@@ -21,7 +21,6 @@ from dynx.sim.plants.integrated import IntegratedPlant
 from dynx.sim.plants.plant import Plant, plant_errors
 from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.steppers.registry import BUILT_IN as STEPPERS
-from dynx.steppers.registry import world_class
 
 GROUP = "dynx.plants"
 """The entry-point group: ``name = "package.module:PlantClass"``."""
@@ -109,9 +108,9 @@ def make_plant(
         return WorldPlant(name, model, disturbances, dt, substeps=substeps)
     if integrator == ENGINE:
         if name in ENGINES:
-            from dynx.sim.plants.stepper_plant import StepperPlant
+            from dynx.sim.plants.world_plant import LoneRobotPlant
 
-            return StepperPlant(world_class(name), model, disturbances, dt, substeps=substeps)
+            return LoneRobotPlant(name, model, disturbances, dt, substeps=substeps)
         try:
             kind = plant_class(name)
         except UnknownBackendError:

@@ -1,4 +1,4 @@
-"""A robot in a world of an engine as a plant: the world's steps, with contacts."""
+"""A robot in a world of an engine as a plant: alone, or in a scene with contacts."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dynx.control.bullet import BulletMotor
 from dynx.errors import EngineError
 from dynx.model import Model
 from dynx.model.elements import JointDynamics
@@ -15,11 +16,71 @@ from dynx.sim.plants.disturbances import Disturbances
 from dynx.sim.plants.plant import Plant, StepResult
 from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.spatial.scalar import Floats
+from dynx.steppers.forces import EngineCommand
+from dynx.steppers.integrators import MeanAcceleration
+from dynx.steppers.registry import world_class
 from dynx.steppers.state import WorldState
 from dynx.world import Contact, World
-from dynx.world.scene import Scene
+from dynx.world.lone_robot import Acting
+from dynx.world.scene import Scene, SceneRobot
 from dynx.world.snapshot import Snapshot
 from dynx.world.surroundings import ContactTable, Surroundings
+
+
+class LoneRobotPlant(Plant):
+    """A robot alone in a world of an engine, without limits: the engine's algorithm and integration scheme.
+
+    Joint dynamics are those of the world, exact because nothing can reach the robot. Pushes act in each
+    sub-step, and so does friction with a slip speed, a torque as in the other plants.
+    """
+
+    def __init__(
+        self, engine: str, model: Model, disturbances: Disturbances, dt: float, *, substeps: int = 1
+    ) -> None:
+        """Raises the errors of the engine for a robot that it cannot represent."""
+        super().__init__(model, disturbances, dt, substeps=substeps)
+        self.motor_commands = world_class(engine).commands
+        robot = SceneRobot("robot", with_joint_dynamics(model, disturbances))
+        scene = Scene("robot alone", robots=(robot,), gravity=model.gravity)
+        self._world = World(scene, engine, self._h, collisions=False, joint_limits=False)
+        self._robot = self._world.lone_robot()
+        self._slips = disturbances.friction.smooth
+
+    def reset(self, q: Floats, v: Floats) -> None:
+        self._robot.set_state(q, v)
+
+    def step(self, t: float, tau: Floats) -> StepResult:
+        robot = self._robot
+        first = robot.step(self._slowed(tau), self._acting(t))
+        for k in range(1, self.substeps):
+            robot.step(self._slowed(tau), self._acting(t + k * self._h))
+        return StepResult(robot.q, robot.v, first, tau)
+
+    def step_motors(self, t: float, command: EngineCommand) -> StepResult:
+        robot, nothing = self._robot, np.zeros(self.model.nv)
+        first, tau = robot.step_motors(command, self._slowed(nothing), self._acting(t))
+        for k in range(1, self.substeps):
+            robot.step_motors(command, self._slowed(nothing), self._acting(t + k * self._h))
+        return StepResult(robot.q, robot.v, first, tau)
+
+    def _slowed(self, tau: Floats) -> Floats:
+        """Return the torque `tau` (nv,) minus that of friction with a slip speed."""
+        return tau - self.disturbances.friction(self._robot.v) if self._slips else tau
+
+    def _acting(self, t: float) -> Acting:
+        """Return the pushes with their shares of the step of the engine at `t`."""
+        if not self.disturbances.pushes:
+            return ()
+        shares = ((push, push.share(t, self._h)) for push in self.disturbances.pushes)
+        return [(push.on, push, share) for push, share in shares if share]
+
+    def refuse(self, controller: object) -> None:
+        super().refuse(controller)
+        if isinstance(controller, BulletMotor):
+            self._robot.refuse_engine_motors(controller.name)
+
+    def close(self) -> None:
+        self._world.close()
 
 
 class Memory(NamedTuple):
@@ -48,13 +109,11 @@ class WorldPlant(Plant):
         self._world = World(
             _scene_of(place, model, disturbances),
             place.engine,
-            dt,
-            substeps=substeps,
+            self._h,
             joint_limits=place.joint_limits,
-            joint_damping=disturbances.sticks,
-            joint_friction=disturbances.sticks,
             **dict(place.settings),
         )
+        self._acceleration = MeanAcceleration(model, self._h)
         self._forces = tuple(replace(push, on=f"{self._robot}/{push.on}") for push in disturbances.pushes)
         self._others = tuple(robot.name for robot in place.scene.robots if robot.name != place.robot)
         self._moving = tuple(body.name for body in place.scene.bodies if not body.fixed)
@@ -80,15 +139,22 @@ class WorldPlant(Plant):
             )
 
     def step(self, t: float, tau: Floats) -> StepResult:
-        world, friction = self._world, self.disturbances.friction
-        before = self._states[-1].robots[self._robot].v
-        acting = tau - friction(before) if friction.smooth else tau
-        world.step(1, {self._robot: acting}, forces=self._forces)
-        state, contacts = world.state, world.contacts()
-        self._states.append(state)
+        before = self._states[-1].robots[self._robot]
+        q, v = self._substep(before.v, tau)
+        first = self._acceleration(*before, q, v)
+        for _ in range(1, self.substeps):
+            q, v = self._substep(v, tau)
+        contacts = self._world.contacts()
+        self._states.append(self._world.state)
         self._contacts.append(contacts)
-        q, v = state.robots[self._robot]
-        return StepResult(q, v, (v - before) / self.dt, tau, contacts)
+        return StepResult(q, v, first, tau, contacts)
+
+    def _substep(self, v: Floats, tau: Floats) -> tuple[Floats, Floats]:
+        """Take one step of the engine from velocity `v` (nv,); return q and v after it."""
+        friction = self.disturbances.friction
+        acting = tau - friction(v) if friction.smooth else tau
+        self._world.step(1, {self._robot: acting}, forces=self._forces)
+        return self._world.state.robots[self._robot]
 
     def save(self) -> Memory:
         return Memory(self._world.save(), tuple(self._contacts), tuple(self._states))
@@ -111,22 +177,31 @@ class WorldPlant(Plant):
 
 def _scene_of(place: ScenePlant, model: Model, disturbances: Disturbances) -> Scene:
     """Return the scene with the robot's masses and joint dynamics as the simulation has them."""
+    # A payload is a link more, without shapes.
+    geometry = Geometry(place.scene_robot.model.geometry.links).for_links(link.name for link in model.links)
+    moved = replace(with_joint_dynamics(model, disturbances), geometry=geometry)
+    robots = tuple(
+        replace(robot, model=moved) if robot.name == place.robot else robot for robot in place.scene.robots
+    )
+    return replace(place.scene, robots=robots)
+
+
+def with_joint_dynamics(model: Model, disturbances: Disturbances) -> Model:
+    """Return a model whose joints have the armature of a simulation, and the damping and dry friction that
+    are solved for (`Disturbances.sticks`)."""
     friction, base = disturbances.friction, 6 if model.floating else 0
-    own = place.scene_robot.model
-    joints = [joint for joint in model.joints if joint.moves]
-    # Coefficients of the description belong to all moving joints, given ones to those with a coordinate.
-    owners = joints if friction.to_tree is not None else list(model.coordinate_joints)
-    pairs = zip(friction.damping[base:].tolist(), friction.friction[base:].tolist(), strict=True)
-    laws = {
-        joint.name: JointDynamics(damping=damping, friction=dry)
-        for joint, (damping, dry) in zip(owners, pairs, strict=True)
-    }
+    laws: dict[str, JointDynamics] = {}
+    if disturbances.sticks:
+        # Coefficients of the description belong to all moving joints, given ones to those with a coordinate.
+        moving = [joint for joint in model.joints if joint.moves]
+        owners = moving if friction.to_tree is not None else list(model.coordinate_joints)
+        pairs = zip(friction.damping[base:].tolist(), friction.friction[base:].tolist(), strict=True)
+        laws = {
+            joint.name: JointDynamics(damping=damping, friction=dry)
+            for joint, (damping, dry) in zip(owners, pairs, strict=True)
+        }
     rotors = zip(model.coordinate_joints, disturbances.armature.diagonal()[base:].tolist(), strict=True)
     for joint, armature in rotors:
         laws[joint.name] = replace(laws.get(joint.name, JointDynamics()), armature=armature)
-    moved = tuple(replace(joint, dynamics=laws.get(joint.name, JointDynamics())) for joint in model.joints)
-    # A payload is a link more, without shapes.
-    geometry = Geometry(own.geometry.links).for_links(link.name for link in model.links)
-    simulated = replace(place.scene_robot, model=replace(model, joints=moved, geometry=geometry))
-    robots = tuple(simulated if robot.name == place.robot else robot for robot in place.scene.robots)
-    return replace(place.scene, robots=robots)
+    joints = tuple(replace(joint, dynamics=laws.get(joint.name, JointDynamics())) for joint in model.joints)
+    return model if joints == model.joints else replace(model, joints=joints)

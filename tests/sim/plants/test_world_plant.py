@@ -1,20 +1,28 @@
-"""A robot in a scene as the plant of `dynx.simulate`: motion, contacts, record and files."""
+"""A robot in an engine's world as the plant of `dynx.simulate`: alone, where a step of MuJoCo and Drake is
+semi-implicit Euler, and in a scene, with its motion, contacts, record and files."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import dynx
 from dynx import control
-from dynx.errors import ArgumentError, UnknownNameError
+from dynx.backends import backend, installed_backends
+from dynx.control import BulletPositionMotor
+from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError
 from dynx.sim import Scenario, ScenePlant, Simulation
 from dynx.world import Material, Scene, SceneRobot, box, ground
+from tests.backends.robots import mixed_robot
+from tests.sim.bars import tutorial_robot
 from tests.world.engines import WORLDS
+
+STEPPERS = [name for name in ("mujoco", "drake") if name in installed_backends()]
 
 ENGINES = [
     pytest.param(name, marks=pytest.mark.skipif(find_spec(name) is None, reason=f"needs {name}"))
@@ -194,3 +202,59 @@ def test_a_scene_refuses_what_it_cannot_do(engine: str) -> None:
         dynx.simulate(replace(scenario, integrator="rk4"))
     with pytest.raises(ArgumentError, match="cannot be resumed"):
         dynx.simulate(scenario, resume=dynx.simulate(scenario), step=10)
+
+
+@pytest.mark.parametrize("engine", STEPPERS)
+@pytest.mark.parametrize("mimic", [False, True])
+def test_a_step_of_the_engine_is_that_of_dynx(engine: str, mimic: bool) -> None:
+    model = mixed_robot("fixed", mimic=mimic)
+    rng = np.random.default_rng(2)
+    given: dict[str, Any] = {
+        "q0": model.random(rng),
+        "v0": 0.3 * rng.standard_normal(model.nv),
+        "duration": 0.1,
+        "substeps": 2,
+        "damping": True,
+        "friction": True,
+        "armature": True,
+        "pushes": dynx.ExternalForce("tip", [1.0, 2.0, 3.0, 0.1, 0.2, 0.3], start=0.02, duration=0.033),
+    }
+    own = dynx.simulate(model, plant=engine, integrator="engine", **given)
+    ours = dynx.simulate(model, plant=engine, integrator="semi_implicit", **given)
+    # Drake's solver couples mimic joints by an iteration.
+    tolerance = 1e-6 if mimic and engine == "drake" else 1e-10
+    for name in ("q", "v"):
+        np.testing.assert_allclose(getattr(own, name), getattr(ours, name), rtol=0.0, atol=tolerance)
+    assert ours.settings["integrator"] == "semi_implicit"
+    assert own.settings["integrator"] == "engine"
+
+
+@pytest.mark.parametrize("engine", STEPPERS)
+def test_motors_of_bullet_are_those_of_bullet(engine: str) -> None:
+    arm = tutorial_robot()
+    with pytest.raises(UnsupportedFeatureError, match="motor inside PyBullet"):
+        dynx.simulate(
+            arm, BulletPositionMotor(arm), arm.neutral(), plant=engine, integrator="engine", duration=0.1
+        )
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("substeps", [1, 3])
+def test_the_recorded_acceleration_is_that_of_the_equation_of_motion(engine: str, substeps: int) -> None:
+    """Also that of a base that rotates, whose velocity is given in axes that rotate with it."""
+    model = dynx.load("solo12", base="floating")
+    rng = np.random.default_rng(4)
+    q0, v0 = model.random(rng), 2.0 * rng.standard_normal(model.nv)
+    scene = Scene("flight", robots=(SceneRobot("dog", model),), gravity=model.gravity)
+    flight = dynx.simulate(
+        model,
+        plant=ScenePlant(scene, engine=engine, joint_limits=False),
+        q0=q0,
+        v0=v0,
+        duration=0.02,
+        substeps=substeps,
+    )
+    with backend("reference", model) as reference:
+        for k in (0, 10, 19):
+            exact = reference.forward_dynamics(flight.q[k], flight.v[k], flight.tau[k])
+            np.testing.assert_allclose(flight.a[k], exact, rtol=0.0, atol=1e-8 * np.abs(exact).max())
