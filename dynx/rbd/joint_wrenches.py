@@ -68,6 +68,12 @@ def _link_wrenches(mechanism: Mechanism, poses: Poses, v: Array, a: Array) -> li
     ]
 
 
+def about_world(wrench: Array, p: Array) -> Array:
+    """Return a wrench (..., 6) in world axes about the point p (..., 3) as one about the world's origin."""
+    force, moment = wrench[..., :3], wrench[..., 3:]
+    return np.concatenate([force, moment + cross(*np.broadcast_arrays(p, force))], axis=-1)
+
+
 class AppliedWrench(NamedTuple):
     """A wrench from outside on link number `link`: force and moment (..., 3) in world axes, the moment about
     the point (..., 3) of the world."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from dynx.errors import UnknownNameError, nearest, shown
 from dynx.files.arrays import ArrayFile
 from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import cross
 from dynx.world.contacts import Contact
 
 Integers = NDArray[np.int64]
@@ -98,15 +99,21 @@ class ContactTable:
 
         A part is a body, ``robot/link``, or a robot for all its links. Raises UnknownNameError for another.
         """
+        return self.wrenches_on(part)[:, :3]
+
+    def wrenches_on(self, part: str) -> Floats:
+        """Return the sum of the contact forces on a part in each step and of their moments about the origin
+        of the world (n_steps, 6) [N, N m], in world axes; see `force_on`."""
         own = np.array([name == part or name.startswith(f"{part}/") for name in self.names])
         if not own.any():
             known = dict.fromkeys([*self.names, *(name.partition("/")[0] for name in self.names)])
             raise UnknownNameError(f"no part {shown(part)}{nearest(str(part), known)}")
-        total = np.zeros((self.n_steps, 3))
+        total = np.zeros((self.n_steps, 6))
         force = self.normal_force[:, None] * self.normal + self.friction_force
+        wrench = np.concatenate([force, cross(0.5 * (self.point_a + self.point_b), force)], axis=1)
         for side, sign in ((self.a, 1.0), (self.b, -1.0)):
             rows = own[side]
-            np.add.at(total, self.step[rows], sign * force[rows])
+            np.add.at(total, self.step[rows], sign * wrench[rows])
         return total
 
     def first(self, n: int) -> ContactTable:

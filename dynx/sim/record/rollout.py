@@ -10,14 +10,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dynx.backends import backend
+from dynx.backends import Backend, backend
 from dynx.control.base import Controller
 from dynx.errors import ArgumentError
 from dynx.files.pages import html_grid
 from dynx.model import Model
+from dynx.rbd.jacobians import LOCAL
+from dynx.rbd.joint_wrenches import about_world
 from dynx.rbd.parameters import plant_model
 from dynx.registry import door
 from dynx.sim.controller_checks import controller_numbers
+from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.scenario.documents import Unknown
 from dynx.sim.scenario.scenario import Scenario
 from dynx.sim.setup import clock_of, disturbances_of, effort_limits_of, refuse_unknown
@@ -156,6 +159,66 @@ class Rollout:
         """Sum of kinetic and potential energy (n + 1,) [J], computed by dynx for every plant."""
         with backend("reference", self.model) as bodies:
             return np.asarray(self.kinetic_energy + bodies.potential_energy(self.q))
+
+    @cached_property
+    def external_forces(self) -> dict[str, Floats]:
+        """Wrenches (n, 6) from outside in each step, by the frames on which they act: pushes and contacts.
+
+        Force [N] and moment [N m] are about the origin of the world, in its axes: the reference ``world`` of
+        `Backend.joint_wrenches`. Forces of constraints and of joint limits, which no engine gives, are not
+        among them.
+        """
+        total: dict[str, Floats] = {}
+        nothing = np.zeros((len(self), 6))
+        for push in () if self.scenario is None else self.scenario.all_pushes:
+            steps = zip(self.t[:-1].tolist(), np.diff(self.t).tolist(), strict=True)
+            shares = np.array([push.share(t, h) for t, h in steps])
+            T = self._bodies.forward_kinematics(self.q[:-1], push.on)
+            for k in np.flatnonzero(shares).tolist():
+                about_frame = push.at_center(T[k], np.zeros(3), shares[k])
+                total.setdefault(push.on, nothing.copy())[k] += about_world(about_frame, T[k, :3, 3])
+        plant = None if self.scenario is None else self.scenario.plant
+        if self.surroundings is not None and isinstance(plant, ScenePlant):
+            contacts = self.surroundings.contacts
+            for part in contacts.touching:
+                robot, _, link = part.partition("/")
+                if robot == plant.robot and link:
+                    total[link] = total.get(link, nothing) + contacts.wrenches_on(part)
+        return total
+
+    def joint_wrenches(self, *, frame: str | None = None, reference: str = LOCAL) -> Floats:
+        """Return the wrenches (n, n_joints, 6) [N, N m] that the parents of all joints exert on their
+        children as each step begins.
+
+        They follow from the recorded motion and from `external_forces`. `Backend.joint_wrenches` describes
+        the order, the signs and the options.
+        """
+        return self._bodies.joint_wrenches(
+            self.q[:-1],
+            self.v[:-1],
+            self.a,
+            frame=frame,
+            reference=reference,
+            external_forces=self.external_forces,
+            force_reference="world",
+        )
+
+    def base_wrench(self, *, frame: str | None = None, reference: str = LOCAL) -> Floats:
+        """Return the wrench (n, 6) [N, N m] that the world exerts on the root link, besides
+        `external_forces`, as each step begins; see `joint_wrenches`."""
+        return self._bodies.base_wrench(
+            self.q[:-1],
+            self.v[:-1],
+            self.a,
+            frame=frame,
+            reference=reference,
+            external_forces=self.external_forces,
+            force_reference="world",
+        )
+
+    @cached_property
+    def _bodies(self) -> Backend:
+        return backend("reference", self.model)
 
     def summary(self) -> Summary:
         """Summarise errors, speeds, torques and the drift of the energy."""
