@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.envs.library import Env, Space, spaces
-from dynx.envs.randomization import Randomization, Variation
-from dynx.envs.task import Episodes, Task, checked_engine
+from dynx.envs.randomization import Randomization, Variation, first_seed
+from dynx.envs.task import Episodes, Outcome, Task, checked_engine
 from dynx.errors import (
     ArgumentError,
     ClosedError,
+    DivergedError,
     DTypeError,
+    EngineError,
     EpisodeError,
     NotFiniteError,
     ShapeError,
@@ -26,6 +28,9 @@ from dynx.model.numbers import whole_number
 
 RENDER_MODES = ("human", "rgb_array")
 
+DIVERGED = "diverged"
+"""Key in `info` of the reason why a step diverged, which truncates its episode."""
+
 MAX_SIDE = 8192
 """Largest width and height of a picture [pixels]."""
 
@@ -33,8 +38,8 @@ MAX_SIDE = 8192
 class TaskEnvironment(Env[Any, Any]):
     """A task on one engine, with the interface of `gymnasium.Env`.
 
-    ``terminated`` is the task's; ``truncated`` is always False here, and set by the time limit that
-    `gymnasium.make` adds (`Task.max_episode_steps`). `render` returns the picture of the task's camera
+    ``terminated`` is the task's; ``truncated`` is True here where a step diverged, and set by the time limit
+    that `gymnasium.make` adds (`Task.max_episode_steps`). `render` returns the picture of the task's camera
     (``"rgb_array"``); with ``"human"`` each step is shown in the browser, at most as fast as in reality. Not
     safe for several threads.
     """
@@ -86,7 +91,8 @@ class TaskEnvironment(Env[Any, Any]):
             except BaseException:
                 self.close()
                 raise
-        self._seeded = False
+        self._seeded_by: np.random.Generator | None = None
+        self._last: Any = None
 
     @property
     def episodes(self) -> Episodes:
@@ -108,12 +114,13 @@ class TaskEnvironment(Env[Any, Any]):
         if not isinstance(options, Mapping | None):
             raise ArgumentError(f"options is {shown(options)}; wanted a dict of options by name")
         if self._variation is not None:
-            if seed is not None or not self._seeded:
-                self._variation.seed(self.np_random_seed, self.np_random)
-                self._seeded = True
+            if self.np_random is not self._seeded_by:
+                self._variation.seed(first_seed(self.np_random_seed, self.np_random))
+                self._seeded_by = self.np_random
             self._variation.start()
             episodes.set_parameters(self._variation.values[0, : self._variation.motion_size].copy())
         observation, info = episodes.start(self.np_random, options or {})
+        self._last = observation
         self._phase = "running"
         self._show()
         if self._variation is not None:
@@ -122,30 +129,38 @@ class TaskEnvironment(Env[Any, Any]):
         return observation, info
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Act for one control step; return observation, reward, terminated, truncated (False) and info.
+        """Act for one control step; return observation, reward, terminated, truncated and info.
 
-        Raises EpisodeError before the first `reset` and after the end of an episode, and ArgumentError (and
-        its kinds) for an action that is not in the action space; the episode is unchanged then.
+        A step that diverges, or that the engine fails to take, truncates the episode: the observation is that
+        before the step, the reward 0, and ``info["diverged"]`` says why. Raises EpisodeError before the first
+        `reset` and after the end of an episode, and ArgumentError (and its kinds) for an action that is not
+        in the action space; the episode is unchanged then.
         """
         episodes = self.episodes
         if self._phase != "running":
             raise EpisodeError(
                 "step was called before the first reset"
                 if self._phase == "before reset"
-                else "step was called after the episode ended (terminated): call reset"
+                else "step was called after the episode ended: call reset"
             )
         given = checked_action(self.action_space, action)
         if self._variation is not None:
             given = self._acting(given)
-        outcome = episodes.step(given)
-        if outcome.terminated:
+        truncated = False
+        try:
+            outcome = episodes.step(given)
+        except (DivergedError, EngineError) as error:  # Drake's solver fails where others diverge
+            outcome, truncated = Outcome(self._last, 0.0, False, {DIVERGED: str(error)}), True
+        else:
+            self._last = outcome.observation
+        if outcome.terminated or truncated:
             self._phase = "ended"
         self._show()
         observation = outcome.observation
         if self._variation is not None:
             self._variation.count_step()
             observation = self._observed(observation)
-        return observation, outcome.reward, outcome.terminated, False, outcome.info
+        return observation, outcome.reward, outcome.terminated, truncated, outcome.info
 
     def _acting(self, action: Any) -> Any:
         """Return an action with noise."""
@@ -160,7 +175,7 @@ class TaskEnvironment(Env[Any, Any]):
         variation = self._variation
         if variation is None or variation.observation_noise is None:
             return observation
-        noisy = variation.noisy_observations(observation.reshape(1, -1).astype(np.float64))
+        noisy = variation.noisy_observations(observation.reshape(1, -1))
         return noisy.reshape(observation.shape).astype(observation.dtype)
 
     def render(self) -> NDArray[np.uint8] | None:

@@ -10,6 +10,7 @@ try:
     from gymnasium import make_vec as make_vec_env
     from gymnasium.envs.registration import register, registry
     from gymnasium.error import Error as GymnasiumError
+    from gymnasium.utils.seeding import np_random
     from gymnasium.vector import AutoresetMode, VectorEnv
     from gymnasium.vector.utils import batch_space
 except ImportError as error:
@@ -24,6 +25,7 @@ __all__ = [
     "batch_space",
     "make_env",
     "make_vec_env",
+    "np_random",
     "register",
     "registry",
     "spaces",

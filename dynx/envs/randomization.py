@@ -276,6 +276,12 @@ class Draws:
         return values
 
 
+def first_seed(seed: int | None, rng: np.random.Generator) -> int:
+    """Return the seed of the first environment: that of Gymnasium's generator `rng`, or one drawn from it
+    where it is unknown (None or below 0)."""
+    return int(rng.integers(2**63)) if seed is None or seed < 0 else seed
+
+
 class Variation:
     """Drawn values and noise of `count` environments.
 
@@ -304,18 +310,21 @@ class Variation:
         self.motion_size = len(motion)
         self.values: Floats = np.zeros((count, len(self._draws.names)))
         """Values (count, k) of the present episodes; the first `motion_size` are those of the motion."""
-        self._streams = Streams(*[0] * count)
+        self._seeds = [0] * count
+        self._streams = Streams(*self._seeds)
         self._episodes = np.full(count, -1)
         self._steps = np.zeros(count, dtype=np.int64)
-        self._everywhere = np.arange(count)
+        self._everywhere, self._dtype = np.arange(count), observation_space.dtype
         self._ahead: Floats = np.zeros((count, BLOCK_STEPS, len(self._draws.names)))
 
-    def seed(self, seed: int | None, rng: np.random.Generator) -> None:
-        """Set the seeds of the environments, from `rng` where its seed is unknown (None or below 0); the next
-        episode of each is its first."""
-        known = int(rng.integers(2**63)) if seed is None or seed < 0 else seed
-        self._streams = Streams(*(known + k for k in range(len(self.values))))
-        self._episodes[:] = -1
+    def seed(self, first: int, rows: NDArray[np.intp] | None = None) -> None:
+        """Seed some environments, by default all: environment k with `first` plus k. The next episode of each
+        is its first."""
+        chosen = self._everywhere if rows is None else rows
+        for row in chosen.tolist():
+            self._seeds[row] = first + row
+        self._streams = Streams(*self._seeds)
+        self._episodes[chosen] = -1
         for noise in (self.observation_noise, self.action_noise):
             if noise is not None:
                 noise.numbers.forget()
@@ -340,10 +349,12 @@ class Variation:
         self._steps += 1
 
     def noisy_observations(self, observations: Floats, rows: NDArray[np.intp] | None = None) -> Floats:
-        """Return observations (n, size) with the noise of the present steps of some environments."""
+        """Return observations (n, size) with the noise of the present steps of some environments; without it
+        they have the precision of the observation space."""
         noise = self.observation_noise
         if noise is None:
             return observations
+        observations = observations.astype(self._dtype).astype(np.float64)
         return noise.added(observations, self._numbers(noise, self._everywhere if rows is None else rows))
 
     def noise_on_actions(self) -> Floats:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from dynx.backends.base import Backend
 from dynx.backends.dynamics import EngineDynamics
 from dynx.backends.registry import backend
-from dynx.envs.library import AutoresetMode, spaces
+from dynx.envs.library import spaces
 from dynx.envs.randomization import Parameter, Randomization
 from dynx.envs.task import (
     Episode,
@@ -176,7 +176,7 @@ class CompiledEpisodes(RobotEpisodes):
         # Imported here, because other engines need no compiler.
         from dynx.envs.task_step import TaskLanes, TaskStep
 
-        self._step = TaskStep(self._task, AutoresetMode.NEXT_STEP, None, self._varied)
+        self._step = TaskStep(self._task, self._varied)
         self._lanes = TaskLanes(self._step, 1)
 
     def vary(self, randomization: Randomization) -> tuple[Parameter, ...]:
@@ -190,6 +190,13 @@ class CompiledEpisodes(RobotEpisodes):
         if "parameters" in self._lanes.arrays:
             self._lanes.arrays["parameters"][0] = values
 
+    def start(self, rng: np.random.Generator, options: Mapping[str, Any]) -> tuple[Any, dict[str, Any]]:
+        self._task.require_start_options(options)
+        states, observations = self._step.starts(rng.random((1, self._task.random_size)), options)
+        self.state = self._step.layout.state(states[0])  # its setter copies
+        self._steps = 0
+        return self._shaped(observations[0]), self._task.info(self._robot, self._state)
+
     def step(self, action: Any) -> Outcome:
         lanes, task = self._lanes, self._task
         now, arrays = lanes.now, lanes.arrays
@@ -202,10 +209,13 @@ class CompiledEpisodes(RobotEpisodes):
             self._raise_divergence(after.q, after.v)
         lanes.accept()
         self._state = after
-        observation = arrays["observation"][0].astype(self._dtype).reshape(self._shape)
+        observation = self._shaped(arrays["observation"][0])
         return Outcome(
             observation, float(arrays["reward"][0, 0]), bool(lanes.flags[0]), task.info(self._robot, after)
         )
+
+    def _shaped(self, observation: Floats) -> Array:
+        return observation.astype(self._dtype).reshape(self._shape)
 
 
 class RobotVariation:

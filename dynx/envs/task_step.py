@@ -1,15 +1,16 @@
-"""The text of one control step of a task with autoreset, and of the start of an episode.
+"""The text of one control step of a task, and of the start of an episode.
 
 The kernel evaluates one environment in each lane of a vector register. Dynamics, integrator, observation,
 reward, the end of an episode and the start of the next are traced together; where an episode starts, all are
-computed and the start is selected.
+computed and the start is selected. One kernel serves vectors of environments, whatever their autoreset and
+their time limit, and single environments: all have the same bits.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,12 +18,13 @@ import numpy as np
 from dynx.compiled.array_dynamics import ArrayDynamics
 from dynx.compiled.parametric import ParametricDynamics
 from dynx.compiled.step import BoundSteps, StepText, compiled
-from dynx.envs.library import AutoresetMode, spaces
+from dynx.envs.library import spaces
 from dynx.envs.task import Move, RobotTask, State, StepFriction, control_step, free_move
 from dynx.envs.variation import VariedRobot
 from dynx.errors import ArgumentError, ShapeError, UnsupportedFeatureError
 from dynx.model.numbers import DIVERGENCE_SPEED
 from dynx.rbd.joint_friction import FrictionLaw, damped_equation
+from dynx.simd.kernel import Kernel
 from dynx.simd.target import host
 from dynx.simd.user_code.arrays import symbol_array, traced_array
 from dynx.simd.user_code.numbers import select
@@ -33,8 +35,11 @@ TERMINATED, TRUNCATED, INVALID, DIVERGED, UNSETTLED = 1, 1 << 8, 1 << 16, 1 << 2
 """Bits of the output ``flags``, an integer of 64 bits: one byte for each flag, so that the bytes are arrays
 of bool without any conversion. A kernel writes doubles; these have the bit patterns of the integers."""
 
+STARTED_AT_ONCE = 16
+"""Number of episodes that start together; more are a power of it, so that few lanes are made."""
+
 ENDED = -1.0
-"""Number of steps of an episode that ended, in mode NEXT_STEP: the step that starts the next makes it 0."""
+"""Number of steps of an episode that ended: the next step starts another and makes it 0."""
 
 
 class RowLayout(NamedTuple):
@@ -66,28 +71,19 @@ class RowLayout(NamedTuple):
 
 
 class TaskStep:
-    """A control step of one task, one autoreset mode and one time limit."""
+    """A control step of one task."""
 
     diverged = DIVERGED
-    """Least number of the flags of an environment that diverged."""
+    """Flag of an environment that diverged: its step was not taken, and its episode is truncated."""
 
-    def __init__(
-        self,
-        task: RobotTask,
-        mode: AutoresetMode,
-        max_episode_steps: int | None,
-        varied: VariedRobot | None = None,
-        *,
-        noisy_actions: bool = False,
-    ) -> None:
+    def __init__(self, task: RobotTask, varied: VariedRobot | None = None) -> None:
         """`varied` are the parameters of the motion that each environment has for itself."""
         space = task.action_space
         if not isinstance(space, spaces.Discrete | spaces.Box):
             raise UnsupportedFeatureError(
                 f"a vector environment takes actions of a Discrete or a Box space, not of {space}"
             )
-        self._task, self._mode = task, mode
-        self._varied, self._noisy_actions = varied, noisy_actions
+        self._task, self._varied = task, varied
         self._friction: JointFrictionText | None = None
         self._parametric: ParametricDynamics | None = None
         if varied is not None and varied.parameters.names:
@@ -95,7 +91,7 @@ class TaskStep:
             if varied.parameters.joint_dynamics:
                 law = FrictionLaw.of(task.model, varied.dry_joints)
                 self._friction = JointFrictionText(task, law, self._parametric)
-        self._limit = math.inf if max_episode_steps is None else float(max_episode_steps)
+        self._starters: dict[int, TaskLanes] = {}
         self.layout = RowLayout.of(task)
         self._robot = ArrayDynamics(task.model)
         shape = task.observation_space.shape
@@ -112,28 +108,54 @@ class TaskStep:
         """Number of modes of dry friction in all steps of the integrator."""
         return 0 if self._friction is None else self._friction.size * self._task.substeps
 
+    @cached_property
+    def kernel(self) -> Kernel:
+        """The kernel of a step. Raises UnsupportedFeatureError for a task that cannot be compiled."""
+        return compiled(self.text())
+
+    def starts(self, random: Floats, options: Mapping[str, Any]) -> tuple[Floats, Floats]:
+        """Return the states and the observations (n, size) at the start of episodes, from numbers
+        (n, random_size); `options` are those of `reset`. The next call overwrites them.
+
+        Without options the kernel of the steps is evaluated, so that episodes start with the bits of those
+        that a step starts.
+        """
+        n = len(random)
+        if options:
+            found = np.empty((n, self.layout.size)), np.empty((n, self.observations))
+            compiled(self.text(options))([random], [*found])
+            return found
+        size = STARTED_AT_ONCE
+        while size < n:
+            size *= STARTED_AT_ONCE
+        if size not in self._starters:
+            self._starters[size] = TaskLanes(self, size)
+        lanes = self._starters[size]
+        lanes.arrays["random"][:n] = random
+        lanes.now["steps"][...] = ENDED
+        lanes.evaluate()
+        return lanes.end["state"][:n], lanes.arrays["observation"][:n]
+
     def text(self, start: Mapping[str, Any] | None = None) -> StepText:
         """Return the text of a step, or of the start of episodes with the options `start`.
 
-        Inputs of a step: ``state`` (layout), the number of ``steps``, ``action``, and ``random`` for the
-        start of the next episode; where they are drawn, ``parameters`` of the motion, ``noise`` on the
-        action, ``earlier`` actions that may still act, and the ``modes`` of dry friction with which a step is
+        Inputs of a step: ``state`` (layout), the number of ``steps`` and its ``limit``, ``action``, and
+        ``random`` for the start of the next episode; where they are drawn, ``parameters`` of the motion,
+        ``earlier`` actions that may still act, and the ``modes`` of dry friction with which a step is
         repeated. Outputs: ``state``, ``steps``, ``observation``, ``reward``, ``flags``, ``earlier`` if it is
-        an input, ``next_modes``, and in mode SAME_STEP ``final``, the last observation of the episode. A
-        start has ``state`` and ``observation`` of ``random``.
+        an input, and ``next_modes``. A step that diverges is not taken: the episode ends in the state before
+        it, truncated, without a reward. A start has ``state`` and ``observation`` of ``random``.
         """
         sizes = {"random": self._task.random_size}
         evaluate: Callable[..., dict[str, Any]] = self._step if start is None else self._start
         if start is None:
-            sizes = {"state": self.layout.size, "steps": 1, "action": self.actions, **sizes}
+            sizes = {"state": self.layout.size, "steps": 1, "limit": 1, "action": self.actions, **sizes}
             if self._varied is not None and self._varied.drawn_parameters:
                 sizes["parameters"] = len(self._varied.drawn_parameters)
                 if self._varied.delayed_actions:
                     sizes["earlier"] = self._varied.delayed_actions * self.actions
             if self.modes:
                 sizes |= {"modes": self.modes, "one_by_one": 1}
-            if self._noisy_actions:
-                sizes["noise"] = self.actions
 
         def traced(**inputs: Array) -> dict[str, Array]:
             given = {name: traced_array(array) for name, array in inputs.items()}
@@ -150,43 +172,36 @@ class TaskStep:
 
     def _step(self, inputs: Mapping[str, Array]) -> dict[str, Any]:
         task, robot, layout = self._task, self._robot, self.layout
-        action, random, (count,) = inputs["action"], inputs["random"], inputs["steps"]
+        action, random, (count,), (limit,) = (inputs[each] for each in ("action", "random", "steps", "limit"))
         before, space = layout.state(inputs["state"]), task.action_space
-        noisy = action
-        if self._noisy_actions and isinstance(space, spaces.Box):
-            low, high = (each.ravel().astype(np.float64) for each in (space.low, space.high))
-            noisy = np.clip(action + inputs["noise"], low, high)
         results: dict[str, Any] = {}
-        actions: list[Array] = [noisy] * task.substeps
+        actions: list[Array] = [action] * task.substeps
         move: Move = partial(free_move, task, robot.forward_dynamics)
         if self._varied is not None and "parameters" in inputs:
             drawn = inputs["parameters"]
             move = self._move(self._varied, drawn, inputs, move)
             if "earlier" in inputs:
                 earlier = inputs["earlier"]
-                actions, results["earlier"] = self._delayed(self._varied, drawn, count, noisy, earlier)
+                actions, results["earlier"] = self._delayed(self._varied, drawn, count, action, earlier)
         moved = control_step(task, robot, move, before, [self._shaped(each) for each in actions])
-        given = self._shaped(noisy)
+        given = self._shaped(action)
         after = task.settle(moved)
         reward = _number(task.reward(robot, before, given, after))
         taken = count + 1.0
-        terminated, truncated = _mask(task.terminated(robot, after)), _mask(taken >= self._limit)
+        terminated, truncated = _mask(task.terminated(robot, after)), _mask(taken >= limit)
         flags = _flags(terminated, truncated)
         if self._friction is not None and self.modes:
             results["next_modes"], changes = self._friction.results()
             flags = select(changes > 0.0, _bits(UNSETTLED), flags)
-        flags = select(np.sum(moved.v * moved.v) < DIVERGENCE_SPEED**2, flags, _bits(DIVERGED))
+        finite = np.sum(moved.v * moved.v) < DIVERGENCE_SPEED**2
+        flags = select(finite, flags, _bits(DIVERGED | TRUNCATED))
         flags = select(_is_valid(space, action), flags, _bits(INVALID))
-        ends = np.maximum(terminated, truncated)
-        if self._mode is AutoresetMode.NEXT_STEP:
-            ended = count < 0.0
-            reward, flags = select(ended, 0.0, reward), select(ended, 0.0, flags)
-            taken = select(ended, 0.0, select(ends, ENDED, taken))
-            after = _selected(ended, task.start(random), after)
-        elif self._mode is AutoresetMode.SAME_STEP:
-            results["final"] = self._observation(after)
-            taken = select(ends, 0.0, taken)
-            after = _selected(ends, task.start(random), after)
+        ends = select(finite, np.maximum(terminated, truncated), 1.0)
+        after, reward = _selected(finite, after, before), select(finite, reward, 0.0)
+        ended = count < 0.0
+        reward, flags = select(ended, 0.0, reward), select(ended, 0.0, flags)
+        taken = select(ended, 0.0, select(ends, ENDED, taken))
+        after = _selected(ended, task.start(random), after)
         return {
             "state": layout.row(after),
             "steps": [taken],
@@ -295,14 +310,16 @@ class TaskLanes:
     The state is read from one set of arrays and written to another, in turn.
     """
 
-    def __init__(self, step: TaskStep, count: int) -> None:
-        kernel, rows = compiled(step.text()), max(count, host().lanes)
+    def __init__(self, step: TaskStep, count: int, max_steps: int | None = None) -> None:
+        """`max_steps` is the number of steps after which an episode is truncated."""
+        kernel, rows = step.kernel, max(count, host().lanes)
         sizes = {port.name: port.size for port in kernel.inputs + kernel.outputs}
         state = {
             name: np.zeros((2, rows, sizes[name])) for name in ("state", "steps", "earlier") if name in sizes
         }
         self.arrays: dict[str, Floats] = {name: np.zeros((rows, size)) for name, size in sizes.items()}
         """Inputs and outputs by name (rows, size), but for the state."""
+        self.arrays["limit"][...] = math.inf if max_steps is None else max_steps
         turns = np.arange(2)
         known = {name: (array[None], 0 * turns) for name, array in self.arrays.items()}
         steps = BoundSteps(

@@ -8,18 +8,17 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dynx.compiled.step import compiled
+from dynx.envs.environment import DIVERGED as DIVERGED_KEY
 from dynx.envs.environment import checked_action
-from dynx.envs.library import AutoresetMode, Space, VectorEnv, batch_space, spaces
-from dynx.envs.randomization import Randomization, Variation
+from dynx.envs.library import AutoresetMode, Space, VectorEnv, batch_space, np_random, spaces
+from dynx.envs.randomization import Randomization, Variation, first_seed
 from dynx.envs.runner import draw_robot
 from dynx.envs.task import RobotTask
-from dynx.envs.task_step import INVALID, TaskLanes, TaskStep
+from dynx.envs.task_step import DIVERGED, INVALID, TaskLanes, TaskStep
 from dynx.envs.variation import VariedRobot
 from dynx.errors import (
     ArgumentError,
     ClosedError,
-    DivergedError,
     DTypeError,
     DynxError,
     EpisodeError,
@@ -27,13 +26,43 @@ from dynx.errors import (
     nearest,
     shown,
 )
-from dynx.model.numbers import checked_array, whole_number
+from dynx.model.numbers import DIVERGENCE_SPEED, checked_array, whole_number
 from dynx.spatial.scalar import Floats
 
 RENDER_MODES = ("rgb_array",)
 
+EPISODES_AHEAD = 32
+"""Number of episodes for which an environment draws random numbers at a time."""
+
 NONE_ENDED = np.zeros(0, dtype=np.intp)
 """Numbers of the environments whose episode ended, where there are none."""
+
+
+class StartNumbers:
+    """Random numbers of the starts of episodes in several environments: each has those that Gymnasium's
+    generator of a single environment with its seed draws."""
+
+    def __init__(self, count: int, size: int) -> None:
+        self._generators: list[Any] = [None] * count
+        self._ahead: Floats = np.zeros((count, EPISODES_AHEAD, size))
+        self._flat = self._ahead.reshape(count * EPISODES_AHEAD, size)
+        self._used = np.zeros(count, dtype=np.intp)
+
+    def seed(self, first: int, rows: NDArray[np.intp]) -> None:
+        """Seed some environments, number k with `first` plus k; their next episode is the first."""
+        for row in rows.tolist():
+            self._generators[row], _ = np_random(first + row)
+        self._used[rows] = 0
+
+    def next(self, rows: NDArray[np.intp]) -> Floats:
+        """Return the numbers (n, size) of the next episodes of some environments."""
+        used = self._used[rows]
+        place = used % EPISODES_AHEAD
+        for row in rows[place == 0].tolist():
+            self._generators[row].random(out=self._ahead[row])
+        self._used[rows] = used + 1
+        # NumPy takes rows of a matrix in a third of the time that it takes entries of two axes.
+        return np.asarray(self._flat.take(rows * EPISODES_AHEAD + place, axis=0))
 
 
 class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
@@ -43,8 +72,11 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
     Autoreset is that of Gymnasium: in mode NEXT_STEP the step after the end of an episode starts the next one
     and ignores the action; in mode SAME_STEP the step that ends an episode returns the first observation of
     the next one, and ``info["final_obs"]`` has the last; in mode DISABLED ``reset(options={"reset_mask":
-    mask})`` starts episodes. Random numbers are drawn for all environments in turn from `np_random`, so a run
-    is repeated by its seed, the number of environments and the actions.
+    mask})`` starts episodes. After ``reset(seed=s)`` environment k has the episodes of a single environment
+    with the seed s + k, whatever the number of environments; on engine ``compiled`` bit for bit.
+
+    An environment whose step diverges is truncated with the observation before that step and a reward of 0;
+    ``info["diverged"]`` says why (in mode SAME_STEP that of ``info["final_info"]``).
 
     With ``copy=False`` observations, rewards and flags are written into the same arrays in every step, which
     is faster. Runs on one thread; not safe for several.
@@ -93,17 +125,18 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
             varied = VariedRobot(task, drawn)
             spaces_of_one = task.observation_space, task.action_space
             self._variation = Variation(drawn, varied.drawn_parameters, *spaces_of_one, count=n)
-        noisy = self._variation is not None and self._variation.action_noise is not None
-        self._task_step = TaskStep(task, mode, max_episode_steps, varied, noisy_actions=noisy)
+        self._task_step = TaskStep(task, varied)
         self._layout = self._task_step.layout
+        self._starts = StartNumbers(n, task.random_size)
+        self._seeded_by: np.random.Generator | None = None
         self._copy = copy
-        self._make_buffers()
+        self._make_buffers(max_episode_steps)
         self._running = False
 
-    def _make_buffers(self) -> None:
+    def _make_buffers(self, max_episode_steps: int | None) -> None:
         """Allocate the arrays of the kernel, and views of them for all environments."""
         n = self.num_envs
-        self._lanes = lanes = TaskLanes(self._task_step, n)
+        self._lanes = lanes = TaskLanes(self._task_step, n, max_episode_steps)
         arrays = self._arrays = lanes.arrays
         self._random = arrays["random"]
         self._actions = arrays["action"][:n, 0] if self._discrete else arrays["action"][:n]
@@ -157,18 +190,15 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         given = dict(options or {})
         mask = checked_reset_mask(given.pop("reset_mask", None), self.num_envs, started=self._running)
         self.task.require_start_options(given)
-        n, now, found = self.num_envs, self._lanes.now, self._arrays["observation"]
         rows = np.flatnonzero(mask)
-        if self._variation is not None and (seed is not None or not self._running):
-            self._variation.seed(self.np_random_seed, self.np_random)
-        self._renew(rows)
-        begun, observation = np.empty_like(now["state"]), np.empty_like(found)
-        compiled(self._task_step.text(given))([self._random], [begun, observation])
-        now["state"][rows], found[rows] = begun[rows], observation[rows]
-        now["steps"][rows] = 0.0
+        if self.np_random is not self._seeded_by:
+            first, self._seeded_by = first_seed(self.np_random_seed, self.np_random), self.np_random
+            self._starts.seed(first, rows)
+            self._random[rows] = self._starts.next(rows)
+            if self._variation is not None:
+                self._variation.seed(first, rows)
+        self._start(rows, given)
         self._ended = self._ended[~mask[self._ended]]
-        if self._mode is not AutoresetMode.DISABLED:
-            self._random[:n] = self.np_random.random((n, self.task.random_size))
         self._running = True
         infos: dict[str, Any] = {}
         self._add_parameters(infos, rows)
@@ -179,8 +209,7 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         truncations and infos, arrays with one row for each.
 
         Raises EpisodeError before the first `reset`, and in mode DISABLED after the end of an episode;
-        ArgumentError and its kinds for an invalid action, DivergedError where a state is not finite, all
-        of which leave every environment as it was.
+        ArgumentError and its kinds for an invalid action, all of which leave every environment as it was.
         """
         if not self._running:
             self._refuse_closed()
@@ -197,14 +226,12 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
             or actions.dtype.kind not in self._kinds
         ):
             actions = checked_actions(self._kinds, self._actions.shape, actions)
-        self._actions[...] = actions
-        if self._variation is not None and self._variation.action_noise is not None:
-            self._arrays["noise"][: self.num_envs] = self._variation.noise_on_actions()
+        self._actions[...] = self._noisy(actions)
         self._lanes.evaluate()
         flags = self._flags
         largest = flags.max()
-        if largest >= INVALID:
-            raise_defect(self.single_action_space, self._actions, flags >= INVALID)
+        if largest >= INVALID and (flags & INVALID).any():
+            raise_invalid_action(self.single_action_space, self._actions, flags & INVALID)
         self._lanes.accept()
         infos: dict[str, Any] = {}
         if self._variation is not None:
@@ -215,9 +242,12 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
             self._add_parameters(infos, ended)
         # NumPy finds True in a third of the time that it takes to find integers other than 0.
         self._ended = ended = flags.astype(np.bool_).nonzero()[0] if largest else NONE_ENDED
+        diverged = flags >= DIVERGED if largest >= DIVERGED else None
+        if diverged is not None:
+            self._add_diverged(infos, diverged)
         if mode is AutoresetMode.SAME_STEP and len(ended):
-            infos = self._final_infos(ended)
-            self._renew(ended)
+            infos = self._final_infos(ended, infos)
+            self._start(ended, {})
             self._add_parameters(infos, ended)
             self._ended = NONE_ENDED
         rewards, terminated, truncated = self._rewards, self._terminated, self._truncated
@@ -228,6 +258,23 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
             observations = self._observations
             observations[...] = self._observed()
         return observations, rewards, terminated, truncated, infos
+
+    def _noisy(self, actions: Any) -> Any:
+        """Return the actions of all environments with noise where it is drawn."""
+        noise = None if self._variation is None else self._variation.action_noise
+        space = self.single_action_space
+        if noise is None or self._variation is None or not isinstance(space, spaces.Box):
+            return actions
+        low, high = space.low, space.high
+        rounded = np.asarray(actions).astype(low.dtype)
+        # Environments that start an episode ignore their actions.
+        checked = np.ones(self.num_envs, dtype=np.bool_)
+        checked[self._ended] = False
+        invalid = ~((rounded >= low) & (rounded <= high)).reshape(self.num_envs, -1).all(axis=1)
+        if (invalid & checked).any():
+            raise_invalid_action(space, actions, invalid & checked)
+        flat = np.asarray(actions, dtype=np.float64).reshape(self.num_envs, -1)
+        return noise.added(flat, self._variation.noise_on_actions()).reshape(self._actions.shape)
 
     def _observed(self) -> Floats:
         """Return the observations that the kernel found, with noise where it is drawn."""
@@ -240,27 +287,45 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
             fresh[rows] = True
             infos["parameters"], infos["_parameters"] = self._variation.by_name(), fresh
 
-    def _renew(self, rows: NDArray[np.intp]) -> None:
-        """Draw the random numbers of the next episodes of some environments."""
+    def _start(self, rows: NDArray[np.intp], options: Mapping[str, Any]) -> None:
+        """Start episodes in some environments."""
         if len(rows):
-            self._random[rows] = self.np_random.random((len(rows), self.task.random_size))
+            states, observations = self._task_step.starts(self._random[rows], options)
+            now = self._lanes.now
+            now["state"][rows], now["steps"][rows], self._found[rows] = states, 0.0, observations
+            self._renew(rows)
+
+    def _renew(self, rows: NDArray[np.intp]) -> None:
+        """Draw the parameters of the episodes that some environments have started, and the random numbers of
+        the next ones."""
+        if len(rows):
+            self._random[rows] = self._starts.next(rows)
             if self._variation is not None:
                 self._variation.start(rows)
                 if "parameters" in self._arrays:
                     size = self._variation.motion_size
                     self._arrays["parameters"][rows] = self._variation.values[rows, :size]
 
-    def _final_infos(self, rows: NDArray[np.intp]) -> dict[str, Any]:
-        """Return the last observations of the episodes that ended, as Gymnasium returns them."""
+    def _add_diverged(self, infos: dict[str, Any], diverged: NDArray[np.bool_]) -> None:
+        """Add to infos why the steps of some environments were not taken."""
+        why = np.full(self.num_envs, None, dtype=object)
+        why[diverged] = (
+            f"the velocity after the step is not finite or beyond {DIVERGENCE_SPEED:g}; smaller steps "
+            "(substeps) or actions may help"
+        )
+        infos[DIVERGED_KEY], infos[f"_{DIVERGED_KEY}"] = why, diverged
+
+    def _final_infos(self, rows: NDArray[np.intp], last_infos: dict[str, Any]) -> dict[str, Any]:
+        """Return the last observations and infos of the episodes that ended, as Gymnasium returns them."""
         found = np.full(self.num_envs, None, dtype=object)
-        final = self._arrays["final"][rows]
+        final = self._found[rows]
         if self._variation is not None:
             final = self._variation.noisy_observations(final, rows)
         last = final.astype(self.single_observation_space.dtype)
         for row, observation in zip(rows.tolist(), last, strict=True):
             found[row] = observation
         mask = self._flags != 0
-        return {"final_obs": found, "_final_obs": mask, "final_info": {}, "_final_info": mask.copy()}
+        return {"final_obs": found, "_final_obs": mask, "final_info": last_infos, "_final_info": mask.copy()}
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
         """Return the pictures of all environments (height, width, 3)."""
@@ -320,17 +385,12 @@ def checked_actions(kinds: str, shape: tuple[int, ...], actions: Any) -> NDArray
     return array
 
 
-def raise_defect(space: Space[Any], actions: Floats, defects: NDArray[np.bool_]) -> NoReturn:
-    """Raise the error of the first environment with a defect (`dynx.envs.task_step`)."""
-    number = int(np.flatnonzero(defects)[0])
+def raise_invalid_action(space: Space[Any], actions: Floats, invalid: NDArray[Any]) -> NoReturn:
+    """Raise the error of the first environment with an invalid action."""
+    number = int(np.flatnonzero(invalid)[0])
     action = int(actions[number]) if isinstance(space, spaces.Discrete) else actions[number]
     try:
         checked_action(space, action)
     except DynxError as error:
         raise type(error)(f"environment {number}: {error}") from None
-    raise DivergedError(
-        f"the velocity in environment {number} is not finite or too large to be meaningful",
-        time=float("nan"),
-        step=-1,
-        state=(None, None),
-    )
+    raise ArgumentError(f"environment {number}: action is {shown(action)}; wanted an element of {space}")

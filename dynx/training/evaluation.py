@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.envs.environment import DIVERGED
 from dynx.envs.library import Env
 from dynx.errors import ArgumentError
 from dynx.model.numbers import whole_number
@@ -30,6 +31,8 @@ class Evaluation:
     returns: NDArray[np.float64]
     lengths: NDArray[np.int64]
     seed: int
+    diverged: int = 0
+    """Number of episodes that were truncated because a step diverged."""
 
     @property
     def mean(self) -> float:
@@ -48,9 +51,10 @@ class Evaluation:
 
     def __repr__(self) -> str:
         low, high = self.interval
+        diverged = f", {self.diverged} of which diverged" if self.diverged else ""
         return (
             f"<Evaluation: return {self.mean:.4g} +/- {self.deviation:.3g} over {len(self.returns)} "
-            f"episodes, mean within {low:.4g} to {high:.4g}>"
+            f"episodes{diverged}, mean within {low:.4g} to {high:.4g}>"
         )
 
 
@@ -71,7 +75,7 @@ def evaluate(
         raise ArgumentError("no environment to judge the policy in")
     returns, lengths = np.zeros(episodes), np.zeros(episodes, dtype=np.int64)
     running: dict[int, tuple[int, Any]] = {}
-    begun = ended = 0
+    begun = ended = diverged = 0
     while ended < episodes:
         for k in range(len(envs)):
             if k not in running and begun < episodes:
@@ -81,15 +85,16 @@ def evaluate(
         actions = act(np.stack([running[k][1] for k in places]))
         for k, action in zip(places, actions, strict=True):
             number = running[k][0]
-            observation, reward, terminated, truncated, _ = envs[k].step(action)
+            observation, reward, terminated, truncated, info = envs[k].step(action)
             returns[number] += float(reward)
             lengths[number] += 1
             running[k] = number, observation
             if terminated or truncated:
                 del running[k]
                 ended += 1
+                diverged += DIVERGED in info
                 progress(ended)
-    return Evaluation(returns, lengths, seed)
+    return Evaluation(returns, lengths, seed, diverged)
 
 
 def confidence_interval(values: NDArray[np.float64]) -> tuple[float, float]:

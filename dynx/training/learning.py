@@ -146,4 +146,5 @@ def evaluation_line(steps: int, found: Evaluation) -> dict[str, Any]:
         "high": high,
         "episodes": len(found.returns),
         "mean_length": float(found.lengths.mean()),
+        "diverged": found.diverged,
     }

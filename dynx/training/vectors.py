@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.envs.environment import DIVERGED
 from dynx.envs.library import VectorEnv
 from dynx.training.library import VecEnv
 
@@ -53,6 +54,9 @@ class BatchedEnvironments(VecEnv):  # type: ignore[misc]  # stable-baselines3 is
                 "terminal_observation": np.array(info["final_obs"][k]),
                 "TimeLimit.truncated": bool(truncated[k] and not terminated[k]),
             }
+            why = info["final_info"].get(DIVERGED)
+            if why is not None and why[k] is not None:
+                infos[k][DIVERGED] = why[k]
         return np.array(observations), np.array(rewards, dtype=np.float32), done, infos
 
     def close(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import gymnasium
@@ -9,11 +10,14 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
+from dynx.backends import installed_backends
+from dynx.backends.dynamics import Dynamics
 from dynx.envs.environment import TaskEnvironment
 from dynx.envs.task import State
 from dynx.envs.tasks.acrobot import Acrobot
 from dynx.envs.tasks.cart_pole import CartPole
 from dynx.envs.tasks.pendulum import Pendulum
+from dynx.envs.tasks.reach import Reach
 from dynx.envs.vector import RobotVectorEnvironment
 from dynx.errors import (
     ArgumentError,
@@ -24,6 +28,7 @@ from dynx.errors import (
     ShapeError,
     UnknownNameError,
 )
+from dynx.spatial.scalar import Array
 
 N = 6
 
@@ -95,6 +100,182 @@ def test_steps_are_those_of_single_environments(mode: AutoresetMode, task: Any) 
         ended = terminated | truncated
         ends += int(ended.sum())
     assert ends > 1
+
+
+DRAWN: dict[str, Any] = {
+    "mass_scale": (0.5, 2.0),
+    "joint_friction": (0.01, 0.1),
+    "delay": (0.0, 0.03),
+    "observation_noise": 0.01,
+    "action_noise": 0.1,
+}
+
+
+DRAWN_POLE: dict[str, Any] = {"mass_scale": {"pole": (0.5, 2.0)}, "observation_noise": 0.01}
+
+
+class Beside:
+    """Single environments on `compiled` with the seeds of those of a vector, beside which they step."""
+
+    def __init__(self, task: Any, count: int, limit: int, **options: Any) -> None:
+        self.envs = [TaskEnvironment(task, "compiled", **options) for _ in range(count)]
+        self.limit = limit
+        self.ended, self.steps = np.zeros(count, dtype=bool), np.zeros(count, dtype=int)
+
+    def reset(self, seed: int | None = None) -> list[Any]:
+        """Start the first episode of each after `seed`, else the next of those that ended; return the first
+        observations of these."""
+        chosen = [k for k in range(len(self.envs)) if seed is not None or self.ended[k]]
+        self.ended[chosen], self.steps[chosen] = False, 0
+        return [self.envs[k].reset(seed=None if seed is None else seed + k)[0] for k in chosen]
+
+    def step(self, k: int, action: Any) -> tuple[Any, float, bool, bool]:
+        observation, reward, terminated, truncated, _ = self.envs[k].step(action)
+        self.steps[k] += 1
+        truncated = truncated or self.steps[k] >= self.limit
+        self.ended[k] = terminated or truncated
+        return observation, reward, terminated, truncated
+
+
+@pytest.mark.parametrize("mode", AutoresetMode, ids=str)
+@pytest.mark.parametrize(
+    ("task", "drawn"),
+    [
+        (CartPole(), None),
+        (Pendulum(), DRAWN),
+        (Acrobot(), None),
+        (Reach(robot="planar_3r"), DRAWN),
+        # Beside the start of an episode its step is compiled to other bits.
+        (Reach(robot="ur5", actions="velocity"), None),
+    ],
+    ids=["CartPole", "Pendulum, drawn", "Acrobot", "Reach, drawn", "Reach on UR5"],
+)
+def test_every_episode_is_that_of_a_single_environment_bit_for_bit(
+    mode: AutoresetMode, task: Any, drawn: Any
+) -> None:
+    n, limit = 5, 9
+    envs = RobotVectorEnvironment(
+        task, n, max_episode_steps=limit, autoreset_mode=mode, randomize=drawn, copy=False
+    )
+    beside = Beside(task, n, limit, randomize=drawn)
+    for seed in (7, 0):
+        assert np.array_equal(envs.reset(seed=seed)[0], beside.reset(seed))
+        for _ in range(25):
+            actions: Any = np.array([each.action_space.sample() for each in beside.envs])
+            if mode is AutoresetMode.DISABLED and beside.ended.any():
+                fresh = beside.ended.copy()
+                observations, _ = envs.reset(options={"reset_mask": fresh})
+                assert np.array_equal(observations[fresh], beside.reset())
+            observations, rewards, terminated, truncated, infos = envs.step(actions)
+            fresh = beside.ended.copy()
+            if mode is AutoresetMode.NEXT_STEP and fresh.any():
+                assert np.array_equal(observations[fresh], beside.reset())
+                assert not np.any([rewards[fresh], terminated[fresh], truncated[fresh]])
+            for k in np.flatnonzero(~fresh).tolist():
+                observation, *others = beside.step(k, actions[k])
+                assert others == [rewards[k], terminated[k], truncated[k]]
+                ended = beside.ended[k] and mode is AutoresetMode.SAME_STEP
+                assert np.array_equal(observation, infos["final_obs"][k] if ended else observations[k])
+            if mode is AutoresetMode.SAME_STEP and beside.ended.any():
+                fresh = beside.ended.copy()
+                assert np.array_equal(observations[fresh], beside.reset())
+            states = [np.concatenate(each.episodes.state) for each in beside.envs]  # type: ignore[attr-defined]
+            assert np.array_equal(envs.states[~beside.ended], np.array(states)[~beside.ended])
+
+
+@pytest.mark.parametrize("sizes", [(1, 7), (3, 5), (4, 1, 3)], ids=str)
+@pytest.mark.parametrize("options", [{}, {"x_init": 1.0}], ids=str)
+def test_any_partition_has_the_episodes_of_the_whole(sizes: tuple[int, ...], options: Any) -> None:
+    n, rng = sum(sizes), np.random.default_rng(3)
+    actions = rng.uniform(-1.0, 1.0, (30, n, 1)).astype(np.float32)
+    first = np.cumsum([0, *sizes])
+
+    def run(a: int, b: int) -> Any:
+        envs = RobotVectorEnvironment(Pendulum(), b - a, max_episode_steps=4, autoreset_mode="SameStep")
+        found = [envs.reset(seed=50 + a, options=options)[0]]
+        return np.stack(found + [envs.step(each)[0] for each in actions[:, a:b]], axis=1)
+
+    parts = [run(a, b) for a, b in pairwise(first.tolist())]
+    assert np.array_equal(np.concatenate(parts), run(0, n))
+
+
+@pytest.mark.parametrize("count", [1, 40])
+def test_cart_poles_start_as_those_of_gymnasium(count: int) -> None:
+    ours = RobotVectorEnvironment(CartPole(), count, autoreset_mode="Disabled")
+    theirs = [gymnasium.make("CartPole-v1") for _ in range(count)]
+    observations, _ = ours.reset(seed=11)
+    assert np.array_equal(observations, [env.reset(seed=11 + k)[0] for k, env in enumerate(theirs)])
+    for _ in range(3):
+        ours.reset(options={"reset_mask": np.arange(count) % 2 == 0})
+    observations, _ = ours.reset()
+    later = [[env.reset()[0] for _ in range(1 if k % 2 else 4)] for k, env in enumerate(theirs)]
+    assert np.array_equal(observations, [each[-1] for each in later])
+
+
+def test_a_seed_of_some_environments_leaves_the_others() -> None:
+    envs, same = (RobotVectorEnvironment(CartPole(), 4, randomize=DRAWN_POLE) for _ in range(2))
+    for each in (envs, same):
+        each.reset(seed=1)
+    mask = np.array([True, False, True, False])
+    observations, infos = envs.reset(seed=20, options={"reset_mask": mask})
+    fresh, drawn = RobotVectorEnvironment(CartPole(), 4, randomize=DRAWN_POLE).reset(seed=20)
+    assert np.array_equal(observations[mask], fresh[mask])
+    for name, values in infos["parameters"].items():
+        assert np.array_equal(values[mask], drawn["parameters"][name][mask])
+    for _ in range(40):
+        seen, others = (each.step(np.ones(4, dtype=int))[0] for each in (envs, same))
+        assert np.array_equal(seen[~mask], others[~mask])
+
+
+class Kicked(CartPole):
+    """A cart that the action 1 kicks so hard that the step diverges."""
+
+    def torque(self, robot: Dynamics, state: Any, action: Array) -> Array:
+        return np.stack([1e14 * action, 0.0 * action])
+
+
+@pytest.mark.parametrize("mode", AutoresetMode, ids=str)
+@pytest.mark.parametrize("drawn", [None, DRAWN_POLE], ids=["fixed", "drawn"])
+def test_an_environment_that_diverges_is_truncated_alone(mode: AutoresetMode, drawn: Any) -> None:
+    envs = RobotVectorEnvironment(Kicked(), N, autoreset_mode=mode, randomize=drawn)
+    alone = TaskEnvironment(Kicked(), "compiled", randomize=drawn)
+    envs.reset(seed=3)
+    alone.reset(seed=5)
+    before = envs.states
+    observations, rewards, terminated, truncated, infos = envs.step((np.arange(N) == 2).astype(int))
+    last, reward, ended, cut, info = alone.step(1)
+    named = infos["final_info"] if mode is AutoresetMode.SAME_STEP else infos
+    assert truncated.tolist() == named["_diverged"].tolist() == [k == 2 for k in range(N)]
+    assert not terminated.any()
+    assert rewards.tolist() == [float(k != 2) for k in range(N)]
+    assert "not finite or beyond 1e+08" in named["diverged"][2]
+    assert "not finite or beyond 1e+08" in info["diverged"]
+    assert (reward, ended, cut) == (0.0, False, True)
+    final = infos["final_obs"][2] if mode is AutoresetMode.SAME_STEP else observations[2]
+    assert np.array_equal(final, last)
+    moved = np.abs(envs.states - before).max(axis=1) > 0.0
+    assert moved.tolist() == [k != 2 or mode is AutoresetMode.SAME_STEP for k in range(N)]
+    if mode is AutoresetMode.DISABLED:
+        observations, _ = envs.reset(options={"reset_mask": truncated})
+    elif mode is AutoresetMode.NEXT_STEP:
+        observations, *_, infos = envs.step(np.zeros(N, dtype=int))
+        assert "diverged" not in infos
+    assert np.array_equal(observations[2], alone.reset()[0])
+    assert not envs.step(np.zeros(N, dtype=int))[3].any()
+
+
+@pytest.mark.parametrize("engine", installed_backends())
+def test_one_after_another_goes_on_when_one_diverges(engine: str) -> None:
+    def make() -> Any:
+        return TaskEnvironment(Kicked(), engine)
+
+    envs = gymnasium.vector.SyncVectorEnv([make, make])
+    envs.reset(seed=0)
+    _, rewards, terminated, truncated, infos = envs.step(np.array([0, 1]))
+    assert (rewards.tolist(), terminated.tolist(), truncated.tolist()) == ([1, 0], [False] * 2, [False, True])
+    assert infos["_diverged"].tolist() == [False, True]
+    assert not envs.step(np.zeros(2, dtype=int))[3].any()
+    envs.close()
 
 
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])

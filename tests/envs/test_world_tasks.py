@@ -16,7 +16,7 @@ from dynx.envs.tasks.push import FINGER_WEIGHT, NEAR, TIP_START, Push
 from dynx.envs.tasks.quadruped import POSTURE
 from dynx.envs.tasks.stand import Stand
 from dynx.envs.tasks.walk import Walk
-from dynx.errors import ArgumentError, UnknownNameError
+from dynx.errors import ArgumentError, EpisodeError, UnknownNameError
 from dynx.steppers.registry import installed_worlds
 from tests.envs.scripted import Controller, posture, pushing, run, trot
 
@@ -50,6 +50,27 @@ def test_episodes_after_a_seed_are_the_same_bits(env: TaskEnvironment) -> None:
     env.reset(seed=4)
     env.step(actions[0])
     assert episode() == first
+
+
+class Thrown(Push):
+    """A hand that is thrown away by its first action."""
+
+    def loads(self, episode: Any, action: Any) -> Any:
+        return {"torques": {"arm": np.full(7, 1e15)}}
+
+
+def test_a_world_that_diverges_is_truncated(engine: str) -> None:
+    with TaskEnvironment(Thrown(), engine) as env:
+        first, _ = env.reset(seed=0)
+        action = np.zeros(3, dtype=np.float32)
+        observation, reward, terminated, truncated, info = env.step(action)
+        assert (reward, terminated, truncated) == (0.0, False, True)
+        assert np.array_equal(observation, first)
+        assert f"{engine} failed" in info["diverged"] or "diverged in" in info["diverged"]
+        assert "likely cause: the torque of 1e+15 on 'arm/" in info["diverged"]
+        with pytest.raises(EpisodeError, match="ended"):
+            env.step(action)
+        assert np.array_equal(env.reset(seed=0)[0], first)
 
 
 def test_a_straight_push_brings_the_cube_to_the_goal(engine: str) -> None:

@@ -47,6 +47,21 @@ def test_each_episode_counts_once(envs: int, episodes: int, seed: int) -> None:
     np.testing.assert_array_equal(found.lengths, expected % 7 + 1)
 
 
+class Diverging(Countdown):
+    """A countdown whose odd seeds diverge at their end."""
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        *found, _ = super().step(action)
+        return *found, {"diverged": "too fast"} if found[3] else {}
+
+
+def test_episodes_that_diverge_are_counted_and_named() -> None:
+    found = evaluate(nothing, [Diverging(), Diverging()], 7, seed=1)
+    assert found.diverged == 4
+    assert "over 7 episodes, 4 of which diverged, mean" in repr(found)
+    assert "diverged" not in repr(evaluate(nothing, [Countdown()], 2))
+
+
 def test_the_interval_is_students() -> None:
     values = np.array([1.0, 2.0, 3.0, 6.0])
     low, high = confidence_interval(values)

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
+from dynx.envs.tasks.cart_pole import CartPole
+from dynx.envs.vector import RobotVectorEnvironment
 from dynx.training import TaskSpec
 from dynx.training.environments import make_vector
 from dynx.training.library import VecMonitor
@@ -64,3 +68,26 @@ def test_other_engines_step_one_by_one(task: TaskSpec) -> None:
     vector = make_vector(small_run(task=task))
     assert not isinstance(vector, VecMonitor)
     vector.close()
+
+
+class Kicked(CartPole):
+    """A cart that the action 1 kicks so hard that the step diverges."""
+
+    def torque(self, robot: Any, state: Any, action: Any) -> Any:
+        return np.stack([1e14 * action, 0.0 * action])
+
+
+def test_one_that_diverges_is_truncated_and_named() -> None:
+    vector = RobotVectorEnvironment(Kicked(), 3, autoreset_mode="SameStep")
+    batched = BatchedEnvironments(vector)
+    batched.seed(2)
+    before = batched.reset()
+    observations, rewards, done, infos = batched.step(np.array([0, 1, 0]))
+    assert done.tolist() == [False, True, False]
+    assert rewards.tolist() == [1.0, 0.0, 1.0]
+    assert infos[1]["TimeLimit.truncated"] is True
+    assert "not finite" in infos[1]["diverged"]
+    assert np.array_equal(infos[1]["terminal_observation"], before[1])
+    assert not np.array_equal(observations[1], before[1])
+    assert infos[0] == infos[2] == {}
+    batched.close()

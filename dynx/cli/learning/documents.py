@@ -73,13 +73,15 @@ class PairEntry(TypedDict):
 
 
 class ReturnEntry(TypedDict):
-    """Returns of a policy on one engine; the mean lies between `low` and `high` with 95 % confidence."""
+    """Returns of a policy on one engine; the mean lies between `low` and `high` with 95 % confidence, and
+    `diverged` episodes were truncated because a step diverged."""
 
     engine: str
     mean: float
     deviation: float
     low: float
     high: float
+    diverged: int
 
 
 class PolicyEntry(TypedDict):
@@ -163,6 +165,7 @@ class RunEntry(TypedDict):
     """One run: its seed and folder, and the returns of its policy at the end.
 
     `mean` and `deviation` are over the episodes; the mean lies between `low` and `high` with 95 % confidence.
+    `diverged` episodes were truncated because a step diverged.
     `resumed_at` is the number of steps that were done before this call.
     """
 
@@ -176,6 +179,7 @@ class RunEntry(TypedDict):
     low: float
     high: float
     least: float
+    diverged: int
     seconds: float
 
 
@@ -244,6 +248,7 @@ class JudgementEntry(TypedDict):
     """Returns of a policy on one engine.
 
     `mean` and `deviation` are over the episodes; the mean lies between `low` and `high` with 95 % confidence.
+    `diverged` episodes were truncated because a step diverged.
     """
 
     engine: str | None
@@ -251,6 +256,7 @@ class JudgementEntry(TypedDict):
     deviation: float
     low: float
     high: float
+    diverged: int
     mean_length: float
     returns: list[float]
     lengths: list[int]

@@ -152,6 +152,10 @@ def show(out: Console, report: Entry) -> None:
             f"{each['mean_length']:.4g}",
         )
     out.print(table)
+    for each in report["engines"]:
+        if each["diverged"]:
+            lost = counted(each["diverged"], "episode")
+            out.print(f"{one_line(each['engine'] or 'its own')}: {lost} diverged and counted up to there")
     episodes = counted(len(report["engines"][0]["returns"]), "episode")
     out.print(
         f"{episodes}, the first with seed {report['seed']}; the true mean lies between the two with 95 %"
