@@ -8,12 +8,17 @@ from typing import Any
 from dynx.envs.library import AutoresetMode, Env, GymnasiumError, make_env, make_vec_env, registry
 from dynx.envs.registration import is_of_dynx
 from dynx.errors import ArgumentError, DynxError
-from dynx.training.library import DummyVecEnv, Monitor, SubprocVecEnv, VecEnv, VecMonitor, VecNormalize
+from dynx.training.library import (
+    CLIPPED_AT,
+    DummyVecEnv,
+    Monitor,
+    SubprocVecEnv,
+    VecEnv,
+    VecMonitor,
+    VecNormalize,
+)
 from dynx.training.specification import TaskSpec, TrainingSpec
 from dynx.training.vectors import BatchedEnvironments
-
-CLIPPED_AT = 10.0
-"""Bound of scaled observations and rewards, in deviations."""
 
 
 def make(task: TaskSpec, render_mode: str | None = None) -> Env[Any, Any]:

@@ -29,6 +29,7 @@ try:
     from stable_baselines3.common.logger import configure
     from stable_baselines3.common.monitor import Monitor
     from stable_baselines3.common.save_util import load_from_zip_file
+    from stable_baselines3.common.torch_layers import BaseFeaturesExtractor, FlattenExtractor
     from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv, VecMonitor, VecNormalize
 except ImportError as error:
     raise NotInstalledError("training needs stable-baselines3: pip install 'dynx[train]'") from error
@@ -55,6 +56,12 @@ __all__ = [
 
 ALGORITHMS: dict[str, type[Any]] = {"ppo": PPO, "a2c": A2C, "dqn": DQN, "sac": SAC, "td3": TD3}
 """Algorithms by the name that `dynx train --algo` takes."""
+
+CLIPPED_AT = 10.0
+"""Bound of scaled observations and rewards, in deviations."""
+
+EPSILON = 1e-8
+"""What is added to a variance before its root is taken, as in stable-baselines3."""
 
 ACTIVATIONS = {
     "tanh": torch.nn.Tanh,
@@ -213,7 +220,7 @@ def _policy_options(options: object) -> dict[str, Any]:
         )
     word = options.get("activation_fn")
     if not isinstance(word, str):
-        return options
+        return {**options}  # A2C adds its optimizer to them, which no file of a run could have
     if word not in ACTIVATIONS:
         raise UnknownNameError(f"no activation function {shown(word)}{nearest(word, ACTIVATIONS)}")
     return {**options, "activation_fn": ACTIVATIONS[word]}
@@ -233,9 +240,59 @@ def action_of(algorithm: Any, observation: Any, deterministic: bool) -> Any:
     return action
 
 
-def write_weights(algorithm: Any, file: BinaryIO) -> None:
-    """Write an algorithm, as its own `save` does: stable-baselines3 alone reads the file, too."""
-    algorithm.save(file)
+class ScaledFeatures(BaseFeaturesExtractor):  # type: ignore[misc]  # stable-baselines3 is not followed
+    """Observations as features, scaled by the mean and the variance of those of training.
+
+    A policy that learned on scaled observations has it in its file, so that it acts in stable-baselines3 on
+    those of the task as in dynx. Files name this class: it keeps its place.
+    """
+
+    def __init__(self, observation_space: spaces.Space[Any]) -> None:
+        super().__init__(observation_space, int(spaces.flatdim(observation_space)))
+        shape = observation_space.shape or ()
+        self.register_buffer("mean", torch.zeros(shape, dtype=torch.float64))
+        self.register_buffer("variance", torch.ones(shape, dtype=torch.float64))
+
+    def forward(self, observations: Any) -> Any:
+        """Return the features (n, size) of observations (n, ...), with the bits of
+        `dynx.training.policy.Scaling`."""
+        scaled = (observations.double() - self.mean) / torch.sqrt(self.variance + EPSILON)
+        return torch.flatten(torch.clamp(scaled, -CLIPPED_AT, CLIPPED_AT).float(), 1)
+
+
+_SCALED = ("features_extractor.mean", "features_extractor.variance")
+"""Ends of the names of the numbers of `ScaledFeatures` in a file, which dynx has in its own document."""
+
+
+def write_weights(
+    algorithm: Any, file: BinaryIO, scaling: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+) -> None:
+    """Write an algorithm, as its own `save` does: stable-baselines3 alone reads the file, too.
+
+    `scaling` are the mean and the variance of the observations on which it learned; what stable-baselines3
+    loads scales the observations by them.
+    """
+    if scaling is None:
+        algorithm.save(file)
+        return
+    scaled = ScaledFeatures(algorithm.observation_space)
+    scaled.mean, scaled.variance = (torch.from_numpy(each.copy()) for each in scaling)
+    plain = [
+        (parent, name, part)
+        for parent in algorithm.policy.modules()
+        for name, part in parent._modules.items()  # `named_children` names a shared one once
+        if isinstance(part, FlattenExtractor)
+    ]
+    options = algorithm.policy_kwargs
+    try:
+        algorithm.policy_kwargs = {**options, "features_extractor_class": ScaledFeatures}
+        for parent, name, _ in plain:
+            setattr(parent, name, scaled)
+        algorithm.save(file)
+    finally:
+        algorithm.policy_kwargs = options
+        for parent, name, part in plain:
+            setattr(parent, name, part)
 
 
 def read_weights(algorithm: Any, file: BinaryIO, source: str) -> None:
@@ -249,6 +306,9 @@ def read_weights(algorithm: Any, file: BinaryIO, source: str) -> None:
         _, weights, variables = load_from_zip_file(file, device="cpu", load_data=False)
         if not all(bool(torch.isfinite(each).all()) for each in _tensors([weights, variables])):
             raise ValueError("a number is not finite")
+        networks = weights.get("policy", {})
+        for name in [each for each in networks if each.endswith(_SCALED)]:
+            del networks[name]
         modules, others = algorithm._get_torch_save_params()
         options = {name: _options_of(_part_of(algorithm, name)) for name in modules}
         algorithm.set_parameters(weights, device="cpu")

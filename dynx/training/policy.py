@@ -20,9 +20,11 @@ from dynx.files.documents import convert_document, json_text, to_json_values
 from dynx.files.reading import irregularity
 from dynx.files.writing import atomic_file
 from dynx.model.numbers import whole_number
-from dynx.training.environments import CLIPPED_AT, make
+from dynx.training.environments import make
 from dynx.training.file_tasks import task_of_file
 from dynx.training.library import (
+    CLIPPED_AT,
+    EPSILON,
     DummyVecEnv,
     VecNormalize,
     action_of,
@@ -39,9 +41,6 @@ DOCUMENT = "dynx.json"
 MAX_DOCUMENT = 1_000_000
 """Largest size of that member [bytes]."""
 
-_EPSILON = 1e-8
-"""What is added to a variance before its root is taken, as in stable-baselines3."""
-
 
 @dataclass(frozen=True)
 class Scaling:
@@ -54,7 +53,7 @@ class Scaling:
 
     def __call__(self, observation: NDArray[Any]) -> NDArray[np.float32]:
         """Scale an observation as in training."""
-        scaled = (observation - self.mean) / np.sqrt(self.variance + _EPSILON)
+        scaled = (observation - self.mean) / np.sqrt(self.variance + EPSILON)
         return np.clip(scaled, -CLIPPED_AT, CLIPPED_AT).astype(np.float32)
 
     @staticmethod
@@ -98,7 +97,8 @@ class Policy:
         return action_of(self.algorithm, seen, deterministic)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the policy: a file that stable-baselines3 loads, with its origin added."""
+        """Write the policy: a file that stable-baselines3 loads, which acts there as here, with its origin
+        added."""
         scaling = self.scaling
         document = PolicyDocument(
             "dynx.policy/1",
@@ -111,7 +111,7 @@ class Policy:
             None if scaling is None else scaling.samples,
         )
         content = io.BytesIO()
-        write_weights(self.algorithm, content)
+        write_weights(self.algorithm, content, None if scaling is None else (scaling.mean, scaling.variance))
         with zipfile.ZipFile(content, "a") as archive:
             archive.writestr(DOCUMENT, json_text(to_json_values(document)))
         with atomic_file(path) as file:

@@ -7,6 +7,7 @@ import io
 import json
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import cloudpickle
 import numpy as np
@@ -15,7 +16,8 @@ from stable_baselines3 import PPO
 
 from dynx.errors import ArgumentError
 from dynx.training import Schedule, TaskSpec, load_policy, make, train
-from dynx.training.policy import read_policy_document
+from dynx.training.library import ALGORITHMS
+from dynx.training.policy import DOCUMENT, read_policy_document
 from tests.training.runs import small_run
 
 ONCE = Schedule(checkpoint_every=1000, evaluate_every=1000)
@@ -29,7 +31,7 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "final.zip"
 
 
-def members(path: Path) -> dict[str, bytes]:
+def members(path: Any) -> dict[str, bytes]:
     with zipfile.ZipFile(path) as archive:
         return {name: archive.read(name) for name in archive.namelist()}
 
@@ -45,10 +47,65 @@ def test_a_loaded_policy_acts_as_stable_baselines_does(trained: Path) -> None:
     policy = load_policy(trained)
     assert policy.scaling is not None
     algorithm = PPO.load(trained, device="cpu")
-    seen = np.random.default_rng(0).normal(size=(50, 4)).astype(np.float32)
-    expected, _ = algorithm.predict(policy.scaling(seen), deterministic=True)
+    seen = 3.0 * np.random.default_rng(0).normal(size=(50, 4)).astype(np.float32)
+    expected, _ = algorithm.predict(seen, deterministic=True)
     np.testing.assert_array_equal(policy(seen), expected)
     assert repr(policy) == "<Policy by ppo of CartPole-v1, 64 steps, seed 0>"
+
+
+OFF_POLICY: dict[str, Any] = {"learning_starts": 8, "buffer_size": 100, "batch_size": 4}
+ON_POLICY: dict[str, Any] = {"n_steps": 16}
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "task", "options"),
+    [
+        ("ppo", "dynx/Pendulum-v0", {**ON_POLICY, "batch_size": 16, "use_sde": True}),
+        ("a2c", "dynx/Acrobot-v0", {**ON_POLICY, "policy_kwargs": {"net_arch": [8, 8]}}),
+        ("dqn", "CartPole-v1", OFF_POLICY),
+        ("sac", "Pendulum-v1", OFF_POLICY),
+        ("td3", "dynx/Pendulum-v0", OFF_POLICY),
+        ("sac", "dynx/Reach-v0", OFF_POLICY),
+    ],
+    ids=lambda each: each if isinstance(each, str) else "",
+)
+def test_what_stable_baselines_loads_scales_as_in_training(
+    algorithm: str, task: str, options: dict[str, Any], tmp_path: Path
+) -> None:
+    engine = "compiled" if task.startswith("dynx") else None
+    spec = small_run(
+        48,
+        task=TaskSpec(task, engine),
+        algorithm=algorithm,
+        envs=1,
+        hyperparameters=options,
+        normalize=True,
+    )
+    final = train(spec, tmp_path / "run", schedule=ONCE, final_episodes=1).policy
+    loaded = ALGORITHMS[algorithm].load(tmp_path / "run" / "final.zip", device="cpu")
+    assert final.scaling is not None
+    # Some beyond the bound of scaled observations.
+    rows = np.random.default_rng(0).normal(size=(40, *final.scaling.mean.shape)).astype(np.float32)
+    rows[20:] *= 1e3
+    expected = final(rows)
+    np.testing.assert_array_equal(loaded.predict(rows, deterministic=True)[0], expected)
+    np.testing.assert_array_equal(load_policy(tmp_path / "run" / "final.zip")(rows), expected)
+    scaled = final.scaling(rows)
+    unscaled, _ = final.algorithm.predict(rows, deterministic=True)
+    again, _ = final.algorithm.predict(scaled, deterministic=True)
+    # Saving leaves the policy that goes on learning as it is.
+    np.testing.assert_array_equal(again, expected)
+    assert algorithm in ("a2c", "dqn") or not np.array_equal(unscaled, expected)
+
+
+def test_files_of_earlier_versions_are_read(trained: Path, tmp_path: Path) -> None:
+    """Files whose weights had no scaling beside it in the document."""
+    policy = load_policy(trained)
+    content = io.BytesIO()
+    policy.algorithm.save(content)
+    earlier = written(tmp_path / "earlier.zip", {**members(content), DOCUMENT: members(trained)[DOCUMENT]})
+    seen = np.random.default_rng(1).normal(size=(20, 4)).astype(np.float32)
+    np.testing.assert_array_equal(load_policy(earlier)(seen), policy(seen))
 
 
 def test_scaling_is_that_of_the_observations_seen(trained: Path) -> None:
