@@ -8,8 +8,9 @@ then; `CoverageMap.moved` finds them in the sources as they stand.
 from __future__ import annotations
 
 import json
+import os
 from collections import defaultdict
-from collections.abc import Generator
+from collections.abc import Generator, Iterable
 from dataclasses import dataclass, field
 from difflib import SequenceMatcher
 from pathlib import Path
@@ -24,17 +25,21 @@ class CoverageMap:
     """Passed tests by the lines that they execute."""
 
     durations: dict[str, float] = field(default_factory=dict)
-    """Test -> time that it took, with its fixtures [s]."""
+    """Test -> processor time of its process and those that it started and ended, with its fixtures [s]. That
+    of the clock would depend on what else the machine did."""
     lines: dict[str, dict[int, set[str]]] = field(default_factory=dict)
     """Path of a source file -> line -> tests."""
     texts: dict[str, list[int]] = field(default_factory=dict)
     """Path of a source file -> checksums of the lines that it had."""
 
-    def tests(self, path: str, first: int, last: int) -> set[str]:
-        """Return the tests that execute one of these lines, or for lines of imports any line of the file."""
-        lines = self.lines.get(path, {})
-        found = {test for line in range(first, last + 1) for test in lines.get(line, ())}
-        return found or {test for tests in lines.values() for test in tests}
+    def tests(self, path: str, lines: Iterable[int]) -> set[str]:
+        """Return the tests that execute one of these lines."""
+        known = self.lines.get(path, {})
+        return {test for line in lines for test in known.get(line, ())}
+
+    def tests_of_file(self, path: str) -> set[str]:
+        """Return the tests that execute a line of a file."""
+        return self.tests(path, self.lines.get(path, {}))
 
     @classmethod
     def load(cls, path: Path) -> CoverageMap:
@@ -95,22 +100,28 @@ def checksums(source: Path) -> list[int]:
     return [crc32(line) for line in source.read_bytes().splitlines()]
 
 
+def processor_time() -> float:
+    """Return the time that processors spent on this process and its ended children [s]."""
+    return sum(os.times()[:4])
+
+
 class ContextSwitcher:
     """A pytest plugin that tells coverage.py which test runs, and keeps the durations of passed tests."""
 
     def __init__(self, recorder: coverage.Coverage) -> None:
         self.recorder = recorder
-        self.durations: dict[str, float] = defaultdict(float)
+        self.durations: dict[str, float] = {}
         self.not_passed: set[str] = set()
 
     @pytest.hookimpl(hookwrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, None, None]:
         self.recorder.switch_context(item.nodeid)
+        before = processor_time()
         yield
+        self.durations[item.nodeid] = processor_time() - before
         self.recorder.switch_context("")
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        self.durations[report.nodeid] += report.duration
         if not report.passed:
             self.not_passed.add(report.nodeid)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
@@ -11,8 +12,17 @@ pytest.importorskip("mutmut", reason="mutation runs need the extra 'mutation'")
 
 from tests.mutation.__main__ import MIN_PER_ROOM, SOURCES
 from tests.mutation.coverage_map import CoverageMap, checksums
-from tests.mutation.population import places, sample
-from tests.mutation.trial import BROKEN, CAUGHT, SURVIVED, ordered, own_tests, verdict
+from tests.mutation.population import Mutant, places, sample
+from tests.mutation.trial import (
+    BROKEN,
+    CAUGHT,
+    SURVIVED,
+    assigned_names,
+    covering_tests,
+    ordered,
+    own_tests,
+    verdict,
+)
 from tests.mutation.warm import ROOT, Change, Runner
 
 SOURCE = '''"""Docstring."""
@@ -111,6 +121,29 @@ def test_a_module_has_its_own_tests_at_the_mirrored_path() -> None:
     assert own_tests("dynx/model/xml/text.py") == "tests/model/xml/test_text.py"
 
 
+def test_tests_of_a_constant_are_those_of_the_lines_that_use_it() -> None:
+    path = "dynx/errors.py"
+    text = (ROOT / path).read_text(encoding="utf-8")
+    lines = text.splitlines()
+    defined, read = (
+        next(number for number, line in enumerate(lines, 1) if part in line)
+        for part in ("TRACEBACK_VARIABLE = ", "environ.get(TRACEBACK_VARIABLE")
+    )
+    assert assigned_names(text, defined) == ["TRACEBACK_VARIABLE"]
+    assert assigned_names(text, read) == []
+    coverage = CoverageMap(
+        {"tests/architecture/t.py::names": 1.0}, {path: {read: {"t::traceback"}, 1: {"t::other"}}}
+    )
+    constant = Mutant(path, "", defined, defined, "string", "", "", text)
+    assert covering_tests(constant, coverage) == {"t::traceback"}
+    function = replace(constant, line=read, last_line=read)
+    assert covering_tests(function, coverage) == {"t::traceback"}
+    assert covering_tests(replace(function, line=2, last_line=2), coverage) == {"t::traceback", "t::other"}
+    assert covering_tests(replace(function, path="dynx/registry.py"), coverage) == {
+        "tests/architecture/t.py::names"
+    }
+
+
 def test_a_verdict_names_the_test_that_failed() -> None:
     assert verdict(0, "") == (SURVIVED, "")
     assert verdict(1, "FAILED tests/t.py::a[1] - AssertionError\n") == (CAUGHT, "tests/t.py::a[1]")
@@ -131,8 +164,9 @@ def test_a_map_is_what_was_saved_and_replaced_by_folder(tmp_path: Path) -> None:
     assert loaded == kept
     loaded.replace(CoverageMap({"a.py::u": 3.0}, {"x.py": {2: {"a.py::u"}}}))
     assert loaded.durations == {"b.py::t": 2.0, "a.py::u": 3.0}
-    assert loaded.tests("x.py", 2, 2) == {"b.py::t", "a.py::u"}
-    assert loaded.tests("x.py", 7, 7) == {"b.py::t", "a.py::u"}
+    assert loaded.tests("x.py", [2]) == {"b.py::t", "a.py::u"}
+    assert loaded.tests("x.py", [7]) == set()
+    assert loaded.tests_of_file("x.py") == {"b.py::t", "a.py::u"}
 
 
 def test_lines_keep_their_tests_where_edits_move_them(tmp_path: Path) -> None:

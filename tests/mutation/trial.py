@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from collections import defaultdict
 from dataclasses import dataclass
+from functools import lru_cache
 
 from tests.mutation.coverage_map import CoverageMap
 from tests.mutation.population import Mutant
-from tests.mutation.warm import TIMED_OUT, Change, Runner
+from tests.mutation.warm import ROOT, TIMED_OUT, Change, Runner
 
 STAGES = ((30, 8.0), (80, 15.0))
 """Tests to run, at most, and the time that they take without a mutant [s]; the next stage if none fails."""
@@ -16,6 +18,11 @@ START = 20
 """Time that the import of dynx and the collection of tests may take [s]."""
 SLOWER = 6
 """Factor by which tests may become slower (kernels are compiled anew, and others use the machine)."""
+
+MIN_NAME = 4
+"""Least length of a name by which the users of a constant are found."""
+HOUSE = "tests/architecture/"
+"""Tests of the names of all packages."""
 
 CAUGHT = "caught"
 SURVIVED = "survived"
@@ -64,9 +71,55 @@ def own_tests(path: str) -> str:
     return "/".join(filter(None, ("tests", folder, f"test_{name}")))
 
 
+def assigned_names(source: str, line: int) -> list[str]:
+    """Return the names that the statement at a line assigns outside of functions."""
+    statements = [ast.parse(source).body]
+    while statements:
+        for each in statements.pop():
+            if isinstance(each, ast.ClassDef):
+                statements.append(each.body)
+            elif isinstance(each, ast.Assign | ast.AnnAssign) and each.lineno <= line <= (
+                each.end_lineno or 0
+            ):
+                targets = each.targets if isinstance(each, ast.Assign) else [each.target]
+                return [name.id for to in targets for name in ast.walk(to) if isinstance(name, ast.Name)]
+    return []
+
+
+@lru_cache(maxsize=1)
+def source_lines() -> dict[str, list[str]]:
+    """Return the lines of every file of dynx by its path."""
+    files = sorted((ROOT / "dynx").rglob("*.py"))
+    return {
+        file.relative_to(ROOT).as_posix(): file.read_text(encoding="utf-8").splitlines() for file in files
+    }
+
+
+def tests_of_users(mutant: Mutant, coverage: CoverageMap) -> set[str]:
+    """Return the tests that execute a line that mentions what a statement outside of functions assigns."""
+    names = [name for name in assigned_names(mutant.source, mutant.line) if len(name) >= MIN_NAME]
+    word = re.compile(rf"\b(?:{'|'.join(names)})\b")
+    found: set[str] = set()
+    for path, text in source_lines().items() if names else ():
+        found |= coverage.tests(path, [at for at, line in enumerate(text, 1) if word.search(line)])
+    return found
+
+
+def covering_tests(mutant: Mutant, coverage: CoverageMap) -> set[str]:
+    """Return the tests that execute the statement of a mutant. If there are none, because it runs when the
+    module is imported: those that use what it assigns, or else the module, or else the room."""
+    room = {test for test in coverage.durations if test.startswith((f"tests/{mutant.room}/", HOUSE))}
+    return (
+        coverage.tests(mutant.path, range(mutant.line, mutant.last_line + 1))
+        or tests_of_users(mutant, coverage)
+        or coverage.tests_of_file(mutant.path)
+        or room
+    )
+
+
 def attempt(mutant: Mutant, coverage: CoverageMap, runner: Runner) -> Outcome:
     """Run the tests that execute the mutant until one fails."""
-    covering = coverage.tests(mutant.path, mutant.line, mutant.last_line)
+    covering = covering_tests(mutant, coverage)
     own = own_tests(mutant.path)
     covering |= {test for test in coverage.durations if test.startswith(f"{own}::")}
     waiting = ordered(covering, coverage.durations, mutant.room)
