@@ -141,7 +141,7 @@ class OperationalSpace(TaskSpace[None], pure=True):
             kd=kd,
             posture_kp=checked_gain("posture_kp", posture_kp, model.nv),
             posture_kd=checked_gain("posture_kd", posture_kd, model.nv),
-            damping=float(checked_gain("damping", damping, 1, per="")[0]),
+            damping=float(checked_gain("damping", damping, 1)[0]),
         )
 
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:

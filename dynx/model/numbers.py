@@ -119,7 +119,8 @@ def checked_gain(name: str, gain: ArrayLike, length: int, *, per: str = "one for
     except ArgumentError as error:
         raise GainError(str(error)) from None
     if array.shape not in ((), (length,)):
-        raise GainError(f"{name} has shape {array.shape}; wanted one number, or {length}, {per}")
+        several = f", or {length}, {per}" if length > 1 else ""
+        raise GainError(f"{name} has shape {array.shape}; wanted one number{several}")
     if not np.isfinite(array).all():
         raise GainError(f"{name} is not finite")
     if (array < 0.0).any():

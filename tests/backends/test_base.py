@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from dynx.backends.hooks import solve_mass_matrix
 from dynx.engines.pinocchio.backend import PinocchioBackend
 from dynx.errors import NotFiniteError, SingularMassMatrixError
 from dynx.model import Joint, Link, Model
+from dynx.rbd import rnea
 from dynx.reference.backend import ReferenceBackend
 from tests.backends.robots import (
     chain,
@@ -57,3 +59,19 @@ def test_an_acceleration_that_is_not_finite_is_named() -> None:
     q, v = model.neutral(), np.zeros(model.nv)
     with pytest.raises(NotFiniteError, match=r"^a\b"):
         backend.frame_acceleration(q, v, np.full(model.nv, np.nan), model.root, point=[0.1, 0.0, 0.0])
+
+
+def test_the_reference_evaluates_a_batch_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    shapes = []
+
+    def counted(mechanism: Any, q: Any, v: Any, a: Any) -> Any:
+        shapes.append(np.shape(q))
+        return inverse_dynamics(mechanism, q, v, a)
+
+    inverse_dynamics = rnea.inverse_dynamics
+    monkeypatch.setattr(rnea, "inverse_dynamics", counted)
+    model = mixed_robot()
+    q = model.random(0, 6).reshape(2, 3, model.nq)
+    found = ReferenceBackend(model).inverse_dynamics(q, np.ones(model.nv), np.ones(model.nv))
+    assert found.shape == (2, 3, model.nv)
+    assert len(shapes) == 1

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -75,6 +76,18 @@ def test_a_pushed_cube_tips_as_its_equation_of_motion_says() -> None:
     assert ratio < push.friction
 
 
+TRIALS = [(name, trial) for name in case_names() for trial in find_case(name).trials]
+
+
+@pytest.mark.parametrize(("name", "trial"), TRIALS)
+def test_a_trial_that_names_a_number_has_it(name: str, trial: str) -> None:
+    parameters = find_case(name).trials[trial]
+    named = [float(number) for number in re.findall(r"\d+(?:\.\d+)?", trial)]
+    assert set(named) <= set(parameters if isinstance(parameters, tuple) else (parameters,))
+    # An elastic impact restores the whole speed of approach, and an inelastic one nothing.
+    assert parameters == {"elastic": 1.0, "inelastic": 0.0}.get(trial, parameters)
+
+
 def test_trials_are_on_the_sides_of_the_thresholds_that_their_names_say() -> None:
     ratio = friction.HALF_WIDTH / friction.HALF_HEIGHT
     trials = friction.TippingBox.trials
@@ -120,7 +133,7 @@ def test_forces_on_feet_balance_the_weight_of_the_robot_that_is_simulated() -> N
 RIGID = {"contact_erp": 0.0, "contact_slop": 0.0, "rebound_time_constant": 1e6}
 """Settings with which Bullet does not push apart what penetrates."""
 
-TRIALS = [(name, trial) for name in case_names() for trial in find_case(name).trials]
+UNITS = {"", "m", "rad", "m/s", "rad/s", "m/s^2", "rad/s^2", "N", "J", "kg m/s", "kg m^2/s"}
 
 IMPACTS = [
     each
@@ -137,11 +150,16 @@ def measured(engine: str, name: str, trial: str, dt: float, **settings: float) -
 
 @pytest.mark.skipif("mujoco" not in installed_worlds(), reason="needs the engine mujoco")
 @pytest.mark.parametrize(("name", "trial"), TRIALS)
-def test_every_case_has_finite_figures_of_different_names(name: str, trial: str) -> None:
-    figures = measured("mujoco", name, trial, 4e-3).figures
+def test_every_case_has_figures_of_different_names_that_are_near_their_closed_forms(
+    name: str, trial: str
+) -> None:
+    figures = measured("mujoco", name, trial, 1e-3).figures
     assert figures
-    assert all(math.isfinite(figure.error) and figure.tolerance > 0.0 for figure in figures)
+    # The contacts of MuJoCo give way, most in impacts. A wrong axis, sign or factor is an error of order 1.
+    bound = 0.5 if name in ("spinning_ball", "bouncing_ball") else 0.05
+    assert all(figure.error <= bound and figure.tolerance > 0.0 for figure in figures)
     assert len({figure.name for figure in figures}) == len(figures)
+    assert {figure.unit for figure in figures} <= UNITS
 
 
 @pytest.mark.skipif("pybullet" not in installed_worlds(), reason="needs the engine pybullet")

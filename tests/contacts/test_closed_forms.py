@@ -7,6 +7,8 @@ from typing import Any
 import pytest
 
 from dynx.contacts import ContactCase, Figure, find_case
+from dynx.contacts.cases import friction
+from dynx.contacts.motion import G
 from dynx.world import World
 
 CASES = (
@@ -56,6 +58,11 @@ def test_exact_mechanics_has_no_error(name: str) -> None:
     for trial in case.trials:
         for figure in figures(case, trial, 2e-3):
             assert figure.error <= figure.tolerance, figure
+
+
+def test_creep_on_a_slope_is_relative_to_the_speed_of_a_fall_by_the_height_of_the_box() -> None:
+    (creep,) = figures(find_case("slope"), "tangent 0.4", 4e-3)
+    assert creep.scale**2 / 2.0 == pytest.approx(G * friction.SLOPE_SIZE[2])
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,11 @@ from hypothesis import strategies as st
 from dynx.contacts.cases import collisions
 from dynx.contacts.motion import Throw, after_bounce, farthest, rms_deviation, speeds_after_collision
 from dynx.contacts.verdict import MIN_ORDER, judge
+from dynx.model.geometry import Collision, Sphere
+from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import rotation_from_rpy
+from dynx.steppers.state import BodyState, WorldState
+from dynx.world import Scene, SceneBody, box
 
 MASSES = st.floats(0.01, 100.0)
 SPEEDS = st.floats(-10.0, 10.0)
@@ -29,6 +34,45 @@ def test_collisions_conserve_momentum_and_separate_by_the_restitution(
     reduced = m1 * m2 / (m1 + m2)
     lost = 0.5 * (m1 * (v1**2 - w1**2) + m2 * (v2**2 - w2**2))
     assert math.isclose(lost, 0.5 * reduced * (1.0 - e**2) * (v1 - v2) ** 2, abs_tol=1e-13 * scale * 20.0)
+
+
+vectors = st.tuples(*[st.floats(-2.0, 2.0)] * 3).map(np.array)
+
+
+@given(st.lists(st.tuples(vectors, vectors, vectors), min_size=2, max_size=2), vectors, vectors)
+def test_momenta_and_energy_of_two_bodies_are_those_of_the_relative_motion(
+    motions: list[tuple[Floats, Floats, Floats]], drift: Floats, shift: Floats
+) -> None:
+    masses, offset = (2.0, 0.5), (0.1, -0.2, 0.3)
+    tensor = ((0.2, 0.05, 0.0), (0.05, 0.3, 0.0), (0.0, 0.0, 0.4))
+    bodies = [
+        SceneBody(name, (Collision(Sphere(0.1)),), mass=m, center_of_mass=offset, inertia=tensor)
+        for name, m in zip("ab", masses, strict=True)
+    ]
+    fixed = box("fixed", (1.0, 1.0, 1.0))
+    scene = Scene("s", bodies=(*bodies, fixed))
+    p, v, energy, turning = [], [], 0.0, np.zeros(3)
+    states = {"fixed": BodyState(np.eye(4), np.full(6, 7.0))}
+    for body, (at, velocity, spin) in zip(bodies, motions, strict=True):
+        T = np.eye(4)
+        T[:3, :3] = R = rotation_from_rpy(at)
+        lever = R @ offset
+        T[:3, 3] = at + shift - lever
+        states[body.name] = BodyState(T, np.concatenate([velocity + drift - np.cross(spin, lever), spin]))
+        p.append(at)
+        v.append(velocity)
+        moments = R @ np.array(tensor) @ R.T
+        turning = turning + moments @ spin
+        energy += 0.5 * float(spin @ moments @ spin)
+    state = WorldState(0.0, {}, states)
+    reduced = masses[0] * masses[1] / sum(masses)
+    apart, relative = p[1] - p[0], v[1] - v[0]
+    momentum = masses[0] * (v[0] + drift) + masses[1] * (v[1] + drift)
+    assert np.allclose(collisions.linear_momentum(scene, state), momentum, atol=1e-12)
+    turning = turning + reduced * np.cross(apart, relative)
+    assert np.allclose(collisions.angular_momentum(scene, state), turning, atol=1e-11)
+    energy += 0.5 * reduced * float(relative @ relative)
+    assert math.isclose(collisions.kinetic_energy(scene, state), energy, abs_tol=1e-11)
 
 
 @given(SPEEDS)

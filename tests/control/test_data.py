@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import pickle
-from dataclasses import FrozenInstanceError, dataclass, fields, replace
+import re
+from dataclasses import FrozenInstanceError, dataclass, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+import dynx.control
 from dynx.control import (
     PD,
     BulletPositionMotor,
@@ -130,6 +132,20 @@ def test_a_controller_prints_its_gains_with_units() -> None:
     assert "position_gain 0.1" in repr(BulletPositionMotor(ARM))
     assert "control_dt 0.002 s" in repr(DiscreteComputedTorque(ARM, control_dt=0.002))
     assert repr(Plain(2.0)) == "<Plain of ur5>"
+
+
+FACTOR = r"(?:1|[Nms]|rad)(?:\^2)?"
+UNIT = rf"{FACTOR}(?:[ /]{FACTOR}|/\({FACTOR} {FACTOR}\))*"
+
+
+KINDS = [getattr(dynx.control, name) for name in dynx.control.__all__]
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if is_dataclass(kind)])
+def test_units_of_parameters_are_products_of_si_units(kind: Any) -> None:
+    for each in fields(kind):
+        unit = each.metadata.get("unit", "")
+        assert unit == "" or re.fullmatch(rf"{UNIT}(?:(?: or |, ){UNIT})*", unit), each.name
 
 
 def test_a_user_s_dataclass_is_a_controller_like_any_other() -> None:

@@ -63,6 +63,8 @@ def test_gains_cannot_be_changed_behind_a_law_s_back() -> None:
 def test_other_arguments_of_laws() -> None:
     with pytest.raises(UnknownNameError, match="tool0"):
         OperationalSpace(ARM, "tool", natural_frequency=1.0)
+    with pytest.raises(GainError, match=r"damping has shape \(6,\); wanted one number$"):
+        OperationalSpace(ARM, "tool0", kp=1.0, kd=1.0, damping=np.ones(6))  # type: ignore[arg-type]
     with pytest.raises(GainError, match="linear then angular"):
         Impedance(ARM, "tool0", stiffness=np.zeros(3), damping=1.0)
     for name, value in (("control_dt", 0.0), ("tracking_time", -1.0)):

@@ -12,7 +12,7 @@ import dynx.envs  # noqa: F401  (registers the environments)
 from dynx.envs import register_task
 from dynx.envs.environment import TaskEnvironment
 from dynx.envs.task import WorldTask
-from dynx.envs.tasks.push import FINGER_WEIGHT, NEAR, TIP_START, Push
+from dynx.envs.tasks.push import ARM, FINGER_WEIGHT, NEAR, START, TIP, TIP_START, Push
 from dynx.envs.tasks.quadruped import POSTURE
 from dynx.envs.tasks.stand import Stand
 from dynx.envs.tasks.walk import Walk
@@ -193,6 +193,27 @@ def test_the_shaped_reward_draws_the_fingers_behind_the_cube() -> None:
     assert np.ptp(rewards["dense"]) < 1e-4
     assert (np.diff(rewards["shaped"]) > 0.0).all()
     assert rewards["shaped"][1] == pytest.approx(-0.1 - FINGER_WEIGHT * np.hypot(0.1, 0.005), abs=2e-3)
+
+
+@pytest.mark.parametrize("action", [(0.0, 0.0, 0.0), (0.5, 0.5, 0.2)])
+def test_the_fingers_turn_back_to_point_down(action: tuple[float, float, float]) -> None:
+    task = Push()
+    with TaskEnvironment(task, ENGINES[0]) as env:
+        env.reset(seed=0)
+        episodes: Any = env.episodes
+        world = episodes.world
+        q = np.array(START)
+        q[4:] += 0.15, -0.2, 0.25
+        world.set_state(robots={ARM: (q, np.zeros_like(q))})
+        angles = []
+        for _ in range(30):
+            R = task.kinematics.forward_kinematics(world.state.robots[ARM].q, TIP)[:3, :3]
+            angles.append(
+                np.arccos(np.clip(0.5 * (np.trace(R @ np.diag([1.0, -1.0, -1.0])) - 1.0), -1.0, 1.0))
+            )
+            env.step(np.array(action, dtype=np.float32))
+    assert angles[0] > 0.2
+    assert angles[-1] < 0.1 * angles[0]
 
 
 def test_wrong_options_are_refused() -> None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
+from xml.etree import ElementTree
+
 import pytest
 
-from dynx.files.figures import NOTEBOOK_RESOLUTION, new_figure
+from dynx.files.figures import NOTEBOOK_RESOLUTION, new_figure, svg_element
 
 
 def test_a_notebook_shows_a_figure_as_a_picture() -> None:
@@ -15,3 +18,46 @@ def test_a_notebook_shows_a_figure_as_a_picture() -> None:
     assert picture.startswith(b"\x89PNG\r\n")
     width, height = (int.from_bytes(picture[k : k + 4], "big") for k in (16, 20))
     assert (width, height) == (2.0 * NOTEBOOK_RESOLUTION, 1.5 * NOTEBOOK_RESOLUTION)
+
+
+def drawn(gid: str) -> str:
+    """Return the SVG element of a curve with this group name, and of a title."""
+    figure = new_figure(2.0, 1.5)
+    axes = figure.subplots()
+    (curve,) = axes.plot([0.0, 1.0, 2.0], [1.0, 0.0, 3.0], marker="o", color="red")
+    curve.set_gid(gid)
+    axes.set_title("torque [N m]")
+    return svg_element(figure)
+
+
+def test_an_svg_element_is_styled_by_the_page_and_refers_to_nothing_else() -> None:
+    pytest.importorskip("matplotlib")
+    text = drawn("elbow")
+    root = ElementTree.fromstring(text)
+    assert root.tag == "svg"
+    assert root.attrib.keys() == {"viewBox"}
+    size = [float(number) for number in root.attrib["viewBox"].split()]
+    assert size == pytest.approx([0.0, 0.0, 2.0 * 72.0, 1.5 * 72.0])
+    assert not {"metadata", "style", "clipPath"} & {each.tag for each in root.iter()}
+    assert not {"style", "clip-path"} & {name for each in root.iter() for name in each.attrib}
+    # Text is text, that can be searched and has the font of the page.
+    assert "torque [N m]" in ["".join(each.itertext()).strip() for each in root.iter("text")]
+    groups = list(root.iter("g"))
+    assert "elbow" in [each.get("class") for each in groups]
+    assert not any("id" in each.attrib for each in groups)
+    # Markers are used by their name in the same element, in the colour of what uses them.
+    names = {each.get("id") for each in root.iter() if "id" in each.attrib}
+    used = {each.attrib["href"] for each in root.iter() if "href" in each.attrib}
+    assert used
+    assert used <= {f"#{name}" for name in names}
+    assert not any("stroke" in marker.attrib for marker in root.findall(".//defs/path"))
+    assert any("#ff0000" in each.attrib.values() for each in root.iter("path"))
+    # Without a background: no area is filled.
+    fills = re.findall(r'fill="(#[0-9a-f]+)"', text)
+    assert "#ffffff" not in fills
+
+
+def test_equal_figures_have_equal_svg_elements() -> None:
+    pytest.importorskip("matplotlib")
+    assert drawn("elbow") == drawn("elbow")
+    assert drawn("elbow") == drawn("wrist").replace("wrist", "elbow")

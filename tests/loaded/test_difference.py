@@ -158,7 +158,13 @@ DEVIATIONS: list[tuple[Callable[[LoadedModel], LoadedModel], tuple[str, str, str
 def test_each_deviation_is_listed_and_no_other(
     change: Callable[[LoadedModel], LoadedModel], row: tuple[str, str, str]
 ) -> None:
-    found = rows(robot(), change(exact(robot())))
+    engine = change(exact(robot()))
+    found = rows(robot(), engine)
+    for each in model_difference(robot(), [engine]):
+        assert each.engine == ENGINE
+        assert each.file != each.engine_value
+        if each.property == "existence":
+            assert (bool(each.file), bool(each.engine_value)) == (each.name != "more", each.name == "more")
     if row == ("base", "base", "position"):
         assert found == [row, ("base", "base", "rotation")]
     else:

@@ -202,10 +202,14 @@ def test_priorities_and_pairs_give_every_contact_its_combination(
     materials, combination, touch = drawn
     found = contact_priorities(materials, combination, touch)
     pairs = {frozenset(pair) for pair in found.pairs}
+    assert len(pairs) == len(found.pairs)
+    assert all(touch[pair] for pair in found.pairs)
     for i, j in np.argwhere(touch).tolist():
         wanted = combination[materials[i], materials[j]]
         high = i if found.priority[i] >= found.priority[j] else j
         if frozenset([i, j]) in pairs:
+            # Only a contact that the priorities would give another combination is one by itself.
+            assert found.combination[high] != wanted
             continue
         assert found.combination[high] == wanted
         if found.priority[i] == found.priority[j]:

@@ -53,7 +53,7 @@ def test_the_page_of_one_robot_says_everything() -> None:
     wanted += [
         "--choose DX901=keep",
         "inertia must be positive",
-        "It loads the mended file",
+        "It loads the mended file.",
         "pinocchio 4.1.0",
     ]
     wanted += [each.call for each in report.engines]

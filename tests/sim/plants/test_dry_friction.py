@@ -48,6 +48,24 @@ def pulled(force: float, plant: str = "compiled", **options: Any) -> Rollout:
     return simulate(robot, law, plant=plant, friction=F, **{**control_dt, **options})
 
 
+@pytest.mark.parametrize("start", [0.0, 4.0])
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("plant", [name for name in PLANTS if name != "pybullet"])
+def test_a_block_slides_under_friction_and_damping_as_the_closed_form(
+    plant: str, scheme: str, start: float
+) -> None:
+    force, damping, dt = 2.0 * F, 2.5, 1e-3
+    found = pulled(force, plant, v0=[start], damping=damping, integrator=scheme, dt=dt, duration=1.0)
+    # m v' = (force - F) - d v
+    end, rate = (force - F) / damping, damping / MASS
+    decay = np.exp(-rate * found.t)
+    v = end + (start - end) * decay
+    q = end * found.t + (start - end) * (1.0 - decay) / rate
+    tolerance = {"semi_implicit": dt * rate * abs(start - end), "rk4": 1e-11, "adaptive": 1e-6}[scheme]
+    assert float(np.max(np.abs(found.v[:, 0] - v))) < tolerance
+    assert float(np.max(np.abs(found.q[:, 0] - q))) < tolerance
+
+
 @pytest.mark.parametrize("dt", STEPS)
 @pytest.mark.parametrize("plant", PLANTS)
 def test_a_load_below_the_friction_moves_nothing(plant: str, dt: float) -> None:
