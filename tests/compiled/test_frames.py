@@ -69,6 +69,7 @@ def test_any_frame_of_any_robot(
 
 
 @each_quantity
+@pytest.mark.parametrize("engine", ["fixed", "floating mimic"], indirect=True)
 @pytest.mark.parametrize("size", [(), (3,), (MAX_COPIED_SAMPLES + 5,)])
 def test_kernels_serve_every_frame_of_their_chain(
     engine: CompiledBackend, quantity: str, size: tuple[int, ...]

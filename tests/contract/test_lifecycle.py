@@ -101,8 +101,8 @@ def test_several_threads_at_once(make: Make) -> None:
     # So short that Python switches threads within calls.
     sys.setswitchinterval(1e-6)
     try:
-        with ThreadPoolExecutor(8) as pool:
-            found = list(pool.map(call_all, range(8)))
+        with ThreadPoolExecutor(4) as pool:
+            found = list(pool.map(call_all, range(4)))
     finally:
         sys.setswitchinterval(interval)
     for results in found:

@@ -84,6 +84,11 @@ OPTIONS: dict[str, dict[str, Any]] = {
         "effort_limits": 12.0,
     },
 }
+PAIRS = [
+    *((law, option) for law in LAWS for option in ("plain", "all")),
+    *zip(LAWS, list(OPTIONS)[1:-1], strict=False),
+]
+"""Each law without and with all options, and each option alone with one law."""
 
 
 @contextmanager
@@ -129,8 +134,7 @@ def law_of(name: str, model: Model, options: dict[str, Any]) -> Controller[Any]:
     return LAWS[name](model, options.get("control_dt", 1e-3))
 
 
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("option", OPTIONS)
+@pytest.mark.parametrize(("law", "option"), PAIRS)
 def test_the_record_is_that_of_the_plain_loop(law: str, option: str) -> None:
     options = OPTIONS[option]
     found = both(ARM, law_of(law, ARM, options), tutorial_motion(), duration=STEPS * 1e-3, **options)

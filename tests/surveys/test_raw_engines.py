@@ -20,9 +20,7 @@ from dynx.model.tree import Base
 ROBOTS = [
     "allegro_left_hand",
     "anymal_c",
-    "g1_29dof_rev_1_0",
     "hyq",
-    "icub",
     "panda",
     "romeo_small",
     "ur5",
