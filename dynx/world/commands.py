@@ -14,7 +14,6 @@ from numpy import ndarray
 from numpy.typing import ArrayLike
 
 from dynx.backends import Backend, backend
-from dynx.backends.dynamics import EngineDynamics
 from dynx.backends.hooks import cholesky_solver
 from dynx.errors import ArgumentError, ShapeError, UnknownNameError, UnsupportedFeatureError, nearest, shown
 from dynx.model.numbers import checked_entries, real_array
@@ -67,6 +66,7 @@ class RobotLoads:
         if self._robot is self._in_engine:
             return None
         # Imported here, because engines have most joint dynamics.
+        from dynx.backends.dynamics import EngineDynamics
         from dynx.steppers.implicit_joints import OutsideJoints
 
         dynamics = EngineDynamics(self.dynamics)
@@ -321,9 +321,9 @@ class Commands:
         self._wrenches: Floats = self._no_wrench
         self.forget()
 
-    def of_robot(self, robot: int) -> RobotLoads:
-        """Return the loads on a robot."""
-        return self._loads[robot]
+    def of_robot(self, name: str) -> RobotLoads:
+        """Return the loads on a robot; UnknownNameError for another name."""
+        return self._loads[found_robot(name, self._robots)]
 
     def forget(self) -> None:
         """Forget all earlier steps: the engine is new, or its state was set."""

@@ -29,7 +29,7 @@ from dynx.steppers.registry import renderer_of, world_class
 from dynx.steppers.settings import changed_settings, checked_settings
 from dynx.steppers.state import BodyState, RobotState, WorldState
 from dynx.steppers.stepper import Stepper
-from dynx.world.commands import Commands, MotorsOf, with_scene_motors
+from dynx.world.commands import Commands, MotorsOf, RobotLoads, with_scene_motors
 from dynx.world.contacts import MAX_RAY_LENGTH, ClosestPoints, Contact, RayHits
 from dynx.world.motion import Motion, apply_state, checked_state
 from dynx.world.notes import Overlap, notes_on_engine, notes_on_start, overlaps_of
@@ -43,7 +43,6 @@ if TYPE_CHECKING:
     from dynx.distance.avoidance import Avoidance
     from dynx.steppers.camera import Camera
     from dynx.world.camera import Picture
-    from dynx.world.lone_robot import LoneRobot
     from dynx.world.queries import Queries
 
 
@@ -277,13 +276,10 @@ class World:
             real_time=real_time,
         )
 
-    def lone_robot(self) -> LoneRobot:
-        """Return the only robot of a world without bodies, collisions and joint limits, for a loop that steps
-        it without the checks of `step`; the clock of the world does not follow."""
-        # Imported here, because it imports compiled code, and few worlds have such a loop.
-        from dynx.world.lone_robot import LoneRobot
-
-        return LoneRobot(self._motion.engine, self._commands.of_robot(0))
+    def stepper_and_loads(self, robot: str) -> tuple[Stepper, RobotLoads]:
+        """Return the stepper, and the loads of a robot, for a loop that steps without the checks of `step`;
+        the time and the state of the world do not follow."""
+        return self._motion.engine, self._commands.of_robot(robot)
 
     # -- state --------------------------------------------------------------------------------
 

@@ -71,17 +71,6 @@ class Disturbances:
         """True if pushes or friction with a slip speed add a torque, a function of time and state."""
         return self.friction.smooth or bool(self.pushes)
 
-    def implicit_joints(self, h: float, *, armature: bool = True) -> ImplicitJoints:
-        """Return the solver of `joints` for steps of `h` [s], with armature or without."""
-        joints = self.joints
-        return ImplicitJoints(
-            FrictionLaw.of(self.model, joints.friction),
-            joints.friction,
-            h,
-            damping=joints.damping,
-            armature=joints.armature if armature else None,
-        )
-
     def slowed(self, M: Floats, v: Floats, h: float) -> Floats:
         """Return the velocity (nv,) that joint friction leaves of `v` in a step of `h` [s].
 
@@ -92,7 +81,9 @@ class Disturbances:
             return np.asarray(v - h * np.linalg.solve(M, self.friction(v)))
         solver = self._solvers.get(h)
         if solver is None:
-            solver = self._solvers[h] = self.implicit_joints(h, armature=False)
+            friction, law = self.friction, FrictionLaw.of(self.model, self.friction.dry)
+            solver = ImplicitJoints(law, friction.dry, h, damping=friction.viscous)
+            self._solvers[h] = solver
         nothing = np.zeros(len(v))
         a, moves = solver.step(M, nothing, nothing, v)
         return np.asarray((v + h * a) * moves)

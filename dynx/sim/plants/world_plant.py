@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dynx.control.bullet import BulletMotor
 from dynx.errors import EngineError
@@ -15,16 +17,47 @@ from dynx.model.geometry import Geometry
 from dynx.sim.plants.disturbances import Disturbances
 from dynx.sim.plants.plant import Plant, StepResult
 from dynx.sim.plants.scene_plant import ScenePlant
+from dynx.spatial.plain import Vector3, minus, minus_cross, rotate, rotate_back, rotation_rows
 from dynx.spatial.scalar import Floats
-from dynx.steppers.forces import EngineCommand
-from dynx.steppers.integrators import MeanAcceleration
+from dynx.steppers.forces import EngineCommand, ExternalForce, Forces
 from dynx.steppers.registry import world_class
 from dynx.steppers.state import WorldState
 from dynx.world import Contact, World
-from dynx.world.lone_robot import Acting
 from dynx.world.scene import Scene, SceneRobot
 from dynx.world.snapshot import Snapshot
 from dynx.world.surroundings import ContactTable, Surroundings
+
+
+class MeanAcceleration:
+    """Acceleration of a robot from its states before and after one step of `h` [s].
+
+    It is that at the beginning of a step of semi-implicit Euler. That of a floating base follows from the
+    velocity of the root's centre of mass and from the angular velocity in axes of the world, as in
+    `dynx.rbd.integration.floating_step`, because the axes in which v is given rotate with the base.
+    """
+
+    def __init__(self, model: Model, h: float) -> None:
+        self._h, self._floating = h, model.floating
+        x, y, z = model.mechanism.root_center.tolist()
+        self._center: Vector3 = (float(x), float(y), float(z))
+
+    def __call__(self, q: Floats, v: Floats, q_next: Floats, v_next: Floats) -> Floats:
+        """Return the acceleration (nv,) between two states q (nq,), v (nv,)."""
+        a: Floats = (v_next - v) / self._h
+        if self._floating:
+            a[:6] = self._of_base(q.tolist(), v.tolist(), q_next.tolist(), v_next.tolist())
+        return a
+
+    def _of_base(
+        self, q: list[float], v: list[float], q_next: list[float], v_next: list[float]
+    ) -> list[float]:
+        h, center = self._h, self._center
+        R, R_next = rotation_rows(*q[3:7]), rotation_rows(*q_next[3:7])
+        w, w_next = v[3:6], v_next[3:6]
+        at, at_next = minus_cross(v[:3], center, w), minus_cross(v_next[:3], center, w_next)
+        alpha = [x / h for x in rotate_back(R, minus(rotate(R_next, w_next), rotate(R, w)))]
+        rising = [x / h for x in rotate_back(R, minus(rotate(R_next, at_next), rotate(R, at)))]
+        return [*minus_cross(minus_cross(rising, alpha, center), w, at), *alpha]
 
 
 class LoneRobotPlant(Plant):
@@ -43,44 +76,88 @@ class LoneRobotPlant(Plant):
         robot = SceneRobot("robot", with_joint_dynamics(model, disturbances))
         scene = Scene("robot alone", robots=(robot,), gravity=model.gravity)
         self._world = World(scene, engine, self._h, collisions=False, joint_limits=False)
-        self._robot = self._world.lone_robot()
+        # Stepped directly, because the checks of `World.step` take as long as a step of some engines.
+        self._stepper, self._loads = self._world.stepper_and_loads("robot")
+        self._joints = self._loads.joints
+        self._acceleration = MeanAcceleration(model, self._h)
+        self._joints_of_q = slice(7 if model.floating else 0, None)
+        self._joints_of_v = slice(6 if model.floating else 0, None)
         self._slips = disturbances.friction.smooth
 
     def reset(self, q: Floats, v: Floats) -> None:
-        self._robot.set_state(q, v)
+        self._q, self._v = q, v
+        self._stepper.set_robot_state(0, q, v)
 
     def step(self, t: float, tau: Floats) -> StepResult:
-        robot = self._robot
-        first = robot.step(self._slowed(tau), self._acting(t))
+        first = self._substep(t, tau)
         for k in range(1, self.substeps):
-            robot.step(self._slowed(tau), self._acting(t + k * self._h))
-        return StepResult(robot.q, robot.v, first, tau)
+            self._substep(t + k * self._h, tau)
+        return StepResult(self._q, self._v, first, tau)
 
     def step_motors(self, t: float, command: EngineCommand) -> StepResult:
-        robot, nothing = self._robot, np.zeros(self.model.nv)
-        first, tau = robot.step_motors(command, self._slowed(nothing), self._acting(t))
+        """Take one step with the engine's motors.
+
+        The torque (nv,) of the motors in the first sub-step follows from the acceleration, by inverse
+        dynamics minus all other torques, because Bullet's own report does not include PD_CONTROL.
+        """
+        q, v = self._q, self._v
+        first, beside = self._motor_substep(t, command)
+        tau = self._loads.dynamics.inverse_dynamics(q, v, first) - beside
         for k in range(1, self.substeps):
-            robot.step_motors(command, self._slowed(nothing), self._acting(t + k * self._h))
-        return StepResult(robot.q, robot.v, first, tau)
+            self._motor_substep(t + k * self._h, command)
+        return StepResult(self._q, self._v, first, tau)
 
-    def _slowed(self, tau: Floats) -> Floats:
-        """Return the torque `tau` (nv,) minus that of friction with a slip speed."""
-        return tau - self.disturbances.friction(self._robot.v) if self._slips else tau
+    def refuse(self, controller: object) -> None:
+        super().refuse(controller)
+        if isinstance(controller, BulletMotor):
+            self._loads.refuse_engine_motors(controller.name)
 
-    def _acting(self, t: float) -> Acting:
+    def close(self) -> None:
+        self._world.close()
+
+    # -- one step of the engine -----------------------------------------------------------------
+
+    def _substep(self, t: float, tau: Floats) -> Floats:
+        """Take one step of the engine under the torque `tau` (nv,); return the acceleration (nv,)."""
+        stuck, pushes = None, self._acting(t)
+        if self._slips:
+            tau = tau - self.disturbances.friction(self._v)
+        if pushes or self._joints is not None:
+            tau = self._loads.torque(self._q, self._v, tau, pushes)
+        if self._joints is not None:
+            moves = self._joints.moves[self._joints_of_v]
+            stuck = moves == 0.0 if 0.0 in moves.tolist() else None
+        return self._advance(Forces([(0, tau)]), stuck)
+
+    def _motor_substep(self, t: float, command: EngineCommand) -> tuple[Floats, Floats]:
+        """Return the acceleration, and the torque beside that of the motors (nv,)."""
+        tau = -self.disturbances.friction(self._v) if self._slips else None
+        beside = self._loads.torque_beside_motors(self._q, self._v, tau, self._acting(t))
+        return self._advance(Forces([(0, beside)], commands={0: command})), beside
+
+    def _acting(self, t: float) -> Sequence[tuple[str, ExternalForce, float]]:
         """Return the pushes with their shares of the step of the engine at `t`."""
         if not self.disturbances.pushes:
             return ()
         shares = ((push, push.share(t, self._h)) for push in self.disturbances.pushes)
         return [(push.on, push, share) for push, share in shares if share]
 
-    def refuse(self, controller: object) -> None:
-        super().refuse(controller)
-        if isinstance(controller, BulletMotor):
-            self._robot.refuse_engine_motors(controller.name)
+    def _advance(self, forces: Forces, stuck: NDArray[np.bool_] | None = None) -> Floats:
+        """Take one step under forces and read the state; return the acceleration (nv,).
 
-    def close(self) -> None:
-        self._world.close()
+        What rounding moved joints that are `stuck` is undone.
+        """
+        q, v = self._q, self._v
+        self._stepper.step(1, forces)
+        self._q, self._v = self._stepper.robot_state(0)
+        if stuck is not None:
+            np.copyto(self._q[self._joints_of_q], q[self._joints_of_q], where=stuck)
+            np.copyto(self._v[self._joints_of_v], 0.0, where=stuck)
+        if stuck is not None or self.model.floating:
+            # The engine is set to the reported state, rounding of the conversion included, so that a rollout
+            # resumed from its record continues bit for bit.
+            self._stepper.set_robot_state(0, self._q, self._v)
+        return self._acceleration(q, v, self._q, self._v)
 
 
 class Memory(NamedTuple):

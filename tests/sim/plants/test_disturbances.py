@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from dynx.model.loading import load
+from dynx.rbd.joint_friction import FrictionLaw
 from dynx.sim.plants.disturbances import Disturbances
+from dynx.steppers.implicit_joints import ImplicitJoints
 
 
 @pytest.mark.parametrize("v", [-0.8, 1e-4, 0.8])
@@ -21,5 +23,6 @@ def test_friction_slows_or_stops_a_joint_within_one_step(v: float) -> None:
 
 
 def test_friction_has_no_torque_before_the_first_step() -> None:
-    solver = Disturbances(load("pendulum"), 0.0, 0.5).implicit_joints(1e-3)
+    model, friction = load("pendulum"), np.array([0.5])
+    solver = ImplicitJoints(FrictionLaw.of(model, friction), friction, 1e-3)
     np.testing.assert_array_equal(solver.torque, [0.0])
