@@ -236,7 +236,7 @@ class DrawnRobot(DrawnParts):
             return {}
         parts = budgets(count, self._look.triangles)
         self._reduced = (
-            sum(parts[mesh] * n for mesh, n in count.items()),
+            sum(len(reduced(mesh, parts[mesh]).faces) * n for mesh, n in count.items()),
             sum(len(mesh.triangles[1]) * n for mesh, n in count.items()),
         )
         return {mesh: part for mesh, part in parts.items() if part < len(mesh.triangles[1])}

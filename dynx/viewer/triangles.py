@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Mapping
-from functools import cache, lru_cache
+from functools import cache, cached_property, lru_cache
 from glob import glob
 from hashlib import sha256
 from pathlib import Path
@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from dynx.files.cache import keep, read_cached, source_hash
 from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
@@ -33,10 +34,10 @@ def turned_outwards(triangles: Triangles) -> Triangles | None:
     places = [np.unique(column, return_inverse=True)[1].reshape(-1) for column in triangles.vertices.T]
     _, number = distinct_rows(np.stack(places, axis=1))
     faces = number[triangles.faces]
+    if not _is_closed(faces):
+        return None
     count = int(faces.max()) + 1
     first, second = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
-    if not np.array_equal(np.sort(first * count + second), np.sort(second * count + first)):
-        return None
     surface = np.arange(count)
     while True:
         # Each vertex takes the smallest number among its neighbours', and then that one's.
@@ -58,17 +59,35 @@ def turned_outwards(triangles: Triangles) -> Triangles | None:
 TRIANGLE_BUDGET = 15_000
 """Largest number of triangles of all visual meshes together where they are reduced."""
 
-FEWEST_TRIANGLES = 100
-"""Number of triangles below which a mesh is not reduced."""
+FEWEST_TRIANGLES = 1_000
+"""Number of triangles up to which a mesh is not reduced."""
 
 _JOINED = 1e-3
 """Distance within which vertices of a reduced mesh are joined, as a share of its size."""
+
+_GENTLE = 3
+"""Aggressiveness of fast-simplification; by its default of 7 thin parts of a mesh collapse."""
+
+_GROWTH = 1.5
+"""Ratio of the numbers of triangles in two attempts to reduce a mesh."""
+
+_LEAST_SAVED = 0.2
+"""Share of its triangles that a reduced mesh saves at least; otherwise the mesh stays whole."""
+
+_SURFACE_CHANGED, _VOLUME_CHANGED, _MOVED = 0.05, 0.02, 0.01
+"""Largest effects of a reduction: on the surface and on the enclosed volume as shares of them, and the
+distance by which the box or any point moves as a share of the diagonal of the box."""
+
+_SAMPLES = 100_000
+"""Number of points that stand for a surface where distances to it are measured; they are so dense that it is
+at most half of the distance allowed from the nearest of them."""
 
 
 def budgets(meshes: Mapping[Mesh, int], total: int = TRIANGLE_BUDGET) -> dict[Mesh, int]:
     """Divide `total` triangles between meshes that occur so many times each, in proportion to what each has.
 
-    A mesh with few triangles keeps them. Meshes that together have fewer than `total` keep all.
+    A mesh with few triangles keeps them. Meshes that together have fewer than `total` keep all. A mesh that
+    so few do not represent gets more (`reduced`).
     """
     sizes = {mesh: len(mesh.triangles[1]) for mesh in meshes}
     everything = sum(sizes[mesh] * count for mesh, count in meshes.items())
@@ -84,7 +103,8 @@ def has_graphics_processor() -> bool:
 
 
 def reduced(shape: Shape, budget: int | None) -> Triangles:
-    """Return a shape as triangles: a mesh with at most `budget`, or four, unless that is None.
+    """Return a shape as triangles: a mesh with at most `budget`, unless that is None, or with as many as its
+    surface, its box and, if it is closed, its volume need.
 
     Raises DescriptionError for a mesh that cannot be read.
     """
@@ -117,8 +137,68 @@ def _simplified(vertices: Floats, faces: NDArray[np.intp], budget: int) -> Trian
     remaining = joined[distinct]
     if len(remaining) <= budget:
         return Triangles.of(points, remaining)
-    found, kept = simplify(points.astype(np.float32), remaining.astype(np.int32), target_count=max(budget, 4))
-    return Triangles.of(found, kept) if len(kept) else Triangles.of(vertices, faces)
+    points, remaining = points.astype(np.float32), remaining.astype(np.int32)
+    whole = _Measures(points, remaining)
+    target = max(budget, 4)
+    while whole.surface > 0.0 and target <= (1.0 - _LEAST_SAVED) * len(faces):
+        found, kept = simplify(points, remaining, target_count=target, agg=_GENTLE)
+        if len(kept) and whole.is_near(_Measures(found, kept)):
+            return Triangles.of(found, kept)
+        target = math.ceil(_GROWTH * target)
+    return Triangles.of(vertices, faces)
+
+
+class _Measures:
+    """What a reduction keeps of a mesh: surface, box, place and, if it is closed, volume."""
+
+    def __init__(self, vertices: NDArray[np.floating[Any]], faces: NDArray[np.integer[Any]]) -> None:
+        self.corners: Floats = vertices.astype(np.float64)[faces]
+        self._faces = faces
+        self._box = np.stack([self.corners.min(axis=(0, 1)), self.corners.max(axis=(0, 1))])
+        self.a, b, c = np.moveaxis(self.corners, 1, 0)
+        self._normals = np.cross(b - self.a, c - self.a)
+        self._areas = 0.5 * np.linalg.norm(self._normals, axis=1)
+        self.surface = float(self._areas.sum())
+
+    def is_near(self, found: _Measures) -> bool:
+        """Check whether a reduced mesh is near this one."""
+        volume = self._volume
+        largest = _MOVED * float(np.linalg.norm(np.ptp(self._box, axis=0)))
+        return bool(
+            abs(found.surface - self.surface) <= _SURFACE_CHANGED * self.surface
+            and np.abs(found._box - self._box).max() <= largest
+            and (volume is None or abs(found._enclosed() - volume) <= _VOLUME_CHANGED * abs(volume))
+            and found.distance(self) <= largest
+            and self.distance(found) <= largest
+        )
+
+    def distance(self, other: _Measures) -> float:
+        """Return the largest distance of a corner from the other surface, or a little more."""
+        corners = np.unique(self.corners.reshape(-1, 3), axis=0)
+        return float(other._points.query(corners)[0].max())
+
+    def _enclosed(self) -> float:
+        from_middle = self.a - self._box.mean(axis=0)
+        return float(np.einsum("ij,ij->", from_middle, self._normals)) / 6.0
+
+    @cached_property
+    def _volume(self) -> float | None:
+        return self._enclosed() if _is_closed(self._faces) else None
+
+    @cached_property
+    def _points(self) -> cKDTree:
+        """Points on the surface."""
+        random = np.random.default_rng(0)
+        of = random.choice(len(self._areas), _SAMPLES, p=self._areas / self.surface)
+        weights = random.dirichlet((1.0, 1.0, 1.0), _SAMPLES)
+        return cKDTree(np.einsum("ij,ijk->ik", weights, self.corners[of]))
+
+
+def _is_closed(faces: NDArray[np.integer[Any]]) -> bool:
+    """Check whether each edge is passed as often in one direction as in the other."""
+    count = int(faces.max(initial=0)) + 1
+    first, second = faces.reshape(-1).astype(np.int64), np.roll(faces, -1, axis=1).reshape(-1)
+    return np.array_equal(np.sort(first * count + second), np.sort(second * count + first))
 
 
 def _name(vertices: Floats, faces: NDArray[np.intp], budget: int) -> str:
