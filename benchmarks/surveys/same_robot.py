@@ -57,6 +57,7 @@ class Node:
     attributes: dict[str, str]
     line: int
     last_line: int = 0
+    text: str = ""
     children: list[Node] = field(default_factory=list)
 
     def first(self, tag: str) -> Node | None:
@@ -68,9 +69,11 @@ class Node:
 
     def without_meshes(self) -> str:
         """Write the element again, without shapes that are meshes and without textures."""
-        inside = "".join(child.without_meshes() for child in self.children if not child.names_file())
-        words = "".join(f" {name}={_quoted(value)}" for name, value in self.attributes.items())
-        return f"<{self.tag}{words}>{inside}</{self.tag}>"
+        inside = _escaped(self.text.strip()) + "".join(
+            child.without_meshes() for child in self.children if not child.names_file()
+        )
+        words = "".join(f' {name}="{_escaped(value)}"' for name, value in self.attributes.items())
+        return f"<{self.tag}{words}>{inside}</{self.tag}>\n"  # PyBullet cannot read lines that are long.
 
     def names_file(self) -> bool:
         if self.tag == "texture":
@@ -79,9 +82,8 @@ class Node:
         return shape and any(child.tag == "mesh" for each in self.children for child in each.children)
 
 
-def _quoted(value: str) -> str:
-    text = value.replace("&", "&amp;").replace("<", "&lt;").replace('"', "&quot;")
-    return f'"{text}"'
+def _escaped(text: str) -> str:
+    return text.replace("&", "&amp;").replace("<", "&lt;").replace('"', "&quot;")
 
 
 def parse(data: bytes) -> Node:
@@ -98,7 +100,11 @@ def parse(data: bytes) -> Node:
     def end(tag: str) -> None:
         stack.pop().last_line = parser.CurrentLineNumber
 
+    def read(text: str) -> None:
+        stack[-1].text += text
+
     parser.StartElementHandler, parser.EndElementHandler = begin, end
+    parser.CharacterDataHandler = read
     parser.Parse(data, True)
     return top.children[0]
 
@@ -230,7 +236,7 @@ def changed_lines(before: str, after: str) -> tuple[int, list[int]]:
 
 
 def call_errors(entry: dict[str, Any], mended: Node, folder: Path) -> dict[str, str]:
-    """Load a mended file by the printed calls; return the error's last line of each engine that fails."""
+    """Load a mended file by the printed calls; return the end of the error of each engine that fails."""
     path = folder / f"{Path(entry['mended']).stem}.urdf"
     path.write_text(mended.without_meshes(), encoding="utf-8")
     children = {node.get("child", "link") for node in mended.children if node.tag == "joint"}
@@ -259,7 +265,7 @@ def call_errors(entry: dict[str, Any], mended: Node, folder: Path) -> dict[str, 
             found[name] = "no end"
             continue
         if done.returncode:
-            found[name] = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
+            found[name] = f"exit code {done.returncode}: {done.stderr.strip()[-200:]}"
     return found
 
 
