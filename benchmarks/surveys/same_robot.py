@@ -4,7 +4,7 @@
 
 RESULTS are those of ``benchmarks.surveys.files --json RESULTS --mended FOLDER``. A parser of its own reads
 names, parents, types, axes, origins, limits, masses, centres of mass and tensors (in link axes) of both. A
-difference is stated where a finding of the report names the link or joint, or a line of it, and counted;
+difference is stated where a finding or a change of the report names the link or joint, or a line of it;
 others are printed, as are other numbers of coordinates. Then each engine loads the mended file, without its
 meshes, by the printed call and lines of code, in a process of its own.
 """
@@ -214,11 +214,12 @@ def differences(one: Reading, other: Reading, within: float) -> Iterator[tuple[t
 
 
 def stated(entry: dict[str, Any], robot: Node, key: tuple[str, str]) -> bool:
-    """Check whether a finding names the part, a line of it, or the end of a joint that it belongs to."""
+    """Check whether a finding or a change of the report names the part, or a line of it."""
     tag, name = key
     nodes = [node for node in robot.children if node.tag == tag and node.attributes.get("name", "") == name]
     lines = {line for node in nodes for line in range(node.line, node.last_line + 1)}
-    return any(each[tag] == name or each["line"] in lines for each in entry["findings"])
+    found = any(each[tag] == name or each["line"] in lines for each in entry["findings"])
+    return found or any(name in each[f"{tag}s"] for each in entry["changes"])
 
 
 def changed_lines(before: str, after: str) -> tuple[int, list[int]]:

@@ -86,7 +86,7 @@ class _Repairer:
             ("<!--", "-->", self._comment),
             ("<![CDATA[", "]]>", self._emit),
             ("<?", "?>", self._declaration),
-            ("<!", ">", self._emit),
+            ("<!", ">", self._unknown),
         ):
             if self.text.startswith(opening, at):
                 end = self.text.find(closing, at + len(opening))
@@ -110,6 +110,13 @@ class _Repairer:
             self._fault("-- in a comment", at)
             content = _DASHES.sub(lambda dashes: "=" * len(dashes.group()), content)
         self.parts.append(f"<!--{content}-->")
+
+    def _unknown(self, written: str, at: int) -> None:
+        """Blank out ``<!mesh ...>``, by which authors disable an element; keep a document type."""
+        if not written.startswith("<!DOCTYPE"):
+            self._fault("<! that begins no comment", at)
+            written = _NO_LINE_END.sub(" ", written)
+        self._emit(written, at)
 
     def _declaration(self, written: str, at: int) -> None:
         if not written.startswith("<?xml") or (at == 0 and _DECLARATION.fullmatch(written)):

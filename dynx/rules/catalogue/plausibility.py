@@ -33,8 +33,9 @@ class InertiaBeyondGeometry(Rule):
     centre of mass, the mean square of the mass's distance in it is at most a b (Bhatia and Davis 2000). It
     follows from the tensor, as half the sum of the moments less the moment about that direction. Thirteen
     directions of the link's axes and diagonals and the three principal ones are examined, for a hull widened
-    by a hundredth of its diagonal. This finds a plate whose tensor is that of a block, and a centre of mass
-    at the end of a link whose mass is spread over all of it.
+    by a hundredth of its diagonal, and root mean squares a tenth beyond the bound are reported: shapes are
+    often drawn without the motor inside. This finds a plate whose tensor is that of a block, and a centre of
+    mass at the end of a link whose mass is spread over all of it.
 
     Usual causes: the tensor is in kg mm^2 or g mm^2 where URDF requires kg m^2; it was taken about the link
     frame, not the centre of mass; the mesh is scaled by 0.001 and the tensor is not; a placeholder.
@@ -68,6 +69,9 @@ class InertiaBeyondGeometry(Rule):
 _MARGIN_OF_SHAPES = 0.01
 """Ratio of the margin of a link's shapes to the diagonal of their box."""
 
+_EXCESS_OF_SPREAD = 0.1
+"""Relative excess of a root mean square beyond its bound from which it is reported."""
+
 _DIRECTIONS = np.array(
     [each for each in product((-1.0, 0.0, 1.0), repeat=3) if each > (0.0, 0.0, 0.0)], dtype=np.float64
 )
@@ -90,7 +94,7 @@ def _spread_beyond(inertial: Inertial, extent: Extent) -> str | None:
         return None  # The centre of mass is outside: DX503.
     worst = int(np.argmax(squares / (below * above)))
     spread, bound = math.sqrt(max(squares[worst], 0.0)), math.sqrt(below[worst] * above[worst])
-    if spread <= bound * (1.0 + _ROUNDING_OF_BOUNDS):
+    if spread <= bound * (1.0 + _EXCESS_OF_SPREAD):
         return None
     direction = " ".join(f"{value + 0.0:.2g}" for value in directions[worst])
     return (

@@ -200,6 +200,7 @@ FAULTS = {
     "no white space": ('" type=', '"type=', "no white space between attributes"),
     "a blank behind <": ("<link", "< link", "white space behind <"),
     "a line break behind <": ("<link", "<\n link", "white space behind <"),
+    "an element disabled by !": ("<link", '<!mesh filename="a.obj" /!>\n<link', "<! that begins no comment"),
     "text in front": ("<robot", "URDF: <robot", "text outside of the root element"),
     "a declaration without quotes": ("<?xml", "<?xml version=1.0?><!-- --><!--", "a malformed XML decl"),
     "two declarations": ("<?xml", '<?xml version="1.0"?>\n<?xml', "a second XML declaration"),
@@ -265,7 +266,9 @@ def test_a_fault_that_no_engine_forgives_is_refused(fault: str, tmp_path: Path) 
 
 @given(
     st.lists(
-        st.sampled_from(["<a", "<b ", "/>", ">", "</a>", "</b>", ' x="1"', "y='<&'", "<!-- -", "--", "-->"])
+        st.sampled_from(
+            ["<a", "<b ", "/>", ">", "</a>", "</b>", ' x="1"', "y='<&'", "<!-- -", "--", "-->", "<!b"]
+        )
     )
 )
 def test_repaired_text_is_well_formed_has_the_same_lines_and_needs_no_repair(parts: list[str]) -> None:
