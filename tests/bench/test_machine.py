@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from dynx.bench.machine import (
     Peak,
     chains_program,
     cost_of,
+    load,
     measure_peak,
     processor_description,
     roofline,
@@ -49,6 +52,12 @@ def test_a_peak_is_measured_on_any_number_of_threads(threads: int) -> None:
 def test_the_processor_is_described_in_one_line() -> None:
     assert "doubles in a vector" in processor_description()
     assert "\n" not in processor_description()
+
+
+def test_the_load_is_known_where_the_system_reports_it() -> None:
+    found = load()
+    assert (found is None) == (sys.platform == "win32")
+    assert found is None or found >= 0.0
 
 
 PEAK = Peak(threads=1, copy_bandwidth=10e9, multiply_adds=20e9)

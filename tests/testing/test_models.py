@@ -74,6 +74,10 @@ SORTS: dict[str, Callable[[Model], bool]] = {
     "no inertial": lambda model: any(link.inertial is None for link in model.links),
     "massless": lambda model: model.total_mass == 0.0 and len(model.joint_names) > 0,
     "no gravity": lambda model: model.gravity == (0.0, 0.0, 0.0),
+    "gravity in another direction": lambda model: abs(model.gravity[0]) > 0.1,
+    "limits of some width": lambda model: any(
+        -np.inf < j.limits.lower < j.limits.upper < np.inf for j in model.joints
+    ),
     "oblique axis": lambda model: any(0.1 < abs(joint.axis[1]) < 0.9 for joint in model.joints),
     "limits without width": lambda model: any(j.limits.lower == j.limits.upper for j in model.joints),
     "limit on one side": lambda model: any(

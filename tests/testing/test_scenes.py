@@ -14,8 +14,10 @@ from hypothesis import HealthCheck, Phase, given, settings
 
 from dynx.errors import ArgumentError, DTypeError, DynxError, UnknownNameError
 from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Sphere
+from dynx.model.geometry.solids import Shape
 from dynx.testing.strategies import materials, scenes, shapes
 from dynx.world import Material, PointToPoint, Scene, Weld, World, read_scene, write_scene
+from dynx.world.boxes import shape_box
 from tests.testing.occurrence import assert_occurs, simplest
 
 
@@ -102,6 +104,16 @@ def test_every_sort_occurs() -> None:
         note()
     for name in missing:
         assert_occurs(scenes(), SORTS[name])
+
+
+@given(shapes())
+def test_shapes_are_from_5_to_50_cm_across(shape: Shape) -> None:
+    lower, upper = shape_box(shape, np.eye(4))
+    size = upper - lower
+    # The length of a capsule is that between the centres of its halves.
+    most = 1.0 if isinstance(shape, Capsule) else 0.5
+    assert (size >= 0.05 - 1e-9).all()
+    assert (size <= most + 1e-9).all()
 
 
 def test_meshes_that_are_given_occur() -> None:

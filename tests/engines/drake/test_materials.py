@@ -18,6 +18,7 @@ from dynx.world.preparation import prepare
 materials = st.builds(
     Material,
     friction=st.sampled_from((0.0, 0.1, 0.25, 0.5, 0.9, 1.5)),
+    torsional_friction=st.sampled_from((0.0, 0.02)),
     rolling_friction=st.sampled_from((0.0, 0.01, 0.3)),
     restitution=st.sampled_from((0.0, 0.7)),
 )
@@ -42,7 +43,7 @@ def test_one_pair_of_copies_touches_for_each_pair_of_colliders_and_has_its_frict
 ) -> None:
     rows = data.draw(st.lists(materials, min_size=2, max_size=5))
     pairs = [(i, j) for j in range(len(rows)) for i in range(j)]
-    scene = layout(rows, data.draw(st.lists(st.sampled_from(pairs), unique=True, max_size=len(pairs) - 1)))
+    scene = layout(rows, data.draw(st.lists(st.sampled_from(pairs), unique=True, max_size=len(pairs))))
     copies = copies_of(scene)
     assert np.array_equal(copies.collider[: len(rows)], np.arange(len(rows)))
     assert np.array_equal(copies.touch, copies.touch.T)
@@ -55,6 +56,9 @@ def test_one_pair_of_copies_touches_for_each_pair_of_colliders_and_has_its_frict
             first, second = copies.friction[a], copies.friction[b]
             mean = 2.0 * first * second / (first + second) if first + second else 0.0
             assert mean == pytest.approx(np.sqrt(rows[i].friction * rows[j].friction), rel=1e-9)
+    if len({each.friction for each in rows}) == 1:
+        # Colliders of one friction have it to the last bit, also those that touch nothing.
+        assert np.array_equal(copies.friction, [rows[0].friction] * len(rows))
     for k in range(len(rows)):
         same = np.flatnonzero(copies.collider == k)
         assert not copies.touch[np.ix_(same, same)].any()
