@@ -81,9 +81,8 @@ def _remarks(scene: Scene, options: Mapping[str, Any]) -> Iterator[str]:
     for robot in scene.robots:
         if robot.model.mechanism.coupling is not None:
             yield (
-                f"{robot.name}: equality constraints couple its mimic joints softly. dynx applies torques to "
-                "all of its joints by which they follow exactly; the damping of its joints is part of these "
-                "torques, and is not in the document."
+                f"{robot.name}: equality constraints couple its mimic joints softly. The torques by which "
+                "dynx lets them follow exactly are not in the document."
             )
         if robot.motors:
             kinds = ", ".join(dict.fromkeys(type(motor).__name__ for motor in robot.motors))

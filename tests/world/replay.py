@@ -57,9 +57,6 @@ def replay(path: Path, scene: Scene, forces: Floats) -> Any:
         data.ctrl[:] = np.where(coupled[dofs], 0.0, row[dofs])
         data.qfrc_applied[:] = np.where(coupled, row, 0.0)
         mujoco.mj_step(model, data)
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
-    mujoco.mj_comVel(model, data)
     return data
 
 
@@ -67,6 +64,10 @@ def distance(world: World, data: Any) -> float:
     """Return the largest difference between the states of a world and of MuJoCo, by the names of the
     document: poses [m, 1] and twists [m/s, rad/s] of floating bases and bodies, positions and velocities of
     joints."""
+    import mujoco
+
+    for compute in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_comVel):
+        compute(data.model, data)
     state = world.state
     found = [0.0]
     for robot in world.scene.robots:

@@ -589,10 +589,8 @@ def _add_joint(body: Element, robot: RobotLayout, index: int, joint: Joint) -> N
     if np.isfinite(lower) or np.isfinite(upper):
         lower, upper = max(lower, -UNLIMITED), min(upper, UNLIMITED)
         values["range"] = lower, max(upper, lower + RANGE_GAP * max(1.0, abs(lower)))
-    # The damping of coupled joints is part of the torque that couples them (`stepper`).
-    damped = robot.model.mechanism.coupling is None
     losses = {
-        "damping": robot.damping[index] if damped else 0.0,
+        "damping": robot.damping[index],
         "frictionloss": robot.friction[index],
         "armature": robot.armature[index],
     }

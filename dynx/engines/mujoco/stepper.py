@@ -9,6 +9,10 @@ couples joints by soft equality constraints only. Here the torque of every joint
 acceleration of the tree is that of the coupled robot: with v_tree = S v and the equation of motion M a = tau
 - b of the tree, the coupled robot has (S' M S) a = tau - S' b, and the tree needs the torque M S a + b. The
 constraints are then idle, except where contacts and limits act on mimic joints.
+
+With damping D of the joints, MuJoCo's integrators solve (M + h D) a = f + J' force in steps of h, but its
+constraints hold for the acceleration without h D: force = -J acc / R with M acc = f + J' force, where R is
+their regularisation. The tree then needs f = (M + h D) S a - J' force, with force = -h J M^-1 D S a / R.
 """
 
 from __future__ import annotations
@@ -35,16 +39,24 @@ from dynx.steppers.stepper import Feature, Stepper, TouchingPoint
 class CoupledRobot:
     """A robot with mimic joints: its torque in coordinates of the model, and the torque of its tree."""
 
-    def __init__(self, robot: RobotLayout, first: int, dt: float) -> None:
-        """`first` is the index in MuJoCo's v at which the robot begins."""
+    def __init__(self, robot: RobotLayout, first: int, row: int, dt: float) -> None:
+        """`first` is the index in MuJoCo's v at which the robot begins, `row` that of its first mimic joint
+        in the constraints."""
         coupling = robot.model.mechanism.coupling
         if coupling is None:
             raise AssertionError("a robot without mimic joints")
         self._S = S = coupling.matrix()
         self._slice = slice(first, first + len(S))
-        self._damping = np.concatenate([np.zeros(len(S) - len(robot.damping)), robot.damping])
-        # Damping is taken at the end of the step, as MuJoCo's Euler does.
-        self._damped = S.T @ (dt * self._damping[:, None] * S)
+        base = len(S) - len(robot.damping)
+        self._damping = np.concatenate([np.zeros(base), robot.damping])
+        self._damping_of_step = dt * self._damping
+        self._damped = S.T @ (self._damping_of_step[:, None] * S)
+        mimics = [k for k, joint in enumerate(j for j in robot.model.joints if j.moves) if joint.mimic]
+        self._rows = slice(row, row + len(mimics))
+        own = [k for k in range(len(coupling.index)) if k not in mimics]
+        self._J = np.eye(len(S))[[base + k for k in mimics]]
+        for each, k in zip(self._J, mimics, strict=True):
+            each[base + own[coupling.index[k]]] -= coupling.scale[k]
         self.tau: Floats = np.zeros(S.shape[1])
         """Torque in coordinates of the model, with the wrench on a floating base as in MuJoCo."""
 
@@ -55,8 +67,13 @@ class CoupledRobot:
         mujoco.mj_fullM(model, data, M)
         M = M[part, part]
         bias = data.qfrc_bias[part] + self._damping * data.qvel[part]
-        a = np.linalg.solve(S.T @ M @ S + self._damped, self.tau - S.T @ bias)
-        data.qfrc_applied[part] = M @ (S @ a) + data.qfrc_bias[part]
+        acceleration = S @ np.linalg.solve(S.T @ M @ S + self._damped, self.tau - S.T @ bias)
+        force = M @ acceleration
+        if self._damping.any():
+            damped = self._damping_of_step * acceleration
+            violation = self._J @ np.linalg.solve(M, damped)
+            force += damped + self._J.T @ (violation / data.efc_R[self._rows])
+        data.qfrc_applied[part] = force + bias
 
 
 def read_contacts(
@@ -125,11 +142,13 @@ class MujocoStepper(Stepper):
             RobotCoordinates(data, robot.model, first)
             for robot, first in zip(layout.robots, built.robots, strict=True)
         ]
-        self._coupled = {
-            number: CoupledRobot(robot, built.robots[number][1], dt)
-            for number, robot in enumerate(layout.robots)
-            if robot.model.mechanism.coupling is not None
-        }
+        self._coupled: dict[int, CoupledRobot] = {}
+        row = 0
+        for number, robot in enumerate(layout.robots):
+            if robot.model.mechanism.coupling is not None:
+                # Mimic joints are the first constraints of the document, in the order of its robots.
+                self._coupled[number] = CoupledRobot(robot, built.robots[number][1], row, dt)
+                row += sum(joint.mimic is not None for joint in robot.model.joints)
         self._applied = [
             self._coupled[number].tau if number in self._coupled else robot.applied
             for number, robot in enumerate(self._robots)
