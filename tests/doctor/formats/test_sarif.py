@@ -228,6 +228,11 @@ def test_what_is_in_the_baseline_is_suppressed() -> None:
     baseline = Baseline("", tuple(e for e in differences(differing(), "") if e.place.rule != "DX902"))
     for result in results(differing(), baseline=baseline):
         assert bool(result["suppressions"]) == (result["ruleId"] in ("DX901", "unexplained"))
+    # A file that cannot be read is always new; without a baseline nothing is suppressed or not.
+    [result] = results(refused(), baseline=baseline)
+    assert result["suppressions"] == []
+    for report in (refused(), differing()):
+        assert not any("suppressions" in each for each in results(report))
 
 
 @given(st.text())

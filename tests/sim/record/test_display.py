@@ -84,12 +84,18 @@ def test_a_frame_controller_plots_the_error_of_its_frame(driven: Rollout) -> Non
 @pytest.mark.parametrize(("spread", "scale"), [(1e-4, "log"), (0.5, "linear")])
 def test_errors_that_span_decades_are_on_a_log_axis(spread: float, scale: str) -> None:
     pytest.importorskip("matplotlib")
-    errors = np.linspace(spread, 1.0, 5)[:, None] * np.ones(6)
-    one, no_record = np.zeros((5, 6)), np.zeros((5, 0, 6))
+    n = 101
+    errors = np.linspace(spread, 1.0, n)[:, None] * np.ones(6)
+    one, no_record = np.zeros((n, 6)), np.zeros((n, 0, 6))
     arrays: dict[str, Any] = dict.fromkeys(("q", "v", "saturated"), one)
     arrays |= dict.fromkeys(("max_error", "rms_error"), errors)
     arrays |= dict.fromkeys(("q_record", "v_record", "tau_record"), no_record)
-    arrays |= {"diverged": np.full(5, np.nan), "done": np.ones(5, dtype=bool), "t": np.zeros(0)}
+    arrays |= {"diverged": np.full(n, np.nan), "done": np.ones(n, dtype=bool), "t": np.zeros(0)}
     many = BatchRollouts(Scenario(ARM), **arrays)
     upper, lower = many.plot().axes
+    # Of each joint the whiskers are the 5th and the 95th percentile.
+    ends = np.percentile(errors[:, 0], (5.0, 95.0))
+    lines = [np.asarray(line.get_ydata(), dtype=float) for line in lower.lines]
+    for end in ends:
+        assert sum(bool(np.isclose(y, end, rtol=1e-9).any()) for y in lines) >= ARM.nv
     assert upper.get_xscale() == lower.get_yscale() == scale

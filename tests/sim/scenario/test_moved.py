@@ -11,8 +11,14 @@ from dynx.sim.scenario.moved import CLASSES, MODULES, present_name
 @pytest.mark.parametrize(
     ("former", "kind"),
     [
-        ("dynx.control.engine_motors:PositionMotor", "BulletPositionMotor"),
+        ("dynx.control.engine_motors:EngineMotor", "BulletMotor"),
         ("dynx.control.engine_motors:MotorCommand", "BulletMotorCommand"),
+        ("dynx.control.engine_motors:PDMotor", "BulletPDMotor"),
+        ("dynx.control.engine_motors:PositionMotor", "BulletPositionMotor"),
+        ("dynx.control.engine_motors:TorqueMotor", "BulletTorqueMotor"),
+        ("dynx.control.engine_motors:VelocityMotor", "BulletVelocityMotor"),
+        ("dynx.control.friction:JointFriction", "JointFriction"),
+        ("dynx.sim.plants.disturbances:Push", "ExternalForce"),
         ("dynx.world.scene.material:Material", "Material"),
         ("dynx.world.camera.view:Camera", "Camera"),
         ("dynx.sim.clock:Clock", "Clock"),
