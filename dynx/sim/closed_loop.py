@@ -411,7 +411,8 @@ class ClosedLoop:
         # the Jacobian of the controller's model may not be available.
         with suppress(DynxError):
             control_dt = self.clock.steps_per_control * self.clock.dt
-            overshoot = largest_overshoot(self.controller, record.q[0], control_dt)
+            armature = self.plant.disturbances.armature.diagonal()
+            overshoot = largest_overshoot(self.controller, record.q[0], control_dt, armature=armature)
             beyond = overcompensated_friction(self.controller, self.plant.disturbances.friction)
         if overshoot is not None:
             why += f"; {overshoot.hint('dt' if self.clock.steps_per_control == 1 else 'control_dt')}"

@@ -1,19 +1,29 @@
-"""Likely causes of divergence: overshoot of a controller's damping in discrete time (kd dt / inertia of each
-joint, or kd dt), and friction that is compensated beyond that of the plant."""
+"""Likely causes of divergence, and of torques that reverse in every control step.
+
+They are overshoot of a controller's damping in discrete time (kd dt / inertia of each joint, or kd dt), and
+friction that is compensated beyond that of the plant."""
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from dynx import control
 from dynx.backends import backend
 from dynx.backends.joint_friction import JointFriction
-from dynx.control.base import Controller
+from dynx.control.base import Controller, chain_of
 from dynx.control.content import attributes_of, fields_of
 from dynx.sim.named_controllers import joint_inertia
 from dynx.spatial.scalar import Floats
+
+UNSTABLE_RATIO = 2.0
+"""Ratio of `Overshoot` above which the velocity grows from one control step to the next."""
+
+MIN_REVERSALS = 20
+"""Number of successive control steps in each of which the torque of a joint reverses if its oscillation does
+not decay."""
 
 
 class Overshoot(NamedTuple):
@@ -31,38 +41,80 @@ class Overshoot(NamedTuple):
     by_inertia: bool
     """Whether the gain is divided by the inertia of the joint."""
 
+    def finding(self, step: str = "control_dt") -> str:
+        """Return what a sustained overshoot is; `step` is the control step's name, dt or control_dt."""
+        return f"the torque of {self.joint} reverses in every control step, because {self.hint(step)}"
+
     def hint(self, step: str) -> str:
         """Return the ratio and what can be done; `step` is the control step's name, dt or control_dt."""
         ratio = f"{self.gain} {step} / inertia" if self.by_inertia else f"{self.gain} {step}"
         return (
-            f"{ratio} is {self.ratio:.3g} at {self.joint}, and a step is unstable above 2; smaller gains or "
-            f"a smaller {step} can help"
+            f"{ratio} is {self.ratio:.3g} at {self.joint}, and a step is unstable above {UNSTABLE_RATIO:g}; "
+            f"smaller gains or a smaller {step} can help"
         )
 
 
-def largest_overshoot(controller: Controller[Any] | None, q: Floats, control_dt: float) -> Overshoot | None:
+def largest_overshoot(
+    controller: Controller[Any] | None, q: Floats, control_dt: float, *, armature: Floats | None = None
+) -> Overshoot | None:
     """Find the largest kd dt / inertia at `q` (nq,), with `control_dt` in s.
 
     None where no ratio exceeds 1, and for a controller without a damping of joints. The inertia of each joint
-    is the diagonal of the mass matrix of the controller's model.
+    is the diagonal of the mass matrix of the controller's model, plus the `armature` (nv,) of the plant.
     """
-    inner = controller.inner if isinstance(controller, control.FrictionCompensation) else controller
-    if inner is None or not inner.model.joint_names:
+    return max(_overshoots(controller, q, control_dt, armature), key=lambda each: each.ratio, default=None)
+
+
+def sustained_overshoot(
+    controller: Controller[Any] | None, q: Floats, control_dt: float, armature: Floats, tau: Floats
+) -> Overshoot | None:
+    """Find the joint with the largest unstable ratio among those whose torque reverses in `MIN_REVERSALS`
+    successive control steps; None without one.
+
+    Effort limits and joint limits bound the motion of such a joint, so that nothing diverges. `tau`
+    (steps, n) are the torques of the joints in each control step, `armature` (nv,) is that of the plant.
+    """
+    reverses = tau[1:] * tau[:-1] < 0.0
+    if len(reverses) < MIN_REVERSALS:
         return None
+    oscillates = np.asarray(sliding_window_view(reverses, MIN_REVERSALS, axis=0).all(axis=-1).any(axis=0))
+    if not oscillates.any() or controller is None:
+        return None
+    names = [name for name, found in zip(controller.model.joint_names, oscillates, strict=True) if found]
+    unstable = (
+        each
+        for each in _overshoots(controller, q, control_dt, armature)
+        if each.joint in names and each.ratio > UNSTABLE_RATIO
+    )
+    return max(unstable, key=lambda each: each.ratio, default=None)
+
+
+def _overshoots(
+    controller: Controller[Any] | None, q: Floats, control_dt: float, armature: Floats | None
+) -> list[Overshoot]:
+    """Return the joints whose ratio exceeds 1."""
+    if controller is None:
+        return []
+    *_, inner = chain_of(controller)
+    if not inner.model.joint_names:
+        return []
     n = len(inner.model.joint_names)
     if isinstance(inner, control.ComputedTorque):
         ratio, by_inertia = inner.kd[-n:] * control_dt, False
     else:
         kd = _joint_damping(inner, q)
         if kd is None:
-            return None
+            return []
         inertia, by_inertia = joint_inertia(inner.model, q), True
+        if armature is not None:
+            inertia = inertia + armature[-n:]
         ratio = np.divide(kd[-n:] * control_dt, inertia, out=np.zeros(n), where=inertia > 0.0)
-    worst = int(np.argmax(ratio))
-    if not ratio[worst] > 1.0:
-        return None
     gain = "damping" if isinstance(inner, control.Impedance) else "kd"
-    return Overshoot(inner.model.joint_names[worst], float(ratio[worst]), gain, by_inertia)
+    return [
+        Overshoot(name, float(each), gain, by_inertia)
+        for name, each in zip(inner.model.joint_names, ratio, strict=True)
+        if each > 1.0
+    ]
 
 
 def overcompensated_friction(controller: Controller[Any] | None, plant: JointFriction) -> str | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,8 +12,11 @@ import pytest
 import dynx
 from dynx import control
 from dynx.errors import DivergedError, SingularMassMatrixError
-from dynx.sim import simulate
+from dynx.model import Model
+from dynx.sim import Noise, ScenePlant, simulate
 from dynx.sim.overshoot import largest_overshoot
+from dynx.steppers.registry import installed_worlds
+from dynx.world import Scene, SceneRobot
 
 DT = 1e-3
 
@@ -119,7 +124,7 @@ def test_a_controller_with_another_kd_has_no_known_overshoot(kd: object) -> None
 
 def test_only_failures_of_dynx_hide_the_explanation_of_a_divergence(monkeypatch: pytest.MonkeyPatch) -> None:
     def diverge(error: Exception) -> None:
-        def fail(*_: object) -> None:
+        def fail(*_: object, **options: object) -> None:
             raise error
 
         monkeypatch.setattr("dynx.sim.closed_loop.largest_overshoot", fail)
@@ -130,3 +135,87 @@ def test_only_failures_of_dynx_hide_the_explanation_of_a_divergence(monkeypatch:
     assert raised.value.overshoot is None
     with pytest.raises(ZeroDivisionError, match="a defect"):
         diverge(ZeroDivisionError("a defect"))
+
+
+START = {
+    "ur5": np.array([0.1, -1.0, 1.0, 0.2, 0.3, 0.1]),
+    "panda": np.array([0.0, 0.2, 0.0, -2.0, 0.0, 2.0, 0.5, 0.02]),
+}
+
+
+def scene_of(model: Model, engine: str) -> ScenePlant:
+    """Return the robot alone in a world."""
+    return ScenePlant(Scene("s", robots=(SceneRobot("r", model),)), engine=engine)
+
+
+PLANTS: dict[str, Callable[[Model], Any]] = {
+    "compiled": lambda _: "compiled",
+    "pinocchio": lambda _: "pinocchio",
+    **{engine: partial(scene_of, engine=engine) for engine in installed_worlds()},
+}
+
+
+@pytest.mark.parametrize("plant", PLANTS)
+@pytest.mark.parametrize("robot", ["ur5", "panda"])
+def test_an_oscillation_that_effort_limits_bound_is_named(robot: str, plant: str) -> None:
+    model = dynx.load(robot)
+    q0 = START[robot]
+    inertia = np.diagonal(dynx.backend("reference", model).mass_matrix(q0))
+    kd = 0.3 * inertia / DT
+    kd[4] *= 110.0
+    for controller in (
+        control.PD(model, kp=1.0, kd=kd),
+        control.Saturated(control.GravityCompensatedPD(model, kp=1.0, kd=kd), limit=model.effort_limit),
+    ):
+        rollout = simulate(
+            model,
+            controller,
+            q0 + 0.01,
+            q0=q0,
+            duration=0.2,
+            plant=PLANTS[plant](model),
+            effort_limits=not isinstance(controller, control.Saturated),
+        )
+        found = rollout.summary().overshoot
+        assert found is not None
+        assert found.joint == model.joint_names[4]
+        assert found.ratio == pytest.approx(33.0)
+        assert f"the torque of {found.joint} reverses in every control step" in str(rollout.summary())
+
+
+@pytest.mark.skipif("drake" not in installed_worlds(), reason="drake")
+def test_an_oscillation_that_the_joint_limits_of_drake_bound_is_named() -> None:
+    model = dynx.load("ur5")
+    rollout = simulate(
+        model,
+        control.PD(model, kp=100.0, kd=500.0),
+        np.full(6, 0.5),
+        q0=np.zeros(6),
+        duration=0.1,
+        plant=scene_of(model, "drake"),
+    )
+    assert np.abs(rollout.v).max() > 1e3
+    assert rollout.overshoot is not None
+    assert rollout.overshoot.joint == model.joint_names[5]
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"noise": Noise(v=0.05, seed=1)},
+        {"friction": 5.0},
+        {"armature": 1.0, "kd": 30.0},
+    ],
+    ids=["noise", "friction", "armature"],
+)
+def test_a_stable_motion_names_no_oscillation(options: dict[str, Any]) -> None:
+    model = dynx.load("ur5")
+    kd = options.pop("kd", None)
+    if kd is None:
+        kd = 0.9 * np.diagonal(dynx.backend("reference", model).mass_matrix(np.zeros(6))) / DT
+    slow = control.PD(model, kp=10.0, kd=kd)
+    rollout = simulate(
+        model, slow, np.full(6, 0.3), q0=np.zeros(6), duration=0.3, effort_limits=True, **options
+    )
+    assert rollout.overshoot is None
+    assert "reverses" not in str(rollout.summary())

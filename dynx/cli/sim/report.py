@@ -22,6 +22,7 @@ from dynx.errors import DivergedError, SimulationError
 from dynx.model import Model
 from dynx.model.documents import pose_numbers
 from dynx.sim import Noise, Rollout, RolloutInterrupted
+from dynx.sim.overshoot import Overshoot
 from dynx.sim.record.tracking_error import base_error, frame_error, joint_error
 from dynx.spatial.scalar import Floats
 from dynx.steppers.forces import ExternalForce
@@ -167,7 +168,7 @@ def document(request: SimulationRequest, rollout: Rollout, seconds: float, ended
         "passive": _is_passive(request, rollout),
         "status": _status(ended),
         "error": _error(ended),
-        "overshoot": _overshoot(ended),
+        "overshoot": _overshoot(rollout, ended),
         "dt": request.clock.dt,
         "steps": len(rollout),
         "steps_asked": request.clock.n_steps,
@@ -266,11 +267,19 @@ def _status(ended: EarlyEnd) -> str:
     return DIVERGED if isinstance(ended, DivergedError) else CONTROL_FAILED
 
 
-def _overshoot(ended: EarlyEnd) -> Entry | None:
-    """Return the joint whose damping is unstable for the time step, if that may have caused divergence."""
-    if not isinstance(ended, DivergedError) or ended.overshoot is None:
+def _overshoot(rollout: Rollout, ended: EarlyEnd) -> Entry | None:
+    """Return the joint whose damping is unstable for the time step, if that may have caused divergence, or if
+    its torque reverses in every control step."""
+    found: Overshoot | None = ended.overshoot if isinstance(ended, DivergedError) else rollout.overshoot
+    if found is None:
         return None
-    return {"joint": ended.overshoot.joint, "ratio": ended.overshoot.ratio}
+    return {
+        "joint": found.joint,
+        "ratio": found.ratio,
+        "finding": None
+        if isinstance(ended, DivergedError)
+        else found.finding(),  # the error of a divergence says it
+    }
 
 
 def _error(ended: EarlyEnd) -> Entry | None:
@@ -312,6 +321,8 @@ def show(out: Console, report: Entry) -> None:
     out.print(_energy(report))
     if report["law"] != "none":
         out.print(_saturation(report))
+    if report["overshoot"] is not None and report["overshoot"]["finding"]:
+        out.print(one_line(report["overshoot"]["finding"]))
     out.print(f"simulated {number(report['simulated'])} s in {report['seconds']:.2f} s")
 
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from dynx.backends import Backend, backend
 from dynx.control.base import Controller
-from dynx.errors import ArgumentError
+from dynx.errors import ArgumentError, DynxError
 from dynx.files.pages import html_grid
 from dynx.model import Model
 from dynx.rbd.jacobians import LOCAL
@@ -37,6 +38,9 @@ from dynx.world.record import (
 )
 from dynx.world.surroundings import Surroundings
 
+if TYPE_CHECKING:
+    from dynx.sim.overshoot import Overshoot
+
 
 class Summary(NamedTuple):
     """Errors, speeds, torques and energy of a rollout; errors (nv,) are NaN without a reference."""
@@ -53,6 +57,8 @@ class Summary(NamedTuple):
     """Names of the coordinates of v: joints, after the six of a floating base."""
     units: tuple[str, ...] = ()
     """Unit of each coordinate: rad or m."""
+    overshoot: Overshoot | None = None
+    """`Rollout.overshoot`."""
 
     def __str__(self) -> str:
         """Return the largest error and torque with joint and unit; without motors, the energy's drift."""
@@ -64,6 +70,8 @@ class Summary(NamedTuple):
         if self.max_torque.any():
             sentences.append(f"largest torque {self._largest(self.max_torque, UNITS['effort'])}")
             sentences.append(f"saturated in {100 * self.saturated:.3g} % of the steps")
+            if self.overshoot is not None:
+                sentences.append(self.overshoot.finding())
         else:
             # Where motors do work, the energy changes by that and does not drift.
             sentences.append(f"energy drift {self.energy_drift:.2g} of the largest kinetic energy")
@@ -235,7 +243,27 @@ class Rollout:
             saturated=float(np.mean(self.saturated.any(axis=1))) if len(self) else 0.0,
             coordinates=coordinate_names(self.model),
             units=coordinate_units(self.model),
+            overshoot=self.overshoot,
         )
+
+    @cached_property
+    def overshoot(self) -> Overshoot | None:
+        """Joint whose damping is unstable for the control step, so that its torque reverses in each of many
+        successive ones: an oscillation that only limits bound. None without one, or without a scenario."""
+        scenario, n = self.scenario, len(self.model.joint_names)
+        if scenario is None or not isinstance(scenario.controller, Controller) or not n:
+            return None
+        # Imported here, because most records are read without it.
+        from dynx.sim.overshoot import sustained_overshoot
+
+        every = clock_of(scenario).steps_per_control
+        control_dt, armature = every * scenario.dt, np.diagonal(self.rotors)
+        # The mass matrix or the Jacobian of the controller's model may not be available.
+        with suppress(DynxError):
+            return sustained_overshoot(
+                scenario.controller, self.q[0], control_dt, armature, self.tau[::every, -n:]
+            )
+        return None
 
     def record(self, name: str = "") -> Record:
         """Return the motion as a record: the configurations of the robot, and the positions of the bodies of

@@ -234,6 +234,18 @@ def test_gains_too_large_for_the_step_are_named(arguments: list[str], name: str)
     assert made["overshoot"]["ratio"] > 2.0
 
 
+def test_an_oscillation_within_the_limits_is_named_though_nothing_diverges() -> None:
+    arguments = [*ELBOW, "--controller", "pd", "--kp", "400", "--kd", "500", "--effort-limits", "urdf"]
+    result = sim(*arguments)
+    assert result.exit_code == 0
+    finding = "the torque of wrist_3_joint reverses in every control step, because kd control_dt / inertia is"
+    assert finding in " ".join(result.stdout.split())
+    made = document(*arguments)
+    assert made["status"] == "done"
+    assert made["overshoot"]["finding"].startswith(finding)
+    assert made["overshoot"]["ratio"] > 20.0
+
+
 def test_divergence_for_another_reason_has_no_overshoot() -> None:
     diverging = ["ur5", "--controller", "none", "--v0", "1e4,1e4,1e4,1e4,1e4,1e4"]
     assert document(*diverging, code=1)["overshoot"] is None
