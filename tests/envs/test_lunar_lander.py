@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +21,16 @@ from dynx.envs.environment import TaskEnvironment
 from dynx.envs.tasks.lunar_lander.craft import (
     CENTER,
     EDGES,
+    HEIGHT,
     HULL_MASS,
     LANDER,
     LEG_LIMITS,
     LEG_MASS,
+    WIDTH,
+    area_properties,
     clearance,
     force_at_center,
+    ground_body,
     ground_heights,
     lander_model,
     main_thrust,
@@ -33,6 +38,7 @@ from dynx.envs.tasks.lunar_lander.craft import (
 )
 from dynx.envs.tasks.lunar_lander.task import LunarLander
 from dynx.errors import ArgumentError
+from dynx.model.geometry import Box
 from dynx.steppers.registry import installed_worlds
 
 FLIGHTS = json.loads((Path(__file__).parent / "data" / "lunar_lander_flights.json").read_text())
@@ -73,6 +79,33 @@ def land(env: TaskEnvironment, seed: int) -> tuple[float, bool]:
         if terminated:
             return total, True
     return total, False
+
+
+def test_the_ground_is_a_broken_line_through_the_heights() -> None:
+    heights = ground_heights(np.random.default_rng(0).uniform(0.0, HEIGHT / 2, EDGES + 2))
+    ends = zip(np.linspace(-WIDTH / 2, WIDTH / 2, EDGES + 1), heights, strict=True)
+    for each, (left, right) in zip(ground_body(heights).shapes, pairwise(ends), strict=True):
+        assert isinstance(each.shape, Box)
+        length, _, depth = each.shape.size
+        for side, (x, z) in ((-1.0, left), (1.0, right)):
+            corner = each.origin.matrix @ (0.5 * side * length, 0.0, 0.5 * depth, 1.0)
+            assert corner[:3] == pytest.approx((x, 0.0, z), abs=1e-12)
+
+
+def test_area_and_second_moments_of_a_polygon_are_the_integrals() -> None:
+    # A trapezium is the union of a rectangle and two triangles.
+    a, b, h, z = 0.3, 0.7, 0.4, 0.2
+    area, center, xx, zz = area_properties([(-b, z), (b, z), (a, z + h), (-a, z + h)])
+    widths, dz = np.linspace(b, a, 20001), h / 20000
+    at = z + np.linspace(0.0, h, 20001)
+
+    def integral(of_height: Any) -> float:
+        return float(np.sum((of_height[1:] + of_height[:-1]) / 2.0) * dz)
+
+    assert area == pytest.approx(integral(2.0 * widths), rel=1e-8)
+    assert center == pytest.approx(integral(2.0 * widths * at) / area, rel=1e-8)
+    assert xx == pytest.approx(integral(2.0 * widths**3 / 3.0), rel=1e-8)
+    assert zz == pytest.approx(integral(2.0 * widths * (at - center) ** 2), rel=1e-6)
 
 
 @pytest.mark.parametrize("flight", FLIGHTS, ids=lambda each: f"seed {each['seed']}")

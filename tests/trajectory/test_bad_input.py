@@ -129,6 +129,10 @@ def test_limits(options: dict[str, Any], error: type[DynxError], message: str) -
     usual: dict[str, Any] = {"velocity": 1.0, "acceleration": 1.0, "jerk": 1.0}
     with pytest.raises(error, match=message):
         trajectory.s_curve([0.0, 0.0], [1.0, 2.0], **{**usual, **options})
+    if "jerk" not in options:
+        del usual["jerk"]
+        with pytest.raises(error, match=message):
+            trajectory.trapezoidal([0.0, 0.0], [1.0, 2.0], **{**usual, **options})
 
 
 def test_a_trapezoid_needs_a_limit_of_acceleration() -> None:
