@@ -46,6 +46,8 @@ class RobotLoads:
         self._h = h
         self._nothing = np.zeros(robot.model.nv)
         self._motors: tuple[Motor, ...] = ()
+        self.motor_torque: Floats = self._nothing[self._base :]
+        """Torque (n,) of the motors on the joints in the last step in which they acted."""
         self.motor_memory: tuple[Floats, Floats] | None = None
         """Velocity and generalised force (nv,) of the step before, on which motors at the end of a step
         depend; None if there was no such step."""
@@ -204,9 +206,10 @@ class RobotLoads:
         return law.torque + law.kp * (law.target - positions) + law.kd * (law.velocity - rates)
 
     def _saturated(self, motor: Floats) -> Floats:
-        if not self._saturates:
-            return motor
-        return np.minimum(np.maximum(motor, -self._law.max_force), self._law.max_force)
+        if self._saturates:
+            motor = np.minimum(np.maximum(motor, -self._law.max_force), self._law.max_force)
+        self.motor_torque = motor
+        return motor
 
     def _with_motors(self, q: Floats, v: Floats, tau: Floats) -> Floats:
         base = self._base
@@ -284,6 +287,9 @@ def found_robot(name: str, robots: Mapping[str, _T]) -> _T:
         raise UnknownNameError(f"no robot {shown(name)}{nearest(str(name), robots)}") from None
 
 
+OnFrames = Sequence[tuple[str, ExternalForce, float]]
+"""External forces on frames of a robot, each with the share of the step in which it acts."""
+
 MotorsOf = Mapping[str, "Motor | EngineCommand | Sequence[Motor]"]
 
 Act = Callable[[Stepper], Forces | None]
@@ -319,6 +325,7 @@ class Commands:
         self._no_wrench = np.zeros((len(layout.bodies), 6))
         self._held: Sequence[tuple[int, Floats]] = _NOTHING
         self._wrenches: Floats = self._no_wrench
+        self._on_frames: dict[int, OnFrames] = {}
         self.forget()
 
     def of_robot(self, name: str) -> RobotLoads:
@@ -329,6 +336,20 @@ class Commands:
         """Forget all earlier steps: the engine is new, or its state was set."""
         self._more_than_torques = True
         self.remember({})
+
+    def on_frames(self, robot: int) -> OnFrames:
+        """Return the external forces on the frames of a robot in the last step, with their shares of it."""
+        return self._on_frames.get(robot, ())
+
+    def driving(self, robot: int) -> Floats:
+        """Return the torque (nv,) given for a robot plus that of its motors in the last step."""
+        loads, total = self._loads[robot], np.zeros(self._layout.robots[robot].model.nv)
+        for k, tau in self._held:
+            if k == robot:
+                total += tau
+        if loads.has_motors:
+            total[len(total) - len(loads.motor_torque) :] += loads.motor_torque
+        return total
 
     def notes(self) -> Iterator[str]:
         """Yield one sentence for each feature of a robot's joints that is not exact."""
@@ -396,6 +417,7 @@ class Commands:
         of_joints = {k for k in motored - frames.keys() - self._outside if self._loads[k].depends_on_joints}
         constant = [(k, tau) for k, tau in self._held if k not in repeated]
         self._forget_steps(motored)
+        self._on_frames = {}
         steps = itertools.count()
 
         def act(engine: Stepper) -> Forces | None:
@@ -406,6 +428,7 @@ class Commands:
                     tau = loads.torque_of_joints(*engine.joint_state(k), given)
                 else:
                     on_frames = [(name, force, force.share(t, self._h)) for name, force in frames.get(k, ())]
+                    self._on_frames[k] = on_frames
                     torque = loads.torque_beside_motors if k in commands else loads.torque
                     tau = torque(*engine.robot_state(k), given, on_frames)
                 # A finite sum has finite entries; of few numbers, Python's is the fastest.

@@ -20,6 +20,7 @@ from dynx.model.geometry import Mesh
 from dynx.model.numbers import positive_seconds, whole_number
 from dynx.model.package_search import StrPath
 from dynx.option_names import checks_option_names, refuse_options, right_name
+from dynx.rbd.jacobians import LOCAL
 from dynx.registry import door
 from dynx.spatial.scalar import Floats
 from dynx.steppers.forces import ExternalForce
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from dynx.distance.avoidance import Avoidance
     from dynx.steppers.camera import Camera
     from dynx.world.camera import Picture
+    from dynx.world.last_step import LastStep
     from dynx.world.queries import Queries
 
 
@@ -141,7 +143,8 @@ class World:
     Each step consists of `substeps` steps of the engine. `joint_limits`, `joint_damping`, `joint_friction`
     and `joint_armature` are those of the robots' descriptions; joint dynamics that the engine does not have
     are computed outside of it. Without `collisions` nothing touches. `settings` are those of the engine
-    (`World.settings`); docs/world.md lists them.
+    (`World.settings`); docs/world.md lists them. With `keep_last_step` the state before each step of the
+    engine is kept, from which `joint_wrenches` and `base_wrench` follow; a step then takes longer.
 
     A world is closed by `close` or at the end of a ``with`` block. Arguments are checked before the engine
     gets them, and a call that raises an error leaves the state as it was.
@@ -159,6 +162,7 @@ class World:
         joint_damping: bool = True,
         joint_friction: bool = True,
         joint_armature: bool = True,
+        keep_last_step: bool = False,
         **settings: object,
     ) -> None:
         """Raises UnknownBackendError and NotInstalledError for an engine, UnknownNameError and ArgumentError
@@ -193,6 +197,12 @@ class World:
         )
         self._identity: str | None = None
         self._motion = Motion(self._layout, self._commands, self._build, self.dt, self.substeps)
+        self._last_step: LastStep | None = None
+        if keep_last_step:
+            # Imported here, because most worlds do not need it.
+            from dynx.world.last_step import LastStep
+
+            self._last_step = LastStep(self._layout, self._commands, self.dt / self.substeps)
         at_start = notes_on_start(self._motion.engine, self._motion.state)
         self.notes: tuple[str, ...] = (*at_start, *self._lasting_notes(settings))
         """Parts that overlap at the start, constraints that it violates, joints beyond their limits, robots
@@ -240,12 +250,15 @@ class World:
             n = whole_number("n", n, 1)
         if self._scene_motors:
             motors = with_scene_motors(self._scene_motors, torques, motors)
-        if not motors and not forces:
+        if not motors and not forces and self._last_step is None:
             held = self._commands.hold(torques, n * self.substeps)
             if held is not None:
                 self._motion.advance(engine, n, held)
                 return
-        self._motion.advance(engine, n, act=self._commands.plan(torques, motors, forces, self._motion.time))
+        act = self._commands.plan(torques, motors, forces, self._motion.time)
+        if self._last_step is not None:
+            act = self._last_step.watched(act)
+        self._motion.advance(engine, n, act=act)
 
     @checks_option_names(wrenches="forces")
     def run(
@@ -281,6 +294,45 @@ class World:
         the time and the state of the world do not follow."""
         return self._motion.engine, self._commands.of_robot(robot)
 
+    # -- what the joints transmit in a step ---------------------------------------------------
+
+    def joint_wrenches(
+        self, robot: str | None = None, *, frame: str | None = None, reference: str = LOCAL
+    ) -> Floats:
+        """Return the wrenches (n_joints, 6) [N, N m] that the parents of all joints of a robot exerted on
+        their children in the last step of the engine.
+
+        They follow from the state before the step, its acceleration, the external forces and the contacts;
+        forces of constraints and of joint limits are not among these. `Backend.joint_wrenches` describes the
+        order, the signs and the options. `robot` may be left out if the scene has one.
+
+        Raises ArgumentError without `keep_last_step`, or if no step was taken since the state was set.
+        """
+        return self._wrenches("joint_wrenches", robot, frame, reference)
+
+    def base_wrench(
+        self, robot: str | None = None, *, frame: str | None = None, reference: str = LOCAL
+    ) -> Floats:
+        """Return the wrench (6,) [N, N m] that the world exerted on the root link of a robot in the last step
+        of the engine, besides external forces and contacts; see `joint_wrenches`."""
+        return self._wrenches("base_wrench", robot, frame, reference)
+
+    def torque(self, robot: str | None = None) -> Floats:
+        """Return the torque (nv,) [N m or N] given for a robot plus that of its motors of `dynx.world` in the
+        last step of the engine; the options and errors are those of `joint_wrenches`."""
+        return self._kept_step().torque(robot)
+
+    def _wrenches(self, quantity: str, robot: str | None, frame: str | None, reference: str) -> Floats:
+        step = self._kept_step()
+        name = self._layout.robots[step.number(robot)].name
+        after, contacts = self.state.robots[name], self.contacts()
+        return step.wrenches(robot, after, contacts, quantity, frame=frame, reference=reference)
+
+    def _kept_step(self) -> LastStep:
+        if self._last_step is None:
+            raise ArgumentError("this world does not keep its last step; make it with keep_last_step=True")
+        return self._last_step
+
     # -- state --------------------------------------------------------------------------------
 
     @property
@@ -307,12 +359,18 @@ class World:
         if state is None and robots is None and bodies is None:
             raise ArgumentError("set_state was given nothing; wanted a state, robots= or bodies=")
         checked = checked_state(self._layout, state, robots or {}, bodies or {})
+        self._forget_last_step()
         clock = None if state is None else (checked.time, 0)
         self._motion.change(lambda engine: apply_state(engine, checked), clock)
 
     def reset(self) -> None:
         """Return to the start of the scene, at time 0, as a new world is."""
+        self._forget_last_step()
         self._motion.reset()
+
+    def _forget_last_step(self) -> None:
+        if self._last_step is not None:
+            self._last_step.forget()
 
     def save(self) -> Snapshot:
         """Return everything that determines the later steps, which `restore` continues bit for bit."""
@@ -336,6 +394,7 @@ class World:
         if not isinstance(snapshot, Snapshot):
             raise ArgumentError(f"snapshot is of type {type(snapshot).__name__}; wanted one of World.save")
         snapshot.require(self.engine, engine.version, self.identity)
+        self._forget_last_step()
 
         def load(engine: Stepper) -> None:
             engine.load(snapshot.data)

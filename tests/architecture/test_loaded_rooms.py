@@ -95,7 +95,7 @@ FLOWS = {
         ("ik", "sim", "envs", "doctor"),
         (),
         113,
-        18700,
+        18900,
     ),
     "step of the cart-pole": Flow(
         "import gymnasium, dynx.envs\n"

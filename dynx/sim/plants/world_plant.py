@@ -17,47 +17,15 @@ from dynx.model.geometry import Geometry
 from dynx.sim.plants.disturbances import Disturbances
 from dynx.sim.plants.plant import Plant, StepResult
 from dynx.sim.plants.scene_plant import ScenePlant
-from dynx.spatial.plain import Vector3, minus, minus_cross, rotate, rotate_back, rotation_rows
 from dynx.spatial.scalar import Floats
 from dynx.steppers.forces import EngineCommand, ExternalForce, Forces
 from dynx.steppers.registry import world_class
 from dynx.steppers.state import WorldState
 from dynx.world import Contact, World
+from dynx.world.last_step import MeanAcceleration
 from dynx.world.scene import Scene, SceneRobot
 from dynx.world.snapshot import Snapshot
 from dynx.world.surroundings import ContactTable, Surroundings
-
-
-class MeanAcceleration:
-    """Acceleration of a robot from its states before and after one step of `h` [s].
-
-    It is that at the beginning of a step of semi-implicit Euler. That of a floating base follows from the
-    velocity of the root's centre of mass and from the angular velocity in axes of the world, as in
-    `dynx.rbd.integration.floating_step`, because the axes in which v is given rotate with the base.
-    """
-
-    def __init__(self, model: Model, h: float) -> None:
-        self._h, self._floating = h, model.floating
-        x, y, z = model.mechanism.root_center.tolist()
-        self._center: Vector3 = (float(x), float(y), float(z))
-
-    def __call__(self, q: Floats, v: Floats, q_next: Floats, v_next: Floats) -> Floats:
-        """Return the acceleration (nv,) between two states q (nq,), v (nv,)."""
-        a: Floats = (v_next - v) / self._h
-        if self._floating:
-            a[:6] = self._of_base(q.tolist(), v.tolist(), q_next.tolist(), v_next.tolist())
-        return a
-
-    def _of_base(
-        self, q: list[float], v: list[float], q_next: list[float], v_next: list[float]
-    ) -> list[float]:
-        h, center = self._h, self._center
-        R, R_next = rotation_rows(*q[3:7]), rotation_rows(*q_next[3:7])
-        w, w_next = v[3:6], v_next[3:6]
-        at, at_next = minus_cross(v[:3], center, w), minus_cross(v_next[:3], center, w_next)
-        alpha = [x / h for x in rotate_back(R, minus(rotate(R_next, w_next), rotate(R, w)))]
-        rising = [x / h for x in rotate_back(R, minus(rotate(R_next, at_next), rotate(R, at)))]
-        return [*minus_cross(minus_cross(rising, alpha, center), w, at), *alpha]
 
 
 class LoneRobotPlant(Plant):

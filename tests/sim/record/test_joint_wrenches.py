@@ -79,30 +79,28 @@ def test_friction_and_armature_act_on_the_side_of_the_motor() -> None:
     np.testing.assert_allclose(along_axes(rollout) + taken, rollout.tau, rtol=0, atol=1e-9)
 
 
-def standing(engine: str, dt: float) -> dynx.Rollout:
-    """Return a quadruped that stands on its feet and is pushed."""
-    dog, q = quadruped("a1")
-    scene = Scene("field", robots=(SceneRobot("dog", dog, q=tuple(q)),), bodies=(ground(),))
-    push = dynx.ExternalForce("trunk", (30.0, 10.0, 0.0, 0.0, 0.0, 0.0), 0.1, 0.1)
-    plant = ScenePlant(scene, engine=engine)
-    controller = control.PD(dog, kp=100, kd=4)
-    return dynx.simulate(dog, controller, q, duration=0.25, dt=dt, q0=q, plant=plant, pushes=[push])
+RESIDUAL = {"mujoco": 1e-12, "drake": 5e-6, "pybullet": 5e-6}
+"""Residual of each engine's equations of motion with contacts, as a share of the weight: rounding in MuJoCo,
+what their solvers leave in the others."""
 
 
 @pytest.mark.parametrize("engine", WORLDS)
 def test_contacts_and_weight_are_the_rate_of_momentum(engine: str) -> None:
-    """Nothing else holds a quadruped, so its base bears nothing; contacts are of the step, poses of its
-    beginning, so that the residual is proportional to the length of the step."""
-    coarse, fine = standing(engine, 1e-3), standing(engine, 5e-4)
-    weight = 9.81 * coarse.model.total_mass
-    assert {"trunk", "FR_foot"} <= set(coarse.external_forces)
-    residuals = [np.abs(each.base_wrench()).max() / weight for each in (coarse, fine)]
-    assert residuals[0] < 2e-4
-    assert residuals[1] < 0.75 * residuals[0]
-    unheld = replace(coarse, surroundings=None)
+    """Nothing else holds a quadruped that stands on its feet and is pushed, so its base bears nothing."""
+    dog, q = quadruped("a1")
+    scene = Scene("field", robots=(SceneRobot("dog", dog, q=tuple(q)),), bodies=(ground(),))
+    push = dynx.ExternalForce("trunk", (30.0, 10.0, 0.0, 0.0, 0.0, 0.0), 0.1, 0.1)
+    plant, controller = ScenePlant(scene, engine=engine), control.PD(dog, kp=100, kd=4)
+    rollout = dynx.simulate(dog, controller, q, duration=0.25, q0=q, plant=plant, pushes=[push])
+    weight = 9.81 * rollout.model.total_mass
+    assert {"trunk", "FR_foot"} <= set(rollout.external_forces)
+    assert np.abs(rollout.base_wrench()).max() < RESIDUAL[engine] * weight
+    unheld = replace(rollout, surroundings=None)
     assert np.abs(unheld.base_wrench()).max() > 0.9 * weight
     # The motors hold the legs with what the feet press.
-    np.testing.assert_allclose(along_axes(coarse), coarse.tau[:, 6:], rtol=0, atol=1e-3)
+    np.testing.assert_allclose(
+        along_axes(rollout), rollout.tau[:, 6:], rtol=0, atol=RESIDUAL[engine] * weight
+    )
 
 
 def test_a_record_without_a_scenario_has_no_external_forces() -> None:
