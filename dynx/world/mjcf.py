@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from dynx.engines.mujoco.materials import SETTINGS
-from dynx.engines.mujoco.mjcf import SceneDocument
+from dynx.engines.mujoco.mjcf import MjcfDocument
 from dynx.errors import ArgumentError
 from dynx.steppers.layout import Layout
 from dynx.steppers.settings import checked_settings
@@ -64,7 +64,7 @@ def layout_to_mjcf(
     Raises the errors of `scene_to_mjcf`.
     """
     h = options["dt"] / options["substeps"]
-    document = SceneDocument(layout, h, checked_settings("mujoco", SETTINGS, settings))
+    document = MjcfDocument(layout, h, checked_settings("mujoco", SETTINGS, settings))
     for refused in document.refused:
         raise refused.error
     return document.text(_remarks(scene, options))

@@ -24,7 +24,7 @@ import numpy as np
 from dynx.backends.solvability import Solvability, refuse_singular_start
 from dynx.engines.mujoco.library import MAX_DEPTH, mujoco, silence_warnings, silent_data
 from dynx.engines.mujoco.materials import ContactMaterials
-from dynx.engines.mujoco.mjcf import SUBSTITUTE, SceneDocument, quat_wxyz
+from dynx.engines.mujoco.mjcf import SUBSTITUTE, MjcfDocument, quat_wxyz
 from dynx.errors import EngineError, EngineLimitError
 from dynx.model import Model
 from dynx.model.elements import Inertial, Pose
@@ -183,7 +183,7 @@ def build_scene(layout: Layout, dt: float, settings: Mapping[str, Any]) -> Built
         if settings["solver"] != "pgs":
             # The other solvers minimise a function that is not convex for such a mass matrix.
             refuse_singular_start(robot.model, robot.q, "use solver='pgs'")
-    document = SceneDocument(layout, dt, settings)
+    document = MjcfDocument(layout, dt, settings)
     model = mujoco.MjModel.from_xml_string(document.text())
     data = silent_data(model)
     if document.refused:

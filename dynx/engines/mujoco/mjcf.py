@@ -326,7 +326,7 @@ class Carrier(NamedTuple):
         return placement(R, p - self.origin)
 
 
-class SceneDocument:
+class MjcfDocument:
     """A scene as an MJCF document, with the step [s] and the settings of the engine."""
 
     def __init__(self, layout: Layout, dt: float, settings: Mapping[str, Any]) -> None:
