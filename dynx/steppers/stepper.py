@@ -67,8 +67,8 @@ class Stepper(ABC):
     """Classes of the commands that the engine's own motors take (`Forces.commands`)."""
 
     inexact: ClassVar[Mapping[Feature, str]] = {}
-    """Damping, dry friction and armature of joints, and joint limits, that the engine has with an error, each
-    with the kind of the error as a clause. Of a robot that neither contacts nor constraints can reach,
+    """Damping, dry friction and armature of joints that the engine has with an error, each with the kind of
+    the error as a clause. Of a robot that neither contacts nor constraints can reach,
     `dynx.world.World` computes these joint dynamics outside of the engine, where they are exact; otherwise
     its notes name them."""
 

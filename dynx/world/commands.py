@@ -95,7 +95,6 @@ class RobotLoads:
             Feature.DAMPING: theirs.damping.any(),
             Feature.DRY_FRICTION: theirs.friction.any(),
             Feature.ARMATURE: theirs.armature.any(),
-            Feature.LIMITS: limited,
         }
         for feature, error in engine.inexact.items():
             if present[feature]:

@@ -95,7 +95,7 @@ def test_the_scenes_of_dynx_have_no_notes(name: str) -> None:
 def test_joints_beyond_their_limits_at_the_start_are_noted(engine: str) -> None:
     robot = SceneRobot("arm", dynx.load("planar_2r"), q=(0.0, -3.0))
     with World(Scene("s", robots=(robot,)), engine) as world:
-        note = world.notes[0]
+        (note,) = world.notes
         assert note.startswith("'arm/elbow' is at -3, beyond its limits -2.6 to 2.6, at the start")
     with World(Scene("s", robots=(robot,)), engine, joint_limits=False) as world:
         assert world.notes == ()

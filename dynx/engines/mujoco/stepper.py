@@ -126,7 +126,6 @@ class MujocoStepper(Stepper):
     settings: ClassVar[Mapping[str, Any]] = SETTINGS
     inexact: ClassVar[Mapping[Feature, str]] = {
         Feature.DRY_FRICTION: "a soft constraint, so that joints that stick creep, at any step",
-        Feature.LIMITS: "damped springs, at which joints overshoot and rebound, at any step",
     }
     native_queries: ClassVar[str] = "dynx.engines.mujoco.native_queries:MujocoQueries"
 

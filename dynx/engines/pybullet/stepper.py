@@ -143,7 +143,6 @@ class BulletStepper(Stepper):
     inexact: ClassVar[Mapping[Feature, str]] = {
         Feature.DAMPING: "that of the velocity when a step begins, an error of first order in the step",
         Feature.DRY_FRICTION: "solved by iterations, before mimic joints are coupled",
-        Feature.LIMITS: "a joint that passed one rebounds with up to a fifth of its speed, at any step",
     }
     native_queries: ClassVar[str] = "dynx.engines.pybullet.native_queries:BulletQueries"
 

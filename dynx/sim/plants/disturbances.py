@@ -93,16 +93,6 @@ class Disturbances:
         return {}
 
     @property
-    def names(self) -> list[str]:
-        """Names of the disturbances present: joint friction, pushes, armature."""
-        present = {
-            "joint friction": self.friction.present,
-            "pushes": bool(self.pushes),
-            "armature": self.has_armature,
-        }
-        return [name for name, is_present in present.items() if is_present]
-
-    @property
     def joints(self) -> JointCoefficients:
         """Coefficients (nv,) that are solved for in each step: armature, and damping and dry friction without
         a slip speed."""
