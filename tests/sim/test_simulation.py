@@ -142,6 +142,11 @@ def test_a_rollout_with_torques_of_the_caller_is_not_resumed() -> None:
         assert simulation.rollout.departures == ("torques of the caller from step 3",)
         with pytest.raises(ArgumentError, match="torques of the caller from step 3"):
             simulate(scenario, resume=simulation.rollout)
+        for n, departures in ((2, ()), (3, ()), (4, simulation.rollout.departures)):
+            prefix = simulation.rollout.first(n)
+            assert prefix.departures == departures
+            if not departures:
+                the_same(simulate(scenario, resume=prefix), simulate(scenario))
 
 
 def test_a_branch_with_another_controller_begins_where_it_was_saved() -> None:
@@ -154,6 +159,8 @@ def test_a_branch_with_another_controller_begins_where_it_was_saved() -> None:
         branch.run()
         found = branch.rollout
         assert found.departures == ("another controller from step 9",)
+        # The steps before do not follow from the scenario of the branch.
+        assert found.first(5).departures == found.departures
         assert np.array_equal(found.q[:10], simulation.rollout.q)
         fresh = simulate(replace(other, q0=found.q[9], v0=found.v[9], duration=0.031))
         assert np.array_equal(fresh.q, found.q[9:])
@@ -428,6 +435,8 @@ def test_a_gain_that_the_caller_changes_acts_from_then_on_and_is_a_departure(pla
         changed = simulation.run()
         assert changed.departures == ("Brake changed by the caller (attribute d) from step 8",)
         assert changed.scenario == first.scenario != scenario
+        assert changed.first(8).departures == ()
+        assert changed.first(9).departures == changed.departures
         assert np.array_equal(changed.q[:9], first.q[:9])
         assert np.array_equal(changed.q[8:], second.q)
         simulation.restore(simulation.save())

@@ -279,14 +279,17 @@ class Rollout:
         return {} if self.scenario is None else settings_of(self.scenario)
 
     def first(self, n: int) -> Rollout:
-        """Return the record of its first n steps."""
+        """Return the record of its first n steps, with the departures that began in them."""
         if not 0 <= n <= len(self):
             raise ArgumentError(f"n is {n}; wanted 0 to {len(self)}, the number of steps")
         reference = None if self.reference is None else Setpoint(*(x[: n + 1] for x in self.reference))
         states = {name: getattr(self, name)[: n + 1] for name in ("t", "q", "v")}
         steps = {name: getattr(self, name)[:n] for name in ("a", "tau", "saturated")}
         around = None if self.surroundings is None else self.surroundings.first(n)
-        return replace(self, **states, **steps, reference=reference, surroundings=around)
+        departures = tuple(each for each in self.departures if _first_step(each) < n)
+        return replace(
+            self, **states, **steps, reference=reference, surroundings=around, departures=departures
+        )
 
     @door("dynx.sim.record.formats:save")
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -356,3 +359,12 @@ def _numbers(controller: Controller[Any] | Unknown | None) -> dict[str, Any]:
     if isinstance(controller, Unknown):
         return controller.numbers
     return {} if controller is None else controller_numbers(controller)
+
+
+def _first_step(departure: str) -> int:
+    """Return the first step that does not follow from the scenario by a departure.
+
+    After another controller or reference the scenario is that of the later steps, so it is the first of all.
+    """
+    how, named, step = departure.rpartition(" from step ")
+    return int(step) if named and step.isdecimal() and not how.startswith("another ") else 0
