@@ -87,7 +87,7 @@ FLOWS = {
         ),
         (),
         176,
-        27800,
+        27900,
     ),
     "step of a box": Flow(
         "from dynx.world import Scene, World, box\n"
