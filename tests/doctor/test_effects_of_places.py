@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dynx.doctor.attribution import AttributedCause, CauseAttributor
@@ -18,7 +18,7 @@ from dynx.loaded import installed_engines, loader_class
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, Rule, all_rules, find_rule
 from dynx.rules.registry import trap_case
-from tests.examples import one_robot
+from tests.examples import PROFILE
 from tests.rules.documents import case_of, joint, link
 
 _VERSIONS = {engine: loader_class(engine).engine_version() for engine in installed_engines()}
@@ -107,10 +107,13 @@ def chain(*dynamics: str) -> Case:
     return case_of(*links, *joints)
 
 
+few = settings(max_examples=min(PROFILE, max(10, PROFILE // 4)))
+"""Every example has several joints, which all engines load together and alone."""
+
 dampings = st.lists(st.floats(-6.0, 4.0).map(lambda power: 10.0**power), min_size=2, max_size=5)
 
 
-@one_robot
+@few
 @given(dampings)
 def test_the_effect_of_damping_is_the_torque_of_its_own_joint(values: list[float]) -> None:
     case = chain(*(f'<dynamics damping="{value!r}"/>' for value in values))
@@ -129,7 +132,7 @@ def test_the_effect_of_damping_is_the_torque_of_its_own_joint(values: list[float
                 assert effect.relative_error == pytest.approx(expected, rel=1e-6)
 
 
-@one_robot
+@few
 @given(dampings)
 def test_the_effect_of_friction_is_the_force_of_its_own_joint(values: list[float]) -> None:
     if "mujoco" not in installed_engines():

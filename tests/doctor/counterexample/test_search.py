@@ -27,6 +27,7 @@ from dynx.reference.backend import ReferenceBackend
 from dynx.rules import Case
 from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import models
+from tests.examples import PROFILE
 
 Difference = Callable[[Case, Model, Floats, Floats, Floats], float]
 
@@ -237,7 +238,7 @@ def robots_with_a_difference(draw: st.DrawFn) -> tuple[Case, Difference]:
     return case, error_of_unit_mass(link)
 
 
-@settings(max_examples=40)  # each example examines a hundred robots
+@settings(max_examples=min(PROFILE, max(20, PROFILE // 4)))  # each example examines a hundred robots
 @given(robots_with_a_difference(), st.integers(0, 3))
 def test_on_random_robots(robot: tuple[Case, Difference], seed: int) -> None:
     case, difference = robot
