@@ -175,7 +175,7 @@ class _Measures:
     def distance(self, other: _Measures) -> float:
         """Return the largest distance of a corner from the other surface, or a little more."""
         corners = np.unique(self.corners.reshape(-1, 3), axis=0)
-        return float(other._points.query(corners)[0].max())
+        return float(np.max(other._points.query(corners)[0]))
 
     def _enclosed(self) -> float:
         from_middle = self.a - self._box.mean(axis=0)
