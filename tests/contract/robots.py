@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
 from dynx.model import Inertial, Joint, JointDynamics, Limits, Link, Mimic, Model, Pose
 
 
@@ -98,3 +100,11 @@ def hinge(inertial: Inertial | None, axis: tuple[float, float, float] = (0.0, 1.
     """Return one link on one hinge."""
     joint = Joint("hinge", "continuous", "ground", "arm", axis=axis)
     return Model.build("hinge", [Link("ground"), Link("arm", inertial)], [joint])
+
+
+MODELS = {
+    "fixed": branched(),
+    "floating": branched().with_base("floating"),
+    "mimicking": mimicking(),
+}
+each_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS.keys())

@@ -10,11 +10,11 @@ import pytest
 
 from dynx.model import Link, Model
 from dynx.spatial.scalar import Floats
+from tests.contract import robots
 from tests.contract.conftest import Make
 from tests.contract.engine_calls import ENGINE_CALLS, EngineCall, State, each_call, random_state
-from tests.contract.robots import body, branched, mimicking
 
-FLOATING = branched().with_base("floating")
+FLOATING = robots.MODELS["floating"]
 
 
 def every_other(x: Floats) -> Floats:
@@ -114,12 +114,7 @@ def test_without_validation_the_results_are_the_same(make: Make, engine_call: En
         )
 
 
-MODELS = {
-    "fixed": branched(),
-    "floating": branched().with_base("floating"),
-    "mimicking": mimicking(),
-    "without_joints": Model.build("block", [Link("block", body(1.0))], []),
-}
+MODELS = {**robots.MODELS, "without_joints": Model.build("block", [Link("block", robots.body(1.0))], [])}
 SIZES = ((), (1,), (3,), (2, 3), (0,), (2, 0))
 
 each_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS.keys())

@@ -12,15 +12,9 @@ from dynx.model import Inertial, JointDynamics, Model, Pose
 from dynx.rbd.jacobians import REFERENCES
 from tests.contract.conftest import Make
 from tests.contract.engine_calls import random_state
-from tests.contract.robots import branched, hinge, mimicking
+from tests.contract.robots import branched, each_model, hinge
 from tests.error_bounds import ErrorBounds, samples_at
 
-MODELS = {
-    "fixed": branched(),
-    "floating": branched().with_base("floating"),
-    "mimicking": mimicking(),
-}
-each_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS.keys())
 each_reference = pytest.mark.parametrize("reference", REFERENCES)
 
 

@@ -12,7 +12,7 @@ from dynx.model import Inertial, Joint, Link, Model, Pose
 from dynx.spatial.scalar import Floats
 from tests.contract.conftest import Make
 from tests.contract.engine_calls import EngineCall, each_call, random_state
-from tests.contract.robots import JOINTS, LINKS, body, branched, hinge, mimicking
+from tests.contract.robots import JOINTS, LINKS, body, branched, each_model, hinge
 from tests.error_bounds import ErrorBounds, samples_at
 
 MASSLESS = {"no inertial": None, "zero inertial": Inertial()}
@@ -187,14 +187,6 @@ def test_what_is_singular_at_one_configuration_is_refused_in_the_same_words(make
         engine.forward_dynamics(np.zeros(2), np.zeros(2), np.ones(2))
     with pytest.raises(SingularMassMatrixError, match=r"is singular at sample \[1\]: "):
         engine.forward_dynamics(np.array([[0.0, 1.0], [0.0, 0.0]]), np.zeros(2), np.ones(2))
-
-
-MODELS = {
-    "fixed": branched(),
-    "floating": branched().with_base("floating"),
-    "mimicking": mimicking(),
-}
-each_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS.keys())
 
 
 def center_jacobians(model: Model, engine: Backend, q: Floats) -> list[tuple[float, Floats, Floats, Floats]]:

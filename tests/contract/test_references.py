@@ -14,18 +14,12 @@ from dynx.spatial.scalar import Floats
 from dynx.testing.strategies import Sample, samples
 from tests.contract.conftest import Make
 from tests.contract.engine_calls import random_state
-from tests.contract.robots import branched, mimicking
+from tests.contract.robots import each_model
 from tests.error_bounds import ErrorBounds, samples_at
 from tests.examples import one_robot
 
-MODELS = {
-    "fixed": branched(),
-    "floating": branched().with_base("floating"),
-    "mimicking": mimicking(),
-}
 FRAME, POINT = "tool", np.array([0.3, -0.2, 0.1])
 
-each_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS.keys())
 each_reference = pytest.mark.parametrize("reference", REFERENCES)
 
 

@@ -13,15 +13,9 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
 from tests.contract.conftest import Make
 from tests.contract.engine_calls import State, random_state
-from tests.contract.robots import branched, hinge, mimicking
+from tests.contract.robots import MODELS, branched, each_model, hinge
 from tests.error_bounds import ErrorBounds, samples_at
 
-MODELS = {
-    "fixed": branched().with_base_pose(Pose((0.4, -1.2, 0.7), (1.1, -0.6, 2.3))),
-    "floating": branched().with_base("floating"),
-    "mimicking": mimicking(),
-}
-each_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS.keys())
 each_reference = pytest.mark.parametrize("reference", REFERENCES)
 WRENCHES = {
     "tool": np.array([3.0, -1.0, 2.0, 0.5, -0.4, 0.3]),
