@@ -92,7 +92,7 @@ def points_on(triangles: Triangles, n: int) -> Floats:
     corners = triangles.vertices[triangles.faces].astype(float)
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     chosen = corners[random.choice(len(corners), n, p=areas / areas.sum())]
-    return np.einsum("ij,ijk->ik", random.dirichlet((1.0, 1.0, 1.0), n), chosen)
+    return np.asarray(np.einsum("ij,ijk->ik", random.dirichlet((1.0, 1.0, 1.0), n), chosen))
 
 
 @needs_examples
@@ -119,7 +119,7 @@ def test_reduced_meshes_keep_surface_box_place_and_volume(robot: str, links: tup
         for ours, theirs in [(whole, found), (found, whole)]:
             # The nearest of so many points is farther away than the surface by half a hundredth at most.
             apart, _ = cKDTree(points_on(theirs, 100_000)).query(points_on(ours, 10_000))
-            assert apart.max() <= 0.015 * diagonal
+            assert np.max(apart) <= 0.015 * diagonal
         if turned_outwards(whole) is not None:
             assert volume(found) == pytest.approx(volume(whole), rel=0.021)
 
