@@ -10,7 +10,7 @@ from dynx.engines.mujoco.mjcf import MjcfDocument
 from dynx.errors import ArgumentError
 from dynx.steppers.layout import Layout
 from dynx.steppers.settings import checked_settings
-from dynx.world.preparation import checked_options, prepare
+from dynx.world.preparation import checked_options, may_be_reached, prepare
 from dynx.world.scene.scene import Scene
 
 
@@ -67,10 +67,10 @@ def layout_to_mjcf(
     document = MjcfDocument(layout, h, checked_settings("mujoco", SETTINGS, settings))
     for refused in document.refused:
         raise refused.error
-    return document.text(_remarks(scene, options))
+    return document.text(_remarks(scene, layout, options))
 
 
-def _remarks(scene: Scene, options: Mapping[str, Any]) -> Iterator[str]:
+def _remarks(scene: Scene, layout: Layout, options: Mapping[str, Any]) -> Iterator[str]:
     """Yield what a reader of the document must know, and what it cannot carry."""
     yield (
         "The world of dynx in MuJoCo. The ctrl of a motor is the torque that World.step takes for its joint; "
@@ -78,7 +78,12 @@ def _remarks(scene: Scene, options: Mapping[str, Any]) -> Iterator[str]:
     )
     if options["substeps"] > 1:
         yield f"A step of the world, {options['dt']!r} s, is {options['substeps']} steps of the document."
-    for robot in scene.robots:
+    for number, robot in enumerate(scene.robots):
+        if layout.robots[number].friction.any() and not may_be_reached(layout, number):
+            yield (
+                f"{robot.name}: the dry friction of its joints is MuJoCo's. Where nothing can touch a robot, "
+                "a world of dynx computes it outside of MuJoCo, as torques."
+            )
         if robot.model.mechanism.coupling is not None:
             yield (
                 f"{robot.name}: equality constraints couple its mimic joints softly. The torques by which "

@@ -116,9 +116,15 @@ def differing_fields(a: Any, b: Any) -> list[str]:
 
 def examine(scene: Scene, path: Path, steps: int, seed: int, **options: Any) -> tuple[float, list[str]]:
     """Write a world to a file; return the distance after a replay of its forces, and the fields of MuJoCo's
-    model of the file that are not those of the world's."""
+    model of the file that are not those of the world's.
+
+    Scenes whose document names dry friction that the world computes outside of MuJoCo have none here.
+    """
     import mujoco
 
+    with World(scene, "mujoco", **options) as world:
+        if "computes it outside of MuJoCo" in world.to_mjcf():
+            options["joint_friction"] = False
     with World(scene, "mujoco", **options) as world:
         path.write_text(world.to_mjcf(), encoding="utf-8")
         model = mujoco.MjModel.from_xml_path(str(path))

@@ -463,10 +463,22 @@ def damped_mimics(base: Any) -> Model:
     for k in range(3):
         ends = f'<parent link="l{k}"/><child link="l{k + 1}"/><origin xyz="0.1 0 0.2" rpy="0.1 0.2 0.3"/>'
         mimic = '<mimic joint="j1" multiplier="-1.5" offset="0.2"/>' if k == 2 else ""
-        losses = f'<dynamics damping="{damping[k]}" friction="0.01"/>'
+        losses = f'<dynamics damping="{damping[k]}"/>'
         parts.append(f'<link name="l{k + 1}">{inertial}</link><joint name="j{k}" type="continuous">{ends}')
         parts.append(f'<axis xyz="0 {k % 2} {1 - k % 2}"/>{losses}{mimic}</joint>')
     return dynx.load(f'<robot name="coupled">{"".join(parts)}</robot>', base=base)
+
+
+def test_a_document_has_the_friction_that_a_world_computes_outside_of_mujoco_and_names_it() -> None:
+    losses = '<limit lower="-9" upper="9" effort="1" velocity="1"/><dynamics friction="0.2" damping="0.3"/>'
+    scene = Scene("s", robots=(SceneRobot("r", chain(INERTIAL, INERTIAL, joint=losses)),))
+    assert "r: the dry friction of its joints is MuJoCo's." in scene_to_mjcf(scene)
+    model, data = load(scene)
+    assert model.dof_frictionloss[0] == 0.2
+    with World(scene, "mujoco") as world:
+        world.step(300)
+        mujoco.mj_step(model, data, 300)
+        assert distance_of(world, data) < 1e-2
 
 
 def test_comments_name_what_a_document_cannot_carry() -> None:
