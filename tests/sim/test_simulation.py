@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import dynx
@@ -81,6 +81,8 @@ def test_simulate_is_a_loop_over_steps(name: str) -> None:
 
 
 @settings(max_examples=20)
+# A push that begins and ends in later chunks of a loop that is one kernel.
+@example(name="disturbances compiled", parts=[3, 9, 9, 9], compiled=True)
 @given(name=names, parts=st.lists(st.integers(1, 9), min_size=1, max_size=12), compiled=st.booleans())
 def test_how_many_steps_at_a_time_changes_no_bit(name: str, parts: list[int], compiled: bool) -> None:
     scenario = replace(SCENARIOS[name], duration=0.1)
