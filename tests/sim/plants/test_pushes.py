@@ -10,7 +10,9 @@ from hypothesis import strategies as st
 from dynx import ExternalForce
 from dynx.backends import installed_backends
 from dynx.control import PD
-from dynx.sim import simulate, simulate_batch
+from dynx.sim import ScenePlant, simulate, simulate_batch
+from dynx.steppers.registry import installed_worlds
+from dynx.world import Scene, SceneRobot
 from tests.backends.robots import chain
 
 SLIDER = chain(1, "prismatic").with_gravity(np.zeros(3))
@@ -57,6 +59,27 @@ def test_the_impulse_is_exact_on_every_plant(
     assert rollout.v[-1, 0] == pytest.approx(3.0, rel=1e-7)
     speed = np.interp(rollout.t, [start, start + duration], [0.0, 3.0])
     np.testing.assert_allclose(rollout.v[:, 0], speed, rtol=0.0, atol=1e-5)
+
+
+@pytest.mark.parametrize("engine", installed_worlds())
+@pytest.mark.parametrize("substeps", [1, 4])
+@pytest.mark.parametrize("dt", [0.01, 0.02])
+@pytest.mark.parametrize(
+    ("start", "duration"), [(0.0, 0.005), (0.0125, 0.003), (0.0199, 2e-4), (0.004, 0.03)], ids=str
+)
+def test_the_impulse_is_exact_in_a_scene(
+    engine: str, substeps: int, dt: float, start: float, duration: float
+) -> None:
+    scene = Scene("s", robots=(SceneRobot("slider", SLIDER),), gravity=(0.0, 0.0, 0.0))
+    rollout = simulate(
+        SLIDER,
+        plant=ScenePlant(scene, engine=engine),
+        pushes=[pushed(3.0 / duration, start, duration)],
+        dt=dt,
+        duration=TIME,
+        substeps=substeps,
+    )
+    assert rollout.v[-1, 0] == pytest.approx(3.0, rel=1e-9)
 
 
 @given(start=starts, duration=durations, dt=steps)
