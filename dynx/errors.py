@@ -7,7 +7,7 @@
     |  `- RobotNotFoundError        no such file or library name
     |- ArgumentError                an argument cannot be used
     |  |- ShapeError                wrong shape
-    |  |- DTypeError                not real numbers
+    |  |- DTypeError                wrong type, or not real numbers
     |  |- NotFiniteError            NaN or infinity where a finite number is needed
     |  |- UnknownNameError          no such frame, joint, reference, ...
     |  |- NoClosedFormError         no closed form of the inverse kinematics (which condition fails)
@@ -82,7 +82,7 @@ class ShapeError(ArgumentError):
 
 
 class DTypeError(ArgumentError, TypeError):
-    """An array does not hold real numbers."""
+    """An argument has the wrong type, or an array does not hold real numbers."""
 
 
 class NotFiniteError(ArgumentError):
@@ -285,9 +285,9 @@ def nonblank_lines(text: object) -> list[str]:
     return [line.strip() for line in str(text).splitlines() if line.strip()]
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
+def nearest(wanted: object, known: Iterable[str]) -> str:
     """Make a clause such as ``; did you mean 'tool0'?`` or, without a near name, the known names."""
-    names = list(known)
+    names, name = list(known), _written(wanted)
     if len(name) <= 200:
         lowered = {known_name.lower(): known_name for known_name in reversed(names)}
         close = difflib.get_close_matches(name.lower(), lowered, n=3, cutoff=0.55)

@@ -27,6 +27,7 @@ from dynx.agreement.magnitudes import Magnitudes
 from dynx.agreement.referee import Referee
 from dynx.agreement.report import AgreementReport, find_suspects, refused_report
 from dynx.agreement.sampling import Samples, draw_samples
+from dynx.argument_types import checks_types
 from dynx.backends import (
     Backend,
     DerivedBackend,
@@ -56,6 +57,7 @@ IDENTITY_SAMPLES = 4
 Progress = Callable[[str], None]
 
 
+@checks_types
 @checks_option_names
 def agree(
     model: Model | str | Path,

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.agreement.comparison import REFEREE
+from dynx.argument_types import checks_types
 from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.model import Model
 from dynx.model.mechanism import Mechanism, build_mechanism
@@ -34,6 +35,7 @@ def exactly(numbers: object) -> Array:
     return np.asarray(np.frompyfunc(mpmath.mpf, 1, 1)(np.asarray(numbers, dtype=np.float64)), dtype=object)
 
 
+@checks_types
 class Referee:
     """Quantities of one model in 50 digits, with the methods and shapes of `Backend`.
 

@@ -34,6 +34,7 @@ from typing import Any
 from dynx._version import __version__
 from dynx.agreement.comparison import DERIVED, REFEREE, Comparison
 from dynx.agreement.identities import IdentityCheck
+from dynx.argument_types import checks_types
 from dynx.errors import DynxError, UnknownNameError, nearest, shown
 from dynx.files.documents import document_of
 from dynx.files.pages import html_grid
@@ -170,6 +171,7 @@ class AgreementReport:
         """The comparisons that are out of tolerance."""
         return tuple(comparison for comparison in self.quantities if not comparison.agree)
 
+    @checks_types
     def worst(self, quantity: str) -> float:
         """Return the largest relative error of a quantity over all pairs.
 
@@ -259,6 +261,7 @@ class AgreementDocument:
     """The robots in xacro below a directory, which are not compared."""
 
 
+@checks_types
 def refused_report(
     robot: str,
     error: DynxError,
@@ -279,6 +282,7 @@ def refused_report(
     )
 
 
+@checks_types
 def results_document(
     reports: Iterable[AgreementReport], not_done: Sequence[str] = (), left_out: Sequence[str] = ()
 ) -> dict[str, Any]:

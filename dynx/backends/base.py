@@ -16,6 +16,7 @@ from dynx.backends.evaluation import common_batch
 from dynx.backends.hooks import apply_matrix, solution_or_nan
 from dynx.backends.quantity_calls import ALL_FRAMES, ONE_FRAME, Forces, QuantityCalls
 from dynx.errors import ArgumentError
+from dynx.model.numbers import checked_bool
 from dynx.rbd.jacobians import LOCAL, LOCAL_WORLD_ALIGNED, shift_jacobian
 from dynx.rbd.joint_wrenches import AppliedWrench, LinkWrenches
 from dynx.registry import door
@@ -282,6 +283,7 @@ class Backend(QuantityCalls):
         Luh, Walker and Paul 1980. Elsewhere: Pinocchio `rnea`, Drake `CalcInverseDynamics`, MuJoCo
         `mj_inverse`, PyBullet `calculateInverseDynamics`.
         """
+        joint_dynamics = joint_dynamics is not False and checked_bool("joint_dynamics", joint_dynamics)
         tau = self._evaluate("inverse_dynamics", (q, v, a))
         if external_forces is not None:
             tau = tau - self._force_torque(q, tau, external_forces, force_reference)
@@ -307,6 +309,7 @@ class Backend(QuantityCalls):
         Featherstone 2008, section 7.3. Elsewhere: Pinocchio `aba`, Drake
         `get_generalized_acceleration_output_port`, MuJoCo `mj_forward`.
         """
+        joint_dynamics = joint_dynamics is not False and checked_bool("joint_dynamics", joint_dynamics)
         if external_forces is None and not joint_dynamics:
             return self._evaluate("forward_dynamics", (q, v, tau))
         q, v = self._checked_q(q), self._checked_v(v)
@@ -329,6 +332,7 @@ class Backend(QuantityCalls):
         Featherstone 2008, section 6.2. Elsewhere: Pinocchio `crba`, Drake `CalcMassMatrix`, MuJoCo
         `mj_fullM`, PyBullet `calculateMassMatrix`.
         """
+        joint_dynamics = joint_dynamics is not False and checked_bool("joint_dynamics", joint_dynamics)
         M = self._evaluate("mass_matrix", (q,))
         return M + self._joint_terms.armature if joint_dynamics else M
 
@@ -346,6 +350,7 @@ class Backend(QuantityCalls):
         Siciliano et al., section 7.1.3. Elsewhere: Pinocchio `nonLinearEffects`, MuJoCo `qfrc_bias`, Drake
         `CalcBiasTerm` minus `CalcGravityGeneralizedForces`.
         """
+        joint_dynamics = joint_dynamics is not False and checked_bool("joint_dynamics", joint_dynamics)
         tau = self._evaluate("bias_torque", (q, v))
         if external_forces is not None:
             tau = tau - self._force_torque(q, tau, external_forces, force_reference)
@@ -463,7 +468,7 @@ class Backend(QuantityCalls):
         `CalcKineticEnergy`, MuJoCo `mj_energyVel`.
         """
         energy = self._evaluate("kinetic_energy", (q, v))
-        if joint_dynamics:
+        if joint_dynamics is not False and checked_bool("joint_dynamics", joint_dynamics):
             v = self._checked_v(v)
             energy = energy + 0.5 * np.sum(v * self._joint_terms.armature_torque(v), axis=-1)
         return energy

@@ -10,6 +10,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Any, ClassVar
 
+from dynx.argument_types import checks_types
 from dynx.backends.base import Backend
 from dynx.backends.quantities import QUANTITIES
 from dynx.errors import ClosedError
@@ -26,6 +27,7 @@ class DerivedBackend(Backend):
 
     name: ClassVar[str] = "derived"
 
+    @checks_types
     def __init__(self, inner: Backend, *, validate: bool = True) -> None:
         # Other backends have these as class attributes; here they depend on `inner`.
         vars(self).update(name=f"{inner.name}/derived", vectorized=inner.vectorized)
@@ -52,6 +54,7 @@ class DerivedBackend(Backend):
         return partial(DerivedBackend, self.inner, **self._options), ()
 
 
+@checks_types
 def native_quantities(backend: Backend | type[Backend]) -> frozenset[str]:
     """Return the names of the quantities that a backend's engine computes itself, without derivation."""
     kind = backend if isinstance(backend, type) else type(backend)

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.errors import ArgumentError, GainError, UnknownNameError, shown
 from dynx.model import Model
@@ -29,6 +30,7 @@ Coefficients = bool | ArrayLike | Mapping[str, ArrayLike]
 by the name of the joint (`coefficients_by_joint`), where joints that are not named have 0."""
 
 
+@checks_types
 @dataclass(frozen=True, eq=False)
 class JointFriction:
     """Torque that overcomes damping and dry (Coulomb) friction: d v + f tanh(v / slip), with the sign of v.

@@ -23,7 +23,7 @@ from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.backends.quantities import QUANTITIES
 from dynx.backends.solvability import Solvability
 from dynx.backends.straight import BindingCall, StraightCall, straight_call
-from dynx.errors import NotFiniteError
+from dynx.errors import DTypeError, NotFiniteError, shown
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
@@ -84,8 +84,12 @@ class Lifecycle:
         """
         try:
             found: Made = self._kept[key]
+        except TypeError:
+            raise DTypeError(f"key is {shown(key)}; wanted a hashable object") from None
         except KeyError:
             self._arguments.refuse_closed()
+            if not callable(make):
+                raise DTypeError(f"make is {shown(make)}; wanted a function without arguments") from None
             found = self._kept.setdefault(key, make())
             if self._arguments.closed:
                 # Another thread closed this backend meanwhile.

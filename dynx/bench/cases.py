@@ -8,6 +8,7 @@ from math import prod
 
 import numpy as np
 
+from dynx.argument_types import checks_types
 from dynx.backends.quantities import QUANTITIES
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model import Model
@@ -28,6 +29,7 @@ MAX_POSITION = 2.0 * np.pi
 """Bound on the drawn positions [rad or m], which are also within the limits."""
 
 
+@checks_types
 @dataclass(frozen=True)
 class BenchmarkCase:
     """`quantity` at `batch` samples in one call; a batch of 1 is one sample without a batch axis.

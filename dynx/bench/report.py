@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import Any, Literal, TypedDict
 
 from dynx._version import __version__
+from dynx.argument_types import checks_types
 from dynx.bench.cases import BenchmarkCase
 from dynx.bench.machine import Cost, Peak, roofline
 from dynx.bench.measurement import BenchmarkMeasurement
@@ -79,6 +80,7 @@ _OF_MEASUREMENT = ("role", "version", "threads", "samples", "error", "tolerance"
 """Attributes of a measurement that the document has under the same name."""
 
 
+@checks_types
 def document(
     session: Session, found: Sequence[Sequence[BenchmarkMeasurement]], processor: str
 ) -> dict[str, Any]:

@@ -6,13 +6,15 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property, partial
 
+from dynx.argument_types import checks_types
 from dynx.backends.registry import installed_backends
 from dynx.bench.cases import BENCHMARK_QUANTITIES, Batch, BenchmarkCase, draw_batch, require_memory
 from dynx.bench.implementations import Implementation, PreparedCall, Role, backend_implementation
 from dynx.bench.machine import Cost, Peak, cost_of, load, measure_peak, program_of
 from dynx.bench.measurement import BenchmarkMeasurement, measure
-from dynx.errors import ArgumentError, DynxError, NotInstalledError
+from dynx.errors import ArgumentError, DynxError, NotInstalledError, shown
 from dynx.model import Model
+from dynx.model.numbers import whole_number
 from dynx.spatial.scalar import Floats
 
 BATCHES = (1, 8, 65536)
@@ -27,6 +29,7 @@ COMPILED = "compiled"
 """Name of the backend whose operations `dynx.bench.machine` counts."""
 
 
+@checks_types
 @dataclass(frozen=True)
 class Plan:
     """Cases to time on one robot. Quantities of frames are timed at `frame`; `backends` None means all."""
@@ -53,6 +56,7 @@ class Plan:
         return tuple(sorted({case.threads for case in self.cases}))
 
 
+@checks_types
 def benchmark_cases(
     quantities: Iterable[str] = tuple(BENCHMARK_QUANTITIES),
     batches: Iterable[int] = BATCHES,
@@ -65,11 +69,17 @@ def benchmark_cases(
     """
     return tuple(
         BenchmarkCase(quantity, batch, count)
-        for batch in sorted(set(batches), reverse=True)
+        for batch in sorted(_counts("batches", batches), reverse=True)
         for quantity in dict.fromkeys(quantities)
-        for count in sorted(set(threads))
+        for count in sorted(_counts("threads", threads))
         if count == 1 or batch >= least
     )
+
+
+def _counts(name: str, counts: Iterable[int]) -> set[int]:
+    if not isinstance(counts, Iterable) or getattr(counts, "ndim", 1) == 0:
+        raise ArgumentError(f"{name} is {shown(counts)}; wanted whole numbers")
+    return {whole_number(name, count, 1) for count in counts}
 
 
 class Session:

@@ -36,7 +36,7 @@ from dynx.compiled.kernels import (
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.compiled.table_kernels import table_kernel
 from dynx.model import Model
-from dynx.model.numbers import MAX_MAGNITUDE, UNIT_NORM_TOLERANCE
+from dynx.model.numbers import MAX_MAGNITUDE, UNIT_NORM_TOLERANCE, checked_bool
 from dynx.rbd.elimination import has_physical_inertias
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
 from dynx.simd.image import COMPILE_LOCK
@@ -151,7 +151,7 @@ class CompiledBackend(Backend):
         joint_dynamics: bool = False,
         out: Floats | None = None,
     ) -> Floats:
-        if external_forces is None and not joint_dynamics:
+        if external_forces is None and joint_dynamics is False:
             call = self._public_calls.get("inverse_dynamics")
             if call is None:
                 call = self._call_by_name("inverse_dynamics")
@@ -177,7 +177,7 @@ class CompiledBackend(Backend):
         joint_dynamics: bool = False,
         out: Floats | None = None,
     ) -> Floats:
-        if external_forces is None and not joint_dynamics and self._eliminates:
+        if external_forces is None and joint_dynamics is False and self._eliminates:
             call = self._public_calls.get("forward_dynamics")
             if call is None:
                 self._arguments.refuse_closed()
@@ -199,7 +199,7 @@ class CompiledBackend(Backend):
         if call is None:
             call = self._call_by_name("mass_matrix")
         M = call(q, out=out)
-        if joint_dynamics:
+        if joint_dynamics is not False and checked_bool("joint_dynamics", joint_dynamics):
             M += self._joint_terms.armature
         return M
 

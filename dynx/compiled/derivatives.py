@@ -23,6 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.backends.arguments import Arguments
 from dynx.backends.solvability import Solvability
 from dynx.compiled import derivative_programs as programs
@@ -32,7 +33,6 @@ from dynx.compiled.robot_kernel import Making, RobotKernels
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.compiled.table_kernels import derivatives_kernel
 from dynx.model import Model
-from dynx.model.model import refuse_other_than_model
 from dynx.simd.call_table import TableKernel
 from dynx.spatial.scalar import Floats
 
@@ -67,6 +67,7 @@ class ForwardDynamicsDerivatives(NamedTuple):
     da_dtau: Floats
 
 
+@checks_types
 class Derivatives:
     """Partial derivatives for one robot, of single samples and of batches.
 
@@ -84,7 +85,6 @@ class Derivatives:
 
     def __init__(self, model: Model, *, threads: int | None = None) -> None:
         """Raises ArgumentError for an argument that is not a Model, and for an invalid number of threads."""
-        refuse_other_than_model(model)
         self.model = model
         self._option = threads
         self._kernels = RobotKernels(model, threads)
@@ -126,6 +126,7 @@ class Derivatives:
             self._solve(factors, np.broadcast_to(np.eye(nv), M.shape)),
         )
 
+    @checks_types
     def forward_kinematics_derivative(self, q: ArrayLike, frame: str) -> Floats:
         """Return the derivative of T_world_frame by q (..., 4, 4, nv); the last axis counts entries of v."""
         index = self.model.frame_index(frame)

@@ -12,6 +12,7 @@ from functools import cached_property, partial
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.backends.arguments import Arguments
 from dynx.backends.quantities import QUANTITIES
 from dynx.compiled.model_coordinates import argument_shapes, reduce_columns, reduce_rows, tree_coordinates
@@ -20,7 +21,6 @@ from dynx.compiled.simplification import simplify_mechanism
 from dynx.errors import ArgumentError, shown
 from dynx.model import Mechanism, Model
 from dynx.model.elements import JointCoefficients
-from dynx.model.model import refuse_other_than_model
 from dynx.model.numbers import checked_array
 from dynx.rbd import crba, rnea
 from dynx.rbd.elimination import factorize_mass_matrix, solve_with_factors
@@ -31,6 +31,7 @@ from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import Array, Floats, sign
 
 
+@checks_types
 def parametric(
     model: Model,
     *,
@@ -51,7 +52,6 @@ def parametric(
     A batch is split over at most `threads` threads; None stands for one per processor. Raises
     UnknownNameError for an unknown link or frame, ArgumentError for a link named twice.
     """
-    refuse_other_than_model(model)
     if isinstance(links, str):
         raise ArgumentError(f"links is the text {shown(links)}; wanted a list of names: [{shown(links)}]")
     parameters = Parameters(
@@ -64,6 +64,7 @@ def parametric(
     return ParametricDynamics(parameters, threads=threads)
 
 
+@checks_types
 class ParametricDynamics:
     """Inverse and forward dynamics and the mass matrix of one robot, as functions of its parameters.
 

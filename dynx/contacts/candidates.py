@@ -6,10 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from dynx.argument_types import checks_types
+
 SUBSTEPS = "substeps"
 """Number of steps of the engine in each step, an option of every world that counts as a setting here."""
 
 
+@checks_types
 @dataclass(frozen=True)
 class SettingsChange:
     """Changes of one setting of an engine, or of several at once, tried one after the other.

@@ -11,11 +11,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, UnknownNameError, shown
 from dynx.registry import ClassRegistry
 from dynx.world import Scene, World
 
 
+@checks_types
 @dataclass(frozen=True)
 class Figure:
     """A measured number of a case, and the value that mechanics gives it."""
@@ -115,11 +117,13 @@ register = _cases.register
 unregister = _cases.unregister
 
 
+@checks_types
 def find_case(name: str) -> ContactCase:
     """Return the case of that name; UnknownNameError where nobody provides it."""
     return _cases.find(name)()
 
 
+@checks_types
 def find_cases(names: Sequence[str] | None = None) -> tuple[ContactCase, ...]:
     """Return the cases of these names, or all."""
     return tuple(find_case(name) for name in (case_names() if names is None else names))

@@ -14,13 +14,13 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
+from dynx.argument_types import checks_types
 from dynx.backends import Backend, backend
 from dynx.backends.dynamics import Dynamics, EngineDynamics
 from dynx.control.content import attributes_of, content_of, fields_of
 from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
 from dynx.files.pages import html_grid
 from dynx.model import Model
-from dynx.model.model import refuse_other_than_model
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
@@ -115,6 +115,7 @@ class Controller(ABC, Generic[ControllerState]):
         The given arrays must not be modified; returned arrays must be new or never change.
         """
 
+    @checks_types
     def on(self: Self, engine: str | Backend) -> Self:
         """Return a controller whose model another backend evaluates; `self` if it evaluates no model."""
         changes: dict[str, Any] = {
@@ -195,12 +196,12 @@ class ModelBased(Controller[ControllerState]):
     backend: str | Backend = field(compare=False)
     dynamics: Dynamics = field(init=False, repr=False)
 
+    @checks_types
     def __init__(self, model: Model, backend: str | Backend = DEFAULT_ENGINE) -> None:
         """`backend` is a name, or a backend of an equal model.
 
         Raises UnsupportedFeatureError for a floating base, ArgumentError for a backend of another robot.
         """
-        refuse_other_than_model(model)
         if model.floating:
             raise UnsupportedFeatureError(
                 f"{type(self).__name__} commands every coordinate, but {model.name} has a floating base, "
@@ -208,6 +209,7 @@ class ModelBased(Controller[ControllerState]):
             )
         self._set(model=model, backend=backend, dynamics=EngineDynamics(engine_of(model, backend)))
 
+    @checks_types
     def on(self: Self, engine: str | Backend) -> Self:
         """Return a controller whose model another backend evaluates."""
         return substitute(self, backend=engine, dynamics=EngineDynamics(engine_of(self.model, engine)))
@@ -295,6 +297,7 @@ def engine_of(model: Model, engine: str | Backend) -> Backend:
     return engine
 
 
+@checks_types
 def model_dynamics(model: Model, backend: str | Backend = "pinocchio") -> Dynamics:
     """Return the dynamics of `model`, for a controller of your own that evaluates them in `torque`.
 

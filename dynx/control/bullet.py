@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.control.base import Controller, Measurement, gain, parameter, refuse_other_than_controller
 from dynx.control.joint_space import JointSpace
 from dynx.control.saturation import checked_limit
@@ -43,6 +44,7 @@ class BulletMotor(JointSpace[None]):
         refuse_mimic_joints(model, "lock them, or use a controller that computes torques")
         super().__init__(model)
 
+    @checks_types
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """Raise UnsupportedFeatureError: the engine's solver determines the torque during the step."""
         raise UnsupportedFeatureError(
@@ -69,6 +71,7 @@ def _forces(limits: Floats | None) -> list[float] | None:
     return finite
 
 
+@checks_types
 @dataclass(frozen=True)
 class BulletPositionMotor(BulletMotor):
     """PyBullet's POSITION_CONTROL: each step ends at v = kd v* + kp (q* - q) / dt, if the force suffices.
@@ -109,6 +112,7 @@ class BulletPositionMotor(BulletMotor):
         )
 
 
+@checks_types
 @dataclass(frozen=True)
 class BulletVelocityMotor(BulletMotor):
     """PyBullet's VELOCITY_CONTROL: each step ends at the velocity of the setpoint, if the force suffices."""
@@ -126,6 +130,7 @@ class BulletVelocityMotor(BulletMotor):
         return BulletMotorCommand("VELOCITY_CONTROL", velocities=velocities, forces=_forces(self.force))
 
 
+@checks_types
 @dataclass(frozen=True)
 class BulletPDMotor(BulletMotor):
     """PyBullet's PD_CONTROL: tau = kp (q* - q) + kd (v* - v), computed inside the engine."""

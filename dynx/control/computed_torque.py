@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.backends import Backend
 from dynx.control.base import Measurement, ModelBased, gain, parameter
 from dynx.control.gains import feedback_gains
@@ -17,6 +18,7 @@ from dynx.spatial.scalar import Array, Floats
 from dynx.trajectory.base import Setpoint
 
 
+@checks_types
 @dataclass(frozen=True)
 class ComputedTorque(ModelBased[None], pure=True):
     """tau = ID(q, v, a* + kd (v* - v) + kp (q* - q)).
@@ -47,6 +49,7 @@ class ComputedTorque(ModelBased[None], pure=True):
         kp, kd = feedback_gains(model.nv, kp, kd, natural_frequency, damping_ratio)
         self._set(kp=kp, kd=kd)
 
+    @checks_types
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         _, q, v = measurement
         a = commanded_acceleration(q, v, *setpoint, self.kp, self.kd)
@@ -61,6 +64,7 @@ def commanded_acceleration(
     return a
 
 
+@checks_types
 @dataclass(frozen=True)
 class DiscreteComputedTorque(ModelBased[None], pure=True):
     """Torque with which one step of semi-implicit Euler ends exactly at the next setpoint.
@@ -83,6 +87,7 @@ class DiscreteComputedTorque(ModelBased[None], pure=True):
         super().__init__(model, backend)
         self._set(control_dt=positive_seconds("control_dt", control_dt))
 
+    @checks_types
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """Return the torque (nv,); the setpoint is that of the end of the step."""
         _, q, v = measurement

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from dynx.argument_types import checks_types
 from dynx.backends.joint_friction import SLIP, Coefficients, JointFriction, coefficients_by_joint
 from dynx.control.base import Controller, ControllerState, Measurement, Wrapper, parameter
 from dynx.errors import ArgumentError, shown
@@ -51,14 +52,16 @@ class FrictionCompensation(Wrapper[ControllerState], pure=True):
         if speed not in SPEEDS:
             raise ArgumentError(f"speed is {shown(speed)}; wanted one of {', '.join(SPEEDS)}")
         super().__init__(inner)
+        losses = JointFriction(inner.model, damping, friction, slip)
         self._set(
             damping=_coefficients(inner.model, "damping", damping),
             friction=_coefficients(inner.model, "friction", friction),
-            slip=float(slip),
+            slip=losses.slip,
             speed=speed,
-            losses=JointFriction(inner.model, damping, friction, slip),
+            losses=losses,
         )
 
+    @checks_types
     def torque(
         self, measurement: Measurement, setpoint: Setpoint, state: ControllerState
     ) -> tuple[Floats, ControllerState]:

@@ -16,25 +16,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.backends import Backend
 from dynx.control.base import Controller, ControllerState, Measurement, ModelBased, gain, parameter
 from dynx.control.saturation import checked_limit
 from dynx.model import Model
-from dynx.model.model import refuse_other_than_model
 from dynx.model.numbers import checked_gain, positive_seconds
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Array, Floats, clamp
 from dynx.trajectory.base import Setpoint
 
 
+@checks_types
 @dataclass(frozen=True)
 class JointSpace(Controller[ControllerState]):
     """A controller that reads and moves joints alone; it commands no force on a floating base."""
 
     model: Model
-
-    def __post_init__(self) -> None:
-        refuse_other_than_model(self.model)
 
     @property
     def n_joints(self) -> int:
@@ -51,6 +49,7 @@ class JointSpace(Controller[ControllerState]):
         """Entries of the joints in a velocity."""
         return slice(6 if self.model.floating else 0, None)
 
+    @checks_types
     def joint_states(self, measurement: Measurement, setpoint: Setpoint) -> tuple[Array, Array, Array, Array]:
         """Return q and v of the joints as measured, and as the setpoint has them (n,)."""
         q, v = self.q_joints, self.v_joints
@@ -61,6 +60,7 @@ class JointSpace(Controller[ControllerState]):
         return np.concatenate([np.zeros(6), joint_torque]) if self.model.floating else joint_torque
 
 
+@checks_types
 @dataclass(frozen=True)
 class PD(JointSpace[None], pure=True):
     """A spring and a damper from each joint to its setpoint; it needs no model of the masses.
@@ -77,6 +77,7 @@ class PD(JointSpace[None], pure=True):
         n, per = self.n_joints, "one for each joint"
         self._set(kp=checked_gain("kp", kp, n, per=per), kd=checked_gain("kd", kd, n, per=per))
 
+    @checks_types
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         states = self.joint_states(measurement, setpoint)
         return self.all_torques(pd_torque(*states, self.kp, self.kd)), None
@@ -88,6 +89,7 @@ def pd_torque(q: Array, v: Array, q_wanted: Array, v_wanted: Array, kp: Array, k
     return tau
 
 
+@checks_types
 @dataclass(frozen=True)
 class Velocity(JointSpace[None], pure=True):
     """A damper from each joint to its velocity setpoint; positions are not controlled."""
@@ -99,11 +101,13 @@ class Velocity(JointSpace[None], pure=True):
         super().__init__(model)
         self._set(kd=checked_gain("kd", kd, self.n_joints, per="one for each joint"))
 
+    @checks_types
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         rates = self.v_joints
         return self.all_torques(self.kd * (setpoint.v[rates] - measurement.v[rates])), None
 
 
+@checks_types
 @dataclass(frozen=True)
 class PID(JointSpace[Floats], pure=True):
     """tau = kp e + kd e' + z with z' = ki e, saturated at the effort limits.
@@ -149,6 +153,7 @@ class PID(JointSpace[Floats], pure=True):
         """Return the integral part 0."""
         return np.zeros(self.n_joints)
 
+    @checks_types
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: Floats) -> tuple[Floats, Floats]:
         """Return the torque (nv,) within the limits, and the next integral part."""
         q, v, q_wanted, v_wanted = self.joint_states(measurement, setpoint)
@@ -161,6 +166,7 @@ class PID(JointSpace[Floats], pure=True):
         return self.all_torques(tau), integral
 
 
+@checks_types
 @dataclass(frozen=True)
 class GravityCompensatedPD(ModelBased[None], pure=True):
     """PD control with gravity compensation, so that there is no error at rest.
@@ -179,6 +185,7 @@ class GravityCompensatedPD(ModelBased[None], pure=True):
         super().__init__(model, backend)
         self._set(kp=checked_gain("kp", kp, model.nv), kd=checked_gain("kd", kd, model.nv))
 
+    @checks_types
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         weight = self.dynamics.gravity_torque(measurement.q)
         return weight + pd_torque(
@@ -186,6 +193,7 @@ class GravityCompensatedPD(ModelBased[None], pure=True):
         ), None
 
 
+@checks_types
 @dataclass(frozen=True)
 class FeedForward(ModelBased[None], pure=True):
     """Inverse dynamics of the setpoint, and with gains PD control of the remaining error.
@@ -208,6 +216,7 @@ class FeedForward(ModelBased[None], pure=True):
         super().__init__(model, backend)
         self._set(kp=checked_gain("kp", kp, model.nv), kd=checked_gain("kd", kd, model.nv))
 
+    @checks_types
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         tau = self.dynamics.inverse_dynamics(*setpoint)
         return tau + pd_torque(measurement.q, measurement.v, setpoint.q, setpoint.v, self.kp, self.kd), None

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.control.base import Controller, Measurement, Wrapper, parameter
 from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
 from dynx.model.numbers import checked_gain, is_real, positive_seconds, real_array
@@ -103,6 +104,7 @@ class MotorLag(_StatefulWrapper, pure=True):
         """Return the torque at the start, as often as torques are under way, and as that of the motor."""
         return self._joined(np.tile(self.initial, self._steps + 1))
 
+    @checks_types
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: Floats) -> tuple[Floats, Floats]:
         """Return the mean torque (nv,) of the motor in this step."""
         nv, k = self.model.nv, self._steps
@@ -156,6 +158,7 @@ class Encoders(_StatefulWrapper, pure=True):
         """Return no last position: zeros, and 0 for that there is none."""
         return self._joined(np.zeros(len(self.resolution) + 1))
 
+    @checks_types
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: Floats) -> tuple[Floats, Floats]:
         """Return the torque (nv,) of the inner controller for the positions that the encoders show."""
         n = len(self.resolution)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.control.base import Controller, Measurement, parameter
 from dynx.errors import ShapeError
 from dynx.model import Model
@@ -15,6 +16,7 @@ from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 
 
+@checks_types
 @dataclass(frozen=True)
 class OpenLoop(Controller[None], pure=True):
     """Controller that applies row k of a table of torques from time k control_dt on, and then zero torque."""
@@ -32,6 +34,7 @@ class OpenLoop(Controller[None], pure=True):
             raise ShapeError(f"torques has shape {table.shape}; wanted (n, {model.nv})")
         self._set(model=model, torques=table, row_dt=positive_seconds("control_dt", control_dt))
 
+    @checks_types
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """Return the torque (nv,) of the row."""
         row = round(measurement.t / self.row_dt)

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from dynx.argument_types import checks_types
 from dynx.backends import Backend, backend_class
 from dynx.control.base import Controller
 from dynx.control.content import attributes_of, fields_of
@@ -56,6 +57,7 @@ register = _classes.register
 unregister = _classes.unregister
 
 
+@checks_types
 def to_document(controller: Controller[Any]) -> dict[str, Any]:
     """Return the name of a controller's class and its constructor arguments, in types that JSON has.
 
@@ -77,6 +79,7 @@ def to_document(controller: Controller[Any]) -> dict[str, Any]:
     return {"controller": name, **arguments}
 
 
+@checks_types
 def from_document(model: Model, document: Mapping[str, Any]) -> Controller[Any]:
     """Return the controller of `model` that `to_document` wrote. Raises ArgumentError for other documents."""
     arguments = {name: _read(model, value) for name, value in document.items() if name != "controller"}

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.backends.joint_friction import coefficients_by_joint, refuse_text
 from dynx.control.base import Controller, ControllerState, Measurement, Wrapper, parameter
 from dynx.errors import GainError, LimitError, shown
@@ -34,6 +35,7 @@ class Saturated(Wrapper[ControllerState], pure=True):
         super().__init__(inner)
         self._set(limit=checked_limit(inner.model, limit))
 
+    @checks_types
     def torque(
         self, measurement: Measurement, setpoint: Setpoint, state: ControllerState
     ) -> tuple[Floats, ControllerState]:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.backends import Backend
 from dynx.control.base import ControllerState, Measurement, ModelBased, gain, parameter
 from dynx.control.computed_torque import commanded_acceleration
@@ -59,6 +60,7 @@ class TaskSpace(ModelBased[ControllerState]):
         return FrameMotionError(np.concatenate([linear, angular]), wanted_twist - J @ measurement.v, J)
 
 
+@checks_types
 @dataclass(frozen=True)
 class Impedance(TaskSpace[None], pure=True):
     """tau = J' (K e + D e') + g(q) - B v, without shaping the inertia.
@@ -94,6 +96,7 @@ class Impedance(TaskSpace[None], pure=True):
             joint_damping=checked_gain("joint_damping", joint_damping, model.nv),
         )
 
+    @checks_types
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         error = self._error(measurement, setpoint)
         wrench = self.stiffness * error.pose + self.damping * error.twist
@@ -101,6 +104,7 @@ class Impedance(TaskSpace[None], pure=True):
         return weight + error.jacobian.T @ wrench - self.joint_damping * measurement.v, None
 
 
+@checks_types
 @dataclass(frozen=True)
 class OperationalSpace(TaskSpace[None], pure=True):
     """Computed torque in the space of a frame (Khatib 1987; Siciliano et al., Robotics, section 8.6.2).
@@ -144,6 +148,7 @@ class OperationalSpace(TaskSpace[None], pure=True):
             damping=float(checked_gain("damping", damping, 1)[0]),
         )
 
+    @checks_types
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         _, q, v = measurement
         dynamics, frame = self.dynamics, self.frame

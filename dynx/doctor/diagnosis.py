@@ -11,6 +11,7 @@ from itertools import combinations
 
 from dynx.agreement.report import LoadFailure
 from dynx.agreement.tolerances import BAR
+from dynx.argument_types import checks_types
 from dynx.doctor.attribution import (
     AttributedCause,
     CauseAttributor,
@@ -66,6 +67,7 @@ from dynx.loaded import COMMON_VARIANTS, ENGINES, VARIANTS, engine_of, installed
 from dynx.loaded.difference import model_difference
 from dynx.model import Model
 from dynx.model.loading import read_description
+from dynx.model.numbers import is_real
 from dynx.model.tree import Base, checked_base
 from dynx.model.xml.source import XmlSource
 from dynx.option_names import checks_option_names
@@ -389,6 +391,7 @@ Progress = Callable[[str], None]
 Robot = str | os.PathLike[str] | bytes | Model
 
 
+@checks_types
 @checks_option_names
 def diagnose(
     robot: Robot,
@@ -448,6 +451,7 @@ def diagnose(
     return replace(report, samples=samples, seed=seed, tolerance=tolerance, seconds=seconds)
 
 
+@checks_types
 def compare_as_loaded(
     robot: Robot,
     *,
@@ -689,7 +693,7 @@ def _examiners(
     for name, value, least in (("samples", samples, 1), ("seed", seed, 0)):
         if isinstance(value, bool) or not isinstance(value, int) or value < least:
             raise ArgumentError(f"{name} is {value!r}; wanted a whole number, at least {least}")
-    if not 0.0 < tolerance < 1.0:
+    if not (is_real(tolerance) and 0.0 < tolerance < 1.0):
         raise ArgumentError(f"tolerance is {tolerance!r}; wanted a relative error between 0 and 1")
     chosen = installed_engines() if engines is None else tuple(dict.fromkeys(engines))
     if isinstance(engines, str) or not chosen:

@@ -13,6 +13,7 @@ from typing import Any, Literal, get_args
 
 from dynx._version import __version__
 from dynx.agreement.report import LoadFailure
+from dynx.argument_types import checks_types
 from dynx.files.documents import document_of, to_json_values
 from dynx.files.pages import html_grid
 from dynx.loaded import engine_of
@@ -438,6 +439,7 @@ class DoctorDocument:
     """The robots in xacro below a directory, which are not examined."""
 
 
+@checks_types
 def results_document(
     reports: Iterable[DoctorReport], not_done: Sequence[str] = (), left_out: Sequence[str] = ()
 ) -> dict[str, Any]:

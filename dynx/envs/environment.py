@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.argument_types import checks_types
 from dynx.envs.library import Env, Space, spaces
 from dynx.envs.randomization import Randomization, Variation, first_seed
 from dynx.envs.task import Episodes, Outcome, Task, checked_engine
@@ -35,6 +36,7 @@ MAX_SIDE = 8192
 """Largest width and height of a picture [pixels]."""
 
 
+@checks_types
 class TaskEnvironment(Env[Any, Any]):
     """A task on one engine, with the interface of `gymnasium.Env`.
 
@@ -101,6 +103,7 @@ class TaskEnvironment(Env[Any, Any]):
             raise ClosedError("this environment was closed")
         return self._episodes
 
+    @checks_types
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
@@ -110,7 +113,7 @@ class TaskEnvironment(Env[Any, Any]):
         Raises UnknownNameError for an option that the task does not have.
         """
         episodes = self.episodes
-        super().reset(seed=seed)
+        super().reset(seed=None if seed is None else whole_number("seed", seed, 0))
         if not isinstance(options, Mapping | None):
             raise ArgumentError(f"options is {shown(options)}; wanted a dict of options by name")
         if self._variation is not None:
@@ -222,10 +225,17 @@ def checked_action(space: Space[Any], action: Any) -> Any:
     return action
 
 
+def _array_of(action: object) -> Any:
+    try:
+        return np.asarray(action)
+    except ValueError as error:
+        raise ShapeError(f"action is ragged: {error}") from None
+
+
 def _checked_choice(space: spaces.Discrete, action: Any) -> int:
     first, last = int(space.start), int(space.start + space.n - 1)
     if type(action) is not int:
-        array = np.asarray(action)
+        array = _array_of(action)
         if array.dtype.kind not in "iu":
             raise DTypeError(f"action is {shown(action)}; wanted a whole number from {first} to {last}")
         if array.size != 1 or array.ndim > 1:
@@ -237,7 +247,7 @@ def _checked_choice(space: spaces.Discrete, action: Any) -> int:
 
 
 def _checked_numbers(space: spaces.Box, action: Any) -> Any:
-    array = np.asarray(action)
+    array = _array_of(action)
     if array.dtype.kind not in "fiu":
         raise DTypeError(f"action is {shown(action)}; wanted numbers of shape {space.shape}")
     if array.shape != space.shape:

@@ -13,6 +13,7 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.argument_types import checks_types
 from dynx.envs.library import Space, spaces
 from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError, nearest, shown
 from dynx.model.numbers import MAX_MAGNITUDE, is_real
@@ -80,7 +81,7 @@ def read_distribution(name: str, given: Any, valid: str = NOT_NEGATIVE) -> Distr
     if (
         not isinstance(pair, Sequence | np.ndarray)
         or isinstance(pair, str)
-        or len(pair) != 2
+        or np.shape(pair) != (2,)
         or not all(is_real(x) and abs(x) < MAX_MAGNITUDE for x in pair)
     ):
         raise ArgumentError(
@@ -106,6 +107,7 @@ PAYLOAD_FIELDS = ("frame", "mass", "center")
 AXES = ("x", "y", "z")
 
 
+@checks_types
 @dataclass(frozen=True)
 class Randomization:
     """Parameters that each episode draws; None for those that keep the values of the task.

@@ -8,6 +8,7 @@ from importlib import import_module
 from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
+from dynx.argument_types import checks_types
 from dynx.envs.environment import TaskEnvironment
 from dynx.envs.library import AutoresetMode, register, registry
 from dynx.envs.randomization import Randomization
@@ -57,6 +58,7 @@ def task_class(task: str | type[Task]) -> type[Task]:
     return found
 
 
+@checks_types
 def make_environment(
     task: str | type[Task],
     engine: str | None = None,
@@ -114,6 +116,7 @@ def make_vector_environment(
     )
 
 
+@checks_types
 def register_task(env_id: str, task: str | type[Task]) -> None:
     """Register a task, so that ``gymnasium.make(env_id, engine=...)`` makes its environment.
 

@@ -16,6 +16,7 @@ from dynx.ik.problem import SOLVERS, Problem, argument_note, checked_problem
 from dynx.ik.reach import proofs
 from dynx.ik.result import IKResult
 from dynx.ik.search import Candidate, Search
+from dynx.model.numbers import checked_bool
 from dynx.spatial.scalar import Floats
 
 if TYPE_CHECKING:
@@ -136,7 +137,7 @@ def _inverse_kinematics(
 ) -> IKResult:
     """Check the arguments and return the result."""
     chosen = Options.of(options)
-    if chosen.all_solutions:
+    if checked_bool("all_solutions", chosen.all_solutions):
         return _all_solutions(backend, target, frame, q0, chosen)
     if chosen.given is not None:
         raise ArgumentError(
@@ -150,6 +151,8 @@ def _inverse_kinematics(
 
 def _solved(backend: Backend, problem: Problem, method: str) -> IKResult:
     """Return the result of a checked problem. Raises ArgumentError for an unknown method."""
+    if not isinstance(method, str) or method not in METHODS:
+        raise ArgumentError(f"method is {shown(method)}{nearest(str(method), METHODS)}")
     if method == "dynx":
         found = None
         if backend.compiles:
@@ -165,9 +168,7 @@ def _solved(backend: Backend, problem: Problem, method: str) -> IKResult:
         found = refined_solutions(backend, problem, found)
         errors = _errors_by_frame(list(found.q.reshape(problem.count, -1)), problem, backend)
         return replace(found, by_frame=errors)
-    if method == "engine":
-        return _solved_by_engine(backend, problem)
-    raise ArgumentError(f"method is {shown(method)}{nearest(str(method), METHODS)}")
+    return _solved_by_engine(backend, problem)
 
 
 def _searched(backend: Backend, problem: Problem) -> IKResult:

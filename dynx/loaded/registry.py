@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from pathlib import Path
 
+from dynx.argument_types import checks_types
 from dynx.errors import BackendError, UnknownBackendError
 from dynx.loaded.robot import LoadedRobot
 from dynx.model import Model
@@ -41,11 +42,13 @@ COMMON_VARIANTS = ("pybullet:plain",)
 """Variants so common that they are examined beside their engine by default."""
 
 
+@checks_types
 def engine_of(name: str) -> str:
     """Return the engine of a loading variant, or the name itself if it is that of an engine."""
     return name.partition(":")[0]
 
 
+@checks_types
 def loader_class(engine: str) -> type[LoadedRobot]:
     """Return the class of that engine or variant; raises NotInstalledError where the engine is missing."""
     found = REGISTRY.find(engine)
@@ -58,6 +61,7 @@ def installed_engines() -> tuple[str, ...]:
     return tuple(name for name in REGISTRY.names() if engine_of(name) == name and _is_installed(name))
 
 
+@checks_types
 def load_as(engine: str, path: Path, model: Model, calls: Collection[str] = ()) -> LoadedRobot:
     """Return the robot as `engine` loads it from the file; see `LoadedRobot`."""
     return loader_class(engine)(path, model, calls)

@@ -42,7 +42,7 @@ def rigid_matrix(T: ArrayLike, name: str) -> Floats:
         if entries.dtype.kind == "c":
             raise DTypeError(f"{name} has dtype {entries.dtype}; wanted real numbers (float64)")
         array = np.asarray(entries, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         if isinstance(error, DTypeError):
             raise
         raise ArgumentError(f"{name} is {shown(T)}; wanted a Pose or a matrix (4, 4)") from None

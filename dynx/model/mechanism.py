@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from dynx.argument_types import checks_types
 from dynx.model.elements import IDENTITY, Pose
 from dynx.model.tree import Tree
 from dynx.spatial.inertia import RigidInertia, inertia_about_origin
@@ -177,6 +178,7 @@ def pose_arrays(pose: Pose, convert: ScalarConverter) -> tuple[Array, Array]:
     return rotation_from_rpy(convert(pose.rpy)), convert(pose.xyz)
 
 
+@checks_types
 def build_mechanism(tree: Tree, convert: ScalarConverter = float64) -> Mechanism:
     """Merge the links connected by fixed joints and their inertias, in the scalar type of `convert`."""
     # Placement of each link: its body and its pose (R, p) in the frame of that body.

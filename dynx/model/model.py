@@ -9,6 +9,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, shown
 from dynx.files.pages import html_grid
 from dynx.model import configuration, topology
@@ -23,6 +24,7 @@ from dynx.registry import door
 from dynx.spatial.scalar import longdouble
 
 
+@checks_types
 @dataclass(frozen=True, eq=False)
 class Model(Tree):
     """A robot: links and joints in depth-first order, its base, and gravity.
@@ -40,6 +42,7 @@ class Model(Tree):
     """
 
     @classmethod
+    @checks_types
     def build(
         cls,
         name: str,
@@ -99,6 +102,7 @@ class Model(Tree):
         """`mechanism` with its inertias merged in extended precision (`dynx.spatial.scalar`)."""
         return build_mechanism(self, longdouble)
 
+    @checks_types
     def with_base(self, base: Base) -> Model:
         """Return the same robot with that kind of base; `base_pose` is kept for a fixed base only, because a
         floating one has its pose in q."""
@@ -117,6 +121,7 @@ class Model(Tree):
         """Return the same robot with another gravity (3,) [m/s^2]."""
         return replace(self, gravity=checked_gravity(gravity))
 
+    @checks_types
     def with_frame(self, name: str, link: str, placement: Pose | ArrayLike = IDENTITY) -> Model:
         """Return the same robot with one more named frame, fixed to `link` (a tool tip, say).
 

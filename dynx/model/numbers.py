@@ -21,6 +21,9 @@ A moment is a product of two lengths, two speeds and a mass. The bound prevents 
 engine would silently return infinity or NaN.
 """
 
+MAX_SAMPLES = 10**9
+"""Largest number of samples that are drawn at once."""
+
 DIVERGENCE_SPEED = 1e8
 """Norm of the velocity [rad/s or m/s] above which a simulation or a world counts as diverged."""
 
@@ -68,6 +71,13 @@ def is_real(value: object) -> TypeGuard[float]:
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         return False
     return not isinstance(value, int) or abs(value) <= _MAX_FLOAT
+
+
+def checked_bool(name: str, value: object) -> bool:
+    """Return True or False, of Python or NumPy; raise DTypeError for anything else."""
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    raise DTypeError(f"{name} is {shown(value)} ({type(value).__name__}); wanted True or False")
 
 
 def positive_seconds(name: str, seconds: object) -> float:
@@ -148,6 +158,8 @@ def checked_size(size: tuple[int, ...] | int) -> tuple[int, ...]:
     shape = tuple(size) if isinstance(size, tuple | list) else (size,)
     if not all(isinstance(n, int | np.integer) and not isinstance(n, bool) and n >= 0 for n in shape):
         raise ArgumentError(f"size is {shown(size)}; wanted a number of samples, or a tuple of them")
+    if math.prod(shape) > MAX_SAMPLES:
+        raise ArgumentError(f"size is {shown(size)}; wanted at most {MAX_SAMPLES:g} samples")
     return tuple(int(n) for n in shape)
 
 

@@ -9,6 +9,7 @@ from typing import Literal, TypeVar
 
 import numpy as np
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model.elements import IDENTITY, Frame, Inertial, Joint, Link, Note, Pose, Vector
 from dynx.model.geometry.links import Geometry
@@ -105,6 +106,7 @@ class Tree:
         """Return the index of the frame in `frame_names`; UnknownNameError if there is none."""
         return self._named("frame", name, self._frame_index)
 
+    @checks_types
     def coordinate_index(self, joint: str) -> int:
         """Return the index of the joint's coordinate in `v` (one higher in `q` with a floating base)."""
         offset = 6 if self.floating else 0

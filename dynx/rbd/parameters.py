@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model.elements import Inertial, Joint, JointCoefficients, JointDynamics, Link, Pose
 from dynx.model.geometry import Geometry
@@ -269,6 +270,7 @@ MassScale = float | Mapping[str, float]
 """One factor for all links, or one for each of some links."""
 
 
+@checks_types
 def plant_model(
     model: Model, payload: Payload | Sequence[Payload] | None = None, mass_scale: MassScale = 1.0
 ) -> Model:

@@ -20,9 +20,9 @@ from functools import cached_property
 
 import numpy as np
 
+from dynx.argument_types import checks_types
 from dynx.model import Model
 from dynx.model.mechanism import Body, BodyFrame, Mechanism, ScalarConverter, float64, pose_arrays
-from dynx.model.model import refuse_other_than_model
 from dynx.rbd.kinematics import BodyPose, Poses, pose_pairs
 from dynx.rbd.loops import Loops, PythonLoops
 from dynx.spatial.inertia import RigidInertia, inertia_about_origin
@@ -180,9 +180,9 @@ def _times(row: Array, A: Array) -> Array:
     return np.asarray((row[..., None, :] @ A)[..., 0, :])
 
 
+@checks_types
 def inertial_parameters(model: Model, convert: ScalarConverter = float64) -> Array:
     """Return pi (10 n_links,): the ten parameters of each of `model.links`, zeros without an inertial."""
-    refuse_other_than_model(model)
     return np.concatenate(
         [parameters_from_inertia(link_inertia(model, link.name, convert)) for link in model.links]
     )

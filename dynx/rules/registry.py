@@ -12,6 +12,7 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, DynxError, RobotNotFoundError, UnknownNameError, nearest, shown
 from dynx.model.library import TRAPS, own_roots
 from dynx.model.xml.source import XmlSource
@@ -53,6 +54,7 @@ def all_rules() -> tuple[Rule, ...]:
     return rules
 
 
+@checks_types
 def find_rule(name: str) -> Rule:
     """Return the rule of that id or name, in any case.
 

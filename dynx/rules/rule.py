@@ -13,6 +13,7 @@ from typing import ClassVar, Literal, get_args
 
 from packaging.specifiers import SpecifierSet
 
+from dynx.argument_types import checks_types
 from dynx.loaded import engine_of
 from dynx.loaded.robot import call_on_joint
 from dynx.model.tree import Base
@@ -73,6 +74,7 @@ class Detection:
         return f"{self.message}: {', '.join(clauses)}" if clauses else self.message
 
 
+@checks_types
 def links_of(detections: Sequence[Detection]) -> list[str]:
     """Return the names of the links in which something was detected."""
     return [detection.link for detection in detections if detection.link is not None]
@@ -258,6 +260,7 @@ class Correction:
     whole: bool = False
 
 
+@checks_types
 def found_at(element: SourceElement, message: str) -> Detection:
     """Return the detection in `element`: its line, and the link or joint of the robot that it belongs to."""
     part = element
@@ -269,6 +272,7 @@ def found_at(element: SourceElement, message: str) -> Detection:
     return Detection(link, joint, element.line, message)
 
 
+@checks_types
 def correction(element: SourceElement, message: str, *edits: Edit) -> Correction:
     """Return the correction of `element` by these edits."""
     return Correction(found_at(element, message), edits)

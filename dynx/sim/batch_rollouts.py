@@ -10,10 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, shown
 from dynx.files.arrays import SCHEMA_ENTRY, read_arrays, write_arrays
 from dynx.files.figures import new_figure, save_figure
 from dynx.files.pages import html_table
+from dynx.model.numbers import checked_entries, real_array
 from dynx.sim.record.csv_file import coordinate_names
 from dynx.sim.scenario.scenario import Scenario
 from dynx.spatial.scalar import Floats
@@ -67,12 +69,16 @@ class BatchRollouts:
         worst = np.max(self.max_error, axis=1, initial=0.0)
         return np.where(np.isnan(self.diverged), worst, np.where(self.done, np.inf, np.nan))
 
+    @checks_types
     def quantiles(self, levels: Sequence[float] = (0.05, 0.5, 0.95)) -> Floats:
         """Return the quantiles (len(levels),) of `worst` over the computed rollouts; NaN without any."""
+        shares = checked_entries("levels", real_array("levels", levels))
+        if shares.ndim != 1 or (shares < 0.0).any() or (shares > 1.0).any():
+            raise ArgumentError(f"levels is {shown(levels)}; wanted a sequence of numbers from 0 to 1")
         worst = self.worst[self.done]
         if not len(worst):
             return np.full(len(levels), np.nan)
-        return np.asarray(np.quantile(worst, levels, method="inverted_cdf"))
+        return np.asarray(np.quantile(worst, shares, method="inverted_cdf"))
 
     def columns(self) -> dict[str, Any]:
         """Return columns (n,) with a row for each rollout, by name, for `pandas.DataFrame`.
@@ -93,6 +99,7 @@ class BatchRollouts:
             found |= {f"{kind}:{name}": column for name, column in zip(names, block.T, strict=True)}
         return found
 
+    @checks_types
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a ``.npz`` that `load` reads, atomically.
 
@@ -104,6 +111,7 @@ class BatchRollouts:
         write_arrays(path, {SCHEMA_ENTRY: SCHEMA, "scenario": self.scenario.to_json(), **arrays})
 
     @classmethod
+    @checks_types
     def load(cls, path: str | os.PathLike[str]) -> BatchRollouts:
         """Read what `save` wrote. Raises ArgumentError for any other file."""
         file = read_arrays(path, "rollouts", SCHEMA)
@@ -121,6 +129,7 @@ class BatchRollouts:
         }
         return cls(scenario, **arrays)
 
+    @checks_types
     def plot(self, path: str | os.PathLike[str] | None = None) -> Any:
         """Plot the share of rollouts below each error, and the errors of each joint; return the `matplotlib`
         figure.

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.backends.registry import backend_class
 from dynx.control.base import Controller
 from dynx.errors import ArgumentError, ClosedError, SimulationError, shown
@@ -162,6 +163,7 @@ class Simulation:
         loop_state = self._advance(end, given)
         return SimulationState(end * self._dt, loop_state.q.copy(), loop_state.v.copy())
 
+    @checks_types
     def run(self, until: float | None = None, *, real_time: bool = False) -> Rollout:
         """Step to the time `until` [s], by default the end of the scenario, and return the record.
 
@@ -403,6 +405,7 @@ class Simulation:
             record,
         )
 
+    @checks_types
     def restore(self, snapshot: Snapshot) -> SimulationState:
         """Continue from a snapshot of this simulation or of another of the same robot and `dt`.
 
@@ -446,6 +449,7 @@ class Simulation:
         self._loop_state, self._plant_needs_reset = loop_state, False
         return self.state
 
+    @checks_types
     def take_over(self, rollout: Rollout, step: int | None = None) -> None:
         """Continue from `step` of a rollout of an equal scenario, by default its last.
 

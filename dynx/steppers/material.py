@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, shown
 from dynx.model.numbers import MAX_MAGNITUDE, colour, is_real
 from dynx.spatial.scalar import Floats
@@ -17,6 +18,7 @@ COEFFICIENTS = ("friction", "torsional_friction", "rolling_friction", "restituti
 """Names of the coefficients of a material, all of at least 0."""
 
 
+@checks_types
 @dataclass(frozen=True)
 class Material:
     """Coefficients of contact of a surface, and the colour of a body.
@@ -54,6 +56,7 @@ def checked_material(name: str, material: object) -> Material:
     return material
 
 
+@checks_types
 def contact_material(a: Material, b: Material) -> Material:
     """Return the coefficients of the contact of two surfaces: the geometric means of theirs."""
     means = [math.sqrt(getattr(a, name) * getattr(b, name)) for name in COEFFICIENTS]

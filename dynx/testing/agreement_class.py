@@ -7,6 +7,7 @@ from typing import Literal
 
 import pytest
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, nearest, shown
 from dynx.model.tree import Base
 from dynx.testing.robot_checks import CHECKS, Disagreement, measured_agreement, require_agreement
@@ -19,6 +20,7 @@ _BASES: dict[str, tuple[Base, ...]] = {
 }
 
 
+@checks_types
 def agreement_tests(
     robot: str,
     *,

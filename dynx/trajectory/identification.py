@@ -25,10 +25,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.backends import backend as make_backend
 from dynx.errors import ArgumentError, ShapeError, TrajectoryError
 from dynx.model import Model
-from dynx.model.model import refuse_other_than_model
 from dynx.model.numbers import read_only, whole_number
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
@@ -41,6 +41,7 @@ SAMPLES = 200
 """Default number of samples of a motion."""
 
 
+@checks_types
 class Identifiability:
     """Condition number of the inertial regressor along motions of one robot.
 
@@ -60,6 +61,7 @@ class Identifiability:
         """Number of identifiable combinations of parameters."""
         self._combinations = directions[: self.identifiable].T
 
+    @checks_types
     def condition_number(self, trajectory: Trajectory) -> float:
         """Return the ratio of the largest to the smallest singular value of Y at evenly spaced times.
 
@@ -126,6 +128,7 @@ class FourierSeries(Curve):
         return x, v, a
 
 
+@checks_types
 def excitation(
     model: Model,
     duration: float,
@@ -229,7 +232,6 @@ def _random_series(rng: np.random.Generator, T: float, harmonics: int, nv: int) 
 
 
 def _ends_around(model: Model, q0: ArrayLike | None) -> Ends:
-    refuse_other_than_model(model)
     if model.floating or not model.nv:
         why = "a floating base" if model.floating else "no joint that moves"
         raise ArgumentError(f"{model.name} has {why}; excitation needs joints on a fixed base")

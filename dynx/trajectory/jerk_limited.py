@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, NotInstalledError, TrajectoryError, nonblank_lines
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
@@ -25,6 +26,7 @@ Phase = tuple[float, tuple[float, float, float, float]]
 """Duration [s], and position, velocity, acceleration and jerk at the start of the phase."""
 
 
+@checks_types
 def time_optimal(
     q0: ArrayLike,
     q1: ArrayLike,

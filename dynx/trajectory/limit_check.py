@@ -8,11 +8,11 @@ from typing import Literal
 
 import numpy as np
 
+from dynx.argument_types import checks_types
 from dynx.backends import Backend
 from dynx.backends import backend as make_backend
 from dynx.errors import ArgumentError, LimitError, LimitViolation, ShapeError, shown
 from dynx.model import Model
-from dynx.model.model import refuse_other_than_model
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory
@@ -40,6 +40,7 @@ Excess = tuple[Literal["position", "velocity", "effort"], Floats, Floats, Floats
 """A quantity, its values (n, nv), the nearest limit of each, and the amount by which they exceed it."""
 
 
+@checks_types
 def check(
     model: Model,
     trajectory: Trajectory,
@@ -59,6 +60,7 @@ def check(
         raise LimitError(f"the motion breaks {limits} of {model.name}:{listed}", found)
 
 
+@checks_types
 def violations(
     model: Model,
     trajectory: Trajectory,
@@ -78,7 +80,6 @@ def violations(
 
     Raises ShapeError if the trajectory does not fit the model.
     """
-    refuse_other_than_model(model)
     if not isinstance(trajectory, Trajectory):
         raise ArgumentError(f"trajectory is of type {type(trajectory).__name__}; wanted a Trajectory")
     if (trajectory.nq, trajectory.nv) != (model.nq, model.nv):

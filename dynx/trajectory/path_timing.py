@@ -25,6 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.backends import Backend
 from dynx.errors import ArgumentError, NotInstalledError, TrajectoryError
 from dynx.model import Model
@@ -187,6 +188,7 @@ STRETCH_MARGIN = 1e-4
 """Fraction by which the motion is slowed down further, for times between the checked ones."""
 
 
+@checks_types
 def time_optimal_path(
     waypoints: ArrayLike,
     *,

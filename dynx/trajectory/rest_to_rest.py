@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, TrajectoryError
 from dynx.model import Model
 from dynx.model.numbers import read_only
@@ -37,6 +38,7 @@ from dynx.trajectory.motion_limits import (
 )
 
 
+@checks_types
 def trapezoidal(
     q0: ArrayLike,
     q1: ArrayLike,
@@ -69,6 +71,7 @@ def trapezoidal(
     return _standstill(ends, duration)
 
 
+@checks_types
 def s_curve(
     q0: ArrayLike,
     q1: ArrayLike,
@@ -147,6 +150,7 @@ def _require_finite(name: str, bound: float) -> None:
         raise ArgumentError(f"{name} is infinite for everything that moves; wanted a limit")
 
 
+@checks_types
 def cycloidal(q0: ArrayLike, q1: ArrayLike, duration: float, *, model: Model | None = None) -> Trajectory:
     """Return the cycloidal motion from rest at `q0` to rest at `q1` (nq,) in `duration` [s]:
 
@@ -191,6 +195,7 @@ class Cycloid(Curve):
         )
 
 
+@checks_types
 def cubic(
     q0: ArrayLike,
     q1: ArrayLike,
@@ -218,6 +223,7 @@ def cubic(
     return ends.trajectory(T, curve, (begin, 2.0 * square), (finish, last))
 
 
+@checks_types
 def quintic(
     q0: ArrayLike,
     q1: ArrayLike,

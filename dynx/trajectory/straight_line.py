@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.backends import Backend
 from dynx.errors import ArgumentError, ShapeError, TrajectoryError, shown
 from dynx.model import Model
 from dynx.model.configuration import checked_q
-from dynx.model.model import refuse_other_than_model
 from dynx.model.numbers import real_array
 from dynx.model.targets import checked_targets
 from dynx.registry import DEFAULT_ENGINE
@@ -58,6 +58,7 @@ class LineTrajectory(TimeScaledTrajectory):
     """Number of pieces of the spline."""
 
 
+@checks_types
 def line(
     model: Model,
     frame: str,
@@ -138,7 +139,6 @@ class _StraightLine:
     def __init__(
         self, model: Model, frame: str, q0: ArrayLike, target: ArrayLike, engine: str | Backend
     ) -> None:
-        refuse_other_than_model(model)
         if model.floating:
             raise ArgumentError(f"{model.name} has a floating base; a line needs a fixed one")
         if isinstance(engine, Backend) and engine.model != model:

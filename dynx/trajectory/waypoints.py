@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.model.numbers import checked_entries, real_array
 from dynx.spatial.scalar import Floats
@@ -19,6 +20,7 @@ Kind = Literal["cubic", "quintic"]
 End = Literal["clamped", "natural", "periodic"]
 
 
+@checks_types
 def spline(
     times: ArrayLike,
     waypoints: ArrayLike,

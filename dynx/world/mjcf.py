@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from dynx.argument_types import checks_types
 from dynx.engines.mujoco.materials import SETTINGS
 from dynx.engines.mujoco.mjcf import MjcfDocument
 from dynx.errors import ArgumentError
@@ -14,6 +15,7 @@ from dynx.world.preparation import checked_options, may_be_reached, prepare
 from dynx.world.scene.scene import Scene
 
 
+@checks_types
 def scene_to_mjcf(
     scene: Scene,
     dt: float = 1e-3,

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, GainError, ShapeError, UnknownNameError, nearest, shown
 from dynx.model import Model
 from dynx.model.numbers import checked_entries, real_array
@@ -54,6 +55,7 @@ class Motor(ABC):
             object.__setattr__(self, each.name, tuple(value) if isinstance(value, list) else value)
 
     @abstractmethod
+    @checks_types
     def law(self, model: Model) -> tuple[tuple[int, ...], JointLaw]:
         """Return the numbers of the joints, in the order of `Model.joint_names`, and the law of each.
 
@@ -75,6 +77,7 @@ class Motor(ABC):
         return joints, JointLaw(**{**absent, **numbers}, implicit=implicit)
 
 
+@checks_types
 @dataclass(frozen=True)
 class TorqueMotor(Motor):
     """A motor with a given `torque` [N m or N], one number or one per joint."""
@@ -83,6 +86,7 @@ class TorqueMotor(Motor):
     max_force: ArrayLike | None = None
     joints: Sequence[str] | None = None
 
+    @checks_types
     def law(self, model: Model) -> tuple[tuple[int, ...], JointLaw]:
         return self._law(model, implicit=False)
 
@@ -99,6 +103,7 @@ class _Servo(Motor):
     joints: Sequence[str] | None = None
 
 
+@checks_types
 @dataclass(frozen=True)
 class PDMotor(_Servo):
     """A motor with the torque kp (target - q) + kd (velocity - v) at the beginning of each step.
@@ -107,10 +112,12 @@ class PDMotor(_Servo):
     joint.
     """
 
+    @checks_types
     def law(self, model: Model) -> tuple[tuple[int, ...], JointLaw]:
         return self._law(model, implicit=False)
 
 
+@checks_types
 @dataclass(frozen=True)
 class PositionMotor(_Servo):
     """A motor with the torque kp (target - q) + kd (velocity - v) at the end of each step; arguments as
@@ -119,10 +126,12 @@ class PositionMotor(_Servo):
     Where the other forces (Coriolis, contacts, limits) hardly change from one step to the next it is stable
     at any gain: it uses those of the step before. In long steps stiff gains diverge (docs/world.md)."""
 
+    @checks_types
     def law(self, model: Model) -> tuple[tuple[int, ...], JointLaw]:
         return self._law(model, implicit=True)
 
 
+@checks_types
 @dataclass(frozen=True)
 class VelocityMotor(Motor):
     """A motor with the torque kd (velocity - v) at the end of each step, with the stability of
@@ -133,6 +142,7 @@ class VelocityMotor(Motor):
     max_force: ArrayLike | None = None
     joints: Sequence[str] | None = None
 
+    @checks_types
     def law(self, model: Model) -> tuple[tuple[int, ...], JointLaw]:
         return self._law(model, implicit=True)
 

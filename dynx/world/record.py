@@ -7,7 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dynx.argument_types import checks_types
+from dynx.errors import DTypeError, UnknownNameError, nearest, shown
 from dynx.model import Model
+from dynx.model.numbers import is_real
 from dynx.spatial.scalar import Floats
 
 SAME_TIME = 1e-6
@@ -96,17 +99,24 @@ class Record:
         """Mean time between two rows [s]."""
         return float(self.times[-1] - self.times[0]) / max(len(self.times) - 1, 1)
 
+    @checks_types
     def times_within(self, begin: float, end: float) -> Floats:
         """Return the times of the record from `begin` to `end` [s]."""
+        for name, time in (("begin", begin), ("end", end)):
+            if not is_real(time):
+                raise DTypeError(f"{name} is {shown(time)}; wanted a number of seconds")
         slack = SAME_TIME * self.step
         return self.times[(self.times >= begin - slack) & (self.times <= end + slack)]
 
+    @checks_types
     def at(self, channel: str, times: Floats) -> Floats:
         """Return the rows of a channel at some times [s], interpolated between the two rows around each.
 
         Rows at the times themselves are returned to the last bit; before the first and after the last time
         they are those of the first and the last.
         """
+        if channel not in self.channels:
+            raise UnknownNameError(f"no channel {shown(channel)}{nearest(channel, self.channels)}")
         found, last = self.channels[channel], len(self.times) - 1
         before = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, max(last - 1, 0))
         after = np.minimum(before + 1, last)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError
 from dynx.spatial.scalar import Floats
 from dynx.world.record import Record
@@ -59,6 +60,7 @@ class Separation:
         return float(self.times[k]), self.names[int(np.argmax(self.distances[k]))]
 
 
+@checks_types
 def separation(ours: Record, theirs: Record, times: Floats | None = None) -> Separation:
     """Measure how far apart two records are over time, in the channels that both have.
 
@@ -75,6 +77,8 @@ def separation(ours: Record, theirs: Record, times: Floats | None = None) -> Sep
     end = min(float(ours.times[-1]), float(theirs.times[-1]))
     fine, coarse = sorted((theirs, ours), key=lambda record: record.step)
     if times is not None:
+        if not times.size:
+            raise ArgumentError("times is empty; wanted at least one time")
         coarse = fine = Record("", times, {})
     compared = coarse.times_within(begin, end)
     if compared.size < 2:

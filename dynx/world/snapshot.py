@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, shown
 from dynx.files.arrays import WORLD_FILE
 from dynx.files.reading import checked_path, open_regular, printable
@@ -83,6 +84,7 @@ class Snapshot:
         what = "world" if self.record is None else "simulation"
         return f"<Snapshot of a {self.engine} {what} at {self.time:.6g} s, {len(self.data)} bytes>"
 
+    @checks_types
     def require(self, engine: str, version: str, identity: str) -> None:
         """Raise ArgumentError unless it is one of a world with the same engine, scene and options."""
         for what, own, other in (

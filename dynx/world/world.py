@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, UnknownNameError, shown
 from dynx.model import Model, Pose
 from dynx.model.geometry import Mesh
@@ -23,6 +24,7 @@ from dynx.option_names import checks_option_names, refuse_options, right_name
 from dynx.rbd.jacobians import LOCAL
 from dynx.registry import door
 from dynx.spatial.scalar import Floats
+from dynx.steppers.clock import MAX_STEPS, refuse_too_many_steps
 from dynx.steppers.forces import ExternalForce
 from dynx.steppers.layout import Layout, RobotLayout
 from dynx.steppers.materials import InexactMaterial, inexact_materials, open_engine
@@ -75,6 +77,7 @@ def run_for(
 ) -> None:
     """Take steps for `duration` [s], rounded up to a multiple of `dt`, with the loads of a function or fixed
     ones."""
+    refuse_too_many_steps("duration", positive_seconds("duration", duration), dt)
     n = max(1, math.ceil(positive_seconds("duration", duration) / dt - TIME_ROUNDING))
     if loads is None and not real_time:
         step(n, **fixed)
@@ -137,6 +140,7 @@ TorquesOf = Mapping[str, ArrayLike]
 LoadsOf = Callable[["World"], Mapping[str, Any]]
 
 
+@checks_types
 class World:
     """The robots and bodies of a scene in motion, with contacts, in steps of `dt` [s].
 
@@ -246,11 +250,12 @@ class World:
         engine = self._motion.ready or self._motion.engine
         if type(forces) is not tuple and not isinstance(forces, tuple | list):
             raise ArgumentError(f"forces is of type {type(forces).__name__}; wanted a list of ExternalForce")
-        if type(n) is not int or n < 1:
-            n = whole_number("n", n, 1)
+        if type(n) is not int or not 1 <= n <= MAX_STEPS:
+            n = whole_number("n", n, 1, MAX_STEPS)
         if self._scene_motors:
             motors = with_scene_motors(self._scene_motors, torques, motors)
-        if not motors and not forces and self._last_step is None:
+        no_motors = motors is None or (type(motors) is dict and not motors)
+        if no_motors and not forces and self._last_step is None:
             held = self._commands.hold(torques, n * self.substeps)
             if held is not None:
                 self._motion.advance(engine, n, held)
@@ -344,6 +349,7 @@ class World:
         """
         return self._motion.state
 
+    @checks_types
     def set_state(
         self,
         state: WorldState | None = None,
@@ -402,6 +408,7 @@ class World:
 
         self._motion.change(load, (snapshot.start, snapshot.steps))
 
+    @checks_types
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the world and its state to a file, from which `read` continues bit for bit; its suffix is
         .world, or it has none.
@@ -424,6 +431,7 @@ class World:
         return layout_to_mjcf(self.scene, self._layout, self.options, settings)
 
     @classmethod
+    @checks_types
     def read(cls, path: StrPath, *, package_dirs: Iterable[StrPath] = ()) -> World:
         """Return the world of a file that `write` wrote, in its state, without the notes on its start.
 
@@ -460,6 +468,7 @@ class World:
 
     # -- queries ------------------------------------------------------------------------------
 
+    @checks_types
     def contacts(self, part: str | None = None) -> tuple[Contact, ...]:
         """Return the contacts of the last step of the engine, with their forces: all, or those of a part.
 
@@ -484,6 +493,7 @@ class World:
         """Return the coefficients of contact that the engine does not have as the scene states them."""
         return inexact_materials(self._motion.engine)
 
+    @checks_types
     def closest_points(
         self, a: str, b: str, within: float = 1.0, *, native: bool = False
     ) -> tuple[ClosestPoints, ...]:
@@ -500,16 +510,19 @@ class World:
         return Queries(self.scene, self._layout)
 
     @checks_option_names
+    @checks_types
     def avoidance(
         self, robot: str | None = None, *, margin: float = MARGIN, self_margin: float | None = None
     ) -> Avoidance:
         """Return what a robot keeps away from, where everything is now (`Scene.avoidance`)."""
         return scene_at(self.scene, self.state).avoidance(robot, margin=margin, self_margin=self_margin)
 
+    @checks_types
     def avoidance_for(self, model: Model) -> Avoidance:
         """Return what the robot that is `model` keeps away from now, with the default margin."""
         return scene_at(self.scene, self.state).avoidance_for(model)
 
+    @checks_types
     def aabb(self, name: str) -> tuple[Floats, Floats]:
         """Return the lower and upper corner (3,) of the box around a part, along the axes of the world."""
         return self._queries.aabb(self.state, name)
@@ -518,10 +531,12 @@ class World:
         """Return the names of the links and bodies whose `aabb` overlaps the box between two corners."""
         return self._queries.overlapping(self.state, lower, upper)
 
+    @checks_types
     def cast_rays(self, origins: ArrayLike, directions: ArrayLike, length: float = MAX_RAY_LENGTH) -> RayHits:
         """Return what rays from `origins` (n, 3) along `directions` (n, 3) hit first within `length` [m]."""
         return self._queries.cast_rays(self._motion.engine, self.state, origins, directions, length)
 
+    @checks_types
     def camera(self, camera: Camera, renderer: str | None = None) -> Picture:
         """Return what a camera sees, drawn by dynx or by the renderer of an engine (``"pybullet"``)."""
         # Imported here, because few worlds are drawn.

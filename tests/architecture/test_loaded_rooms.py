@@ -58,15 +58,15 @@ FLOWS = {
             "viewer",
         ),
         (),
-        73,
-        11700,
+        74,
+        12100,
     ),
     "inverse kinematics": Flow(
         ENGINE + "engine.inverse_kinematics(engine.forward_kinematics(q, 'tool0'), 'tool0', q)",
         ("world", "sim", "ik.closed_forms"),
         (),
-        108,
-        19200,
+        109,
+        19700,
     ),
     "simulate": Flow(
         ROBOT + "from dynx import control\n"
@@ -86,16 +86,16 @@ FLOWS = {
             "envs",
         ),
         (),
-        176,
-        27900,
+        177,
+        28650,
     ),
     "step of a box": Flow(
         "from dynx.world import Scene, World, box\n"
         "World(Scene('box', bodies=(box('box', (0.1, 0.1, 0.1), mass=1.0),)), 'mujoco').step()",
         ("ik", "sim", "envs", "doctor"),
         (),
-        113,
-        18900,
+        115,
+        19500,
     ),
     "step of the cart-pole": Flow(
         "import gymnasium, dynx.envs\n"
@@ -104,8 +104,8 @@ FLOWS = {
         "environment.step(environment.action_space.sample())",
         ("distance", "ik", "world.camera", "steppers.camera"),
         (),
-        168,
-        27100,
+        169,
+        27900,
     ),
 }
 

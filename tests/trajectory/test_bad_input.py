@@ -87,7 +87,7 @@ def test_velocities_at_the_ends() -> None:
 
 def test_models() -> None:
     model: Any = "ur5"
-    with pytest.raises(ArgumentError, match="model is of type str; wanted a Model"):
+    with pytest.raises(ArgumentError, match="model is 'ur5', of type str; wanted Model"):
         trajectory.cycloidal([0.0], [1.0], 1.0, model=model)
     with pytest.raises(ShapeError, match=r"q0 has shape \(1,\); wanted \(\.\.\., 6\)"):
         trajectory.cycloidal([0.0], [1.0], 1.0, model=ur5())
@@ -198,7 +198,7 @@ def test_waypoints(
 @pytest.mark.parametrize(
     ("changed", "error", "message"),
     [
-        ({"model": "ur5"}, ArgumentError, "model is of type str"),
+        ({"model": "ur5"}, ArgumentError, "model is 'ur5', of type str"),
         ({"model": floating()}, ArgumentError, "floating base; a line needs a fixed one"),
         ({"frame": "tool"}, UnknownNameError, "no frame 'tool'"),
         ({"q0": [0.0]}, ShapeError, "q0 has shape"),
@@ -207,7 +207,7 @@ def test_waypoints(
         ({"target": 2.0 * np.eye(4)}, ArgumentError, "not a rigid transform"),
         ({"duration": None}, ArgumentError, "wanted either a duration or a law"),
         ({"law": SLOW}, ArgumentError, "wanted either a duration or a law"),
-        ({"duration": None, "law": "slow"}, ArgumentError, "law is of type str"),
+        ({"duration": None, "law": "slow"}, ArgumentError, "law is 'slow', of type str"),
         ({"duration": None, "law": HALF}, ArgumentError, "law goes from 0 to 0.5; wanted from 0 to 1"),
         ({"duration": None, "law": BEYOND}, ArgumentError, "wanted within 0 and 1"),
         ({"deviation": 0.0}, ArgumentError, "^deviation is '0.0'; wanted a number, at least 1e-09"),

@@ -25,6 +25,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.backends.base import Backend
 from dynx.engines.pybullet.canonical_urdf import Ballast, PrincipalBody, ballast_for, bullet_tree
 from dynx.engines.pybullet.client import CanonicalClient
@@ -32,13 +33,16 @@ from dynx.engines.pybullet.library import bullet, bullet_version
 from dynx.errors import ArgumentError, ClosedError, EngineError
 from dynx.model import Model
 from dynx.model.mechanism import ROOT, BodyFrame, Mechanism, float64
-from dynx.model.numbers import checked_array
+from dynx.model.numbers import checked_array, positive_number, whole_number
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, Reference
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import cross, quat_from_rotation, skew
 
 _IDENTITY = np.eye(4)
+
+MAX_ITERATIONS = 10**6
+"""Largest number of iterations of Bullet's inverse kinematics, which no signal interrupts."""
 
 
 class BulletQuantities:
@@ -370,6 +374,7 @@ class PyBulletBackend(Backend):
         """
         return self._has_ballast
 
+    @checks_types
     def engine_inverse_kinematics(
         self,
         T_world_target: ArrayLike,
@@ -390,6 +395,8 @@ class PyBulletBackend(Backend):
         """
         q0 = self._arguments.q(q0)
         index = self._index(frame)
+        count = whole_number("iterations", iterations, 1, MAX_ITERATIONS)
+        residual = positive_number("residual", residual)
         target = checked_array("T_world_target", T_world_target, 4)
         if target.shape != (4, 4) or q0.ndim != 1:
             raise ArgumentError(
@@ -404,7 +411,7 @@ class PyBulletBackend(Backend):
         bounded = limits and coupling is None and bool(np.isfinite(bounds).all())
         with self._lock:
             joints = self._robot().inverse_kinematics(
-                target, index, tree_q, bounds if bounded else None, int(iterations), float(residual)
+                target, index, tree_q, bounds if bounded else None, count, residual
             )
         if coupling is not None:
             S = coupling.matrix()[-len(joints) :, -coupling.n_joints :]

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.backends.base import Backend
 from dynx.errors import ArgumentError, NoClosedFormError, ShapeError, shown
 from dynx.ik.closed_forms.candidates import (
@@ -35,7 +36,7 @@ from dynx.ik.closed_forms.solutions import FullTurns, IKSolutions
 from dynx.ik.options import SearchLimits
 from dynx.model import Model
 from dynx.model.configuration import checked_q
-from dynx.model.model import refuse_other_than_model
+from dynx.model.numbers import checked_bool
 from dynx.model.targets import checked_targets
 from dynx.simd.variants import BoundVariants
 from dynx.spatial.scalar import Floats
@@ -61,6 +62,7 @@ MAX_SURPLUS = 3
 """Most joints beyond those of a closed form for which sets to be given are looked for."""
 
 
+@checks_types
 class ClosedForm:
     """The closed form of the inverse kinematics of one frame; safe to use from several threads."""
 
@@ -144,6 +146,7 @@ class ClosedForm:
 
         Raises ShapeError, DTypeError, NotFiniteError or ArgumentError for an invalid target or q0.
         """
+        ignore_limits = ignore_limits is not False and checked_bool("ignore_limits", ignore_limits)
         # A kernel finds targets that are no poses in a fraction of the time that NumPy takes.
         is_batch = (
             isinstance(target, np.ndarray)
@@ -264,6 +267,7 @@ def _checked_poses(target: ArrayLike) -> Floats:
     return np.asarray(homogeneous(targets.rotations, targets.positions))
 
 
+@checks_types
 def closed_form(
     model: Model, frame: str, given: Mapping[str, float] | None = None, *, compiled: bool = False
 ) -> ClosedForm:
@@ -279,7 +283,6 @@ def closed_form(
     Raises NoClosedFormError, which says what is missing; UnknownNameError or ArgumentError for arguments.
     """
     model.frame_index(frame)
-    refuse_other_than_model(model)
     positions = {} if given is None else given
     try:
         chain, recognised = _recognised(model, frame, positions)

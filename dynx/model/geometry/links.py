@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, DescriptionError, DynxError, UnknownNameError, nearest, shown
 from dynx.model.elements import IDENTITY, Pose, checked_pose
 from dynx.model.geometry.mesh import Mesh
@@ -79,6 +80,7 @@ class LinkGeometry:
 Links = Mapping[str, LinkGeometry]
 
 
+@checks_types
 class Geometry:
     """The shapes of every link of a robot, by the name of the link.
 
@@ -90,6 +92,7 @@ class Geometry:
         """`links` are the shapes by link, or a function that returns them and can be pickled."""
         self._links_or_reader = links
 
+    @checks_types
     def visuals(self, link: str) -> tuple[Visual, ...]:
         """Return the visual shapes of a link, in the order of the description.
 
@@ -100,6 +103,7 @@ class Geometry:
             raise found.visual_fault
         return found.visuals
 
+    @checks_types
     def collisions(self, link: str) -> tuple[Collision, ...]:
         """Return the collision shapes of a link, in the order of the description.
 

@@ -6,6 +6,7 @@ import math
 import sys
 from collections.abc import Callable, Iterator
 
+from dynx.argument_types import checks_types
 from dynx.errors import DescriptionError, shown
 from dynx.model.elements import Inertial, Joint, JointDynamics, Pose, Vector
 from dynx.model.geometry import (
@@ -82,6 +83,7 @@ def _finite_numbers(numbers: tuple[float, ...]) -> str:
 # -- the robot ------------------------------------------------------------------------------------
 
 
+@checks_types
 def write_urdf(tree: Tree, *, geometry: bool = False) -> str:
     """Return the robot as URDF text in canonical form: one element a line, and nothing that has its default.
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from dynx.argument_types import checks_types
 from dynx.backends import backend, backend_class, backend_names
 from dynx.backends.registry import BUILT_IN as BACKENDS
 from dynx.errors import ArgumentError, BackendError, UnknownBackendError, nearest, shown
@@ -59,6 +60,7 @@ def require_plant(name: str) -> None:
     backend_class(name).require_engine()
 
 
+@checks_types
 def register(name: str, loader: Callable[[], type[Plant]]) -> None:
     """Add a plant class of the running program; `loader()` returns it when it is first used.
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model import Model
 from dynx.steppers.registry import world_class
@@ -13,6 +14,7 @@ from dynx.steppers.settings import checked_settings
 from dynx.world.scene import Scene, SceneRobot
 
 
+@checks_types
 @dataclass(frozen=True)
 class ScenePlant:
     """A plant in which a robot moves among the bodies of a scene, with contacts.

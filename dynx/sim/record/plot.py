@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dynx.argument_types import checks_types
 from dynx.control.base import Controller, chain_of
 from dynx.files.figures import new_figure, save_figure
 from dynx.model import Model
@@ -46,6 +47,7 @@ class Column(NamedTuple):
     """True if this is the column of a floating base: position in the world, all else in its own axes."""
 
 
+@checks_types
 def plot(rollout: Rollout, path: str | os.PathLike[str] | None = None) -> Any:
     """Plot positions, errors and torques with their limits; return the `matplotlib.figure.Figure`, and save
     it at `path` if that is given.

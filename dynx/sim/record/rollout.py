@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from dynx.argument_types import checks_types
 from dynx.backends import Backend, backend
 from dynx.control.base import Controller
 from dynx.errors import ArgumentError, DynxError
 from dynx.files.pages import html_grid
 from dynx.model import Model
+from dynx.model.numbers import whole_number
 from dynx.rbd.jacobians import LOCAL
 from dynx.rbd.joint_wrenches import about_world
 from dynx.rbd.parameters import plant_model
@@ -265,6 +267,7 @@ class Rollout:
             )
         return None
 
+    @checks_types
     def record(self, name: str = "") -> Record:
         """Return the motion as a record: the configurations of the robot, and the positions of the bodies of
         its scene."""
@@ -278,9 +281,11 @@ class Rollout:
         """The main settings of the scenario, as numbers and text; empty without a scenario."""
         return {} if self.scenario is None else settings_of(self.scenario)
 
+    @checks_types
     def first(self, n: int) -> Rollout:
         """Return the record of its first n steps, with the departures that began in them."""
-        if not 0 <= n <= len(self):
+        n = whole_number("n", n, 0)
+        if not n <= len(self):
             raise ArgumentError(f"n is {n}; wanted 0 to {len(self)}, the number of steps")
         reference = None if self.reference is None else Setpoint(*(x[: n + 1] for x in self.reference))
         states = {name: getattr(self, name)[: n + 1] for name in ("t", "q", "v")}

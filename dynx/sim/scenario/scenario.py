@@ -11,6 +11,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.control.base import Controller, refuse_other_than_controller
 from dynx.errors import ArgumentError, shown
 from dynx.files.documents import check_document
@@ -155,6 +156,7 @@ class Scenario(SimulationOptions):
         unchanged = all(copied is getattr(self, name) for name, copied in parts.items())
         return self if unchanged else replace(self, **parts)
 
+    @checks_types
     def differences(self, other: Scenario) -> list[Difference]:
         """Return the fields in which `other` differs; empty for an equal scenario."""
         found: list[Difference] = []
@@ -200,6 +202,7 @@ class Scenario(SimulationOptions):
         return document
 
     @classmethod
+    @checks_types
     def from_dict(cls, document: Mapping[str, Document]) -> Scenario:
         """Return the scenario of a document. Raises ArgumentError for a document of another layout."""
         if not isinstance(document, Mapping) or document.get("schema") != SCHEMA:

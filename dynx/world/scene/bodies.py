@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.model import Inertial, Link, Model, Pose
 from dynx.model.elements import IDENTITY, ZERO, Vector, checked_pose
@@ -140,6 +141,7 @@ class SceneBody:
         return Inertial(self.mass, Pose(center), xx, xy, xz, yy, yz, zz)
 
 
+@checks_types
 def ground(
     name: str = "ground", *, pose: Pose | ArrayLike = IDENTITY, material: Material = DEFAULT_MATERIAL
 ) -> SceneBody:
@@ -147,27 +149,32 @@ def ground(
     return SceneBody(name, Plane(), checked_pose("pose", pose), material=material)
 
 
+@checks_types
 def box(name: str, size: ArrayLike, **options: Unpack[BodyOptions]) -> SceneBody:
     """Return a body with the shape of a box of that size (3,) [m]; `options` are those of `SceneBody`."""
     return SceneBody(name, Box(finite_vector("size of a box", size)), **options)
 
 
+@checks_types
 def sphere(name: str, radius: float, **options: Unpack[BodyOptions]) -> SceneBody:
     """Return a body with the shape of a ball; `options` are those of `SceneBody`."""
     return SceneBody(name, Sphere(radius), **options)
 
 
+@checks_types
 def cylinder(name: str, radius: float, length: float, **options: Unpack[BodyOptions]) -> SceneBody:
     """Return a body with the shape of a cylinder about z [m]; `options` are those of `SceneBody`."""
     return SceneBody(name, Cylinder(radius, length), **options)
 
 
+@checks_types
 def capsule(name: str, radius: float, length: float, **options: Unpack[BodyOptions]) -> SceneBody:
     """Return a body with the shape of a capsule about z [m], whose ends are half balls beyond the length;
     `options` are those of `SceneBody`."""
     return SceneBody(name, Capsule(radius, length), **options)
 
 
+@checks_types
 def mesh(
     name: str, file: str, scale: ArrayLike = (1.0, 1.0, 1.0), **options: Unpack[BodyOptions]
 ) -> SceneBody:
@@ -199,6 +206,7 @@ def _checked_inertia(what: str, inertia: ArrayLike) -> Tensor:
     return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
 
 
+@checks_types
 def body_to_urdf(body: SceneBody) -> str:
     """Return a body of a scene as URDF text of one link, whose frame is that of the body.
 
@@ -213,6 +221,7 @@ def body_to_urdf(body: SceneBody) -> str:
     return Model.build(body.name, [link], [], geometry=geometry).to_urdf(geometry=True)
 
 
+@checks_types
 @dataclass(frozen=True)
 class Weld:
     """A rigid connection of `a` and `b`: each a body, ``robot/link`` or ``world``.
@@ -230,6 +239,7 @@ class Weld:
             object.__setattr__(self, "T_a_b", checked_pose("T_a_b of a weld", self.T_a_b))
 
 
+@checks_types
 @dataclass(frozen=True)
 class PointToPoint:
     """A ball joint: `point_a` (3,) [m] of `a` stays at `point_b` of `b`, each in the frame of its end.

@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, DescriptionError, NotInstalledError, RobotNotFoundError, nearest, shown
 from dynx.files.reading import checked_path, printable, read_file
 from dynx.files.writing import write_bytes
@@ -22,6 +23,7 @@ from dynx.world.scene.scene import Scene
 SUFFIXES = (".toml", ".json")
 
 
+@checks_types
 def read_scene(source: str | os.PathLike[str], *, package_dirs: Iterable[StrPath] = ()) -> Scene:
     """Read a scene from a ``.toml`` or ``.json`` file, or one of the scenes of dynx by its name.
 
@@ -47,6 +49,7 @@ def read_scene(source: str | os.PathLike[str], *, package_dirs: Iterable[StrPath
         raise kind(f"{name}: {error}") from error
 
 
+@checks_types
 def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
     """Write a scene to a ``.toml`` or ``.json`` file, atomically; `read_scene` returns an equal one.
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.model import Model, Pose
 from dynx.model.configuration import checked_q, neutral
@@ -25,6 +26,24 @@ from dynx.world.motors import Motor, combine
 
 WORLD = "world"
 """Name of the fixed world in constraints."""
+
+
+def checked_pairs(what: str, given: object, second: type, wanted: str) -> tuple[tuple[str, Any], ...]:
+    """Return the entries of a mapping, or of a sequence of pairs, from a name to a `second`.
+
+    Raises ArgumentError for anything else; `wanted` describes a pair.
+    """
+    pairs = given.items() if isinstance(given, Mapping) else given
+    if isinstance(pairs, str) or not isinstance(pairs, Collection) or isinstance(pairs, np.ndarray):
+        raise ArgumentError(f"{what} is {shown(given)}; wanted a sequence of pairs of {wanted}")
+    found = []
+    for k, pair in enumerate(pairs):
+        if not (isinstance(pair, tuple | list) and len(pair) == 2):
+            raise ArgumentError(f"{what}[{k}] is {shown(pair)}; wanted {wanted}")
+        if not (isinstance(pair[0], str) and isinstance(pair[1], second)):
+            raise ArgumentError(f"{what}[{k}] is {shown(tuple(pair))}; wanted {wanted}")
+        found.append((pair[0], pair[1]))
+    return tuple(found)
 
 
 def checked_name(what: str, name: object) -> str:
@@ -118,14 +137,18 @@ class SceneRobot:
         checked_material(f"material of {what}", self.material)
         if not isinstance(self.self_collision, bool):
             raise ArgumentError(f"self_collision of {what} is {shown(self.self_collision)}; wanted a bool")
-        motors = (self.motors,) if isinstance(self.motors, Motor) else tuple(self.motors)
+        motors = (self.motors,) if isinstance(self.motors, Motor) else self.motors
+        if not isinstance(motors, Iterable) or isinstance(motors, np.ndarray):
+            raise ArgumentError(f"motors of {what} is {shown(motors)}; wanted motors")
+        motors = tuple(motors)
         for motor in motors:
             if not isinstance(motor, Motor):
                 raise ArgumentError(f"motors of {what} holds {shown(motor)}; wanted a Motor")
         combine(self.model, motors)
         object.__setattr__(self, "motors", motors)
-        pairs = self.materials.items() if isinstance(self.materials, Mapping) else self.materials
-        materials = dict(pairs)
+        materials = dict(
+            checked_pairs(f"materials of {what}", self.materials, Material, "a link and a Material")
+        )
         for link, material in materials.items():
             self.model.link(link)
             checked_material(f"material of {shown(link)} of {what}", material)
@@ -141,6 +164,7 @@ class SceneRobot:
         quat = quat_from_rotation(placed.matrix[:3, :3]).tolist()
         return replace(self, q=(*placed.xyz, *quat, *np.array(self.q)[7:].tolist()))
 
+    @checks_types
     def material_of(self, link: str) -> Material:
         """Return the material of a link; UnknownNameError for an unknown one."""
         self.model.link(link)

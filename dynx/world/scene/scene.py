@@ -10,16 +10,17 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model import Model
 from dynx.model.elements import Vector
-from dynx.model.numbers import checked_gravity
+from dynx.model.numbers import checked_gravity, is_real
 from dynx.model.tree import STANDARD_GRAVITY
 from dynx.option_names import checks_option_names
 from dynx.steppers.material import Material
 from dynx.world.scene.bodies import Constraint, PointToPoint, SceneBody, Weld
 from dynx.world.scene.filters import CollisionFilter
-from dynx.world.scene.robots import WORLD, SceneRobot, checked_name, split_name
+from dynx.world.scene.robots import WORLD, SceneRobot, checked_name, checked_pairs, split_name
 
 if TYPE_CHECKING:
     from dynx.distance.avoidance import Avoidance
@@ -67,12 +68,13 @@ class Scene:
         put(self, "constraints", _instances("constraints", self.constraints, Weld | PointToPoint))
         put(self, "gravity", checked_gravity(self.gravity))
         _refuse_repeated([*(r.name for r in self.robots), *(b.name for b in self.bodies)])
-        groups = self.groups.items() if isinstance(self.groups, Mapping) else self.groups
-        put(
-            self, "groups", tuple((name, _names(f"group {shown(name)}", members)) for name, members in groups)
-        )
+        groups = [
+            (name, _names(f"group {shown(name)}", members))
+            for name, members in checked_pairs("groups", self.groups, Iterable, "a name and names")
+        ]
+        put(self, "groups", tuple(groups))
         self._check_groups()
-        put(self, "ignored", tuple(_pair(k, pair) for k, pair in enumerate(self.ignored)))
+        put(self, "ignored", checked_pairs("ignored", self.ignored, str, "two names"))
         for name in (name for pair in self.ignored for name in pair):
             if name not in self._groups:
                 self.require(name)
@@ -91,18 +93,21 @@ class Scene:
     def _groups(self) -> dict[str, tuple[str, ...]]:
         return dict(self.groups)
 
+    @checks_types
     def robot(self, name: str) -> SceneRobot:
         """Return the robot of that name; UnknownNameError if there is none."""
         if name not in self._robots:
             raise UnknownNameError(f"no robot {shown(name)} in {self.name}{nearest(str(name), self._robots)}")
         return self._robots[name]
 
+    @checks_types
     def body(self, name: str) -> SceneBody:
         """Return the body of that name; UnknownNameError if there is none."""
         if name not in self._bodies:
             raise UnknownNameError(f"no body {shown(name)} in {self.name}{nearest(str(name), self._bodies)}")
         return self._bodies[name]
 
+    @checks_types
     def material(self, name: str) -> Material:
         """Return the material of a body or of ``robot/link``; UnknownNameError for another name."""
         self.require(name)
@@ -113,6 +118,7 @@ class Scene:
             raise UnknownNameError(f"{shown(name)} is a robot, whose links have materials; wanted robot/link")
         return self._robots[owner].material_of(link)
 
+    @checks_types
     def may_collide(self, a: str, b: str) -> bool:
         """Check whether two parts, each a body or ``robot/link``, collide where they touch.
 
@@ -135,6 +141,7 @@ class Scene:
         return CollisionFilter(self.robots, self.bodies, [tuple(map(self._members, p)) for p in self.ignored])
 
     @checks_option_names
+    @checks_types
     def avoidance(
         self, robot: str | None = None, *, margin: float = MARGIN, self_margin: float | None = None
     ) -> Avoidance:
@@ -163,6 +170,7 @@ class Scene:
         return self._avoidance(self.robot(robot), margin, self_margin)
 
     @checks_option_names
+    @checks_types
     def avoidance_for(
         self, model: Model, *, margin: float = MARGIN, self_margin: float | None = None
     ) -> Avoidance:
@@ -172,7 +180,8 @@ class Scene:
         scene is like `model`, or the scene has none; and the errors of `avoidance`.
         """
         margins = margin, self_margin
-        kept = self._kept_avoidance.get(margins)
+        numbers = all(each is None or is_real(each) for each in margins)
+        kept = self._kept_avoidance.get(margins) if numbers else None
         if kept is None or kept.model is not model:
             # Distances are imported where something is to be avoided, which a scene that moves does not need.
             from dynx.world.scene.avoidance import robot_like
@@ -200,6 +209,7 @@ class Scene:
             return frozenset(f"{name}/{link.name}" for link in self._robots[name].model.links)
         return frozenset([name])
 
+    @checks_types
     def require(self, name: str) -> None:
         """Raise UnknownNameError unless `name` is a body, a robot or ``robot/link``."""
         if not isinstance(name, str):
@@ -254,13 +264,6 @@ def _names(what: str, names: object) -> tuple[str, ...]:
     if isinstance(names, str) or not isinstance(names, Iterable):
         raise ArgumentError(f"{what} is {shown(names)}; wanted a sequence of names")
     return tuple(names)
-
-
-def _pair(k: int, pair: object) -> tuple[str, str]:
-    names = _names(f"ignored[{k}]", pair)
-    if len(names) != 2:
-        raise ArgumentError(f"ignored[{k}] is {shown(list(names))}; wanted two names")
-    return names[0], names[1]
 
 
 def _refuse_repeated(names: list[str]) -> None:

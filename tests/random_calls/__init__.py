@@ -1,0 +1,1 @@
+"""Random calls of everything public, with arguments of every wrong kind."""

@@ -1,0 +1,122 @@
+"""No public call raises anything but an error of dynx, whatever it is given.
+
+2,000 calls or more are made outside this suite by ``python -m tests.random_calls``.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import dynx
+from dynx import trajectory
+from dynx.argument_types import checks_types
+from dynx.errors import DTypeError
+from tests.random_calls.calls import Foreign, doors, fault, random_call
+from tests.random_calls.objects import arm, motion, scene
+
+CALLS = 250
+SEED = 20
+
+
+def test_random_calls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    calls = [random_call(SEED, number) for number in range(CALLS)]
+    faults = {str(call): fault(call) for call in calls if call is not None}
+    assert {call: wrong for call, wrong in faults.items() if wrong is not None} == {}
+
+
+def test_the_calls_reach_every_room() -> None:
+    """A door that no longer opens would leave the calls as they are, only fewer."""
+    names = [door.name for door in doors()]
+    assert len(names) > 250
+    for part in (
+        "dynx.control.",
+        "dynx.world.",
+        "dynx.trajectory.",
+        "dynx.ik.",
+        "<world>.",
+        "<backend drake>.",
+    ):
+        assert any(name.startswith(part) for name in names), part
+
+
+untyped: Any = dynx
+"""dynx without types: the mistakes are tested."""
+
+
+def untyped_scene() -> Any:
+    """Return the scene without types."""
+    return scene()
+
+
+WRONG: dict[str, tuple[Callable[[], Any], str]] = {
+    "model": (
+        lambda: untyped.ik.closed_form(3, "tip"),
+        "model is '3', of type int; wanted Model, such as dynx.load",
+    ),
+    "model by name": (lambda: untyped.control.PD("ur5", kp=1.0, kd=1.0), "such as dynx.load\\('ur5'\\)"),
+    "parameters": (
+        lambda: untyped.ParametricDynamics(3),
+        "parameters is '3', of type int; wanted Parameters",
+    ),
+    "joints": (
+        lambda: untyped.PDMotor(0.1, 1.0, 1.0, joints=3),
+        "joints is '3', of type int; wanted Sequence\\[str\\]",
+    ),
+    "class imported for types": (
+        lambda: untyped.trajectory.Identifiability(arm()).condition_number(0),
+        "trajectory is '0'",
+    ),
+    "record": (lambda: untyped.world.separation(3, 4), "ours is '3', of type int; wanted Record"),
+    "path": (lambda: untyped.world.write_scene(scene(), 3), "path is '3', of type int; wanted str"),
+    "callable": (lambda: untyped.agree(arm(), progress=3), "progress is '3'"),
+    "class": (lambda: untyped.backends.native_quantities(int), "backend is .*int"),
+    "name of many axes": (lambda: untyped_scene().robot(np.eye(2)), "name is .*of type ndarray; wanted str"),
+    "truth value": (
+        lambda: untyped.backend("reference", arm()).mass_matrix(np.zeros(3), joint_dynamics=np.ones(2)),
+        "joint_dynamics",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_a_wrong_type_is_named_with_what_was_given_and_what_is_valid(case: str) -> None:
+    call, message = WRONG[case]
+    with pytest.raises(DTypeError, match=message):
+        call()
+
+
+def test_the_signature_and_a_right_call_are_those_of_the_function() -> None:
+    calls: list[tuple[Any, ...]] = []
+
+    @checks_types
+    def follow(
+        path: trajectory.Trajectory, /, names: list[str] | None = None, *rest: int, **others: int
+    ) -> None:
+        """Follow."""
+        calls.append((path, names, rest, others))
+
+    follow(motion(), None, 1, 2, extra=3)
+    follow(motion(), names=["a"])
+    assert calls == [(motion(), None, (1, 2), {"extra": 3}), (motion(), ["a"], (), {})]
+    assert list(inspect.signature(follow).parameters) == ["path", "names", "rest", "others"]
+    assert follow.__doc__ == "Follow."
+    for wrong in ([3], 3, np.array(1.0), Foreign()):
+        with pytest.raises(DTypeError, match="names is"):
+            follow(motion(), wrong)  # type: ignore[arg-type]  # the mistake that is tested
+    with pytest.raises(TypeError, match="missing 1 required positional argument"):
+        follow()  # type: ignore[call-arg]
+
+
+def test_an_iterator_is_left_for_the_function() -> None:
+    @checks_types
+    def joined(names: Iterable[str]) -> str:
+        return ",".join(names)
+
+    assert joined(name for name in "ab") == "a,b"
