@@ -43,6 +43,7 @@ from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane
 from dynx.model.mechanism import ROOT
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import FLOAT64_EPS, Array, Floats, jacobi_eigen, longdouble
+from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import cross, quat_from_rotation, rotation_from_quat, skew
 from dynx.steppers.layout import WORLD, BodyLayout, Layout, Owner, RobotLayout
 
@@ -340,6 +341,7 @@ class MjcfDocument:
         self.free: dict[str, str] = {}
         """The free body of each robot and body of the scene that moves freely."""
         self._colliders = {each.name: number for number, each in enumerate(layout.colliders)}
+        self._bodies_of_colliders: dict[int, str] = {}
         self._root = root = Element("mujoco", model=layout.name)
         flags = {"angle": "radian", "autolimits": "true", "inertiafromgeom": "false", "fusestatic": "false"}
         SubElement(root, "compiler", flags)
@@ -434,15 +436,22 @@ class MjcfDocument:
                 inertia = PrincipalInertia.of_rigid(each.inertia, model.name)
                 self._add_inertia(body, name, inertia, model, link)
                 _add_joint(body, robot, index, moving[link])
+                offset = np.eye(4)
             else:
                 carrier = carriers[index]
                 pose = carrier.placement(frame.R, frame.p)
-                body = SubElement(carrier.body, "body", {"name": name, **pose})
-            self._add_link_shapes(robot, link, body, moves=model.floating or index != ROOT)
+                SubElement(carrier.body, "body", {"name": name, **pose})
+                offset = homogeneous(frame.R, frame.p - carrier.origin)
+            self._add_link_shapes(
+                robot, link, carriers[index].body, offset, moves=model.floating or index != ROOT
+            )
         self._carriers |= {Owner(number, index): carrier for index, carrier in carriers.items()}
         self._couple(robot)
 
-    def _add_link_shapes(self, robot: RobotLayout, link: str, body: Element, *, moves: bool) -> None:
+    def _add_link_shapes(
+        self, robot: RobotLayout, link: str, carrier: Element, T: Floats, *, moves: bool
+    ) -> None:
+        """Add the shapes of a link at the pose T (4, 4) in its carrier's body."""
         name = f"{robot.name}/{link}"
         if name not in self._colliders:
             return
@@ -457,7 +466,7 @@ class MjcfDocument:
             )
         drawn = (each.material.rgba for each in geometry.visuals(link) if each.material is not None)
         colour = next((each for each in drawn if each is not None), None)
-        self._add_shapes(body, name, ((each.shape, each.origin.matrix) for each in placed), colour)
+        self._add_shapes(carrier, name, ((each.shape, T @ each.origin.matrix) for each in placed), colour)
 
     def _couple(self, robot: RobotLayout) -> None:
         """Add a motor for each joint with a coordinate of its own, and the coupling of the mimic joints."""
@@ -496,11 +505,12 @@ class MjcfDocument:
             self._add_inertia(element, body.name, inertia)
             carrier = Carrier(element, body.center)
             if offset:
-                element = SubElement(element, "body", name=body.name, pos=text(-body.center))
+                SubElement(element, "body", name=body.name, pos=text(-body.center))
         self._carriers[Owner(None, number)] = carrier
         if body.name in self._colliders:
             shapes = self._layout.colliders[self._colliders[body.name]].shapes
-            self._add_shapes(element, body.name, ((each.shape, each.T) for each in shapes), None)
+            T = homogeneous(np.eye(3), -carrier.origin)
+            self._add_shapes(carrier.body, body.name, ((each.shape, T @ each.T) for each in shapes), None)
 
     @staticmethod
     def _set_free(body: Element, joint: str, q: Floats) -> None:
@@ -535,13 +545,23 @@ class MjcfDocument:
 
     def _add_shapes(
         self,
-        body: Element,
+        carrier: Element,
         name: str,
         placed: Iterable[tuple[Shape, Floats]],
         colour: Iterable[float] | None,
     ) -> None:
-        """Add the shapes of a link or body, named by it and their number."""
+        """Add the shapes of a link or body, named by it and their number, at poses in its carrier's body.
+
+        Shapes of a link that is fixed to another are in a body of their own, so that its pairs can be
+        excluded. It is at the origin of the carrier's body, because MuJoCo scales the softness of a contact
+        by the inverse weight that the origin has while all joints are at 0: that of a foot below a straight
+        leg is 50 times as large.
+        """
         number = self._colliders[name]
+        body = carrier
+        if carrier.attrib.get("name") not in (name, f"{name}/center"):
+            body = SubElement(carrier, "body", name=f"{name}/shapes")
+        self._bodies_of_colliders[number] = body.get("name", "world")
         rgba = self._layout.colliders[number].material.rgba if colour is None else colour
         contype, conaffinity = self._masks[number]
         options = {**self.materials.geom(number), "contype": contype, "conaffinity": conaffinity}
@@ -554,7 +574,8 @@ class MjcfDocument:
         colliders = self._layout.colliders
         excluded = () if self.materials.complete else pairs_to_exclude(self._layout, self._masks)
         for a, b in excluded:
-            SubElement(self._contact, "exclude", body1=colliders[a].name, body2=colliders[b].name)
+            ends = {f"body{k}": self._bodies_of_colliders[end] for k, end in ((1, a), (2, b))}
+            SubElement(self._contact, "exclude", ends)
         for a, b, options in self.materials.pairs:
             given = attributes(options, self.materials.common_of_pairs)
             for i, j in product(range(len(colliders[a].shapes)), range(len(colliders[b].shapes))):
