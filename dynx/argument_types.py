@@ -58,9 +58,9 @@ def _checked(function: Callable[..., Any]) -> Callable[..., Any]:
     def checked(*given: Any, **options: Any) -> Any:
         if unread:
             read()
-        for test, value in zip(by_place, given, strict=False):
+        for place, (test, value) in enumerate(zip(by_place, given, strict=False)):
             if test is not None and not test(value):
-                raise _wrong_type(function, by_place.index(test), value)
+                raise _wrong_type(function, place, value)
         for name in options:
             if name in by_name and not by_name[name](options[name]):
                 raise _wrong_type(function, name, options[name])
@@ -76,7 +76,7 @@ def _wrong_type(function: Callable[..., Any], argument: str | int, value: object
     name = argument if isinstance(argument, str) else list(parameters)[argument]
     wanted = _written(parameters[name].annotation)
     if wanted.startswith("Model"):
-        wanted += f", such as dynx.load({shown(value) if isinstance(value, str) else '...'})"
+        wanted = f"a {wanted}, such as dynx.load({shown(value) if isinstance(value, str) else '...'})"
     given = f"the class {value.__name__}" if isinstance(value, type) else shown(value)
     return DTypeError(f"{name} is {given}, of type {type(value).__name__}; wanted {wanted}")
 

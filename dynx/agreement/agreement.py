@@ -57,8 +57,8 @@ IDENTITY_SAMPLES = 4
 Progress = Callable[[str], None]
 
 
-@checks_types
 @checks_option_names
+@checks_types
 def agree(
     model: Model | str | Path,
     backends: Sequence[str | Backend] | None = None,
@@ -218,8 +218,6 @@ def _check_arguments(
     for each in chosen:
         if isinstance(each, str):
             backend_class(each)
-        elif not isinstance(each, Backend):
-            raise ArgumentError(f"a backend is of type {type(each).__name__}; wanted a name or a Backend")
     return chosen
 
 

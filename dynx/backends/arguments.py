@@ -86,7 +86,7 @@ class Arguments:
 
     def frames(self, frames: object) -> list[str]:
         """Return the names in a sequence of frames."""
-        if isinstance(frames, Iterable):
+        if isinstance(frames, Iterable) and getattr(frames, "ndim", 1) > 0:
             return list(frames)
         raise ArgumentError(
             f"frame is of type {type(frames).__name__}; wanted a name, a sequence of names, or None for all"

@@ -9,9 +9,9 @@ from __future__ import annotations
 import inspect
 from typing import TYPE_CHECKING, Any
 
-from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, BackendError, UnknownBackendError, shown
 from dynx.model import Model
+from dynx.model.model import refuse_other_than_model
 from dynx.registry import ClassRegistry
 
 if TYPE_CHECKING:
@@ -43,7 +43,6 @@ register = _backends.register
 unregister = _backends.unregister
 
 
-@checks_types
 def backend(name: str, model: Model, **options: Any) -> Backend:
     """Return the backend of that name for `model`; `options` go to its constructor (``validate=False``).
 
@@ -52,6 +51,7 @@ def backend(name: str, model: Model, **options: Any) -> Backend:
     option that the backend does not have or anything but a `Model`.
     """
     kind = backend_class(name)
+    refuse_other_than_model(model)
     try:
         inspect.signature(kind).bind(model, **options)
     except TypeError as error:

@@ -49,7 +49,7 @@ class FrictionCompensation(Wrapper[ControllerState], pure=True):
         if damping is None and friction is None:
             damping = friction = True
         damping, friction = (False if each is None else each for each in (damping, friction))
-        if speed not in SPEEDS:
+        if not isinstance(speed, str) or speed not in SPEEDS:
             raise ArgumentError(f"speed is {shown(speed)}; wanted one of {', '.join(SPEEDS)}")
         super().__init__(inner)
         losses = JointFriction(inner.model, damping, friction, slip)

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.argument_types import checks_types
 from dynx.distance.cores import ConvexShape, Core, core_of
 from dynx.distance.gjk import CorePair
 from dynx.distance.penetration import Penetration, penetration, penetration_of_parallel
@@ -56,7 +55,6 @@ class Distance:
         return Distance(self.lower, self.upper, self.point_b, self.point_a, -self.normal)
 
 
-@checks_types
 def distance(
     shape_a: ConvexShape | Plane, T_a: Pose | ArrayLike, shape_b: ConvexShape | Plane, T_b: Pose | ArrayLike
 ) -> Distance:
@@ -71,7 +69,6 @@ def distance(
     return found
 
 
-@checks_types
 def support(shape: ConvexShape | Plane, T: Pose | ArrayLike, direction: ArrayLike) -> tuple[float, Floats]:
     """Return h(n) = max {n . x : x in shape} for the unit vector n of a direction, and its point.
 
@@ -91,7 +88,6 @@ def support(shape: ConvexShape | Plane, T: Pose | ArrayLike, direction: ArrayLik
     return float(n @ point), point
 
 
-@checks_types
 def separation(
     shape_a: ConvexShape | Plane,
     T_a: Pose | ArrayLike,

@@ -36,7 +36,6 @@ MAX_SIDE = 8192
 """Largest width and height of a picture [pixels]."""
 
 
-@checks_types
 class TaskEnvironment(Env[Any, Any]):
     """A task on one engine, with the interface of `gymnasium.Env`.
 

@@ -405,7 +405,6 @@ class Simulation:
             record,
         )
 
-    @checks_types
     def restore(self, snapshot: Snapshot) -> SimulationState:
         """Continue from a snapshot of this simulation or of another of the same robot and `dt`.
 
@@ -449,7 +448,6 @@ class Simulation:
         self._loop_state, self._plant_needs_reset = loop_state, False
         return self.state
 
-    @checks_types
     def take_over(self, rollout: Rollout, step: int | None = None) -> None:
         """Continue from `step` of a rollout of an equal scenario, by default its last.
 

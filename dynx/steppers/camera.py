@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, shown
 from dynx.model import Pose
 from dynx.model.elements import IDENTITY, checked_pose
@@ -23,7 +22,6 @@ MAX_SIDE = 8192
 """Largest width and height of a picture [pixels]."""
 
 
-@checks_types
 @dataclass(frozen=True)
 class Camera:
     """A pinhole camera at `pose` in the frame of `part`, a body or ``robot/link`` that carries it, or in the

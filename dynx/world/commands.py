@@ -409,7 +409,7 @@ class Commands:
         self._more_than_torques = True
         self._held = checked_torques({} if torques is None else torques, self._torques)
         held = dict(self._held)
-        commands = self._set_motors(motors or {})
+        commands = self._set_motors({} if motors is None else motors)
         frames, pushes = self._sort_forces(forces)
         motored = frozenset(k for k, loads in enumerate(self._loads) if loads.has_motors)
         repeated = motored | frames.keys() | self._outside

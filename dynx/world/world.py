@@ -18,7 +18,7 @@ from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, UnknownNameError, shown
 from dynx.model import Model, Pose
 from dynx.model.geometry import Mesh
-from dynx.model.numbers import positive_seconds, whole_number
+from dynx.model.numbers import checked_bool, positive_seconds, whole_number
 from dynx.model.package_search import StrPath
 from dynx.option_names import checks_option_names, refuse_options, right_name
 from dynx.rbd.jacobians import LOCAL
@@ -283,6 +283,7 @@ class World:
         step is taken before its time has come on the clock of the machine.
         """
         _ = self._motion.engine
+        real_time = checked_bool("real_time", real_time)
         if loads is not None and not callable(loads):
             raise ArgumentError(f"loads is of type {type(loads).__name__}; wanted a function of the world")
         run_for(

@@ -172,7 +172,9 @@ def test_invalid_arguments_are_refused() -> None:
     with pytest.raises(ArgumentError, match="at least one"):
         agree(arm(), [])
     number: Any = 3
-    with pytest.raises(ArgumentError, match="wanted a name or a Backend"):
+    with pytest.raises(
+        ArgumentError, match=r"backends is '\[3\]', of type list; wanted Sequence\[str \| Backend\]"
+    ):
         agree(arm(), [number])
     with pytest.raises(ArgumentError, match="another model"):
         agree(arm(), [ReferenceBackend(rock())])

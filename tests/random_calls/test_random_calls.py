@@ -57,8 +57,8 @@ def untyped_scene() -> Any:
 
 WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "model": (
-        lambda: untyped.ik.closed_form(3, "tip"),
-        "model is '3', of type int; wanted Model, such as dynx.load",
+        lambda: untyped.control.Velocity(3, kd=1.0),
+        "model is '3', of type int; wanted a Model, such as dynx.load",
     ),
     "model by name": (lambda: untyped.control.PD("ur5", kp=1.0, kd=1.0), "such as dynx.load\\('ur5'\\)"),
     "parameters": (
@@ -114,9 +114,26 @@ def test_the_signature_and_a_right_call_are_those_of_the_function() -> None:
         follow()  # type: ignore[call-arg]
 
 
+def test_the_second_of_two_arguments_of_one_type_is_named() -> None:
+    @checks_types
+    def chosen(first: bool, second: bool) -> bool:
+        return first and second
+
+    with pytest.raises(DTypeError, match=r"^second is '3', of type int; wanted True or False$"):
+        chosen(True, 3)  # type: ignore[arg-type]  # the mistake that is tested
+
+
 def test_an_iterator_is_left_for_the_function() -> None:
     @checks_types
     def joined(names: Iterable[str]) -> str:
         return ",".join(names)
 
     assert joined(name for name in "ab") == "a,b"
+
+
+def test_a_matrix_is_a_pose_where_one_is_read() -> None:
+    """The field of a dataclass holds what is made of an argument, whose type may be wider."""
+    matrix: Any = np.eye(4)
+    assert untyped.world.Camera(pose=matrix).pose == dynx.Pose()
+    assert untyped.world.Weld("a", "b", matrix).T_a_b == dynx.Pose()
+    assert untyped.world.box("b", (1.0, 1.0, 1.0), pose=matrix).pose == dynx.Pose()

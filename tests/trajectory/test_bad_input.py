@@ -87,7 +87,7 @@ def test_velocities_at_the_ends() -> None:
 
 def test_models() -> None:
     model: Any = "ur5"
-    with pytest.raises(ArgumentError, match="model is 'ur5', of type str; wanted Model"):
+    with pytest.raises(ArgumentError, match="model is 'ur5', of type str; wanted a Model"):
         trajectory.cycloidal([0.0], [1.0], 1.0, model=model)
     with pytest.raises(ShapeError, match=r"q0 has shape \(1,\); wanted \(\.\.\., 6\)"):
         trajectory.cycloidal([0.0], [1.0], 1.0, model=ur5())

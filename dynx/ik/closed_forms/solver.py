@@ -36,6 +36,7 @@ from dynx.ik.closed_forms.solutions import FullTurns, IKSolutions
 from dynx.ik.options import SearchLimits
 from dynx.model import Model
 from dynx.model.configuration import checked_q
+from dynx.model.model import refuse_other_than_model
 from dynx.model.numbers import checked_bool
 from dynx.model.targets import checked_targets
 from dynx.simd.variants import BoundVariants
@@ -267,7 +268,6 @@ def _checked_poses(target: ArrayLike) -> Floats:
     return np.asarray(homogeneous(targets.rotations, targets.positions))
 
 
-@checks_types
 def closed_form(
     model: Model, frame: str, given: Mapping[str, float] | None = None, *, compiled: bool = False
 ) -> ClosedForm:
@@ -282,6 +282,7 @@ def closed_form(
 
     Raises NoClosedFormError, which says what is missing; UnknownNameError or ArgumentError for arguments.
     """
+    refuse_other_than_model(model)
     model.frame_index(frame)
     positions = {} if given is None else given
     try:

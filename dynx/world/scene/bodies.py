@@ -221,7 +221,6 @@ def body_to_urdf(body: SceneBody) -> str:
     return Model.build(body.name, [link], [], geometry=geometry).to_urdf(geometry=True)
 
 
-@checks_types
 @dataclass(frozen=True)
 class Weld:
     """A rigid connection of `a` and `b`: each a body, ``robot/link`` or ``world``.
