@@ -67,6 +67,7 @@ def benchmark_cases(
 
     Batches smaller than `least` are not combined with several threads.
     """
+    whole_number("least", least, 0)
     return tuple(
         BenchmarkCase(quantity, batch, count)
         for batch in sorted(_counts("batches", batches), reverse=True)

@@ -430,7 +430,7 @@ def diagnose(
     examiner, variants = _examiners(engines, samples, seed, tolerance)
     choices = checked_choices((choose or {}).items())
     checked_base(base)
-    if fix_tolerance is not None and not 0.0 < fix_tolerance < 1.0:
+    if fix_tolerance is not None and not (is_real(fix_tolerance) and 0.0 < fix_tolerance < 1.0):
         raise ArgumentError(f"fix_tolerance is {fix_tolerance!r}; wanted a relative error between 0 and 1")
     if level not in LEVELS:
         raise UnknownNameError(f"no level {shown(level)}{nearest(level, LEVELS)}")

@@ -29,7 +29,7 @@ from dynx.argument_types import checks_types
 from dynx.backends import backend as make_backend
 from dynx.errors import ArgumentError, ShapeError, TrajectoryError
 from dynx.model import Model
-from dynx.model.numbers import read_only, whole_number
+from dynx.model.numbers import checked_generator, read_only, whole_number
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Trajectory, checked_duration
@@ -157,7 +157,7 @@ def excitation(
     ends = _ends_around(model, q0)
     T = checked_duration(duration)
     harmonics, candidates = whole_number("harmonics", harmonics, 3), whole_number("candidates", candidates, 1)
-    generator = np.random.default_rng(rng)
+    generator = checked_generator(rng)
     bounds = _MotionLimits(ends, velocity, acceleration)
     drawn = [
         ends.rest_to_rest(T, bounds.scale(_random_series(generator, T, harmonics, ends.nv)))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynx.argument_types import checks_types
-from dynx.errors import ArgumentError
+from dynx.errors import ArgumentError, ShapeError
 from dynx.spatial.scalar import Floats
 from dynx.world.record import Record
 
@@ -77,8 +77,8 @@ def separation(ours: Record, theirs: Record, times: Floats | None = None) -> Sep
     end = min(float(ours.times[-1]), float(theirs.times[-1]))
     fine, coarse = sorted((theirs, ours), key=lambda record: record.step)
     if times is not None:
-        if not times.size:
-            raise ArgumentError("times is empty; wanted at least one time")
+        if times.ndim != 1 or not times.size:
+            raise ShapeError(f"times has shape {times.shape}; wanted (n,), at least one time")
         coarse = fine = Record("", times, {})
     compared = coarse.times_within(begin, end)
     if compared.size < 2:
