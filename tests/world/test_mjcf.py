@@ -76,7 +76,13 @@ def test_the_scenes_of_dynx_load_in_mujoco(name: str) -> None:
     models = [robot.model for robot in scene.robots]
     moving = [body for body in scene.bodies if not body.fixed]
     free = [body for body in moving if any(body.inertial.origin.xyz)]
-    assert model.nbody == 1 + len(scene.robots) + len(scene.parts) + len(free)
+    carried = [number for number in range(model.nbody) if model.body(number).name.endswith("/shapes")]
+    assert model.nbody - len(carried) == 1 + len(scene.robots) + len(scene.parts) + len(free)
+    # MuJoCo scales the softness of contacts by the inverse weight at the origin of a geom's body.
+    places = data.xpos[model.body_weldid[model.geom_bodyid]]
+    np.testing.assert_array_equal(
+        data.xpos[model.geom_bodyid][places.any(axis=1)], places[places.any(axis=1)]
+    )
     assert model.njnt == sum(len([j for j in m.joints if j.moves]) + m.floating for m in models) + len(moving)
     shapes = [len(m.geometry.collisions(link.name)) for m in models for link in m.links]
     assert model.ngeom == sum(shapes) + sum(len(body.shapes) for body in scene.bodies)
@@ -149,12 +155,12 @@ def test_every_shape_has_its_size_pose_and_material() -> None:
     scene = Scene(
         "s", bodies=(SceneBody("b", placed, mass=1.0, material=material), ground("g", material=material))
     )
-    model, _ = load(scene)
+    model, data = load(scene)
     sizes = [[0.5, 1, 1.5], [0.3, 0, 0], [0.2, 0.3, 0], [0.1, 0.25, 0]]
     for number, size in enumerate(sizes):
         geom = model.geom(f"b/{number}")
         np.testing.assert_array_equal(geom.size, size)
-        np.testing.assert_allclose(geom.pos, (0.1, 0.2, 0.3), atol=1e-15)
+        np.testing.assert_allclose(data.geom(geom.id).xpos, (0.1, 0.2, 0.3), atol=1e-15)
         np.testing.assert_allclose(geom.quat, (np.cos(0.25), np.sin(0.25), 0, 0), atol=1e-12)
         np.testing.assert_allclose(geom.friction, (0.7, 0.02, 0.001), rtol=1e-15)
         np.testing.assert_allclose(geom.rgba, COLOUR, rtol=1e-6)
@@ -368,7 +374,7 @@ def test_a_document_of_a_scene_is_that_of_its_world() -> None:
         scene_to_mjcf(scene, impratioo=1.0)
     with pytest.raises(ArgumentError, match="joint_friction is '1'"):
         scene_to_mjcf(scene, joint_friction=1)  # type: ignore[arg-type]
-    with pytest.raises(ArgumentError, match="scene is of type str"):
+    with pytest.raises(ArgumentError, match="scene is 'stack', of type str"):
         scene_to_mjcf("stack")  # type: ignore[arg-type]
 
 

@@ -2,7 +2,8 @@
 
 A robot is a body named as it is, in which each link is a body ``robot/link``. Links that move are nested as
 their joints are, and have the merged inertia of the links that fixed joints connect to them; those links are
-bodies without inertia in them. What does not move has no inertia either.
+bodies without inertia in them, and have their shapes in bodies ``robot/link/shapes``. What does not move has
+no inertia either.
 
 The body of a robot with a fixed base is at the origin of the world. A free body is at the centre of mass,
 where MuJoCo's Euler conserves momentum: that of a floating base, and, for a body of the scene whose origin is
