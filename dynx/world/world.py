@@ -461,9 +461,11 @@ class World:
         the same steps."""
         if self._identity is None:
             options = {**self.options, **self.settings}
-            if not self.options["joint_armature"]:
-                # Files of earlier versions do not have the option.
-                del options["joint_armature"]
+            # Files of earlier versions do not have these.
+            added = {"joint_armature": False, "link_damping": 0.0}
+            for name in added.keys() & options.keys():
+                if options[name] == added[name]:
+                    del options[name]
             self._identity = identity(self._layout, options)
         return self._identity
 

@@ -5,12 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
+import dynx
 from dynx.errors import ArgumentError, UnknownNameError
 from dynx.steppers.registry import world_class
 from dynx.steppers.settings import Setting, checked_settings
 from dynx.world import Scene, World, box, ground
+from dynx.world.scene import SceneRobot
 from tests.world.engines import WORLDS
 
 PAGE = (Path(__file__).parents[2] / "docs" / "world.md").read_text(encoding="utf-8")
@@ -78,3 +81,48 @@ def test_a_world_steps_with_every_setting_changed(engine: str) -> None:
         with World(scene, engine, **{name: value}) as world:
             assert world.settings[name] == value
             world.step(5)
+
+
+def test_link_damping_is_that_of_bullet_by_itself(tmp_path: Path) -> None:
+    pybullet = pytest.importorskip("pybullet")
+    model = dynx.load("double_pendulum", gravity=(0, 0, 0))
+    path = tmp_path / "robot.urdf"
+    path.write_text(model.to_urdf())
+    q, v = (0.3, -0.4), (2.0, -3.0)
+    scene = Scene("s", robots=(SceneRobot("r", model, q=q, v=v),), gravity=(0, 0, 0))
+    options = {"joint_damping": False, "joint_friction": False, "joint_limits": False}
+    ends = {}
+    for damping in (0.0, 0.04):
+        with World(scene, "pybullet", **options, collisions=False, link_damping=damping) as world:
+            world.step(1000)
+            ends[damping] = world.state.robots["r"]
+    client = pybullet.connect(pybullet.DIRECT)
+    try:
+        pybullet.setTimeStep(1e-3, physicsClientId=client)
+        flags = pybullet.URDF_USE_INERTIA_FROM_FILE
+        body = pybullet.loadURDF(str(path), useFixedBase=True, flags=flags, physicsClientId=client)
+        joints = [
+            k
+            for k in range(pybullet.getNumJoints(body, physicsClientId=client))
+            if pybullet.getJointInfo(body, k, physicsClientId=client)[2] != pybullet.JOINT_FIXED
+        ]
+        for k, position, velocity in zip(joints, q, v, strict=True):
+            pybullet.setJointMotorControl2(
+                body, k, pybullet.VELOCITY_CONTROL, force=0, physicsClientId=client
+            )
+            pybullet.changeDynamics(
+                body,
+                k,
+                jointDamping=0.0,
+                jointLowerLimit=-1e9,
+                jointUpperLimit=1e9,
+                physicsClientId=client,
+            )
+            pybullet.resetJointState(body, k, position, velocity, physicsClientId=client)
+        for _ in range(1000):
+            pybullet.stepSimulation(physicsClientId=client)
+        found = np.array([pybullet.getJointState(body, k, physicsClientId=client)[:2] for k in joints]).T
+    finally:
+        pybullet.disconnect(client)
+    np.testing.assert_allclose(found, ends[0.04], atol=1e-9)
+    assert np.abs(found - ends[0.0]).max() > 1e-2

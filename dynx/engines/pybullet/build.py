@@ -130,6 +130,9 @@ SETTINGS = {
     "contact_slop": Setting(1e-5, "depth [m] to which a penetration is not removed", most=1.0),
     "mesh_margin": Setting(0.0, "distance [m] by which the hull of a mesh is enlarged", most=1.0),
     "constraint_force": Setting(1e6, "largest force [N] or moment [N m] of welds and points", most=1e12),
+    "link_damping": Setting(
+        0.0, "damping [1/s] of the motion of every link and body, which Bullet by itself sets to 0.04"
+    ),
     "strict_materials": STRICT_MATERIALS,
 }
 """Settings by name."""
@@ -376,7 +379,7 @@ UNLIMITED = 1e30
 """Limit of a joint that is limited in the other direction only."""
 
 FREE = {"linearDamping": 0.0, "angularDamping": 0.0, "maxJointVelocity": 1e300}
-"""Options of `changeDynamics` without which Bullet damps the base and limits speeds."""
+"""Options of `changeDynamics` for the root, without which Bullet damps every link and limits speeds."""
 
 
 class BulletObject:

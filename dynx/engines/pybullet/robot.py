@@ -4,8 +4,8 @@
 POSITION_CONTROL or VELOCITY_CONTROL leave one active when they are no longer called. A torque that is
 commanded afterwards is added to that of the motor, which cancels it: the arm does not move, and there is no
 message. A motor is released by VELOCITY_CONTROL with a force of 0, as `BulletRobot` does when it is made and
-whenever torques follow a command. Bullet also damps the base (0.04 of its speed per second), damps joints as
-in the URDF, and limits speeds to 100: dynx switches all of that off.
+whenever torques follow a command. Bullet also damps every link (0.04 of its speed per second), damps joints
+as in the URDF, and limits speeds to 100: dynx switches all of that off.
 """
 
 from __future__ import annotations

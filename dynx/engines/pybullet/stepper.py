@@ -200,7 +200,12 @@ class BulletStepper(Stepper):
         places: list[list[tuple[int, int]]] = [[] for _ in layout.colliders]
         objects: list[BulletObject] = [robot.object for robot in self.robots]
         objects += [body.object for body in self._bodies]
+        damping = settings["link_damping"]
         for each in objects:
+            if damping:
+                # Set for the root, it acts on all links.
+                given = {"linearDamping": damping, "angularDamping": damping}
+                client.call(client.engine.changeDynamics, each.body, ROOT, **given)
             for number, link in each.link_of.items():
                 places[number].append((each.body, link))
         for number, collider in enumerate(layout.colliders):
