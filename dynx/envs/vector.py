@@ -31,7 +31,7 @@ from dynx.spatial.scalar import Floats
 
 RENDER_MODES = ("rgb_array",)
 
-EPISODES_AHEAD = 32
+EPISODES_AHEAD = 64
 """Number of episodes for which an environment draws random numbers at a time."""
 
 NONE_ENDED = np.zeros(0, dtype=np.intp)
@@ -56,11 +56,12 @@ class StartNumbers:
 
     def next(self, rows: NDArray[np.intp]) -> Floats:
         """Return the numbers (n, size) of the next episodes of some environments."""
-        used = self._used[rows]
-        place = used % EPISODES_AHEAD
-        for row in rows[place == 0].tolist():
-            self._generators[row].random(out=self._ahead[row])
-        self._used[rows] = used + 1
+        place = self._used.take(rows)
+        fresh = place == 0
+        if fresh.any():
+            for row in rows[fresh].tolist():
+                self._generators[row].random(out=self._ahead[row])
+        self._used[rows] = (place + 1) % EPISODES_AHEAD
         # NumPy takes rows of a matrix in a third of the time that it takes entries of two axes.
         return np.asarray(self._flat.take(rows * EPISODES_AHEAD + place, axis=0))
 
