@@ -68,6 +68,11 @@ def checked_settings(
     """
     for name in given:
         if name not in known:
+            if name == "settings":
+                raise UnknownNameError(
+                    "settings of an engine are given by their names, such as "
+                    f"{next(iter(known), 'name')}=..., or as **settings"
+                )
             raise UnknownNameError(
                 f"the engine {shown(engine)} has no setting {shown(name)}{nearest(name, known)}"
             )

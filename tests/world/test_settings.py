@@ -126,3 +126,8 @@ def test_link_damping_is_that_of_bullet_by_itself(tmp_path: Path) -> None:
         pybullet.disconnect(client)
     np.testing.assert_allclose(found, ends[0.04], atol=1e-9)
     assert np.abs(found - ends[0.0]).max() > 1e-2
+
+
+def test_settings_are_given_by_their_names() -> None:
+    with pytest.raises(UnknownNameError, match=r"or as \*\*settings"):
+        World(Scene("s", bodies=(ground(),)), "pybullet", settings={"erp": 0.3})

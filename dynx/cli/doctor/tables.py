@@ -362,6 +362,7 @@ def show_many(out: Console, reports: Sequence[DoctorReport]) -> None:
         out.print(line.format(level=levels), style="bold")
     out.print(table)
     _count_variants(out, reports)
+    _count_practice(out, reports)
     unread = sum(bool(report.unread_meshes) for report in reports)
     if unread:
         share = f"{unread} of {counted(len(reports), 'robot')}"
@@ -380,6 +381,16 @@ def _count_variants(out: Console, reports: Sequence[DoctorReport]) -> None:
         rules = ", ".join(sorted({finding.rule for each in mine for finding in each.findings}))
         share = f"{len(mine)} of {counted(len(reports), 'robot')}"
         out.print(f"{name}: {share} loaded otherwise by this call{f' ({rules})' if rules else ''}")
+
+
+def _count_practice(out: Console, reports: Sequence[DoctorReport]) -> None:
+    """Print the number of robots with bad practice, which no verdict counts, and the rules that name it."""
+    found = [sorted({each.rule for each in causes(report) if each.kind == "practice"}) for report in reports]
+    affected = sum(map(bool, found))
+    if affected:
+        share = f"{affected} of {counted(len(reports), 'robot')}"
+        rules = ", ".join(sorted({rule for each in found for rule in each}))
+        out.print(f"bad practice: {share} ({rules}); for a single file the report shows the places")
 
 
 def show_summary(out: Console, reports: Sequence[DoctorReport], seconds: float, not_done: int) -> None:

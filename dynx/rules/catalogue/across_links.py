@@ -113,8 +113,10 @@ class TwinsDiffer(Rule):
     zero, and three in which the moments of an arm are exchanged. Of more than 1,000 files of pybullet_data
     one is: a bracket's centre of mass is at 2 cm on the left and at 3 cm on the right.
 
-    Usual causes: the sign of a product of inertia or of a centre of mass was lost in reflecting the file; one
-    side was measured or exported again and the other was not; an extra digit; moments in another unit.
+    Usual causes: one side was measured or exported again and the other was not; an extra digit; moments in
+    another unit; one of several signs of products of inertia was lost in reflecting the file. A sign that is
+    lost alone, of a product or of the centre of mass, changes none of these numbers, and links on joints that
+    differ in their distance from the parent are not compared.
 
     All engines use the numbers unchanged. The robot leans to one side, and a gait that was tuned on one leg
     fails on the other. Where the parts differ (a tool in one hand), nothing is wrong.

@@ -204,6 +204,16 @@ def test_an_engine_that_is_not_used_on_the_mended_file_does_not_refuse_it(key: s
     assert line.count(word) == 2
 
 
+def test_bad_practice_is_counted_where_several_files_have_a_line_each() -> None:
+    practice = replace(differing().findings[0], rule="DX520", kind="practice", effect=None, effects={})
+    for findings, share in [((), ""), ((practice, practice), "bad practice: 1 of 2 robots (DX520)")]:
+        out = StringIO()
+        reports = [replace(differing(), findings=()), replace(differing(), findings=findings)]
+        show_many(Console(file=out, width=200, markup=False), reports)
+        assert ("bad practice" in out.getvalue()) == bool(share)
+        assert share in out.getvalue()
+
+
 def test_places_with_and_without_effect_are_counted_apart() -> None:
     """As many have an effect as in JSON."""
     one = differing().findings[0]
