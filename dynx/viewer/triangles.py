@@ -59,8 +59,8 @@ def turned_outwards(triangles: Triangles) -> Triangles | None:
 TRIANGLE_BUDGET = 15_000
 """Largest number of triangles of all visual meshes together where they are reduced."""
 
-FEWEST_TRIANGLES = 1_000
-"""Number of triangles up to which a mesh is not reduced."""
+MAX_WHOLE = 1_000
+"""Largest number of triangles of a mesh that always stays whole."""
 
 _JOINED = 1e-3
 """Distance within which vertices of a reduced mesh are joined, as a share of its size."""
@@ -79,8 +79,8 @@ _SURFACE_CHANGED, _VOLUME_CHANGED, _MOVED = 0.05, 0.02, 0.01
 distance by which the box or any point moves as a share of the diagonal of the box."""
 
 _SAMPLES = 100_000
-"""Number of points that stand for a surface where distances to it are measured; they are so dense that it is
-at most half of the distance allowed from the nearest of them."""
+"""Number of random points that stand for a surface where distances to it are measured. They lie so densely
+that the nearest of them is farther away than the surface by less than half of the distance allowed."""
 
 
 def budgets(meshes: Mapping[Mesh, int], total: int = TRIANGLE_BUDGET) -> dict[Mesh, int]:
@@ -92,7 +92,7 @@ def budgets(meshes: Mapping[Mesh, int], total: int = TRIANGLE_BUDGET) -> dict[Me
     sizes = {mesh: len(mesh.triangles[1]) for mesh in meshes}
     everything = sum(sizes[mesh] * count for mesh, count in meshes.items())
     share = min(1.0, total / max(everything, 1))
-    return {mesh: max(math.floor(size * share), min(size, FEWEST_TRIANGLES)) for mesh, size in sizes.items()}
+    return {mesh: max(math.floor(size * share), min(size, MAX_WHOLE)) for mesh, size in sizes.items()}
 
 
 def has_graphics_processor() -> bool:

@@ -8,7 +8,6 @@ from typing import Any
 from dynx.argument_types import checks_types
 from dynx.engines.mujoco.materials import SETTINGS
 from dynx.engines.mujoco.mjcf import MjcfDocument
-from dynx.errors import ArgumentError
 from dynx.steppers.layout import Layout
 from dynx.steppers.settings import checked_settings
 from dynx.world.preparation import checked_options, may_be_reached, prepare
@@ -45,8 +44,6 @@ def scene_to_mjcf(
     without mass, and for a ground that moves; DescriptionError for a fault in a collision shape or its mesh;
     EngineLimitError for a robot with too many links in a row; ArgumentError and UnknownNameError for options.
     """
-    if not isinstance(scene, Scene):
-        raise ArgumentError(f"scene is of type {type(scene).__name__}; wanted a Scene")
     switches = {
         "collisions": collisions,
         "joint_limits": joint_limits,

@@ -172,8 +172,6 @@ class World:
         """Raises UnknownBackendError and NotInstalledError for an engine, UnknownNameError and ArgumentError
         for settings, DescriptionError for collision shapes, EngineLimitError for what the engine cannot
         represent."""
-        if not isinstance(scene, Scene):
-            raise ArgumentError(f"scene is of type {type(scene).__name__}; wanted a Scene")
         self._kind = world_class(engine)
         self.scene = scene
         self.engine = engine

@@ -18,7 +18,7 @@ from dynx.spatial.scalar import Floats
 from dynx.viewer import triangles as meshes_module
 from dynx.viewer.library import simplify
 from dynx.viewer.triangles import (
-    FEWEST_TRIANGLES,
+    MAX_WHOLE,
     TRIANGLE_BUDGET,
     Triangles,
     budgets,
@@ -109,7 +109,7 @@ def test_reduced_meshes_keep_surface_box_place_and_volume(robot: str, links: tup
     meshes = {visual.shape for link in links for visual in model.geometry.visuals(link)}
     for mesh in meshes:
         assert isinstance(mesh, Mesh)
-        whole, found = triangles_of(mesh), reduced(mesh, FEWEST_TRIANGLES)
+        whole, found = triangles_of(mesh), reduced(mesh, MAX_WHOLE)
         assert len(found.faces) <= 0.8 * len(whole.faces) or len(found.faces) == len(whole.faces)
         assert 0.95 <= surface(found) / surface(whole) <= 1.05
         diagonal = np.linalg.norm(np.ptp(whole.vertices, axis=0))
@@ -136,7 +136,7 @@ def test_budgets_are_kept_but_for_small_meshes(robot: str) -> None:
     ]
     parts = budgets({mesh: meshes.count(mesh) for mesh in meshes})
     wanted = sum(min(parts[mesh], len(mesh.triangles[1])) for mesh in meshes)
-    assert wanted <= TRIANGLE_BUDGET + FEWEST_TRIANGLES * len(meshes)
+    assert wanted <= TRIANGLE_BUDGET + MAX_WHOLE * len(meshes)
 
 
 def ball(folder: Path) -> Mesh:
