@@ -19,6 +19,10 @@ IDEAS = {
     "joint friction": r"^class FrictionLaw\b",
     "a step of a robot by a backend": r"^class RobotStep\b",
     "parameters in which robots differ": r"^class Parameters\b|^def plant_model\b",
+    "what joints transmit": r"^def joint_wrenches\b",
+    "acceleration from two states": r"^class MeanAcceleration\b",
+    "a scene in MuJoCo": r"\bElement\(\"mujoco\"",
+    "types of arguments": r"^def checks_types\b",
 }
 """Text that only the module of an idea contains, by the name of the idea."""
 
