@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+import shlex
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import PurePath
@@ -18,10 +20,14 @@ from dynx.model.package_search import StrPath, data_folders, environment_folders
 from dynx.model.tree import STANDARD_GRAVITY, Base
 from dynx.model.urdf.geometry import urdf_geometry
 from dynx.model.urdf.reader import read_urdf
-from dynx.model.xacro_reading import expand_xacro, split_arguments
 from dynx.option_names import checks_option_names
 
 _SUFFIXES = (".urdf", ".xacro", ".xml")
+
+# Without the colon an argument is a mistake, which is named.
+_WITH_ARGUMENTS = re.compile(r"(?P<path>.*\.xacro)\s+(?P<arguments>\w+:?=.*)", re.DOTALL)
+
+_ARGUMENT = re.compile(r"(\w+):=(.*)", re.DOTALL)
 
 
 @checks_option_names
@@ -97,8 +103,35 @@ def read_description(
     path = _path_of(named, package_dirs)
     name = PurePath(path).name.split(".")[0]
     if path.endswith(".xacro"):
+        # Imported here, because most robots are read from URDF.
+        from dynx.model.xacro_reading import expand_xacro
+
         return expand_xacro(path, package_dirs, arguments), printable(path), name
     return read_file(path), printable(path), name
+
+
+def split_arguments(path: str) -> tuple[str, dict[str, str]]:
+    """Split ``FILE.xacro name:=value ...``, as ROS writes it, into the path and the arguments.
+
+    A value with blanks stands in quotes. A path without arguments is returned as it is. Raises ArgumentError
+    for a part after the path that is no argument.
+    """
+    match = _WITH_ARGUMENTS.fullmatch(path)
+    if match is None:
+        return path, {}
+    try:
+        parts = shlex.split(match["arguments"])
+    except ValueError as error:
+        raise ArgumentError(f"arguments of {shown(match['path'], 300)}: {error}") from None
+    arguments = {}
+    for part in parts:
+        argument = _ARGUMENT.fullmatch(part)
+        if argument is None:
+            raise ArgumentError(
+                f"{shown(part)} is no argument of {shown(match['path'], 300)}; wanted name:=value"
+            )
+        arguments[argument[1]] = argument[2]
+    return match["path"], arguments
 
 
 def _path_of(x: StrPath, package_dirs: Iterable[StrPath]) -> str:

@@ -13,8 +13,6 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
-import re
-import shlex
 import signal
 import subprocess
 import sys
@@ -24,7 +22,7 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from dynx.errors import ArgumentError, DescriptionError, NotInstalledError, escaped, nearest, shown
+from dynx.errors import DescriptionError, NotInstalledError, escaped, nearest, shown
 from dynx.files.reading import MAX_BYTES, printable, read_file
 from dynx.model.package_search import StrPath, environment_folders, find_package, package_of
 
@@ -33,11 +31,6 @@ TIMEOUT = 60.0
 
 MAX_MEMORY = 2 * 2**30
 """Largest memory of an expansion [bytes], besides that of the interpreter; bounded on Linux."""
-
-# Without the colon an argument is a mistake, which is named.
-_WITH_ARGUMENTS = re.compile(r"(?P<path>.*\.xacro)\s+(?P<arguments>\w+:?=.*)", re.DOTALL)
-
-_ARGUMENT = re.compile(r"(\w+):=(.*)", re.DOTALL)
 
 _SCHEME = "package://"
 """Beginning of the path in a package that was not found."""
@@ -58,30 +51,6 @@ spec.loader.exec_module(sys.modules["dynx"])
 from dynx.model.xacro_reading import expand_here
 expand_here(task["file"], task["roots"], task["arguments"])
 """
-
-
-def split_arguments(path: str) -> tuple[str, dict[str, str]]:
-    """Split ``FILE.xacro name:=value ...``, as ROS writes it, into the path and the arguments.
-
-    A value with blanks stands in quotes. A path without arguments is returned as it is. Raises ArgumentError
-    for a part after the path that is no argument.
-    """
-    match = _WITH_ARGUMENTS.fullmatch(path)
-    if match is None:
-        return path, {}
-    try:
-        parts = shlex.split(match["arguments"])
-    except ValueError as error:
-        raise ArgumentError(f"arguments of {shown(match['path'], 300)}: {error}") from None
-    arguments = {}
-    for part in parts:
-        argument = _ARGUMENT.fullmatch(part)
-        if argument is None:
-            raise ArgumentError(
-                f"{shown(part)} is no argument of {shown(match['path'], 300)}; wanted name:=value"
-            )
-        arguments[argument[1]] = argument[2]
-    return match["path"], arguments
 
 
 def expand_xacro(

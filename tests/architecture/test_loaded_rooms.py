@@ -58,15 +58,15 @@ FLOWS = {
             "viewer",
         ),
         (),
-        74,
-        12100,
+        71,
+        11700,
     ),
     "inverse kinematics": Flow(
         ENGINE + "engine.inverse_kinematics(engine.forward_kinematics(q, 'tool0'), 'tool0', q)",
         ("world", "sim", "ik.closed_forms"),
         (),
-        109,
-        19700,
+        106,
+        19300,
     ),
     "simulate": Flow(
         ROBOT + "from dynx import control\n"
@@ -86,16 +86,16 @@ FLOWS = {
             "envs",
         ),
         (),
-        177,
-        28650,
+        174,
+        28250,
     ),
     "step of a box": Flow(
         "from dynx.world import Scene, World, box\n"
         "World(Scene('box', bodies=(box('box', (0.1, 0.1, 0.1), mass=1.0),)), 'mujoco').step()",
         ("ik", "sim", "envs", "doctor"),
         (),
-        115,
-        19500,
+        112,
+        19250,
     ),
     "step of the cart-pole": Flow(
         "import gymnasium, dynx.envs\n"
@@ -104,8 +104,8 @@ FLOWS = {
         "environment.step(environment.action_space.sample())",
         ("distance", "ik", "world.camera", "steppers.camera"),
         (),
-        169,
-        27900,
+        166,
+        27450,
     ),
 }
 

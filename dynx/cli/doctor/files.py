@@ -27,8 +27,8 @@ from dynx.files.documents import json_text
 from dynx.files.reading import read_file
 from dynx.files.writing import write_bytes, write_text
 from dynx.model.expansion import RobotInput, is_library_name
+from dynx.model.loading import split_arguments
 from dynx.model.tree import Base
-from dynx.model.xacro_reading import split_arguments
 from dynx.model.xml.source import XmlSource
 
 STDOUT = "-"

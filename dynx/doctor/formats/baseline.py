@@ -20,7 +20,7 @@ from dynx.doctor.report import DoctorReport
 from dynx.errors import ArgumentError, shown
 from dynx.files.documents import read_document, to_json_values
 from dynx.files.reading import read_file
-from dynx.model.xacro_reading import split_arguments
+from dynx.model.loading import split_arguments
 
 SCHEMA = 1
 

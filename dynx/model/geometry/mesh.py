@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from dynx.errors import ArgumentError, DescriptionError, DynxError, shown
 from dynx.files.reading import checked_path, printable, read_file
 from dynx.model.elements import Vector
-from dynx.model.geometry.formats.facets import obj_triangles, stl_triangles
 from dynx.model.numbers import MAX_MAGNITUDE, finite_vector
 from dynx.spatial.scalar import Floats
 
@@ -115,11 +114,11 @@ def _checked(path: str) -> Triangles:
 
 def _parsed(path: str, data: bytes, suffix: str) -> Triangles:
     try:
-        if suffix == ".stl":
-            return stl_triangles(data)
-        if suffix == ".obj":
-            return obj_triangles(data)
-        # Imported here, because most robots have no such meshes, or nobody asks for them.
+        # Imported here, because nobody asks for the triangles of most robots, or they have no such meshes.
+        if suffix in (".stl", ".obj"):
+            from dynx.model.geometry.formats.facets import obj_triangles, stl_triangles
+
+            return stl_triangles(data) if suffix == ".stl" else obj_triangles(data)
         if suffix == ".dae":
             from dynx.model.geometry.formats.collada import collada_triangles
 

@@ -32,9 +32,8 @@ from dynx.model.geometry import (
     Sphere,
     Visual,
 )
-from dynx.model.loading import load, read_model
+from dynx.model.loading import load, read_model, split_arguments
 from dynx.model.numbers import finite_numbers, finite_vector
-from dynx.model.xacro_reading import split_arguments
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_quat
 from dynx.steppers.material import DEFAULT_MATERIAL, Material
