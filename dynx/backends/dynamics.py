@@ -20,7 +20,9 @@ from dynx.spatial.scalar import Floats
 Evaluation = Callable[..., Any]
 """Function of arrays that returns one array; quantities of a frame take its name after the arrays."""
 
-QUANTITIES = ("inverse_dynamics", "forward_dynamics", "bias_torque", "gravity_torque", "mass_matrix")
+MATRICES = ("mass_matrix", "coriolis_matrix")
+"""Quantities (nv, nv); others of `QUANTITIES` are (nv,)."""
+QUANTITIES = ("inverse_dynamics", "forward_dynamics", "bias_torque", "gravity_torque", *MATRICES)
 FRAME_QUANTITIES = ("forward_kinematics", "jacobian", "jacobian_derivative", "frame_acceleration")
 
 
@@ -37,6 +39,8 @@ class Dynamics(ABC):
     """g (nv,) of q."""
     mass_matrix: Evaluation
     """M (nv, nv) of q."""
+    coriolis_matrix: Evaluation
+    """C (nv, nv) of q, v."""
     forward_kinematics: Evaluation
     """T_world_frame (4, 4) of q, frame."""
     jacobian: Evaluation
@@ -108,6 +112,8 @@ class EngineDynamics(Dynamics):
         """Check whether the backend's method only passes its arguments to the hook of its engine."""
         backend, hook = self.backend, f"_{quantity}"
         unchanged = _function(backend, quantity) is getattr(Backend, quantity)
+        if not hasattr(type(backend), hook):
+            return False
         own_hook = _function(backend, hook) is getattr(type(backend), hook)
         return unchanged and own_hook and backend.model.mechanism.coupling is None
 
@@ -124,5 +130,5 @@ def _defines_first(kind: type, name: str, others: tuple[str, ...]) -> bool:
     """Check whether no class defines one of the `others` that overrides the class which defines `name`."""
     order = [vars(each) for each in kind.__mro__]
     return next(k for k, own in enumerate(order) if name in own) <= min(
-        next(k for k, own in enumerate(order) if other in own) for other in others
+        next((k for k, own in enumerate(order) if other in own), len(order)) for other in others
     )

@@ -1,4 +1,4 @@
-"""Torque of joint friction, viscous and dry, as a function of the velocity, and its coefficients.
+"""Torque of joint friction, viscous and dry, as a function of the velocity; coefficients of joints.
 
 How joints stick and slide in a step is solved for by `dynx.steppers.implicit_joints`.
 """
@@ -172,6 +172,20 @@ def coefficients_by_joint(
     if len(lengths) > 1 or any(len(shape) > 1 for shape in lengths):
         raise GainError(f"{name} by joint: wanted one number for each joint, or one for each rollout")
     return np.stack(np.broadcast_arrays(*columns), axis=-1) if columns else np.zeros(0)
+
+
+def armature_matrix(model: Model, armature: Coefficients) -> Floats:
+    """Return what an armature [kg m^2 or kg], as `Coefficients`, adds to the mass matrix (nv, nv).
+
+    Raises GainError and UnknownNameError as `JointFriction` does.
+    """
+    if isinstance(armature, bool):
+        return JointDynamicsTerms(model).armature if armature else np.zeros((model.nv, model.nv))
+    base = 6 if model.floating else 0
+    refuse_text("armature", armature, model.nv - base)
+    numbers = coefficients_by_joint(model, "armature", armature)
+    joints = checked_gain("armature", numbers, model.nv - base, per="one for each joint")
+    return np.diag(np.concatenate([np.zeros(base), joints]))
 
 
 def refuse_text(name: str, given: object, joints: int, own: str = "True") -> None:

@@ -27,6 +27,8 @@ from dynx.trajectory.base import Setpoint
 
 ControllerState = TypeVar("ControllerState")
 Self = TypeVar("Self", bound="Controller[Any]")
+Evaluation = TypeVar("Evaluation", bound="ModelEvaluation")
+Copied = TypeVar("Copied")
 
 
 class _TimedState(NamedTuple):
@@ -118,11 +120,7 @@ class Controller(ABC, Generic[ControllerState]):
     @checks_types
     def on(self: Self, engine: str | Backend) -> Self:
         """Return a controller whose model another backend evaluates; `self` if it evaluates no model."""
-        changes: dict[str, Any] = {
-            name: EngineDynamics(engine_of(value.model, engine))
-            for name, value in attributes_of(self).items()
-            if isinstance(value, EngineDynamics)
-        }
+        changes = _with_dynamics(self, lambda own: EngineDynamics(engine_of(own.model, engine)))
         inner = getattr(self, "inner", None)
         if isinstance(inner, Controller):
             changes["inner"] = inner.on(engine)
@@ -215,6 +213,15 @@ class ModelBased(Controller[ControllerState]):
         return substitute(self, backend=engine, dynamics=EngineDynamics(engine_of(self.model, engine)))
 
 
+class ModelEvaluation(ABC):
+    """An attribute of a controller that evaluates a model, and so gets other dynamics as the controller
+    does."""
+
+    @abstractmethod
+    def with_dynamics(self: Evaluation, change: Callable[[Dynamics], Dynamics]) -> Evaluation:
+        """Return a copy whose dynamics are those that `change` returns for its own."""
+
+
 @dataclass(frozen=True)
 class Wrapper(Controller[ControllerState]):
     """A controller that modifies the torque of another one."""
@@ -261,9 +268,9 @@ def gains_of(controller: Controller[Any]) -> dict[str, Floats]:
     }
 
 
-def substitute(controller: Self, **attributes: Any) -> Self:
-    """Copy a controller with some attributes replaced, without checking them."""
-    twin = copy.copy(controller)
+def substitute(thing: Copied, **attributes: Any) -> Copied:
+    """Copy a controller, or another frozen object, with some attributes replaced, without checking them."""
+    twin = copy.copy(thing)
     for name, value in attributes.items():
         object.__setattr__(twin, name, value)
     return twin
@@ -282,10 +289,20 @@ def rebind(
     inner = getattr(controller, "inner", None)
     if isinstance(inner, Controller):
         changes["inner"] = rebind(inner, dynamics, gains)
+    changes |= _with_dynamics(controller, dynamics)
+    return substitute(controller, **changes)
+
+
+def _with_dynamics(controller: Controller[Any], change: Callable[[Dynamics], Dynamics]) -> dict[str, Any]:
+    """Return the attributes of a controller that evaluate a model, with the dynamics that `change` returns
+    for their own."""
+    changes: dict[str, Any] = {}
     for name, value in attributes_of(controller).items():
         if isinstance(value, Dynamics):
-            changes[name] = dynamics(value)
-    return substitute(controller, **changes)
+            changes[name] = change(value)
+        elif isinstance(value, ModelEvaluation):
+            changes[name] = value.with_dynamics(change)
+    return changes
 
 
 def engine_of(model: Model, engine: str | Backend) -> Backend:

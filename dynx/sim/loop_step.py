@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.backends.dynamics import QUANTITIES, Dynamics, EngineDynamics, Evaluation
+from dynx.backends.dynamics import MATRICES, QUANTITIES, Dynamics, EngineDynamics, Evaluation
 from dynx.backends.joint_friction import JointFriction
 from dynx.compiled.array_dynamics import ArrayDynamics
 from dynx.compiled.kernels import evaluate_quantity
@@ -608,7 +608,7 @@ class _EngineCalls(Dynamics):
     def evaluation(self, quantity: str) -> Evaluation:
         """Return the callable that records an engine call and returns symbols for its result."""
         nv = self.model.nv
-        shape = (nv, nv) if quantity == "mass_matrix" else (nv,)
+        shape = (nv, nv) if quantity in MATRICES else (nv,)
 
         def record(*arguments: Array) -> Array:
             if quantity not in QUANTITIES:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dynx.backends.dynamics import Dynamics, Evaluation
+from dynx.backends.dynamics import MATRICES, Dynamics, Evaluation
 from dynx.control.base import Controller, Measurement, chain_of, rebind
 from dynx.control.content import attributes_of, is_foreign, is_foreign_module
 from dynx.errors import TraceError
@@ -166,7 +166,7 @@ class _SymbolicResults(Dynamics):
         """Return the function that notes its arguments and returns new symbols."""
         nv = self.model.nv
         shape = {
-            "mass_matrix": (nv, nv),
+            **dict.fromkeys(MATRICES, (nv, nv)),
             "forward_kinematics": (4, 4),
             "jacobian": (6, nv),
             "jacobian_derivative": (6, nv),

@@ -13,18 +13,10 @@ from functools import cached_property
 import numpy as np
 
 from dynx.backends import Backend, backend
-from dynx.backends.joint_dynamics import JointDynamicsTerms
-from dynx.backends.joint_friction import (
-    Coefficients,
-    JointFriction,
-    checked_slip,
-    coefficients_by_joint,
-    refuse_text,
-)
+from dynx.backends.joint_friction import Coefficients, JointFriction, armature_matrix, checked_slip
 from dynx.errors import ArgumentError
 from dynx.model import Model
 from dynx.model.elements import JointCoefficients
-from dynx.model.numbers import checked_gain
 from dynx.rbd.joint_friction import FrictionLaw
 from dynx.sim.step import with_disturbances
 from dynx.spatial.scalar import Floats
@@ -56,7 +48,7 @@ class Disturbances:
         self.model = model
         self.friction = JointFriction(model, damping, friction, checked_slip("friction_slip", slip))
         self.pushes = tuple(push.checked(model) for push in pushes)
-        self.armature = _armature_matrix(model, armature)
+        self.armature = armature_matrix(model, armature)
         """Armature (nv, nv), added to the mass matrix."""
         self.has_armature = bool(self.armature.any())
         self._step = step
@@ -122,16 +114,6 @@ class Disturbances:
             self.friction(v) if self.friction.smooth else None,
             (push.at_frame(engine, push.on, q, share) for push, share in shares if share),
         )
-
-
-def _armature_matrix(model: Model, armature: Coefficients) -> Floats:
-    if isinstance(armature, bool):
-        return JointDynamicsTerms(model).armature if armature else np.zeros((model.nv, model.nv))
-    base = 6 if model.floating else 0
-    refuse_text("armature", armature, model.nv - base)
-    numbers = coefficients_by_joint(model, "armature", armature)
-    joints = checked_gain("armature", numbers, model.nv - base, per="one for each joint")
-    return np.diag(np.concatenate([np.zeros(base), joints]))
 
 
 def refuse_small_slip(disturbances: Disturbances, integrator: str, h: float, q: Floats) -> None:
