@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     from dynx.control.computed_torque import ComputedTorque, DiscreteComputedTorque
     from dynx.control.friction import FrictionCompensation
     from dynx.control.joint_space import PD, PID, FeedForward, GravityCompensatedPD, Velocity
-    from dynx.control.momentum_observer import MomentumObserver
     from dynx.control.motors_and_encoders import Encoders, MotorLag
+    from dynx.control.observers.momentum_observer import MomentumObserver
+    from dynx.control.observers.wrench_estimate import WrenchEstimate
     from dynx.control.open_loop import OpenLoop
     from dynx.control.registry import from_document as controller_from_document
     from dynx.control.registry import register as register_controller
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from dynx.control.registry import unregister as unregister_controller
     from dynx.control.saturation import Saturated
     from dynx.control.task_space import Impedance, OperationalSpace
-    from dynx.control.wrench_estimate import WrenchEstimate
 
 __all__ = [
     "PD",
@@ -81,7 +81,7 @@ _HOME = {
     "JointFriction": "dynx.backends.joint_friction",
     "Measurement": "dynx.control.base",
     "ModelBased": "dynx.control.base",
-    "MomentumObserver": "dynx.control.momentum_observer",
+    "MomentumObserver": "dynx.control.observers.momentum_observer",
     "MotorLag": "dynx.control.motors_and_encoders",
     "OpenLoop": "dynx.control.open_loop",
     "OperationalSpace": "dynx.control.task_space",
@@ -89,7 +89,7 @@ _HOME = {
     "PID": "dynx.control.joint_space",
     "Saturated": "dynx.control.saturation",
     "Velocity": "dynx.control.joint_space",
-    "WrenchEstimate": "dynx.control.wrench_estimate",
+    "WrenchEstimate": "dynx.control.observers.wrench_estimate",
     "controller_from_document": "dynx.control.registry:from_document",
     "controller_to_document": "dynx.control.registry:to_document",
     "model_dynamics": "dynx.control.base",

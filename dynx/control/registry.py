@@ -29,7 +29,8 @@ GROUP = "dynx.controllers"
 
 def _own_controllers() -> dict[str, str]:
     """Return the entries of the controllers in the modules beside this one."""
-    modules = (name for _, name, _ in iter_modules([str(Path(__file__).parent)]) if name != "registry")
+    beside = iter_modules([str(Path(__file__).parent)])
+    modules = (name for _, name, is_package in beside if name != "registry" and not is_package)
     members = (each for name in modules for each in vars(import_module(f"dynx.control.{name}")).values())
     # `isinstance(each, type)` would not do, because it is true in Python 3.10 for aliases such as
     # Callable[..., float].

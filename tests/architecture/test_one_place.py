@@ -20,6 +20,7 @@ IDEAS = {
     "a step of a robot by a backend": r"^class RobotStep\b",
     "parameters in which robots differ": r"^class Parameters\b|^def plant_model\b",
     "what joints transmit": r"^def joint_wrenches\b",
+    "external torque from a motion": r"^class MomentumObserver\b",
     "acceleration from two states": r"^class MeanAcceleration\b",
     "a scene in MuJoCo": r"\bElement\(\"mujoco\"",
     "types of arguments": r"^def checks_types\b",

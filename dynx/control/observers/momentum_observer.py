@@ -29,7 +29,7 @@ from dynx.backends import Backend
 from dynx.backends.dynamics import Dynamics, EngineDynamics
 from dynx.backends.joint_friction import Coefficients, JointFriction, armature_matrix, checked_slip
 from dynx.control.base import ModelEvaluation, engine_of, parameter, substitute
-from dynx.control.wrench_estimate import MIN_RATIO, WrenchEstimate, estimate_wrenches
+from dynx.control.observers.wrench_estimate import MIN_RATIO, WrenchEstimate, estimate_wrenches
 from dynx.errors import ArgumentError, GainError, ShapeError, shown
 from dynx.model import Model
 from dynx.model.numbers import checked_entries, checked_gain, real_array

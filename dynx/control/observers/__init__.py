@@ -1,0 +1,1 @@
+"""Estimates of what acts on a robot, beside its controllers."""
