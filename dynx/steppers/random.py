@@ -27,6 +27,7 @@ class Purpose(IntEnum):
     PARAMETERS = 2
     OBSERVATION = 3
     ACTION = 4
+    SENSOR = 5
 
 
 class Streams:

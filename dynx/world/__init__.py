@@ -39,6 +39,17 @@ if TYPE_CHECKING:
     from dynx.world.scene.files import read_scene, write_scene
     from dynx.world.scene.robots import SceneRobot
     from dynx.world.scene.scene import Scene
+    from dynx.world.sensors.errors import SensorErrors
+    from dynx.world.sensors.kinds import (
+        ContactSensor,
+        Encoder,
+        ForceTorqueSensor,
+        Imu,
+        JointTorqueSensor,
+        RaySensor,
+    )
+    from dynx.world.sensors.readings import Readings
+    from dynx.world.sensors.sensor import Sensor
     from dynx.world.snapshot import Snapshot
     from dynx.world.surroundings import ContactTable, Surroundings
     from dynx.world.world import World
@@ -48,9 +59,14 @@ __all__ = [
     "Camera",
     "ClosestPoints",
     "Contact",
+    "ContactSensor",
     "ContactTable",
+    "Encoder",
     "ExternalForce",
+    "ForceTorqueSensor",
+    "Imu",
     "InexactMaterial",
+    "JointTorqueSensor",
     "Material",
     "Motor",
     "PDMotor",
@@ -58,11 +74,15 @@ __all__ = [
     "PointToPoint",
     "PositionMotor",
     "RayHits",
+    "RaySensor",
+    "Readings",
     "Record",
     "RobotState",
     "Scene",
     "SceneBody",
     "SceneRobot",
+    "Sensor",
+    "SensorErrors",
     "Separation",
     "Snapshot",
     "Surroundings",
@@ -95,9 +115,14 @@ _HOME = {
     "Camera": "dynx.steppers.camera",
     "ClosestPoints": "dynx.world.contacts",
     "Contact": "dynx.world.contacts",
+    "ContactSensor": "dynx.world.sensors.kinds",
     "ContactTable": "dynx.world.surroundings",
+    "Encoder": "dynx.world.sensors.kinds",
     "ExternalForce": "dynx.steppers.forces",
+    "ForceTorqueSensor": "dynx.world.sensors.kinds",
+    "Imu": "dynx.world.sensors.kinds",
     "InexactMaterial": "dynx.steppers.materials",
+    "JointTorqueSensor": "dynx.world.sensors.kinds",
     "Material": "dynx.steppers.material",
     "Motor": "dynx.world.motors",
     "PDMotor": "dynx.world.motors",
@@ -105,11 +130,15 @@ _HOME = {
     "PointToPoint": "dynx.world.scene.bodies",
     "PositionMotor": "dynx.world.motors",
     "RayHits": "dynx.world.contacts",
+    "RaySensor": "dynx.world.sensors.kinds",
+    "Readings": "dynx.world.sensors.readings",
     "Record": "dynx.world.record",
     "RobotState": "dynx.steppers.state",
     "Scene": "dynx.world.scene.scene",
     "SceneBody": "dynx.world.scene.bodies",
     "SceneRobot": "dynx.world.scene.robots",
+    "Sensor": "dynx.world.sensors.sensor",
+    "SensorErrors": "dynx.world.sensors.errors",
     "Snapshot": "dynx.world.snapshot",
     "Surroundings": "dynx.world.surroundings",
     "TorqueMotor": "dynx.world.motors",

@@ -15,6 +15,8 @@ IDEAS = {
     "recorded motion": r"^class Record\b",
     "snapshot": r"^class Snapshot\b",
     "distance of two motions": r"^class Separation\b",
+    "errors of a sensor": r"^class SensorErrors\b",
+    "samples of a sensor": r"^def read_sensor\b",
     "force from outside": r"def share\(self, t: float",
     "joint friction": r"^class FrictionLaw\b",
     "a step of a robot by a backend": r"^class RobotStep\b",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -42,6 +42,8 @@ from dynx.world.surroundings import Surroundings
 
 if TYPE_CHECKING:
     from dynx.sim.overshoot import Overshoot
+    from dynx.world.sensors.readings import Readings
+    from dynx.world.sensors.sensor import Sensor
 
 
 class Summary(NamedTuple):
@@ -225,6 +227,11 @@ class Rollout:
             external_forces=self.external_forces,
             force_reference="world",
         )
+
+    @door("dynx.sim.record.sensing:read_sensors")
+    def read_sensors(self, sensors: Sensor | Iterable[Sensor]) -> dict[str, Readings]:
+        """Return the readings of sensors along the recorded motion, by their names."""
+        raise NotImplementedError
 
     @cached_property
     def _bodies(self) -> Backend:

@@ -1,0 +1,266 @@
+"""The sensors: force and torque, inertial, joint torque, encoder, contact and ray."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from dynx.argument_types import checks_types
+from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
+from dynx.model import Model, Pose
+from dynx.model.elements import IDENTITY, Joint, checked_pose
+from dynx.model.numbers import positive_number
+from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import cross, rotate, rotate_back
+from dynx.world.sensors.errors import NO_ERRORS, SensorErrors
+from dynx.world.sensors.places import Parts
+from dynx.world.sensors.sensor import AXES, Channel, Sensor
+
+if TYPE_CHECKING:
+    from dynx.world.sensors.motion import SensedMotion
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlacedSensor(Sensor):
+    """A sensor with a frame of its own, at `pose` in the frame of its part."""
+
+    pose: Pose = IDENTITY
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "pose", checked_pose(f"pose of {self}", self.pose))
+
+    def frame(self, T_world_part: Floats) -> tuple[Floats, Floats]:
+        """Return the rotations (n, 3, 3) and the origins (n, 3) of the sensor's frame in the world."""
+        T = T_world_part @ self.pose.matrix
+        return T[:, :3, :3], T[:, :3, 3]
+
+
+@checks_types
+@dataclass(frozen=True, kw_only=True)
+class ForceTorqueSensor(PlacedSensor):
+    """A sensor of the wrench that a joint transmits, ``force`` [N] and ``torque`` [N m].
+
+    It is that which the parent exerts on the child, in the axes and about the origin of the sensor's frame:
+    so the sensor of an arm at rest reads a force upwards. `on` is a joint, fixed or moving, with `pose` in
+    the frame of its child link; or a frame of the robot, in which `pose` is and which lies on the child link
+    of the joint. On the root link of a robot with a fixed base it is the wrench of the foundation. Without
+    `weight`, what the weight of the links beyond the joint contributes in their present pose is subtracted.
+    """
+
+    weight: bool = True
+    force: SensorErrors = NO_ERRORS
+    torque: SensorErrors = NO_ERRORS
+
+    kind: ClassVar[str] = "force_torque"
+    channels: ClassVar[tuple[Channel, ...]] = (
+        Channel("force", "force", AXES, "N"),
+        Channel("torque", "torque", AXES, "N m"),
+    )
+
+    def require(self, parts: Parts) -> None:
+        model, name = _robot_part(self, parts)
+        self.mounting(model, name)
+
+    def mounting(self, model: Model, name: str) -> tuple[int | None, str]:
+        """Return the number of the joint that is measured, None for the foundation, and the frame in which
+        the sensor has its pose."""
+        for k, joint in enumerate(model.joints):
+            if joint.name == name:
+                return k, joint.child
+        frame = _frame(self, model, name, "joint or frame")
+        link = model.frames[model.frame_index(frame)].link
+        number = next((k for k, joint in enumerate(model.joints) if joint.child == link), None)
+        if number is None and model.floating:
+            raise ArgumentError(f"{self} is on the root of a floating base, which no joint carries")
+        return number, frame
+
+    def measure(self, motion: SensedMotion) -> tuple[Floats, ...]:
+        robot, name = motion.robot(self.place(motion.parts))
+        number, frame = self.mounting(robot.model, name)
+        found = robot.transmitted(number)
+        if not self.weight:
+            found = found - robot.weight(number)
+        T = robot.pose(robot.model.root if number is None else robot.model.joints[number].child)
+        R, p = self.frame(robot.pose(frame))
+        force, moment = rotate(T[:, :3, :3], found[:, :3]), rotate(T[:, :3, :3], found[:, 3:])
+        moment = moment + cross(T[:, :3, 3] - p, force)
+        return rotate_back(R, force), rotate_back(R, moment)
+
+
+@checks_types
+@dataclass(frozen=True, kw_only=True)
+class Imu(PlacedSensor):
+    """An inertial measurement unit: specific force ``acceleration`` [m/s^2] and ``angular_velocity`` [rad/s].
+
+    Both are those of the sensor's frame, at `pose` in a frame of a robot, in its axes. The specific force is
+    the acceleration of the frame's origin minus gravity: at rest it is 9.81 m/s^2 upwards (Groves, Principles
+    of GNSS, inertial and multisensor integrated navigation systems, 2013, eq. 2.76).
+    """
+
+    accelerometer: SensorErrors = NO_ERRORS
+    gyroscope: SensorErrors = NO_ERRORS
+
+    kind: ClassVar[str] = "imu"
+    channels: ClassVar[tuple[Channel, ...]] = (
+        Channel("acceleration", "accelerometer", AXES, "m/s^2"),
+        Channel("angular_velocity", "gyroscope", AXES, "rad/s"),
+    )
+
+    def require(self, parts: Parts) -> None:
+        model, name = _robot_part(self, parts)
+        _frame(self, model, name, "frame")
+
+    def measure(self, motion: SensedMotion) -> tuple[Floats, ...]:
+        robot, frame = motion.robot(self.place(motion.parts))
+        T, velocity, acceleration = robot.pose(frame), robot.velocity(frame), robot.acceleration(frame)
+        R, p = self.frame(T)
+        omega, alpha, lever = velocity[:, 3:], acceleration[:, 3:], p - T[:, :3, 3]
+        proper = acceleration[:, :3] - np.array(robot.model.gravity)
+        proper = proper + cross(alpha, lever) + cross(omega, cross(omega, lever))
+        return rotate_back(R, proper), rotate_back(R, omega)
+
+
+@checks_types
+@dataclass(frozen=True, kw_only=True)
+class JointTorqueSensor(Sensor):
+    """A sensor of the ``torque`` [N m], or the force [N], that a joint transmits along its axis to its child
+    link.
+
+    It lies between the gear and the link: friction and armature of the joint, which act between the motor and
+    the gear, are not in it. The torque of the motor is `Rollout.tau` and `World.torque`.
+    """
+
+    torque: SensorErrors = NO_ERRORS
+
+    kind: ClassVar[str] = "joint_torque"
+    channels: ClassVar[tuple[Channel, ...]] = (Channel("torque", "torque", ("",), "N m or N"),)
+
+    def require(self, parts: Parts) -> None:
+        _moving_joint(self, *_robot_part(self, parts))
+
+    def measure(self, motion: SensedMotion) -> tuple[Floats, ...]:
+        robot, name = motion.robot(self.place(motion.parts))
+        joint = _moving_joint(self, robot.model, name)
+        wrench = robot.transmitted(robot.model.joints.index(joint))
+        part = wrench[:, :3] if joint.type == "prismatic" else wrench[:, 3:]
+        return ((part @ np.array(joint.axis))[:, None],)
+
+
+@checks_types
+@dataclass(frozen=True, kw_only=True)
+class Encoder(Sensor):
+    """An encoder of a joint: ``position`` [rad or m] and ``velocity`` [rad/s or m/s]; of a mimic joint, its
+    own."""
+
+    position: SensorErrors = NO_ERRORS
+    velocity: SensorErrors = NO_ERRORS
+
+    kind: ClassVar[str] = "encoder"
+    channels: ClassVar[tuple[Channel, ...]] = (
+        Channel("position", "position", ("",), "rad or m"),
+        Channel("velocity", "velocity", ("",), "rad/s or m/s"),
+    )
+
+    def require(self, parts: Parts) -> None:
+        _moving_joint(self, *_robot_part(self, parts))
+
+    def measure(self, motion: SensedMotion) -> tuple[Floats, ...]:
+        robot, name = motion.robot(self.place(motion.parts))
+        joint = _moving_joint(self, robot.model, name)
+        position, velocity = robot.joint_state(joint)
+        return position[:, None], velocity[:, None]
+
+
+@checks_types
+@dataclass(frozen=True, kw_only=True)
+class ContactSensor(PlacedSensor):
+    """A sensor of the sum of the contact forces on a link or body, ``force`` [N] in the axes of the sensor's
+    frame."""
+
+    force: SensorErrors = NO_ERRORS
+
+    kind: ClassVar[str] = "contact"
+    channels: ClassVar[tuple[Channel, ...]] = (Channel("force", "force", AXES, "N"),)
+
+    def require(self, parts: Parts) -> None:
+        _link_or_body(self, parts)
+
+    def measure(self, motion: SensedMotion) -> tuple[Floats, ...]:
+        place = self.place(motion.parts)
+        R, _ = self.frame(motion.pose(place))
+        return (rotate_back(R, motion.contact_force(place)),)
+
+
+@checks_types
+@dataclass(frozen=True, kw_only=True)
+class RaySensor(PlacedSensor):
+    """A sensor of the ``distance`` [m] along the z axis of its frame to what is hit first, `length` [m] where
+    nothing is hit within it.
+
+    It is on a link or body, whose own shapes the ray passes through.
+    """
+
+    length: float = 10.0
+    distance: SensorErrors = NO_ERRORS
+
+    kind: ClassVar[str] = "ray"
+    channels: ClassVar[tuple[Channel, ...]] = (Channel("distance", "distance", ("",), "m"),)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "length", positive_number(f"length of {self}", self.length))
+
+    def require(self, parts: Parts) -> None:
+        _link_or_body(self, parts)
+
+    def measure(self, motion: SensedMotion) -> tuple[Floats, ...]:
+        place = self.place(motion.parts)
+        R, p = self.frame(motion.pose(place))
+        found = motion.ray_distances(place, p, R[:, :, 2], self.length)
+        return (np.minimum(found, self.length)[:, None],)
+
+
+KINDS: dict[str, type[Any]] = {
+    each.kind: each for each in (ForceTorqueSensor, Imu, JointTorqueSensor, Encoder, ContactSensor, RaySensor)
+}
+"""Classes of sensors by their names in a document."""
+
+
+def _robot_part(sensor: Sensor, parts: Parts) -> tuple[Model, str]:
+    """Return the robot of a sensor and the name of the joint or frame; ArgumentError for one on a body."""
+    _, robot, name = sensor.place(parts)
+    if robot is None:
+        raise ArgumentError(f"{sensor} is on the body {shown(name)}; wanted a part of a robot")
+    return parts.robots[robot], name
+
+
+def _link_or_body(sensor: Sensor, parts: Parts) -> None:
+    _, robot, name = sensor.place(parts)
+    if robot is not None:
+        links = [link.name for link in parts.robots[robot].links]
+        if name not in links:
+            raise UnknownNameError(f"{sensor} is on {shown(sensor.on)}; wanted a link{nearest(name, links)}")
+
+
+def _frame(sensor: Sensor, model: Model, name: str, wanted: str) -> str:
+    if name not in model.frame_names:
+        known = [*model.frame_names, *(joint.name for joint in model.joints if wanted != "frame")]
+        raise UnknownNameError(
+            f"{sensor} is on {shown(name)}, which {model.name} does not have; wanted a {wanted}"
+            f"{nearest(name, known)}"
+        )
+    return name
+
+
+def _moving_joint(sensor: Sensor, model: Model, name: str) -> Joint:
+    joints = {joint.name: joint for joint in model.joints if joint.moves}
+    if name not in joints:
+        fixed = any(joint.name == name for joint in model.joints)
+        raise UnknownNameError(
+            f"{sensor} is on {shown(name)}, which {'is a fixed joint' if fixed else 'is no joint'} of "
+            f"{model.name}; wanted a joint that moves{nearest(name, joints)}"
+        )
+    return joints[name]

@@ -1,0 +1,131 @@
+"""What sensors sense: robots at n instants, and in a scene what is around them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from dynx.backends import Backend, backend
+from dynx.errors import UnsupportedFeatureError, shown
+from dynx.model import Model
+from dynx.model.elements import Joint
+from dynx.spatial.scalar import Floats
+from dynx.world.sensors.places import Parts, Place
+
+
+@dataclass(frozen=True, eq=False)
+class RobotMotion:
+    """A robot at n instants: state, acceleration, and the external wrenches, contacts included."""
+
+    model: Model
+    q: Floats
+    """Configurations (n, nq)."""
+    v: Floats
+    """Velocities (n, nv)."""
+    a: Floats
+    """Accelerations (n, nv)."""
+    external_forces: Mapping[str, Floats]
+    """Wrenches (n, 6) by frames, about the origin of the world in its axes [N, N m]."""
+
+    @cached_property
+    def _bodies(self) -> Backend:
+        return backend("reference", self.model)
+
+    @cached_property
+    def _poses(self) -> dict[str, Floats]:
+        return {}
+
+    def pose(self, frame: str) -> Floats:
+        """Return the poses (n, 4, 4) of a frame in the world."""
+        if frame not in self._poses:
+            self._poses[frame] = self._bodies.forward_kinematics(self.q, frame)
+        return self._poses[frame]
+
+    def velocity(self, frame: str) -> Floats:
+        """Return the velocities (n, 6) of a frame, in world axes at its origin."""
+        return self._bodies.frame_velocity(self.q, self.v, frame)
+
+    def acceleration(self, frame: str) -> Floats:
+        """Return the classical accelerations (n, 6) of a frame, in world axes at its origin."""
+        return self._bodies.frame_acceleration(self.q, self.v, self.a, frame)
+
+    def joint_state(self, joint: Joint) -> tuple[Floats, Floats]:
+        """Return the position and the velocity (n,) of a joint, also of a mimic joint."""
+        if joint.mimic is None:
+            at = self.model.coordinate_index(joint.name)
+            return self.q[:, at + (1 if self.model.floating else 0)], self.v[:, at]
+        driver = next(each for each in self.model.joints if each.name == joint.mimic.joint)
+        position, velocity = self.joint_state(driver)
+        return joint.mimic.multiplier * position + joint.mimic.offset, joint.mimic.multiplier * velocity
+
+    def transmitted(self, joint: int | None) -> Floats:
+        """Return the wrenches (n, 6) that a joint transmits to its child, in the frame of the child link;
+        for None those of the foundation of a fixed base, in the frame of the root link."""
+        return self._base_wrench if joint is None else self._joint_wrenches[:, joint]
+
+    def weight(self, joint: int | None) -> Floats:
+        """Return the part (n, 6) of `transmitted` that carries the weight of the links beyond the joint."""
+        return self._base_weight if joint is None else self._joint_weights[:, joint]
+
+    @cached_property
+    def _joint_wrenches(self) -> Floats:
+        return self._bodies.joint_wrenches(
+            self.q, self.v, self.a, external_forces=self.external_forces, force_reference="world"
+        )
+
+    @cached_property
+    def _base_wrench(self) -> Floats:
+        return self._bodies.base_wrench(
+            self.q, self.v, self.a, external_forces=self.external_forces, force_reference="world"
+        )
+
+    @cached_property
+    def _joint_weights(self) -> Floats:
+        rest = np.zeros_like(self.v)
+        return self._bodies.joint_wrenches(self.q, rest, rest)
+
+    @cached_property
+    def _base_weight(self) -> Floats:
+        rest = np.zeros_like(self.v)
+        return self._bodies.base_wrench(self.q, rest, rest)
+
+
+class SensedMotion:
+    """Robots at the instants `t` (n,) [s], the beginnings of steps of `h` [s]."""
+
+    def __init__(self, t: Floats, h: float, robots: Mapping[str, RobotMotion], alone: str | None) -> None:
+        self.t, self.h = t, h
+        self.robots = robots
+        self.parts = Parts({name: robot.model for name, robot in robots.items()}, (), alone)
+
+    def robot(self, place: Place) -> tuple[RobotMotion, str]:
+        """Return the robot of a place, and the name of the joint or frame."""
+        if place.robot is None or place.robot not in self.robots:
+            raise UnsupportedFeatureError(
+                f"{place.sensor} is on {shown(place.robot or place.name)}, whose acceleration is not recorded"
+            )
+        return self.robots[place.robot], place.name
+
+    def pose(self, place: Place) -> Floats:
+        """Return the poses (n, 4, 4) of a link or body in the world."""
+        robot, name = self.robot(place)
+        return robot.pose(name)
+
+    def contact_force(self, place: Place) -> Floats:
+        """Return the sum (n, 3) of the contact forces on a link or body, in world axes [N]."""
+        raise _no_scene(place)
+
+    def ray_distances(self, place: Place, origins: Floats, directions: Floats, length: float) -> Floats:
+        """Return the distances (n,) [m] from the origins (n, 3) along unit directions (n, 3) to what is hit
+        first within `length` [m], other than the link or body of the sensor; infinity without a hit."""
+        raise _no_scene(place)
+
+
+def _no_scene(place: Place) -> UnsupportedFeatureError:
+    return UnsupportedFeatureError(
+        f"{place.sensor} needs a scene with something to touch or to hit: simulate with "
+        "plant=ScenePlant(...), or use a World"
+    )

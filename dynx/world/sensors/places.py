@@ -1,0 +1,42 @@
+"""Where sensors are: on parts of robots, and on bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from dynx.errors import UnknownNameError, nearest, shown
+from dynx.model import Model
+
+
+class Place(NamedTuple):
+    """Where a sensor is: on a frame or joint of a robot, or on a body."""
+
+    sensor: str
+    """The sensor, in words."""
+    robot: str | None
+    """None for a body."""
+    name: str
+
+
+class Parts(NamedTuple):
+    """Robots and bodies among which sensors are placed."""
+
+    robots: Mapping[str, Model]
+    bodies: tuple[str, ...] = ()
+    alone: str | None = None
+    """Robot in which a name without a robot is looked up; None if there are several."""
+
+    def place(self, on: str, sensor: str) -> Place:
+        """Return the place of a sensor; UnknownNameError for a robot or body that does not exist."""
+        owner, slash, name = on.partition("/")
+        if owner in self.robots and slash:
+            return Place(sensor, owner, name)
+        if on in self.bodies:
+            return Place(sensor, None, on)
+        if self.alone is not None:
+            return Place(sensor, self.alone, on)
+        known = [*self.bodies, *self.robots]
+        raise UnknownNameError(
+            f"{sensor} is on {shown(on)}; wanted a body, robot/frame or robot/joint{nearest(owner, known)}"
+        )

@@ -1,0 +1,93 @@
+"""`Readings`: the samples of a sensor along a motion, with its errors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynx.argument_types import checks_types
+from dynx.errors import UnknownNameError, nearest, shown
+from dynx.spatial.scalar import Floats
+from dynx.world.sensors.errors import Integers, SampleNumbers, apply_errors
+from dynx.world.sensors.motion import SensedMotion
+from dynx.world.sensors.sensor import Sensor
+
+SAME_SAMPLE = 1e-6
+"""Part of a period within which a time counts as that of a sample."""
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """m samples of a sensor; there are no readings between them."""
+
+    sensor: Sensor
+    t: Floats
+    """Times (m,) [s] at which the samples were taken."""
+    channels: Mapping[str, Floats]
+    """Values (m, size) of each channel."""
+
+    def __len__(self) -> int:
+        """Return the number of samples."""
+        return len(self.t)
+
+    def __getitem__(self, channel: str) -> Floats:
+        """Return the values of a channel: (m, size), or (m,) of one that is a number."""
+        if channel not in self.channels:
+            known = nearest(str(channel), self.channels)
+            raise UnknownNameError(f"{self.sensor} has no channel {shown(channel)}{known}")
+        rows = self.channels[channel]
+        named = next(each for each in self.sensor.channels if each.name == channel)
+        return rows if named.components != ("",) else rows[:, 0]
+
+    @property
+    def available(self) -> Floats:
+        """Times (m,) [s] from which the samples can be read."""
+        return self.t + self.sensor.delay
+
+    @property
+    def values(self) -> Floats:
+        """Values (m, size) of all channels side by side, called `Sensor.value_names`."""
+        return np.concatenate(list(self.channels.values()), axis=1)
+
+    @checks_types
+    def held(self, times: Floats) -> Floats:
+        """Return the values (n, size) that can be read at some times (n,) [s]: those of the last sample that
+        is available then, NaN before the first."""
+        slack = SAME_SAMPLE * float(np.min(np.diff(self.t), initial=1.0))
+        last = np.searchsorted(self.available, np.asarray(times) + slack, side="right") - 1
+        found = self.values[np.maximum(last, 0)] if len(self) else np.zeros((len(last), self.sensor.size))
+        return np.where((last >= 0)[:, None], found, np.nan)
+
+    def __repr__(self) -> str:
+        return f"<Readings of {self.sensor}: {len(self)} samples of {', '.join(self.channels)}>"
+
+
+def sample_numbers(sensor: Sensor, t: Floats, h: float) -> tuple[Integers, Integers]:
+    """Return the rows of the instants `t` (n,), steps of `h` [s] apart, at which a sensor takes samples, and
+    the numbers of the samples, which depend on the time alone."""
+    period = sensor.period(h)
+    before = np.concatenate([t[:1] - h, t[:-1]])
+    number, previous = (np.floor(times / period + SAME_SAMPLE).astype(np.int64) for times in (t, before))
+    rows = np.flatnonzero(number != previous)
+    return rows, np.maximum(number[rows], 0)
+
+
+def read_sensor(
+    sensor: Sensor, motion: SensedMotion, rollout: int = 0, numbers: SampleNumbers | None = None
+) -> Readings:
+    """Return the readings of a sensor along a motion.
+
+    `rollout` is the number of the rollout, on which the random numbers depend; `numbers` are those of an
+    earlier call for the same sensor, which are continued. Raises ArgumentError for a rate above that of the
+    steps, UnknownNameError for its place, UnsupportedFeatureError for what the motion does not tell.
+    """
+    sensor.require(motion.parts)
+    rows, samples = sample_numbers(sensor, motion.t, motion.h)
+    values = (each[rows] for each in sensor.measure(motion))
+    true = {channel.name: each for channel, each in zip(sensor.channels, values, strict=True)}
+    if numbers is None:
+        numbers = SampleNumbers(sensor.name, sensor.seed, rollout, sensor.size)
+    found = apply_errors(sensor.errors, true, samples, sensor.period(motion.h), numbers)
+    return Readings(sensor, motion.t[rows], found)
