@@ -87,11 +87,12 @@ def verdicts(report: Entry) -> str:
 
 
 def cell(figure: Entry | None) -> str:
-    """A verdict with the relative errors at the largest and the smallest step."""
+    """A verdict with the errors at the largest and the smallest step, and the values under bounds."""
     if figure is None:
         return ""
     order = f" ({wording.order_text(figure['order'])})" if figure["verdict"] == "falls" else ""
-    return f"{figure['verdict']}{order}, {wording.span_text(figure['errors'])}"
+    values = "" if figure["most"] is None else f" (measured {wording.measured_text(figure)})"
+    return f"{figure['verdict']}{order}, {wording.span_text(figure['errors'])}{values}"
 
 
 def settings(report: Entry) -> str:
@@ -155,12 +156,11 @@ def figures(report: Entry) -> str:
     for case in report["cases"]:
         for name, found in wording.figures_by_name(case).items():
             first = next(iter(found.values()))
-            exact = wording.quantity_text(first["exact"], first["unit"])
             rows.append(
                 (
                     f"`{case['name']}`",
                     name,
-                    exact,
+                    wording.exact_text(first),
                     f"{first['tolerance']:.0e}",
                     *(cell(found.get(each)) for each in names),
                 )

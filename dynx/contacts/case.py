@@ -26,6 +26,7 @@ class Figure:
     """Noun phrase, unique within a trial of the case."""
     measured: float
     exact: float
+    """The value that mechanics gives; the least one where it gives bounds."""
     unit: str
     """Unit in which both are given, such as ``m/s``; empty for a ratio."""
     scale: float
@@ -35,6 +36,8 @@ class Figure:
     rests_on: tuple[str, ...] = ()
     """Coefficients of `dynx.world.Material`, such as ``restitution``, without which the exact value would be
     another one: an engine that lacks one of them cannot give it."""
+    most: float | None = None
+    """The largest value that mechanics allows, where it gives bounds and no value; else None."""
 
     def __post_init__(self) -> None:
         for name in ("scale", "tolerance"):
@@ -47,11 +50,17 @@ class Figure:
             raise ArgumentError(
                 f"the exact value of the figure {shown(self.name)} is {self.exact}; wanted a finite number"
             )
+        if self.most is not None and not self.exact < self.most < math.inf:
+            raise ArgumentError(
+                f"most of the figure {shown(self.name)} is {self.most}; wanted a finite number above "
+                f"{self.exact:g}"
+            )
 
     @property
     def error(self) -> float:
-        """Distance from the exact value, relative to the scale."""
-        return abs(self.measured - self.exact) / self.scale
+        """Distance from the exact value, or from the interval between the bounds, relative to the scale."""
+        nearest = self.exact if self.most is None else min(max(self.measured, self.exact), self.most)
+        return abs(self.measured - nearest) / self.scale
 
 
 class ContactCase(ABC):
@@ -102,6 +111,10 @@ BUILT_IN = {
     "tipping_box": "dynx.contacts.cases.friction:TippingBox",
     "pushed_box": "dynx.contacts.cases.friction:PushedBox",
     "stack": "dynx.contacts.cases.resting:Stack",
+    "fast_slide": "dynx.contacts.cases.friction:FastSlide",
+    "spinning_plate": "dynx.contacts.cases.friction:SpinningPlate",
+    "oblique_impact": "dynx.contacts.cases.collisions:ObliqueImpact",
+    "free_wedge": "dynx.contacts.cases.supports:FreeWedge",
     "driven_platform": "dynx.contacts.cases.resting:DrivenPlatform",
     "standing_robot": "dynx.contacts.cases.resting:StandingRobot",
     "spin_down": "dynx.contacts.cases.friction:SpinDown",

@@ -44,6 +44,7 @@ class FigureResult:
     figure: str
     unit: str
     exact: float
+    """The value that mechanics gives, or the least one."""
     scale: float
     """Magnitude by which errors are divided."""
     tolerance: float
@@ -53,6 +54,8 @@ class FigureResult:
     errors: tuple[float, ...]
     """Relative error at each step."""
     verdict: Verdict
+    most: float | None = None
+    """The largest value that mechanics allows, where it gives bounds; else None."""
 
 
 @dataclass(frozen=True)
@@ -219,6 +222,7 @@ def _result(series: FigureSeries, verdict: Verdict) -> FigureResult:
         tuple(figure.measured for figure in series.figures),
         series.errors,
         verdict,
+        first.most,
     )
 
 

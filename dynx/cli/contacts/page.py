@@ -19,9 +19,9 @@ from dynx.cli.contacts import wording
 from dynx.cli.contacts.wording import (
     MAX_ORDER,
     as_number,
+    exact_text,
     figure_name,
     figures_by_name,
-    quantity_text,
     step_text,
 )
 from dynx.cli.shell.output import Entry
@@ -147,7 +147,7 @@ def template_environment() -> Environment:
         wording.figures_by_name,
         wording.coefficient_text,
         wording.last_error,
-        wording.quantity_text,
+        wording.exact_text,
         wording.headline,
         wording.price_text,
         wording.span_text,
@@ -215,7 +215,7 @@ def plots(case: Entry, steps: Sequence[float], engines: Sequence[str]) -> list[P
     return [
         Plot(
             figure_name(first),
-            quantity_text(first["exact"], first["unit"]),
+            exact_text(first),
             svg_element(draw_errors([first, *others], steps, engines)),
         )
         for first, *others in shown

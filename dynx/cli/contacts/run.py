@@ -195,8 +195,10 @@ class AttributionEntry(TypedDict):
 class FigureEntry(TypedDict):
     """A figure of one engine at every step, with the verdict on its error.
 
-    An error is abs(measured - exact) / scale. `order` is that of the error in the step, under ``falls``;
-    `reason` states why the engine cannot give the exact value, under ``cannot``.
+    An error is abs(measured - exact) / scale. Where mechanics gives bounds, `exact` is the least value and
+    `most` the largest, else null; the error is then the distance from the interval. `order` is that of the
+    error in the step, under ``falls``; `reason` states why the engine cannot give the exact value, under
+    ``cannot``.
     """
 
     engine: str
@@ -204,6 +206,7 @@ class FigureEntry(TypedDict):
     figure: str
     unit: str
     exact: float
+    most: float | None
     scale: float
     tolerance: float
     measured: list[float]

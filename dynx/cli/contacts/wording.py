@@ -98,6 +98,19 @@ def quantity_text(value: float | None, unit: str) -> str:
     return f"{text} {unit}" if unit else text
 
 
+def exact_text(figure: Entry) -> str:
+    """Write the exact value of a figure with its unit, or the bounds that mechanics gives."""
+    if figure["most"] is None:
+        return quantity_text(figure["exact"], figure["unit"])
+    return f"{quantity_text(figure['exact'], '')} .. {quantity_text(figure['most'], figure['unit'])}"
+
+
+def measured_text(figure: Entry) -> str:
+    """Write what was measured at the largest and at the smallest step."""
+    first, last = (quantity_text(figure["measured"][k], figure["unit"]) for k in (0, -1))
+    return last if len(figure["measured"]) == 1 else f"{first} .. {last}"
+
+
 def coefficient_text(value: float | None) -> str:
     """Write a coefficient of friction or restitution."""
     number = as_number(value)
@@ -139,7 +152,14 @@ def change_text(settings: Mapping[str, Sequence[Any]], *, arrow: str = "->") -> 
 
 
 def verdict_text(figure: Entry) -> str:
-    """Write the verdict on a figure with what proves it."""
+    """Write the verdict on a figure with what proves it; under bounds also what was measured."""
+    text = _verdict_text(figure)
+    if figure["most"] is None:
+        return text
+    return f"{text}; measured {measured_text(figure)}, bounds {exact_text(figure)}"
+
+
+def _verdict_text(figure: Entry) -> str:
     verdict: str = figure["verdict"]
     if verdict == "falls":
         return f"falls with the step ({order_text(figure['order'])})"

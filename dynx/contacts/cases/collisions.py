@@ -402,6 +402,123 @@ class SpinningBall(ContactCase):
         return figures
 
 
+OBLIQUE_RADII = (2.5, 5.0)
+"""Radii [m] of the moving ball and of the one at rest: the way along the surfaces during a contact is short
+beside them, so that the line of the centres hardly turns in contacts that are springs."""
+
+OBLIQUE_MASSES = (1.0, 2.0)
+"""Masses [kg]."""
+
+OBLIQUE_APPROACH = 1.0
+"""Speed of the approach along the line of the centres [m/s]."""
+
+OBLIQUE_GAPS = tuple(0.1 + delay * OBLIQUE_APPROACH for delay in CONTACT_DELAYS)
+"""Distances [m] along that line between the surfaces at the start."""
+
+OBLIQUE_DURATION = 0.25
+"""Time [s] by which every pair has collided and separated."""
+
+
+class Graze(NamedTuple):
+    """Speed across the line of the centres of two balls that meet, and their friction."""
+
+    slip: float
+    """Slip of the surfaces at the touch [m/s]."""
+    friction: float
+
+
+class ObliqueImpact(ContactCase):
+    """A ball that hits another off its centre, without gravity, with restitution 1 and friction."""
+
+    name: ClassVar[str] = "oblique_impact"
+    title: ClassVar[str] = "Oblique elastic impact of two balls with friction"
+    law: ClassVar[str] = (
+        "P = (1 + e) m u and J = min(mu P, 2/7 m s), so that m_i v_i' = m_i v_i +- P +- J and "
+        "2/5 m_i r_i^2 w_i' = -r_i J, for the reduced mass m = m1 m2 / (m1 + m2), the speed u of the "
+        "approach, the slip s, friction mu and restitution e: surfaces slide to the end where "
+        "7 mu (1 + e) u < 2 s, and stick at it otherwise"
+    )
+    source: ClassVar[str] = (
+        "Coulomb's law for the impulses of rigid bodies with Newton's restitution, with which those of "
+        "Poisson and Stronge agree here, because friction of two balls does not change the approach "
+        "(Stronge, Impact Mechanics, 2000, ch. 3 and 4)"
+    )
+    trials: ClassVar[dict[str, Graze]] = {"slides": Graze(2.0, 0.1), "sticks": Graze(1.0, 0.5)}
+
+    def scene(self, parameters: Graze) -> Scene:
+        material = Material(friction=parameters.friction, restitution=1.0)
+        twist = (OBLIQUE_APPROACH, parameters.slip, 0.0, 0.0, 0.0, 0.0)
+        bodies = []
+        for row, gap in enumerate(OBLIQUE_GAPS):
+            z = 15.0 * row
+            start = (-gap - sum(OBLIQUE_RADII), -gap / OBLIQUE_APPROACH * parameters.slip, z)
+            for name, radius, mass, at, motion in zip(
+                _names(row, 0),
+                OBLIQUE_RADII,
+                OBLIQUE_MASSES,
+                (start, (0.0, 0.0, z)),
+                (twist, (0.0,) * 6),
+                strict=True,
+            ):
+                bodies.append(sphere(name, radius, mass=mass, pose=Pose(at), twist=motion, material=material))
+        return Scene("oblique_impact", bodies=tuple(bodies), gravity=(0.0, 0.0, 0.0))
+
+    def measure(self, world: World, parameters: Graze) -> Sequence[Figure]:
+        world.run(OBLIQUE_DURATION)
+        bodies = world.state.bodies
+        twists = [[bodies[name].twist for name in _names(row, 0)] for row in range(len(OBLIQUE_GAPS))]
+        slip = parameters.slip
+        separation = farthest([float(hit[0] - moving[0]) for moving, hit in twists], OBLIQUE_APPROACH)
+        figures = [
+            Figure(
+                "speed of the separation",
+                separation,
+                OBLIQUE_APPROACH,
+                "m/s",
+                OBLIQUE_APPROACH,
+                rests_on=("restitution",),
+            )
+        ]
+        if slides_to_the_end(parameters):
+            # The normal impulse is that of the separation found, which has a figure of its own.
+            ratios = [float(hit[1] / hit[0]) for _, hit in twists]
+            found = farthest(ratios, parameters.friction)
+            what = "impulse of friction, relative to the normal impulse"
+            figures.append(Figure(what, found, parameters.friction, "", 1.0))
+        else:
+            found = farthest([slip_of(moving, hit) for moving, hit in twists], 0.0)
+            figures.append(Figure("slip after the impact", found, 0.0, "m/s", slip))
+        # The impulse acts at the touch, so that it leaves the angular momentum of each ball about that.
+        turning = [moving[1] - 0.4 * OBLIQUE_RADII[0] * moving[5] for moving, _ in twists]
+        turned = [hit[1] + 0.4 * OBLIQUE_RADII[1] * hit[5] for _, hit in twists]
+        across = [OBLIQUE_MASSES[0] * moving[1] + OBLIQUE_MASSES[1] * hit[1] for moving, hit in twists]
+        what = "angular momentum about the touch, by m r, of the"
+        return [
+            *figures,
+            Figure(f"{what} moving ball", farthest(map(float, turning), slip), slip, "m/s", slip),
+            Figure(f"{what} hit ball", farthest(map(float, turned), 0.0), 0.0, "m/s", slip),
+            Figure(
+                "momentum across the line of the centres",
+                farthest(map(float, across), OBLIQUE_MASSES[0] * slip),
+                OBLIQUE_MASSES[0] * slip,
+                "kg m/s",
+                OBLIQUE_MASSES[0] * slip,
+                1e-9,
+            ),
+        ]
+
+
+def slides_to_the_end(graze: Graze) -> bool:
+    """Check whether two balls of restitution 1 still slide on one another when they separate."""
+    return 7.0 * graze.friction * 2.0 * OBLIQUE_APPROACH < 2.0 * graze.slip
+
+
+def slip_of(moving: Floats, hit: Floats) -> float:
+    """Return the slip [m/s] of the surfaces of two balls with these twists (6,) where they touch: the line of
+    the centres is x, and the slip is along y."""
+    return float(moving[1] + OBLIQUE_RADII[0] * moving[5] - hit[1] + OBLIQUE_RADII[1] * hit[5])
+
+
 BOUNCING_BALL_RADIUS = 0.05
 RESTITUTION = 0.5
 BOUNCING_BALL_HEIGHTS = tuple(0.5 * G * (0.25 + 0.4e-3 * k) ** 2 for k in range(10))

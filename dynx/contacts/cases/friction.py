@@ -1,17 +1,29 @@
-"""Dry friction: slopes, directions, pairs of materials, boxes that tip, and torsional friction."""
+"""Dry friction: slopes, directions, pairs of materials, boxes that tip or must not, and spinning bodies."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import combinations_with_replacement
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from dynx.contacts.case import ContactCase, Figure
-from dynx.contacts.motion import G, acceleration, farthest, inclined, rate_at, record, slope_axes, tilts
+from dynx.contacts.motion import (
+    G,
+    acceleration,
+    body_of,
+    farthest,
+    inclined,
+    rate_at,
+    record,
+    slope_axes,
+    tilts,
+)
 from dynx.model import Pose
+from dynx.model.geometry import Box, Cylinder, Shape
 from dynx.world import ExternalForce, Material, Scene, World, box, ground, sphere
 
 SLOPE_FRICTION = 0.5
@@ -385,3 +397,132 @@ class SpinDown(ContactCase):
             Figure("angular deceleration", slowing, exact, "rad/s^2", exact, rests_on=rests_on),
             Figure("spin after the stop", left, 0.0, "rad/s", SPIN, rests_on=rests_on),
         ]
+
+
+FAST_SLIDE_SPEED = 10.0
+"""Speed at the start [m/s]."""
+
+FAST_SLIDE_STARTING = 0.1
+"""Time [s] after which the boxes slide steadily."""
+
+FAST_SLIDE_DURATION = 0.4
+"""Time [s] of the measurement, at the end of which the boxes still slide."""
+
+
+class Slider(NamedTuple):
+    """A box that slides along an edge of length `width`, and its friction."""
+
+    width: float
+    """Length and width [m]."""
+    height: float
+    friction: float
+
+
+class FastSlide(ContactCase):
+    """A box that slides at 10 m/s, flat enough that friction cannot tip it."""
+
+    name: ClassVar[str] = "fast_slide"
+    title: ClassVar[str] = "A fast slide of a box that must not tip"
+    law: ClassVar[str] = (
+        "dv/dt = -mu g and no tilt where mu h < b, for friction mu, half height h and half width b, at any "
+        "speed v"
+    )
+    source: ClassVar[str] = (
+        "Coulomb's law, and balance of moments about the centre: the load is at mu h ahead"
+    )
+    trials: ClassVar[dict[str, Slider]] = {
+        "flat": Slider(0.2, 0.1, 0.4),
+        "cube": Slider(0.2, 0.2, 0.4),
+        "cube, friction 0.6": Slider(0.2, 0.2, 0.6),
+    }
+
+    def scene(self, parameters: Slider) -> Scene:
+        material = Material(friction=parameters.friction)
+        size = (parameters.width, parameters.width, parameters.height)
+        slider = box(
+            "box",
+            size,
+            mass=1.0,
+            pose=Pose((0.0, 0.0, 0.5 * parameters.height)),
+            twist=(FAST_SLIDE_SPEED, 0.0, 0.0, 0.0, 0.0, 0.0),
+            material=material,
+        )
+        return Scene("fast_slide", bodies=(ground(material=material), slider))
+
+    def measure(self, world: World, parameters: Slider) -> Sequence[Figure]:
+        start = record(world, FAST_SLIDE_STARTING)
+        motion = record(world, FAST_SLIDE_DURATION)
+        exact = parameters.friction * G
+        slowing = -acceleration(motion.times, motion.velocities("box")[:, 0])
+        upward = np.concatenate([each.rotations("box")[:, 2, 2] for each in (start, motion)])
+        tilt = float(np.arccos(np.clip(np.min(upward), -1.0, 1.0)))
+        return [
+            Figure("deceleration", slowing, exact, "m/s^2", exact),
+            Figure("largest tilt", tilt, 0.0, "rad", 1.0, 1e-2),
+        ]
+
+
+SPINNING_PLATE_FRICTION = 0.5
+SPINNING_PLATE_SPIN = 10.0
+"""Angular velocity at the start [rad/s]."""
+
+PLATE_RADIUS, PLATE_HEIGHT = 0.2, 0.05
+"""Radius of the disc, or half the edge of the square, and height of both [m]."""
+
+SPINNING_PLATE_STARTING = 0.02
+SPINNING_PLATE_DURATION = 0.08
+"""Time [s] of the measurement, at the end of which the plates still spin."""
+
+
+class Plate(NamedTuple):
+    """A plate: whether it is round, and its polar radius of gyration, squared [m^2]."""
+
+    round: bool
+    gyration: float
+
+    @property
+    def farthest(self) -> float:
+        """Distance [m] of the farthest point of its face from the axis."""
+        return PLATE_RADIUS if self.round else math.sqrt(2.0) * PLATE_RADIUS
+
+
+class SpinningPlate(ContactCase):
+    """A flat box and a flat cylinder that spin on a plane about their vertical axis.
+
+    Of rigid bodies, mechanics does not determine the pressure on a face, so that it bounds the deceleration
+    only. The figure is the pressure that an engine implies.
+    """
+
+    name: ClassVar[str] = "spinning_plate"
+    title: ClassVar[str] = "A flat body that spins on a plane: the pressure below it"
+    law: ClassVar[str] = (
+        "k^2 dw/dt = -mu g s with 0 < s <= d for every pressure below the plate, for its radius of gyration "
+        "k, friction mu, the mean distance s of the pressure from the axis and that d of the farthest point; "
+        "under uniform pressure s / d is 0.541 for a square and 2/3 for a disc"
+    )
+    source: ClassVar[str] = "Coulomb's law at every point of the face, and Euler's equation"
+    trials: ClassVar[dict[str, Plate]] = {
+        "square": Plate(False, 2.0 / 3.0 * PLATE_RADIUS**2),
+        "disc": Plate(True, 0.5 * PLATE_RADIUS**2),
+    }
+
+    def scene(self, parameters: Plate) -> Scene:
+        material = Material(friction=SPINNING_PLATE_FRICTION)
+        edge = 2.0 * PLATE_RADIUS
+        shape: Shape = (
+            Cylinder(PLATE_RADIUS, PLATE_HEIGHT) if parameters.round else Box((edge, edge, PLATE_HEIGHT))
+        )
+        plate = replace(
+            body_of(shape, "plate", (0.0, 0.0, 0.5 * PLATE_HEIGHT), 1.0),
+            twist=(0.0, 0.0, 0.0, 0.0, 0.0, SPINNING_PLATE_SPIN),
+            material=material,
+        )
+        return Scene("spinning_plate", bodies=(ground(material=material), plate))
+
+    def measure(self, world: World, parameters: Plate) -> Sequence[Figure]:
+        world.run(SPINNING_PLATE_STARTING)
+        motion = record(world, SPINNING_PLATE_DURATION)
+        slowing = -acceleration(motion.times, motion.velocities("plate")[:, 5])
+        distance = slowing * parameters.gyration / (SPINNING_PLATE_FRICTION * G)
+        what = "mean distance of the pressure from the axis, relative to the farthest point"
+        return [Figure(what, distance / parameters.farthest, 0.0, "", 1.0, most=1.0)]

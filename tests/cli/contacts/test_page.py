@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -12,9 +13,10 @@ from hypothesis import strategies as st
 
 from dynx.cli.contacts.page import ENGINE_STYLES, contacts_page, draw_errors, plots
 from dynx.cli.contacts.run import document
-from dynx.cli.contacts.wording import figures_by_name, headline
+from dynx.cli.contacts.wording import exact_text, figures_by_name, headline, measured_text, verdict_text
+from dynx.contacts import Verdict
 from dynx.files.documents import json_text
-from tests.cli.contacts.documents import ENGINES, STEPS, at_one_step, conformance, example
+from tests.cli.contacts.documents import ENGINES, STEPS, at_one_step, conformance, example, result
 from tests.examples import PROFILE
 from tests.files.page import Page, contrast
 
@@ -135,3 +137,17 @@ def test_the_headline_counts_what_an_engine_cannot_do_apart() -> None:
     text = headline(counts)
     assert text.startswith("No error is unexplained")
     assert "4 that the engine cannot avoid" in text
+
+
+def test_bounds_are_written_with_what_was_measured_between_them() -> None:
+    bounded = replace(result(verdict=Verdict("within")), exact=-3.0, most=4.0)
+    (case,) = document(replace(conformance(), results=(bounded,)), 1.0)["cases"]
+    (entry,) = case["figures"]
+    assert exact_text(entry) == "-3 .. 4 m/s^2"
+    assert measured_text(entry) == "-2.08 m/s^2 .. -2.02 m/s^2"
+    assert verdict_text(entry) == (
+        "within the tolerance; measured -2.08 m/s^2 .. -2.02 m/s^2, bounds -3 .. 4 m/s^2"
+    )
+    alone = {**entry, "measured": [1.5], "most": None}
+    assert (measured_text(alone), exact_text(alone)) == ("1.5 m/s^2", "-3 m/s^2")
+    assert verdict_text(alone) == "within the tolerance"
