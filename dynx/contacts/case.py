@@ -80,6 +80,8 @@ class ContactCase(ABC):
     """Where the equation comes from: a textbook with its section, or the principle from which it follows."""
     trials: ClassVar[Mapping[str, Any]] = {"": None}
     """Parameters by the name of the trial; the name is empty where a case has one trial only."""
+    contact_interval: ClassVar[float | None] = None
+    """Time [s] of which `World.mean_contacts` gives the mean to `measure`; None where it is not read."""
 
     @abstractmethod
     def scene(self, parameters: Any) -> Scene:

@@ -51,29 +51,12 @@ def step_count(world: World, duration: float) -> int:
     return max(1, round(duration / world.dt))
 
 
-def contact_force(world: World, part: str) -> Floats:
-    """Return the sum (3,) of the contact forces of the last step on a body or link [N]."""
+def mean_contact_force(world: World, part: str) -> Floats:
+    """Return the mean (3,) of the contact forces on a body or link in the interval of the case [N]."""
     total: Floats = np.zeros(3)
-    for contact in world.contacts():
-        if contact.a == part:
-            total += contact.force
-        elif contact.b == part:
-            total -= contact.force
+    for contact in world.mean_contacts(part):
+        total += contact.force if contact.a == part else -contact.force
     return total
-
-
-def mean_contact_forces(
-    world: World, parts: Sequence[str], duration: float, **loads: Any
-) -> dict[str, Floats]:
-    """Take steps for `duration` [s], during which `loads` act (arguments of `World.step`); return the mean
-    (3,) of the contact forces on each of these bodies and links [N]."""
-    steps = step_count(world, duration)
-    total: dict[str, Floats] = {name: np.zeros(3) for name in parts}
-    for _ in range(steps):
-        world.step(**loads)
-        for name in parts:
-            total[name] += contact_force(world, name)
-    return {name: force / steps for name, force in total.items()}
 
 
 def acceleration(times: Floats, velocities: Floats) -> float:

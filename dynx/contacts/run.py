@@ -65,7 +65,8 @@ def carry_out(run: CaseRun) -> Measured | Unmeasured:
     try:
         parameters = run.case.trials[run.trial]
         scene = run.case.scene(parameters)
-        with World(scene, run.engine, run.dt, **run.settings) as world:
+        interval = run.case.contact_interval
+        with World(scene, run.engine, run.dt, contact_interval=interval, **run.settings) as world:
             version = world.version
             lacking = {each.quantity: str(each) for each in world.inexact_materials()}
             figures = checked_figures(run.case.measure(world, parameters))

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from dynx.steppers.state import BodyState, RobotState, WorldState
     from dynx.world.camera import Picture
     from dynx.world.comparison import WorldComparison
-    from dynx.world.contacts import ClosestPoints, Contact, RayHits
+    from dynx.world.contacts import ClosestPoints, Contact, MeanContact, RayHits
     from dynx.world.mjcf import scene_to_mjcf
     from dynx.world.motors import Motor, PDMotor, PositionMotor, TorqueMotor, VelocityMotor
     from dynx.world.record import Record
@@ -68,6 +68,7 @@ __all__ = [
     "InexactMaterial",
     "JointTorqueSensor",
     "Material",
+    "MeanContact",
     "Motor",
     "PDMotor",
     "Picture",
@@ -124,6 +125,7 @@ _HOME = {
     "InexactMaterial": "dynx.steppers.materials",
     "JointTorqueSensor": "dynx.world.sensors.kinds",
     "Material": "dynx.steppers.material",
+    "MeanContact": "dynx.world.contacts",
     "Motor": "dynx.world.motors",
     "PDMotor": "dynx.world.motors",
     "Picture": "dynx.world.camera",

@@ -49,6 +49,25 @@ class Contact:
 
 
 @dataclass(frozen=True, eq=False)
+class MeanContact:
+    """Mean over an interval of what two bodies exert on one another where they touch.
+
+    Force and moment times the length of the interval are the impulses of the contacts.
+    """
+
+    a: str
+    b: str
+    force: Floats
+    """Mean force (3,) on `a` [N]; that on `b` is its opposite."""
+    moment: Floats
+    """Mean moment (3,) of the forces on `a` about the origin of the world [N m]."""
+    normal_force: float
+    """Mean of the sum of the forces along the normals [N]."""
+    touching: float
+    """Share of the interval in which the two had a contact, from 0 to 1."""
+
+
+@dataclass(frozen=True, eq=False)
 class ClosestPoints:
     """The nearest points of two bodies or links."""
 

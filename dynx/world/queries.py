@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from functools import lru_cache
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,8 +23,11 @@ from dynx.steppers.native_queries import NativeQueries, RayHit, native_queries_o
 from dynx.steppers.state import WorldState
 from dynx.steppers.stepper import Stepper, TouchingPoint
 from dynx.world.boxes import OwnerPoses, collider_box, shape_box
-from dynx.world.contacts import ClosestPoints, Contact, RayHits
+from dynx.world.contacts import ClosestPoints, Contact, MeanContact, RayHits
 from dynx.world.scene import Scene
+
+if TYPE_CHECKING:
+    from dynx.world.contact_interval import ContactInterval
 
 
 class Distances:
@@ -153,6 +157,12 @@ class Queries:
             )
             for p in points
         )
+
+    def mean_contacts(
+        self, interval: ContactInterval, engine: Stepper, part: str | None = None
+    ) -> tuple[MeanContact, ...]:
+        """Return the mean contacts of an interval, of a part or all, ordered by the parts of the scene."""
+        return interval.means(engine, None if part is None else set(self._colliders(part)))
 
     def touching_pairs(self, engine: Stepper) -> frozenset[tuple[str, str]]:
         """Return the names of the parts that touch, ordered by the parts of the scene."""

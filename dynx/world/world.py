@@ -33,7 +33,7 @@ from dynx.steppers.settings import changed_settings, checked_settings
 from dynx.steppers.state import BodyState, RobotState, WorldState
 from dynx.steppers.stepper import Stepper
 from dynx.world.commands import Commands, MotorsOf, RobotLoads, with_scene_motors
-from dynx.world.contacts import MAX_RAY_LENGTH, ClosestPoints, Contact, RayHits
+from dynx.world.contacts import MAX_RAY_LENGTH, ClosestPoints, Contact, MeanContact, RayHits
 from dynx.world.motion import Motion, apply_state, checked_state
 from dynx.world.notes import Overlap, notes_on_engine, notes_on_start, overlaps_of
 from dynx.world.preparation import checked_options, layout_for, prepare
@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from dynx.distance.avoidance import Avoidance
     from dynx.steppers.camera import Camera
     from dynx.world.camera import Picture
+    from dynx.world.contact_interval import ContactInterval
     from dynx.world.last_step import LastStep
     from dynx.world.queries import Queries
 
@@ -66,6 +67,11 @@ TIME_ROUNDING = 1e-9
 """Tolerance within which the ratio of two times counts as a whole number."""
 
 
+def steps_in(duration: float, dt: float) -> int:
+    """Return the number of steps of `dt` [s] that last for `duration` [s], rounded up."""
+    return max(1, math.ceil(duration / dt - TIME_ROUNDING))
+
+
 def run_for(
     duration: float,
     dt: float,
@@ -78,7 +84,7 @@ def run_for(
     """Take steps for `duration` [s], rounded up to a multiple of `dt`, with the loads of a function or fixed
     ones."""
     refuse_too_many_steps("duration", positive_seconds("duration", duration), dt)
-    n = max(1, math.ceil(positive_seconds("duration", duration) / dt - TIME_ROUNDING))
+    n = steps_in(duration, dt)
     if loads is None and not real_time:
         step(n, **fixed)
         return
@@ -148,7 +154,9 @@ class World:
     and `joint_armature` are those of the robots' descriptions; joint dynamics that the engine does not have
     are computed outside of it. Without `collisions` nothing touches. `settings` are those of the engine
     (`World.settings`); docs/world.md lists them. With `keep_last_step` the state before each step of the
-    engine is kept, from which `joint_wrenches` and `base_wrench` follow; a step then takes longer.
+    engine is kept, from which `joint_wrenches` and `base_wrench` follow; with `contact_interval` [s] the
+    contacts of each step of the engine are summed, of which `mean_contacts` gives the mean over that time.
+    A step then takes longer.
 
     A world is closed by `close` or at the end of a ``with`` block. Arguments are checked before the engine
     gets them, and a call that raises an error leaves the state as it was.
@@ -167,6 +175,7 @@ class World:
         joint_friction: bool = True,
         joint_armature: bool = True,
         keep_last_step: bool = False,
+        contact_interval: float | None = None,
         **settings: object,
     ) -> None:
         """Raises UnknownBackendError and NotInstalledError for an engine, UnknownNameError and ArgumentError
@@ -205,6 +214,17 @@ class World:
             from dynx.world.last_step import LastStep
 
             self._last_step = LastStep(self._layout, self._commands, self.dt / self.substeps)
+        self._contact_interval: ContactInterval | None = None
+        if contact_interval is not None:
+            from dynx.world.contact_interval import ContactInterval
+
+            h = self.dt / self.substeps
+            seconds = positive_seconds("contact_interval", contact_interval)
+            refuse_too_many_steps("contact_interval", seconds, h)
+            names = [collider.name for collider in self._layout.colliders]
+            self._contact_interval = ContactInterval(names, steps_in(seconds, h))
+        self._watchers = [each for each in (self._last_step, self._contact_interval) if each is not None]
+        """What is read around every step of the engine."""
         at_start = notes_on_start(self._motion.engine, self._motion.state)
         self.notes: tuple[str, ...] = (*at_start, *self._lasting_notes(settings))
         """Parts that overlap at the start, constraints that it violates, joints beyond their limits, robots
@@ -253,15 +273,19 @@ class World:
         if self._scene_motors:
             motors = with_scene_motors(self._scene_motors, torques, motors)
         no_motors = motors is None or (type(motors) is dict and not motors)
-        if no_motors and not forces and self._last_step is None:
+        if no_motors and not forces and not self._watchers:
             held = self._commands.hold(torques, n * self.substeps)
             if held is not None:
                 self._motion.advance(engine, n, held)
                 return
         act = self._commands.plan(torques, motors, forces, self._motion.time)
-        if self._last_step is not None:
-            act = self._last_step.watched(act)
-        self._motion.advance(engine, n, act=act)
+        for watcher in self._watchers:
+            act = watcher.watched(act)
+        try:
+            self._motion.advance(engine, n, act=act)
+        except BaseException:
+            self._forget_steps()
+            raise
 
     @checks_option_names(wrenches="forces")
     def run(
@@ -364,18 +388,19 @@ class World:
         if state is None and robots is None and bodies is None:
             raise ArgumentError("set_state was given nothing; wanted a state, robots= or bodies=")
         checked = checked_state(self._layout, state, robots or {}, bodies or {})
-        self._forget_last_step()
+        self._forget_steps()
         clock = None if state is None else (checked.time, 0)
         self._motion.change(lambda engine: apply_state(engine, checked), clock)
 
     def reset(self) -> None:
         """Return to the start of the scene, at time 0, as a new world is."""
-        self._forget_last_step()
+        self._forget_steps()
         self._motion.reset()
 
-    def _forget_last_step(self) -> None:
-        if self._last_step is not None:
-            self._last_step.forget()
+    def _forget_steps(self) -> None:
+        """Forget what was read around the last steps: they did not lead to the present state."""
+        for watcher in self._watchers:
+            watcher.forget()
 
     def save(self) -> Snapshot:
         """Return everything that determines the later steps, which `restore` continues bit for bit."""
@@ -399,7 +424,7 @@ class World:
         if not isinstance(snapshot, Snapshot):
             raise ArgumentError(f"snapshot is of type {type(snapshot).__name__}; wanted one of World.save")
         snapshot.require(self.engine, engine.version, self.identity)
-        self._forget_last_step()
+        self._forget_steps()
 
         def load(engine: Stepper) -> None:
             engine.load(snapshot.data)
@@ -477,6 +502,18 @@ class World:
         are those of the new state, without forces.
         """
         return self._queries.contacts(self._motion.engine, part)
+
+    @checks_types
+    def mean_contacts(self, part: str | None = None) -> tuple[MeanContact, ...]:
+        """Return the mean force of each pair of parts that touched in the last `contact_interval`: of all
+        pairs, or those of a part, which is named as in `contacts`.
+
+        The interval begins anew where the state is set, and the mean is over the time since then if that is
+        shorter; before the first step there is none. Raises ArgumentError without `contact_interval`.
+        """
+        if self._contact_interval is None:
+            raise ArgumentError("this world sums no contacts; make it with contact_interval=, in seconds")
+        return self._queries.mean_contacts(self._contact_interval, self._motion.engine, part)
 
     def touching_pairs(self) -> frozenset[tuple[str, str]]:
         """Return the parts that have a contact in `contacts`, as pairs of names in the order of `Contact`.

@@ -24,6 +24,7 @@ IDEAS = {
     "what joints transmit": r"^def joint_wrenches\b",
     "external torque from a motion": r"^class MomentumObserver\b",
     "acceleration from two states": r"^class MeanAcceleration\b",
+    "mean contacts": r"^class ContactInterval\b",
     "a scene in MuJoCo": r"\bElement\(\"mujoco\"",
     "types of arguments": r"^def checks_types\b",
 }

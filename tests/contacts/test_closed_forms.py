@@ -50,7 +50,8 @@ pytestmark = pytest.mark.usefixtures("exact")
 def figures(case: ContactCase, trial: str, dt: float, **settings: Any) -> list[Figure]:
     """Return the figures of a trial in the exact world."""
     parameters = case.trials[trial]
-    with World(case.scene(parameters), "exact", dt, **settings) as world:
+    interval = case.contact_interval
+    with World(case.scene(parameters), "exact", dt, contact_interval=interval, **settings) as world:
         return list(case.measure(world, parameters))
 
 

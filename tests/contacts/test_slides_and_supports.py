@@ -153,7 +153,7 @@ NOTICED = 0.02
 
 
 def worst(case: ContactCase, trial: str, scene: Scene, engine: str) -> float:
-    with World(scene, engine, 1e-3) as world:
+    with World(scene, engine, 1e-3, contact_interval=case.contact_interval) as world:
         return max(figure.error for figure in case.measure(world, case.trials[trial]))
 
 

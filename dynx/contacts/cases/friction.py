@@ -409,7 +409,7 @@ FAST_SLIDE_DURATION = 0.4
 """Time [s] of the measurement, at the end of which the boxes still slide."""
 
 
-class Slider(NamedTuple):
+class SlidingBox(NamedTuple):
     """A box that slides along an edge of length `width`, and its friction."""
 
     width: float
@@ -430,13 +430,13 @@ class FastSlide(ContactCase):
     source: ClassVar[str] = (
         "Coulomb's law, and balance of moments about the centre: the load is at mu h ahead"
     )
-    trials: ClassVar[dict[str, Slider]] = {
-        "flat": Slider(0.2, 0.1, 0.4),
-        "cube": Slider(0.2, 0.2, 0.4),
-        "cube, friction 0.6": Slider(0.2, 0.2, 0.6),
+    trials: ClassVar[dict[str, SlidingBox]] = {
+        "flat": SlidingBox(0.2, 0.1, 0.4),
+        "cube": SlidingBox(0.2, 0.2, 0.4),
+        "cube, friction 0.6": SlidingBox(0.2, 0.2, 0.6),
     }
 
-    def scene(self, parameters: Slider) -> Scene:
+    def scene(self, parameters: SlidingBox) -> Scene:
         material = Material(friction=parameters.friction)
         size = (parameters.width, parameters.width, parameters.height)
         slider = box(
@@ -449,7 +449,7 @@ class FastSlide(ContactCase):
         )
         return Scene("fast_slide", bodies=(ground(material=material), slider))
 
-    def measure(self, world: World, parameters: Slider) -> Sequence[Figure]:
+    def measure(self, world: World, parameters: SlidingBox) -> Sequence[Figure]:
         start = record(world, FAST_SLIDE_STARTING)
         motion = record(world, FAST_SLIDE_DURATION)
         exact = parameters.friction * G

@@ -12,10 +12,9 @@ from dynx.contacts.motion import (
     G,
     acceleration,
     farthest,
-    mean_contact_forces,
+    mean_contact_force,
     record,
     resting_bodies,
-    step_count,
 )
 from dynx.model import Pose
 from dynx.model.loading import load
@@ -35,16 +34,16 @@ class RestingForce(ContactCase):
     title: ClassVar[str] = "Force of the ground on a body at rest"
     law: ClassVar[str] = "N = m g, for mass m and gravity g"
     source: ClassVar[str] = "balance of forces (Newton's first law)"
+    contact_interval: ClassVar[float | None] = RESTING_FORCE_AVERAGING
 
     def scene(self, parameters: None) -> Scene:
         return resting_bodies()
 
     def measure(self, world: World, parameters: None) -> Sequence[Figure]:
-        world.run(RESTING_FORCE_SETTLING)
+        world.run(RESTING_FORCE_SETTLING + RESTING_FORCE_AVERAGING)
         weights = {body.name: body.mass * G for body in world.scene.bodies if body.mass is not None}
-        forces = mean_contact_forces(world, [*weights], RESTING_FORCE_AVERAGING)
         return [
-            Figure(f"force on the {name}", float(forces[name][2]), weight, "N", weight)
+            Figure(f"force on the {name}", float(mean_contact_force(world, name)[2]), weight, "N", weight)
             for name, weight in weights.items()
         ]
 
@@ -87,8 +86,8 @@ EDGE = 0.1
 """Edge of the boxes [m], whose mass is 1 kg."""
 
 STACK_DURATION = 0.5
-FORCES = 10
-"""Number of last steps over which the forces are averaged."""
+STACK_AVERAGING = 0.02
+"""Time [s] at the end over which the forces are averaged."""
 
 
 class Stack(ContactCase):
@@ -100,6 +99,7 @@ class Stack(ContactCase):
         "N_k = k m g between the k upper boxes and the rest, and height 10 h for boxes of height h"
     )
     source: ClassVar[str] = "balance of forces on the boxes above each contact (Newton's first law)"
+    contact_interval: ClassVar[float | None] = STACK_AVERAGING
 
     def scene(self, parameters: None) -> Scene:
         boxes = [
@@ -109,14 +109,12 @@ class Stack(ContactCase):
         return Scene("stack", bodies=(ground(), *boxes))
 
     def measure(self, world: World, parameters: None) -> Sequence[Figure]:
-        world.step(max(1, step_count(world, STACK_DURATION) - FORCES))
+        world.run(STACK_DURATION)
         forces = np.zeros(BOXES)
         number = {_name(k): k for k in range(BOXES)} | {"ground": -1}
-        for _ in range(FORCES):
-            world.step()
-            for contact in world.contacts():
-                upper = max(number[contact.a], number[contact.b])
-                forces[upper] += abs(float(contact.force[2])) / FORCES
+        for contact in world.mean_contacts():
+            upper = max(number[contact.a], number[contact.b])
+            forces[upper] += abs(float(contact.force[2]))
         ratios = forces / (G * np.arange(BOXES, 0, -1))
         centers = np.array([world.state.bodies[_name(k)].T_world_body[:3, 3] for k in range(BOXES)])
         height = float(centers[-1, 2]) + 0.5 * EDGE
@@ -170,6 +168,7 @@ class StandingRobot(ContactCase):
         "the weight of two feet, for a trunk m with its centre c ahead of the middle and feet at distances l"
     )
     source: ClassVar[str] = "balance of forces and moments"
+    contact_interval: ClassVar[float | None] = STANDING_ROBOT_AVERAGING
 
     def scene(self, parameters: None) -> Scene:
         robot = load(quadruped(), base="floating")
@@ -178,11 +177,8 @@ class StandingRobot(ContactCase):
 
     def measure(self, world: World, parameters: None) -> Sequence[Figure]:
         motors = {"robot": PositionMotor(LEG, kp=30000.0, kd=1500.0)}
-        world.run(STANDING_ROBOT_SETTLING, motors=motors)
-        means = mean_contact_forces(
-            world, [f"robot/{foot}" for foot in FEET], STANDING_ROBOT_AVERAGING, motors=motors
-        )
-        forces = {foot: float(means[f"robot/{foot}"][2]) for foot in FEET}
+        world.run(STANDING_ROBOT_SETTLING + STANDING_ROBOT_AVERAGING, motors=motors)
+        forces = {foot: float(mean_contact_force(world, f"robot/{foot}")[2]) for foot in FEET}
         weight, front = foot_forces()
         ahead = sum(force for foot, force in forces.items() if foot.startswith("front"))
         return [
