@@ -223,6 +223,7 @@ class Backend(QuantityCalls):
         max_starts: int = 32,
         rng: np.random.Generator | int = 0,
         avoid: AvoidanceSource | None = None,
+        timeout: float | None = None,
     ) -> TrackResult:
         """Return configurations (..., n, nq) that follow `targets`, poses (..., n, 4, 4), continuously.
 
@@ -247,6 +248,7 @@ class Backend(QuantityCalls):
         v0: ArrayLike | None = None,
         avoid: AvoidanceSource | None = None,
         avoid_gain: float = 5.0,
+        timeout: float | None = None,
     ) -> VelocityResult:
         """Return the velocity v (nv,) that meets `tasks` best at q (nq,) and keeps the limits for `dt` [s].
 

@@ -25,6 +25,7 @@ from dynx.simd.target import host
 from dynx.simd.trace import trace
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.so3 import rotate
+from dynx.time_limit import UNLIMITED, TimeLimit
 
 MAX_COORDINATES = 24
 """Most coordinates for which a step, or a whole descent, is compiled."""
@@ -61,6 +62,7 @@ def descend_by_kernel(
     q: Floats,
     settings: Sequence[float],
     bounds: tuple[Sequence[float], Sequence[float]],
+    time_limit: TimeLimit = UNLIMITED,
 ) -> Descended:
     """Descend from q (nq,) by a kernel, with the poses and Jacobians of a frame by a backend; there are 1 to
     `MAX_COORDINATES` coordinates."""
@@ -78,7 +80,7 @@ def descend_by_kernel(
     space.xs[0][...] = coordinates.values(q)
     space.memories[0][...] = space.initial
     run = _run_whole if coordinates.is_all else _run_part
-    best, now = run(space, descent, backend, frame, coordinates, q)
+    best, now = run(space, descent, backend, frame, coordinates, q, time_limit)
     found = space.memories[now][: n + 4].tolist()
     free.append(space)
     q = coordinates.with_values(q, found[:n]) if best is None else best
@@ -92,23 +94,25 @@ def _run_whole(
     frame: str,
     coordinates: FrameCoordinates,
     q: Floats,
+    time_limit: TimeLimit,
 ) -> tuple[None, int]:
     """Descend where the coordinates are all of q; return the number of the last state."""
     pose_at, jacobian_at = backend.forward_kinematics, backend.jacobian
     pose, jacobian, status, xs, (first, second) = (
         space.pose, space.jacobian, space.status, space.xs, space.runs
     )  # fmt: skip
+    is_over = time_limit.is_over
     while True:
         pose[...] = pose_at(q, frame)
         jacobian[...] = jacobian_at(q, frame)
         first()
-        if status[0] != RUNNING:
+        if status[0] != RUNNING or is_over():
             return None, 1
         q = xs[1]
         pose[...] = pose_at(q, frame)
         jacobian[...] = jacobian_at(q, frame)
         second()
-        if status[0] != RUNNING:
+        if status[0] != RUNNING or is_over():
             return None, 0
         q = xs[0]
 
@@ -120,6 +124,7 @@ def _run_part(
     frame: str,
     coordinates: FrameCoordinates,
     q: Floats,
+    time_limit: TimeLimit,
 ) -> tuple[Floats | None, int]:
     """Descend in some coordinates of q; return the best configuration of a floating robot, and the number of
     the last state."""
@@ -135,7 +140,7 @@ def _run_part(
             after = space.memories[now][n + descent.least]
             if after < least or space.memories[now][n + 2]:
                 best, least = q, after
-        if space.status[0] != RUNNING:
+        if space.status[0] != RUNNING or time_limit.is_over():
             return best if floating else None, now
         start = best if floating and descent is not SEARCH else q
         q = coordinates.with_values(start, space.xs[now].tolist())
@@ -150,6 +155,7 @@ def descend_on_floats(
     q: Floats,
     settings: Sequence[float],
     bounds: tuple[Sequence[float], Sequence[float]],
+    time_limit: TimeLimit = UNLIMITED,
 ) -> Descended:
     """Descend from q (nq,) by the text itself; `error_at` returns the error and its Jacobian rows (m, n)."""
     n, memory = coordinates.count, descent.initial(coordinates.count)
@@ -160,7 +166,7 @@ def descend_on_floats(
         memory = found["memory"]
         if memory[n + descent.least] < least or memory[n + 2]:
             best, least = q, float(memory[n + descent.least])
-        if found["status"] != RUNNING:
+        if found["status"] != RUNNING or time_limit.is_over():
             break
         start = best if descent is not SEARCH else q
         q = coordinates.with_values(start, found["x"].tolist())

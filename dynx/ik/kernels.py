@@ -9,7 +9,7 @@ microseconds.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from hashlib import sha256
@@ -54,6 +54,10 @@ from dynx.simd.image import COMPILE_LOCK
 from dynx.simd.iteration import Iteration, IterationKernel, load_iteration
 from dynx.simd.target import host
 from dynx.spatial.scalar import Floats
+from dynx.time_limit import TimeLimit
+
+LANES = 8
+"""Fewest tasks of a piece of work that a time limit divides: the lanes of the widest vectors."""
 
 
 class Race:
@@ -71,6 +75,7 @@ class Race:
         self.result = np.zeros((count, n + SEARCH.results))
         shared = [SEARCH.initial(n), self.target, self.near, np.zeros(1), *self._optional]
         tasks = [self.x, *(np.broadcast_to(row, (count, len(row))) for row in shared)]
+        self._kernel, self._tasks = kernel, tasks
         self.run = kernel.bind_race(tasks, self.result, self._settings, starts.random)
         """Function that solves for the present target and returns the number of completed starts."""
 
@@ -82,9 +87,20 @@ class Race:
             array[:] = values
         self._settings[:3] = limits.position_tolerance, limits.rotation_tolerance, limits.max_iterations
 
-    def solve(self, problem: Problem, indices: list[int]) -> Floats:
+    def run_within(self, time_limit: TimeLimit) -> int:
+        """Do as `run` in pieces, until the time is over."""
+        completed = 0
+        for part in time_limit.pieces(len(self.result), LANES):
+            tasks = [each[part] for each in self._tasks]
+            race = self._kernel.bind_race(tasks, self.result[part], self._settings, self.starts.random)
+            completed = part.start + race()
+            if self.result[completed - 1, self._n + 2]:
+                break
+        return completed
+
+    def solve(self, problem: Problem, indices: list[int]) -> tuple[Floats, bool]:
         """Return the results (as one row) of the first start that reaches the target, or of the best one,
-        with the iterations and restarts of all starts up to it."""
+        with the iterations and restarts of all starts up to it; and whether no start is left to try."""
         self.prepare(problem, indices)
         starts = self.starts
         if starts.near:
@@ -94,13 +110,14 @@ class Race:
         if problem.begins_at_q0:
             self.x[0] = self.near
         self.target[:] = self._kind.rows(problem.targets, problem.batch)[0]
-        n, completed = self._n, self.run()
+        n, time_limit = self._n, problem.limits.time_limit
+        completed = self.run() if time_limit.timeout is None else self.run_within(time_limit)
         last, done = completed - 1, self.result[:completed]
         if not done[last, n + 2]:
             last = int(np.argmin(done[:, -1]))
         found: Floats = done[last : last + 1].copy()
         found[0, n + 3], found[0, n + 4] = done[:, n + 3].sum(), completed - 1
-        return found
+        return found, bool(found[0, n + 2]) or completed == len(self.result)
 
 
 _POSE = Struct("12d")
@@ -208,13 +225,15 @@ class FrameSolver:
 
         A target that the bounds prove out of reach is not tried from more than `FIRST_RESTARTS` others.
         """
+        if problem.limits.time_limit.timeout is not None:
+            return self._solve_within(problem, backend)
         starts, n, count = self._starts(problem), self._coordinates.count, problem.count
         most, model = problem.limits.max_restarts, backend.model
         unreached, proof = np.ones(count, dtype=bool), None
         if count == 1:
             proof = proofs(problem, model, unreached)
         if proof is not None and not proof[0]:
-            rows = self._race(problem, starts)
+            rows, _ = self._race(problem, starts)
             unreached = rows[:, n + 2] == 0.0
         else:
             arrays = self._arrays(problem, starts)
@@ -229,8 +248,40 @@ class FrameSolver:
                     rows[again] = self._batch(chosen, problem, starts, most)
                     unreached = rows[:, n + 2] == 0.0
         if unreached.any():
-            self._refine(rows, np.flatnonzero(unreached), problem, starts)
+            self._refine(rows, np.flatnonzero(unreached), problem, self._arrays(problem, starts))
         return self._result(rows, problem, proof)
+
+    def _solve_within(self, problem: Problem, backend: Backend) -> IKResult:
+        """Solve samples until the time is over: several from few starts first, then each from all."""
+        starts, n, count = self._starts(problem), self._coordinates.count, problem.count
+        time_limit, most, model = problem.limits.time_limit, problem.limits.max_restarts, backend.model
+        arrays, first = self._arrays(problem, starts), min(most, FIRST_RESTARTS)
+        rows = np.zeros((count, n + SEARCH.results))
+        rows[:, :n], rows[:, n : n + 2] = arrays[3], np.nan
+        unreached, proof, begun = np.ones(count, dtype=bool), None, count
+        if count == 1:
+            proof = proofs(problem, model, unreached)
+        if proof is None or proof[0]:
+            for part in time_limit.pieces(count, LANES):
+                rows[part] = self._batch([array[part] for array in arrays], problem, starts, first)
+                begun = part.stop
+            unreached = rows[:, n + 2] == 0.0
+        if proof is None:
+            proof = proofs(problem, model, unreached & (np.arange(count) < begun))
+        late = unreached & (proof == "")
+        if count > 1 and first == most:
+            late[:begun] = False
+        for k in np.flatnonzero(late).tolist():
+            if count > 1 and time_limit.is_over():
+                break
+            rows[k : k + 1], is_complete = self._race(problem.sample(k), starts)
+            late[k] = not is_complete
+        at = np.flatnonzero((rows[:, n + 2] == 0.0) & ~late)
+        for part in () if time_limit.is_over() else time_limit.pieces(len(at), LANES):
+            self._refine(rows, at[part], problem, arrays)
+        found = self._result(rows, problem, proof)
+        late &= rows[:, n + 2] == 0.0
+        return replace(found, timed_out=late.reshape(problem.batch)) if late.any() else found
 
     def nearest(self, problem: Problem, posture: Posture) -> tuple[Floats, IKResult]:
         """Return the objective (count,) and the solutions nearest to a posture, each from its own q0."""
@@ -302,10 +353,12 @@ class FrameSolver:
         self._kernel(arrays, rows, constants, starts.rows, threads=self._threads)
         return rows
 
-    def _refine(self, rows: Floats, at: NDArray[np.int64], problem: Problem, starts: Starts) -> None:
+    def _refine(
+        self, rows: Floats, at: NDArray[np.int64], problem: Problem, arrays: Sequence[Floats]
+    ) -> None:
         """Refine the results of the samples `at` to local minima of their errors."""
         n = self._coordinates.count
-        _, _, target, near, _, *optional = (array[at] for array in self._arrays(problem, starts))
+        _, _, target, near, _, *optional = (array[at] for array in arrays)
         begin = np.ascontiguousarray(rows[at, :n])
         tasks = [begin, _repeated(REFINEMENT.initial(n), len(at)), target, near, *optional]
         refined = np.empty((len(at), n + REFINEMENT.results))
@@ -313,8 +366,9 @@ class FrameSolver:
         refined[:, n + 3] += rows[at, n + 3]
         rows[at, : refined.shape[1]] = refined
 
-    def _race(self, problem: Problem, starts: Starts) -> Floats:
-        """Return the results (1, coordinates and `SEARCH.results`) of the only sample."""
+    def _race(self, problem: Problem, starts: Starts) -> tuple[Floats, bool]:
+        """Return the results (1, coordinates and `SEARCH.results`) of the only sample, and whether it is
+        reached or no start is left to try."""
         try:
             race = self._free.pop()
         except IndexError:

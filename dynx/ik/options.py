@@ -19,6 +19,7 @@ from dynx.errors import ArgumentError, ShapeError, UnknownNameError, nearest, sh
 from dynx.model.numbers import real_array, whole_number
 from dynx.model.targets import FREE, Targets
 from dynx.option_names import checks_field_names
+from dynx.time_limit import UNLIMITED, TimeLimit
 
 if TYPE_CHECKING:
     from dynx.distance.avoidance import AvoidanceSource
@@ -26,12 +27,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SearchLimits:
-    """Tolerances within which a target counts as reached, and limits on the number of steps and starts."""
+    """Tolerances within which a target counts as reached, and limits on the number of steps and starts
+    and on the time."""
 
     position_tolerance: float  # [m]
     rotation_tolerance: float  # [rad]
     max_iterations: int  # of each start
     max_restarts: int
+    time_limit: TimeLimit = UNLIMITED
 
 
 AXIS_NAMES = ("position_x", "position_y", "position_z", "rotation_x", "rotation_y", "rotation_z")
@@ -188,6 +191,7 @@ class IKOptions(TypedDict, total=False):
     avoid: AvoidanceSource | None
     max_iterations: int
     max_restarts: int
+    timeout: float | None
     rng: np.random.Generator | int | None
     method: str
     all_solutions: bool
@@ -230,6 +234,9 @@ class Options:
     """Most steps of each start."""
     max_restarts: int = 200
     """Most starts after the first."""
+    timeout: float | None = None
+    """Time [s] after which the search stops with the best configuration found so far (status TIMED_OUT), to
+    within 10 %; None for any. Compiling or loading the kernels of a robot, once, does not count."""
     rng: np.random.Generator | int | None = 0
     """Seed or generator of the random starts."""
     method: str = "dynx"
@@ -263,7 +270,7 @@ class Options:
             whole_number("max_iterations", self.max_iterations, 0),
             whole_number("max_restarts", self.max_restarts, 0),
         )
-        return SearchLimits(position, rotation, *counts)
+        return SearchLimits(position, rotation, *counts, TimeLimit(self.timeout))
 
     def checked_rng(self) -> np.random.Generator | int | None:
         """Return the seed or generator. Raises ArgumentError."""

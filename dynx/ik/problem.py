@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +22,7 @@ from dynx.model.configuration import checked_q
 from dynx.model.numbers import checked_vector, real_array
 from dynx.model.targets import Targets, checked_targets
 from dynx.spatial.scalar import Floats
+from dynx.time_limit import TimeLimit
 
 if TYPE_CHECKING:
     from dynx.distance.avoidance import Avoidance, AvoidanceSource
@@ -166,6 +167,30 @@ class Problem:
         """Point of the first frame."""
         return self.requirements[0].point
 
+    def sample(self, k: int) -> Problem:
+        """Return the problem of sample number k alone."""
+        index = np.unravel_index(k, self.batch)
+
+        def at_index(array: Floats, axes: int) -> Floats:
+            return np.asarray(np.broadcast_to(array, (*self.batch, *array.shape[array.ndim - axes :]))[index])
+
+        def of_sample(targets: Targets) -> Targets:
+            p, R = targets.positions, targets.rotations
+            return Targets(None if p is None else at_index(p, 1), None if R is None else at_index(R, 2))
+
+        requirements = tuple(replace(each, targets=of_sample(each.targets)) for each in self.requirements)
+        return replace(self, requirements=requirements, q0=at_index(self.q0, 1), batch=())
+
+    def by_frame(self, errors: Sequence[Sequence[tuple[float, float]]]) -> dict[str, tuple[Floats, Floats]]:
+        """Return the position and rotation errors (...,) of each frame, if there are several, from those of
+        each sample."""
+        if len(self.requirements) == 1:
+            return {}
+        columns = np.array(errors, dtype=np.float64).reshape(*self.batch, len(self.requirements), 2)
+        return {
+            each.frame: (columns[..., k, 0], columns[..., k, 1]) for k, each in enumerate(self.requirements)
+        }
+
     @property
     def is_plain(self) -> bool:
         """Whether there is one frame, without requirements per axis."""
@@ -191,7 +216,8 @@ class Problem:
                 requirement.task(backend, self.coordinates, position, rotation)
                 for requirement, (position, rotation) in zip(self.requirements, sample, strict=True)
             ]
-            yield k, tasks[0] if len(tasks) == 1 else SeveralTasks(tasks, self.coordinates)
+            several = len(tasks) > 1
+            yield k, SeveralTasks(tasks, self.coordinates, self.limits.time_limit) if several else tasks[0]
 
 
 def checked_problem(
@@ -205,8 +231,8 @@ def checked_problem(
     wanted = frame_targets(target, frame, options)
     for name, _, _ in wanted:
         model.frame_index(name)
-    requirements = tuple(_requirement(name, value, each) for name, value, each in wanted)
     limits, rng = options.search_limits(), options.checked_rng()
+    requirements = tuple(_requirement(name, value, each, limits.time_limit) for name, value, each in wanted)
     margin = checked_margin(model, options.limit_margin)
     frames = tuple(requirement.frame for requirement in requirements)
     coordinates = stored_coordinates(model, frames, None if margin is None else tuple(margin.tolist()))
@@ -264,7 +290,7 @@ def _secondary(model: Model, options: Options) -> Secondary | None:
     return Secondary(checked_q(model, goal, "nearest"), None)
 
 
-def _requirement(frame: str, target: ArrayLike, options: Options) -> Requirement:
+def _requirement(frame: str, target: ArrayLike, options: Options, time_limit: TimeLimit) -> Requirement:
     """Return the checked target of one frame."""
     free, axes = checked_axes(
         options.free, options.weights, options.position_tolerance, options.rotation_tolerance, options.axes
@@ -278,7 +304,8 @@ def _requirement(frame: str, target: ArrayLike, options: Options) -> Requirement
     placed = targets.positions is not None and (axes is None or any(axes.weights[:3]))
     if point is not None and not placed:
         raise ArgumentError("point is given in addition to free='position', with which it has no effect")
-    return Requirement(frame, targets, point, axes, options.search_limits())
+    tolerances = replace(options.search_limits(), time_limit=time_limit)
+    return Requirement(frame, targets, point, axes, tolerances)
 
 
 def _part_read(target: ArrayLike, options: Options) -> str | None:

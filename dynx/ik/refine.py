@@ -31,6 +31,7 @@ from dynx.ik.step import ACCEPTED_FACTOR, DAMPING, MIN_DAMPING, REJECTED_FACTOR,
 from dynx.model.targets import Targets
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
+from dynx.time_limit import UNLIMITED, TimeLimit
 
 if TYPE_CHECKING:
     from dynx.distance.avoidance import Avoidance, NearPair, Pair
@@ -52,13 +53,17 @@ def refined_solutions(backend: Backend, problem: Problem, first: IKResult) -> IK
     """Return `first` with solutions that keep all margins, and of those the best by the objective.
 
     Samples that `first` does not reach stay. Where each candidate is too close to something, `success` is
-    False, q is the one that lacks least, and `collision` says which pairs prevent it.
+    False, q is the one that lacks least, and `collision` says which pairs prevent it. What was not examined
+    before the time is over counts as too close.
     """
     avoidance, secondary = problem.avoidance, problem.secondary
     q = first.q.reshape(problem.count, -1).copy()
     columns = [getattr(first, name).reshape(-1).copy() for name in _COLUMNS]
     success = first.success.reshape(-1).copy()
     sentences = np.full(len(q), "", dtype=object)
+    late = np.zeros(len(q), dtype=bool) if first.timed_out is None else first.timed_out.reshape(-1).copy()
+    parts = np.array([np.stack(errors, axis=-1).reshape(-1, 2) for errors in first.by_frame.values()])
+    time_limit = problem.limits.time_limit
     search, starts = Search(backend.model, problem.coordinates, problem.limits), problem.starts()
     goals = None
     if secondary is not None and secondary.nearest is not None:
@@ -70,15 +75,20 @@ def refined_solutions(backend: Backend, problem: Problem, first: IKResult) -> IK
         for column, name in zip(columns, _COLUMNS, strict=True):
             value = getattr(found, name)
             column[k] = value if name.endswith("error") else column[k] + value
+        if len(parts):
+            parts[:, k] = found.by_frame
 
     samples = zip(problem.tasks(backend), problem.targets.rows(problem.batch), strict=True)
     for (k, task), target in samples:
         if not success[k]:
             continue
+        if k and time_limit.is_over():
+            late[k], success[k] = True, finder is None
+            continue
         wanted = _OneTarget(backend, problem, search, task, target, starts[k])
         if finder is not None:
             found, sentences[k] = finder.find(wanted, q[k])
-            success[k] = not sentences[k]
+            success[k], late[k] = not (sentences[k] or found.timed_out), found.timed_out
             keep(k, found)
         if secondary is not None and success[k] and problem.coordinates.count:
             goal = None if goals is None else goals[k]
@@ -86,10 +96,18 @@ def refined_solutions(backend: Backend, problem: Problem, first: IKResult) -> IK
             # Rounding decides at the edge of a tolerance or of a margin: otherwise what was found stays.
             if best is not None:
                 keep(k, best)
+            late[k] = time_limit.is_over()
     shaped = {name: x.reshape(problem.batch) for name, x in zip(_COLUMNS, columns, strict=True)}
     if avoidance is not None:
         shaped |= {"collision": sentences.reshape(problem.batch)}
-    return replace(first, q=q.reshape(first.q.shape), success=success.reshape(problem.batch), **shaped)
+    return replace(
+        first,
+        q=q.reshape(first.q.shape),
+        success=success.reshape(problem.batch),
+        timed_out=late.reshape(problem.batch) if late.any() else None,
+        by_frame=problem.by_frame(parts.swapaxes(0, 1).tolist()) if len(parts) else {},
+        **shaped,
+    )
 
 
 Target = tuple[Floats | None, Floats | None]
@@ -200,7 +218,10 @@ def _preferred(
     objective = secondary.objective(coordinates, wanted.task)
     solutions: list[tuple[float, Candidate]] = []
     iterations = 0
+    time_limit = limits.time_limit
     for start in begins:
+        if time_limit.is_over():
+            break
         found, steps = wanted.descended(start, begins[0] if goal is None else goal)
         iterations += steps
         if found.success and is_admissible(found.q):
@@ -229,7 +250,8 @@ def _improved(
     steps, and the objective."""
     coordinates, length, steps = wanted.problem.coordinates, _FIRST_STEP, 0
     direction: Floats | None = None
-    while steps < MAX_STEPS and length > _LEAST_STEP:
+    is_over = wanted.problem.limits.time_limit.is_over
+    while steps < MAX_STEPS and length > _LEAST_STEP and not is_over():
         steps += 1
         if direction is None:
             direction = _descent_direction(coordinates, wanted.task, best.q, objective)
@@ -352,8 +374,10 @@ class AvoidingDescent:
         backend: Backend,
         coordinates: FrameCoordinates,
         bounds: tuple[Floats, Floats] | None = None,
+        time_limit: TimeLimit = UNLIMITED,
     ) -> None:
         """`bounds` (n,) and (n,) on the coordinates replace the limits of the joints."""
+        self._time_limit = time_limit
         self._task, self._avoidance, self._backend = task, avoidance, backend
         self._coordinates = coordinates
         # What no step changes would only hide the progress of the others.
@@ -368,6 +392,8 @@ class AvoidingDescent:
         best, factor, steps = self._state(q), DAMPING, 0
         recent = deque([best.squared])
         while not best.done and steps < MAX_STEPS and factor <= MAX_FACTOR:
+            if self._time_limit.is_over():
+                break
             steps += 1
             trial = self._state(self._moved(best, factor * best.squared + MIN_DAMPING))
             gain = best.squared - trial.squared
@@ -477,13 +503,18 @@ class _ClearFinder:
         from dynx.distance.avoidance import FIXED, OF_TARGET, collision_sentence, inevitable_sentence
 
         tally, task = _Tally(), wanted.task
-        descent = AvoidingDescent(task, self._avoidance, self._backend, self._problem.coordinates)
+        time_limit = self._problem.limits.time_limit
+        descent = AvoidingDescent(
+            task, self._avoidance, self._backend, self._problem.coordinates, time_limit=time_limit
+        )
         starts, improvements = 0, 0
         for solutions, drawn, is_all in self._rounds(wanted, solution):
             starts, complete = starts + drawn, is_all
             restarts = starts - 1
             lacking: list[tuple[float, Candidate]] = []
             for q in solutions:
+                if tally.count and time_limit.is_over():
+                    break
                 candidate = self._search.evaluate(q, task)
                 if not candidate.success:
                     continue
@@ -499,13 +530,20 @@ class _ClearFinder:
             lacking.sort(key=lambda each: each[0])
             for _, candidate in lacking[: min(IMPROVED, MOST_IMPROVED - improvements)]:
                 improvements += 1
+                if time_limit.is_over():
+                    break
                 if self._is_redundant(task, candidate.q):
                     improved = self._improved(task, descent, candidate, tally)
                     if improved is not None:
                         improved.restarts = restarts
                         return improved, ""
-        assert tally.best is not None
-        tally.best.restarts = max(starts - 1, 0)
+            if time_limit.is_over():
+                complete = False
+                break
+        if tally.best is None:
+            # The time was over, and rounding decided against the solution at the edge of a tolerance.
+            return replace(self._search.evaluate(solution, task), success=False, timed_out=True), ""
+        tally.best.restarts, tally.best.timed_out = max(starts - 1, 0), time_limit.is_over()
         return tally.best, collision_sentence(
             self._avoidance, tally.blockers, tally.pairs, tally.count, complete=complete
         )
@@ -526,7 +564,9 @@ class _ClearFinder:
             left -= count
             found = wanted.from_kernel(rng, count)
             if found is None:
-                found = [wanted.descended(coordinates.random(start, rng), start)[0].q for _ in range(count)]
+                found = []
+                while len(found) < count and not problem.limits.time_limit.is_over():
+                    found.append(wanted.descended(coordinates.random(start, rng), start)[0].q)
             new = _distinct(found, seen, coordinates)
             seen += new
             yield new, count, False

@@ -17,8 +17,13 @@ from dynx.spatial.scalar import Floats
 Measures = tuple[float, float, float, int]
 
 REACHED, UNREACHABLE, NOT_FOUND = "REACHED", "UNREACHABLE", "NOT_FOUND"
-IN_COLLISION = "IN_COLLISION"
+IN_COLLISION, TIMED_OUT = "IN_COLLISION", "TIMED_OUT"
 """Values of `IKResult.status`."""
+
+
+def largest_error(errors: Floats) -> float:
+    """Return the largest error, or 0; NaN of what was not begun does not count."""
+    return float(np.fmax.reduce(errors, axis=None, initial=0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +52,9 @@ class IKResult:
     collision: NDArray[np.object_] | None = field(default=None, kw_only=True)
     """With `avoid` a sentence (...,) that says which bodies are too close in the solutions found; empty where
     that is not the failure."""
+    timed_out: NDArray[np.bool_] | None = field(default=None, kw_only=True)
+    """True (...,) where `timeout` ended the search before it was complete: q is the best found so far, which
+    may reach the target if only the choice among solutions was cut short. None stands for nowhere."""
     by_frame: Mapping[str, tuple[Floats, Floats]] = field(default_factory=dict, kw_only=True)
     """Position error (...,) [m] and rotation error (...,) [rad] of each frame, if there are several; those of
     the result are the largest."""
@@ -58,10 +66,13 @@ class IKResult:
     @property
     def status(self) -> Any:
         """``"REACHED"``, ``"UNREACHABLE"`` (there is a `proof`), ``"IN_COLLISION"`` (bodies are too close in
-        every solution found) or ``"NOT_FOUND"``; an array (...,) of them for a batch."""
+        every solution found), ``"TIMED_OUT"`` (the time was over before the search was complete) or
+        ``"NOT_FOUND"``; an array (...,) of them for a batch."""
         proved = False if self.proof is None else self.proof != ""
         collides = False if self.collision is None else self.collision != ""
-        unreached = np.where(proved, UNREACHABLE, np.where(collides, IN_COLLISION, NOT_FOUND))
+        late = False if self.timed_out is None else self.timed_out
+        complete = np.where(collides, IN_COLLISION, NOT_FOUND)
+        unreached = np.where(proved, UNREACHABLE, np.where(late, TIMED_OUT, complete))
         found = np.where(self.success, REACHED, unreached)
         return found if found.ndim else str(found)
 
@@ -71,23 +82,25 @@ class IKResult:
         return f"{self._summary()}; {self.note}" if self.note else self._summary()
 
     def _summary(self) -> str:
-        worst = (
-            f"at most {float(np.max(self.position_error, initial=0.0)):.3g} m "
-            f"and {float(np.max(self.rotation_error, initial=0.0)):.3g} rad off"
-        )
+        position, rotation = largest_error(self.position_error), largest_error(self.rotation_error)
+        worst = f"at most {position:.3g} m and {rotation:.3g} rad off"
+        late = 0 if self.timed_out is None else int(np.sum(self.timed_out))
         if self.success.ndim:
             beyond = 0 if self.proof is None else int((self.proof != "").sum())
             proved = f", {beyond} proved out of reach" if beyond else ""
-            close = 0 if self.collision is None else int((self.collision != "").sum())
+            close = int((self.status == IN_COLLISION).sum())
             proved += f", {close} only in collision" if close else ""
+            proved += f", {late} stopped by timeout" if late else ""
             return f"{int(self.success.sum())} of {self.success.size} reached{proved}, {worst}"
         if self.success:
             restarts = "1 restart" if self.restarts == 1 else f"{int(self.restarts)} restarts"
             steps = "1 step" if self.iterations == 1 else f"{int(self.iterations)} steps"
-            return f"reached, {worst}, after {steps} and {restarts}"
-        if self.status == IN_COLLISION:
-            return f"in collision: {self.collision}"
-        why = "not found" if self.status == NOT_FOUND else "out of reach"
+            cut_short = ", the choice among solutions stopped by timeout" if late else ""
+            return f"reached, {worst}, after {steps} and {restarts}{cut_short}"
+        if self.collision is not None and self.collision != "":
+            return f"{'stopped by timeout, best so far ' if late else ''}in collision: {self.collision}"
+        status = str(self.status)
+        why = {NOT_FOUND: "not found", TIMED_OUT: "stopped by timeout"}.get(status, "out of reach")
         starts = "the start" if not self.restarts else f"the best of {int(self.restarts) + 1} starts"
         off = f"{starts} is {float(self.position_error):.3g} m and {float(self.rotation_error):.3g} rad off"
         proof = f"; {self.proof}" if self.status == UNREACHABLE else ""

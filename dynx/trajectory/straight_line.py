@@ -25,6 +25,7 @@ from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous, pose_error
 from dynx.spatial.so3 import quat_exp, quat_from_rotation, quat_log, rotation_from_quat
+from dynx.time_limit import TimeLimit
 from dynx.trajectory.base import Trajectory
 from dynx.trajectory.curve import PiecewisePolynomial, TimeScaledTrajectory, checked_law, end_setpoints
 from dynx.trajectory.limit_check import open_backend
@@ -70,6 +71,7 @@ def line(
     deviation: float = 1e-5,
     rotation_deviation: float = 1e-5,
     backend: str | Backend = DEFAULT_ENGINE,
+    timeout: float | None = None,
 ) -> LineTrajectory:
     """Return a motion from `q0` (nq,) that moves `frame` on a straight line to the pose `target`.
 
@@ -84,8 +86,10 @@ def line(
 
     Raises TrajectoryError if beyond some fraction `at` (0 to 1) of the line no configuration within limits is
     found near the previous one, or the bounds are not met: there the arm is near a singularity, or has to
-    change its posture. Raises ArgumentError for invalid arguments.
+    change its posture; or if no motion is found within `timeout` [s]. Raises ArgumentError for invalid
+    arguments.
     """
+    time_limit = TimeLimit(timeout)
     path = _StraightLine(model, frame, q0, target, backend)
     if law is not None and duration is None:
         motion_law = checked_law(law)
@@ -97,23 +101,23 @@ def line(
         if not (isinstance(bound, int | float | np.number) and MIN_DEVIATION <= bound < np.inf):
             raise ArgumentError(f"{name} is {shown(bound)}; wanted a number, at least {MIN_DEVIATION:g}")
     with open_backend(backend, model) as engine:
-        curve, n, off, angle = _refine(path, engine, deviation, rotation_deviation)
+        curve, n, off, angle = _refine(path, engine, deviation, rotation_deviation, time_limit)
     q1 = curve(np.array([1.0]))[0][0]
     start, end = end_setpoints(curve, motion_law, path.q0, q1)
     return LineTrajectory(motion_law.duration, start, end, curve, motion_law, off, angle, n)
 
 
 def _refine(
-    path: _StraightLine, engine: Backend, deviation: float, rotation_deviation: float
+    path: _StraightLine, engine: Backend, deviation: float, rotation_deviation: float, time_limit: TimeLimit
 ) -> tuple[PiecewisePolynomial, int, float, float]:
     """Return the spline within the bounds, its number of intervals, and its distance and angle errors."""
     n = MIN_INTERVALS
     while True:
         try:
-            points = path.solve(engine, n)
+            points = path.solve(engine, n, time_limit)
         except TrajectoryError:
             # With fewer intervals, the previous solution may be too far away as a start.
-            if n >= RELIABLE_INTERVALS:
+            if n >= RELIABLE_INTERVALS or time_limit.is_over():
                 raise
             n *= 2
             continue
@@ -167,7 +171,7 @@ class _StraightLine:
         R = self._start_rotation @ rotation_from_quat(quat_exp(s[:, None] * self._rotation_vector))
         return homogeneous(R, p)
 
-    def solve(self, engine: Backend, n: int) -> Floats:
+    def solve(self, engine: Backend, n: int, time_limit: TimeLimit) -> Floats:
         """Return configurations (n + 1, nq) at evenly spaced s, starting with q0."""
         fractions = np.linspace(0.0, 1.0, n + 1)
         found = [self.q0]
@@ -179,7 +183,14 @@ class _StraightLine:
                 position_tolerance=IK_TOLERANCE,
                 rotation_tolerance=IK_TOLERANCE,
                 max_restarts=0,
+                timeout=time_limit.left(),
             )
+            if time_limit.is_over():
+                raise TrajectoryError(
+                    f"the search for a motion of {shown(self.frame)} along the line was "
+                    f"{time_limit.sentence}, at {s:.4f} of the way",
+                    at=s,
+                )
             if not result.success:
                 x, y, z = T[:3, 3]
                 raise TrajectoryError(

@@ -65,8 +65,8 @@ FLOWS = {
         ENGINE + "engine.inverse_kinematics(engine.forward_kinematics(q, 'tool0'), 'tool0', q)",
         ("world", "sim", "ik.closed_forms"),
         (),
-        106,
-        19300,
+        107,
+        19400,
     ),
     "simulate": Flow(
         ROBOT + "from dynx import control\n"
@@ -86,8 +86,8 @@ FLOWS = {
             "envs",
         ),
         (),
-        174,
-        28250,
+        175,
+        28350,
     ),
     "step of a box": Flow(
         "from dynx.world import Scene, World, box\n"
@@ -104,7 +104,7 @@ FLOWS = {
         "environment.step(environment.action_space.sample())",
         ("distance", "ik", "world.camera", "steppers.camera"),
         (),
-        166,
+        167,
         27450,
     ),
 }

@@ -6,6 +6,7 @@ import click
 
 from dynx.cli.shell.lazy import runs
 from dynx.cli.shell.options import (
+    FiniteRange,
     frame_option,
     json_option,
     model_options,
@@ -220,6 +221,12 @@ def mass() -> None:
     type=float,
     metavar="METRES",
     help="Distance [m] that --avoid keeps (default: 0.01)",
+)
+@click.option(
+    "--timeout",
+    type=FiniteRange(min=0.0, min_open=True),
+    metavar="SECONDS",
+    help="Time [s] after which the search stops with the best configuration found so far (default: none)",
 )
 @runs("dynx.cli.queries.ik:ik")
 def ik() -> None:

@@ -23,6 +23,7 @@ from dynx.cli.shell.tables import Table
 from dynx.distance.avoidance import Avoidance, closest_sentence
 from dynx.errors import ArgumentError, NoClosedFormError
 from dynx.ik import IKSolutions, closed_form
+from dynx.ik.result import TIMED_OUT
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 from dynx.world.scene import read_scene
@@ -38,6 +39,7 @@ def ik(
     given: Numbers,
     avoid: str | None,
     margin: float | None,
+    timeout: float | None,
     json_path: str | None,
     **robot: Any,
 ) -> int:
@@ -69,7 +71,7 @@ def ik(
                 note=note,
                 frame_is_default=by_default,
             )
-        found = engine.inverse_kinematics(wanted, name, start, free=free, avoid=kept)
+        found = engine.inverse_kinematics(wanted, name, start, free=free, avoid=kept, timeout=timeout)
         result = {
             **document_head(engine),
             "frame": name,
@@ -116,10 +118,11 @@ def _outcome(result: dict[str, Any]) -> str:
     if result["success"]:
         clear = ", margins kept" if "avoid" in result else ""
         return f"target reached{clear}: error {error}, after {iterations} and {restarts}"
+    stopped = "stopped by --timeout, " if result["status"] == TIMED_OUT else ""
     if result.get("collision"):
-        return f"in collision: {result['collision']}"
+        return f"{stopped}in collision: {result['collision']}"
     proof = f"; out of reach: {result['proof']}" if result["proof"] else "; not proved out of reach"
-    return f"target not reached: smallest error {error}, after {iterations} and {restarts}{proof}"
+    return f"{stopped}target not reached: smallest error {error}, after {iterations} and {restarts}{proof}"
 
 
 def all_solutions(

@@ -80,7 +80,10 @@ class Followed:
 
 
 class Follower(Protocol):
-    """Solver of targets, one after the other or each on its own."""
+    """Solver of targets, one after the other or each on its own.
+
+    Both methods end after fewer targets, at least one, when the time of the search is over.
+    """
 
     def follow(self, q: Floats, targets: Targets, bounds: StepBounds, *, stop: bool) -> Followed:
         """Descend to each target (n,) from the solution of the one before, the first from q (nq,).
@@ -102,17 +105,21 @@ class SampleFollower:
 
     def follow(self, q: Floats, targets: Targets, bounds: StepBounds, *, stop: bool) -> Followed:
         found: list[Descended] = []
+        time_limit = self._requirement.tolerances.time_limit
         for position, rotation in targets.rows(targets.batch):
             sample = self._solve(q, self._task(position, rotation), bounds, abandons=False)
             found.append(sample)
             q = sample.q
-            if stop and not sample.reached:
+            if (stop and not sample.reached) or time_limit.is_over():
                 break
         return _followed(found, len(q))
 
     def descend(self, starts: Floats, targets: Targets, bounds: StepBounds) -> Followed:
-        rows = zip(starts, targets.rows(targets.batch), strict=True)
-        found = [self._solve(q, self._task(p, R), bounds, abandons=True) for q, (p, R) in rows]
+        found: list[Descended] = []
+        for q, (p, R) in zip(starts, targets.rows(targets.batch), strict=True):
+            found.append(self._solve(q, self._task(p, R), bounds, abandons=True))
+            if self._requirement.tolerances.time_limit.is_over():
+                break
         return _followed(found, starts.shape[-1])
 
     def _task(self, position: Floats | None, rotation: Floats | None) -> SearchTask:
@@ -158,8 +165,13 @@ class KernelFollower:
         rows = np.empty((targets.batch[0] + 1, n + TRACKING.results))
         rows[0, :n] = q[self._coordinates.indices]
         # The results of a sample are the start of the next.
-        completed = self._run(rows[:-1, :n], targets, rows[1:], bounds, stop=stop, abandons=False)
-        return self._followed(q, rows[1 : 1 + completed])
+        x, results, completed = rows[:-1, :n], rows[1:], 0
+        for part in self._limits.time_limit.pieces(len(results)):
+            done = self._run(x[part], targets[part], results[part], bounds, stop=stop, abandons=False)
+            completed = part.start + done
+            if completed < part.stop or (stop and not results[completed - 1, n + 2]):
+                break
+        return self._followed(q, results[:completed])
 
     def descend(self, starts: Floats, targets: Targets, bounds: StepBounds) -> Followed:
         """Descend to each target from its own start."""
@@ -237,15 +249,22 @@ class AvoidingFollower:
         """Follow targets (n,) from q (nq,), each from the solution of the one before."""
         n, done = targets.batch[0], 0
         pieces: list[Followed] = []
+        time_limit = self._requirement.tolerances.time_limit
         while done < n:
+            if pieces and time_limit.is_over():
+                break
             part = targets[done : min(n, done + CHUNK)]
             found = self._base.follow(q, part, bounds, stop=True)
             clear = 0
             while clear < len(found) and found.reached[clear] and self._is_clear(found.q[clear]):
                 clear += 1
+                if time_limit.is_over():
+                    break
             if clear:
                 pieces.append(found.part(slice(clear)))
                 q, done = found.q[clear - 1], done + clear
+                if time_limit.is_over():
+                    break
             if clear < part.batch[0]:
                 # The other follower ends with a sample that it does not reach.
                 sample = found.part(slice(clear, clear + 1))
@@ -260,8 +279,10 @@ class AvoidingFollower:
     def descend(self, starts: Floats, targets: Targets, bounds: StepBounds) -> Followed:
         """Descend from starts (n, nq); a solution that is too close to something does not count."""
         found = self._base.descend(starts, targets, bounds)
+        is_over = self._requirement.tolerances.time_limit.is_over
         for k in np.flatnonzero(found.reached).tolist():
-            found.reached[k] = self._is_clear(found.q[k])
+            # A solution that there is no time to examine does not count.
+            found.reached[k] = not (k and is_over()) and self._is_clear(found.q[k])
         return found
 
     def _is_clear(self, q: Floats) -> bool:
@@ -275,7 +296,8 @@ class AvoidingFollower:
         ((position, rotation),) = target.rows((1,))
         task = self._requirement.task(self._backend, coordinates, position, rotation)
         around = bounds.around(np.array(coordinates.values(q)))
-        descent = AvoidingDescent(task, self._avoidance, self._backend, coordinates, around)
+        time_limit = self._requirement.tolerances.time_limit
+        descent = AvoidingDescent(task, self._avoidance, self._backend, coordinates, around, time_limit)
         moved, steps, reached = descent.run(q)
         stays = not reached and not self._is_clear(moved)
         error = task.error(q if stays else moved)

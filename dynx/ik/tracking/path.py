@@ -23,6 +23,7 @@ from dynx.backends.base import Backend
 from dynx.files.pages import html_table
 from dynx.ik.coordinates import FrameCoordinates
 from dynx.ik.problem import Requirement
+from dynx.ik.result import largest_error
 from dynx.ik.step import rotation_between
 from dynx.ik.tracking.followers import Followed, Follower, StepBounds
 from dynx.model.targets import Targets
@@ -51,6 +52,9 @@ class TrackStatus(IntEnum):
     error that is continuous with the sample before."""
     JUMPED = 3
     """The target is reached, but only by a configuration that is not continuous with the sample before."""
+    TIMED_OUT = 4
+    """`timeout` ended the search before the target was reached: q is the best found so far, or that of the
+    sample before, with NaN as errors, where the search did not begin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +101,8 @@ class TrackResult:
         found = ", ".join(f"{count} {status.name}" for status, count in counts if count and count < n)
         whole = next((status.name for status, count in counts if count == n), found)
         worst = (
-            f"at most {float(np.max(self.position_error, initial=0.0)):.3g} m "
-            f"and {float(np.max(self.rotation_error, initial=0.0)):.3g} rad off"
+            f"at most {largest_error(self.position_error):.3g} m "
+            f"and {largest_error(self.rotation_error):.3g} rad off"
         )
         text = f"{n} samples {whole if whole != found else f'({found})'}, {worst}"
         if self.status.ndim == 1 and not self:
@@ -163,6 +167,11 @@ class TrackedPath:
         """Make a path of which nothing is filled."""
         return cls(np.empty((n, nq)), *(np.zeros(n) for _ in range(5)))
 
+    def leave(self, first: int, q: Floats) -> None:
+        """Write samples from number `first`, for which no time is left, at the configuration q (nq,)."""
+        self.q[first:], self.status[first:] = q, TrackStatus.TIMED_OUT
+        self.position_error[first:] = self.rotation_error[first:] = np.nan
+
     @property
     def leading(self) -> int:
         """Number of samples that are OK from the start without interruption."""
@@ -196,7 +205,7 @@ class PathTracker:
         """`starts` (k, n) are values of the joints, at which searches for another solution begin."""
         self._backend, self._requirement = backend, requirement
         self._follower, self._limits, self._starts = follower, limits, starts
-        self.coordinates = coordinates
+        self.coordinates, self.time_limit = coordinates, requirement.tolerances.time_limit
 
     def track(self, q: Floats, targets: Targets, *, jumps: bool) -> TrackedPath:
         """Track targets (n,) from the configuration q (nq,) before the first, within the limits."""
@@ -205,6 +214,7 @@ class PathTracker:
         bounds, before = limits.direct, q
         # With velocity limits nothing more can be done for a sample that is not reached.
         stop = jumps or limits.divisible
+        time_limit = self.time_limit
         done = 0
         while done < n:
             found = self._follower.follow(q, targets[done:n], bounds, stop=stop)
@@ -212,14 +222,22 @@ class PathTracker:
             failed = done + np.flatnonzero(~found.reached)
             for k in failed.tolist():
                 start = path.q[k - 1] if k else before
+                if time_limit.is_over():
+                    path.status[k] = TrackStatus.TIMED_OUT
+                    continue
                 recovered = stop and self._recover(path, k, start, targets, jumps)
-                if not recovered:
+                if not recovered and time_limit.is_over():
+                    path.status[k] = TrackStatus.TIMED_OUT
+                elif not recovered:
                     limited = self.limiting(path.q[k], start, targets, k).any()
                     path.status[k] = TrackStatus.LIMITED if limited else TrackStatus.HELD
                 if path.before_failure is None and path.status[k] != TrackStatus.OK:
                     path.before_failure = start.copy()
             done += len(found)
             q = path.q[done - 1]
+            if time_limit.is_over():
+                path.leave(done, q)
+                break
         return path
 
     def solutions(self, q: Floats, target: Targets) -> Floats:
@@ -253,6 +271,8 @@ class PathTracker:
         distances = [self._distance(q, other) for other in others]
         nearest = int(np.argmin(distances))
         found = self._follower.descend(others[nearest : nearest + 1], target, limits.unbounded_steps)
+        if not found.reached[0]:
+            return False
         path.fill(k, found)
         path.status[k], path.jump[k] = TrackStatus.JUMPED, self._distance(q, found.q[0])
         return True
@@ -266,10 +286,11 @@ class PathTracker:
             self._backend.forward_kinematics(q, self._requirement.frame), self._requirement, target
         )
         parts, steps = 2, 0
-        while parts <= MAX_DIVISIONS:
+        time_limit = self.time_limit
+        while parts <= MAX_DIVISIONS and not time_limit.is_over():
             found = self._follower.follow(q, between.targets(parts), bounds, stop=True)
             steps += int(found.iterations.sum())
-            if found.reached.all():
+            if found.reached.all() and len(found) == parts:
                 return replace(found.part(slice(-1, None)), iterations=np.array([steps]))
             parts *= 2
         return None

@@ -32,6 +32,7 @@ from dynx.model.numbers import checked_vector, is_real, positive_seconds, whole_
 from dynx.model.targets import Targets, checked_targets
 from dynx.option_names import checks_option_names
 from dynx.spatial.scalar import Floats
+from dynx.time_limit import TimeLimit
 
 if TYPE_CHECKING:
     from dynx.distance.avoidance import Avoidance, AvoidanceSource
@@ -60,6 +61,8 @@ class FailureExplainer:
     def reason(self, path: TrackedPath) -> str:
         """Return why the first sample that is not OK is so; empty if all are."""
         k = path.leading
+        if k < len(path.status) and path.status[k] == TrackStatus.TIMED_OUT:
+            return self.requirement.tolerances.time_limit.sentence
         if path.before_failure is None or k == len(path.status):
             return ""
         before, q = path.before_failure, path.q[k]
@@ -167,6 +170,7 @@ def track(
     max_starts: int = 32,
     rng: np.random.Generator | int = 0,
     avoid: AvoidanceSource | None = None,
+    timeout: float | None = None,
 ) -> TrackResult:
     """Follow a path of targets by a continuous sequence of configurations within limits.
 
@@ -198,6 +202,9 @@ def track(
     (not the ways between them): redundant joints move around what is in the way, and where no continuous
     configuration is clear the path jumps, or the sample is HELD at one that is clear.
 
+    With `timeout` [s] the search ends after that time, to within 10 %: samples that are not reached then are
+    TIMED_OUT. Compiling or loading the kernels of a robot, once, does not count.
+
     Raises UnknownNameError for the frame; ArgumentError (ShapeError, DTypeError, NotFiniteError) for an
     invalid argument.
     """
@@ -227,7 +234,9 @@ def track(
     if may_jump and seconds is not None:
         raise ArgumentError("jumps=True is given with dt, whose velocity limits a jump would violate")
     limits = _limits(model, coordinates, max_step, seconds, velocity_limit)
-    settings = SearchLimits(float(position_tolerance), float(rotation_tolerance), MAX_STEPS, 0)
+    settings = SearchLimits(
+        float(position_tolerance), float(rotation_tolerance), MAX_STEPS, 0, TimeLimit(timeout)
+    )
     requirement = Requirement(frame, path, at, axes, settings)
     follower: Follower | None = None
     if axes is None:
@@ -257,7 +266,10 @@ def track(
     found: list[TrackedPath] = []
     for k in range(count):
         of_path = paths[k]
-        if q0 is None:
+        if k and settings.time_limit.is_over():
+            found.append(TrackedPath.empty(n, model.nq))
+            found[-1].leave(0, flat_starts[k])
+        elif q0 is None:
             found.append(_from_best_start(tracker, flat_starts[k], of_path, limits, may_jump))
         else:
             found.append(tracker.track(flat_starts[k], of_path, jumps=may_jump))
@@ -292,14 +304,17 @@ def _from_best_start(
         clearance = np.min(np.minimum((x - low), (high - x)) / np.where(np.isfinite(extent), extent, 1.0),
                            axis=-1, initial=0.5)  # fmt: skip
     best: tuple[int, Floats, TrackedPath | None] = (-1, q, None)
+    time_limit = tracker.time_limit
     for k in np.argsort(-clearance, kind="stable").tolist():
         path = tracker.track(starts[k], targets, jumps=False)
         if path.leading == targets.batch[0]:
             return path
         if path.leading > best[0]:
             best = path.leading, starts[k], path
+        if time_limit.is_over():
+            break
     _, start, path_or_none = best
-    if path_or_none is None or jumps:
+    if path_or_none is None or (jumps and not time_limit.is_over()):
         return tracker.track(start, targets, jumps=jumps)
     return path_or_none
 

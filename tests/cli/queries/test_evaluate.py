@@ -490,3 +490,14 @@ def test_no_other_frame_is_suggested_for_seven_joints_of_an_arm() -> None:
     refused = CliRunner().invoke(cli, ["ik", str(MODELS / "seven_axis_arm.urdf"), *options])
     assert refused.exit_code == 2
     assert refused.stderr.rstrip().endswith(" was chosen by default")
+
+
+def test_a_search_that_is_stopped_by_its_timeout_says_so() -> None:
+    target = ("--to-pose", "0,0,0.09,0,0,0", "--frame", "tool0", "--backend", "reference")
+    result = CliRunner().invoke(cli, ["ik", "ur5", *target, "--timeout", "1e-9"])
+    assert result.exit_code == 1, result.stderr
+    assert "stopped by --timeout, target not reached: smallest error" in " ".join(result.stdout.split())
+    found = json.loads(CliRunner().invoke(cli, ["ik", "ur5", *target, "--timeout", "1e-9", "--json"]).stdout)
+    assert (found["success"], found["status"]) == (False, "TIMED_OUT")
+    refused = CliRunner().invoke(cli, ["ik", "ur5", *target, "--timeout", "0"])
+    assert refused.exit_code == 2

@@ -14,7 +14,7 @@ from dynx.model.elements import Limits
 from dynx.spatial.scalar import Floats
 from tests.ik.test_planar_arm import L1, L2, arm, elbow
 
-OK, LIMITED, HELD, JUMPED = TrackStatus
+OK, LIMITED, HELD, JUMPED, TIMED_OUT = TrackStatus
 TOLERANCE = 1e-6
 """Default tolerances of `track` [m, rad]."""
 RANGE = 3.0
