@@ -81,6 +81,10 @@ class DrawnParts:
         for placed in self._placed:
             placed(poses)
 
+    def move_root(self, position: tuple[float, float, float]) -> None:
+        """Shift everything drawn to a position [m] in the world; `pose` and `place` do not count it."""
+        self._root.position = position
+
     def remove(self) -> None:
         """Remove all parts from the page."""
         self._root.remove()
@@ -410,17 +414,15 @@ class DrawnScene(DrawnParts):
 
 
 def _add_body(scene: Any, node: Any, body: SceneBody, look: Look) -> Iterator[Any]:
-    rgba = body.material.rgba
-    opacity = look.opacity or (None if rgba[3] == 1.0 else rgba[3])
-    for k, placed in enumerate(body.shapes):
+    for k, (shape, rgba, T) in enumerate(body.drawn_shapes()):
         yield add_triangles(
             scene,
             f"{node.name}/shape{k}",
-            resized(reduced(placed.shape, look.triangles), look.size),
-            placed.origin.matrix,
+            resized(reduced(shape, look.triangles), look.size),
+            T,
             look.colour or rgb_of(rgba),
-            opacity,
-            flat=isinstance(placed.shape, Mesh),
+            look.opacity or (None if rgba[3] == 1.0 else rgba[3]),
+            flat=isinstance(shape, Mesh),
         )
 
 

@@ -135,8 +135,8 @@ def _shapes(motion: MotionFrames) -> Iterator[tuple[str, Shape, Colour, Floats]]
             yield f"{robot}/{link}", shape, rgba, T
     for body in motion.bodies:
         pose = np.eye(4) if body.name in motion.poses else body.pose.matrix
-        for placed in body.shapes:
-            yield body.name, placed.shape, body.material.rgba, pose @ placed.origin.matrix
+        for shape, rgba, T in body.drawn_shapes():
+            yield body.name, shape, rgba, pose @ T
 
 
 def _sticks(model: Model) -> Iterator[tuple[str, Shape, Colour, Floats]]:

@@ -119,7 +119,7 @@ def round_length(length: float) -> float:
 def _body_box(body: SceneBody) -> PartBox:
     """Return the box around the shapes of a body; a point where one cannot be read."""
     try:
-        return _box(np.concatenate([_corners(each.shape, each.origin.matrix) for each in body.shapes]))
+        return _box(np.concatenate([_corners(shape, T) for shape, _, T in body.drawn_shapes()]))
     except DynxError:
         return _POINT
 

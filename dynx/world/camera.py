@@ -299,9 +299,8 @@ def drawn_shapes(scene: Scene, frames: dict[str, Floats]) -> Iterator[DrawnShape
             for shape, rgba, T in link_shapes(robot.model.geometry, link.name):
                 yield DrawnShape(number[name], shape, rgba, frames[name] @ T)
     for body in scene.bodies:
-        for placed in body.shapes:
-            T = frames[body.name] @ placed.origin.matrix
-            yield DrawnShape(number[body.name], placed.shape, body.material.rgba, T)
+        for shape, rgba, T in body.drawn_shapes():
+            yield DrawnShape(number[body.name], shape, rgba, frames[body.name] @ T)
 
 
 def _light(buffer: DepthBuffer, camera: Camera) -> Floats:

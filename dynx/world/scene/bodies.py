@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypedDict
@@ -30,6 +30,7 @@ from dynx.model.geometry import (
     Visual,
     solid_properties,
 )
+from dynx.model.geometry.links import Colour
 from dynx.model.numbers import checked_array, finite_numbers, finite_vector, positive_number
 from dynx.model.urdf.reader import inertia_fault
 from dynx.spatial.scalar import Floats
@@ -52,6 +53,7 @@ class BodyOptions(TypedDict, total=False):
     center_of_mass: ArrayLike | None
     twist: ArrayLike
     material: Material
+    visuals: Sequence[Visual]
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,8 @@ class SceneBody:
     Without `mass` it is fixed in the world. `center_of_mass` (3,) [m] is in the body frame, and `inertia`
     (3, 3) [kg m^2] about it in the axes of the body; each is that of shapes of one density where it is None
     (overlaps count twice; a mesh counts as its convex hull). `twist` (6,) is the velocity at the start:
-    linear [m/s] of the origin of the body frame, angular [rad/s], in world axes.
+    linear [m/s] of the origin of the body frame, angular [rad/s], in world axes. The body is drawn by its
+    `visuals`, which never collide, where it has some, and otherwise by its shapes.
     """
 
     name: str
@@ -72,6 +75,7 @@ class SceneBody:
     center_of_mass: Vector | None = None
     twist: tuple[float, ...] = (0.0,) * 6
     material: Material = DEFAULT_MATERIAL
+    visuals: tuple[Visual, ...] = ()
 
     if TYPE_CHECKING:
         # Type checkers see what is accepted; the fields hold what is made of it.
@@ -85,6 +89,7 @@ class SceneBody:
             center_of_mass: ArrayLike | None = None,
             twist: ArrayLike = ...,
             material: Material = DEFAULT_MATERIAL,
+            visuals: Sequence[Visual] = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -95,6 +100,7 @@ class SceneBody:
         put(self, "pose", checked_pose(f"pose of {what}", self.pose))
         put(self, "twist", finite_numbers(f"twist of {what}", self.twist, 6))
         checked_material(f"material of {what}", self.material)
+        put(self, "visuals", _checked_visuals(what, self.visuals))
         if self.mass is None:
             self._refuse_motion(what)
             return
@@ -114,6 +120,16 @@ class SceneBody:
                 raise ArgumentError(f"{what} has {name} and no mass; a body without mass is fixed")
         if any(self.twist):
             raise ArgumentError(f"{what} has a twist and no mass; a body without mass is fixed")
+
+    def drawn_shapes(self) -> Iterator[tuple[Shape, Colour, Floats]]:
+        """Yield the shapes by which the body is drawn, each with its colour and its pose in the body (4, 4).
+
+        A visual without a colour of its own has that of the material of the body.
+        """
+        for each in self.visuals or self.shapes:
+            own = each.material if isinstance(each, Visual) else None
+            rgba = self.material.rgba if own is None or own.rgba is None else own.rgba
+            yield each.shape, rgba, each.origin.matrix
 
     @property
     def fixed(self) -> bool:
@@ -192,6 +208,12 @@ def _placed_shapes(what: str, shapes: object) -> tuple[Collision, ...]:
     return tuple(each if isinstance(each, Collision) else Collision(each) for each in listed)
 
 
+def _checked_visuals(what: str, visuals: object) -> tuple[Visual, ...]:
+    if not isinstance(visuals, Sequence) or not all(isinstance(each, Visual) for each in visuals):
+        raise ArgumentError(f"visuals of {what} is {shown(visuals)}; wanted a sequence of Visual")
+    return tuple(visuals)
+
+
 def _checked_inertia(what: str, inertia: ArrayLike) -> Tensor:
     array: Floats = checked_array(f"inertia of {what}", inertia, 3)
     if array.shape != (3, 3):
@@ -215,7 +237,12 @@ def body_to_urdf(body: SceneBody) -> str:
     field, which URDF cannot express.
     """
     colour = Appearance(f"{body.name}_colour", body.material.rgba)
-    visuals = tuple(Visual(each.shape, each.origin, colour) for each in body.shapes)
+    visuals = tuple(
+        each
+        if isinstance(each, Visual) and each.material is not None and each.material.rgba is not None
+        else Visual(each.shape, each.origin, colour)
+        for each in body.visuals or body.shapes
+    )
     geometry = Geometry({body.name: LinkGeometry(visuals, body.shapes)})
     link = Link(body.name, None if body.fixed else body.inertial)
     return Model.build(body.name, [link], [], geometry=geometry).to_urdf(geometry=True)

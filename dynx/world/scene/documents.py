@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -21,6 +21,7 @@ from dynx.model import Model, Pose
 from dynx.model.documents import pose_numbers
 from dynx.model.elements import IDENTITY, ZERO
 from dynx.model.geometry import (
+    Appearance,
     Box,
     Capsule,
     Collision,
@@ -82,7 +83,8 @@ class ShapeDocument:
     """One shape; exactly one of the keys before `scale` is given.
 
     `box` has three edge lengths, `cylinder` and `capsule` radius and length, `mesh` a file beside the scene,
-    scaled by `scale`, `heights` the rows of a height field of the extent `size` along x and y.
+    scaled by `scale`, `heights` the rows of a height field of the extent `size` along x and y. `rgba` is the
+    colour of a visual; without it a visual has that of its body.
     """
 
     box: Vector | None = None
@@ -95,6 +97,7 @@ class ShapeDocument:
     scale: Vector | None = None
     size: Vector | None = None
     pose: Vector | None = None
+    rgba: Vector | None = None
 
 
 @dataclass
@@ -137,7 +140,10 @@ class RobotDocument:
 
 @dataclass
 class BodyDocument:
-    """A body of one shape or several; without `mass` it is fixed in the world."""
+    """A body of one shape or several; without `mass` it is fixed in the world.
+
+    It is drawn by its `visuals` where it has some, and otherwise by its shapes.
+    """
 
     name: str
     shape: ShapeDocument | None = None
@@ -148,6 +154,7 @@ class BodyDocument:
     center_of_mass: Vector | None = None
     twist: Vector | None = None
     material: MaterialDocument | None = None
+    visuals: list[ShapeDocument] = field(default_factory=list)
 
 
 @dataclass
@@ -317,10 +324,19 @@ def _body(given: BodyDocument, paths: ScenePaths) -> SceneBody:
         given.center_of_mass,
         (0.0,) * 6 if given.twist is None else given.twist,
         _material(given.material),
+        tuple(_visual(each, paths) for each in given.visuals),
     )
 
 
+def _visual(given: ShapeDocument, paths: ScenePaths) -> Visual:
+    placed = _shape(replace(given, rgba=None), paths)
+    colour = None if given.rgba is None else Appearance(rgba=given.rgba)  # type: ignore[arg-type]
+    return Visual(placed.shape, placed.origin, colour)
+
+
 def _shape(given: ShapeDocument, paths: ScenePaths) -> Collision:
+    if given.rgba is not None:
+        raise ArgumentError("rgba belongs to visuals; the colour of shapes is that of the material")
     kinds = ("box", "sphere", "cylinder", "capsule", "plane", "mesh", "heights")
     present = [name for name in kinds if getattr(given, name) is not None]
     if len(present) != 1:
@@ -476,7 +492,14 @@ def _body_document(body: SceneBody, paths: ScenePaths) -> BodyDocument:
         None if body.center_of_mass is None else list(body.center_of_mass),
         list(body.twist) if any(body.twist) else None,
         _material_document(body.material),
+        [_visual_document(each, paths) for each in body.visuals],
     )
+
+
+def _visual_document(visual: Visual, paths: ScenePaths) -> ShapeDocument:
+    rgba = None if visual.material is None else visual.material.rgba
+    document = _shape_document(Collision(visual.shape, visual.origin), paths)
+    return replace(document, rgba=None if rgba is None else list(rgba))
 
 
 def _shape_document(placed: Collision, paths: ScenePaths) -> ShapeDocument:
