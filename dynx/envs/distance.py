@@ -10,14 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.envs.environment import Act
 from dynx.envs.library import Env
 from dynx.errors import ArgumentError
 from dynx.model.numbers import whole_number
 from dynx.world.record import Channel, Record
 from dynx.world.separation import separation
-
-Act = Callable[[NDArray[Any]], NDArray[Any]]
-"""A policy: observations (1, ...) in, actions (1, ...) out."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,9 @@ from dynx.errors import (
     shown,
 )
 from dynx.model.numbers import whole_number
+
+Act = Callable[[NDArray[Any]], NDArray[Any]]
+"""A policy: observations (n, ...) in, actions (n, ...) out."""
 
 RENDER_MODES = ("human", "rgb_array")
 

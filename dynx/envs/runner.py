@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -77,6 +77,8 @@ class RobotEpisodes(Episodes):
         self._dtype, self._shape = task.observation_space.dtype, task.observation_space.shape
         self._viewer: Any = None
         self._steps = 0
+        self._last: tuple[State, Array] | None = None
+        """The state before the last step, and its action."""
 
     def vary(self, randomization: Randomization) -> tuple[Parameter, ...]:
         """Return the parameters of this robot that episodes draw."""
@@ -115,6 +117,7 @@ class RobotEpisodes(Episodes):
         self._steps += 1
         self._refuse_divergence(moved.q, moved.v)
         after = self._state = task.settle(moved)
+        self._last = before, given
         reward = float(task.reward(robot, before, given, after))
         terminated = bool(task.terminated(robot, after))
         return Outcome(self._observation(), reward, terminated, task.info(robot, after))
@@ -145,6 +148,21 @@ class RobotEpisodes(Episodes):
     def picture(self, width: int, height: int) -> NDArray[np.uint8]:
         """Draw the robot by rays through the shapes of its description."""
         return draw_robot(self._task, self._state, width, height)
+
+    def scene_and_state(self) -> tuple[Scene, WorldState]:
+        """Return a scene of the robot alone, and its state."""
+        return self._scene, _state_of_robot(self._state)
+
+    @cached_property
+    def _scene(self) -> Scene:
+        return _scene_of_robot(self._task)
+
+    def reward_terms(self) -> Mapping[str, float]:
+        if self._last is None:
+            return {}
+        before, action = self._last
+        terms = self._task.reward_terms(self._robot, before, action, self._state)
+        return {name: float(value) for name, value in terms.items()}
 
     def view(self) -> None:
         """Show the robot in the browser."""
@@ -208,7 +226,7 @@ class CompiledEpisodes(RobotEpisodes):
         if lanes.flags[0] >= self._step.diverged:
             self._raise_divergence(after.q, after.v)
         lanes.accept()
-        self._state = after
+        self._last, self._state = (self._state, arrays["action"][0].reshape(np.shape(action))), after
         observation = self._shaped(arrays["observation"][0])
         return Outcome(
             observation, float(arrays["reward"][0, 0]), bool(lanes.flags[0]), task.info(self._robot, after)
@@ -301,6 +319,7 @@ class WorldEpisodes(Episodes):
         self._start: Snapshot | None = None
         self._viewer: Any = None
         self._episode: Episode | None = None
+        self._action: Any = None
 
     @property
     def world(self) -> World:
@@ -352,6 +371,7 @@ class WorldEpisodes(Episodes):
             action = acting
         self._world.step(**task.loads(episode, action))
         task.settle(episode, action)
+        self._action = action
         terminated = bool(task.terminated(episode))
         return Outcome(
             task.observation(episode), float(task.reward(episode, action)), terminated, task.info(episode)
@@ -360,6 +380,15 @@ class WorldEpisodes(Episodes):
     def picture(self, width: int, height: int) -> NDArray[np.uint8]:
         """Draw the world by the task's camera."""
         return self._world.camera(replace(self._task.camera, size=(width, height))).rgb
+
+    def scene_and_state(self) -> tuple[Scene, WorldState]:
+        """Return the scene of the present episode, and its state."""
+        return self._world.scene, self._world.state
+
+    def reward_terms(self) -> Mapping[str, float]:
+        if self._action is None:
+            return {}
+        return self._task.reward_terms(self.episode, self._action)
 
     def view(self) -> None:
         """Show the world in the browser, on one page for all worlds of these episodes."""
@@ -405,9 +434,16 @@ def draw_robot(task: RobotTask, state: State, width: int, height: int) -> NDArra
     """Draw the robot (height, width, 3), seen by the camera of the task."""
     # Imported here, because most environments draw no picture.
     from dynx.world.camera import cast_rays, draw_picture
+
+    camera = replace(task.camera, size=(width, height))
+    return draw_picture(_scene_of_robot(task), _state_of_robot(state), camera, cast_rays).rgb
+
+
+def _scene_of_robot(task: RobotTask) -> Scene:
     from dynx.world.scene import Scene, SceneRobot
 
-    scene = Scene(robots=(SceneRobot(ROBOT, task.model),))
-    seen = WorldState(0.0, {ROBOT: RobotState(state.q, state.v)}, {})
-    camera = replace(task.camera, size=(width, height))
-    return draw_picture(scene, seen, camera, cast_rays).rgb
+    return Scene(type(task).__name__, robots=(SceneRobot(ROBOT, task.model),))
+
+
+def _state_of_robot(state: State) -> WorldState:
+    return WorldState(0.0, {ROBOT: RobotState(state.q, state.v)}, {})

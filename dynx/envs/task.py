@@ -33,6 +33,7 @@ from dynx.steppers.registry import WITHOUT_CONTACTS, world_names
 
 if TYPE_CHECKING:
     from dynx.steppers.camera import Camera
+    from dynx.steppers.state import WorldState
     from dynx.world.scene import Scene
     from dynx.world.world import World
 
@@ -153,6 +154,14 @@ class Episodes(ABC):
     def view(self) -> None:
         """Show the present state in the browser; the first call opens a viewer."""
 
+    def scene_and_state(self) -> tuple[Scene, WorldState] | None:
+        """Return what is drawn and its present state; None, the default, for episodes with pictures only."""
+        return None
+
+    def reward_terms(self) -> Mapping[str, float]:
+        """Return the terms of the reward of the last step by name; empty where the task names none."""
+        return {}
+
     @abstractmethod
     def close(self) -> None:
         """Release engine and viewer. Closing twice is harmless."""
@@ -225,6 +234,13 @@ class RobotTask(Task):
     @abstractmethod
     def reward(self, robot: Dynamics, before: State, action: Array, after: State) -> Any:
         """Return the reward of a control step, one number."""
+
+    def reward_terms(
+        self, robot: Dynamics, before: State, action: Array, after: State
+    ) -> Mapping[str, float]:
+        """Return the terms whose sum is the reward, by name; by default none. Only pages that show episodes
+        ask for them."""
+        return {}
 
     def terminated(self, robot: Dynamics, state: State) -> Any:
         """Check whether the episode is over in a state; by default it never is."""
@@ -395,6 +411,11 @@ class WorldTask(Task):
     def reward(self, episode: Episode, action: Any) -> float:
         """Return the reward of a control step."""
 
+    def reward_terms(self, episode: Episode, action: Any) -> Mapping[str, float]:
+        """Return the terms whose sum is the reward, by name; by default none. Only pages that show episodes
+        ask for them."""
+        return {}
+
     def terminated(self, episode: Episode) -> bool:
         """Check whether the task ended the episode; by default it never does."""
         return False
@@ -466,3 +487,20 @@ def camera_at(position: ArrayLike, target: ArrayLike, **options: Any) -> Camera:
     from dynx.steppers.camera import Camera
 
     return Camera.look_at(position, target, **options)
+
+
+PAINTS = {
+    "dark": (0.25, 0.27, 0.3),
+    "white": (0.92, 0.92, 0.9),
+    "stone": (0.5, 0.47, 0.44),
+    "blue": (0.0, 0.447, 0.698),
+    "orange": (0.902, 0.624, 0.0),
+    "yellow": (0.941, 0.894, 0.259),
+}
+"""Colours of the parts of tasks, told apart with any colour vision (Okabe and Ito 2008)."""
+
+
+def painted(paint: str) -> str:
+    """Return the element of URDF that gives a visual one of the `PAINTS`."""
+    red, green, blue = PAINTS[paint]
+    return f'<material name="{paint}"><color rgba="{red} {green} {blue} 1"/></material>'

@@ -9,13 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.envs.environment import DIVERGED
+from dynx.envs.environment import DIVERGED, Act
 from dynx.envs.library import Env
 from dynx.errors import ArgumentError
 from dynx.model.numbers import whole_number
-
-Act = Callable[[NDArray[Any]], NDArray[Any]]
-"""A policy: observations (n, ...) in, actions (n, ...) out."""
 
 CONFIDENCE = 0.95
 """Probability with which an interval holds the true mean."""

@@ -134,7 +134,7 @@ class Timeline:
             began, start, speed = time.monotonic(), self._time, self._speed.value
             moved = -math.inf
             while self._running.is_set() and self._speed.value == speed:
-                wanted = start + (time.monotonic() - began) * _number(speed)
+                wanted = start + (time.monotonic() - began) * speed_factor(speed)
                 if wanted >= self._end:
                     self.go_to(self._end)
                     if self._loop.value:
@@ -153,7 +153,8 @@ class Timeline:
                     break
 
 
-def _number(speed: str) -> float:
+def speed_factor(speed: str) -> float:
+    """Return one of the `SPEEDS` as a number."""
     above, _, below = speed.partition("/")
     return float(above) / float(below or 1.0)
 

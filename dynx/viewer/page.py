@@ -16,6 +16,7 @@ import numpy as np
 from dynx.errors import ArgumentError, shown
 from dynx.model.numbers import whole_number
 from dynx.spatial.scalar import Floats
+from dynx.steppers.camera import Camera
 from dynx.viewer.browser import Access, CheckedMessages, Client, is_loopback
 from dynx.viewer.framing import VIEW_DIRECTION, fitting_distance, round_length
 from dynx.viewer.library import serve, silent
@@ -211,6 +212,16 @@ class Page:
         self._view = view = _FirstView(low, high, tangent)
         self._server.initial_camera.position = tuple((view.target + view.away()).tolist())
         self._server.initial_camera.look_at = tuple(view.target.tolist())
+
+    def look_from(self, camera: Camera) -> None:
+        """Begin with the view of a camera in the world, and turn about a point at the distance of the origin
+        of the world."""
+        T = camera.pose.matrix
+        initial = self._server.initial_camera
+        initial.fov = camera.field_of_view
+        initial.position = tuple(T[:3, 3].tolist())
+        ahead = float(np.linalg.norm(T[:3, 3])) or 1.0
+        initial.look_at = tuple((T[:3, 3] + ahead * T[:3, 2]).tolist())
 
     def _watch_narrow(self, client: Any) -> None:
         # The picture is as wide as the page only until the panel stands beside it.

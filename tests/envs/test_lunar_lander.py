@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ from dynx.envs.tasks.lunar_lander.craft import (
     LANDER,
     LEG_LIMITS,
     LEG_MASS,
+    MOON,
     WIDTH,
     area_properties,
     clearance,
@@ -40,6 +42,9 @@ from dynx.envs.tasks.lunar_lander.task import LunarLander
 from dynx.errors import ArgumentError
 from dynx.model.geometry import Box
 from dynx.steppers.registry import installed_worlds
+from dynx.steppers.state import BodyState, WorldState
+from dynx.world import Scene
+from dynx.world.camera import draw_picture
 
 FLIGHTS = json.loads((Path(__file__).parent / "data" / "lunar_lander_flights.json").read_text())
 FLIGHT_TOLERANCE = (0.001, 0.002, 0.005, 0.01, 0.005, 0.008, 0.0, 0.0)
@@ -254,3 +259,24 @@ def test_pictures_show_lander_and_ground() -> None:
     assert picture is not None
     assert picture.shape == (60, 90, 3)
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 2
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_ground_is_drawn_without_gaps_and_flags_stand_at_the_pad(seed: int) -> None:
+    heights = ground_heights(np.random.default_rng(seed).uniform(0.0, HEIGHT / 2, EDGES + 2))
+    camera = replace(LunarLander().camera, size=(180, 120))
+    scene = Scene(bodies=(ground_body(heights),))
+    picture = draw_picture(scene, WorldState(0.0, {}, {MOON: BodyState(np.eye(4), np.zeros(6))}), camera)
+    seen = picture.segmentation == 0
+    spread = np.ptp(picture.rgb.astype(int), axis=2)
+    white, yellow = spread < 5, spread > 100
+    flags = seen & yellow
+    # Below its surface the ground goes down to the end of the picture.
+    first = np.argmax(seen & ~yellow & ~white, axis=0)
+    below = np.arange(120)[:, None] >= first
+    assert (seen | ~below).all()
+    columns = np.flatnonzero(flags.any(axis=0)) - 90
+    pixels = camera.focal_length / 30.0
+    for x in (-WIDTH / EDGES, WIDTH / EDGES):
+        assert np.abs(columns - pixels * x).min() < 3.0
+    assert not (flags & below).any()

@@ -264,7 +264,11 @@ def train() -> None:
 )
 @group(
     "Output",
-    click.option("--view", is_flag=True, help="Show the episodes in the browser, in real time."),
+    click.option(
+        "--view",
+        is_flag=True,
+        help="Page in the browser with the episodes, their numbers and controls; on one engine or two.",
+    ),
     click.option("--export", "export_path", metavar="FILE", help="Film of an episode, as .gif."),
     json_option,
     quiet_option,
@@ -285,5 +289,6 @@ def play() -> None:
       dynx play runs/CartPole-compiled-ppo/final.zip
       dynx play lander/final.zip --engine mujoco,pybullet --episodes 100
       dynx play lander/final.zip --view
+      dynx play lander/final.zip --view --engine mujoco,pybullet
       dynx play lander/final.zip --export lander.gif
     """

@@ -12,7 +12,8 @@ from dynx.cli.shell.exits import DONE, exit_code, interruptible, one_line
 from dynx.cli.shell.options import json_value
 from dynx.cli.shell.output import Entry, check_json, console, entry_of, present, progress_bar, write_json
 from dynx.cli.shell.tables import Table
-from dynx.envs.distance import Act, engine_distance
+from dynx.envs.distance import engine_distance
+from dynx.envs.environment import Act
 from dynx.envs.library import make_env, registry
 from dynx.envs.registration import NAMESPACE, is_of_dynx, task_class, task_id
 from dynx.errors import ArgumentError, shown

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import closing, suppress
+from contextlib import ExitStack, closing, suppress
 from itertools import count
 from typing import Any
 
@@ -45,19 +45,20 @@ def play(
     check_json(json_path)
     if view and export_path is not None:
         raise ArgumentError("--view and --export are given together; wanted one of them")
-    shown_only = "--view" if view else "--export"
-    if (view or export_path is not None) and (json_path is not None or len(engines or ()) > 1):
-        raise ArgumentError(f"{shown_only} shows episodes of one engine; --json and more engines judge them")
+    most = 2 if view else 1
+    if (view or export_path is not None) and (json_path is not None or len(engines or ()) > most):
+        shown_only = "--view shows episodes of one or two engines" if view else "--export films one engine"
+        raise ArgumentError(f"{shown_only}; --json and more engines judge them")
     task = _task_of(policy, options, own_task)
     if engines is not None and not is_of_dynx(task.id):
         raise ArgumentError(f"--engine chooses the engine of a task of dynx; {task.id} has its own")
-    first = task.on(engines[0] if engines else None)
+    tasks = [task.on(engine) for engine in engines or (None,)]
+    first = tasks[0]
     if view or export_path is not None:
         trained = load_policy(policy, first)
         if export_path is not None:
             return _film(trained, first, episodes or 1, seed, not stochastic, export_path, quiet)
-        return _show(trained, first, episodes, seed, not stochastic)
-    tasks = [task.on(engine) for engine in engines or (None,)]
+        return _show(trained, tasks, episodes, seed, not stochastic)
     found: list[tuple[TaskSpec, Evaluation]] = []
     with interruptible() as interruption:
         per_engine = episodes or DEFAULT_EPISODES
@@ -85,13 +86,31 @@ def _task_of(policy: str, options: Sequence[tuple[str, str]], own_task: str | No
     return task_of_file(task, policy, given, None if own_task is None else task_id(own_task))
 
 
-def _show(policy: Policy, task: TaskSpec, episodes: int | None, seed: int, deterministic: bool) -> int:
+def _show(
+    policy: Policy, tasks: Sequence[TaskSpec], episodes: int | None, seed: int, deterministic: bool
+) -> int:
+    # Imported here, because judging and filming need no page.
+    from dynx.envs.watching import Ended, EpisodePage
+
     out = console()
-    with suppress(KeyboardInterrupt), interruptible(), closing(make(task, "human")) as env:
-        out.print(f"{one_line(repr(policy)[1:-1])}; Ctrl-C ends it")
-        for k in count() if episodes is None else range(episodes):
-            total, length = _episode(policy, env, seed + k, deterministic)
-            out.print(f"seed {seed + k}: return {total:.5g} in {length} steps")
+
+    def ended(episode: Ended) -> None:
+        numbers = zip(tasks, episode.totals, episode.steps, strict=True)
+        found = [f"return {total:.5g} in {steps} steps" for _, total, steps in numbers]
+        if len(tasks) > 1:
+            found = [f"{task.engine}: {text}" for task, text in zip(tasks, found, strict=True)]
+        out.print(f"seed {episode.seed}: {'; '.join(found)}")
+
+    with suppress(KeyboardInterrupt), interruptible(), ExitStack() as opened:
+        envs = [opened.enter_context(closing(make(task, "rgb_array"))) for task in tasks]
+        names = [one_line(task.engine or "") for task in tasks]
+        page = opened.enter_context(
+            EpisodePage(
+                lambda seen: policy(seen, deterministic), envs, names, title=one_line(tasks[0].id), seed=seed
+            )
+        )
+        out.print(f"{one_line(repr(policy)[1:-1])} is shown at {page.url}; Ctrl-C ends it", soft_wrap=True)
+        page.run(episodes, ended)
     return DONE
 
 

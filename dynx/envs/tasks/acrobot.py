@@ -16,7 +16,7 @@ import numpy as np
 
 from dynx.backends.dynamics import Dynamics
 from dynx.envs.library import spaces
-from dynx.envs.task import RobotTask, State, camera_at, refuse_unphysical
+from dynx.envs.task import RobotTask, State, camera_at, painted, refuse_unphysical
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.spatial.scalar import Array
@@ -34,12 +34,12 @@ LINK = """<link name="{name}">
       <inertia ixx="{inertia!r}" ixy="0" ixz="0" iyy="{inertia!r}" iyz="0" izz="{inertia!r}"/>
     </inertial>
     <visual>
-      <origin xyz="0 {side} -0.5"/><geometry><box size="0.12 0.04 1"/></geometry>
+      <origin xyz="0 {side} -0.5"/><geometry><box size="0.12 0.04 1"/></geometry>{colour}
     </visual>
   </link>"""
 
 URDF = """<robot name="acrobot">
-  <link name="bar"><visual><geometry><box size="0.2 0.02 0.2"/></geometry></visual></link>
+  <link name="bar"><visual><geometry><box size="0.2 0.02 0.2"/></geometry>{colour}</visual></link>
   {upper}
   {lower}
   <link name="tip"/>
@@ -84,10 +84,16 @@ class Acrobot(RobotTask):
     def model(self) -> Model:
         """Two links of 1 m; at q = 0 they hang down."""
         links = {
-            name: LINK.format(name=name, mass=float(self.mass), inertia=float(self.inertia), side=side)
-            for name, side in (("upper", -0.05), ("lower", -0.1))
+            name: LINK.format(
+                name=name,
+                mass=float(self.mass),
+                inertia=float(self.inertia),
+                side=side,
+                colour=painted(paint),
+            )
+            for name, side, paint in (("upper", -0.05, "blue"), ("lower", -0.1, "orange"))
         }
-        return load(URDF.format(**links), gravity=(0.0, 0.0, -9.8))
+        return load(URDF.format(**links, colour=painted("dark")), gravity=(0.0, 0.0, -9.8))
 
     @cached_property
     def observation_space(self) -> spaces.Box:

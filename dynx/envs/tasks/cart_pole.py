@@ -15,7 +15,7 @@ import numpy as np
 
 from dynx.backends.dynamics import Dynamics
 from dynx.envs.library import spaces
-from dynx.envs.task import RobotTask, State, camera_at, refuse_unphysical
+from dynx.envs.task import RobotTask, State, camera_at, painted, refuse_unphysical
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.spatial.scalar import Array
@@ -36,14 +36,14 @@ LARGEST = float(np.finfo(np.float32).max)
 
 URDF = """<robot name="cart_pole">
   <link name="rail">
-    <visual><geometry><box size="5.2 0.04 0.04"/></geometry></visual>
+    <visual><geometry><box size="5.2 0.04 0.04"/></geometry>{rail_colour}</visual>
   </link>
   <link name="cart">
     <inertial>
       <mass value="{cart_mass!r}"/>
       <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/>
     </inertial>
-    <visual><geometry><box size="0.4 0.25 0.2"/></geometry></visual>
+    <visual><geometry><box size="0.4 0.25 0.2"/></geometry>{cart_colour}</visual>
   </link>
   <link name="pole">
     <inertial>
@@ -53,6 +53,7 @@ URDF = """<robot name="cart_pole">
     </inertial>
     <visual>
       <origin xyz="0 -0.15 {half!r}"/><geometry><cylinder radius="0.04" length="{length!r}"/></geometry>
+      {pole_colour}
     </visual>
   </link>
   <joint name="slide" type="prismatic">
@@ -106,6 +107,9 @@ class CartPole(RobotTask):
             length=2.0 * half,
             inertia=inertia,
             axial=1e-3 * inertia,
+            rail_colour=painted("dark"),
+            cart_colour=painted("blue"),
+            pole_colour=painted("orange"),
         )
         return load(text, gravity=(0.0, 0.0, -9.8))
 

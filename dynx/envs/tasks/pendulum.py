@@ -7,6 +7,7 @@ of Gymnasium: semi-implicit, with the velocity clamped before the angle follows 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,7 @@ import numpy as np
 
 from dynx.backends.dynamics import Dynamics
 from dynx.envs.library import spaces
-from dynx.envs.task import RobotTask, State, camera_at, refuse_unknown_choice, refuse_unphysical
+from dynx.envs.task import RobotTask, State, camera_at, painted, refuse_unknown_choice, refuse_unphysical
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.rbd.integration import Accelerate
@@ -34,7 +35,7 @@ ACTIONS = ("relative", "torque")
 
 URDF = """<robot name="pendulum">
   <link name="stand">
-    <visual><geometry><box size="0.1 0.02 0.1"/></geometry></visual>
+    <visual><geometry><box size="0.1 0.02 0.1"/></geometry>{stand_colour}</visual>
   </link>
   <link name="rod">
     <inertial>
@@ -43,7 +44,7 @@ URDF = """<robot name="pendulum">
       <inertia ixx="{inertia!r}" ixy="0" ixz="0" iyy="{inertia!r}" iyz="0" izz="{axial!r}"/>
     </inertial>
     <visual>
-      <origin xyz="0 -0.1 {half!r}"/><geometry><box size="0.08 0.04 {length!r}"/></geometry>
+      <origin xyz="0 -0.1 {half!r}"/><geometry><box size="0.08 0.04 {length!r}"/></geometry>{rod_colour}
     </visual>
   </link>
   <joint name="hinge" type="continuous">
@@ -86,7 +87,15 @@ class Pendulum(RobotTask):
         """The rod; at q = 0 it stands upright."""
         m, length = float(self.mass), float(self.length)
         inertia = m * length**2 / 12.0
-        text = URDF.format(mass=m, length=length, half=0.5 * length, inertia=inertia, axial=1e-3 * inertia)
+        text = URDF.format(
+            mass=m,
+            length=length,
+            half=0.5 * length,
+            inertia=inertia,
+            axial=1e-3 * inertia,
+            stand_colour=painted("dark"),
+            rod_colour=painted("orange"),
+        )
         return load(text, gravity=(0.0, 0.0, -float(self.g)))
 
     @cached_property
@@ -132,6 +141,19 @@ class Pendulum(RobotTask):
         # The angle in [-pi, pi) without a remainder: by its sine and cosine.
         wrapped = np.arctan2(np.sin(angle), np.cos(angle))
         return -(wrapped**2 + 0.1 * velocity**2 + 0.001 * torque**2)
+
+    def reward_terms(
+        self, robot: Dynamics, before: State, action: Array, after: State
+    ) -> Mapping[str, float]:
+        """Return the terms of the angle, the velocity and the torque."""
+        (angle,), (velocity,) = before.q, before.v
+        (torque,) = self.torque(robot, before, action)
+        wrapped = math.remainder(float(angle), 2.0 * math.pi)
+        return {
+            "angle": -(wrapped**2),
+            "velocity": -0.1 * float(velocity**2),
+            "torque": -0.001 * float(torque**2),
+        }
 
     @cached_property
     def camera(self) -> Camera:

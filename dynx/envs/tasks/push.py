@@ -196,6 +196,12 @@ class Push(WorldTask):
         tip = self.kinematics.forward_kinematics(episode.world.state.robots[ARM].q, TIP)[:3, 3]
         return -distance - FINGER_WEIGHT * float(np.linalg.norm(tip - self.pushing_place(episode)))
 
+    def reward_terms(self, episode: Episode, action: Any) -> Mapping[str, float]:
+        """Return the terms of the cube and, for the shaped reward, of the finger tips."""
+        total = self.reward(episode, action)
+        cube = -self.distance(episode) if self.reward_kind != "sparse" else total
+        return {"cube": cube, "finger tips": total - cube}
+
     def pushing_place(self, episode: Episode) -> Floats:
         """Return the place (3,) [m] of the finger tips from which they push the cube to the goal: an edge's
         length from its center, less where the cube is almost at the goal."""

@@ -162,3 +162,8 @@ class Quadruped(WorldTask):
 def vertical_axis(q: Floats) -> Vector3:
     """Return the upward vertical (3,) in the axes of the trunk."""
     return rotation_rows(*q[3:7].tolist())[2]
+
+
+def with_floor(terms: Mapping[str, float]) -> dict[str, float]:
+    """Return the terms of a reward that is not below zero, with that which adds to a negative sum."""
+    return {**terms, "floor at zero": max(-sum(terms.values()), 0.0)}

@@ -7,6 +7,7 @@ limits of the joints, so each can be reached; the limits do not stop the joints.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -180,6 +181,17 @@ class Reach(RobotTask):
         _, distance, rotation = self.errors(robot, after)
         lengths = [np.sqrt(np.sum(each * each)) for each in (distance, rotation)]
         return -(lengths[0] + ROTATION_WEIGHT * lengths[1] + ACTION_WEIGHT * np.sum(action * action))
+
+    def reward_terms(
+        self, robot: Dynamics, before: State, action: Array, after: State
+    ) -> Mapping[str, float]:
+        """Return the terms of the distance, the angle and the effort."""
+        _, distance, rotation = self.errors(robot, after)
+        return {
+            "distance": -float(np.linalg.norm(distance)),
+            "angle": -ROTATION_WEIGHT * float(np.linalg.norm(rotation)),
+            "effort": -ACTION_WEIGHT * float(action @ action),
+        }
 
     def info(self, robot: Dynamics, state: State) -> dict[str, Any]:
         """Return the ``distance`` [m] and the ``angle`` [rad] to the goal."""

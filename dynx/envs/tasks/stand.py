@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from dynx.envs.task import Episode
-from dynx.envs.tasks.quadruped import DOG, SPEED_WIDTH, STAND_HEIGHT, Quadruped, vertical_axis
+from dynx.envs.tasks.quadruped import DOG, SPEED_WIDTH, STAND_HEIGHT, Quadruped, vertical_axis, with_floor
 
 
 @dataclass(frozen=True)
@@ -37,3 +38,16 @@ class Stand(Quadruped):
         high = float(np.exp(-((q[2] - STAND_HEIGHT) ** 2) / 0.01))
         still = float(np.exp(-(v[:6] @ v[:6]) / SPEED_WIDTH))
         return max(upright * high * (0.5 + 0.5 * still) - self.costs(episode), 0.0)
+
+    def reward_terms(self, episode: Episode, action: Any) -> Mapping[str, float]:
+        """Return the terms of the posture and the costs, and what makes a negative sum zero."""
+        q, v = episode.world.state.robots[DOG]
+        posture = float(vertical_axis(q)[2] * np.exp(-((q[2] - STAND_HEIGHT) ** 2) / 0.01))
+        still = float(np.exp(-(v[:6] @ v[:6]) / SPEED_WIDTH))
+        return with_floor(
+            {
+                "upright and high": 0.5 * posture,
+                "at rest": 0.5 * posture * still,
+                "power and jerks": -self.costs(episode),
+            }
+        )

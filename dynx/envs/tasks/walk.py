@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.envs.task import Episode, component_names
-from dynx.envs.tasks.quadruped import DOG, SPEED_WIDTH, Quadruped, vertical_axis
+from dynx.envs.tasks.quadruped import DOG, SPEED_WIDTH, Quadruped, vertical_axis, with_floor
 from dynx.errors import ArgumentError, shown
 from dynx.model.numbers import MAX_MAGNITUDE, is_real
 from dynx.spatial.scalar import Floats
@@ -66,6 +67,23 @@ class Walk(Quadruped):
         shaking = 2.0 * v[2] ** 2 + 0.05 * (v[3:5] @ v[3:5]) + 0.5 * (leaning_x**2 + leaning_y**2)
         # Were rewards negative, a policy that does not walk yet would earn more by falling, which ends them.
         return max(float(tracking - shaking) - self.costs(episode), 0.0)
+
+    def reward_terms(self, episode: Episode, action: Any) -> Mapping[str, float]:
+        """Return the terms of the velocity and the costs, and what makes a negative sum zero."""
+        q, v = episode.world.state.robots[DOG]
+        wanted = episode.memory.velocity
+        leaning_x, leaning_y, _ = vertical_axis(q)
+        error = v[:2] - wanted[:2]
+        return with_floor(
+            {
+                "speed": float(np.exp(-(error @ error) / SPEED_WIDTH)),
+                "yaw rate": 0.5 * float(np.exp(-((v[5] - wanted[2]) ** 2) / SPEED_WIDTH)),
+                "bouncing": -2.0 * float(v[2] ** 2),
+                "rolling and pitching": -0.05 * float(v[3:5] @ v[3:5]),
+                "leaning": -0.5 * float(leaning_x**2 + leaning_y**2),
+                "power and jerks": -self.costs(episode),
+            }
+        )
 
     def info(self, episode: Episode) -> dict[str, Any]:
         """Return the wanted ``velocity`` (3,)."""

@@ -9,7 +9,7 @@ are those and the angles of its two hips. Gymnasium's source: gymnasium/envs/box
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cache, lru_cache
 from itertools import pairwise
 
@@ -17,8 +17,9 @@ import numpy as np
 
 from dynx.backends import backend
 from dynx.control.bullet import BulletMotorCommand
+from dynx.envs.task import PAINTS, painted
 from dynx.model import Model, Pose
-from dynx.model.geometry import Box, Collision
+from dynx.model.geometry import Appearance, Box, Collision, Visual
 from dynx.model.loading import load
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
@@ -60,6 +61,14 @@ EDGES = 10
 """Number of straight edges of the ground."""
 GROUND_DEPTH = 0.5
 """Thickness of the ground below an edge [m]."""
+GROUND_WIDTH = 2.0
+"""Extent of the ground along y [m]."""
+GROUND_BOTTOM = -HEIGHT / 2
+"""Height [m] down to which the ground is drawn, below the picture."""
+STONE = Appearance("stone", (*PAINTS["stone"], 1.0))
+FLAG_HEIGHT = 50.0 / SCALE
+FLAG = (25.0 / SCALE, 15.0 / SCALE)
+"""Height of a flag's pole, and width and height of its cloth [m]."""
 START_HEIGHT = HEIGHT - HEIGHT / 4
 """Height of the lander at the start [m]."""
 REACH = math.hypot(LEG_AWAY, LEG_DOWN) + 0.5 * math.hypot(*LEG_SIZE)
@@ -100,9 +109,9 @@ def _inertial(mass: float, x: float, z: float, xx: float, zz: float) -> str:
     )
 
 
-def _box(x: float, z: float, width: float, height: float) -> str:
-    size = f'<box size="{width} {DEPTH} {height}"/>'
-    return f'<collision><origin xyz="{x} 0 {z}"/><geometry>{size}</geometry></collision>'
+def _box(x: float, z: float, width: float, height: float, paint: str) -> str:
+    placed = f'<origin xyz="{x} 0 {z}"/><geometry><box size="{width} {DEPTH} {height}"/></geometry>'
+    return f"<collision>{placed}</collision><visual>{placed}{painted(paint)}</visual>"
 
 
 def _joint(name: str, kind: str, parent: str, child: str, axis: str, lower: float, upper: float) -> str:
@@ -118,7 +127,7 @@ def _leg(name: str, side: float) -> str:
     x, (width, height) = side * LEG_AWAY, LEG_SIZE
     lower, upper = sorted(side * angle for angle in LEG_LIMITS)
     inertial = _inertial(LEG_MASS, x, -LEG_DOWN, width**2 / 12, height**2 / 12)
-    link = f'<link name="{name}_leg">{inertial}{_box(x, -LEG_DOWN, width, height)}</link>'
+    link = f'<link name="{name}_leg">{inertial}{_box(x, -LEG_DOWN, width, height, "dark")}</link>'
     return link + _joint(f"{name}_hip", "revolute", BODY, f"{name}_leg", "0 -1 0", lower, upper)
 
 
@@ -128,7 +137,8 @@ def lander_model(gravity: float = -10.0) -> Model:
     [m/s^2], so that what a world computes of it is computed once."""
     (top, top_z), (side, side_z), (_, bottom_z) = HULL[5], HULL[4], HULL[3]
     # Two boxes with the corners of the body's six-cornered outline.
-    boxes = _box(0.0, bottom_z / 2, 2 * side, side_z - bottom_z) + _box(0.0, top_z / 2, 2 * top, top_z)
+    boxes = _box(0.0, bottom_z / 2, 2 * side, side_z - bottom_z, "orange")
+    boxes += _box(0.0, top_z / 2, 2 * top, top_z, "white")
     body = _inertial(HULL_MASS, 0.0, CENTER, _XX / _AREA, _ZZ / _AREA)
     far = 1e3
     return load(
@@ -178,9 +188,40 @@ def ground_body(heights: Sequence[float]) -> SceneBody:
         slope = math.atan2(right - left, step)
         x = (number + 0.5) * step - WIDTH / 2 + 0.5 * GROUND_DEPTH * math.sin(slope)
         z = 0.5 * (left + right) - 0.5 * GROUND_DEPTH * math.cos(slope)
-        size = (math.hypot(step, right - left), 2.0, GROUND_DEPTH)
+        size = (math.hypot(step, right - left), GROUND_WIDTH, GROUND_DEPTH)
         shapes.append(Collision(Box(size), origin=Pose((x, 0.0, z), (0.0, -slope, 0.0))))
-    return SceneBody(MOON, shapes, material=Material(friction=GROUND_FRICTION, rgba=(0.75, 0.75, 0.75, 1.0)))
+    seen = [Visual(each.shape, each.origin, STONE) for each in shapes]
+    seen += [*_columns(heights), *_flags()]
+    return SceneBody(MOON, shapes, material=Material(friction=GROUND_FRICTION), visuals=seen)
+
+
+def _columns(heights: Sequence[float]) -> Iterator[Visual]:
+    """Yield what is seen below the edges down to the end of the picture: columns whose tops are within the
+    boxes of their edges, which leave gaps below the corners of the ground."""
+    step = WIDTH / EDGES
+    for number, (left, right) in enumerate(pairwise(heights)):
+        count = 1 + math.floor(abs(right - left) / (0.8 * GROUND_DEPTH))
+        width = step / count
+        for k in range(count):
+            top = min(left + (right - left) * share / count for share in (k, k + 1))
+            x = number * step - WIDTH / 2 + (k + 0.5) * width
+            column = Box((width, GROUND_WIDTH, top - GROUND_BOTTOM))
+            yield Visual(column, Pose((x, 0.0, 0.5 * (top + GROUND_BOTTOM))), STONE)
+
+
+@cache
+def _flags() -> tuple[Visual, ...]:
+    """Return the flags at both ends of the landing pad, behind the lander."""
+    (width, height), y = FLAG, 0.5 * GROUND_WIDTH
+    pole, cloth = Box((0.08, 0.08, FLAG_HEIGHT)), Box((width, 0.04, height))
+    white, yellow = (Appearance(paint, (*PAINTS[paint], 1.0)) for paint in ("white", "yellow"))
+    foot = 0.33 * 3.0 * HEIGHT / 4 - HEIGHT / 4
+    found = []
+    for x in (-WIDTH / EDGES, WIDTH / EDGES):
+        found.append(Visual(pole, Pose((x, y, foot + 0.5 * FLAG_HEIGHT)), white))
+        middle = (x + 0.5 * width, y, foot + FLAG_HEIGHT - 0.5 * height)
+        found.append(Visual(cloth, Pose(middle), yellow))
+    return tuple(found)
 
 
 def lander_scene(

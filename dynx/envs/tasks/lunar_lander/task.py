@@ -229,6 +229,14 @@ class LunarLander(WorldTask):
         main, side = memory.power
         return float(memory.progress - 0.30 * main - 0.03 * abs(side))
 
+    def reward_terms(self, episode: Episode, action: Any) -> Mapping[str, float]:
+        """Return the terms of progress and of both kinds of engines, or that of the end."""
+        memory = episode.memory
+        if self.terminated(episode):
+            return {"landing or crash": self.reward(episode, action)}
+        main, side = memory.power
+        return {"progress": memory.progress, "main engine": -0.30 * main, "side engines": -0.03 * abs(side)}
+
     def crashed(self, episode: Episode) -> bool:
         """Check whether the body touches the ground, or the lander left the picture."""
         return "body" in episode.memory.touching or abs(episode.memory.observation[0]) >= 1.0
