@@ -13,14 +13,12 @@ from dynx.backends.solvability import singular_matrix
 from dynx.errors import (
     ArgumentError,
     ClosedError,
-    UnknownNameError,
-    nearest,
     shown,
 )
 from dynx.model import Model
 from dynx.model.configuration import checked_q
 from dynx.model.numbers import MAX_MAGNITUDE, UNIT_NORM_TOLERANCE, checked_array, checked_vector
-from dynx.rbd.jacobians import REFERENCES, Reference
+from dynx.rbd.jacobians import Reference, checked_reference
 from dynx.spatial.scalar import Floats
 
 _FLOAT64 = np.dtype(np.float64)
@@ -77,12 +75,7 @@ class Arguments:
 
     def reference(self, reference: str) -> Reference:
         """Return one of the three references; raise an error that lists them for any other."""
-        try:
-            return REFERENCES[reference]
-        except (KeyError, TypeError):
-            raise UnknownNameError(
-                f"reference is {shown(reference)}{nearest(str(reference), REFERENCES)}"
-            ) from None
+        return checked_reference(reference)
 
     def frames(self, frames: object) -> list[str]:
         """Return the names in a sequence of frames."""

@@ -11,6 +11,7 @@ from typing import Literal
 
 import numpy as np
 
+from dynx.errors import UnknownNameError, nearest, shown
 from dynx.model.mechanism import ROOT, Mechanism
 from dynx.rbd.kinematics import Poses, ancestry, body_twists, frame_pose, joint_axis
 from dynx.spatial.scalar import Array
@@ -24,6 +25,16 @@ REFERENCES: dict[str, Reference] = {
     "local": "local",
     "world": "world",
 }
+
+
+def checked_reference(reference: object) -> Reference:
+    """Return one of the three references. Raises UnknownNameError, which lists them, for anything else."""
+    try:
+        return REFERENCES[reference]  # type: ignore[index]
+    except (KeyError, TypeError):
+        raise UnknownNameError(
+            f"reference is {shown(reference)}{nearest(str(reference), REFERENCES)}"
+        ) from None
 
 
 def frame_jacobian(mechanism: Mechanism, poses: Poses, frame: int, reference: Reference) -> Array:

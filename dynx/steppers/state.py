@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import hypot, isfinite
 from typing import Any, NamedTuple, TypeVar
 
@@ -64,11 +64,15 @@ class PartStates(dict[str, Part]):
 
 @dataclass(frozen=True)
 class WorldState:
-    """Time [s], and the state of every robot and body by name."""
+    """Time [s], the state of every robot and body by name, and the torques that led there."""
 
     time: float
     robots: Mapping[str, RobotState]
     bodies: Mapping[str, BodyState]
+    torques: Mapping[str, Floats] = field(default_factory=PartStates, compare=False)
+    """Torque (nv,) [N m or N] of every robot in the last step of the engine: the torque given plus that of
+    the motors. Zero if no step was taken since the state was set, and NaN for joints whose torque is known to
+    a motor inside the engine alone. No later step depends on it, so that it is neither set nor compared."""
 
 
 def has_diverged(position: Floats, velocity: Floats) -> bool:

@@ -113,6 +113,16 @@ class Stepper(ABC):
     def step(self, n: int, forces: Forces = NO_FORCES) -> None:
         """Take `n` steps of `dt`, in which these forces act, and no others."""
 
+    def damps_at_end(self, robot: int) -> bool:
+        """Check whether the engine's damping of the joints is that of the velocity at the end of a step, not
+        at its beginning."""
+        return True
+
+    def motor_torque(self, robot: int) -> Floats | None:
+        """Return the torque (nv,) of the engine's own motors in the last step, for a robot with a command;
+        NaN for joints of which the engine does not report it. None for an engine without such motors."""
+        return None
+
     # -- state --------------------------------------------------------------------------------
 
     @abstractmethod

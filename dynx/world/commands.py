@@ -325,6 +325,9 @@ class Commands:
         self._held: Sequence[tuple[int, Floats]] = _NOTHING
         self._wrenches: Floats = self._no_wrench
         self._on_frames: dict[int, OnFrames] = {}
+        self._engine_commands: Mapping[int, EngineCommand] = NO_COMMANDS
+        self._restored: Mapping[str, Floats] | None = None
+        """Torques of robots in the step before the state was restored; None after the next step."""
         self.forget()
 
     def of_robot(self, name: str) -> RobotLoads:
@@ -340,14 +343,20 @@ class Commands:
         """Return the external forces on the frames of a robot in the last step, with their shares of it."""
         return self._on_frames.get(robot, ())
 
-    def driving(self, robot: int) -> Floats:
-        """Return the torque (nv,) given for a robot plus that of its motors in the last step."""
+    def driving(self, robot: int, engine: Stepper) -> Floats:
+        """Return the torque (nv,) given for a robot plus that of its motors in the last step; zero if no step
+        was taken since the state was set."""
         loads, total = self._loads[robot], np.zeros(self._layout.robots[robot].model.nv)
+        if self._restored is not None:
+            return total + self._restored.get(loads.name, 0.0)
         for k, tau in self._held:
             if k == robot:
                 total += tau
         if loads.has_motors:
             total[len(total) - len(loads.motor_torque) :] += loads.motor_torque
+        if robot in self._engine_commands:
+            own = engine.motor_torque(robot)
+            total += np.nan if own is None else own
         return total
 
     def notes(self) -> Iterator[str]:
@@ -374,8 +383,9 @@ class Commands:
         kept = {name: self._loads[k].memory for name, k in self._robots.items()}
         return {name: rows for name, rows in kept.items() if rows is not None}
 
-    def remember(self, memory: Mapping[str, Floats]) -> None:
-        """Restore what `memory` returned."""
+    def remember(self, memory: Mapping[str, Floats], torques: Mapping[str, Floats] | None = None) -> None:
+        """Restore what `memory` returned, and the torques (nv,) of robots in the step before."""
+        self._restored = {} if torques is None else dict(torques)
         for name, k in self._robots.items():
             self._loads[k].memory = memory.get(name)
         self._more_than_torques = True
@@ -393,7 +403,10 @@ class Commands:
         self._held = held
         if self._more_than_torques:
             self._more_than_torques = False
-            self._wrenches = self._no_wrench
+            self._restored, self._engine_commands = None, NO_COMMANDS
+            for loads in self._loads:
+                loads.set_motors(())
+            self._wrenches, self._on_frames = self._no_wrench, {}
             self._forget_steps(frozenset())
         return Forces(held)
 
@@ -406,10 +419,10 @@ class Commands:
     ) -> Act:
         """Check what acts in the next steps, the first of which begins at `time` [s], and return the function
         that returns it before each of them."""
-        self._more_than_torques = True
+        self._more_than_torques, self._restored = True, None
         self._held = checked_torques({} if torques is None else torques, self._torques)
         held = dict(self._held)
-        commands = self._set_motors({} if motors is None else motors)
+        commands = self._engine_commands = self._set_motors({} if motors is None else motors)
         frames, pushes = self._sort_forces(forces)
         motored = frozenset(k for k, loads in enumerate(self._loads) if loads.has_motors)
         repeated = motored | frames.keys() | self._outside

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dynx.backends import backend
+from dynx.backends import Backend, backend
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model import Model
 from dynx.rbd.joint_wrenches import about_world
 from dynx.spatial.plain import Vector3, minus, minus_cross, rotate, rotate_back, rotation_rows
 from dynx.spatial.scalar import Floats
-from dynx.steppers.forces import Forces
+from dynx.steppers.forces import NO_FORCES, Forces
 from dynx.steppers.layout import Layout
-from dynx.steppers.state import RobotState
+from dynx.steppers.state import WorldState
 from dynx.steppers.stepper import Stepper
 from dynx.world.commands import Act, Commands
 from dynx.world.contacts import Contact
+
+if TYPE_CHECKING:
+    from dynx.world.constraint_wrenches import Reactions
 
 
 class MeanAcceleration:
@@ -53,25 +58,39 @@ class MeanAcceleration:
 
 
 class LastStep:
-    """The states of robots before the last step of the engine, and the external forces during it."""
+    """The states before the last step of the engine, and what acted during it."""
 
-    def __init__(self, layout: Layout, commands: Commands, h: float) -> None:
-        """`h` is the length of the engine's steps [s]."""
+    def __init__(self, layout: Layout, in_engine: Layout, commands: Commands, h: float) -> None:
+        """`in_engine` is the layout with the joint dynamics that the engine has, `h` the length of the
+        engine's steps [s]."""
+        self._layout, self._in_engine = layout, in_engine
         self._robots = {robot.name: k for k, robot in enumerate(layout.robots)}
         self._models = [robot.model for robot in layout.robots]
         self._commands, self._h = commands, h
-        self._before: list[RobotState] = []
+        self._ties = bool(layout.constraints)
+        self.forget()
 
     def forget(self) -> None:
         """Forget the step: the state was set."""
-        self._before = []
+        self._before: WorldState | None = None
+        self._forces = NO_FORCES
 
     def watched(self, act: Act) -> Act:
-        """Return `act`, which keeps the states before each step of the engine."""
+        """Return `act`, which keeps what acts in each step of the engine and the states before it."""
 
         def act_and_keep(engine: Stepper) -> Forces | None:
-            self._before = [engine.robot_state(k) for k in range(len(self._models))]
-            return act(engine)
+            layout = self._layout
+            # Without constraints nothing follows from the bodies of the scene.
+            bodies = enumerate(layout.bodies if self._ties else ())
+            self._before = WorldState(
+                0.0,
+                {robot.name: engine.robot_state(k) for k, robot in enumerate(layout.robots)},
+                {body.name: engine.body_state(k) for k, body in bodies},
+            )
+            forces = act(engine)
+            if forces is not None:
+                self._forces = forces._replace(torques=[(k, tau.copy()) for k, tau in forces.torques])
+            return forces
 
         return act_and_keep
 
@@ -86,54 +105,81 @@ class LastStep:
         except (KeyError, TypeError):
             raise UnknownNameError(f"no robot {shown(robot)}{nearest(str(robot), self._robots)}") from None
 
-    def torque(self, robot: str | None) -> Floats:
-        """Return the torque (nv,) of the motors, and that given, on a robot in the step."""
-        k = self.number(robot)
-        self._require_step()
-        return self._commands.driving(k)
+    def require(self) -> None:
+        """Raise ArgumentError if no step was taken since the state was set."""
+        _ = self._begun
 
     def wrenches(
         self,
         robot: str | None,
-        after: RobotState,
+        engine: Stepper,
+        after: WorldState,
         contacts: Sequence[Contact],
         quantity: str,
         **options: object,
     ) -> Floats:
         """Return `joint_wrenches` or `base_wrench` of a robot in the step, which led to the state `after`."""
         k = self.number(robot)
-        self._require_step()
-        q, v = self._before[k]
-        a = MeanAcceleration(self._models[k], self._h)(q, v, *after)
-        with backend("reference", self._models[k]) as engine:
-            poses = dict(zip(self._models[k].frame_names, engine.forward_kinematics(q), strict=True))
-            forces = self._external_forces(k, contacts, poses)
-            method = getattr(engine, quantity)
-            found: Floats = method(q, v, a, external_forces=forces, force_reference="world", **options)
+        q, v = self._begun.robots[self._layout.robots[k].name]
+        forces = self._contact_forces(k, contacts)
+        for frame, force, share in self._commands.on_frames(k):
+            T = self._engines[k].forward_kinematics(q, frame)
+            _add(forces, frame, about_world(force.at_center(T, np.zeros(3), share), T[:3, 3]))
+        if self._ties:
+            for link, wrench in self.reactions(engine, after, contacts).on_links(k):
+                _add(forces, link, wrench)
+        method = getattr(self._engines[k], quantity)
+        a = self._acceleration(k, after)
+        found: Floats = method(q, v, a, external_forces=forces, force_reference="world", **options)
         return found
 
-    def _external_forces(
-        self, k: int, contacts: Sequence[Contact], poses: Mapping[str, Floats]
-    ) -> dict[str, Floats]:
-        """Return the wrenches (6,) of external forces and contacts on the frames of a robot, about the origin
-        of the world in its axes."""
+    def reactions(self, engine: Stepper, after: WorldState, contacts: Sequence[Contact]) -> Reactions:
+        """Return the wrenches of constraints and the torques of joint limits in the step, which led to the
+        state `after`."""
+        # Imported here, because most scenes have neither constraints nor joints at a limit.
+        from dynx.world.constraint_wrenches import StepRecord, reactions
+
+        robots = range(len(self._models))
+        step = StepRecord(
+            self._begun,
+            self._forces,
+            after,
+            contacts,
+            [engine.damps_at_end(k) for k in robots],
+            self._h,
+            [self._acceleration(k, after) for k in robots],
+            self._engines,
+            [self._contact_forces(k, contacts) for k in robots],
+        )
+        return reactions(self._layout, self._in_engine, step)
+
+    @cached_property
+    def _engines(self) -> list[Backend]:
+        return [backend("reference", model) for model in self._models]
+
+    @property
+    def _begun(self) -> WorldState:
+        """State before the step. Raises ArgumentError if there is none."""
+        if self._before is None:
+            raise ArgumentError("no step was taken since the state of this world was set; call step first")
+        return self._before
+
+    def _acceleration(self, k: int, after: WorldState) -> Floats:
+        name = self._layout.robots[k].name
+        return MeanAcceleration(self._models[k], self._h)(*self._begun.robots[name], *after.robots[name])
+
+    def _contact_forces(self, k: int, contacts: Sequence[Contact]) -> dict[str, Floats]:
+        """Return the wrenches (6,) of contacts on the links of a robot, about the origin of the world in its
+        axes."""
         total: dict[str, Floats] = {}
-
-        def add(frame: str, wrench: Floats) -> None:
-            total[frame] = total.get(frame, 0.0) + wrench
-
-        for frame, force, share in self._commands.on_frames(k):
-            T = poses[frame]
-            add(frame, about_world(force.at_center(T, np.zeros(3), share), T[:3, 3]))
-        name = next(name for name, number in self._robots.items() if number == k)
         for contact in contacts:
             wrench = about_world(np.array([*contact.force, 0.0, 0.0, 0.0]), contact.point)
             for part, sign in ((contact.a, 1.0), (contact.b, -1.0)):
                 owner, slash, link = part.partition("/")
-                if slash and owner == name:
-                    add(link, sign * wrench)
+                if slash and owner == self._layout.robots[k].name:
+                    _add(total, link, sign * wrench)
         return total
 
-    def _require_step(self) -> None:
-        if not self._before:
-            raise ArgumentError("no step was taken since the state of this world was set; call step first")
+
+def _add(total: dict[str, Floats], frame: str, wrench: Floats) -> None:
+    total[frame] = total.get(frame, 0.0) + wrench

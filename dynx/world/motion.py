@@ -262,7 +262,10 @@ class Motion:
     def _read(self, engine: Stepper) -> WorldState:
         robots = {robot.name: engine.robot_state(k) for k, robot in enumerate(self._layout.robots)}
         bodies = {body.name: engine.body_state(k) for k, body in enumerate(self._layout.bodies)}
-        return WorldState(self.time, PartStates(robots), PartStates(bodies))
+        torques = {
+            robot.name: self._commands.driving(k, engine) for k, robot in enumerate(self._layout.robots)
+        }
+        return WorldState(self.time, PartStates(robots), PartStates(bodies), PartStates(torques))
 
     def _diverge(self, reason: str) -> NoReturn:
         """Return to the state kept last, and raise DivergedError."""

@@ -11,7 +11,7 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -58,6 +58,9 @@ class Snapshot:
     """State of the engine, in the engine's own format; empty for an engine that keeps none."""
     record: Any = None
     """What a simulation recorded until then, and the state of its controller; None for a world."""
+    torques: Mapping[str, Floats] = field(default_factory=dict)
+    """Torque (nv,) of each robot of a world in the step before (`WorldState.torques`), on which no later step
+    depends; empty in files of earlier versions."""
 
     def _content(self) -> tuple[Any, ...]:
         arrays = tuple((name, x.shape, x.tobytes()) for name, x in self.arrays.items())
@@ -132,6 +135,7 @@ def write_snapshot(path: str | os.PathLike[str], snapshot: Snapshot, world: dict
             else None
             for name in _robots(world)
         ],
+        "torques": [[x.hex() for x in snapshot.torques[name].tolist()] for name in _robots(world)],
     }
     text = json.dumps(header, ensure_ascii=True, allow_nan=False).encode("ascii")
     content = len(text).to_bytes(8, "little") + text + snapshot.data
@@ -182,9 +186,16 @@ def _snapshot(header: dict[str, Any], robots: Sequence[str], data: bytes) -> Sna
         for name, rows in zip(robots, header["memory"], strict=True)
         if rows is not None
     }
+    # Files of earlier versions have no torques.
+    torques = {
+        name: np.array([float.fromhex(x) for x in row])
+        for name, row in zip(robots, header.get("torques") or [()] * len(robots), strict=True)
+        if row
+    }
     engine, version, identity = (str(header[name]) for name in ("engine", "version", "identity"))
     time, start = (float.fromhex(header[name]) for name in ("time", "start"))
-    return Snapshot(engine, version, identity, time, start, int(header["steps"]), arrays, data)
+    steps = int(header["steps"])
+    return Snapshot(engine, version, identity, time, start, steps, arrays, data, torques=torques)
 
 
 def _robots(world: Mapping[str, Any]) -> list[str]:

@@ -21,7 +21,7 @@ from dynx.model.geometry import Mesh
 from dynx.model.numbers import checked_bool, positive_seconds, whole_number
 from dynx.model.package_search import StrPath
 from dynx.option_names import checks_option_names, refuse_options, right_name
-from dynx.rbd.jacobians import LOCAL
+from dynx.rbd.jacobians import LOCAL, checked_reference
 from dynx.registry import door
 from dynx.spatial.scalar import Floats
 from dynx.steppers.clock import MAX_STEPS, refuse_too_many_steps
@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from dynx.distance.avoidance import Avoidance
     from dynx.steppers.camera import Camera
     from dynx.world.camera import Picture
+    from dynx.world.constraint_wrenches import ConstraintWrench, Reactions
     from dynx.world.contact_interval import ContactInterval
     from dynx.world.last_step import LastStep
     from dynx.world.queries import Queries
@@ -213,7 +214,7 @@ class World:
             # Imported here, because most worlds do not need it.
             from dynx.world.last_step import LastStep
 
-            self._last_step = LastStep(self._layout, self._commands, self.dt / self.substeps)
+            self._last_step = LastStep(self._layout, self._in_engine, self._commands, self.dt / self.substeps)
         self._contact_interval: ContactInterval | None = None
         if contact_interval is not None:
             from dynx.world.contact_interval import ContactInterval
@@ -330,9 +331,10 @@ class World:
         """Return the wrenches (n_joints, 6) [N, N m] that the parents of all joints of a robot exerted on
         their children in the last step of the engine.
 
-        They follow from the state before the step, its acceleration, the external forces and the contacts;
-        forces of constraints and of joint limits are not among these. `Backend.joint_wrenches` describes the
-        order, the signs and the options. `robot` may be left out if the scene has one.
+        They follow from the state before the step, its acceleration, the external forces, the contacts and
+        `constraint_wrenches`. The component along the axis of a joint is its `torque` plus its
+        `limit_torque`. `Backend.joint_wrenches` describes the order, the signs and the options. `robot` may
+        be left out if the scene has one.
 
         Raises ArgumentError without `keep_last_step`, or if no step was taken since the state was set.
         """
@@ -342,19 +344,43 @@ class World:
         self, robot: str | None = None, *, frame: str | None = None, reference: str = LOCAL
     ) -> Floats:
         """Return the wrench (6,) [N, N m] that the world exerted on the root link of a robot in the last step
-        of the engine, besides external forces and contacts; see `joint_wrenches`."""
+        of the engine, besides external forces, contacts and constraints; see `joint_wrenches`."""
         return self._wrenches("base_wrench", robot, frame, reference)
 
     def torque(self, robot: str | None = None) -> Floats:
-        """Return the torque (nv,) [N m or N] given for a robot plus that of its motors of `dynx.world` in the
-        last step of the engine; the options and errors are those of `joint_wrenches`."""
-        return self._kept_step().torque(robot)
+        """Return the torque (nv,) [N m or N] given for a robot plus that of its motors in the last step of
+        the engine (`WorldState.torques`), with the errors of `joint_wrenches`."""
+        step = self._kept_step()
+        step.require()
+        return self.state.torques[self._layout.robots[step.number(robot)].name]
+
+    @checks_types
+    def constraint_wrenches(self, *, reference: str = LOCAL) -> tuple[ConstraintWrench, ...]:
+        """Return the wrench of each constraint of the scene on both of its ends in the last step of the
+        engine: force [N], then moment [N m].
+
+        By default each is at the anchor of the constraint in the part, in the axes of the anchor;
+        `reference` chooses other axes and points as for a Jacobian. They follow from the motion
+        (`dynx.world.constraint_wrenches`), on every engine alike. Raises the errors of `joint_wrenches`.
+        """
+        axes = checked_reference(reference)
+        return self._reactions().of_constraints(axes)
+
+    def limit_torque(self, robot: str | None = None) -> Floats:
+        """Return the torque (nv,) [N m or N] of the joint limits of a robot in the last step of the engine,
+        with the errors of `joint_wrenches`."""
+        k = self._kept_step().number(robot)
+        found = self._reactions().limit_torques.get(k)
+        return np.zeros(self._layout.robots[k].model.nv) if found is None else found
+
+    def _reactions(self) -> Reactions:
+        step, engine = self._kept_step(), self._motion.engine
+        return step.reactions(engine, self.state, self.contacts())
 
     def _wrenches(self, quantity: str, robot: str | None, frame: str | None, reference: str) -> Floats:
-        step = self._kept_step()
-        name = self._layout.robots[step.number(robot)].name
-        after, contacts = self.state.robots[name], self.contacts()
-        return step.wrenches(robot, after, contacts, quantity, frame=frame, reference=reference)
+        step, engine = self._kept_step(), self._motion.engine
+        options = {"frame": frame, "reference": reference}
+        return step.wrenches(robot, engine, self.state, self.contacts(), quantity, **options)
 
     def _kept_step(self) -> LastStep:
         if self._last_step is None:
@@ -413,6 +439,7 @@ class World:
             *self._motion.clock,
             self._commands.memory(),
             engine.dump(),
+            torques=dict(self.state.torques),
         )
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -428,7 +455,7 @@ class World:
 
         def load(engine: Stepper) -> None:
             engine.load(snapshot.data)
-            self._commands.remember(snapshot.arrays)
+            self._commands.remember(snapshot.arrays, snapshot.torques)
 
         self._motion.change(load, (snapshot.start, snapshot.steps))
 

@@ -227,6 +227,20 @@ class BulletRobot:
                 **command.options(),
             )
 
+    def motor_torque(self, command: BulletMotorCommand) -> Floats:
+        """Return the torque (nv,) of Bullet's motors in the last step; NaN for PD_CONTROL, which Bullet's
+        report leaves out."""
+        links = self.object.links
+        torque = np.zeros(self._base + len(links))
+        if command.mode == "TORQUE_CONTROL":
+            torque[self._base :] = command.forces or 0.0
+        elif command.mode == "PD_CONTROL":
+            torque[self._base :] = np.nan
+        elif links:
+            states = self._client.call(self._client.engine.getJointStates, self._body, links)
+            torque[self._base :] = [state[3] for state in states]
+        return torque
+
     def release_motors(self) -> None:
         """Let Bullet's motors, which hold every joint of a loaded robot, give only its Coulomb friction."""
         if self.object.links:

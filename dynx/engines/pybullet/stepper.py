@@ -272,6 +272,13 @@ class BulletStepper(Stepper):
                 self.robots[k].command(command)
         self._commands = commands
 
+    def damps_at_end(self, robot: int) -> bool:
+        return self.robots[robot].corrected
+
+    def motor_torque(self, robot: int) -> Floats | None:
+        command = self._commands.get(robot)
+        return self.robots[robot].motor_torque(command) if isinstance(command, BulletMotorCommand) else None
+
     # -- state --------------------------------------------------------------------------------
 
     def robot_state(self, robot: int) -> RobotState:
