@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -58,7 +59,7 @@ def test_given_torques_and_motors_add(engine: str, tmp_path: Path) -> None:
         state = world.state
         world.set_state(state)
         assert not torques(world).any()
-        assert world.state == state
+        assert replace(state, torques={}) == state
     with World.read(tmp_path / "w.world") as again:
         assert_array_equal(torques(again), both)
         again.step()
