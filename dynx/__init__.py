@@ -166,14 +166,10 @@ if not TYPE_CHECKING:
         if name in _MOVED:
             raise ImportError(f"dynx.{name} is now {_MOVED[name]}", name="dynx")
         if name not in _HOME:
-            raise AttributeError(f"module 'dynx' has no attribute {name!r}{nearest_name(name)}")
+            from dynx.registry import unknown_name
+
+            raise AttributeError(unknown_name("module 'dynx'", name, __all__))
         return getattr(import_module(_HOME[name]), name)
-
-    def nearest_name(name: str) -> str:
-        """Return the clause of an error that names the nearest attribute."""
-        from dynx.errors import nearest
-
-        return nearest(name, __all__)
 
 
 def __dir__() -> list[str]:

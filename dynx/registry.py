@@ -6,14 +6,15 @@ classes. A name never changes its meaning: `ClassRegistry.register` refuses a na
 point with the name of one of dynx's own classes is ignored.
 
 A class is imported when it is first looked up; listing names imports none. So is the body of a method that
-lies in a module above its class (`door`).
+lies in a module above its class (`door`), and so are the names of engines, at the first look-up of a name
+that does not exist (`explains_names`).
 """
 
 from __future__ import annotations
 
 import inspect
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
@@ -22,6 +23,7 @@ from typing import Any, Generic, TypeVar, cast
 from dynx.errors import ArgumentError, DynxError, nearest, shown
 
 Kind = TypeVar("Kind")
+Owner = TypeVar("Owner", bound=type)
 Method = TypeVar("Method", bound=Callable[..., Any])
 
 DEFAULT_ENGINE = "compiled" if find_spec("pinocchio") is None else "pinocchio"
@@ -83,9 +85,33 @@ def moved_names(
         # Not what Python itself asks every module for, such as `__path__`.
         if not name.startswith("_") and find_spec(f"{package}.{name}") is not None:
             return import_module(f"{package}.{name}")
-        raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        module = sys.modules[package]
+        raise AttributeError(unknown_name(f"module {package!r}", name, getattr(module, "__all__", ())))
 
     return getattr_of_package
+
+
+def explains_names(owner: Owner) -> Owner:
+    """Decorate a class, so that the AttributeError of its objects names dynx's call for the name of an
+    engine, or the nearest attribute (`dynx.engine_names`)."""
+
+    def getattr_of_object(self: object, name: str) -> Any:
+        if hasattr(type(self), name):
+            return object.__getattribute__(self, name)  # a property, whose own AttributeError is raised
+        subject = f"{type(self).__name__!r} object"
+        raise AttributeError(unknown_name(subject, name, (each for each in dir(self) if each[0] != "_")))
+
+    owner.__getattr__ = getattr_of_object  # type: ignore[attr-defined]  # type checkers know the attributes
+    return owner
+
+
+def unknown_name(subject: str, name: str, known: Iterable[str]) -> str:
+    """Return the message of the AttributeError for a name; names with an underscore, which Python and other
+    libraries ask every object for, are not explained."""
+    if name.startswith("_"):
+        return f"{subject} has no attribute {name!r}"
+    explained: str = import_module("dynx.engine_names").explained(subject, name, known)
+    return explained
 
 
 class ClassRegistry(Generic[Kind]):

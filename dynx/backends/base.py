@@ -19,7 +19,7 @@ from dynx.errors import ArgumentError
 from dynx.model.numbers import checked_bool
 from dynx.rbd.jacobians import LOCAL, LOCAL_WORLD_ALIGNED, shift_jacobian
 from dynx.rbd.joint_wrenches import AppliedWrench, LinkWrenches
-from dynx.registry import door
+from dynx.registry import door, explains_names
 from dynx.spatial.scalar import Floats
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from dynx.ik.velocity import VelocityResult, VelocityTask
 
 
+@explains_names
 class Backend(QuantityCalls):
     """A robot in one engine, with the same methods, conventions and results for every engine.
 

@@ -10,10 +10,10 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from dynx.errors import nearest
 from dynx.ik.options import FrameTarget, IKOptions, Options
 from dynx.ik.result import IKResult
 from dynx.ik.solver import inverse_kinematics
+from dynx.registry import unknown_name
 
 if TYPE_CHECKING:
     from dynx.ik.closed_forms.solutions import IKSolutions
@@ -40,7 +40,7 @@ if not TYPE_CHECKING:
             # The text of an ImportError reaches the user of ``from dynx.ik import name`` too.
             raise ImportError(f"dynx.ik.{name} is now {_MOVED[name]}", name="dynx.ik")
         if name not in _CLOSED_FORMS:
-            raise AttributeError(f"module 'dynx.ik' has no attribute {name!r}{nearest(name, __all__)}")
+            raise AttributeError(unknown_name("module 'dynx.ik'", name, __all__))
         return getattr(import_module(f"dynx.ik.closed_forms.{_CLOSED_FORMS[name]}"), name)
 
 

@@ -20,10 +20,11 @@ from dynx.model.numbers import checked_gravity
 from dynx.model.topology import refuse_unbounded_numbers
 from dynx.model.tree import NO_GEOMETRY, STANDARD_GRAVITY, Base, Tree, checked_base
 from dynx.model.urdf.writer import write_urdf
-from dynx.registry import door
+from dynx.registry import door, explains_names
 from dynx.spatial.scalar import longdouble
 
 
+@explains_names
 @checks_types
 @dataclass(frozen=True, eq=False)
 class Model(Tree):

@@ -20,6 +20,7 @@ from dynx.errors import ArgumentError, ClosedError, SimulationError, shown
 from dynx.model import Model
 from dynx.model.numbers import checked_array
 from dynx.option_names import takes
+from dynx.registry import explains_names
 from dynx.sim.closed_loop import ClosedLoop, LoopState, Sensors, StateBuffers, stops_of
 from dynx.sim.controller_checks import ControllerWatch, refuse_self_changed
 from dynx.sim.plants.disturbances import refuse_small_slip
@@ -78,6 +79,7 @@ MIN_BUFFER_STEPS = 1024
 """Number of steps that fit into the first buffers of a simulation without a duration."""
 
 
+@explains_names
 class Simulation:
     """One scenario, simulated step by step by the caller.
 

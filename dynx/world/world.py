@@ -22,7 +22,7 @@ from dynx.model.numbers import checked_bool, positive_seconds, whole_number
 from dynx.model.package_search import StrPath
 from dynx.option_names import checks_option_names, refuse_options, right_name
 from dynx.rbd.jacobians import LOCAL, checked_reference
-from dynx.registry import door
+from dynx.registry import door, explains_names
 from dynx.spatial.scalar import Floats
 from dynx.steppers.clock import MAX_STEPS, refuse_too_many_steps
 from dynx.steppers.forces import ExternalForce
@@ -147,6 +147,7 @@ TorquesOf = Mapping[str, ArrayLike]
 LoadsOf = Callable[["World"], Mapping[str, Any]]
 
 
+@explains_names
 @checks_types
 class World:
     """The robots and bodies of a scene in motion, with contacts, in steps of `dt` [s].

@@ -21,7 +21,7 @@ from dynx.model.numbers import whole_number
 from dynx.rbd.jacobians import LOCAL
 from dynx.rbd.joint_wrenches import about_world
 from dynx.rbd.parameters import plant_model
-from dynx.registry import door
+from dynx.registry import door, explains_names
 from dynx.sim.controller_checks import controller_numbers
 from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.scenario.documents import Unknown
@@ -112,6 +112,7 @@ class Summary(NamedTuple):
         return f"{values[k]:.3g} {unit if units is None else units[unit]} of {self.coordinates[k]}"
 
 
+@explains_names
 @dataclass(frozen=True, eq=False)
 class Rollout:
     """n steps of a robot in motion: states at n + 1 times, and torques and accelerations between them.

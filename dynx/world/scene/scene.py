@@ -17,6 +17,7 @@ from dynx.model.elements import Vector
 from dynx.model.numbers import checked_gravity, is_real
 from dynx.model.tree import STANDARD_GRAVITY
 from dynx.option_names import checks_option_names
+from dynx.registry import explains_names
 from dynx.steppers.material import Material
 from dynx.world.scene.bodies import Constraint, PointToPoint, SceneBody, Weld
 from dynx.world.scene.filters import CollisionFilter
@@ -29,6 +30,7 @@ MARGIN = 0.01
 """Distance [m] that is kept where no other margin is given."""
 
 
+@explains_names
 @dataclass(frozen=True)
 class Scene:
     """Everything that is in a world at the start, for every engine alike.

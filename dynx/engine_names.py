@@ -1,0 +1,203 @@
+"""Names of PyBullet, Pinocchio, MuJoCo and Drake, and the calls of dynx that do the same.
+
+Who knows an engine types its names first: `World.stepSimulation`, `dynx.rnea`, `model.getNumJoints`. The
+AttributeError of dynx's classes and packages then names dynx's own call, or else the nearest name
+(`explained`). Names of quantities are those of the table of quantities; the others stand here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from dynx.backends.quantities import QUANTITIES
+from dynx.errors import nearest, shown
+
+_JOINT_LIMITS = "Model.joint(name), with limits, axis and dynamics"
+_MOTORS = "a motor of the joint, such as dynx.PDMotor, in World.step(motors={robot: motor})"
+_STATE = "World.state, with robots[name].q and .v"
+_POSE_OF_BODY = "World.state, with bodies[name].T_world_body; the base of a robot is in robots[name].q"
+_SET_STATE = "World.set_state(...), or SceneRobot(q=..., v=...) at the start"
+_SHAPES = "dynx.world.box, sphere, cylinder, capsule or mesh, in Scene(bodies=...)"
+_CONSTRAINT = "dynx.world.PointToPoint or Weld, in Scene(constraints=...)"
+_FORCE = "dynx.ExternalForce(part, wrench), in World.step(forces=[...])"
+_CAMERA = "World.camera(dynx.world.Camera(...))"
+_FILES = "dynx.load(path) for a robot in URDF or xacro, and dynx.world.read_scene(path) for a scene"
+_SAVE = "World.save(), or World.write(path) for a file"
+_VIEW = "World.view(), a page in the browser"
+_CLOSE = "World.close(), or a with block"
+_START = "World(scene, engine='pybullet'), without a window; World.view shows it"
+_SETTINGS = "an option of World(scene, ...), such as dt, substeps or a setting of the engine"
+_MATERIAL = "dynx.world.Material of a body or a link, in the Scene"
+_LOADED = "dynx.load(path)"
+_EULER = "roll, pitch, yaw [rad]"
+
+PYBULLET = {
+    "addUserDebugLine": _VIEW,
+    "addUserDebugParameter": _VIEW,
+    "addUserDebugText": _VIEW,
+    "applyExternalForce": _FORCE,
+    "applyExternalTorque": _FORCE,
+    "calculateInverseKinematics": "Backend.inverse_kinematics(pose, frame)",
+    "calculateInverseKinematics2": "Backend.inverse_kinematics({frame: pose, ...})",
+    "changeConstraint": _CONSTRAINT,
+    "changeDynamics": f"{_MATERIAL}, or mass_scale and payload of dynx.simulate",
+    "computeProjectionMatrixFOV": _CAMERA,
+    "computeViewMatrix": _CAMERA,
+    "computeViewMatrixFromYawPitchRoll": _CAMERA,
+    "connect": _START,
+    "createCollisionShape": _SHAPES,
+    "createConstraint": _CONSTRAINT,
+    "createMultiBody": _SHAPES,
+    "createVisualShape": _SHAPES,
+    "disconnect": _CLOSE,
+    "enableJointForceTorqueSensor": "World(scene, keep_last_step=True), then World.joint_wrenches()",
+    "getAABB": "World.aabb(part)",
+    "getBasePositionAndOrientation": _POSE_OF_BODY,
+    "getBaseVelocity": "World.state, with bodies[name].twist; that of a robot's base is in robots[name].v",
+    "getBodyInfo": "Scene.robots and Scene.bodies",
+    "getCameraImage": _CAMERA,
+    "getClosestPoints": "World.closest_points(a, b)",
+    "getContactPoints": "World.contacts(part)",
+    "getDynamicsInfo": "Model.link(name), with its inertial",
+    "getEulerFromQuaternion": f"dynx.rpy_from_quat(quat_xyzw): {_EULER}",
+    "getJointInfo": _JOINT_LIMITS,
+    "getJointState": _STATE,
+    "getJointStateMultiDof": _STATE,
+    "getJointStates": _STATE,
+    "getLinkState": "Backend.forward_kinematics(q, frame), and Backend.frame_velocity(q, v, frame)",
+    "getLinkStates": "Backend.forward_kinematics(q, frames)",
+    "getMatrixFromQuaternion": "dynx.rotation_from_quat(quat_xyzw)",
+    "getNumBodies": "Scene.robots and Scene.bodies",
+    "getNumJoints": "Model.nv, with names in Model.joint_names; Model.joints also has the fixed ones",
+    "getOverlappingObjects": "World.overlapping(lower, upper)",
+    "getPhysicsEngineParameters": "World.options and World.settings",
+    "getQuaternionFromEuler": f"dynx.quat_from_rpy(rpy): {_EULER}, result x, y, z, w",
+    "getVisualShapeData": "Model.geometry",
+    "invertTransform": "numpy.linalg.inv(T) of a pose (4, 4), or the transposed rotation",
+    "loadMJCF": f"{_FILES}; MJCF is written by World.to_mjcf, not read",
+    "loadSDF": f"{_FILES}; SDF is not read",
+    "loadURDF": f"{_LOADED}, and dynx.world.SceneRobot(name, model) in a Scene",
+    "multiplyTransforms": "T_AB @ T_BC of poses (4, 4)",
+    "rayTest": "World.cast_rays(origins, directions)",
+    "rayTestBatch": "World.cast_rays(origins, directions)",
+    "removeBody": "a Scene without the body, in a new World",
+    "removeConstraint": _CONSTRAINT,
+    "resetBasePositionAndOrientation": _SET_STATE,
+    "resetBaseVelocity": _SET_STATE,
+    "resetDebugVisualizerCamera": _VIEW,
+    "resetJointState": _SET_STATE,
+    "resetJointStateMultiDof": _SET_STATE,
+    "resetSimulation": "World.reset()",
+    "restoreState": "World.restore(snapshot)",
+    "saveBullet": _SAVE,
+    "saveState": _SAVE,
+    "setAdditionalSearchPath": "dynx.load(path, package_dirs=[...]); pybullet_data is searched by itself",
+    "setCollisionFilterGroupMask": "Scene.ignored, pairs of parts that do not touch",
+    "setCollisionFilterPair": "Scene.ignored, pairs of parts that do not touch",
+    "setGravity": "gravity=(0, 0, -9.81) of Scene, or of dynx.load",
+    "setJointMotorControl": _MOTORS,
+    "setJointMotorControl2": _MOTORS,
+    "setJointMotorControlArray": _MOTORS,
+    "setJointMotorControlMultiDof": _MOTORS,
+    "setPhysicsEngineParameter": _SETTINGS,
+    "setRealTimeSimulation": "World.run(duration, real_time=True)",
+    "setTimeStep": "World(scene, dt=0.001)",
+    "startStateLogging": "dynx.world.Record of a World, or the rollout of dynx.simulate",
+    "stepSimulation": "World.step()",
+}
+"""Functions of PyBullet, with what does the same in dynx."""
+
+PINOCCHIO = {
+    "RobotWrapper": "dynx.backend('pinocchio', dynx.load(path))",
+    "buildModelFromUrdf": _LOADED,
+    "buildModelsFromUrdf": _LOADED,
+    "ccrba": "Backend.centroidal_momentum(q, v)",
+    "computeABADerivatives": "dynx.Derivatives",
+    "computeAllTerms": "the methods of Backend, such as Backend.mass_matrix(q) and Backend.bias_torque(q, v)",
+    "computeForwardKinematicsDerivatives": "Backend.jacobian(q, frame)",
+    "computeJointJacobian": "Backend.jacobian(q, frame)",
+    "computeJointJacobians": "Backend.jacobian(q, frame)",
+    "computeMinverse": "Backend.forward_dynamics(q, v, tau), or numpy.linalg.inv(Backend.mass_matrix(q))",
+    "computeRNEADerivatives": "dynx.Derivatives",
+    "computeTotalMass": "Model.total_mass",
+    "difference": "Model.difference(q0, q1)",
+    "forwardKinematics": "Backend.forward_kinematics(q, frame)",
+    "getFrameId": "the name of the frame, which dynx takes everywhere; Model.frame_names lists them",
+    "getFrameJacobian": "Backend.jacobian(q, frame, reference='local')",
+    "getJointId": "the name of the joint, which dynx takes everywhere; Model.joint_names lists them",
+    "getJointJacobian": "Backend.jacobian(q, frame, reference='local')",
+    "integrate": "Model.integrate(q, v)",
+    "neutral": "Model.neutral()",
+    "randomConfiguration": "Model.random(rng)",
+    "updateFramePlacement": "Backend.forward_kinematics(q, frame)",
+    "updateFramePlacements": "Backend.forward_kinematics(q)",
+}
+"""Functions of Pinocchio, besides those of quantities."""
+
+MUJOCO = {
+    "MjData": "World(scene, engine='mujoco'), whose state is World.state",
+    "MjModel": f"{_LOADED} for a robot, or World(scene, engine='mujoco') for a scene",
+    "mj_applyFT": _FORCE,
+    "mj_contactForce": "World.contacts(part), each with its force",
+    "mj_crb": "Backend.mass_matrix(q)",
+    "mj_differentiatePos": "Model.difference(q0, q1)",
+    "mj_geomDistance": "World.closest_points(a, b)",
+    "mj_getTotalmass": "Model.total_mass",
+    "mj_integratePos": "Model.integrate(q, v)",
+    "mj_jacBody": "Backend.jacobian(q, frame)",
+    "mj_jacSite": "Backend.jacobian(q, frame)",
+    "mj_name2id": "the name of the part, which dynx takes everywhere",
+    "mj_ray": "World.cast_rays(origins, directions)",
+    "mj_resetData": "World.reset()",
+    "mj_rne": "Backend.inverse_dynamics(q, v, a)",
+    "mj_saveLastXML": "World.to_mjcf()",
+    "mj_step": "World.step()",
+    "mj_step1": "World.step()",
+    "mj_step2": "World.step()",
+}
+"""Functions and classes of MuJoCo, besides those of quantities."""
+
+DRAKE = {
+    "AdvanceTo": "World.run(duration)",
+    "CalcBiasSpatialAcceleration": "Backend.jacobian_derivative(q, v, frame), times v",
+    "CalcMassMatrixViaInverseDynamics": "Backend.mass_matrix(q)",
+    "CalcRelativeTransform": "Backend.forward_kinematics(q, frame)",
+    "CalcTotalMass": "Model.total_mass",
+    "EvalBodyPoseInWorld": "Backend.forward_kinematics(q, frame)",
+    "EvalBodySpatialVelocityInWorld": "Backend.frame_velocity(q, v, frame)",
+    "GetJointByName": _JOINT_LIMITS,
+    "GetPositions": _STATE,
+    "GetVelocities": _STATE,
+    "InverseKinematics": "Backend.inverse_kinematics(pose, frame)",
+    "MultibodyPlant": "dynx.backend('drake', model) for its dynamics, or World(scene, engine='drake')",
+    "SetPositions": _SET_STATE,
+    "SetVelocities": _SET_STATE,
+    "Simulator": "World(scene, engine='drake'), then World.run(duration)",
+    "num_positions": "Model.nq",
+    "num_velocities": "Model.nv",
+}
+"""Methods and classes of Drake, besides those of quantities."""
+
+TABLES = {"PyBullet": PYBULLET, "Pinocchio": PINOCCHIO, "MuJoCo": MUJOCO, "Drake": DRAKE}
+"""What does the same in dynx, by library and name."""
+
+
+def call_of_dynx(name: str) -> str | None:
+    """Return a clause with the call of dynx for the name that an engine has; None for another name."""
+    for library, table in TABLES.items():
+        if name in table:
+            return f"; for {name} of {library} dynx has {table[name]}"
+    for quantity in QUANTITIES.values():
+        for library, other in quantity.other_names.items():
+            if name == other:
+                call = f"Backend.{quantity.name}({', '.join(quantity.arguments)})"
+                return f"; for {name} of {library} dynx has {call}"
+    return None
+
+
+def explained(subject: str, name: str, known: Iterable[str]) -> str:
+    """Return the message of the AttributeError for a name that `subject`, such as ``'World' object``, lacks.
+
+    It names dynx's call for the name of an engine, or the nearest of the `known` names.
+    """
+    return f"{subject} has no attribute {shown(name)}{call_of_dynx(name) or nearest(name, known)}"
