@@ -75,16 +75,25 @@ def _wrong_type(function: Callable[..., Any], argument: str | int, value: object
     parameters = inspect.signature(function).parameters
     name = argument if isinstance(argument, str) else list(parameters)[argument]
     wanted = _written(parameters[name].annotation)
-    if wanted.startswith("Model"):
-        wanted = f"a {wanted}, such as dynx.load({shown(value) if isinstance(value, str) else '...'})"
+    for kind, maker in _MAKERS.items():
+        if re.match(rf"{kind}\b", wanted):
+            wanted = f"a {wanted}, such as {maker}({shown(value) if isinstance(value, str) else '...'})"
+    if isinstance(value, list | tuple) and value:
+        test = _tests_of(function)[name]
+        wanted += "; one at a time" if all(map(test, value)) else ""
     given = f"the class {value.__name__}" if isinstance(value, type) else shown(value)
     return DTypeError(f"{name} is {given}, of type {type(value).__name__}; wanted {wanted}")
 
 
+_MAKERS = {"Model": "dynx.load", "Scene": "dynx.world.read_scene"}
+"""Functions that make an object of a class from its name or file."""
+
+
 def _written(annotation: object) -> str:
-    """Return the text of an annotation, with arrays and truth values as a reader knows them."""
+    """Return the text of an annotation, with arrays, robots and truth values as a reader knows them."""
     text = annotation if isinstance(annotation, str) else getattr(annotation, "__name__", str(annotation))
     text = re.sub(r"\b(Floats|Array|Integers)\b", "numpy.ndarray", text)
+    text = re.sub(r"^Robot$", "a name, a path, URDF text or a Model", text)
     return re.sub(r"\bbool\b", "True or False", text)
 
 

@@ -7,9 +7,10 @@ import inspect
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
 from functools import wraps
+from types import MappingProxyType
 from typing import Any, ParamSpec, TypeVar, cast, overload
 
-from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
+from dynx.errors import ArgumentError, UnknownNameError, escaped, nearest, shown
 
 F = TypeVar("F", bound=Callable[..., Any])
 C = TypeVar("C", bound=type)
@@ -51,6 +52,15 @@ def right_name(wrong: str, known: Iterable[str], renamed: Mapping[str, str]) -> 
     return f"; it is now {renamed[wrong]}" if wrong in renamed else nearest(wrong, known)
 
 
+def as_object(given: object, kind: str) -> str:
+    """Make the clause of an error about a mapping that is given for objects of the class `kind`: its first
+    entry as such an object."""
+    if not isinstance(given, Mapping) or not given:
+        return ""
+    name, value = next(iter(given.items()))
+    return f", such as {kind}({shown(name)}, {escaped(value)})"
+
+
 def refuse_options(
     name: str, options: Iterable[str], function: Callable[..., Any], renamed: Mapping[str, str]
 ) -> None:
@@ -66,21 +76,32 @@ def refuse_options(
 
 
 def check_arguments(
-    name: str, signature: inspect.Signature, given: Iterable[Any], options: Mapping[str, Any]
+    name: str,
+    signature: inspect.Signature,
+    given: Iterable[Any],
+    options: Mapping[str, Any],
+    elsewhere: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
     """Raise UnknownNameError for a keyword of `options` that the signature of the function `name` does not
-    have, TypeError for other arguments that do not fit it."""
+    have, TypeError for other arguments that do not fit it.
+
+    `elsewhere` has the option for each name under which other functions have it.
+    """
     for each in options:
         if each not in signature.parameters:
-            raise UnknownNameError(f"{name} has no option {shown(each)}{nearest(each, signature.parameters)}")
+            near = nearest(each, signature.parameters)
+            clause = f"; here it is {elsewhere[each]}" if each in elsewhere else near
+            raise UnknownNameError(f"{name} has no option {shown(each)}{clause}")
     try:
         signature.bind(*given, **options)
     except TypeError as error:
         raise TypeError(f"{name}: {error}") from None
 
 
-def takes(arguments: Callable[P, A]) -> Callable[[Callable[[A], R]], Callable[P, R]]:
+def takes(arguments: Callable[P, A], **elsewhere: str) -> Callable[[Callable[[A], R]], Callable[P, R]]:
     """Decorate a function of one object, so that it has the signature of the dataclass `arguments`.
+
+    `elsewhere` has the option for each name under which other functions have it.
 
     Type checkers and `help` see the fields as arguments. A keyword that is no field raises UnknownNameError,
     other arguments that do not fit TypeError. The docstring gets a line for each field that `option`
@@ -93,7 +114,7 @@ def takes(arguments: Callable[P, A]) -> Callable[[Callable[[A], R]], Callable[P,
 
         @wraps(function)
         def called(*given: P.args, **options: P.kwargs) -> R:
-            check_arguments(name, signature, given, options)
+            check_arguments(name, signature, given, options, elsewhere)
             return function(arguments(*given, **options))
 
         lines = [

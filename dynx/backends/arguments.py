@@ -89,8 +89,9 @@ class Arguments:
         """Return the wrenches (..., 6) by the name of the frame on which each acts."""
         if not isinstance(forces, Mapping):
             raise ArgumentError(
-                f"external_forces is of type {type(forces).__name__}; "
-                "wanted a mapping from frame names to wrenches (..., 6)"
+                f"external_forces is of type {type(forces).__name__}; wanted a mapping from frame names to "
+                f"wrenches (..., 6), such as {{'tool0': [0, 0, -10, 0, 0, 0]}}; an ExternalForce is for what "
+                "moves: World.step(forces=), and pushes= of a simulation"
             )
         return {
             frame: checked_array(f"external_forces[{shown(frame)}]", wrench, 6)

@@ -72,7 +72,7 @@ def world(
         for option, path in (("--json", json_path), ("--plot", plot_path), ("--save", save_path)):
             if path is not None:
                 raise ArgumentError(f"{option} is given with --export, which runs nothing")
-        return _export(scene, export_path, dt, substeps, settings, quiet=quiet)
+        return _export(scene, export_path, engines, dt, substeps, settings, quiet=quiet)
     check_json(json_path)
     for path in (plot_path, save_path):
         if path is not None:
@@ -117,12 +117,24 @@ def world(
 
 
 def _export(
-    scene: str, path: str, dt: float, substeps: int, settings: Sequence[tuple[str, str]], *, quiet: bool
+    scene: str,
+    path: str,
+    engines: Sequence[str] | None,
+    dt: float,
+    substeps: int,
+    settings: Sequence[tuple[str, str]],
+    *,
+    quiet: bool,
 ) -> int:
     check_suffix(path)
     check_writable(path)
+    if engines is not None and len(engines) > 1:
+        raise ArgumentError(
+            f"--export writes the scene of one world, and --engine has {len(engines)} engines"
+        )
+    engine = engines[0] if engines else "mujoco"
     given = settings_by_engine(("mujoco",), settings)["mujoco"] if settings else {}
-    for file in export(read_scene(scene), path, dt, substeps=substeps, **given):
+    for file in export(read_scene(scene), path, dt, substeps=substeps, engine=engine, **given):
         if not quiet:
             console().print(f"wrote {one_line(file)}")
     return DONE

@@ -120,7 +120,7 @@ class TaskEnvironment(Env[Any, Any]):
             raise ArgumentError(f"options is {shown(options)}; wanted a dict of options by name")
         if self._variation is not None:
             if self.np_random is not self._seeded_by:
-                self._variation.seed(first_seed(self.np_random_seed, self.np_random))
+                self._variation.seed([first_seed(self.np_random_seed, self.np_random)])
                 self._seeded_by = self.np_random
             self._variation.start()
             episodes.set_parameters(self._variation.values[0, : self._variation.motion_size].copy())

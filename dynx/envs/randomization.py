@@ -319,12 +319,12 @@ class Variation:
         self._everywhere, self._dtype = np.arange(count), observation_space.dtype
         self._ahead: Floats = np.zeros((count, BLOCK_STEPS, len(self._draws.names)))
 
-    def seed(self, first: int, rows: NDArray[np.intp] | None = None) -> None:
-        """Seed some environments, by default all: environment k with `first` plus k. The next episode of each
-        is its first."""
+    def seed(self, seeds: Sequence[int], rows: NDArray[np.intp] | None = None) -> None:
+        """Seed some environments, by default all: each with its own of `seeds` (count,). The next episode of
+        each is its first."""
         chosen = self._everywhere if rows is None else rows
         for row in chosen.tolist():
-            self._seeds[row] = first + row
+            self._seeds[row] = seeds[row]
         self._streams = Streams(*self._seeds)
         self._episodes[chosen] = -1
         for noise in (self.observation_noise, self.action_noise):

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from importlib import import_module
-from types import FunctionType
+from pathlib import Path
+from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any
 
 from dynx.argument_types import checks_types
@@ -39,14 +40,22 @@ TASKS = {
 
 
 def task_class(task: str | type[Task]) -> type[Task]:
-    """Return a class of tasks, given itself or as ``"package.module:Class"``.
+    """Return a class of tasks, given itself, as ``"package.module:Class"``, or by the id or the name of its
+    environment.
 
-    Raises ArgumentError for anything else.
+    Raises UnknownNameError for a name that does not exist, ArgumentError for anything else.
     """
-    found = task
+    found: Any = task
     if isinstance(task, str):
-        module, _, name = task.partition(":")
-        found = getattr(import_module(module), name)
+        module, colon, name = task.partition(":")
+        found = getattr(import_tasks(module), name, None) if colon else None
+        if found is None:
+            env_id = task_id(task)
+            if not is_of_dynx(env_id):
+                raise ArgumentError(
+                    f"{env_id} is no task of dynx: gymnasium.make({env_id!r}) makes its environment"
+                )
+            return task_class(specification(env_id).kwargs["task"])
     if not (isinstance(found, type) and issubclass(found, Task)):
         raise ArgumentError(f"task is {shown(task)}; wanted a subclass of dynx.envs.Task")
     for base in found.__mro__[1:]:
@@ -69,7 +78,12 @@ def make_environment(
     height: int = 360,
     **options: Any,
 ) -> TaskEnvironment:
-    """Return the environment of a task with these `options` on an engine; `gymnasium.make` calls this."""
+    """Return the environment of a task with these `options` on an engine; `gymnasium.make` calls this, and
+    adds the limit of steps.
+
+    `task` is a class, ``"package.module:Class"``, or the id of an environment of dynx, such as
+    ``dynx/Pendulum-v0``.
+    """
     made = task_class(task).with_options(options)
     return TaskEnvironment(made, engine, render_mode, randomize=randomize, width=width, height=height)
 
@@ -149,7 +163,12 @@ def task_id(name: str) -> str:
     """
     module, colon, own = name.rpartition(":")
     if colon:
-        _import(module)
+        held = getattr(import_tasks(module), own, None)
+        if own not in registry and isinstance(held, type) and issubclass(held, Task):
+            raise UnknownNameError(
+                f"{name} is a class; wanted the id of its environment, which the module registers: "
+                f"dynx.envs.register_task('own/{own}-v0', {own})"
+            )
         if own not in registry:
             raise UnknownNameError(
                 f"module {shown(module)} registers no task {shown(own)}{nearest(own, registry)}"
@@ -166,16 +185,33 @@ def task_id(name: str) -> str:
     )
 
 
-def _import(module: str) -> None:
+def import_tasks(module: str) -> ModuleType:
+    """Import a module, which registers its tasks. Raises UnknownNameError if it cannot be imported."""
     try:
-        import_module(module)
+        return import_module(module)
     except (ImportError, ValueError) as error:
-        raise UnknownNameError(f"module {shown(module)} cannot be imported: {error}") from error
+        top = module.partition(".")[0]
+        missing = isinstance(error, ModuleNotFoundError) and error.name == top
+        here = missing and (Path(f"{top}.py").exists() or Path(top).is_dir())
+        clause = "; the current folder has it, which PYTHONPATH=. adds" if here else ""
+        raise UnknownNameError(f"module {shown(module)} cannot be imported: {error}{clause}") from error
+
+
+def bare_id(env_id: str) -> str:
+    """Return an id without its module: ``own/Walk-v0`` of ``module:own/Walk-v0``."""
+    return env_id.rpartition(":")[2]
+
+
+def specification(env_id: str) -> Any:
+    """Return what Gymnasium knows of an id, with or without its module; None for an unknown one."""
+    return registry.get(bare_id(env_id))
 
 
 def is_of_dynx(env_id: str) -> bool:
-    """Check whether an id is that of a task of dynx, which takes an engine."""
-    return env_id.startswith(f"{NAMESPACE}/")
+    """Check whether an id is that of an environment of dynx, which takes an engine: its own tasks and those
+    of `register_task`."""
+    known = specification(env_id)
+    return known is not None and known.entry_point == ENTRY_POINT
 
 
 def bare_name(env_id: str) -> str:

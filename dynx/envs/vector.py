@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NoReturn
 
 import numpy as np
@@ -48,10 +48,10 @@ class StartNumbers:
         self._flat = self._ahead.reshape(count * EPISODES_AHEAD, size)
         self._used = np.zeros(count, dtype=np.intp)
 
-    def seed(self, first: int, rows: NDArray[np.intp]) -> None:
-        """Seed some environments, number k with `first` plus k; their next episode is the first."""
+    def seed(self, seeds: Sequence[int], rows: NDArray[np.intp]) -> None:
+        """Seed some environments, each with its own of `seeds` (count,); their next episode is the first."""
         for row in rows.tolist():
-            self._generators[row], _ = np_random(first + row)
+            self._generators[row], _ = np_random(seeds[row])
         self._used[rows] = 0
 
     def next(self, rows: NDArray[np.intp]) -> Floats:
@@ -64,6 +64,21 @@ class StartNumbers:
         self._used[rows] = (place + 1) % EPISODES_AHEAD
         # NumPy takes rows of a matrix in a third of the time that it takes entries of two axes.
         return np.asarray(self._flat.take(rows * EPISODES_AHEAD + place, axis=0))
+
+
+def checked_seeds(seed: object, count: int) -> Sequence[int]:
+    """Return the seeds of `count` environments: those given, or numbers that count up from one.
+
+    Raises ArgumentError for anything else.
+    """
+    if not isinstance(seed, list | tuple | np.ndarray) or np.ndim(seed) == 0:
+        first = whole_number("seed", seed, 0)
+        return range(first, first + count)
+    if len(seed) != count:
+        raise ArgumentError(
+            f"seed has {len(seed)} numbers; wanted that of the first environment, or {count}, one for each"
+        )
+    return tuple(whole_number(f"seed[{k}]", each, 0) for k, each in enumerate(seed))
 
 
 class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
@@ -177,15 +192,17 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         return {} if self._variation is None else self._variation.by_name()
 
     def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+        self, *, seed: int | Sequence[int] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Start an episode in every environment, or in those of ``options["reset_mask"]``.
 
-        The other options are those of the task's start. Raises UnknownNameError for one that it does not
-        have.
+        `seed` is that of the first environment, or a list with one for each. The other options are those of
+        the task's start. Raises UnknownNameError for one that it does not have, ArgumentError for an invalid
+        seed.
         """
         self._refuse_closed()
-        super().reset(seed=seed)
+        seeds = None if seed is None else checked_seeds(seed, self.num_envs)
+        super().reset(seed=None if seeds is None else seeds[0])
         if not isinstance(options, Mapping | None):
             raise ArgumentError(f"options is {shown(options)}; wanted a dict of options by name")
         given = dict(options or {})
@@ -194,10 +211,11 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         rows = np.flatnonzero(mask)
         if self.np_random is not self._seeded_by:
             first, self._seeded_by = first_seed(self.np_random_seed, self.np_random), self.np_random
-            self._starts.seed(first, rows)
+            seeds = range(first, first + self.num_envs) if seeds is None else seeds
+            self._starts.seed(seeds, rows)
             self._random[rows] = self._starts.next(rows)
             if self._variation is not None:
-                self._variation.seed(first, rows)
+                self._variation.seed(seeds, rows)
         self._start(rows, given)
         self._ended = self._ended[~mask[self._ended]]
         self._running = True

@@ -538,7 +538,7 @@ class BatchArguments(ScenarioArguments):
     progress: Progress | None = None
 
 
-@takes(BatchArguments)
+@takes(BatchArguments, external_forces="pushes", forces="pushes")
 def simulate_batch(given: BatchArguments) -> BatchRollouts:
     """Simulate many rollouts of `model` under `controller` along `reference`, by semi-implicit Euler.
 

@@ -34,7 +34,7 @@ from dynx.sim.setup import Setup, require_duration, setpoints_of, step_bytes
 from dynx.sim.step import at_limit
 from dynx.simd.machine import require_memory
 from dynx.spatial.scalar import Floats
-from dynx.steppers.clock import multiple, refuse_too_many_steps
+from dynx.steppers.clock import multiple, refuse_too_many_steps, step_count
 from dynx.steppers.state import same_numbers
 from dynx.trajectory.base import Trajectory
 from dynx.world.snapshot import Snapshot
@@ -153,15 +153,14 @@ class Simulation:
         effort limits apply to it, and it is held until the next control step. Raises DivergedError and
         ControlError, with the record so far in ``error.rollout``.
         """
-        if not isinstance(n, int | np.integer) or n < 1:
-            raise ArgumentError(f"n is {shown(n)}; wanted a number of steps, 1 or more")
+        n = step_count(n, "run(until) takes the time")
         given = None
         if tau is not None:
             given = checked_array("tau", tau, self._setup.model.nv).copy()
             if given.ndim != 1:
                 raise ArgumentError(f"tau has shape {given.shape}; wanted ({self._setup.model.nv},)")
             self._note_departure("torques of the caller")
-        end = self._record.steps + int(n)
+        end = self._record.steps + n
         loop_state = self._advance(end, given)
         return SimulationState(end * self._dt, loop_state.q.copy(), loop_state.v.copy())
 
@@ -604,7 +603,7 @@ class SimulateArguments(ScenarioArguments):
         return replace(self, controller=self.controller.on(self.controller_backend)).scenario()
 
 
-@takes(SimulateArguments)
+@takes(SimulateArguments, external_forces="pushes", forces="pushes")
 def simulate(given: SimulateArguments) -> Rollout:
     """Simulate `model` under `controller` along `reference`, and return the record.
 

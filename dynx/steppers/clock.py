@@ -99,6 +99,15 @@ def refuse_too_many_steps(name: str, seconds: float, dt: float) -> None:
         )
 
 
+def step_count(n: object, by_time: str) -> int:
+    """Return a number of steps, from 1 to `MAX_STEPS`. Raises ArgumentError for anything else, which states
+    `by_time`, the call that takes seconds, for a number that is not whole."""
+    if isinstance(n, bool) or not isinstance(n, int | np.integer) or not 1 <= n <= MAX_STEPS:
+        clause = f"; {by_time} [s]" if is_real(n) and not isinstance(n, int | np.integer) else ""
+        raise ArgumentError(f"n is {shown(n)}; wanted a number of steps, from 1 to {MAX_STEPS:g}{clause}")
+    return int(n)
+
+
 def steps_to(seconds: float, dt: float) -> int:
     """Return the number of steps of `dt` after which a time has passed, 1 or more."""
     steps = max(1, round(seconds / dt))

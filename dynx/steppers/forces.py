@@ -66,8 +66,9 @@ class ExternalForce:
     In each step of an engine the wrench is constant, multiplied by the share of the step in which it lasts.
     So the impulse is exact for any start, duration and step, on every engine and under every integrator.
 
-    Raises ArgumentError unless the wrench and the point are finite numbers, the start is finite, the duration
-    is positive and `reference` is one of the three, and for a point in the reference ``world``.
+    Raises ArgumentError unless the wrench and the point are finite numbers, the start is finite and not
+    before 0, the duration is positive and `reference` is one of the three, and for a point in the reference
+    ``world``.
     """
 
     on: str
@@ -98,13 +99,13 @@ class ExternalForce:
                 f"frame, and none for the wrench about the origin of the world"
             )
         seconds = is_real(self.start) and is_real(self.duration)
-        if not seconds or not self.duration > 0.0 or not np.isfinite(self.start):
+        if not seconds or not self.duration > 0.0 or not 0.0 <= self.start < math.inf:
             start, duration = (
                 shown(x) if isinstance(x, str) else escaped(x) for x in (self.start, self.duration)
             )
             raise ArgumentError(
-                f"{what} starts at {start} and lasts {duration}; wanted a finite and a positive number of "
-                "seconds"
+                f"{what} starts at {start} and lasts {duration}; wanted a finite number of seconds that is 0 "
+                "or more, and a positive one"
             )
 
     def checked(self, model: Model) -> ExternalForce:

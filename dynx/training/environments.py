@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-from dynx.envs.library import AutoresetMode, Env, GymnasiumError, make_env, make_vec_env, registry
-from dynx.envs.registration import is_of_dynx
+from dynx.envs.library import AutoresetMode, Env, GymnasiumError, make_env, make_vec_env
+from dynx.envs.registration import is_of_dynx, specification
 from dynx.errors import ArgumentError, DynxError
 from dynx.training.library import (
     CLIPPED_AT,
@@ -52,7 +52,7 @@ def make_vector(spec: TrainingSpec) -> VecEnv:
 
 
 def _steps_in_a_kernel(task: TaskSpec) -> bool:
-    known = registry.get(task.id)
+    known = specification(task.id)
     in_kernel = known is not None and known.vector_entry_point is not None
     return in_kernel and is_of_dynx(task.id) and task.engine == "compiled"
 

@@ -14,7 +14,7 @@ from dataclasses import replace
 from typing import Any
 
 from dynx.envs.library import registry
-from dynx.envs.registration import ENTRY_POINT
+from dynx.envs.registration import is_of_dynx
 from dynx.errors import ArgumentError, RobotNotFoundError, shown
 from dynx.model.library import find
 from dynx.training.specification import TaskSpec
@@ -50,8 +50,7 @@ def task_of_file(
             "task=TaskSpec(...))"
         )
     chosen = env_id or task.id
-    known = registry.get(chosen.rpartition(":")[2])
-    of_dynx = known is not None and known.entry_point == ENTRY_POINT
+    of_dynx = is_of_dynx(chosen)
     if task.engine is not None:
         _check_words("engine", task.engine, where)
     for name, value in task.options.items():

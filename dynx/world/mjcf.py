@@ -8,7 +8,9 @@ from typing import Any
 from dynx.argument_types import checks_types
 from dynx.engines.mujoco.materials import SETTINGS
 from dynx.engines.mujoco.mjcf import MjcfDocument
+from dynx.errors import UnknownBackendError, nearest, shown
 from dynx.steppers.layout import Layout
+from dynx.steppers.registry import world_names
 from dynx.steppers.settings import checked_settings
 from dynx.world.preparation import checked_options, may_be_reached, prepare
 from dynx.world.scene.scene import Scene
@@ -25,12 +27,14 @@ def scene_to_mjcf(
     joint_damping: bool = True,
     joint_friction: bool = True,
     joint_armature: bool = True,
+    engine: str = "mujoco",
     **settings: object,
 ) -> str:
     """Return a scene as an MJCF document, complete in itself: the model of its world in MuJoCo.
 
-    The options are those of `World`, with the settings of MuJoCo; `World.to_mjcf` has those of a world. The
-    step of the document is that of the engine, dt / substeps [s].
+    The options are those of `World`, with the settings of MuJoCo; `World.to_mjcf` has those of a world. Where
+    that runs in another `engine`, a comment says that solver and contacts are MuJoCo's. The step of the
+    document is that of the engine, dt / substeps [s].
 
     Links are bodies named ``robot/link``, bodies as in the scene, joints ``robot/joint``, free joints as the
     robot or body that they move, geoms by their part and number. A motor ``robot/joint`` applies its ctrl
@@ -52,13 +56,20 @@ def scene_to_mjcf(
         "joint_armature": joint_armature,
     }
     options = checked_options(dt, substeps, **switches)
-    return layout_to_mjcf(scene, prepare(scene, **switches), options, settings)
+    if engine not in world_names():
+        raise UnknownBackendError(f"no world engine {shown(engine)}{nearest(engine, world_names())}")
+    return layout_to_mjcf(scene, prepare(scene, **switches), options, settings, engine)
 
 
 def layout_to_mjcf(
-    scene: Scene, layout: Layout, options: Mapping[str, Any], settings: Mapping[str, object]
+    scene: Scene,
+    layout: Layout,
+    options: Mapping[str, Any],
+    settings: Mapping[str, object],
+    engine: str = "mujoco",
 ) -> str:
-    """Return the document of a prepared scene, with the options of a world and settings of MuJoCo.
+    """Return the document of a prepared scene, with the options of its world in an engine and settings of
+    MuJoCo.
 
     Raises the errors of `scene_to_mjcf`.
     """
@@ -66,15 +77,21 @@ def layout_to_mjcf(
     document = MjcfDocument(layout, h, checked_settings("mujoco", SETTINGS, settings))
     for refused in document.refused:
         raise refused.error
-    return document.text(_remarks(scene, layout, options))
+    return document.text(_remarks(scene, layout, options, engine))
 
 
-def _remarks(scene: Scene, layout: Layout, options: Mapping[str, Any]) -> Iterator[str]:
+def _remarks(scene: Scene, layout: Layout, options: Mapping[str, Any], engine: str) -> Iterator[str]:
     """Yield what a reader of the document must know, and what it cannot carry."""
     yield (
         "The world of dynx in MuJoCo. The ctrl of a motor is the torque that World.step takes for its joint; "
         "the keyframe 'start' is the start of the world; free joints are at centres of mass."
     )
+    if engine != "mujoco":
+        yield (
+            f"The world runs in {engine}. MJCF cannot carry its solver, contacts and settings: those of this "
+            "document are MuJoCo's, with their defaults unless they are given, so the motions differ where "
+            "parts touch."
+        )
     if options["substeps"] > 1:
         yield f"A step of the world, {options['dt']!r} s, is {options['substeps']} steps of the document."
     for number, robot in enumerate(scene.robots):

@@ -18,13 +18,13 @@ from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, UnknownNameError, shown
 from dynx.model import Model, Pose
 from dynx.model.geometry import Mesh
-from dynx.model.numbers import checked_bool, positive_seconds, whole_number
+from dynx.model.numbers import checked_bool, positive_seconds
 from dynx.model.package_search import StrPath
-from dynx.option_names import checks_option_names, refuse_options, right_name
+from dynx.option_names import as_object, checks_option_names, refuse_options, right_name
 from dynx.rbd.jacobians import LOCAL, checked_reference
 from dynx.registry import door, explains_names
 from dynx.spatial.scalar import Floats
-from dynx.steppers.clock import MAX_STEPS, refuse_too_many_steps
+from dynx.steppers.clock import MAX_STEPS, refuse_too_many_steps, step_count
 from dynx.steppers.forces import ExternalForce
 from dynx.steppers.layout import Layout, RobotLayout
 from dynx.steppers.materials import InexactMaterial, inexact_materials, open_engine
@@ -269,9 +269,12 @@ class World:
             refuse_options("step", wrong, World.step, {"wrenches": "forces"})
         engine = self._motion.ready or self._motion.engine
         if type(forces) is not tuple and not isinstance(forces, tuple | list):
-            raise ArgumentError(f"forces is of type {type(forces).__name__}; wanted a list of ExternalForce")
+            raise ArgumentError(
+                f"forces is of type {type(forces).__name__}; wanted a list of ExternalForce"
+                f"{as_object(forces, 'ExternalForce')}"
+            )
         if type(n) is not int or not 1 <= n <= MAX_STEPS:
-            n = whole_number("n", n, 1, MAX_STEPS)
+            n = step_count(n, "run(duration) takes the time")
         if self._scene_motors:
             motors = with_scene_motors(self._scene_motors, torques, motors)
         no_motors = motors is None or (type(motors) is dict and not motors)
@@ -475,12 +478,12 @@ class World:
         """Return the world at the start of its scene as an MJCF document (`scene_to_mjcf`), with its options.
 
         For a world in MuJoCo it is the model that runs; for one in another engine that of MuJoCo with its
-        default settings. Raises the errors of `scene_to_mjcf`.
+        default settings, as a comment in it says. Raises the errors of `scene_to_mjcf`.
         """
         from dynx.world.mjcf import layout_to_mjcf
 
         settings = self.settings if self.engine == "mujoco" else {}
-        return layout_to_mjcf(self.scene, self._layout, self.options, settings)
+        return layout_to_mjcf(self.scene, self._layout, self.options, settings, self.engine)
 
     @classmethod
     @checks_types

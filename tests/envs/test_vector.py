@@ -199,6 +199,26 @@ def test_any_partition_has_the_episodes_of_the_whole(sizes: tuple[int, ...], opt
     assert np.array_equal(np.concatenate(parts), run(0, n))
 
 
+@pytest.mark.parametrize("randomize", [None, DRAWN_POLE])
+def test_each_environment_may_have_a_seed_of_its_own(randomize: Any) -> None:
+    seeds = [41, 3, 20]
+    many = RobotVectorEnvironment(CartPole(), 3, randomize=randomize)
+    observations, _ = many.reset(seed=seeds)
+    for k, seed in enumerate(seeds):
+        alone = RobotVectorEnvironment(CartPole(), 1, randomize=randomize)
+        assert np.array_equal(alone.reset(seed=seed)[0][0], observations[k])
+    counted = many.reset(seed=np.int64(7))[0]
+    assert np.array_equal(counted, many.reset(seed=[7, 8, 9])[0])
+    assert np.array_equal(counted, many.reset(seed=7)[0])
+
+
+@pytest.mark.parametrize("seed", [-1, 0.5, "7", True, [1, 2], [1, 2, -3], [1, 2, None], [[1], [2], [3]]])
+def test_another_seed_is_an_error_of_dynx(seed: Any) -> None:
+    many = RobotVectorEnvironment(CartPole(), 3)
+    with pytest.raises(ArgumentError, match="seed"):
+        many.reset(seed=seed)
+
+
 @pytest.mark.parametrize("count", [1, 40])
 def test_cart_poles_start_as_those_of_gymnasium(count: int) -> None:
     ours = RobotVectorEnvironment(CartPole(), count, autoreset_mode="Disabled")

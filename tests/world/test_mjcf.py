@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 import dynx
 from dynx import Model, Pose
+from dynx.cli.shell.main import cli
 from dynx.errors import ArgumentError, EngineLimitError, UnknownNameError, UnsupportedFeatureError
 from dynx.model import Inertial, Link
 from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, Sphere
@@ -29,6 +31,7 @@ from dynx.world import (
     scene_names,
     scene_to_mjcf,
     sphere,
+    world_names,
 )
 from dynx.world.scene.robots import LinkFrames
 from tests.world.materials import four_materials
@@ -363,13 +366,27 @@ def test_recorded_torques_move_a_scene_in_mujoco_alone_as_in_the_world(name: str
     assert not differing
 
 
+@pytest.mark.parametrize("engine", world_names())
+def test_a_document_names_the_engine_whose_contacts_it_lacks(engine: str, tmp_path: Path) -> None:
+    scene, remark = read_scene("stack"), f"The world runs in {engine}. MJCF cannot carry its solver"
+    with World(scene, engine) as world:
+        text = world.to_mjcf()
+    assert (remark in text) == (engine != "mujoco")
+    assert text.partition("<mujoco")[2] == scene_to_mjcf(scene).partition("<mujoco")[2]
+    file = tmp_path / "scene.xml"
+    result = CliRunner().invoke(cli, ["world", "stack", "--export", str(file), "--engine", engine])
+    assert result.exit_code == 0, result.output
+    assert (remark in file.read_text()) == (engine != "mujoco")
+
+
 def test_a_document_of_a_scene_is_that_of_its_world() -> None:
     scene = scene_of(4)
     with World(scene, "mujoco", 2e-3, substeps=2, joint_friction=False, impratio=7.0) as world:
         expected = world.to_mjcf()
     assert scene_to_mjcf(scene, 2e-3, substeps=2, joint_friction=False, impratio=7.0) == expected
     with World(scene, "pybullet", 2e-3, substeps=2, joint_friction=False) as world:
-        assert world.to_mjcf() == scene_to_mjcf(scene, 2e-3, substeps=2, joint_friction=False)
+        other = world.to_mjcf()
+    assert other == scene_to_mjcf(scene, 2e-3, substeps=2, joint_friction=False, engine="pybullet")
     with pytest.raises(UnknownNameError, match="has no setting 'impratioo'; did you mean 'impratio'"):
         scene_to_mjcf(scene, impratioo=1.0)
     with pytest.raises(ArgumentError, match="joint_friction is '1'"):

@@ -159,8 +159,8 @@ def doctor() -> None:
     that was read is changed only with --in-place. Other files named as outputs are replaced where they exist.
 
     Exit code 0 if no engine differs (or only as the baseline allows, or a baseline was written), 1 if
-    some differ, 2 if some robot cannot be used (the others are examined nevertheless). Ctrl-C ends the
-    run with the results so far and exit code 130.
+    some differ on the file as it was read, mended or not, 2 if some robot cannot be used (the others are
+    examined nevertheless). Ctrl-C ends the run with the results so far and exit code 130.
 
     \b
     Examples:

@@ -32,14 +32,16 @@ def env() -> None:
 
 
 @env.command("list")
+@click.argument("modules", nargs=-1, metavar="[MODULE...]")
 @json_option
 @runs("dynx.cli.learning.env:list_tasks")
 def list_tasks() -> None:
-    """List the tasks of dynx: id, engines, spaces, time limit.
+    """List the tasks of dynx, and those that each MODULE of yours registers: id, engines, time limit.
 
     \b
     Examples:
       dynx env list
+      dynx env list my_tasks
       dynx env list --json
     """
 
@@ -91,6 +93,8 @@ def list_tasks() -> None:
 @runs("dynx.cli.learning.env:distance")
 def distance() -> None:
     """Run a task with the same seeds and the same actions on several engines, and tell where they part.
+
+    TASK is a task of dynx (`dynx env list`), or one of your own as module:Env-v0, whose module is imported.
 
     For every two engines: in how many episodes the observations part by more than the tolerance, after how
     many steps, by how much at most, and the returns. With --policy also a table: each policy, trained on one

@@ -139,9 +139,11 @@ def _pair(measurement: EngineDistance, episodes: Sequence[EpisodeDifference]) ->
     }
 
 
-def policy_entry(path: str, engines: Sequence[str], options: dict[str, Any], episodes: int) -> PolicyEntry:
-    """Load a policy, run `episodes` of its task on each engine, and return its returns as an entry of the
-    document of ``dynx env``."""
+def policy_entry(
+    path: str, env_id: str, engines: Sequence[str], options: dict[str, Any], episodes: int
+) -> PolicyEntry:
+    """Load a policy, run `episodes` of its task, which is `env_id`, on each engine, and return its returns as
+    an entry of the document of ``dynx env``."""
     # Imports PyTorch.
     from dynx.training import TaskSpec, load_policy
     from dynx.training.file_tasks import task_of_file
@@ -151,7 +153,7 @@ def policy_entry(path: str, engines: Sequence[str], options: dict[str, Any], epi
     rows: list[ReturnEntry] = []
     trained_on = None
     for engine in engines:
-        task = task_of_file(read_policy_document(path).spec.task, path, options)
+        task = task_of_file(read_policy_document(path).spec.task, path, options, env_id)
         trained_on = task.engine
         task = TaskSpec(task.id, engine, task.options)
         policy = load_policy(path, task)

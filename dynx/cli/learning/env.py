@@ -15,7 +15,7 @@ from dynx.cli.shell.tables import Table
 from dynx.envs.distance import engine_distance
 from dynx.envs.environment import Act
 from dynx.envs.library import make_env, registry
-from dynx.envs.registration import NAMESPACE, is_of_dynx, task_class, task_id
+from dynx.envs.registration import bare_id, import_tasks, is_of_dynx, task_class, task_id
 from dynx.errors import ArgumentError, shown
 
 
@@ -36,7 +36,7 @@ def distance(
     env_id = task_id(task)
     if not is_of_dynx(env_id):
         raise ArgumentError(f"{env_id} runs on one engine, its own; wanted a task of dynx (dynx env list)")
-    chosen = engines or task_class(registry[env_id].kwargs["task"]).engines()
+    chosen = engines or task_class(env_id).engines()
     given = {name: json_value(word) for name, word in options}
     numbers = seeds or tuple(range(10))
     act = _first_policy(policies, env_id, chosen[0])
@@ -55,7 +55,7 @@ def distance(
             )
         with progress_bar(len(policies) * len(chosen), words="judged", enabled=not quiet) as advance:
             for path in policies:
-                judged.append(policy_entry(path, chosen, given, episodes))
+                judged.append(policy_entry(path, env_id, chosen, given, episodes))
                 advance(len(judged) * len(chosen), "judged")
         interruption.finishing = True
         made = distance_document(env_id, given, found, judged)
@@ -74,7 +74,7 @@ def _first_policy(policies: tuple[str, ...], env_id: str, engine: str) -> Act | 
     found = []
     for path in policies:
         trained_on = read_policy_document(path).spec.task.id
-        if trained_on != env_id:
+        if bare_id(trained_on) != bare_id(env_id):
             raise ArgumentError(f"{path} is a policy for {shown(trained_on)}, not for {env_id}")
         found.append(load_policy(path, TaskSpec(env_id, engine)))
     return found[0]
@@ -127,12 +127,12 @@ def _show_policies(out: Console, report: Entry) -> None:
     out.print(table)
 
 
-def list_tasks(json_path: str | None) -> int:
-    """List the registered tasks of dynx; return the exit code."""
+def list_tasks(modules: tuple[str, ...], json_path: str | None) -> int:
+    """List the registered tasks, those of some modules included; return the exit code."""
+    for module in modules:
+        import_tasks(module)
     entries: list[TaskEntry] = [
-        _task_entry(each)
-        for name, each in sorted(registry.items())
-        if name.startswith(f"{NAMESPACE}/") and "task" in each.kwargs
+        _task_entry(each) for name, each in sorted(registry.items()) if is_of_dynx(name)
     ]
     document: TasksDocument = {"schema": "dynx.tasks/1", "tasks": entries}
     if write_json(document, json_path):

@@ -17,6 +17,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from dynx.errors import ArgumentError, shown
+from dynx.option_names import as_object
 from dynx.registry import DEFAULT_ENGINE
 
 if TYPE_CHECKING:
@@ -184,7 +185,8 @@ class Parts(Kind):
         given = () if value is None else value
         parts = tuple(given) if isinstance(given, Iterable) else (given,)
         if not all(isinstance(each, known) for each in parts):
-            raise ArgumentError(f"{name} is {shown(given)}; wanted {self.values}")
+            clause = as_object(given, self.part_class.__name__)
+            raise ArgumentError(f"{name} is {shown(given)}; wanted {self.values}{clause}")
         return parts
 
 

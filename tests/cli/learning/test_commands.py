@@ -105,6 +105,43 @@ def test_distance_of_engines_and_transfer_of_a_policy(folder: Path) -> None:
     assert "trained on" in shown.output
 
 
+OWN = """
+from dynx.envs import register_task
+from dynx.envs.tasks.pendulum import Pendulum
+
+class Swing(Pendulum):
+    \"\"\"Swing up a pendulum.\"\"\"
+
+    max_episode_steps = 30
+
+register_task("own/Swing-v0", Swing)
+"""
+
+
+def test_a_task_of_a_module_is_trained_played_and_compared(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "swings_of_a_test.py").write_text(OWN)
+    monkeypatch.syspath_prepend(tmp_path)
+    task, policy = "swings_of_a_test:own/Swing-v0", str(tmp_path / "run" / "final.zip")
+    assert "own/Swing-v0" in run("env", "list", "swings_of_a_test").output
+    options = ("--engine", "reference", "--steps", "64", "--out", str(tmp_path / "run"))
+    trained = run("train", task, *options, *FEW)
+    assert trained.exit_code == 0, trained.output
+    unnamed = run("play", policy)  # a file imports nothing
+    assert unnamed.exit_code == 2
+    assert "name the task yourself: --task" in unnamed.output
+    played = run("play", policy, "--task", task, "--engine", "compiled", "--episodes", "1", "--json")
+    assert played.exit_code == 0, played.output
+    engines = ("--engine", "reference,compiled", "--seed", "0", "--steps", "30")
+    apart = run("env", "distance", task, *engines, "--policy", policy, "--episodes", "1", "--json")
+    assert apart.exit_code == 0, apart.output
+    found: dict[str, Any] = json.loads(apart.stdout)
+    assert found["pairs"][0]["largest"] < 1e-9
+    alone = found["policies"][0]["engines"][1]["mean"]
+    assert json.loads(played.stdout)["engines"][0]["mean"] == alone
+
+
 def test_the_list_names_tasks_and_engines() -> None:
     result = run("env", "list")
     assert result.exit_code == 0, result.output
