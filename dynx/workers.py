@@ -16,6 +16,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -28,6 +29,9 @@ MAX_START_TIME = 120.0
 """Time limit of the start of a process and of the imports of its target [s], unless that of a task is longer.
 
 It is not part of the first task's time: imports of engines take seconds on a busy machine."""
+
+MAX_SIGNAL_DELAY = 0.5
+"""Longest time [s] for which a signal to the waiting process can go unnoticed."""
 
 FailureKind = Literal["crash", "timeout", "defect"]
 
@@ -109,7 +113,7 @@ class Workers:
         for thread in threads:
             thread.start()
         for _ in tasks:
-            yield outcomes.get()
+            yield _next(outcomes)
         # Their workers are then idle, and the next call takes them.
         for thread in threads:
             thread.join()
@@ -176,6 +180,17 @@ class Workers:
         worker.end()
         with self._lock:
             self._alive.discard(worker)
+
+
+def _next(outcomes: queue.SimpleQueue[WorkerResult]) -> WorkerResult:
+    """Wait for an outcome, and for Ctrl-C.
+
+    A wait without a limit does not notice a signal that arrives as it begins, or that another thread
+    receives.
+    """
+    while True:
+        with suppress(queue.Empty):
+            return outcomes.get(timeout=MAX_SIGNAL_DELAY)
 
 
 class _Worker:

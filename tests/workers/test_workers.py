@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 import time
 
 import pytest
@@ -71,6 +73,16 @@ def test_leaving_ends_what_is_under_way() -> None:
     with Workers(act, 2) as workers:
         running = workers.run(["hang", "a", "hang"])
         next(running)
+    assert time.monotonic() - started < 30.0
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_kill"), reason="no signal to one thread")
+def test_ctrl_c_is_noticed_where_another_thread_receives_it() -> None:
+    started = time.monotonic()
+    timer = threading.Timer(0.5, lambda: signal.pthread_kill(threading.get_ident(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(KeyboardInterrupt), Workers(act, 1, timeout=60.0) as workers:
+        list(workers.run(["hang"]))
     assert time.monotonic() - started < 30.0
 
 
