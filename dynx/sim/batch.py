@@ -716,6 +716,11 @@ def refuse_uncompiled(scenario: Scenario) -> None:
         value = getattr(scenario, name)
         if value not in possible:
             raise ArgumentError(f"{name} is {shown(value)}; in a batch it is {shown(possible[0])}")
+    if scenario.sensors != ():
+        raise ArgumentError(
+            "sensors were given, and a batch records no accelerations: simulate(..., noise=Noise(rollout=k)) "
+            "has the readings of its rollout k"
+        )
     for name in ("controller", "reference"):
         if getattr(scenario, name) is None:
             raise ArgumentError(f"{name} is None; a batch needs one")

@@ -61,6 +61,8 @@ class Setup:
             check_controller(scenario.model, controller, clock)
         require_memory(f"{clock.n_steps} steps", clock.n_steps * step_bytes(scenario.model, controller))
         moved = plant_model(scenario.model, scenario.payloads, scenario.mass_scale)
+        if isinstance(scenario.plant, ScenePlant) and moved.gravity != scenario.plant.scene.gravity:
+            moved = moved.with_gravity(scenario.plant.scene.gravity)
         setpoint_of = checked_reference(
             scenario.model, scenario.reference, within_limits=scenario.check_reference
         )

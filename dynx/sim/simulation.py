@@ -114,6 +114,13 @@ class Simulation:
         self._progress = progress
         setpoints = setpoints_of(setup.setpoint_of, clock, setup.controller)
         sensors = Sensors(scenario.model, clock, scenario.noise, setup.controller)
+        if scenario.sensors != () or (
+            isinstance(scenario.plant, ScenePlant) and scenario.plant.scene.sensors
+        ):
+            # Imported here, because most simulations have none.
+            from dynx.sim.record.sensing import check_sensors
+
+            check_sensors(scenario, setup.model)
         self._plant = make_plant(
             scenario.plant,
             setup.model,
@@ -637,7 +644,8 @@ def simulate(given: SimulateArguments) -> Rollout:
     stops (`dynx.steppers.joint_stops`); `pushes` are external wrenches.
 
     **Model error.** The plant has a `payload` and masses scaled by `mass_scale` (all links, or some) that the
-    controller does not know; `noise` is added to the measurements.
+    controller does not know; `noise` is added to the measurements. `sensors` and those of a scene are read
+    after the simulation (`Rollout.sensors`); controllers do not use them.
 
     **Resuming.** With `resume` the first `step` steps (by default all) are taken from that record and the
     rest is computed, with the same result as one run, to the last bit. The record's scenario must be equal to

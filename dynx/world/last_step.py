@@ -20,6 +20,7 @@ from dynx.steppers.state import WorldState
 from dynx.steppers.stepper import Stepper
 from dynx.world.commands import Act, Commands
 from dynx.world.contacts import Contact
+from dynx.world.sensors.motion import RobotMotion
 
 if TYPE_CHECKING:
     from dynx.world.constraint_wrenches import Reactions
@@ -120,7 +121,28 @@ class LastStep:
     ) -> Floats:
         """Return `joint_wrenches` or `base_wrench` of a robot in the step, which led to the state `after`."""
         k = self.number(robot)
+        motion = self.instant(k, engine, after, contacts)
+        forces = {frame: wrench[0] for frame, wrench in motion.external_forces.items()}
+        method = getattr(self._engines[k], quantity)
+        state = motion.q[0], motion.v[0], motion.a[0]
+        found: Floats = method(*state, external_forces=forces, force_reference="world", **options)
+        return found
+
+    def instant(
+        self, k: int, engine: Stepper, after: WorldState, contacts: Sequence[Contact] | None
+    ) -> RobotMotion:
+        """Return robot k as the step began, which led to the state `after`, with the wrenches of contacts,
+        external forces and constraints; without any where `contacts` is None."""
         q, v = self._begun.robots[self._layout.robots[k].name]
+        forces = {} if contacts is None else self._all_wrenches(k, engine, after, contacts)
+        rows = {frame: wrench[None] for frame, wrench in forces.items()}
+        return RobotMotion(self._models[k], q[None], v[None], self._acceleration(k, after)[None], rows)
+
+    def _all_wrenches(
+        self, k: int, engine: Stepper, after: WorldState, contacts: Sequence[Contact]
+    ) -> dict[str, Floats]:
+        """Return the wrenches (6,) on the frames of a robot, about the origin of the world in its axes."""
+        q, _ = self._begun.robots[self._layout.robots[k].name]
         forces = self._contact_forces(k, contacts)
         for frame, force, share in self._commands.on_frames(k):
             T = self._engines[k].forward_kinematics(q, frame)
@@ -128,10 +150,7 @@ class LastStep:
         if self._ties:
             for link, wrench in self.reactions(engine, after, contacts).on_links(k):
                 _add(forces, link, wrench)
-        method = getattr(self._engines[k], quantity)
-        a = self._acceleration(k, after)
-        found: Floats = method(q, v, a, external_forces=forces, force_reference="world", **options)
-        return found
+        return forces
 
     def reactions(self, engine: Stepper, after: WorldState, contacts: Sequence[Contact]) -> Reactions:
         """Return the wrenches of constraints and the torques of joint limits in the step, which led to the

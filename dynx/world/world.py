@@ -50,6 +50,8 @@ if TYPE_CHECKING:
     from dynx.world.contact_interval import ContactInterval
     from dynx.world.last_step import LastStep
     from dynx.world.queries import Queries
+    from dynx.world.sensing import WorldSensors
+    from dynx.world.sensors.readings import Reading
 
 
 def scene_at(scene: Scene, state: WorldState) -> Scene:
@@ -156,9 +158,9 @@ class World:
     and `joint_armature` are those of the robots' descriptions; joint dynamics that the engine does not have
     are computed outside of it. Without `collisions` nothing touches. `settings` are those of the engine
     (`World.settings`); docs/world.md lists them. With `keep_last_step` the state before each step of the
-    engine is kept, from which `joint_wrenches` and `base_wrench` follow; with `contact_interval` [s] the
-    contacts of each step of the engine are summed, of which `mean_contacts` gives the mean over that time.
-    A step then takes longer.
+    engine is kept, from which `joint_wrenches` and `base_wrench` follow, as it is for a scene with sensors;
+    with `contact_interval` [s] the contacts of each step of the engine are summed, of which `mean_contacts`
+    gives the mean over that time. A step then takes longer.
 
     A world is closed by `close` or at the end of a ``with`` block. Arguments are checked before the engine
     gets them, and a call that raises an error leaves the state as it was.
@@ -211,11 +213,23 @@ class World:
         self._identity: str | None = None
         self._motion = Motion(self._layout, self._commands, self._build, self.dt, self.substeps)
         self._last_step: LastStep | None = None
-        if keep_last_step:
+        self._sensors: WorldSensors | None = None
+        if keep_last_step or scene.sensors:
             # Imported here, because most worlds do not need it.
             from dynx.world.last_step import LastStep
 
             self._last_step = LastStep(self._layout, self._in_engine, self._commands, self.dt / self.substeps)
+        if scene.sensors and self._last_step is not None:
+            from dynx.world.sensing import WorldSensors
+
+            self._sensors = WorldSensors(
+                self._layout,
+                scene.sensors,
+                self.dt / self.substeps,
+                self._last_step,
+                lambda: self._motion.time,
+                lambda engine: self._queries.contacts(engine),
+            )
         self._contact_interval: ContactInterval | None = None
         if contact_interval is not None:
             from dynx.world.contact_interval import ContactInterval
@@ -225,7 +239,9 @@ class World:
             refuse_too_many_steps("contact_interval", seconds, h)
             names = [collider.name for collider in self._layout.colliders]
             self._contact_interval = ContactInterval(names, steps_in(seconds, h))
-        self._watchers = [each for each in (self._last_step, self._contact_interval) if each is not None]
+        # Sensors read what the last step keeps before it keeps the next one.
+        watchers = (self._last_step, self._sensors, self._contact_interval)
+        self._watchers = [each for each in watchers if each is not None]
         """What is read around every step of the engine."""
         at_start = notes_on_start(self._motion.engine, self._motion.state)
         self.notes: tuple[str, ...] = (*at_start, *self._lasting_notes(settings))
@@ -288,6 +304,8 @@ class World:
             act = watcher.watched(act)
         try:
             self._motion.advance(engine, n, act=act)
+            if self._sensors is not None:
+                self._sensors.complete(engine)
         except BaseException:
             self._forget_steps()
             raise
@@ -380,6 +398,16 @@ class World:
     def _reactions(self) -> Reactions:
         step, engine = self._kept_step(), self._motion.engine
         return step.reactions(engine, self.state, self.contacts())
+
+    def read_sensors(self) -> dict[str, Reading]:
+        """Return the last reading of each sensor of the scene, by name.
+
+        A sample is taken at the beginning of a step of the engine and can be read after that step, or its
+        delay later; until the next one it is held. A sensor without a reading yet, since the state was set or
+        restored, is absent.
+        """
+        _ = self._motion.engine
+        return {} if self._sensors is None else self._sensors.readings(self.time)
 
     def _wrenches(self, quantity: str, robot: str | None, frame: str | None, reference: str) -> Floats:
         step, engine = self._kept_step(), self._motion.engine

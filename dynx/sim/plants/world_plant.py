@@ -221,14 +221,15 @@ class WorldPlant(Plant):
 
 
 def _scene_of(place: ScenePlant, model: Model, disturbances: Disturbances) -> Scene:
-    """Return the scene with the robot's masses and joint dynamics as the simulation has them."""
+    """Return the scene with the robot's masses and joint dynamics as the simulation has them, and without
+    sensors, whose readings follow from the record."""
     # A payload is a link more, without shapes.
     geometry = Geometry(place.scene_robot.model.geometry.links).for_links(link.name for link in model.links)
     moved = replace(with_joint_dynamics(model, disturbances), geometry=geometry)
     robots = tuple(
         replace(robot, model=moved) if robot.name == place.robot else robot for robot in place.scene.robots
     )
-    return replace(place.scene, robots=robots)
+    return replace(place.scene, robots=robots, sensors=())
 
 
 def with_joint_dynamics(model: Model, disturbances: Disturbances) -> Model:

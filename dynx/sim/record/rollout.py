@@ -229,6 +229,19 @@ class Rollout:
             force_reference="world",
         )
 
+    @cached_property
+    def sensors(self) -> Mapping[str, Readings]:
+        """Readings of the sensors of the scenario and of its scene, by name.
+
+        They follow from the recorded motion, so that no file has more than the scenario for them. A sensor of
+        the scene on another robot, whose acceleration is not recorded, raises UnsupportedFeatureError.
+        """
+        return self._read_own_sensors()
+
+    @door("dynx.sim.record.sensing:read_own_sensors")
+    def _read_own_sensors(self) -> Mapping[str, Readings]:
+        raise NotImplementedError
+
     @door("dynx.sim.record.sensing:read_sensors")
     def read_sensors(self, sensors: Sensor | Iterable[Sensor]) -> dict[str, Readings]:
         """Return the readings of sensors along the recorded motion, by their names."""

@@ -43,7 +43,7 @@ Document = Any
 """Value that `json.dumps` accepts."""
 
 FINGERPRINT, CLASS, MODEL, ARRAY, CONTROLLER = "fingerprint", "class", "model", "array", "controller"
-SCENE = "scene"
+SCENE, SENSOR = "scene", "sensor"
 
 _ROOMS_ABOVE = frozenset(
     ("__main__", "agreement", "bench", "cli", "contacts", "doctor", "rules", "testing", "training", "viewer")
@@ -140,6 +140,10 @@ def encode(value: Any, model: Model | None = None) -> Document:
         from dynx.world.scene.documents import scene_document
 
         return {SCENE: scene_document(value)}
+    if _is_sensor(value):
+        from dynx.world.scene.documents import document_of_sensor
+
+        return {SENSOR: document_of_sensor(value)}
     if isinstance(value, Controller):
         document = _controller(value, model)
         if document is not None:
@@ -189,6 +193,8 @@ def in_words(document: Document) -> str:
             return f"{name}({given})"
         if document == SAME_MODEL or MODEL in document:
             return "of the scenario's model" if document == SAME_MODEL else "of another model"
+        if SENSOR in document:
+            return f"the sensor {shown(document[SENSOR].get('name', ''))}"
         if SCENE in document:
             return f"the scene {shown(document[SCENE].get('name', 'scene'))}"
         for kind in (ARRAY, "float", "mapping"):
@@ -238,6 +244,10 @@ def _decoded(document: Document, model: Model | None) -> Any:
         from dynx.world.scene.documents import scene_from_document
 
         return scene_from_document(document[SCENE])
+    if SENSOR in document:
+        from dynx.world.scene.documents import sensor_of_document
+
+        return sensor_of_document(document[SENSOR])
     if MODEL in document:
         return robot_from_document(document[MODEL])
     if FINGERPRINT in document:
@@ -306,6 +316,12 @@ def _is_declared(value: Any) -> bool:
     if "__dataclass_fields__" not in vars(type(value)):
         return False
     return set(getattr(value, "__dict__", ())) <= {each.name for each in fields(value)}
+
+
+def _is_sensor(value: object) -> bool:
+    # A sensor exists only where its module is imported, which most scenarios do not need.
+    module = sys.modules.get("dynx.world.sensors.sensor")
+    return module is not None and isinstance(value, module.Sensor)
 
 
 def _controller(controller: Controller[Any], model: Model | None) -> Document | None:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from dynx.sim.noise import Noise
     from dynx.sim.plants.scene_plant import ScenePlant
     from dynx.steppers.forces import ExternalForce
+    from dynx.world.sensors.sensor import Sensor
 
 T = TypeVar("T")
 
@@ -190,6 +191,14 @@ class Parts(Kind):
         return parts
 
 
+class SensorParts(Parts):
+    """Sensors, whose classes are imported only for simulations that have some."""
+
+    def checked(self, name: str, value: Any, model: Model) -> Any:
+        """Return the sensors as a tuple."""
+        return value if value == () else super().checked(name, value, model)
+
+
 class Factors(Kind):
     """One factor, or factors by the name of a link."""
 
@@ -238,6 +247,11 @@ PAYLOADS = Parts(
 )
 PUSHES = Parts(
     "an ExternalForce, or a list of them", list[dict[str, Any]], "dynx.steppers.forces:ExternalForce"
+)
+SENSORS = SensorParts(
+    "a sensor, such as dynx.world.Imu, or a list of them",
+    list[dict[str, Any]],
+    "dynx.world.sensors.sensor:Sensor",
 )
 INTEGRATOR = Choice("a name", str, "dynx.sim.plants.registry:INTEGRATORS")
 METHOD = Choice("a name", str, "dynx.steppers.integrators:METHODS")
@@ -465,6 +479,13 @@ class SimulationOptions:
     )
     pushes: ExternalForce | Sequence[ExternalForce] = option(
         (), "External force [N] and moment [N m] on a frame", kind=PUSHES, group=JOINTS, flag="push"
+    )
+    sensors: Sensor | Sequence[Sensor] = option(
+        (),
+        "Sensors of the robot, which `Rollout.sensors` reads; controllers do not",
+        kind=SENSORS,
+        group=ERRORS,
+        flag="-",
     )
     check_reference: bool = option(
         True,

@@ -11,7 +11,7 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
 
@@ -44,11 +44,16 @@ from dynx.world.scene.paths import ScenePaths
 from dynx.world.scene.robots import SceneRobot
 from dynx.world.scene.scene import Scene
 
+if TYPE_CHECKING:
+    from dynx.world.sensors.sensor import Sensor
+
 Vector = list[float]
 Numbers = float | list[float]
 
 SCHEMA: Literal["dynx.scene/1"] = "dynx.scene/1"
 """Name and version of the layout of a scene's document."""
+
+SensorKind = Literal["force_torque", "imu", "joint_torque", "encoder", "contact", "ray"]
 
 MotorKind = Literal["position", "velocity", "pd", "torque"]
 
@@ -170,6 +175,46 @@ class ConstraintDocument:
 
 
 @dataclass
+class SensorErrorsDocument:
+    """Errors of one measured vector; see `dynx.world.SensorErrors`."""
+
+    noise: Numbers = 0.0
+    noise_density: Numbers = 0.0
+    bias: Numbers = 0.0
+    random_walk: Numbers = 0.0
+    scale: Numbers = 0.0
+    cross_axis: float | list[Vector] = 0.0
+    resolution: Numbers = 0.0
+    saturation: Numbers | None = None
+
+
+@dataclass
+class SensorDocument:
+    """A sensor `on` a part; see `dynx.world.Imu` and its siblings.
+
+    `force`, `torque`, `accelerometer`, `gyroscope`, `position`, `velocity` and `distance` are the errors of
+    what it measures.
+    """
+
+    kind: SensorKind
+    name: str
+    on: str
+    rate: float | None = None
+    delay: float | None = None
+    seed: int | None = None
+    pose: Vector | None = None
+    weight: bool | None = None
+    length: float | None = None
+    force: SensorErrorsDocument | None = None
+    torque: SensorErrorsDocument | None = None
+    accelerometer: SensorErrorsDocument | None = None
+    gyroscope: SensorErrorsDocument | None = None
+    position: SensorErrorsDocument | None = None
+    velocity: SensorErrorsDocument | None = None
+    distance: SensorErrorsDocument | None = None
+
+
+@dataclass
 class SceneDocument:
     """A scene; see `dynx.world.Scene`."""
 
@@ -181,6 +226,7 @@ class SceneDocument:
     constraints: list[ConstraintDocument] = field(default_factory=list)
     ignored: list[list[str]] = field(default_factory=list)
     groups: dict[str, list[str]] = field(default_factory=dict)
+    sensors: list[SensorDocument] = field(default_factory=list)
 
 
 # -- reading --------------------------------------------------------------------------------------
@@ -209,6 +255,10 @@ def scene_from_document(document: object, paths: ScenePaths | None = None) -> Sc
     for k, constraint in enumerate(given.constraints):
         with _place(f"constraints[{k}]"):
             constraints.append(_constraint(constraint))
+    sensors = []
+    for k, sensor in enumerate(given.sensors):
+        with _place(f"sensors[{k}], {shown(sensor.name)}"):
+            sensors.append(_sensor(sensor))
     return Scene(
         given.name,
         tuple(robots),
@@ -217,6 +267,7 @@ def scene_from_document(document: object, paths: ScenePaths | None = None) -> Sc
         given.ignored,
         given.groups,
         given.gravity,
+        tuple(sensors),
     )
 
 
@@ -297,18 +348,42 @@ def _coordinates(
 
 def _motor(k: int, given: MotorDocument) -> Motor:
     kind = MOTORS[given.kind]
+    return kind(**_arguments(f"motors[{k}]", kind, given))
+
+
+def _arguments(what: str, kind: type[Any], given: MotorDocument | SensorDocument) -> dict[str, Any]:
+    """Return the fields of a document as the arguments of its class, all of which it must have."""
     values = {each.name: getattr(given, each.name) for each in fields(given) if each.name != "kind"}
     values = {name: value for name, value in values.items() if value is not None}
     wanted = {each.name: each for each in fields(kind)}
     for name in values:
         if name not in wanted:
-            raise ArgumentError(
-                f"motors[{k}] of kind {given.kind!r} has no {name}; it has {', '.join(wanted)}"
-            )
+            raise ArgumentError(f"{what} of kind {given.kind!r} has no {name}; it has {', '.join(wanted)}")
     for name, each in wanted.items():
         if each.default is MISSING and name not in values:
-            raise ArgumentError(f"motors[{k}] of kind {given.kind!r} lacks {name}")
-    return kind(**values)
+            raise ArgumentError(f"{what} of kind {given.kind!r} lacks {name}")
+    return values
+
+
+def sensor_of_document(document: object) -> Sensor:
+    """Return the sensor of a document that `document_of_sensor` made; ArgumentError for any other."""
+    return _sensor(convert_document(document, SensorDocument))
+
+
+def _sensor(given: SensorDocument) -> Sensor:
+    # Imported here, because most scenes have none.
+    from dynx.world.sensors.errors import SensorErrors
+    from dynx.world.sensors.kinds import KINDS
+
+    values = _arguments("a sensor", KINDS[given.kind], given)
+    for name, value in values.items():
+        if isinstance(value, SensorErrorsDocument):
+            errors = {each.name: getattr(value, each.name) for each in fields(value)}
+            values[name] = SensorErrors(**{key: each for key, each in errors.items() if each is not None})
+    if "pose" in values:
+        values["pose"] = _pose("pose", values["pose"])
+    found: Sensor = KINDS[given.kind](**values)
+    return found
 
 
 def _body(given: BodyDocument, paths: ScenePaths) -> SceneBody:
@@ -425,6 +500,7 @@ def scene_document(scene: Scene, paths: ScenePaths | None = None) -> dict[str, A
             [_constraint_document(each) for each in scene.constraints],
             [list(pair) for pair in scene.ignored],
             {name: list(members) for name, members in scene.groups},
+            [_sensor_document(each) for each in scene.sensors],
         )
     )
     return written
@@ -477,6 +553,31 @@ def _motor_document(motor: Motor) -> MotorDocument:
         raise ArgumentError(f"a {type(motor).__name__} cannot be written to a file of a scene")
     given: dict[str, Any] = {each.name: getattr(motor, each.name) for each in fields(motor)}
     return MotorDocument(_MOTOR_KINDS[type(motor)], **given)
+
+
+def document_of_sensor(sensor: Sensor) -> dict[str, Any]:
+    """Return the document of a sensor, from which `sensor_of_document` makes an equal one."""
+    written: dict[str, Any] = _without_defaults(_sensor_document(sensor))
+    return written
+
+
+def _sensor_document(sensor: Sensor) -> SensorDocument:
+    given: dict[str, Any] = {}
+    for each in fields(sensor):
+        value = getattr(sensor, each.name)
+        if value == each.default:
+            continue
+        given[each.name] = _pose_document(value) if isinstance(value, Pose) else value
+        if each.name in {channel.errors for channel in sensor.channels}:
+            errors = {part.name: getattr(value, part.name) for part in fields(value)}
+            given[each.name] = SensorErrorsDocument(
+                **{
+                    name: number
+                    for name, number in errors.items()
+                    if not (name == "saturation" and np.all(np.isinf(number)))
+                }
+            )
+    return SensorDocument(cast(SensorKind, sensor.kind), **given)
 
 
 def _body_document(body: SceneBody, paths: ScenePaths) -> BodyDocument:

@@ -25,6 +25,7 @@ from dynx.world.scene.robots import WORLD, SceneRobot, checked_name, checked_pai
 
 if TYPE_CHECKING:
     from dynx.distance.avoidance import Avoidance
+    from dynx.world.sensors.sensor import Sensor
 
 MARGIN = 0.01
 """Distance [m] that is kept where no other margin is given."""
@@ -38,7 +39,7 @@ class Scene:
     A part is named by its body, its robot, or ``robot/link``. `ignored` are pairs of names that do not
     collide, where a robot stands for all its links and a name in `groups` for all its members; a pair of one
     name twice makes the parts behind it ignore one another. Gravity (3,) [m/s^2] is that of the scene, not of
-    the models.
+    the models. `sensors` are read by `World.read_sensors`.
     """
 
     name: str = "scene"
@@ -48,6 +49,7 @@ class Scene:
     ignored: tuple[tuple[str, str], ...] = ()
     groups: tuple[tuple[str, tuple[str, ...]], ...] = ()
     gravity: Vector = STANDARD_GRAVITY
+    sensors: tuple[Sensor, ...] = ()
 
     if TYPE_CHECKING:
         # Type checkers see what is accepted; the fields hold what is made of it.
@@ -60,6 +62,7 @@ class Scene:
             ignored: Iterable[Sequence[str]] = (),
             groups: Mapping[str, Iterable[str]] | Iterable[tuple[str, Iterable[str]]] = (),
             gravity: ArrayLike = STANDARD_GRAVITY,
+            sensors: Iterable[Sensor] = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -82,6 +85,14 @@ class Scene:
                 self.require(name)
         for constraint in self.constraints:
             self._check_constraint(constraint)
+        if self.sensors != ():
+            # Imported here, because most scenes have none.
+            from dynx.world.sensors.places import Parts
+            from dynx.world.sensors.sensor import checked_sensors
+
+            models = {robot.name: robot.model for robot in self.robots}
+            alone = self.robots[0].name if len(models) == 1 else None
+            put(self, "sensors", checked_sensors(self.sensors, Parts(models, tuple(self._bodies), alone)))
 
     @cached_property
     def _robots(self) -> dict[str, SceneRobot]:

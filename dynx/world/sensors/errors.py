@@ -72,8 +72,8 @@ class SensorErrors:
     def __post_init__(self) -> None:
         for each in fields(self):
             value = real_array(each.name, getattr(self, each.name))
-            finite = np.isfinite(value).all() or (each.name == "saturation" and not np.isnan(value).any())
-            if not finite:
+            unlimited = each.name == "saturation" and (value == np.inf).all()
+            if not np.isfinite(value).all() and not unlimited:
                 raise GainError(f"{each.name} of a sensor is {value.tolist()}; wanted finite numbers")
             if each.name not in _SIGNED and (value < 0.0).any():
                 raise GainError(f"{each.name} of a sensor is {value.tolist()}; wanted numbers of at least 0")

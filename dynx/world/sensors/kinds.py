@@ -55,6 +55,7 @@ class ForceTorqueSensor(PlacedSensor):
     torque: SensorErrors = NO_ERRORS
 
     kind: ClassVar[str] = "force_torque"
+    touches: ClassVar[bool] = True
     channels: ClassVar[tuple[Channel, ...]] = (
         Channel("force", "force", AXES, "N"),
         Channel("torque", "torque", AXES, "N m"),
@@ -136,6 +137,7 @@ class JointTorqueSensor(Sensor):
     torque: SensorErrors = NO_ERRORS
 
     kind: ClassVar[str] = "joint_torque"
+    touches: ClassVar[bool] = True
     channels: ClassVar[tuple[Channel, ...]] = (Channel("torque", "torque", ("",), "N m or N"),)
 
     def require(self, parts: Parts) -> None:
@@ -183,6 +185,7 @@ class ContactSensor(PlacedSensor):
     force: SensorErrors = NO_ERRORS
 
     kind: ClassVar[str] = "contact"
+    touches: ClassVar[bool] = True
     channels: ClassVar[tuple[Channel, ...]] = (Channel("force", "force", AXES, "N"),)
 
     def require(self, parts: Parts) -> None:

@@ -116,16 +116,9 @@ class SensedMotion:
 
     def contact_force(self, place: Place) -> Floats:
         """Return the sum (n, 3) of the contact forces on a link or body, in world axes [N]."""
-        raise _no_scene(place)
+        raise place.without_scene
 
     def ray_distances(self, place: Place, origins: Floats, directions: Floats, length: float) -> Floats:
         """Return the distances (n,) [m] from the origins (n, 3) along unit directions (n, 3) to what is hit
         first within `length` [m], other than the link or body of the sensor; infinity without a hit."""
-        raise _no_scene(place)
-
-
-def _no_scene(place: Place) -> UnsupportedFeatureError:
-    return UnsupportedFeatureError(
-        f"{place.sensor} needs a scene with something to touch or to hit: simulate with "
-        "plant=ScenePlant(...), or use a World"
-    )
+        raise place.without_scene

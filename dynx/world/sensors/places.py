@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from dynx.errors import UnknownNameError, nearest, shown
+from dynx.errors import UnknownNameError, UnsupportedFeatureError, nearest, shown
 from dynx.model import Model
 
 
@@ -17,6 +17,14 @@ class Place(NamedTuple):
     robot: str | None
     """None for a body."""
     name: str
+
+    @property
+    def without_scene(self) -> UnsupportedFeatureError:
+        """Error for a sensor of contacts or distances outside a scene."""
+        return UnsupportedFeatureError(
+            f"{self.sensor} needs a scene with something to touch or to hit: simulate with "
+            "plant=ScenePlant(...), or use a World"
+        )
 
 
 class Parts(NamedTuple):

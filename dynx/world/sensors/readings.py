@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from dynx.argument_types import checks_types
-from dynx.errors import UnknownNameError, nearest, shown
+from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.spatial.scalar import Floats
 from dynx.world.sensors.errors import Integers, SampleNumbers, apply_errors
 from dynx.world.sensors.motion import SensedMotion
@@ -16,6 +17,31 @@ from dynx.world.sensors.sensor import Sensor
 
 SAME_SAMPLE = 1e-6
 """Part of a period within which a time counts as that of a sample."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """One sample of a sensor."""
+
+    sensor: Sensor
+    t: float
+    """Time [s] at which it was taken."""
+    channels: Mapping[str, Floats]
+    """Values (size,) of each channel."""
+
+    def __getitem__(self, channel: str) -> Any:
+        """Return the value of a channel: (size,), or a float of one that is a number."""
+        rows = _of_channel(self.sensor, self.channels, channel)
+        return rows if rows.ndim else float(rows)
+
+    @property
+    def values(self) -> Floats:
+        """Values (size,) of all channels one after the other, called `Sensor.value_names`."""
+        return np.concatenate(list(self.channels.values()))
+
+    def __repr__(self) -> str:
+        pairs = zip(self.sensor.value_names, self.values.tolist(), strict=True)
+        return f"<Reading of {self.sensor} at {self.t:.6g} s: {', '.join(f'{n} {x:.6g}' for n, x in pairs)}>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,12 +60,16 @@ class Readings:
 
     def __getitem__(self, channel: str) -> Floats:
         """Return the values of a channel: (m, size), or (m,) of one that is a number."""
-        if channel not in self.channels:
-            known = nearest(str(channel), self.channels)
-            raise UnknownNameError(f"{self.sensor} has no channel {shown(channel)}{known}")
-        rows = self.channels[channel]
-        named = next(each for each in self.sensor.channels if each.name == channel)
-        return rows if named.components != ("",) else rows[:, 0]
+        return _of_channel(self.sensor, self.channels, channel)
+
+    @property
+    def last(self) -> Reading:
+        """The last sample; ArgumentError if there is none."""
+        if not len(self):
+            raise ArgumentError(f"{self.sensor} has taken no sample")
+        return Reading(
+            self.sensor, float(self.t[-1]), {name: rows[-1] for name, rows in self.channels.items()}
+        )
 
     @property
     def available(self) -> Floats:
@@ -62,6 +92,14 @@ class Readings:
 
     def __repr__(self) -> str:
         return f"<Readings of {self.sensor}: {len(self)} samples of {', '.join(self.channels)}>"
+
+
+def _of_channel(sensor: Sensor, channels: Mapping[str, Floats], name: str) -> Floats:
+    """Return the values (..., size) of a channel, (...,) of one that is a number."""
+    if name not in channels:
+        raise UnknownNameError(f"{sensor} has no channel {shown(name)}{nearest(str(name), channels)}")
+    number = next(each for each in sensor.channels if each.name == name).components == ("",)
+    return channels[name][..., 0] if number else channels[name]
 
 
 def sample_numbers(sensor: Sensor, t: Floats, h: float) -> tuple[Integers, Integers]:

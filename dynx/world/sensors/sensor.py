@@ -53,6 +53,8 @@ class Sensor(ABC):
     """What it measures, in the order of the values of a reading."""
     kind: ClassVar[str]
     """Name of the class in documents."""
+    touches: ClassVar[bool] = False
+    """Whether readings depend on contacts."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not isinstance(self.on, str):

@@ -23,6 +23,8 @@ FILE = Path(__file__).with_name("scenarios_before_options.json.gz")
 ROBOTS = next(iter(example_roots()), Path("absent"))
 TEXT = gzip.decompress(FILE.read_bytes()).decode().replace("{example-robot-data}", ROBOTS.parent.as_posix())
 SAVED: dict[str, Any] = json.loads(TEXT)
+ADDED: dict[str, Any] = {"sensors": []}
+"""Options that were added since, with their defaults."""
 
 
 def document_of(name: str) -> Any:
@@ -40,7 +42,8 @@ def test_a_saved_document_is_read_and_written_alike(name: str) -> None:
     scenario = Scenario.from_dict(document)
     written = json.loads(scenario.to_json())
     assert Scenario.from_dict(written) == scenario
-    assert written.keys() == document.keys()
+    assert written.keys() == document.keys() | ADDED.keys()
+    assert {key: written[key] for key in ADDED} == ADDED
     objects = {"controller", "reference", *(each for each in OPTIONS if has_objects(OPTIONS[each].kind))}
     assert [key for key in document if key not in objects and written[key] != document[key]] == []
 

@@ -1,0 +1,242 @@
+"""Sensors of a scene: what they sense in it, and their samples in the steps of a world."""
+
+from __future__ import annotations
+
+import itertools
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from dynx.backends import backend
+from dynx.errors import UnsupportedFeatureError, shown
+from dynx.spatial.scalar import Floats
+from dynx.steppers.forces import Forces
+from dynx.steppers.layout import Layout
+from dynx.steppers.state import BodyState, RobotState, WorldState
+from dynx.steppers.stepper import Stepper
+from dynx.world.boxes import OwnerPoses
+from dynx.world.commands import Act
+from dynx.world.contacts import Contact
+from dynx.world.last_step import LastStep
+from dynx.world.queries import first_hits
+from dynx.world.sensors.errors import SampleNumbers
+from dynx.world.sensors.kinds import ContactSensor
+from dynx.world.sensors.motion import RobotMotion, SensedMotion
+from dynx.world.sensors.places import Parts, Place
+from dynx.world.sensors.readings import SAME_SAMPLE, Reading, read_sensor, sample_numbers
+from dynx.world.sensors.sensor import Sensor
+
+
+@dataclass(frozen=True, eq=False)
+class SceneInstants:
+    """Where everything in a scene is at n instants, and the contacts in the steps that begin there."""
+
+    layout: Layout
+    configurations: Mapping[str, Floats]
+    """Configurations (n, nq) of all robots."""
+    bodies: Mapping[str, Floats]
+    """Poses (n, 4, 4) of the bodies that move."""
+    force_on: Callable[[str], Floats]
+    """Sum (n, 3) of the contact forces on a part, in world axes [N]."""
+
+
+class SceneMotion(SensedMotion):
+    """Robots among the parts of a scene, at the instants `t` (n,) [s]."""
+
+    def __init__(
+        self, t: Floats, h: float, robots: Mapping[str, RobotMotion], around: SceneInstants, alone: str | None
+    ) -> None:
+        super().__init__(t, h, robots, alone)
+        self._around = around
+        parts = parts_of(around.layout, alone)
+        moving = {name: robot.model for name, robot in robots.items()}
+        self.parts = parts._replace(robots={**parts.robots, **moving})
+
+    def pose(self, place: Place) -> Floats:
+        around, n = self._around, len(self.t)
+        moving = None if place.robot is None else self.robots.get(place.robot)
+        if moving is not None:
+            return moving.pose(place.name)
+        for robot in around.layout.robots:
+            if robot.name == place.robot:
+                with backend("reference", robot.model) as engine:
+                    return engine.forward_kinematics(around.configurations[robot.name], place.name)
+        return np.broadcast_to(self._bodies[place.name], (n, 4, 4))
+
+    def contact_force(self, place: Place) -> Floats:
+        require_shapes(place, self._around.layout)
+        return self._around.force_on(_part(place))
+
+    def ray_distances(self, place: Place, origins: Floats, directions: Floats, length: float) -> Floats:
+        layout = self._around.layout
+        others = tuple(each for each in layout.colliders if each.name != _part(place))
+        seen, found = replace(layout, colliders=others), np.empty(len(self.t))
+        for k in range(len(self.t)):
+            rays = slice(k, k + 1)
+            (hit,) = first_hits(seen, self._poses(k), origins[rays], directions[rays], length)
+            found[k] = np.inf if hit.collider is None else hit.distance
+        return found
+
+    @property
+    def _bodies(self) -> dict[str, Floats]:
+        """Poses of all bodies, of those that are fixed without the axis of the instants."""
+        return {body.name: body.T for body in self._around.layout.bodies} | dict(self._around.bodies)
+
+    def _poses(self, k: int) -> OwnerPoses:
+        """Return the poses of all rigid bodies at instant k."""
+        still = np.zeros(6)
+        robots = {
+            name: RobotState(rows[k], np.zeros(0)) for name, rows in self._around.configurations.items()
+        }
+        bodies = {name: BodyState(T[k] if T.ndim == 3 else T, still) for name, T in self._bodies.items()}
+        return OwnerPoses(self._around.layout, WorldState(float(self.t[k]), robots, bodies))
+
+
+def parts_of(layout: Layout, alone: str | None = None) -> Parts:
+    """Return the robots and bodies of a scene; `alone` is the robot whose parts are named without it, by
+    default the only one."""
+    robots = {robot.name: robot.model for robot in layout.robots}
+    if alone is None and len(robots) == 1:
+        (alone,) = robots
+    return Parts(robots, tuple(body.name for body in layout.bodies), alone)
+
+
+def require_shapes(place: Place, layout: Layout) -> None:
+    """Raise UnsupportedFeatureError for a sensor of contacts on a part that nothing can touch."""
+    if _part(place) not in {each.name for each in layout.colliders}:
+        why = "has no collision shape" if layout.colliders else "has no shapes where collisions=False"
+        raise UnsupportedFeatureError(f"{place.sensor} is on {shown(_part(place))}, which {why}")
+
+
+def _part(place: Place) -> str:
+    return place.name if place.robot is None else f"{place.robot}/{place.name}"
+
+
+class _Pending(NamedTuple):
+    """A step in which sensors take samples, until it is complete."""
+
+    t: float
+    sensors: Sequence[Sensor]
+    robots: Mapping[str, RobotState]
+    bodies: Mapping[str, Floats]
+
+
+@dataclass(eq=False)
+class _Sample:
+    """One sample of a sensor, which is evaluated when it is read."""
+
+    motion: SceneMotion
+    reading: Reading | None = None
+
+
+class WorldSensors:
+    """Samples of the sensors of a scene, taken as steps of the engine of `h` [s] begin.
+
+    A sample needs the acceleration and the contacts of its step, so it can be read after that step. Those
+    that a delay still holds back are kept.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        sensors: Sequence[Sensor],
+        h: float,
+        last_step: LastStep,
+        clock: Callable[[], float],
+        contacts: Callable[[Stepper], Sequence[Contact]],
+    ) -> None:
+        """`clock` returns the time [s] of the world, `contacts` those of the engine's last step.
+
+        Raises ArgumentError for a rate above that of the steps, UnsupportedFeatureError for a sensor of
+        contacts where nothing can be touched."""
+        self._layout, self._sensors, self._h = layout, sensors, h
+        self._last_step, self._clock, self._contacts = last_step, clock, contacts
+        parts = parts_of(layout)
+        for sensor in sensors:
+            sensor.period(h)
+            if isinstance(sensor, ContactSensor):
+                require_shapes(sensor.place(parts), layout)
+        self._numbers = {each.name: SampleNumbers(each.name, each.seed, 0, each.size) for each in sensors}
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget all samples: the state was set."""
+        self._pending: _Pending | None = None
+        self._samples: dict[str, deque[_Sample]] = {each.name: deque() for each in self._sensors}
+
+    def watched(self, act: Act) -> Act:
+        """Return `act`, which begins the samples of each step, and takes those of the step before."""
+        steps, time = itertools.count(), self._clock()
+
+        def act_and_sample(engine: Stepper) -> Forces | None:
+            self.complete(engine)
+            self._begin(engine, time + next(steps) * self._h)
+            return act(engine)
+
+        return act_and_sample
+
+    def _begin(self, engine: Stepper, t: float) -> None:
+        due = [each for each in self._sensors if len(sample_numbers(each, np.array([t]), self._h)[0])]
+        if not due:
+            return
+        robots = {robot.name: engine.robot_state(k) for k, robot in enumerate(self._layout.robots)}
+        bodies = {
+            body.name: engine.body_state(k).T_world_body[None]
+            for k, body in enumerate(self._layout.bodies)
+            if not body.fixed
+        }
+        self._pending = _Pending(t, due, robots, bodies)
+
+    def complete(self, engine: Stepper) -> None:
+        """Take the samples of the step that the engine has taken."""
+        if self._pending is None:
+            return
+        t, due, before, bodies = self._pending
+        self._pending = None
+        contacts = self._contacts(engine) if any(each.touches for each in due) else None
+        after = WorldState(
+            t,
+            {name: engine.robot_state(k) for k, name in enumerate(before)},
+            {body.name: engine.body_state(k) for k, body in enumerate(self._layout.bodies)},
+        )
+        robots = {name: self._last_step.instant(k, engine, after, contacts) for k, name in enumerate(before)}
+        around = SceneInstants(
+            self._layout,
+            {name: state.q[None] for name, state in before.items()},
+            bodies,
+            lambda part: _force_on(part, contacts or ()),
+        )
+        motion = SceneMotion(np.array([t]), self._h, robots, around, None)
+        for sensor in due:
+            kept = self._samples[sensor.name]
+            kept.append(_Sample(motion))
+            # Of those that can be read at the end of the step, the last is enough.
+            while len(kept) > 1 and self._is_available(sensor, kept[1], t + self._h):
+                kept.popleft()
+
+    def readings(self, time: float) -> dict[str, Reading]:
+        """Return the last reading of each sensor that is available at `time` [s]."""
+        found: dict[str, Reading] = {}
+        for sensor in self._sensors:
+            ready = [each for each in self._samples[sensor.name] if self._is_available(sensor, each, time)]
+            if ready:
+                sample = ready[-1]
+                if sample.reading is None:
+                    numbers = self._numbers[sensor.name]
+                    sample.reading = read_sensor(sensor, sample.motion, numbers=numbers).last
+                found[sensor.name] = sample.reading
+        return found
+
+    def _is_available(self, sensor: Sensor, sample: _Sample, time: float) -> bool:
+        return bool(sample.motion.t[0] + sensor.delay <= time + SAME_SAMPLE * self._h)
+
+
+def _force_on(part: str, contacts: Sequence[Contact]) -> Floats:
+    """Return the sum (1, 3) of the forces of contacts on a part."""
+    total = np.zeros((1, 3))
+    for contact in contacts:
+        total += (contact.a == part) * contact.force - (contact.b == part) * contact.force
+    return total
