@@ -694,7 +694,9 @@ def simulate_batch(given: BatchArguments) -> BatchRollouts:
     done: dict[int, PartOutcome] = {}
 
     def outcome() -> BatchRollouts:
-        return _batch_rollouts(recorded, clock, parts, done, record_every)
+        return _batch_rollouts(
+            recorded, clock, parts, done, record_every, own_parameters=parameters is not None
+        )
 
     try:
         _run_parts(parts, done, checked_threads(given.threads), executor, store, progress, n)
@@ -784,7 +786,13 @@ def _run_parts(
 
 
 def _batch_rollouts(
-    scenario: Scenario, clock: Clock, parts: list[BatchPart], done: dict[int, PartOutcome], record_every: int
+    scenario: Scenario,
+    clock: Clock,
+    parts: list[BatchPart],
+    done: dict[int, PartOutcome],
+    record_every: int,
+    *,
+    own_parameters: bool,
 ) -> BatchRollouts:
     kept = clock.n_steps // record_every if record_every else 0
     nq, nv = scenario.model.nq, scenario.model.nv
@@ -801,4 +809,4 @@ def _batch_rollouts(
     diverged = np.where(whole.diverged < 0, np.nan, whole.diverged * clock.dt)
     times = clock.times()[record_every::record_every] if record_every else np.zeros(0)
     found = {**whole._asdict(), "diverged": diverged}
-    return BatchRollouts(scenario, done=finished, t=times, **found)
+    return BatchRollouts(scenario, done=finished, t=times, own_parameters=own_parameters, **found)

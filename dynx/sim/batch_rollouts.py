@@ -16,12 +16,16 @@ from dynx.files.arrays import SCHEMA_ENTRY, read_arrays, write_arrays
 from dynx.files.figures import new_figure, save_figure
 from dynx.files.pages import html_table
 from dynx.model.numbers import checked_entries, real_array
+from dynx.registry import door
 from dynx.sim.record.csv_file import coordinate_names
 from dynx.sim.scenario.scenario import Scenario
 from dynx.spatial.scalar import Floats
 
 SCHEMA = "dynx.rollouts/2"
 """Schema name of the file."""
+
+OWN_PARAMETERS = "own_parameters"
+"""Name of the text in the file that says whether rollouts had parameters of their own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +53,9 @@ class BatchRollouts:
     v_record: Floats  # (n, kept, nv)
     tau_record: Floats  # (n, kept, nv)
     saturated: Floats  # (n, nv), the share of steps at the effort limit
+    own_parameters: bool | None = False
+    """True if rollouts had `parameters` of their own, which are not recorded; None of a file that does not
+    say."""
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -99,6 +106,16 @@ class BatchRollouts:
             found |= {f"{kind}:{name}": column for name, column in zip(names, block.T, strict=True)}
         return found
 
+    @door("dynx.sim.batch_wrenches:joint_wrenches")
+    def joint_wrenches(self, **options: Any) -> Floats:
+        """Return the wrenches (n, kept - 1, n_joints, 6) that joints transmit in each recorded step."""
+        raise NotImplementedError
+
+    @door("dynx.sim.batch_wrenches:base_wrench")
+    def base_wrench(self, **options: Any) -> Floats:
+        """Return the wrench (n, kept - 1, 6) that the world exerts on the root link in each recorded step."""
+        raise NotImplementedError
+
     @checks_types
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write a ``.npz`` that `load` reads, atomically.
@@ -108,7 +125,8 @@ class BatchRollouts:
         if Path(path).suffix != ".npz":
             raise ArgumentError(f"rollouts are saved as .npz, not as {shown(Path(path).name)}")
         arrays = {name: getattr(self, name) for name in _array_names()}
-        write_arrays(path, {SCHEMA_ENTRY: SCHEMA, "scenario": self.scenario.to_json(), **arrays})
+        known = {} if self.own_parameters is None else {OWN_PARAMETERS: str(self.own_parameters)}
+        write_arrays(path, {SCHEMA_ENTRY: SCHEMA, "scenario": self.scenario.to_json(), **known, **arrays})
 
     @classmethod
     @checks_types
@@ -127,7 +145,8 @@ class BatchRollouts:
         arrays = {
             name: file.array(name, shape, bool if name == "done" else float) for name, shape in shapes.items()
         }
-        return cls(scenario, **arrays)
+        own = {"True": True, "False": False}.get(file.texts.get(OWN_PARAMETERS, ""))
+        return cls(scenario, **arrays, own_parameters=own)
 
     @checks_types
     def plot(self, path: str | os.PathLike[str] | None = None) -> Any:
@@ -187,4 +206,4 @@ def _spans_decades(errors: Floats) -> bool:
 
 
 def _array_names() -> list[str]:
-    return [field.name for field in fields(BatchRollouts) if field.name != "scenario"]
+    return [field.name for field in fields(BatchRollouts) if field.name not in ("scenario", OWN_PARAMETERS)]

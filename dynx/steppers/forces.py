@@ -151,17 +151,19 @@ class ExternalForce:
         return engine.jacobian(q, frame, reference=self.reference), wrench
 
     def at_center(self, T: Floats, center: Floats, share: float) -> Floats:
-        """Return the force and the moment about the point `center` (3,) of a body (6,) with pose `T` (4, 4),
-        in world axes."""
-        R = T[:3, :3]
+        """Return the force and the moment about the point `center` (3,) of a body (..., 6) with pose `T`
+        (..., 4, 4), in world axes."""
+        R = T[..., :3, :3]
         wrench: Floats = share * np.asarray(self.wrench)
         force, moment = wrench[:3], wrench[3:]
         if self.reference == LOCAL:
             force, moment = R @ force, R @ moment
         lever = R @ (np.asarray(self.point) - center)
         if self.reference == WORLD:
-            lever = -(T[:3, 3] + R @ center)
-        return np.concatenate([force, moment + cross(lever, force)])
+            lever = -(T[..., :3, 3] + R @ center)
+        if T.ndim > 2:
+            force, moment, lever = np.broadcast_arrays(force, moment, lever)
+        return np.concatenate([force, moment + cross(lever, force)], axis=-1)
 
 
 class Forces(NamedTuple):

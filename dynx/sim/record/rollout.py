@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -28,6 +28,7 @@ from dynx.sim.scenario.documents import Unknown
 from dynx.sim.scenario.scenario import Scenario
 from dynx.sim.setup import clock_of, disturbances_of, effort_limits_of, refuse_unknown
 from dynx.spatial.scalar import Floats
+from dynx.steppers.forces import ExternalForce
 from dynx.trajectory.base import Setpoint
 from dynx.trajectory.limit_check import UNITS
 from dynx.world.record import (
@@ -181,15 +182,9 @@ class Rollout:
         `Backend.joint_wrenches`. Forces of constraints and of joint limits, which no engine gives, are not
         among them.
         """
-        total: dict[str, Floats] = {}
         nothing = np.zeros((len(self), 6))
-        for push in () if self.scenario is None else self.scenario.all_pushes:
-            steps = zip(self.t[:-1].tolist(), np.diff(self.t).tolist(), strict=True)
-            shares = np.array([push.share(t, h) for t, h in steps])
-            T = self._bodies.forward_kinematics(self.q[:-1], push.on)
-            for k in np.flatnonzero(shares).tolist():
-                about_frame = push.at_center(T[k], np.zeros(3), shares[k])
-                total.setdefault(push.on, nothing.copy())[k] += about_world(about_frame, T[k, :3, 3])
+        pushes = () if self.scenario is None else self.scenario.all_pushes
+        total = push_wrenches(self._bodies, pushes, self.t, self.q[:-1])
         plant = None if self.scenario is None else self.scenario.plant
         if self.surroundings is not None and isinstance(plant, ScenePlant):
             contacts = self.surroundings.contacts
@@ -351,6 +346,22 @@ class Rollout:
 
     def _repr_html_(self) -> str:
         return self.summary().to_html(repr(self)[1:-1])
+
+
+def push_wrenches(
+    engine: Backend, pushes: Sequence[ExternalForce], t: Floats, q: Floats
+) -> dict[str, Floats]:
+    """Return the wrenches (..., n, 6) of pushes in the n steps between times t (n + 1,), by frame, about the
+    origin of the world in its axes; q (..., n, nq) are the configurations as the steps begin."""
+    total: dict[str, Floats] = {}
+    steps = list(zip(t[:-1].tolist(), np.diff(t).tolist(), strict=True))
+    for push in pushes:
+        T = engine.forward_kinematics(q, push.on)
+        about_frame = push.at_center(T, np.zeros(3), 1.0)
+        shares = np.array([push.share(at, h) for at, h in steps])
+        wrenches = shares[:, None] * about_world(about_frame, T[..., :3, 3])
+        total[push.on] = total.get(push.on, 0.0) + wrenches
+    return total
 
 
 def settings_of(scenario: Scenario) -> dict[str, Any]:
