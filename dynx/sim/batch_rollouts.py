@@ -106,12 +106,12 @@ class BatchRollouts:
             found |= {f"{kind}:{name}": column for name, column in zip(names, block.T, strict=True)}
         return found
 
-    @door("dynx.sim.batch_wrenches:joint_wrenches")
+    @door("dynx.sim.batch_wrenches:joint_wrenches_of")
     def joint_wrenches(self, **options: Any) -> Floats:
         """Return the wrenches (n, kept - 1, n_joints, 6) that joints transmit in each recorded step."""
         raise NotImplementedError
 
-    @door("dynx.sim.batch_wrenches:base_wrench")
+    @door("dynx.sim.batch_wrenches:base_wrench_of")
     def base_wrench(self, **options: Any) -> Floats:
         """Return the wrench (n, kept - 1, 6) that the world exerts on the root link in each recorded step."""
         raise NotImplementedError

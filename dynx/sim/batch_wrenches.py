@@ -24,7 +24,7 @@ Models = Sequence[Model] | None
 
 
 @checks_types
-def joint_wrenches(
+def joint_wrenches_of(
     rollouts: BatchRollouts,
     *,
     frame: str | None = None,
@@ -46,7 +46,7 @@ def joint_wrenches(
 
 
 @checks_types
-def base_wrench(
+def base_wrench_of(
     rollouts: BatchRollouts,
     *,
     frame: str | None = None,
@@ -54,7 +54,7 @@ def base_wrench(
     models: Models = None,
 ) -> Floats:
     """Return the wrench (n, kept - 1, 6) [N, N m] that the world exerts on the root link, besides pushes, in
-    each step from one recorded state to the next; see `joint_wrenches`."""
+    each step from one recorded state to the next; see `joint_wrenches_of`."""
     return _wrenches(rollouts, "base_wrench", models, frame=frame, reference=reference)
 
 
