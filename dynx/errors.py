@@ -25,6 +25,7 @@
     |  |- DivergedError             the state is not finite, or too fast to be meaningful
     |  `- ControlError              a controller returned an invalid torque
     |- SingularMassMatrixError      forward dynamics has no unique solution
+    |- TemporaryFolderError         the folder for temporary files cannot be written (and which it is)
     |- EpisodeError                 a step of an environment before its reset or after the end of an episode
     `- CompileError                 the SIMD compiler cannot compile a program
        `- TraceError                traced code branches on or converts a symbol
@@ -36,7 +37,10 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Iterable
+import signal
+import threading
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from typing import Any, Literal, NamedTuple
 
@@ -139,6 +143,54 @@ class NotInstalledError(BackendError, ImportError):
     """A package is missing; the message names the extra of dynx that installs it."""
 
 
+@contextmanager
+def importing(needed: str, *also: type[Exception]) -> Iterator[None]:
+    """Import a package that may be missing in this block: NotInstalledError with the text `needed`, in which
+    ``{error}`` stands for what went wrong, replaces ImportError and the errors `also`.
+
+    An interrupt remains one. Extension modules turn a KeyboardInterrupt during their import into an
+    ImportError of their own, mostly without a cause, so that the signals that arrive are noted.
+    """
+    arrived: list[int] = []
+    failures: tuple[type[Exception], ...] = (ImportError, *also)
+    with _noted_signals(arrived):
+        try:
+            yield
+        except failures as error:
+            if arrived or _is_caused_by_interrupt(error):
+                raise KeyboardInterrupt from error
+            raise NotInstalledError(needed.replace("{error}", str(error))) from error
+
+
+@contextmanager
+def _noted_signals(arrived: list[int]) -> Iterator[None]:
+    """Note the interrupts that arrive in the block, and handle them as before."""
+    handlers: dict[int, Any] = {}
+    if threading.current_thread() is threading.main_thread():
+        handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+        handlers = {number: handler for number, handler in handlers.items() if callable(handler)}
+
+    def noted(number: int, frame: Any) -> None:
+        arrived.append(number)
+        handlers[number](number, frame)
+
+    for number in handlers:
+        signal.signal(number, noted)
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            # What the block installed itself stays.
+            if signal.getsignal(number) is noted:
+                signal.signal(number, handler)
+
+
+def _is_caused_by_interrupt(error: BaseException | None) -> bool:
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
+
+
 class EngineLimitError(BackendError):
     """The model is larger than the engine supports without a wrong result or a crash."""
 
@@ -234,6 +286,10 @@ class ControlError(SimulationError):
 
 class SingularMassMatrixError(DynxError, ArithmeticError):
     """The mass matrix is singular, so no unique acceleration exists."""
+
+
+class TemporaryFolderError(DynxError, OSError):
+    """The folder for temporary files cannot be written, for example because it is full."""
 
 
 class EpisodeError(DynxError, RuntimeError):

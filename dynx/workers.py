@@ -3,7 +3,8 @@
 Engines are foreign code that can end the process or never return while they hold the interpreter lock. So
 each task runs in a child process, which is reused until it ends; only the task that ended it fails. One
 thread waits for each child, which is portable and leaves the main thread free for Ctrl-C. Children run in
-their own session and do not receive Ctrl-C.
+their own session and do not receive Ctrl-C; they end with the process that started them, however that ends
+(on Windows when their task is done).
 """
 
 from __future__ import annotations
@@ -35,7 +36,13 @@ MAX_SIGNAL_DELAY = 0.5
 
 FailureKind = Literal["crash", "timeout", "defect"]
 
-_START = "import sys; sys.path[:] = sys.argv[1:]; from dynx.workers import serve; serve()"
+_START = (
+    "import sys; lifeline = int(sys.argv[1]); sys.path[:] = sys.argv[2:]; "
+    "from dynx.workers import serve; serve(lifeline)"
+)
+
+_NO_LIFELINE = -1
+"""In place of a pipe where a child inherits none, as on Windows."""
 
 
 class EngineCrash(EngineError):
@@ -200,14 +207,18 @@ class _Worker:
         # Each worker uses one thread for linear algebra, because matrices are small and there are many
         # workers.
         environment = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **os.environ}
+        inherited, self._lifeline = (_NO_LIFELINE, _NO_LIFELINE) if os.name == "nt" else os.pipe()
         self._process = subprocess.Popen(
-            [sys.executable, "-c", _START, *sys.path],
+            [sys.executable, "-c", _START, str(inherited), *sys.path],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=environment,
+            pass_fds=() if inherited == _NO_LIFELINE else (inherited,),
             start_new_session=True,
             creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
         )
+        if inherited != _NO_LIFELINE:
+            os.close(inherited)
         self._target = target
         self._has_target = False
         self._expired = False
@@ -259,6 +270,8 @@ class _Worker:
         assert self._process.stdout is not None
         self._process.kill()
         self._process.wait()
+        if self._lifeline != _NO_LIFELINE:
+            os.close(self._lifeline)
         self._process.stdout.close()
         # Closing a pipe flushes it. That fails if the ended process has not read all data, but the pipe is
         # closed.
@@ -272,9 +285,11 @@ class _Worker:
         self.kill()
 
 
-def serve() -> None:
+def serve(lifeline: int = _NO_LIFELINE) -> None:
     """Run in the child: read the target, confirm it, and compute tasks from standard input until it is
-    closed."""
+    closed. `lifeline` is the pipe whose other end only the parent holds."""
+    if lifeline != _NO_LIFELINE:
+        _end_with_parent(lifeline)
     replies = os.fdopen(os.dup(1), "wb")
     _silence()
     requests = sys.stdin.buffer
@@ -291,6 +306,24 @@ def serve() -> None:
         except EOFError:
             return
         send(_reply(target, task))
+
+
+def _end_with_parent(lifeline: int) -> None:
+    """End this process when the other end of a pipe is closed: when its parent has ended."""
+
+    def wait() -> None:
+        os.read(lifeline, 1)
+        os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
+    if sys.platform == "linux":
+        import fcntl
+
+        # The thread waits in vain while an engine holds the interpreter's lock. The kernel does not: SIGIO,
+        # which it then sends, ends a process that does not handle it.
+        signal.signal(signal.SIGIO, signal.SIG_DFL)
+        fcntl.fcntl(lifeline, fcntl.F_SETOWN, os.getpid())
+        fcntl.fcntl(lifeline, fcntl.F_SETFL, fcntl.fcntl(lifeline, fcntl.F_GETFL) | os.O_ASYNC)
 
 
 def _reply(target: Callable[[Any], Any], task: Any) -> tuple[Any] | WorkerFailure:

@@ -7,11 +7,16 @@ import runpy
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from dynx import load
+from dynx.cli.shell.main import cli
 from dynx.contacts import case_names
 from dynx.registry import DEFAULT_ENGINE
 from dynx.rules import all_rules
 from dynx.sim.scenario.options import OPTIONS
+from dynx.world import World, read_scene
+from dynx.world.scene.documents import scene_from_document
 from tests.cli.contacts.documents import example
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -79,3 +84,14 @@ def test_the_danger_of_xacro_files_is_stated(name: str) -> None:
         "evaluates expressions of (a|the) file as Python code[,:] (so )?expand only files that you trust",
         words,
     )
+
+
+def test_what_expands_xacro_files_says_that_they_run_code() -> None:
+    readers = (read_scene, scene_from_document, World.read, load)
+    texts = [reader.__doc__ or "" for reader in readers]
+    helped = ("world", "view", "ik")
+    texts += [CliRunner().invoke(cli, [command, "--help"], terminal_width=200).output for command in helped]
+    for text in texts:
+        words = " ".join(text.split())
+        assert re.search(r"xacro.*(as )?Python code", words), words
+        assert "trust" in words

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import count, product
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from dynx.backends.solvability import singular_coordinates
 from dynx.doctor.lines import line_opcodes, lines_of
 from dynx.engines.silence import silence
 from dynx.errors import DescriptionError, DynxError, UnusableEngineError
+from dynx.files.temporary import temporary_folder
 from dynx.loaded import LoadedModel, LoadedRobot, loader_class
 from dynx.model import Model
 from dynx.model.elements import Vector
@@ -143,9 +143,9 @@ def _named_meshes(shape: SourceElement) -> list[SourceElement]:
 def temporary_urdf(source: XmlSource, *, mesh_boxes: bool = False) -> Iterator[Path]:
     """Write the document, with `mesh_boxes` in place of collision meshes, to a file that exists while the
     context lasts."""
-    with TemporaryDirectory(prefix="dynx-", ignore_cleanup_errors=True) as folder:
-        path = Path(folder) / "robot.urdf"
-        written = with_mesh_boxes(source, Path(folder)) if mesh_boxes else source
+    with temporary_folder() as folder:
+        path = folder / "robot.urdf"
+        written = with_mesh_boxes(source, folder) if mesh_boxes else source
         path.write_bytes(written.to_bytes())
         yield path
 

@@ -7,9 +7,9 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from tempfile import TemporaryFile
 
 from dynx.errors import nonblank_lines
+from dynx.files.temporary import temporary_file
 
 
 @contextmanager
@@ -29,7 +29,7 @@ def silence() -> Iterator[None]:
 @contextmanager
 def capture_output(lines: list[str]) -> Iterator[None]:
     """Capture all output of the process as `silence` does, and append its non-blank lines to `lines`."""
-    with TemporaryFile() as file:
+    with temporary_file() as file:
         try:
             with _streams_to(file.fileno()):
                 yield

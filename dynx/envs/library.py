@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dynx.errors import NotInstalledError
+from dynx.errors import importing
 
-try:
+with importing("environments need Gymnasium: pip install 'dynx[envs]' ({error})"):
     from gymnasium import Env, Space, spaces
     from gymnasium import make as make_env
     from gymnasium import make_vec as make_vec_env
@@ -13,8 +13,6 @@ try:
     from gymnasium.utils.seeding import np_random
     from gymnasium.vector import AutoresetMode, VectorEnv
     from gymnasium.vector.utils import batch_space
-except ImportError as error:
-    raise NotInstalledError(f"environments need Gymnasium: pip install 'dynx[envs]' ({error})") from error
 
 __all__ = [
     "AutoresetMode",

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from dynx.errors import ArgumentError, NotInstalledError, shown
+from dynx.errors import ArgumentError, importing, shown
 from dynx.files.writing import atomic_file
 
 RESOLUTION = 200
@@ -22,10 +22,8 @@ NOTEBOOK_RESOLUTION = 100
 
 def new_figure(width: float, height: float) -> Any:
     """Make a `matplotlib.figure.Figure` of that size [in]. Raises NotInstalledError without matplotlib."""
-    try:
+    with importing("a plot needs matplotlib: pip install 'dynx[plot]'"):
         from matplotlib.figure import Figure
-    except ImportError as error:
-        raise NotInstalledError("a plot needs matplotlib: pip install 'dynx[plot]'") from error
     return _notebook_figure(Figure)(figsize=(width, height), layout="constrained")
 
 

@@ -18,13 +18,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dynx.backends.base import Backend
-from dynx.errors import ArgumentError, NotInstalledError, ShapeError, shown
+from dynx.errors import ArgumentError, ShapeError, importing, shown
 from dynx.ik.descent import ErrorCall, KernelTarget
 from dynx.ik.problem import checked_avoidance, checked_velocity_limit
 from dynx.ik.step import TargetKind
@@ -263,6 +264,13 @@ PRIMAL_TOLERANCE = 1e-11
 _SOLVED = 1
 
 
+@cache
+def _daqp() -> Any:
+    with importing("velocity_ik needs daqp: pip install 'dynx[qp]'"):
+        import daqp
+    return daqp
+
+
 def solve_programme(
     H: Floats, g: Floats, lower: Floats, upper: Floats, A: Floats, b: Floats, G: Floats, least: Floats
 ) -> Floats | None:
@@ -271,10 +279,7 @@ def solve_programme(
     H (n, n) is positive definite. Returns None if no x satisfies the constraints. Raises NotInstalledError
     without DAQP.
     """
-    try:
-        import daqp
-    except ImportError:
-        raise NotInstalledError("velocity_ik needs daqp: pip install 'dynx[qp]'") from None
+    daqp = _daqp()
     # Rows of norm 1 give the tolerance one meaning for all constraints.
     rows, values = np.concatenate([A, G]), np.concatenate([b, least])
     norms = np.linalg.norm(rows, axis=1, keepdims=True)

@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.envs.library import spaces
-from dynx.errors import ArgumentError, NotInstalledError, UnknownNameError, nearest, shown
+from dynx.errors import ArgumentError, UnknownNameError, importing, nearest, shown
 from dynx.training.schedules import SCHEDULED, schedule_of
 
-try:
+with importing("training needs stable-baselines3: pip install 'dynx[train]'"):
     import torch
     from stable_baselines3 import A2C, DQN, PPO, SAC, TD3
     from stable_baselines3.common.callbacks import BaseCallback
@@ -31,8 +31,6 @@ try:
     from stable_baselines3.common.save_util import load_from_zip_file
     from stable_baselines3.common.torch_layers import BaseFeaturesExtractor, FlattenExtractor
     from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv, VecEnv, VecMonitor, VecNormalize
-except ImportError as error:
-    raise NotInstalledError("training needs stable-baselines3: pip install 'dynx[train]'") from error
 
 __all__ = [
     "ALGORITHMS",
@@ -450,10 +448,8 @@ def log_to(algorithm: Any, folder: str) -> None:
 
     Raises NotInstalledError without TensorBoard.
     """
-    try:
+    with importing("curves for TensorBoard need it: pip install 'dynx[train]'", AssertionError):
         algorithm.set_logger(configure(folder, ["tensorboard"]))
-    except (ImportError, AssertionError) as error:
-        raise NotInstalledError("curves for TensorBoard need it: pip install 'dynx[train]'") from error
 
 
 def set_threads(count: int) -> Callable[[], None]:

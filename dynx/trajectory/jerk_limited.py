@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.argument_types import checks_types
-from dynx.errors import ArgumentError, NotInstalledError, TrajectoryError, nonblank_lines
+from dynx.errors import ArgumentError, TrajectoryError, importing, nonblank_lines
 from dynx.model import Model
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import MAX_DURATION, MIN_DURATION, Trajectory
@@ -81,12 +81,8 @@ def _run_ruckig(
     ends: Ends, limits: dict[str, Floats], begin: tuple[Floats, Floats], finish: tuple[Floats, Floats]
 ) -> Any:
     """Return Ruckig's trajectory, relative to q0."""
-    try:
+    with importing("time_optimal needs Ruckig: pip install 'dynx[trajectory]' ({error})"):
         import ruckig
-    except ImportError as error:
-        raise NotInstalledError(
-            f"time_optimal needs Ruckig: pip install 'dynx[trajectory]' ({error})"
-        ) from error
     parameters = ruckig.InputParameter(ends.nv)
     parameters.current_position, parameters.target_position = [0.0] * ends.nv, ends.displacement.tolist()
     parameters.current_velocity, parameters.current_acceleration = (x.tolist() for x in begin)

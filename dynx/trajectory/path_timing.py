@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike
 
 from dynx.argument_types import checks_types
 from dynx.backends import Backend
-from dynx.errors import ArgumentError, NotInstalledError, TrajectoryError
+from dynx.errors import ArgumentError, TrajectoryError, importing
 from dynx.model import Model
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Floats
@@ -267,17 +267,13 @@ def _speeds(
 
     Viscous damping is that near the speeds `damped_at` of the grid points.
     """
-    try:
-        # TOPP-RA's source has invalid escapes, of which Python warns when compiling it.
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            import toppra
-            from toppra.algorithm import TOPPRA
-            from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
-    except ImportError as error:
-        raise NotInstalledError(
-            f"time_optimal_path needs TOPP-RA: pip install 'dynx[trajectory]' ({error})"
-        ) from error
+    needed = "time_optimal_path needs TOPP-RA: pip install 'dynx[trajectory]' ({error})"
+    # TOPP-RA's source has invalid escapes, of which Python warns when compiling it.
+    with importing(needed), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import toppra
+        from toppra.algorithm import TOPPRA
+        from toppra.constraint import JointAccelerationConstraint, JointVelocityConstraint
     parts = np.linspace(0.0, 1.0, GRID_POINTS_PER_SEGMENT, endpoint=False)
     grid = np.append((s_points[:-1, None] + parts * np.diff(s_points)[:, None]).ravel(), 1.0)
     limits: list[Any] = [JointVelocityConstraint(np.stack([-V, V], axis=-1))]

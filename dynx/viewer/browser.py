@@ -15,18 +15,18 @@ import json
 import math
 import secrets
 import socket
-import tempfile
 import types
 from base64 import b64encode
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from functools import cache
 from hashlib import sha256
 from html import escape
 from http import HTTPStatus
-from pathlib import Path
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 from urllib.parse import urlsplit
 
+from dynx.files.temporary import temporary_folder, writing_in
 from dynx.viewer.library import CLIENT
 
 LOOPBACK_NAMES = ("localhost", "127.0.0.1", "::1")
@@ -378,7 +378,9 @@ class Client:
 
     def __init__(self, title: str, *, antialiasing: bool) -> None:
         """Without `antialiasing` edges are jagged, and software draws twice as fast."""
-        self._folder = tempfile.TemporaryDirectory(prefix="dynx-page-", ignore_cleanup_errors=True)
+        self._kept = ExitStack()
+        self.folder = self._kept.enter_context(temporary_folder("dynx-page-"))
+        """The folder that is served."""
         script = _PRESSES + _NAMES_ON_HOVER if antialiasing else _FOR_SOFTWARE + _PRESSES + _NAMES_ON_HOVER
         policy = ContentPolicy("'self' data: blob:")
         self.headers = tuple(policy.headers([HANDLER_HASH]))
@@ -390,16 +392,12 @@ class Client:
 
     def entitle(self, title: str) -> None:
         """Give the page another title, which its tab shows when it is loaded."""
-        (self.folder / "index.html").write_text(_with_title(self._text, title), encoding="utf-8")
-
-    @property
-    def folder(self) -> Path:
-        """The folder that is served."""
-        return Path(self._folder.name)
+        with writing_in(self.folder):
+            (self.folder / "index.html").write_text(_with_title(self._text, title), encoding="utf-8")
 
     def remove(self) -> None:
         """Remove the folder."""
-        self._folder.cleanup()
+        self._kept.close()
 
 
 def names_element(names: Mapping[str, str]) -> str:

@@ -12,16 +12,14 @@ from typing import Any
 
 import rich
 
-from dynx.errors import NotInstalledError
+from dynx.errors import NotInstalledError, importing
 
-try:
+with importing("the viewer needs viser: pip install 'dynx[viewer]' ({error})"):
     import viser
     from fast_simplification import __version__ as SIMPLIFY_VERSION
     from fast_simplification import simplify
     from PIL import Image
     from viser import uplot
-except ImportError as error:
-    raise NotInstalledError(f"the viewer needs viser: pip install 'dynx[viewer]' ({error})") from error
 
 __all__ = ["CLIENT", "HOTKEYS", "SIMPLIFY_VERSION", "Image", "serve", "silent", "simplify", "uplot"]
 

@@ -518,9 +518,10 @@ class World:
     def read(cls, path: StrPath, *, package_dirs: Iterable[StrPath] = ()) -> World:
         """Return the world of a file that `write` wrote, in its state, without the notes on its start.
 
-        Meshes are read in the libraries of robots and in `package_dirs` only. Read files that you trust: a
-        changed state can end the process inside an engine. Raises ArgumentError for a file that is damaged,
-        of another version of the engine, or whose meshes changed.
+        Robots and meshes are read in the libraries of robots and in `package_dirs` only. Read files that you
+        trust: a changed state can end the process inside an engine, and a robot in a ``.xacro`` file is
+        expanded, which evaluates expressions of it as Python code. Raises ArgumentError for a file that is
+        damaged, of another version of the engine, or whose meshes changed.
         """
         snapshot, given = read_snapshot(path)
         scene = scene_from_document(given["scene"], ScenePaths(None, package_dirs))

@@ -82,7 +82,8 @@ def world() -> None:
     """Run a scene of robots and bodies with contacts, and compare the engines.
 
     SCENE is a scene file (TOML or JSON) or the name of a scene of dynx: bowling, duck, lifting, pushing,
-    rolling, slope, stack or standing.
+    rolling, slope, stack or standing. Robots of a scene in .xacro files are expanded, which evaluates
+    expressions of them as Python code: run only scenes with such files that you trust.
     The final states are printed, the contacts of the last step, and for every two engines how far apart
     their motions are over time. Notes name parts that overlap at the start, and constraints that it violates.
 
@@ -293,7 +294,8 @@ def view() -> None:
     TARGET is a robot (a URDF or xacro file, or a name), a rollout (.npz or .mcap of `dynx sim --save`), or a
     scene (TOML or JSON, or the name of a scene of dynx). A robot has sliders and a handle that moves a frame
     by inverse kinematics; a rollout has a timeline; a scene is stepped live, or recorded first for --compare
-    and --export.
+    and --export. A .xacro file, of a scene too, is expanded, which evaluates expressions of it as Python
+    code: show only such files that you trust.
 
     The page is served until Ctrl-C. Exit code 0; 2 for input that cannot be shown, or a port that is taken.
 

@@ -214,7 +214,8 @@ def mass() -> None:
     "--avoid",
     metavar="SCENE",
     help="Scene whose bodies and robots the robot keeps away from, as its links do from one another: a file, "
-    "or a name of the library. A scene without robots has this one.",
+    "or a name of the library. A scene without robots has this one. A .xacro file of a "
+    "scene is expanded, which evaluates expressions as Python code: name only scenes that you trust.",
 )
 @click.option(
     "--margin",

@@ -24,7 +24,7 @@ from types import FrameType
 
 import click
 
-from dynx.errors import DynxError, traceback_wanted
+from dynx.errors import DynxError, TemporaryFolderError, traceback_wanted
 
 DONE, NEGATIVE_RESULT, BAD_INPUT, DEFECT, NOT_WRITTEN, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 70, 74, 130, 141
 
@@ -115,7 +115,7 @@ def report_failure(error: BaseException, command: str) -> int:
         return BAD_INPUT
     if isinstance(error, DynxError):
         complain(str(error))
-        return BAD_INPUT
+        return NOT_WRITTEN if isinstance(error, TemporaryFolderError) else BAD_INPUT
     if isinstance(error, OSError) and error.filename is None and error.errno in _WRITING_FAILED:
         _discard_output()
         complain(f"standard output cannot be written: {error.strerror}")

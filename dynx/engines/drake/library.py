@@ -17,9 +17,13 @@ from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from dynx.errors import NotInstalledError, escaped
+from dynx.errors import escaped, importing
 
-try:
+with importing(
+    "the engine 'drake' needs Drake: pip install 'dynx[drake]' (wheels exist for Linux and macOS, 64 bit) "
+    "({error})",
+    OSError,
+):
     _math: Any = import_module("pydrake.math")
     _tree: Any = import_module("pydrake.multibody.tree")
     _plant: Any = import_module("pydrake.multibody.plant")
@@ -27,11 +31,6 @@ try:
     _framework: Any = import_module("pydrake.systems.framework")
     geometry: Any = import_module("pydrake.geometry")
     """Drake's module of geometry: shapes, their properties, and queries."""
-except (ImportError, OSError) as error:
-    raise NotInstalledError(
-        "the engine 'drake' needs Drake: pip install 'dynx[drake]' "
-        f"(wheels exist for Linux and macOS, 64 bit) ({error})"
-    ) from error
 
 AddMultibodyPlantSceneGraph: Any = _plant.AddMultibodyPlantSceneGraph
 ContactModel: Any = _plant.ContactModel

@@ -7,18 +7,19 @@ import sys
 import warnings
 from typing import Any
 
-from dynx.errors import NotInstalledError
+from dynx.errors import importing
 from dynx.safe_path import isolated_children
 
-try:
-    with isolated_children():
-        import mujoco
-except (ImportError, AttributeError, OSError, RuntimeError) as error:
-    # The last three are raised while its renderer is set up, because of a wrong MUJOCO_GL or missing
-    # libraries.
-    raise NotInstalledError(
-        f"the engine 'mujoco' needs MuJoCo: pip install 'dynx[mujoco]' ({error})"
-    ) from error
+# The further errors are raised while its renderer is set up, because of a wrong MUJOCO_GL or missing
+# libraries.
+with (
+    importing(
+        "the engine 'mujoco' needs MuJoCo: pip install 'dynx[mujoco]' ({error})",
+        *(AttributeError, OSError, RuntimeError),
+    ),
+    isolated_children(),
+):
+    import mujoco
 
 __all__ = ["MAX_DEPTH", "mujoco", "silence_warnings", "silent_data"]
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dynx.errors import NotInstalledError
+from dynx.errors import importing
 
-try:
+with importing(
+    "the engine 'pinocchio' needs the package pin, which `pip install dynx` brings except on Windows "
+    "({error}); the backends compiled, reference and mujoco compute the same"
+):
     import pinocchio as pin
-except ImportError as error:
-    raise NotInstalledError(
-        f"the engine 'pinocchio' needs the package pin, which `pip install dynx` brings except on Windows "
-        f"({error}); the backends compiled, reference and mujoco compute the same"
-    ) from error
 
 __all__ = ["pin"]

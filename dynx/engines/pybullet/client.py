@@ -20,7 +20,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from math import isfinite
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from types import ModuleType
 from typing import Any, ClassVar
 
@@ -30,6 +29,7 @@ from dynx.engines.decimal_point import decimal_point
 from dynx.engines.pybullet.canonical_urdf import BulletTree, write_bullet_urdf
 from dynx.engines.silence import capture_output
 from dynx.errors import DynxError, EngineError, EngineLimitError, NotFiniteError
+from dynx.files.temporary import temporary_folder
 from dynx.model.mechanism import ROOT
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
@@ -363,14 +363,11 @@ class CanonicalClient(RobotClient):
 
     def _load(self) -> None:
         flags = self.engine.URDF_USE_INERTIA_FROM_FILE
-        try:
-            with TemporaryDirectory(prefix="dynx-", ignore_cleanup_errors=True) as folder:
-                path = Path(folder) / "robot.urdf"
-                path.write_text(write_bullet_urdf(self._tree), encoding="ascii")
-                fixed = not self.floating
-                self.body = int(self.call(self.engine.loadURDF, str(path), useFixedBase=fixed, flags=flags))
-        except OSError as error:
-            raise EngineError(f"the file through which Bullet loads {self.subject}: {error}") from error
+        with temporary_folder() as folder:
+            path = folder / "robot.urdf"
+            path.write_text(write_bullet_urdf(self._tree), encoding="ascii")
+            fixed = not self.floating
+            self.body = int(self.call(self.engine.loadURDF, str(path), useFixedBase=fixed, flags=flags))
         self.disable_damping()
         if self.floating:
             self._set_inertia(ROOT, self._tree.root.moments)
@@ -513,8 +510,8 @@ class LoadedClient(RobotClient):
             self._load_from(self._path)
             return
         # The file is gone or another when a robot is loaded again.
-        with TemporaryDirectory(prefix="dynx-", ignore_cleanup_errors=True) as folder:
-            path = Path(folder) / "robot.urdf"
+        with temporary_folder() as folder:
+            path = folder / "robot.urdf"
             path.write_bytes(self._file)
             self._load_from(path)
 

@@ -9,7 +9,7 @@ from threading import Lock
 from types import ModuleType
 
 from dynx.engines.silence import silence
-from dynx.errors import NotInstalledError
+from dynx.errors import importing
 
 _import_lock = Lock()
 
@@ -27,11 +27,9 @@ def bullet() -> ModuleType:
     loaded = sys.modules.get("pybullet")
     if loaded is not None:
         return loaded
-    with _import_lock, silence():
-        try:
-            return import_module("pybullet")
-        except ImportError as error:
-            raise NotInstalledError(
-                "the engine 'pybullet' needs PyBullet: pip install 'dynx[pybullet]' "
-                "(wheels exist up to Python 3.11; above, it builds from source)"
-            ) from error
+    needed = (
+        "the engine 'pybullet' needs PyBullet: pip install 'dynx[pybullet]' "
+        "(wheels exist up to Python 3.11; above, it builds from source)"
+    )
+    with _import_lock, importing(needed), silence():
+        return import_module("pybullet")

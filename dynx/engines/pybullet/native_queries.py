@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from types import ModuleType
 from typing import Any, ClassVar
 
@@ -14,6 +13,7 @@ from dynx.engines.pybullet.build import binary_stl
 from dynx.engines.pybullet.library import bullet
 from dynx.engines.pybullet.stepper import BulletStepper, touching_point
 from dynx.errors import EngineError, EngineLimitError
+from dynx.files.temporary import temporary_folder
 from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import inverse
@@ -64,7 +64,7 @@ class BulletQueries(NativeQueries):
         if client < 0:
             raise EngineError("Bullet has no client left (1,024 at most); close worlds that are not needed")
         try:
-            with TemporaryDirectory() as folder:
+            with temporary_folder() as folder:
                 for number, each in enumerate(shapes):
                     _add(engine, client, each, Path(folder, f"{number}.stl"))
                 return _picture(engine, client, T_world_camera, camera)

@@ -11,7 +11,6 @@ import struct
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, ClassVar
 
 import numpy as np
@@ -31,7 +30,7 @@ from dynx.engines.pybullet.client import BulletClient
 from dynx.engines.pybullet.library import bullet, bullet_version
 from dynx.engines.pybullet.motors import BulletMotorCommand
 from dynx.engines.pybullet.robot import BulletBody, BulletRobot
-from dynx.errors import EngineError
+from dynx.files.temporary import temporary_folder
 from dynx.model.mechanism import ROOT
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
@@ -163,11 +162,8 @@ class BulletStepper(Stepper):
         self._step_simulation = engine.stepSimulation
         try:
             set_parameters(client, settings)
-            with TemporaryDirectory(prefix="dynx-", ignore_cleanup_errors=True) as folder:
-                self._load(Path(folder), settings)
-        except OSError as error:
-            client.close()
-            raise EngineError(f"the files through which Bullet loads {layout.name}: {error}") from error
+            with temporary_folder() as folder:
+                self._load(folder, settings)
         except BaseException:
             client.close()
             raise
@@ -306,16 +302,20 @@ class BulletStepper(Stepper):
 
     def dump(self) -> bytes:
         near = np.array([robot.near for robot in self.robots]).tobytes()
-        with TemporaryDirectory(prefix="dynx-", ignore_cleanup_errors=True) as folder:
-            path = Path(folder) / "world.bullet"
+        with temporary_folder() as folder:
+            path = folder / "world.bullet"
             self.client.call(self.client.engine.saveBullet, str(path))
-            return struct.pack("<?", self.contact_reader.fresh) + near + path.read_bytes()
+            data = path.read_bytes()
+            # Bullet does not notice a full disk, which has no room for one more byte either.
+            with path.open("ab") as file:
+                file.write(b"0")
+            return struct.pack("<?", self.contact_reader.fresh) + near + data
 
     def load(self, data: bytes) -> None:
         size = 32 * len(self.robots)
         near = np.frombuffer(data[1 : 1 + size]).reshape(-1, 4)
-        with TemporaryDirectory(prefix="dynx-", ignore_cleanup_errors=True) as folder:
-            path = Path(folder) / "world.bullet"
+        with temporary_folder() as folder:
+            path = folder / "world.bullet"
             path.write_bytes(data[1 + size :])
             self.client.call(self.client.engine.restoreState, fileName=str(path))
         for robot, quat in zip(self.robots, near, strict=True):

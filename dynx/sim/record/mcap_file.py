@@ -16,7 +16,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from dynx._version import __version__
-from dynx.errors import ArgumentError, DynxError, NotInstalledError, shown
+from dynx.errors import ArgumentError, DynxError, importing, shown
 from dynx.files.reading import checked_path, open_regular, printable
 from dynx.model import Model
 from dynx.model.documents import pose_numbers, robot_from_document
@@ -37,10 +37,8 @@ ABOUT_CHANNEL = {"offered_qos_profiles": ""}
 
 def write_mcap(rollout: Rollout, file: BinaryIO) -> None:
     """Write `rollout` as a recording. Raises NotInstalledError without mcap (``dynx[mcap]``)."""
-    try:
+    with importing("a .mcap file needs mcap: pip install 'dynx[mcap]'"):
         from mcap.writer import Writer
-    except ImportError as error:
-        raise NotInstalledError("a .mcap file needs mcap: pip install 'dynx[mcap]'") from error
     writer = Writer(file)
     writer.start(profile="ros2", library=f"dynx {__version__}")
     writer.add_metadata("dynx.rollout", _metadata(rollout))
@@ -71,10 +69,8 @@ def read_messages(path: str) -> tuple[list[tuple[str, int, bytes]], dict[str, di
 
     Raises ArgumentError for a file that cannot be read as MCAP, NotInstalledError without mcap.
     """
-    try:
+    with importing("a .mcap file needs mcap: pip install 'dynx[mcap]'"):
         from mcap.reader import make_reader
-    except ImportError as error:
-        raise NotInstalledError("a .mcap file needs mcap: pip install 'dynx[mcap]'") from error
     try:
         with open_regular(path) as file:
             reader = make_reader(file, validate_crcs=True)

@@ -236,8 +236,9 @@ def scene_from_document(document: object, paths: ScenePaths | None = None) -> Sc
     """Return the scene of a document.
 
     Files are looked for by `paths`; without them, robots are given as text only, so that a document from
-    elsewhere names no file that is read as a robot. Raises ArgumentError, DescriptionError and their kinds,
-    naming the place in the document.
+    elsewhere names no file that is read as a robot. With them a ``.xacro`` file is expanded, which evaluates
+    expressions of it as Python code: give them only for a document that you trust. Raises ArgumentError,
+    DescriptionError and their kinds, naming the place in the document.
     """
     if not isinstance(document, Mapping):
         raise ArgumentError(f"a scene's document is a table of keys; this is {shown(document)}")

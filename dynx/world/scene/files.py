@@ -11,7 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from dynx.argument_types import checks_types
-from dynx.errors import ArgumentError, DescriptionError, NotInstalledError, RobotNotFoundError, nearest, shown
+from dynx.errors import (
+    ArgumentError,
+    DescriptionError,
+    NotInstalledError,
+    RobotNotFoundError,
+    importing,
+    nearest,
+    shown,
+)
 from dynx.files.reading import checked_path, printable, read_file
 from dynx.files.writing import write_bytes
 from dynx.model.library import SCENES, own_roots, robots, scene_names
@@ -27,9 +35,10 @@ SUFFIXES = (".toml", ".json")
 def read_scene(source: str | os.PathLike[str], *, package_dirs: Iterable[StrPath] = ()) -> Scene:
     """Read a scene from a ``.toml`` or ``.json`` file, or one of the scenes of dynx by its name.
 
-    docs/world.md describes the keys. A file may come from anyone: the robots and meshes that it names lie in
-    its folder (its repository or package, if it lies in one), in the libraries of robots, or in
-    `package_dirs`, and no other file is read.
+    docs/world.md describes the keys. The robots and meshes that a file names lie in its folder (its
+    repository or package, if it lies in one), in the libraries of robots, or in `package_dirs`, and no other
+    file is read. A robot in a ``.xacro`` file is expanded, which evaluates expressions of that file as Python
+    code: read only scenes with such files that you trust. Other files may come from anyone.
     Raises RobotNotFoundError where nothing is there, ArgumentError and its kinds for a file that is no scene,
     with the place in it, and the errors of `dynx.load` for its robots.
     """
@@ -66,10 +75,8 @@ def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
     if suffix == ".json":
         write_bytes(file, json.dumps(document, indent=1, allow_nan=False).encode())
         return
-    try:
+    with importing("a scene in TOML needs tomli-w: pip install 'dynx[world]'"):
         import tomli_w
-    except ImportError as error:
-        raise NotInstalledError("a scene in TOML needs tomli-w: pip install 'dynx[world]'") from error
     write_bytes(file, tomli_w.dumps(document, multiline_strings=True).encode())
 
 

@@ -13,7 +13,7 @@ import pytest
 from dynx.engines.pybullet import client as bullet_client
 from dynx.engines.pybullet.backend import PyBulletBackend
 from dynx.engines.pybullet.canonical_urdf import write_bullet_urdf
-from dynx.errors import EngineError, NotInstalledError
+from dynx.errors import EngineError, NotInstalledError, TemporaryFolderError
 from dynx.model import Inertial
 from tests.backends.robots import BOX, all_quantities, chain, mixed_robot, motion, pair
 from tests.engines.pybullet.robots import clients
@@ -83,9 +83,9 @@ def test_inertia_that_bullet_drops_is_noticed(monkeypatch: pytest.MonkeyPatch) -
         PyBulletBackend(pair(BOX, BOX, "fixed"))
 
 
-def test_a_folder_that_cannot_be_written_is_an_engine_error(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_that_cannot_be_written_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tempfile.tempdir", "/nonexistent/folder")
-    with pytest.raises(EngineError, match="file through which Bullet loads chain"):
+    with pytest.raises(TemporaryFolderError, match=r"temporary folder /nonexistent/folder cannot be written"):
         PyBulletBackend(chain(2))
 
 

@@ -19,7 +19,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.errors import NotInstalledError, shown
+from dynx.errors import importing, shown
 from dynx.spatial.scalar import Floats
 
 MAX_NUMBERS = 20_000_000
@@ -70,10 +70,8 @@ def gltf_triangles(data: bytes, read_beside: ReadBeside) -> tuple[Floats, NDArra
 
 
 def _trimesh() -> Any:
-    try:
+    with importing("glTF meshes are read by trimesh: pip install 'dynx[world]'"):
         import trimesh
-    except ImportError as error:
-        raise NotInstalledError("glTF meshes are read by trimesh: pip install 'dynx[world]'") from error
     return trimesh
 
 
