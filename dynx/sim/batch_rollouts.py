@@ -15,7 +15,9 @@ from dynx.errors import ArgumentError, shown
 from dynx.files.arrays import SCHEMA_ENTRY, read_arrays, write_arrays
 from dynx.files.figures import new_figure, save_figure
 from dynx.files.pages import html_table
+from dynx.model import Model
 from dynx.model.numbers import checked_entries, real_array
+from dynx.rbd.jacobians import LOCAL
 from dynx.registry import door
 from dynx.sim.record.csv_file import coordinate_names
 from dynx.sim.scenario.scenario import Scenario
@@ -107,12 +109,16 @@ class BatchRollouts:
         return found
 
     @door("dynx.sim.batch_wrenches:joint_wrenches_of")
-    def joint_wrenches(self, **options: Any) -> Floats:
+    def joint_wrenches(
+        self, *, frame: str | None = None, reference: str = LOCAL, models: Sequence[Model] | None = None
+    ) -> Floats:
         """Return the wrenches (n, kept - 1, n_joints, 6) that joints transmit in each recorded step."""
         raise NotImplementedError
 
     @door("dynx.sim.batch_wrenches:base_wrench_of")
-    def base_wrench(self, **options: Any) -> Floats:
+    def base_wrench(
+        self, *, frame: str | None = None, reference: str = LOCAL, models: Sequence[Model] | None = None
+    ) -> Floats:
         """Return the wrench (n, kept - 1, 6) that the world exerts on the root link in each recorded step."""
         raise NotImplementedError
 

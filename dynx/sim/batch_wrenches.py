@@ -20,8 +20,6 @@ from dynx.world.last_step import MeanAcceleration
 if TYPE_CHECKING:
     from dynx.sim.batch_rollouts import BatchRollouts
 
-Models = Sequence[Model] | None
-
 
 @checks_types
 def joint_wrenches_of(
@@ -29,7 +27,7 @@ def joint_wrenches_of(
     *,
     frame: str | None = None,
     reference: str = LOCAL,
-    models: Models = None,
+    models: Sequence[Model] | None = None,
 ) -> Floats:
     """Return the wrenches (n, kept - 1, n_joints, 6) [N, N m] that the parents of all joints exert on their
     children in each step from one recorded state to the next.
@@ -51,14 +49,16 @@ def base_wrench_of(
     *,
     frame: str | None = None,
     reference: str = LOCAL,
-    models: Models = None,
+    models: Sequence[Model] | None = None,
 ) -> Floats:
     """Return the wrench (n, kept - 1, 6) [N, N m] that the world exerts on the root link, besides pushes, in
     each step from one recorded state to the next; see `joint_wrenches_of`."""
     return _wrenches(rollouts, "base_wrench", models, frame=frame, reference=reference)
 
 
-def _wrenches(rollouts: BatchRollouts, quantity: str, models: Models, **options: Any) -> Floats:
+def _wrenches(
+    rollouts: BatchRollouts, quantity: str, models: Sequence[Model] | None, **options: Any
+) -> Floats:
     robots, t, dt = _robots_of(rollouts, models), rollouts.t, rollouts.dt
     if len(t) < 2 or not np.allclose(np.diff(t), dt, rtol=1e-6):
         raise ArgumentError(
@@ -98,7 +98,7 @@ def _accelerations(model: Model, q: Floats, v: Floats, dt: float) -> Floats:
     return found
 
 
-def _robots_of(rollouts: BatchRollouts, models: Models) -> list[Model]:
+def _robots_of(rollouts: BatchRollouts, models: Sequence[Model] | None) -> list[Model]:
     """Return the robot of each rollout."""
     scenario, n = rollouts.scenario, len(rollouts)
     if models is None:

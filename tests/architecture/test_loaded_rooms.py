@@ -87,7 +87,7 @@ FLOWS = {
         ),
         (),
         175,
-        28350,
+        28650,
     ),
     "step of a box": Flow(
         "from dynx.world import Scene, World, box\n"
@@ -95,7 +95,7 @@ FLOWS = {
         ("ik", "sim", "envs", "doctor"),
         (),
         112,
-        19250,
+        19800,
     ),
     "step of the cart-pole": Flow(
         "import gymnasium, dynx.envs\n"
@@ -105,7 +105,7 @@ FLOWS = {
         ("distance", "ik", "world.camera", "steppers.camera"),
         (),
         167,
-        27450,
+        27950,
     ),
 }
 
