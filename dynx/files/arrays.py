@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from dynx.errors import ArgumentError, shown
-from dynx.files.reading import checked_path, open_regular, printable
+from dynx.files.reading import checked_path, open_regular, printable, require_size
 from dynx.files.writing import atomic_file
 
 WORLD_FILE = b"dynx world "
@@ -30,6 +30,9 @@ _LOADERS = {"dynx.rollout": "dynx.Rollout.load", "dynx.rollouts": "dynx.BatchRol
 
 _KINDS = "biufU"
 """Kinds of NumPy's types that are read."""
+
+_PIECE = 2**24
+"""Length of the pieces in which an array is read [bytes]."""
 
 _VERSION = (1, 0)
 """Version of the format in which NumPy writes arrays of these types."""
@@ -91,7 +94,7 @@ def read_arrays(path: str | os.PathLike[str], what: str, schema: str | None = No
                     if head == WORLD_FILE
                     else "it is not a .npz file, or it is truncated"
                 )
-            size = os.fstat(file.fileno()).st_size
+            size = require_size(file)
             with zipfile.ZipFile(file) as archive:
                 parts = archive.infolist()
                 if sum(part.file_size for part in parts) > size:
@@ -122,8 +125,10 @@ def _read(archive: zipfile.ZipFile, part: zipfile.ZipInfo, content: ArrayFile) -
         if np.lib.format.read_magic(stream) != _VERSION:
             raise ValueError(f"{part.filename} is an array of another version than {_VERSION}")
         shape, in_columns, dtype = np.lib.format.read_array_header_1_0(stream)
-        # Reading to the end compares the checksum.
-        data = bytearray(stream.read())
+        data = bytearray()
+        # Reading to the end compares the checksum; in one piece, the array would be in memory twice.
+        while piece := stream.read(_PIECE):
+            data += piece
     if dtype.kind not in _KINDS or math.prod(shape) * dtype.itemsize != len(data):
         raise ValueError(f"{part.filename} is {shown(dtype)} {shape} in {len(data)} bytes")
     array: np.ndarray[Any, Any] = np.ndarray(shape, dtype, data, order="F" if in_columns else "C")

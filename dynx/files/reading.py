@@ -5,12 +5,17 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import BinaryIO
 
 from dynx.errors import ArgumentError, DescriptionError, RobotNotFoundError, shown
 
 MAX_BYTES = 64 * 1024 * 1024
 """Largest size of a file [bytes]; the largest description in public use is under 2 MiB."""
+
+MAX_BINARY_BYTES = 1_500_000_000
+"""Largest size of a file of arrays or messages, and of what is expanded from it [bytes]."""
 
 
 class NotRegularError(OSError):
@@ -59,6 +64,26 @@ def read_file(path: str) -> bytes:
             f"is larger than {MAX_BYTES // 1024**2} MiB, the most that is read", source=printable(path)
         )
     return data
+
+
+@contextmanager
+def named_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
+    """Open a regular file that a user names. Raises ArgumentError for anything that cannot be opened."""
+    try:
+        file = open_regular(path)
+    except OSError as error:
+        raise ArgumentError(f"{shown(path, 300)} cannot be read: {error.strerror or error}") from error
+    with file:
+        yield file
+
+
+def require_size(file: BinaryIO, most: int = MAX_BINARY_BYTES) -> int:
+    """Return the size of an open file [bytes]. Raises ValueError for one above `most`, which a file with
+    holes can be without taking space on the disk."""
+    size = os.fstat(file.fileno()).st_size
+    if size > most:
+        raise ValueError(f"it has {size:,} bytes, more than the {most:,} that are read")
+    return size
 
 
 def irregularity(path: str | os.PathLike[str]) -> str:

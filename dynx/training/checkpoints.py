@@ -12,6 +12,7 @@ import numpy as np
 
 from dynx.errors import ArgumentError, shown
 from dynx.files.arrays import read_arrays
+from dynx.files.reading import named_file
 from dynx.files.writing import atomic_file
 from dynx.training.library import read_weights, replay_arrays, restore_replay
 from dynx.training.policy import Policy, read_policy_document, scaling_of
@@ -35,7 +36,7 @@ class Checkpoint:
 
     def restore(self, algorithm: Any, vector: Any) -> None:
         """Let a new algorithm and its environments go on from here."""
-        with open(self.path, "rb") as file:
+        with named_file(self.path) as file:
             read_weights(algorithm, file, str(self.path))
         algorithm.num_timesteps = self.steps_done
         scaling = scaling_of(self.document, vector.observation_space.shape, str(self.path))

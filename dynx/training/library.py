@@ -302,8 +302,8 @@ def read_weights(algorithm: Any, file: BinaryIO, source: str) -> None:
     try:
         _check_archive(file)
         _, weights, variables = load_from_zip_file(file, device="cpu", load_data=False)
-        if not all(bool(torch.isfinite(each).all()) for each in _tensors([weights, variables])):
-            raise ValueError("a number is not finite")
+        for each in _tensors([weights, variables]):
+            _check_tensor(each)
         networks = weights.get("policy", {})
         for name in [each for each in networks if each.endswith(_SCALED)]:
             del networks[name]
@@ -339,16 +339,32 @@ def _check_archive(file: BinaryIO) -> None:
 
 
 def _tensors(value: object) -> Iterator[Any]:
-    """Yield the tensors in nested dictionaries and lists."""
-    waiting = [value]
+    """Yield the tensors in nested dictionaries and lists, which a file can let share their parts."""
+    waiting, seen = [value], set[int]()
     while waiting:
         each = waiting.pop()
+        if id(each) in seen:
+            continue
+        seen.add(id(each))
         if isinstance(each, torch.Tensor):
             yield each
         elif isinstance(each, Mapping):
             waiting += each.values()
         elif isinstance(each, list | tuple):
             waiting += each
+
+
+def _check_tensor(tensor: Any) -> None:
+    """Raise ValueError for a tensor that repeats its numbers, has no plain layout, or is not finite.
+
+    Repeated numbers (a stride of 0) take no space in a file, and any space where they are computed with.
+    """
+    if tensor.layout is not torch.strided or tensor.is_quantized or tensor.device.type != "cpu":
+        raise ValueError("a tensor has another layout than plain numbers in memory")
+    if tensor.numel() * tensor.element_size() > tensor.untyped_storage().nbytes():
+        raise ValueError("a tensor is larger than its numbers")
+    if not bool(torch.isfinite(tensor).all()):
+        raise ValueError("a number is not finite")
 
 
 def _part_of(algorithm: Any, path: str) -> Any:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import os
 import warnings
 import zipfile
@@ -16,8 +15,8 @@ from numpy.typing import NDArray
 
 from dynx._version import __version__
 from dynx.errors import ArgumentError, shown
-from dynx.files.documents import convert_document, json_text, to_json_values
-from dynx.files.reading import irregularity
+from dynx.files.documents import convert_document, json_text, parse_json, to_json_values
+from dynx.files.reading import irregularity, named_file
 from dynx.files.writing import atomic_file
 from dynx.model.numbers import whole_number
 from dynx.training.environments import make
@@ -129,13 +128,13 @@ def read_policy_document(path: str | os.PathLike[str]) -> PolicyDocument:
             raise ArgumentError(f"{where} is the folder of a run; its policy is {Path(path, 'final.zip')}")
         raise ArgumentError(f"{where}: {irregularity(path) or 'there is no such file'}")
     try:
-        with zipfile.ZipFile(path) as archive:
+        with named_file(path) as file, zipfile.ZipFile(file) as archive:
             if DOCUMENT not in archive.namelist():
                 raise ArgumentError(f"{where} was not written by dynx train: it does not name its task")
             if archive.getinfo(DOCUMENT).file_size > MAX_DOCUMENT:
                 raise ArgumentError(f"{where}: {DOCUMENT} is larger than {MAX_DOCUMENT:,} bytes")
-            document = json.loads(archive.read(DOCUMENT))
-    except (zipfile.BadZipFile, OSError, ValueError, RecursionError, NotImplementedError) as error:
+            document = parse_json(archive.read(DOCUMENT))
+    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError) as error:
         if isinstance(error, ArgumentError):
             raise
         raise ArgumentError(f"{where} is damaged, or no policy: {' '.join(str(error).split())}") from error
@@ -160,7 +159,7 @@ def load_policy(path: str | os.PathLike[str], task: TaskSpec | None = None) -> P
     spec = _spec_of(document, task, os.fspath(path))
     vector = DummyVecEnv([lambda: make(task or spec.task)])
     try:
-        with open(path, "rb") as file:
+        with named_file(path) as file:
             with warnings.catch_warnings():
                 # Warnings about the number of environments concern training.
                 warnings.simplefilter("ignore", UserWarning)

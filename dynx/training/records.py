@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from dynx.errors import ArgumentError, shown
-from dynx.files.documents import to_json_values
+from dynx.files.documents import parse_json, to_json_values
 from dynx.files.reading import read_file
 from dynx.files.writing import write_text
 
@@ -46,8 +46,8 @@ def read_lines(path: Path) -> list[dict[str, Any]]:
     if not path.exists():
         return found
     for line in read_file(str(path)).decode("ascii", "replace").splitlines():
-        with contextlib.suppress(ValueError, RecursionError):
-            document = json.loads(line)
+        with contextlib.suppress(ValueError):
+            document = parse_json(line)
             if isinstance(document, dict) and type(document.get("steps")) is int:
                 found.append(document)
     return found

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Callable
 from contextlib import ExitStack, closing
@@ -11,7 +10,7 @@ from pathlib import Path
 
 from dynx._version import __version__
 from dynx.errors import ArgumentError, DescriptionError, RobotNotFoundError, shown
-from dynx.files.documents import json_text
+from dynx.files.documents import json_text, parse_json
 from dynx.files.reading import read_file
 from dynx.files.writing import write_text
 from dynx.training.checkpoints import Checkpoints
@@ -89,11 +88,11 @@ def read_run(folder: str | os.PathLike[str]) -> TrainingSpec:
     """
     path = Path(folder) / RUN
     try:
-        document = json.loads(read_file(str(path)))
+        document = parse_json(read_file(str(path)))
         spec: object = document["spec"]
     except RobotNotFoundError:
         raise ArgumentError(f"{shown(folder, 300)} has no training run: there is no {RUN} in it") from None
-    except (DescriptionError, ValueError, KeyError, TypeError, RecursionError) as error:
+    except (DescriptionError, ValueError, KeyError, TypeError) as error:
         raise ArgumentError(f"{shown(path, 300)} cannot be read: {error}") from error
     return read_spec(spec, str(path))
 

@@ -253,12 +253,10 @@ def _collider(
 
 
 def _pairs(scene: Scene, colliders: tuple[Collider, ...]) -> np.ndarray[tuple[int, int], np.dtype[np.bool_]]:
-    n = len(colliders)
-    pairs = np.zeros((n, n), dtype=bool)
-    may_collide = scene.collision_filter.may_collide
-    for i, a in enumerate(colliders):
-        for j in range(i):
-            b = colliders[j]
-            if a.owner != b.owner and may_collide(a.name, b.name):
-                pairs[i, j] = pairs[j, i] = True
+    pairs = scene.collision_filter.pairs([each.name for each in colliders])
+    parts_of: dict[Owner, list[int]] = {}
+    for k, each in enumerate(colliders):
+        parts_of.setdefault(each.owner, []).append(k)
+    for parts in parts_of.values():
+        pairs[np.ix_(parts, parts)] = False
     return pairs

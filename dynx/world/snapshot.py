@@ -19,7 +19,8 @@ import numpy as np
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, shown
 from dynx.files.arrays import WORLD_FILE
-from dynx.files.reading import checked_path, open_regular, printable
+from dynx.files.documents import parse_json
+from dynx.files.reading import checked_path, open_regular, printable, require_size
 from dynx.files.writing import write_bytes
 from dynx.spatial.scalar import Floats
 
@@ -30,8 +31,8 @@ _OTHER_SUFFIXES: dict[tuple[str, ...], str] = {
     (".npz", ".mcap", ".csv"): "; Rollout.save writes the record of a simulation to .npz, .mcap and .csv",
     (".html", ".png", ".gif"): "; World.view(...).export writes pages and pictures to .html, .png and .gif",
 }
-MAX_BYTES = 1 << 30
-"""Largest file that is read."""
+MAX_STATE = 1 << 28
+"""Largest file that is read [bytes]; a world of a thousand bodies takes under 2 MiB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,22 +151,26 @@ def read_snapshot(path: str | os.PathLike[str]) -> tuple[Snapshot, dict[str, Any
     name = printable(checked_path(path))
     try:
         with open_regular(path) as file:
-            data = file.read(MAX_BYTES + 1)
+            data = file.read(require_size(file, MAX_STATE))
     except OSError as error:
         raise ArgumentError(f"{name} cannot be read: {error.strerror or error}") from None
+    except ValueError as error:
+        raise ArgumentError(f"{name} cannot be read as a world: {error}") from None
     start = len(MAGIC) + hashlib.sha256().digest_size
     if not data.startswith(MAGIC):
         raise ArgumentError(f"{name} is no file that World.write wrote{_other_kind(data, name)}")
     content = data[start:]
-    if len(data) > MAX_BYTES or hashlib.sha256(content).digest() != data[len(MAGIC) : start]:
+    if hashlib.sha256(content).digest() != data[len(MAGIC) : start]:
         raise ArgumentError(f"{name} is damaged: its content does not match its checksum")
     length = int.from_bytes(content[:8], "little")
     try:
-        header = json.loads(content[8 : 8 + length])
+        if length > len(content) - 8:
+            raise ValueError(f"its header is announced with {length} bytes")
+        header = parse_json(content[8 : 8 + length])
         world = _world(header["world"])
         return _snapshot(header, _robots(world), content[8 + length :]), world
     # The header of a file that was not written by dynx may have any form.
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         raise ArgumentError(f"{name} cannot be read as a world: {error}") from error
 
 

@@ -59,7 +59,7 @@ FLOWS = {
         ),
         (),
         71,
-        11700,
+        11750,
     ),
     "inverse kinematics": Flow(
         ENGINE + "engine.inverse_kinematics(engine.forward_kinematics(q, 'tool0'), 'tool0', q)",

@@ -24,13 +24,14 @@ import csv
 import io
 import math
 import os
+import re
 from collections.abc import Sequence
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TextIO
 
 import numpy as np
 
 from dynx.errors import ArgumentError, nearest, shown
-from dynx.files.reading import checked_path, irregularity
+from dynx.files.reading import checked_path, open_regular, require_size
 from dynx.model import Model
 from dynx.model.configuration import checked_q
 from dynx.sim.record.rollout import Rollout
@@ -92,9 +93,23 @@ def coordinate_names(model: Model) -> tuple[list[str], list[str]]:
     return [*(positions if model.floating else []), *joints], [*(rates if model.floating else []), *joints]
 
 
+_FORMULA = re.compile(r"[;\t]\s*[=+@-]")
+"""What a spreadsheet computes, in a country where it divides cells at semicolons or tabs."""
+
+
 def _quoted(text: str) -> str:
+    if _FORMULA.search(text):
+        raise ArgumentError(
+            f"the column {shown(text)} has a part that spreadsheets compute; save it as .npz or .mcap"
+        )
     return '"' + text.replace('"', '""') + '"' if any(c in text for c in ',"\n\r') else text
 
+
+MAX_TABLE = 2**28
+"""Largest size of a table that is read [bytes]."""
+
+MAX_CELLS = 20_000_000
+"""Largest number of cells, which take up to 65 bytes in memory each, and of rows, which count as three."""
 
 TIMES = ("t", "time", "timestamp")
 """Names of the column of times [s]."""
@@ -112,13 +127,11 @@ def load_csv(path: str | os.PathLike[str], model: Model) -> dict[str, Any]:
     no number, a quaternion of another length than 1, and times that do not increase.
     """
     name = shown(checked_path(path), 300)
-    problem = irregularity(path)
-    if problem:
-        raise ArgumentError(f"{name} {problem}")
     try:
-        with open(path, newline="", encoding="utf-8-sig") as file:
-            rows = list(csv.reader(io.StringIO(file.read()), skipinitialspace=True))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        with open_regular(path) as file, io.TextIOWrapper(file, "utf-8-sig", newline="") as text:
+            require_size(file, MAX_TABLE)
+            rows = _rows(text)
+    except (OSError, ValueError, csv.Error) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise ArgumentError(f"{name} cannot be read as a table: {reason}") from None
     if not rows:
@@ -158,6 +171,17 @@ def load_csv(path: str | os.PathLike[str], model: Model) -> dict[str, Any]:
         "reference": None,
         "rotors": np.zeros((model.nv, model.nv)),
     }
+
+
+def _rows(file: TextIO) -> list[list[str]]:
+    """Return the cells of a table by row. Raises ValueError for more than `MAX_CELLS`."""
+    rows, cells = [], 0
+    for row in csv.reader(file, skipinitialspace=True):
+        rows.append(row)
+        cells += 3 + len(row)
+        if cells > MAX_CELLS:
+            raise ValueError(f"it has more than {MAX_CELLS:,} cells")
+    return rows
 
 
 class _TextColumns:

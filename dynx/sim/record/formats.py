@@ -13,6 +13,7 @@ import numpy as np
 
 from dynx.errors import ArgumentError, shown
 from dynx.files.arrays import ArrayFile, read_arrays
+from dynx.files.documents import parse_json
 from dynx.files.reading import checked_path
 from dynx.files.writing import atomic_file
 from dynx.model import Model
@@ -81,7 +82,7 @@ def _fields(path: str | os.PathLike[str], model: Model | None) -> dict[str, Any]
         return load_mcap(path)
     file = read_arrays(path, "a rollout", SCHEMA)
     with _reading("the robot", file):
-        robot: dict[str, Any] = json.loads(file.text("robot"))
+        robot: dict[str, Any] = parse_json(file.text("robot"))
         model = robot_from_document(robot)
         scenario = None if robot["scenario"] is None else Scenario.from_dict(robot["scenario"])
         executor, departures = str(robot["executor"]), tuple(map(str, robot["departures"]))

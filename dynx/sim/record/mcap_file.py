@@ -11,13 +11,16 @@ from __future__ import annotations
 import json
 import os
 from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, BinaryIO
 
 import numpy as np
 
 from dynx._version import __version__
 from dynx.errors import ArgumentError, DynxError, importing, shown
-from dynx.files.reading import checked_path, open_regular, printable
+from dynx.files.documents import parse_json
+from dynx.files.reading import MAX_BINARY_BYTES, checked_path, open_regular, printable, require_size
 from dynx.model import Model
 from dynx.model.documents import pose_numbers, robot_from_document
 from dynx.sim.record.rollout import Rollout
@@ -30,6 +33,12 @@ SCHEMA = "dynx.rollout.mcap/1"
 
 BLOCK = 1000
 """Number of states that are encoded together; it limits the memory that a long recording needs."""
+
+MAX_CHUNK = 32 * 2**20
+"""Largest size of the records of a chunk [bytes]; writers of MCAP begin a new one after 1 to 4 MiB."""
+
+MAX_MESSAGES = 4_000_000
+"""Largest number of messages that are read: each takes 150 bytes beside its own."""
 
 ABOUT_CHANNEL = {"offered_qos_profiles": ""}
 """Entry that the ROS 2 profile of MCAP requires; an empty one leaves the quality of service to the player."""
@@ -70,20 +79,68 @@ def read_messages(path: str) -> tuple[list[tuple[str, int, bytes]], dict[str, di
     Raises ArgumentError for a file that cannot be read as MCAP, NotInstalledError without mcap.
     """
     with importing("a .mcap file needs mcap: pip install 'dynx[mcap]'"):
-        from mcap.reader import make_reader
+        from mcap.records import Channel, Message, Metadata
+    about: dict[str, dict[str, str]] = {}
+    messages: list[tuple[str, int, bytes]] = []
+    topics: dict[int, str] = {}
     try:
         with open_regular(path) as file:
-            reader = make_reader(file, validate_crcs=True)
-            about = {each.name: dict(each.metadata) for each in reader.iter_metadata()}
-            messages = [
-                (channel.topic, message.log_time, message.data)
-                for _, channel, message in reader.iter_messages(log_time_order=False)
-            ]
+            for record in _records(file):
+                if isinstance(record, Metadata):
+                    about[record.name] = dict(record.metadata)
+                elif isinstance(record, Channel):
+                    topics[record.id] = record.topic
+                elif isinstance(record, Message):
+                    messages.append((topics[record.channel_id], record.log_time, record.data))
+                    if len(messages) > MAX_MESSAGES:
+                        raise ValueError(f"it has more than {MAX_MESSAGES:,} messages")
     # A damaged file raises what its records lead to: struct.error, KeyError, errors of zstandard.
     except Exception as error:
         reason = str(error) or type(error).__name__
         raise ArgumentError(f"{printable(path)} is no whole MCAP file: {reason}") from error
     return messages, about
+
+
+def _records(file: BinaryIO) -> Iterator[Any]:
+    """Yield the records of a recording in their order, those of its chunks included.
+
+    A chunk is expanded here, because readers of MCAP expand one to any size. Raises ValueError for a
+    recording that is larger than what is read, and any exception for a damaged one.
+    """
+    from mcap.records import Chunk
+    from mcap.stream_reader import StreamReader, breakup_chunk
+
+    size = require_size(file)
+    expanded = 0
+    for record in StreamReader(file, emit_chunks=True, validate_crcs=True, record_size_limit=size).records:
+        if isinstance(record, Chunk):
+            data = _expanded(record)
+            expanded += len(data)
+            if expanded > MAX_BINARY_BYTES:
+                raise ValueError(f"its chunks have more than {MAX_BINARY_BYTES:,} bytes")
+            yield from breakup_chunk(replace(record, compression="", data=data), validate_crc=True)
+        else:
+            yield record
+
+
+def _expanded(chunk: Any) -> bytes:
+    """Return the records of a chunk. Raises ValueError for more bytes than `MAX_CHUNK`."""
+    if chunk.compression == "zstd":
+        import zstandard
+
+        with zstandard.ZstdDecompressor(max_window_size=MAX_CHUNK).stream_reader(chunk.data) as stream:
+            data: bytes = stream.read(MAX_CHUNK + 1)
+    elif chunk.compression == "lz4":
+        import lz4.frame
+
+        data = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, MAX_CHUNK + 1)
+    elif chunk.compression == "":
+        data = chunk.data
+    else:
+        raise ValueError(f"a chunk has the compression {shown(chunk.compression)}; wanted zstd or lz4")
+    if len(data) > MAX_CHUNK:
+        raise ValueError(f"a chunk has more than {MAX_CHUNK:,} bytes")
+    return data
 
 
 def _metadata(rollout: Rollout) -> dict[str, str]:
@@ -131,7 +188,7 @@ def load_mcap(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def _fields(messages: Messages, settings: dict[str, str]) -> dict[str, Any]:
-    known = {key: json.loads(settings[key]) for key in ("gravity", "base_pose", "rotors")}
+    known = {key: parse_json(settings[key]) for key in ("gravity", "base_pose", "rotors")}
     description = MessageReader(messages["/robot_description"][0][1]).text()
     model = robot_from_document(
         {

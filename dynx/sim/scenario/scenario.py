@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from dynx.argument_types import checks_types
 from dynx.control.base import Controller, refuse_other_than_controller
 from dynx.errors import ArgumentError, shown
-from dynx.files.documents import check_document
+from dynx.files.documents import check_document, parse_json
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.model.model import refuse_other_than_model
@@ -234,8 +234,8 @@ class Scenario(SimulationOptions):
     def from_json(cls, text: str) -> Scenario:
         """Return the scenario of a text that `to_json` wrote. Raises ArgumentError for any other text."""
         try:
-            document = json.loads(text)
-        except (TypeError, ValueError, RecursionError) as error:
+            document = parse_json(text)
+        except (TypeError, ValueError) as error:
             raise ArgumentError(f"the text is not JSON: {error}") from error
         return cls.from_dict(document)
 

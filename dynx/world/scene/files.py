@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Iterable
 from importlib import import_module
 from importlib.util import find_spec
@@ -20,6 +21,7 @@ from dynx.errors import (
     nearest,
     shown,
 )
+from dynx.files.documents import parse_json
 from dynx.files.reading import checked_path, printable, read_file
 from dynx.files.writing import write_bytes
 from dynx.model.library import SCENES, own_roots, robots, scene_names
@@ -29,6 +31,15 @@ from dynx.world.scene.paths import ScenePaths
 from dynx.world.scene.scene import Scene
 
 SUFFIXES = (".toml", ".json")
+
+MAX_TOML = 8 * 2**20
+"""Largest size of a scene in TOML, of which Python reads about a million characters a second."""
+
+MAX_KEY_PARTS = 16
+"""Largest number of parts of a dotted key; Python's time grows with its square."""
+
+_PART = r"""(?:(?<![\w-])[\w-]+|"[^"\n]*"|'[^'\n]*')"""
+_LONG_KEY = re.compile(rf"{_PART}(?:[ \t]*\.[ \t]*{_PART}){{{MAX_KEY_PARTS}}}")
 
 
 @checks_types
@@ -49,7 +60,7 @@ def read_scene(source: str | os.PathLike[str], *, package_dirs: Iterable[StrPath
     text = _text(read_file(str(path)), name)
     try:
         document = _parsed(text, path.suffix.lower())
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise ArgumentError(f"{name} cannot be read: {error}") from None
     try:
         return scene_from_document(document, ScenePaths(path.parent, package_dirs))
@@ -105,9 +116,20 @@ def _text(data: bytes, name: str) -> str:
 
 def _parsed(text: str, suffix: str) -> Any:
     if suffix == ".json":
-        return json.loads(text)
+        return parse_json(text)
+    if len(text) > MAX_TOML:
+        raise ValueError(
+            f"it is larger than {MAX_TOML // 2**20} MiB, the most that is read of TOML; use JSON"
+        )
+    long = _LONG_KEY.search(text)
+    if long is not None:
+        line = text.count("\n", 0, long.start()) + 1
+        raise ValueError(f"a key in line {line} has more than {MAX_KEY_PARTS} parts: {shown(long[0])}")
     # Part of Python from 3.11 on; before that, tomli is the same module.
     for name in ("tomllib", "tomli"):
         if find_spec(name) is not None:
-            return import_module(name).loads(text)
+            try:
+                return import_module(name).loads(text)
+            except RecursionError:
+                raise ValueError("its lists and tables are nested too deeply") from None
     raise NotInstalledError("a scene in TOML needs tomli: pip install 'dynx[world]'")

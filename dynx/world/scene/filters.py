@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
 
 from dynx.model import Model
 from dynx.world.scene.bodies import SceneBody
@@ -47,6 +51,21 @@ class CollisionFilter:
         merged = self._merged[robot]
         pair = frozenset([merged[link_a], merged[link_b]])
         return self._robots[robot].self_collision and len(pair) == 2 and pair not in self._joined[robot]
+
+    def pairs(self, names: Sequence[str]) -> NDArray[np.bool_]:
+        """Return which of the parts named may collide with which (n, n), as `may_collide` says of two."""
+        fixed = np.array([self.is_fixed(name) for name in names], dtype=bool)
+        found: NDArray[np.bool_] = ~(fixed[:, None] & fixed)
+        for one, two in self._ignored:
+            in_one, in_two = (np.array([name in part for name in names], dtype=bool) for part in (one, two))
+            found[np.ix_(in_one, in_two)] = found[np.ix_(in_two, in_one)] = False
+        parts_of: dict[str, list[int]] = {}
+        for k, name in enumerate(names):
+            parts_of.setdefault(split_name(name)[0], []).append(k)
+        for parts in parts_of.values():
+            for i, j in product(parts, parts):
+                found[i, j] = self.may_collide(names[i], names[j])
+        return found
 
 
 def merged_links(model: Model) -> dict[str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from array import array
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,24 +62,40 @@ def _numbered(corners: Floats) -> tuple[Floats, NDArray[np.intp]]:
 # Triangles of Wavefront OBJ files; materials and the files that they name are ignored.
 
 
+LONGEST_LINE = 2**20
+"""Largest length of a line of an OBJ file, such as a polygon of 100,000 corners [bytes]."""
+
+MAX_VERTICES = 6_000_000
+"""Largest number of vertices of an OBJ file."""
+
+_LINE_END = re.compile(rb"\r\n|[\r\n]")
+_VERTEX_OR_FACE = re.compile(rb"(?<![^\r\n])[ \t\f\v]*[vf](?:[ \t\f\v][^\r\n]*|(?=[\r\n]|\Z))")
+
+
 def obj_triangles(data: bytes) -> tuple[Floats, NDArray[np.intp]]:
     """Return the vertices (n, 3) and triangles (m, 3) of all objects; polygons are divided into fans.
 
     Raises ValueError, with the line, for a damaged file.
     """
-    numbers: list[float] = []
-    corners: list[int] = []
+    # Lists of Python's numbers would take five times the memory.
+    numbers, corners = array("d"), array("q")
     text = data.replace(b"\\\r\n", b"  ").replace(b"\\\n", b" ")
-    for line, words in enumerate(map(bytes.split, text.splitlines()), start=1):
-        if not words:
-            continue
-        try:
+    start = 0
+    try:
+        for match in _VERTEX_OR_FACE.finditer(text):
+            start = match.start()
+            if match.end() - start > LONGEST_LINE:
+                raise ValueError(f"it has more than {LONGEST_LINE:,} bytes")
+            words = match[0].split()
             if words[0] == b"v":
-                numbers += _vertex(words)
-            elif words[0] == b"f":
-                corners += _fan(words[1:], len(numbers) // 3)
-        except ValueError as error:
-            raise ValueError(f"line {line}: {error}") from None
+                numbers.extend(_vertex(words))
+            else:
+                corners.extend(_fan(words[1:], len(numbers) // 3))
+            if len(numbers) > 3 * MAX_VERTICES:
+                raise ValueError(f"the file has more than {MAX_VERTICES:,} vertices")
+    except ValueError as error:
+        line = 1 + sum(1 for _ in _LINE_END.finditer(text, 0, start))
+        raise ValueError(f"line {line}: {error}") from None
     faces = np.array(corners, np.intp).reshape(-1, 3)
     vertices = np.array(numbers, np.float64).reshape(-1, 3)
     if faces.size and faces.max() >= len(vertices):

@@ -20,10 +20,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.errors import importing, shown
+from dynx.files.documents import parse_json
+from dynx.files.reading import MAX_BYTES
 from dynx.spatial.scalar import Floats
 
 MAX_NUMBERS = 20_000_000
 """Largest number of entries of all accessors."""
+
+MAX_BUFFERS = 1000
+"""Largest number of buffers."""
+
+MAX_BUFFER_BYTES = 4 * MAX_BYTES
+"""Largest size of all buffers; many can be the same file [bytes]."""
 
 MAX_NODES = 100_000
 """Largest number of nodes."""
@@ -47,10 +55,12 @@ def gltf_triangles(data: bytes, read_beside: ReadBeside) -> tuple[Floats, NDArra
     """
     tree, binary = _tree(data)
     _refuse_excess(tree)
-    buffers = {}
+    buffers: dict[str, bytes] = {}
     for number, buffer in enumerate(tree.get("buffers", [])):
         buffers[str(number)] = _buffer(buffer, binary, read_beside)
         buffer["uri"] = str(number)
+        if sum(map(len, buffers.values())) > MAX_BUFFER_BYTES:
+            raise ValueError(f"its buffers have more than {MAX_BUFFER_BYTES:,} bytes")
     scene = _trimesh().load_scene(
         io.BytesIO(json.dumps(tree).encode()), file_type="gltf", resolver=buffers, process=False
     )
@@ -85,8 +95,8 @@ def _tree(data: bytes) -> tuple[dict[str, Any], bytes]:
         end = 20 + int.from_bytes(data[12:16], "little")
         text, binary = data[20:end], data[end + 8 :]
     try:
-        tree = json.loads(text)
-    except (ValueError, RecursionError) as error:
+        tree = parse_json(text)
+    except ValueError as error:
         raise ValueError(f"it is not JSON: {error}") from None
     if not isinstance(tree, dict):
         raise ValueError("it is no JSON object")
@@ -104,6 +114,8 @@ def _positions_only(primitive: dict[str, Any]) -> dict[str, Any]:
 def _refuse_excess(tree: dict[str, Any]) -> None:
     """Raise ValueError for a tree on which trimesh would spend memory or time without bound."""
     nodes = tree.get("nodes", [])
+    if len(tree.get("buffers", [])) > MAX_BUFFERS:
+        raise ValueError(f"it has more than {MAX_BUFFERS} buffers")
     if len(nodes) > MAX_NODES:
         raise ValueError(f"it has more than {MAX_NODES} nodes")
     children = [child for node in nodes for child in node.get("children", [])]
@@ -116,7 +128,10 @@ def _refuse_excess(tree: dict[str, Any]) -> None:
             above, steps = parent.get(above), steps + 1
             if steps > 50:
                 raise ValueError("its nodes are nested deeper than 50, or in a cycle")
-    if sum(3 * each["count"] for each in tree.get("accessors", [])) > MAX_NUMBERS:
+    counts = [each["count"] for each in tree.get("accessors", [])]
+    if not all(type(count) is int and count >= 0 for count in counts):
+        raise ValueError("the count of an accessor is no whole number")
+    if 3 * sum(counts) > MAX_NUMBERS:
         raise ValueError(f"its accessors have more than {MAX_NUMBERS} entries")
     for accessor in tree.get("accessors", []):
         if "bufferView" not in accessor or "sparse" in accessor:

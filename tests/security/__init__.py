@@ -1,0 +1,1 @@
+"""Attacks on everything that dynx reads from strangers: files, folders, and the socket of its page."""

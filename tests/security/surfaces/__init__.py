@@ -1,0 +1,1 @@
+"""Attacks by what they attack; importing `every` registers all of them."""
