@@ -6,14 +6,14 @@ reads a file, or sees a value that was not checked.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dynx.model import Model
-from dynx.model.elements import JointCoefficients
+from dynx.model.elements import Joint, JointCoefficients
 from dynx.model.geometry import Shape
 from dynx.spatial.scalar import Floats
 from dynx.steppers.material import Material
@@ -126,6 +126,21 @@ class ConstraintLayout:
 
 
 @dataclass(frozen=True, eq=False)
+class SensorLayout:
+    """A sensor, for an engine with sensors of its own; it changes nothing that moves."""
+
+    name: str
+    kind: str
+    """``imu``, ``force_torque``, ``joint_torque``, ``encoder``, ``contact`` or ``ray``."""
+    part: str
+    """Link (``robot/link``) or body in whose frame `T` is."""
+    T: Floats
+    """Pose of the sensor's frame (4, 4)."""
+    joint: Joint | None = None
+    """The joint that is measured; None for the foundation."""
+
+
+@dataclass(frozen=True, eq=False)
 class Layout:
     """A scene in numbers; robots, bodies and colliders are in the order of the scene."""
 
@@ -139,6 +154,7 @@ class Layout:
     """Matrix (n, n), True for colliders that may touch: symmetric, False on the diagonal, between colliders
     of one owner, between fixed ones, and where the scene ignores the pair."""
     constraints: tuple[ConstraintLayout, ...]
+    sensors: tuple[SensorLayout, ...] = field(default=(), compare=False)
 
     def is_fixed(self, owner: Owner) -> bool:
         """Check whether a body cannot move: the world, a fixed base, or a body without mass."""

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
         JointTorqueSensor,
         RaySensor,
     )
-    from dynx.world.sensors.readings import Readings
+    from dynx.world.sensors.readings import Reading, Readings
     from dynx.world.sensors.sensor import Sensor
     from dynx.world.snapshot import Snapshot
     from dynx.world.surroundings import ContactTable, Surroundings
@@ -76,6 +76,7 @@ __all__ = [
     "PositionMotor",
     "RayHits",
     "RaySensor",
+    "Reading",
     "Readings",
     "Record",
     "RobotState",
@@ -133,6 +134,7 @@ _HOME = {
     "PositionMotor": "dynx.world.motors",
     "RayHits": "dynx.world.contacts",
     "RaySensor": "dynx.world.sensors.kinds",
+    "Reading": "dynx.world.sensors.readings",
     "Readings": "dynx.world.sensors.readings",
     "Record": "dynx.world.record",
     "RobotState": "dynx.steppers.state",

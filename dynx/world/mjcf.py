@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from dynx.argument_types import checks_types
@@ -14,6 +14,7 @@ from dynx.steppers.registry import world_names
 from dynx.steppers.settings import checked_settings
 from dynx.world.preparation import checked_options, may_be_reached, prepare
 from dynx.world.scene.scene import Scene
+from dynx.world.sensors.kinds import ForceTorqueSensor
 
 
 @checks_types
@@ -77,7 +78,8 @@ def layout_to_mjcf(
     document = MjcfDocument(layout, h, checked_settings("mujoco", SETTINGS, settings))
     for refused in document.refused:
         raise refused.error
-    return document.text(_remarks(scene, layout, options, engine))
+    remarks = (*_remarks(scene, layout, options, engine), *_remarks_on_sensors(scene, document.left_out))
+    return document.text(remarks)
 
 
 def _remarks(scene: Scene, layout: Layout, options: Mapping[str, Any], engine: str) -> Iterator[str]:
@@ -108,3 +110,32 @@ def _remarks(scene: Scene, layout: Layout, options: Mapping[str, Any], engine: s
         if robot.motors:
             kinds = ", ".join(dict.fromkeys(type(motor).__name__ for motor in robot.motors))
             yield f"{robot.name}: the laws of its motors ({kinds}) are not in the document."
+
+
+def _remarks_on_sensors(scene: Scene, left_out: Sequence[str]) -> Iterator[str]:
+    """Yield how the sensors of the document differ from those of the scene."""
+    if not scene.sensors:
+        return
+    yield (
+        "The sensors of MuJoCo are called by the sensor and what it measures, and have neither errors nor "
+        "rates nor delays. After a step they are those of its beginning, as in dynx."
+    )
+    kinds = {sensor.kind for sensor in scene.sensors if sensor.name not in left_out}
+    notes = {
+        "contact": "Sensors of contacts read in the axes of the world, those of dynx in axes of their own.",
+        "ray": (
+            "Sensors of rays read -1 where nothing is hit, those of dynx their length; from inside a shape "
+            "they read the distance to its other side, those of dynx 0."
+        ),
+        "joint_torque": "Sensors of joint torques read three numbers, of which the last is along the axis.",
+    }
+    yield from (note for kind, note in notes.items() if kind in kinds)
+    compensated = [
+        sensor.name
+        for sensor in scene.sensors
+        if isinstance(sensor, ForceTorqueSensor) and not sensor.weight and sensor.name not in left_out
+    ]
+    for name in compensated:
+        yield f"{name}: the weight of what it carries is not subtracted."
+    for name in left_out:
+        yield f"{name}: MuJoCo measures no force at fixed joints, whose links it merges; it is left out."

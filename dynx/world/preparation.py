@@ -75,6 +75,7 @@ def prepare(
         colliders=colliders,
         collides=_pairs(scene, colliders),
         constraints=tuple(map(parts.constraint, scene.constraints)),
+        sensors=tuple(each.layout(scene.sensed_parts) for each in scene.sensors),
     )
 
 

@@ -46,7 +46,7 @@ from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import FLOAT64_EPS, Array, Floats, jacobi_eigen, longdouble
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import cross, quat_from_rotation, rotation_from_quat, skew
-from dynx.steppers.layout import WORLD, BodyLayout, Layout, Owner, RobotLayout
+from dynx.steppers.layout import WORLD, BodyLayout, Layout, Owner, RobotLayout, SensorLayout
 
 # -- numbers ------------------------------------------------------------------------------------------------
 
@@ -359,8 +359,8 @@ class MjcfDocument:
         self._shapes = ShapeWriter(SubElement(root, "asset"))
         world = SubElement(root, "worldbody")
         self._carriers = {Owner(None, WORLD): Carrier(world, np.zeros(3))}
-        self._contact, self._equality, self._actuator = (
-            SubElement(root, name) for name in ("contact", "equality", "actuator")
+        self._contact, self._equality, self._actuator, self._sensor = (
+            SubElement(root, name) for name in ("contact", "equality", "actuator", "sensor")
         )
         q: list[Floats] = []
         v: list[Floats] = []
@@ -373,6 +373,10 @@ class MjcfDocument:
                 _append_state(q, v, body_coordinates(body.T, body.twist, body.center))
         self._add_contacts()
         self._add_constraints()
+        self.left_out: list[str] = []
+        """Names of sensors that the document cannot carry."""
+        for sensor in layout.sensors:
+            self._add_sensor(sensor)
         if q:
             state = {"name": "start", "qpos": np.concatenate(q), "qvel": np.concatenate(v)}
             SubElement(SubElement(root, "keyframe"), "key", attributes(state))
@@ -594,6 +598,69 @@ class MjcfDocument:
                 pose = carrier.placement(anchor.T[:3, :3], anchor.T[:3, 3])
                 SubElement(carrier.body, "site", {"name": name, "group": "3", **pose})
             SubElement(self._equality, tags[constraint.kind], site1=sites[0], site2=sites[1])
+
+    def _add_sensor(self, sensor: SensorLayout) -> None:
+        """Add the elements of a sensor, named by it and by what they measure.
+
+        MuJoCo measures force and torque between a body and its parent, so that it knows those of joints that
+        move alone: the inertia of links that fixed joints connect is merged.
+        """
+        names = {name: f"{sensor.name}/{name}" for name in SENSOR_ELEMENTS[sensor.kind]}
+        transmits = sensor.kind in ("force_torque", "joint_torque")
+        if transmits and (sensor.joint is None or not sensor.joint.moves):
+            self.left_out.append(sensor.name)
+            return
+        if sensor.kind == "encoder":
+            assert sensor.joint is not None
+            joint = f"{sensor.part.partition('/')[0]}/{sensor.joint.name}"
+            for name, element in SENSOR_ELEMENTS[sensor.kind].items():
+                SubElement(self._sensor, element, name=names[name], joint=joint)
+            return
+        number = self._colliders.get(sensor.part)
+        body = sensor.part if number is None else self._bodies_of_colliders[number]
+        if sensor.kind == "contact":
+            given = {"name": names["force"], "body2": body, "reduce": "netforce", "data": "force"}
+            SubElement(self._sensor, "contact", given)
+            return
+        # A ray passes through the shapes of the body on which its site is.
+        self._add_site(sensor, body if sensor.kind == "ray" else sensor.part)
+        for name, element in SENSOR_ELEMENTS[sensor.kind].items():
+            along = sensor.joint is not None and sensor.joint.type == "prismatic"
+            kind = "force" if along and sensor.kind == "joint_torque" else element
+            SubElement(self._sensor, kind, name=names[name], site=sensor.name)
+
+    def _add_site(self, sensor: SensorLayout, body: str) -> None:
+        """Add the site of a sensor to a body that is rigidly connected with its part."""
+        elements = {each.get("name"): each for each in self._root.iter("body")}
+        T = sensor.T
+        if body == f"{sensor.part}/shapes":
+            part = elements[sensor.part]
+            given = (np.array(part.get(name, default).split(), dtype=float) for name, default in _AT_ORIGIN)
+            position, (w, x, y, z) = given
+            T = homogeneous(rotation_from_quat(np.array([x, y, z, w])), position) @ T
+        elif body == f"{sensor.part}/center":
+            T = (
+                homogeneous(np.eye(3), np.array(elements[sensor.part].get("pos", "").split(), dtype=float))
+                @ T
+            )
+        pose = placement(T[:3, :3], T[:3, 3])
+        if sensor.kind == "joint_torque" and sensor.joint is not None:
+            pose = attributes({"zaxis": sensor.joint.axis})
+        SubElement(elements[body], "site", {"name": sensor.name, "group": "3", **pose})
+
+
+SENSOR_ELEMENTS: dict[str, dict[str, str]] = {
+    "force_torque": {"force": "force", "torque": "torque"},
+    "imu": {"acceleration": "accelerometer", "angular_velocity": "gyro"},
+    "joint_torque": {"torque": "torque"},
+    "encoder": {"position": "jointpos", "velocity": "jointvel"},
+    "contact": {"force": "contact"},
+    "ray": {"distance": "rangefinder"},
+}
+"""Elements of MuJoCo by what sensors of each kind measure."""
+
+_AT_ORIGIN = (("pos", "0 0 0"), ("quat", "1 0 0 0"))
+"""Attributes of a pose, and their defaults."""
 
 
 def _append_state(q: list[Floats], v: list[Floats], state: tuple[Floats, Floats]) -> None:

@@ -25,6 +25,7 @@ from dynx.world.scene.robots import WORLD, SceneRobot, checked_name, checked_pai
 
 if TYPE_CHECKING:
     from dynx.distance.avoidance import Avoidance
+    from dynx.world.sensors.places import Parts
     from dynx.world.sensors.sensor import Sensor
 
 MARGIN = 0.01
@@ -87,12 +88,9 @@ class Scene:
             self._check_constraint(constraint)
         if self.sensors != ():
             # Imported here, because most scenes have none.
-            from dynx.world.sensors.places import Parts
             from dynx.world.sensors.sensor import checked_sensors
 
-            models = {robot.name: robot.model for robot in self.robots}
-            alone = self.robots[0].name if len(models) == 1 else None
-            put(self, "sensors", checked_sensors(self.sensors, Parts(models, tuple(self._bodies), alone)))
+            put(self, "sensors", checked_sensors(self.sensors, self.sensed_parts))
 
     @cached_property
     def _robots(self) -> dict[str, SceneRobot]:
@@ -147,6 +145,14 @@ class Scene:
         """Every body, and every link as ``robot/link``, robots first."""
         links = (f"{robot.name}/{link.name}" for robot in self.robots for link in robot.model.links)
         return (*links, *self._bodies)
+
+    @cached_property
+    def sensed_parts(self) -> Parts:
+        """Robots and bodies on which sensors may be."""
+        from dynx.world.sensors.places import Parts
+
+        models = {robot.name: robot.model for robot in self.robots}
+        return Parts(models, tuple(self._bodies), self.robots[0].name if len(models) == 1 else None)
 
     @cached_property
     def collision_filter(self) -> CollisionFilter:

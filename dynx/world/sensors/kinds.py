@@ -14,6 +14,7 @@ from dynx.model.elements import IDENTITY, Joint, checked_pose
 from dynx.model.numbers import positive_number
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross, rotate, rotate_back
+from dynx.steppers.layout import SensorLayout
 from dynx.world.sensors.errors import NO_ERRORS, SensorErrors
 from dynx.world.sensors.places import Parts
 from dynx.world.sensors.sensor import AXES, Channel, Sensor
@@ -31,6 +32,18 @@ class PlacedSensor(Sensor):
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "pose", checked_pose(f"pose of {self}", self.pose))
+
+    def _on_frame(self, robot: str, model: Model, frame: str, joint: Joint | None = None) -> SensorLayout:
+        """Return the layout of the sensor on a frame of a robot."""
+        found = model.frames[model.frame_index(frame)]
+        T = found.placement.matrix @ self.pose.matrix
+        return SensorLayout(self.name, self.kind, f"{robot}/{found.link}", T, joint)
+
+    def _on_part(self, parts: Parts) -> SensorLayout:
+        """Return the layout of the sensor on a link or body."""
+        _, robot, name = self.place(parts)
+        part = name if robot is None else f"{robot}/{name}"
+        return SensorLayout(self.name, self.kind, part, self.pose.matrix)
 
     def frame(self, T_world_part: Floats) -> tuple[Floats, Floats]:
         """Return the rotations (n, 3, 3) and the origins (n, 3) of the sensor's frame in the world."""
@@ -64,6 +77,11 @@ class ForceTorqueSensor(PlacedSensor):
     def require(self, parts: Parts) -> None:
         model, name = _robot_part(self, parts)
         self.mounting(model, name)
+
+    def layout(self, parts: Parts) -> SensorLayout:
+        robot, model, name = _robot_and_part(self, parts)
+        number, frame = self.mounting(model, name)
+        return self._on_frame(robot, model, frame, None if number is None else model.joints[number])
 
     def mounting(self, model: Model, name: str) -> tuple[int | None, str]:
         """Return the number of the joint that is measured, None for the foundation, and the frame in which
@@ -114,6 +132,10 @@ class Imu(PlacedSensor):
         model, name = _robot_part(self, parts)
         _frame(self, model, name, "frame")
 
+    def layout(self, parts: Parts) -> SensorLayout:
+        robot, model, name = _robot_and_part(self, parts)
+        return self._on_frame(robot, model, name)
+
     def measure(self, motion: SensedMotion) -> tuple[Floats, ...]:
         robot, frame = motion.robot(self.place(motion.parts))
         T, velocity, acceleration = robot.pose(frame), robot.velocity(frame), robot.acceleration(frame)
@@ -143,6 +165,9 @@ class JointTorqueSensor(Sensor):
     def require(self, parts: Parts) -> None:
         _moving_joint(self, *_robot_part(self, parts))
 
+    def layout(self, parts: Parts) -> SensorLayout:
+        return _layout_of_joint(self, parts)
+
     def measure(self, motion: SensedMotion) -> tuple[Floats, ...]:
         robot, name = motion.robot(self.place(motion.parts))
         joint = _moving_joint(self, robot.model, name)
@@ -169,6 +194,9 @@ class Encoder(Sensor):
     def require(self, parts: Parts) -> None:
         _moving_joint(self, *_robot_part(self, parts))
 
+    def layout(self, parts: Parts) -> SensorLayout:
+        return _layout_of_joint(self, parts)
+
     def measure(self, motion: SensedMotion) -> tuple[Floats, ...]:
         robot, name = motion.robot(self.place(motion.parts))
         joint = _moving_joint(self, robot.model, name)
@@ -190,6 +218,9 @@ class ContactSensor(PlacedSensor):
 
     def require(self, parts: Parts) -> None:
         _link_or_body(self, parts)
+
+    def layout(self, parts: Parts) -> SensorLayout:
+        return self._on_part(parts)
 
     def measure(self, motion: SensedMotion) -> tuple[Floats, ...]:
         place = self.place(motion.parts)
@@ -219,6 +250,9 @@ class RaySensor(PlacedSensor):
     def require(self, parts: Parts) -> None:
         _link_or_body(self, parts)
 
+    def layout(self, parts: Parts) -> SensorLayout:
+        return self._on_part(parts)
+
     def measure(self, motion: SensedMotion) -> tuple[Floats, ...]:
         place = self.place(motion.parts)
         R, p = self.frame(motion.pose(place))
@@ -232,12 +266,24 @@ KINDS: dict[str, type[Any]] = {
 """Classes of sensors by their names in a document."""
 
 
-def _robot_part(sensor: Sensor, parts: Parts) -> tuple[Model, str]:
-    """Return the robot of a sensor and the name of the joint or frame; ArgumentError for one on a body."""
+def _robot_and_part(sensor: Sensor, parts: Parts) -> tuple[str, Model, str]:
+    """Return the robot of a sensor, its model, and the name of the joint or frame; ArgumentError for a sensor
+    on a body."""
     _, robot, name = sensor.place(parts)
     if robot is None:
         raise ArgumentError(f"{sensor} is on the body {shown(name)}; wanted a part of a robot")
-    return parts.robots[robot], name
+    return robot, parts.robots[robot], name
+
+
+def _robot_part(sensor: Sensor, parts: Parts) -> tuple[Model, str]:
+    return _robot_and_part(sensor, parts)[1:]
+
+
+def _layout_of_joint(sensor: Sensor, parts: Parts) -> SensorLayout:
+    """Return the layout of a sensor on a joint that moves."""
+    robot, model, name = _robot_and_part(sensor, parts)
+    joint = _moving_joint(sensor, model, name)
+    return SensorLayout(sensor.name, sensor.kind, f"{robot}/{joint.child}", np.eye(4), joint)
 
 
 def _link_or_body(sensor: Sensor, parts: Parts) -> None:

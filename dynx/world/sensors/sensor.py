@@ -16,6 +16,7 @@ from dynx.world.sensors.errors import SensorErrors
 from dynx.world.sensors.places import Parts, Place
 
 if TYPE_CHECKING:
+    from dynx.steppers.layout import SensorLayout
     from dynx.world.sensors.motion import SensedMotion
 
 
@@ -118,6 +119,10 @@ class Sensor(ABC):
     @abstractmethod
     def require(self, parts: Parts) -> None:
         """Raise UnknownNameError or ArgumentError unless the sensor can be on its place among `parts`."""
+
+    @abstractmethod
+    def layout(self, parts: Parts) -> SensorLayout:
+        """Return the sensor for an engine with sensors of its own; its place was checked by `require`."""
 
     @abstractmethod
     def measure(self, motion: SensedMotion) -> tuple[Floats, ...]:
