@@ -24,8 +24,9 @@ from dynx.spatial.scalar import Floats
 from dynx.steppers.camera import Camera
 from dynx.steppers.state import WorldState
 from dynx.viewer.colours import SKY_BLUE
-from dynx.viewer.drawn_robot import GHOST_OPACITY, GHOST_SIZE, DrawnScene, FollowingCamera, Look
+from dynx.viewer.drawn_robot import GHOST_OPACITY, GHOST_SIZE, DrawnScene, Look
 from dynx.viewer.episode_panel import ActionEntry, EpisodePanel, Standing, action_entries
+from dynx.viewer.following import FollowingCamera
 from dynx.viewer.framing import box_around
 from dynx.viewer.page import DEFAULT_HOST, Page
 from dynx.viewer.triangles import TRIANGLE_BUDGET, has_graphics_processor

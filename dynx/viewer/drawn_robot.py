@@ -1,5 +1,4 @@
-"""Robots and scenes as nodes of the page, placed by configuration or by poses of parts, and a camera that
-follows a part."""
+"""Robots and scenes as nodes of the page, placed by configuration or by poses of parts."""
 
 from __future__ import annotations
 
@@ -9,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dynx.errors import ArgumentError, DynxError, nearest, shown
+from dynx.errors import DynxError
 from dynx.model import Model
 from dynx.model.geometry import Mesh, Shape
 from dynx.model.geometry.links import Collision, Colour, Visual, link_shapes
@@ -17,7 +16,6 @@ from dynx.rbd.kinematics import link_poses
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
 from dynx.viewer.colours import GREY, ORANGE, RGB, VERMILION
-from dynx.viewer.page import Page
 from dynx.viewer.triangles import (
     TRIANGLE_BUDGET,
     Triangles,
@@ -43,17 +41,37 @@ class DrawnParts:
     the world.
     """
 
-    def __init__(self, root: Any, parts: dict[str, Any], above: Mapping[str, str]) -> None:
-        """`above` names the part below whose node that of a part lies; the others lie below the root."""
-        self._root = root
+    visuals: dict[str, list[Any]]
+    """The nodes of the visual shapes of each part."""
+
+    def __init__(
+        self,
+        root: Any,
+        parts: dict[str, Any],
+        above: Mapping[str, str],
+        roots: Mapping[str, str],
+        rigid: Mapping[str, str],
+    ) -> None:
+        """`above` names the part below whose node that of a part lies; the others lie below the root. `rigid`
+        names the parent of each part that a fixed joint connects to it."""
+        self._root, self._rigid = root, dict(rigid)
         self.parts = parts
         """The node of each part."""
+        self.roots = dict(roots)
+        """The root link of each robot, by the name of the robot."""
         self._number = {name: k for k, name in enumerate(parts)}
         # The last row is the world.
         self._above = np.array([self._number[above[n]] if n in above else -1 for n in parts], dtype=np.intp)
         self._poses = np.tile(np.eye(4), (len(parts) + 1, 1, 1))
         self._sent = np.full((len(parts), 3, 4), np.nan)
         self._placed: list[Callable[[Mapping[str, Floats]], None]] = []
+
+    def rigid_with(self, name: str) -> list[str]:
+        """Return the parts that fixed joints connect to a part, itself among them."""
+        body = {part: part for part in self.parts}
+        for part in self.parts:  # The parent of a link is before it.
+            body[part] = body[self._rigid[part]] if part in self._rigid else part
+        return [part for part in self.parts if body[part] == body[name]]
 
     def on_placed(self, placed: Callable[[Mapping[str, Floats]], None]) -> None:
         """Call `placed(poses)` whenever parts were placed."""
@@ -148,9 +166,10 @@ class DrawnRobot(DrawnParts):
         for link in _parents_first(model):
             over = self.links[self.above[link]].name if link in self.above else path
             self.links[link] = scene.add_frame(f"{over}/link{len(self.links)}", show_axes=False)
-        super().__init__(root, self.links, self.above)
-        self.visuals: dict[str, list[Any]] = {}
-        """The nodes of the visual shapes of each link."""
+        self.fixed = {joint.child: joint.parent for joint in model.joints if not joint.moves}
+        """The parent of each link that a fixed joint connects to it."""
+        super().__init__(root, self.links, self.above, {model.name: model.root}, self.fixed)
+        self.visuals = {}
         self._collisions: list[Any] | None = None
         self._add_visuals()
         self.move(model.neutral())
@@ -387,25 +406,24 @@ class DrawnScene(DrawnParts):
             except DynxError as error:
                 faults.append(f"{body.name}: {error}")
             start[body.name] = body.pose.matrix
-        above = {
-            f"{robot}/{link}": f"{robot}/{parent}"
-            for robot, drawn in self.robots.items()
-            for link, parent in drawn.above.items()
-        }
-        super().__init__(root, parts, above)
-        self.place(start)
-        self.faults = tuple(faults)
-        """Shapes that cannot be drawn, one sentence each."""
-
-    @property
-    def visuals(self) -> dict[str, list[Any]]:
-        """The nodes of the visual shapes of each link of the robots, and of each body."""
-        links = {
+        above, rigid = (
+            {
+                f"{robot}/{link}": f"{robot}/{parent}"
+                for robot, drawn in self.robots.items()
+                for link, parent in getattr(drawn, kind).items()
+            }
+            for kind in ("above", "fixed")
+        )
+        roots = {robot: f"{robot}/{drawn.model.root}" for robot, drawn in self.robots.items()}
+        super().__init__(root, parts, above, roots, rigid)
+        self.visuals = self._bodies | {
             f"{name}/{link}": nodes
             for name, robot in self.robots.items()
             for link, nodes in robot.visuals.items()
         }
-        return links | self._bodies
+        self.place(start)
+        self.faults = tuple(faults)
+        """Shapes that cannot be drawn, one sentence each."""
 
     def show(self, *, visuals: bool, collisions: bool) -> None:
         """Show or hide the visual shapes and the collision shapes of the robots."""
@@ -455,63 +473,3 @@ class ContactArrows:
         else:
             self._node.points = segments
             self._node.visible = True
-
-
-_NO_PART = "none"
-
-_FREE, _FOLLOWS, _FIRST_PERSON = "free", "moves with", "looks from"
-
-
-class FollowingCamera:
-    """The controls of the camera; it moves all open pages alike."""
-
-    def __init__(self, page: Page, drawn: DrawnParts) -> None:
-        self._page, self._drawn = page, drawn
-        self._before: Floats | None = None
-        gui = page.gui
-        with gui.add_folder("camera", expand_by_default=False):
-            self._mode = gui.add_dropdown("it is", (_FREE, _FOLLOWS, _FIRST_PERSON), initial_value=_FREE)
-            # An empty scene has no part.
-            self._part = gui.add_dropdown("part", tuple(drawn.parts) or (_NO_PART,))
-        self._mode.on_update(lambda _: self._start())
-        self._part.on_update(lambda _: self._start())
-        drawn.on_placed(self._move)
-
-    def watch(self, drawn: DrawnParts) -> None:
-        """Follow the parts of another drawing with the same names from now on."""
-        self._drawn, self._before = drawn, None
-        drawn.on_placed(self._move)
-
-    def follow(self, part: str | None, *, first_person: bool = False) -> None:
-        """Follow a part; None leaves the camera where it is. Raises ArgumentError for an unknown part."""
-        if part is not None:
-            if part not in self._drawn.parts:
-                raise ArgumentError(f"no part {shown(part)}{nearest(str(part), self._drawn.parts)}")
-            self._part.value = part
-        self._mode.value = _FREE if part is None else _FIRST_PERSON if first_person else _FOLLOWS
-        self._start()
-
-    def _start(self) -> None:
-        with self._page.lock:
-            self._before = None
-            part = self._part.value
-            self._move({part: self._drawn.pose(part)} if part in self._drawn.parts else {})
-
-    def _move(self, poses: Mapping[str, Floats]) -> None:
-        mode = self._mode.value
-        T = poses.get(self._part.value)
-        if mode == _FREE or T is None:
-            return
-        origin = np.array(T[:3, 3])
-        shift = None if self._before is None else origin - self._before
-        self._before = origin
-        for client in self._page.server.get_clients().values():
-            camera = client.camera
-            if mode == _FIRST_PERSON:
-                with client.atomic():
-                    camera.up_direction = tuple(T[:3, 2].tolist())
-                    camera.position = tuple(origin.tolist())
-                    camera.look_at = tuple((origin + T[:3, 0]).tolist())
-            elif shift is not None:
-                # viser moves what the camera looks at along with it.
-                camera.position = tuple((np.array(camera.position) + shift).tolist())

@@ -20,9 +20,9 @@ from dynx.viewer.drawn_robot import (
     GHOST_SIZE,
     ContactArrows,
     DrawnScene,
-    FollowingCamera,
     Look,
 )
+from dynx.viewer.following import FollowingCamera
 from dynx.viewer.framing import box_around, has_ground
 from dynx.viewer.library import uplot
 from dynx.viewer.marks import NamedParts

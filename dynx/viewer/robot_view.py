@@ -25,7 +25,8 @@ from dynx.spatial.so3 import rotation_from_quat
 from dynx.viewer.browser import CopyButton
 from dynx.viewer.colours import BLUE, VERMILION
 from dynx.viewer.controls import slider_step
-from dynx.viewer.drawn_robot import AS_DESCRIBED, DrawnRobot, FollowingCamera, Look, size_of, wxyz
+from dynx.viewer.drawn_robot import AS_DESCRIBED, DrawnRobot, Look, size_of, wxyz
+from dynx.viewer.following import FollowingCamera
 from dynx.viewer.framing import box_around
 from dynx.viewer.marks import Marks, NamedParts
 from dynx.viewer.page import Page

@@ -313,10 +313,11 @@ class Viewer(Controls):
 
     def follow(self, part: str | None, *, first_person: bool = False) -> None:
         """Let the camera of every page move with a part: a link of a robot, or in a motion or a world a body
-        or ``robot/link``; with None it stays where it is.
+        or ``robot/link``. A robot's name stands for its root link. With None the camera stays where it is.
 
-        The page turns around the part as before. With `first_person` it looks from the origin of the part
-        along its x axis, with its z axis up. Raises ArgumentError for an unknown part.
+        The page keeps its view of the part until its user turns, zooms or shifts it. With `first_person` it
+        looks along the x axis of the part, with its z axis up, from where that axis leaves the shapes of the
+        part and of what is fixed to it. Raises ArgumentError for an unknown part.
         """
         self.page.check_open()
         self.view.camera.follow(part, first_person=first_person)

@@ -15,7 +15,8 @@ from dynx.errors import ArgumentError, ClosedError, DynxError, nearest, shown
 from dynx.model.numbers import checked_array
 from dynx.rbd.kinematics import link_poses
 from dynx.spatial.scalar import Floats
-from dynx.viewer.drawn_robot import AS_DESCRIBED, ContactArrows, DrawnScene, FollowingCamera, Look
+from dynx.viewer.drawn_robot import AS_DESCRIBED, ContactArrows, DrawnScene, Look
+from dynx.viewer.following import FollowingCamera
 from dynx.viewer.framing import box_around, has_ground
 from dynx.viewer.marks import NamedParts
 from dynx.viewer.motion import MotionFrames, fixed_bodies, motion_of_state
