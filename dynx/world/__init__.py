@@ -48,7 +48,7 @@ if TYPE_CHECKING:
         JointTorqueSensor,
         RaySensor,
     )
-    from dynx.world.sensors.readings import Reading, Readings
+    from dynx.world.sensors.readings import Readings, SensorReading
     from dynx.world.sensors.sensor import Sensor
     from dynx.world.snapshot import Snapshot
     from dynx.world.surroundings import ContactTable, Surroundings
@@ -76,7 +76,6 @@ __all__ = [
     "PositionMotor",
     "RayHits",
     "RaySensor",
-    "Reading",
     "Readings",
     "Record",
     "RobotState",
@@ -85,6 +84,7 @@ __all__ = [
     "SceneRobot",
     "Sensor",
     "SensorErrors",
+    "SensorReading",
     "Separation",
     "Snapshot",
     "Surroundings",
@@ -134,7 +134,6 @@ _HOME = {
     "PositionMotor": "dynx.world.motors",
     "RayHits": "dynx.world.contacts",
     "RaySensor": "dynx.world.sensors.kinds",
-    "Reading": "dynx.world.sensors.readings",
     "Readings": "dynx.world.sensors.readings",
     "Record": "dynx.world.record",
     "RobotState": "dynx.steppers.state",
@@ -143,6 +142,7 @@ _HOME = {
     "SceneRobot": "dynx.world.scene.robots",
     "Sensor": "dynx.world.sensors.sensor",
     "SensorErrors": "dynx.world.sensors.errors",
+    "SensorReading": "dynx.world.sensors.readings",
     "Snapshot": "dynx.world.snapshot",
     "Surroundings": "dynx.world.surroundings",
     "TorqueMotor": "dynx.world.motors",

@@ -25,8 +25,8 @@ from dynx.world.queries import first_hits
 from dynx.world.sensors.errors import SampleNumbers
 from dynx.world.sensors.kinds import ContactSensor
 from dynx.world.sensors.motion import RobotMotion, SensedMotion
-from dynx.world.sensors.places import Parts, Place
-from dynx.world.sensors.readings import SAME_SAMPLE, Reading, read_sensor, sample_numbers
+from dynx.world.sensors.places import SensedParts, SensorPlace
+from dynx.world.sensors.readings import SAME_SAMPLE, SensorReading, read_sensor, sample_numbers
 from dynx.world.sensors.sensor import Sensor
 
 
@@ -55,7 +55,7 @@ class SceneMotion(SensedMotion):
         moving = {name: robot.model for name, robot in robots.items()}
         self.parts = parts._replace(robots={**parts.robots, **moving})
 
-    def pose(self, place: Place) -> Floats:
+    def pose(self, place: SensorPlace) -> Floats:
         around, n = self._around, len(self.t)
         moving = None if place.robot is None else self.robots.get(place.robot)
         if moving is not None:
@@ -66,11 +66,11 @@ class SceneMotion(SensedMotion):
                     return engine.forward_kinematics(around.configurations[robot.name], place.name)
         return np.broadcast_to(self._bodies[place.name], (n, 4, 4))
 
-    def contact_force(self, place: Place) -> Floats:
+    def contact_force(self, place: SensorPlace) -> Floats:
         require_shapes(place, self._around.layout)
         return self._around.force_on(_part(place))
 
-    def ray_distances(self, place: Place, origins: Floats, directions: Floats, length: float) -> Floats:
+    def ray_distances(self, place: SensorPlace, origins: Floats, directions: Floats, length: float) -> Floats:
         layout = self._around.layout
         others = tuple(each for each in layout.colliders if each.name != _part(place))
         seen, found = replace(layout, colliders=others), np.empty(len(self.t))
@@ -95,23 +95,23 @@ class SceneMotion(SensedMotion):
         return OwnerPoses(self._around.layout, WorldState(float(self.t[k]), robots, bodies))
 
 
-def parts_of(layout: Layout, alone: str | None = None) -> Parts:
+def parts_of(layout: Layout, alone: str | None = None) -> SensedParts:
     """Return the robots and bodies of a scene; `alone` is the robot whose parts are named without it, by
     default the only one."""
     robots = {robot.name: robot.model for robot in layout.robots}
     if alone is None and len(robots) == 1:
         (alone,) = robots
-    return Parts(robots, tuple(body.name for body in layout.bodies), alone)
+    return SensedParts(robots, tuple(body.name for body in layout.bodies), alone)
 
 
-def require_shapes(place: Place, layout: Layout) -> None:
+def require_shapes(place: SensorPlace, layout: Layout) -> None:
     """Raise UnsupportedFeatureError for a sensor of contacts on a part that nothing can touch."""
     if _part(place) not in {each.name for each in layout.colliders}:
         why = "has no collision shape" if layout.colliders else "has no shapes where collisions=False"
         raise UnsupportedFeatureError(f"{place.sensor} is on {shown(_part(place))}, which {why}")
 
 
-def _part(place: Place) -> str:
+def _part(place: SensorPlace) -> str:
     return place.name if place.robot is None else f"{place.robot}/{place.name}"
 
 
@@ -125,11 +125,11 @@ class _Pending(NamedTuple):
 
 
 @dataclass(eq=False)
-class _Sample:
+class _TakenSample:
     """One sample of a sensor, which is evaluated when it is read."""
 
     motion: SceneMotion
-    reading: Reading | None = None
+    reading: SensorReading | None = None
 
 
 class WorldSensors:
@@ -165,7 +165,7 @@ class WorldSensors:
     def forget(self) -> None:
         """Forget all samples: the state was set."""
         self._pending: _Pending | None = None
-        self._samples: dict[str, deque[_Sample]] = {each.name: deque() for each in self._sensors}
+        self._samples: dict[str, deque[_TakenSample]] = {each.name: deque() for each in self._sensors}
 
     def watched(self, act: Act) -> Act:
         """Return `act`, which begins the samples of each step, and takes those of the step before."""
@@ -212,14 +212,14 @@ class WorldSensors:
         motion = SceneMotion(np.array([t]), self._h, robots, around, None)
         for sensor in due:
             kept = self._samples[sensor.name]
-            kept.append(_Sample(motion))
+            kept.append(_TakenSample(motion))
             # Of those that can be read at the end of the step, the last is enough.
             while len(kept) > 1 and self._is_available(sensor, kept[1], t + self._h):
                 kept.popleft()
 
-    def readings(self, time: float) -> dict[str, Reading]:
+    def readings(self, time: float) -> dict[str, SensorReading]:
         """Return the last reading of each sensor that is available at `time` [s]."""
-        found: dict[str, Reading] = {}
+        found: dict[str, SensorReading] = {}
         for sensor in self._sensors:
             ready = [each for each in self._samples[sensor.name] if self._is_available(sensor, each, time)]
             if ready:
@@ -230,7 +230,7 @@ class WorldSensors:
                 found[sensor.name] = sample.reading
         return found
 
-    def _is_available(self, sensor: Sensor, sample: _Sample, time: float) -> bool:
+    def _is_available(self, sensor: Sensor, sample: _TakenSample, time: float) -> bool:
         return bool(sample.motion.t[0] + sensor.delay <= time + SAME_SAMPLE * self._h)
 
 

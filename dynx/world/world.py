@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from dynx.world.last_step import LastStep
     from dynx.world.queries import Queries
     from dynx.world.sensing import WorldSensors
-    from dynx.world.sensors.readings import Reading
+    from dynx.world.sensors.readings import SensorReading
 
 
 def scene_at(scene: Scene, state: WorldState) -> Scene:
@@ -399,7 +399,7 @@ class World:
         step, engine = self._kept_step(), self._motion.engine
         return step.reactions(engine, self.state, self.contacts())
 
-    def read_sensors(self) -> dict[str, Reading]:
+    def read_sensors(self) -> dict[str, SensorReading]:
         """Return the last reading of each sensor of the scene, by name.
 
         A sample is taken at the beginning of a step of the engine and can be read after that step, or its

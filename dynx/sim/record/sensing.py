@@ -19,7 +19,7 @@ from dynx.world.scene import Scene
 from dynx.world.sensing import SceneInstants, SceneMotion, parts_of, require_shapes
 from dynx.world.sensors.kinds import ContactSensor, RaySensor
 from dynx.world.sensors.motion import RobotMotion, SensedMotion
-from dynx.world.sensors.places import Parts
+from dynx.world.sensors.places import SensedParts
 from dynx.world.sensors.readings import Readings, read_sensor
 from dynx.world.sensors.sensor import Sensor, checked_sensors
 
@@ -95,7 +95,7 @@ def check_sensors(scenario: Scenario, model: Model) -> None:
     does not exist, a rate above that of the steps, contacts and rays without a scene."""
     scene, sensors = _scene_of(scenario), sensors_of(scenario)
     if scene is None:
-        parts, layout = Parts({model.name: model}, (), model.name), None
+        parts, layout = SensedParts({model.name: model}, (), model.name), None
     else:
         layout = _layout(scene)
         parts = parts_of(layout, _robot_name(scenario, model))

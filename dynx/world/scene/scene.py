@@ -25,7 +25,7 @@ from dynx.world.scene.robots import WORLD, SceneRobot, checked_name, checked_pai
 
 if TYPE_CHECKING:
     from dynx.distance.avoidance import Avoidance
-    from dynx.world.sensors.places import Parts
+    from dynx.world.sensors.places import SensedParts
     from dynx.world.sensors.sensor import Sensor
 
 MARGIN = 0.01
@@ -147,12 +147,12 @@ class Scene:
         return (*links, *self._bodies)
 
     @cached_property
-    def sensed_parts(self) -> Parts:
+    def sensed_parts(self) -> SensedParts:
         """Robots and bodies on which sensors may be."""
-        from dynx.world.sensors.places import Parts
+        from dynx.world.sensors.places import SensedParts
 
         models = {robot.name: robot.model for robot in self.robots}
-        return Parts(models, tuple(self._bodies), self.robots[0].name if len(models) == 1 else None)
+        return SensedParts(models, tuple(self._bodies), self.robots[0].name if len(models) == 1 else None)
 
     @cached_property
     def collision_filter(self) -> CollisionFilter:

@@ -16,8 +16,8 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross, rotate, rotate_back
 from dynx.steppers.layout import SensorLayout
 from dynx.world.sensors.errors import NO_ERRORS, SensorErrors
-from dynx.world.sensors.places import Parts
-from dynx.world.sensors.sensor import AXES, Channel, Sensor
+from dynx.world.sensors.places import SensedParts
+from dynx.world.sensors.sensor import AXES, Sensor, SensorChannel
 
 if TYPE_CHECKING:
     from dynx.world.sensors.motion import SensedMotion
@@ -39,7 +39,7 @@ class PlacedSensor(Sensor):
         T = found.placement.matrix @ self.pose.matrix
         return SensorLayout(self.name, self.kind, f"{robot}/{found.link}", T, joint)
 
-    def _on_part(self, parts: Parts) -> SensorLayout:
+    def _on_part(self, parts: SensedParts) -> SensorLayout:
         """Return the layout of the sensor on a link or body."""
         _, robot, name = self.place(parts)
         part = name if robot is None else f"{robot}/{name}"
@@ -69,16 +69,16 @@ class ForceTorqueSensor(PlacedSensor):
 
     kind: ClassVar[str] = "force_torque"
     touches: ClassVar[bool] = True
-    channels: ClassVar[tuple[Channel, ...]] = (
-        Channel("force", "force", AXES, "N"),
-        Channel("torque", "torque", AXES, "N m"),
+    channels: ClassVar[tuple[SensorChannel, ...]] = (
+        SensorChannel("force", "force", AXES, "N"),
+        SensorChannel("torque", "torque", AXES, "N m"),
     )
 
-    def require(self, parts: Parts) -> None:
+    def require(self, parts: SensedParts) -> None:
         model, name = _robot_part(self, parts)
         self.mounting(model, name)
 
-    def layout(self, parts: Parts) -> SensorLayout:
+    def layout(self, parts: SensedParts) -> SensorLayout:
         robot, model, name = _robot_and_part(self, parts)
         number, frame = self.mounting(model, name)
         return self._on_frame(robot, model, frame, None if number is None else model.joints[number])
@@ -123,16 +123,16 @@ class Imu(PlacedSensor):
     gyroscope: SensorErrors = NO_ERRORS
 
     kind: ClassVar[str] = "imu"
-    channels: ClassVar[tuple[Channel, ...]] = (
-        Channel("acceleration", "accelerometer", AXES, "m/s^2"),
-        Channel("angular_velocity", "gyroscope", AXES, "rad/s"),
+    channels: ClassVar[tuple[SensorChannel, ...]] = (
+        SensorChannel("acceleration", "accelerometer", AXES, "m/s^2"),
+        SensorChannel("angular_velocity", "gyroscope", AXES, "rad/s"),
     )
 
-    def require(self, parts: Parts) -> None:
+    def require(self, parts: SensedParts) -> None:
         model, name = _robot_part(self, parts)
         _frame(self, model, name, "frame")
 
-    def layout(self, parts: Parts) -> SensorLayout:
+    def layout(self, parts: SensedParts) -> SensorLayout:
         robot, model, name = _robot_and_part(self, parts)
         return self._on_frame(robot, model, name)
 
@@ -160,12 +160,12 @@ class JointTorqueSensor(Sensor):
 
     kind: ClassVar[str] = "joint_torque"
     touches: ClassVar[bool] = True
-    channels: ClassVar[tuple[Channel, ...]] = (Channel("torque", "torque", ("",), "N m or N"),)
+    channels: ClassVar[tuple[SensorChannel, ...]] = (SensorChannel("torque", "torque", ("",), "N m or N"),)
 
-    def require(self, parts: Parts) -> None:
+    def require(self, parts: SensedParts) -> None:
         _moving_joint(self, *_robot_part(self, parts))
 
-    def layout(self, parts: Parts) -> SensorLayout:
+    def layout(self, parts: SensedParts) -> SensorLayout:
         return _layout_of_joint(self, parts)
 
     def measure(self, motion: SensedMotion) -> tuple[Floats, ...]:
@@ -186,15 +186,15 @@ class Encoder(Sensor):
     velocity: SensorErrors = NO_ERRORS
 
     kind: ClassVar[str] = "encoder"
-    channels: ClassVar[tuple[Channel, ...]] = (
-        Channel("position", "position", ("",), "rad or m"),
-        Channel("velocity", "velocity", ("",), "rad/s or m/s"),
+    channels: ClassVar[tuple[SensorChannel, ...]] = (
+        SensorChannel("position", "position", ("",), "rad or m"),
+        SensorChannel("velocity", "velocity", ("",), "rad/s or m/s"),
     )
 
-    def require(self, parts: Parts) -> None:
+    def require(self, parts: SensedParts) -> None:
         _moving_joint(self, *_robot_part(self, parts))
 
-    def layout(self, parts: Parts) -> SensorLayout:
+    def layout(self, parts: SensedParts) -> SensorLayout:
         return _layout_of_joint(self, parts)
 
     def measure(self, motion: SensedMotion) -> tuple[Floats, ...]:
@@ -214,12 +214,12 @@ class ContactSensor(PlacedSensor):
 
     kind: ClassVar[str] = "contact"
     touches: ClassVar[bool] = True
-    channels: ClassVar[tuple[Channel, ...]] = (Channel("force", "force", AXES, "N"),)
+    channels: ClassVar[tuple[SensorChannel, ...]] = (SensorChannel("force", "force", AXES, "N"),)
 
-    def require(self, parts: Parts) -> None:
+    def require(self, parts: SensedParts) -> None:
         _link_or_body(self, parts)
 
-    def layout(self, parts: Parts) -> SensorLayout:
+    def layout(self, parts: SensedParts) -> SensorLayout:
         return self._on_part(parts)
 
     def measure(self, motion: SensedMotion) -> tuple[Floats, ...]:
@@ -241,16 +241,16 @@ class RaySensor(PlacedSensor):
     distance: SensorErrors = NO_ERRORS
 
     kind: ClassVar[str] = "ray"
-    channels: ClassVar[tuple[Channel, ...]] = (Channel("distance", "distance", ("",), "m"),)
+    channels: ClassVar[tuple[SensorChannel, ...]] = (SensorChannel("distance", "distance", ("",), "m"),)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "length", positive_number(f"length of {self}", self.length))
 
-    def require(self, parts: Parts) -> None:
+    def require(self, parts: SensedParts) -> None:
         _link_or_body(self, parts)
 
-    def layout(self, parts: Parts) -> SensorLayout:
+    def layout(self, parts: SensedParts) -> SensorLayout:
         return self._on_part(parts)
 
     def measure(self, motion: SensedMotion) -> tuple[Floats, ...]:
@@ -266,7 +266,7 @@ KINDS: dict[str, type[Any]] = {
 """Classes of sensors by their names in a document."""
 
 
-def _robot_and_part(sensor: Sensor, parts: Parts) -> tuple[str, Model, str]:
+def _robot_and_part(sensor: Sensor, parts: SensedParts) -> tuple[str, Model, str]:
     """Return the robot of a sensor, its model, and the name of the joint or frame; ArgumentError for a sensor
     on a body."""
     _, robot, name = sensor.place(parts)
@@ -275,18 +275,18 @@ def _robot_and_part(sensor: Sensor, parts: Parts) -> tuple[str, Model, str]:
     return robot, parts.robots[robot], name
 
 
-def _robot_part(sensor: Sensor, parts: Parts) -> tuple[Model, str]:
+def _robot_part(sensor: Sensor, parts: SensedParts) -> tuple[Model, str]:
     return _robot_and_part(sensor, parts)[1:]
 
 
-def _layout_of_joint(sensor: Sensor, parts: Parts) -> SensorLayout:
+def _layout_of_joint(sensor: Sensor, parts: SensedParts) -> SensorLayout:
     """Return the layout of a sensor on a joint that moves."""
     robot, model, name = _robot_and_part(sensor, parts)
     joint = _moving_joint(sensor, model, name)
     return SensorLayout(sensor.name, sensor.kind, f"{robot}/{joint.child}", np.eye(4), joint)
 
 
-def _link_or_body(sensor: Sensor, parts: Parts) -> None:
+def _link_or_body(sensor: Sensor, parts: SensedParts) -> None:
     _, robot, name = sensor.place(parts)
     if robot is not None:
         links = [link.name for link in parts.robots[robot].links]

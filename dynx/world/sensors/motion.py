@@ -13,7 +13,7 @@ from dynx.errors import UnsupportedFeatureError, shown
 from dynx.model import Model
 from dynx.model.elements import Joint
 from dynx.spatial.scalar import Floats
-from dynx.world.sensors.places import Parts, Place
+from dynx.world.sensors.places import SensedParts, SensorPlace
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,9 +99,9 @@ class SensedMotion:
     def __init__(self, t: Floats, h: float, robots: Mapping[str, RobotMotion], alone: str | None) -> None:
         self.t, self.h = t, h
         self.robots = robots
-        self.parts = Parts({name: robot.model for name, robot in robots.items()}, (), alone)
+        self.parts = SensedParts({name: robot.model for name, robot in robots.items()}, (), alone)
 
-    def robot(self, place: Place) -> tuple[RobotMotion, str]:
+    def robot(self, place: SensorPlace) -> tuple[RobotMotion, str]:
         """Return the robot of a place, and the name of the joint or frame."""
         if place.robot is None or place.robot not in self.robots:
             raise UnsupportedFeatureError(
@@ -109,16 +109,16 @@ class SensedMotion:
             )
         return self.robots[place.robot], place.name
 
-    def pose(self, place: Place) -> Floats:
+    def pose(self, place: SensorPlace) -> Floats:
         """Return the poses (n, 4, 4) of a link or body in the world."""
         robot, name = self.robot(place)
         return robot.pose(name)
 
-    def contact_force(self, place: Place) -> Floats:
+    def contact_force(self, place: SensorPlace) -> Floats:
         """Return the sum (n, 3) of the contact forces on a link or body, in world axes [N]."""
         raise place.without_scene
 
-    def ray_distances(self, place: Place, origins: Floats, directions: Floats, length: float) -> Floats:
+    def ray_distances(self, place: SensorPlace, origins: Floats, directions: Floats, length: float) -> Floats:
         """Return the distances (n,) [m] from the origins (n, 3) along unit directions (n, 3) to what is hit
         first within `length` [m], other than the link or body of the sensor; infinity without a hit."""
         raise place.without_scene

@@ -9,7 +9,7 @@ from dynx.errors import UnknownNameError, UnsupportedFeatureError, nearest, show
 from dynx.model import Model
 
 
-class Place(NamedTuple):
+class SensorPlace(NamedTuple):
     """Where a sensor is: on a frame or joint of a robot, or on a body."""
 
     sensor: str
@@ -27,7 +27,7 @@ class Place(NamedTuple):
         )
 
 
-class Parts(NamedTuple):
+class SensedParts(NamedTuple):
     """Robots and bodies among which sensors are placed."""
 
     robots: Mapping[str, Model]
@@ -35,15 +35,15 @@ class Parts(NamedTuple):
     alone: str | None = None
     """Robot in which a name without a robot is looked up; None if there are several."""
 
-    def place(self, on: str, sensor: str) -> Place:
+    def place(self, on: str, sensor: str) -> SensorPlace:
         """Return the place of a sensor; UnknownNameError for a robot or body that does not exist."""
         owner, slash, name = on.partition("/")
         if owner in self.robots and slash:
-            return Place(sensor, owner, name)
+            return SensorPlace(sensor, owner, name)
         if on in self.bodies:
-            return Place(sensor, None, on)
+            return SensorPlace(sensor, None, on)
         if self.alone is not None:
-            return Place(sensor, self.alone, on)
+            return SensorPlace(sensor, self.alone, on)
         known = [*self.bodies, *self.robots]
         raise UnknownNameError(
             f"{sensor} is on {shown(on)}; wanted a body, robot/frame or robot/joint{nearest(owner, known)}"

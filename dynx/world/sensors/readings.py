@@ -20,7 +20,7 @@ SAME_SAMPLE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class SensorReading:
     """One sample of a sensor."""
 
     sensor: Sensor
@@ -63,11 +63,11 @@ class Readings:
         return _of_channel(self.sensor, self.channels, channel)
 
     @property
-    def last(self) -> Reading:
+    def last(self) -> SensorReading:
         """The last sample; ArgumentError if there is none."""
         if not len(self):
             raise ArgumentError(f"{self.sensor} has taken no sample")
-        return Reading(
+        return SensorReading(
             self.sensor, float(self.t[-1]), {name: rows[-1] for name, rows in self.channels.items()}
         )
 

@@ -13,14 +13,14 @@ from dynx.model.numbers import is_real, whole_number
 from dynx.model.urdf.values import name_fault
 from dynx.spatial.scalar import Floats
 from dynx.world.sensors.errors import SensorErrors
-from dynx.world.sensors.places import Parts, Place
+from dynx.world.sensors.places import SensedParts, SensorPlace
 
 if TYPE_CHECKING:
     from dynx.steppers.layout import SensorLayout
     from dynx.world.sensors.motion import SensedMotion
 
 
-class Channel(NamedTuple):
+class SensorChannel(NamedTuple):
     """One vector that a sensor measures; its errors are the field of the sensor called `errors`."""
 
     name: str
@@ -50,7 +50,7 @@ class Sensor(ABC):
     delay: float = 0.0
     seed: int = 0
 
-    channels: ClassVar[tuple[Channel, ...]]
+    channels: ClassVar[tuple[SensorChannel, ...]]
     """What it measures, in the order of the values of a reading."""
     kind: ClassVar[str]
     """Name of the class in documents."""
@@ -112,16 +112,16 @@ class Sensor(ABC):
             )
         return 1.0 / self.rate
 
-    def place(self, parts: Parts) -> Place:
+    def place(self, parts: SensedParts) -> SensorPlace:
         """Return the place of the sensor among `parts`; UnknownNameError without one."""
         return parts.place(self.on, str(self))
 
     @abstractmethod
-    def require(self, parts: Parts) -> None:
+    def require(self, parts: SensedParts) -> None:
         """Raise UnknownNameError or ArgumentError unless the sensor can be on its place among `parts`."""
 
     @abstractmethod
-    def layout(self, parts: Parts) -> SensorLayout:
+    def layout(self, parts: SensedParts) -> SensorLayout:
         """Return the sensor for an engine with sensors of its own; its place was checked by `require`."""
 
     @abstractmethod
@@ -135,7 +135,7 @@ class Sensor(ABC):
         return f"the {self.kind.replace('_', ' ')} sensor {shown(self.name)}"
 
 
-def checked_sensors(sensors: object, parts: Parts) -> tuple[Sensor, ...]:
+def checked_sensors(sensors: object, parts: SensedParts) -> tuple[Sensor, ...]:
     """Return sensors as a tuple.
 
     Raises ArgumentError for anything else and for two of one name, and the errors of `Sensor.require`.

@@ -19,9 +19,9 @@ from dynx.world import (
     Imu,
     JointTorqueSensor,
     RaySensor,
-    Reading,
     Scene,
     SceneRobot,
+    SensorReading,
     World,
     box,
     ground,
@@ -70,7 +70,7 @@ def field() -> Scene:
     return Scene("field", robots=robots, bodies=(ground(), crate, ball), sensors=sensors)
 
 
-def raw_values(data: Any, reading: Reading, world: World) -> Floats:
+def raw_values(data: Any, reading: SensorReading, world: World) -> Floats:
     """Return the values that raw MuJoCo has for a reading of dynx, with the differences that it states."""
     sensor = reading.sensor
     values = [data.sensor(f"{sensor.name}/{channel.name}").data for channel in sensor.channels]
