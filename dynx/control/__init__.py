@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from dynx.control.joint_space import PD, PID, FeedForward, GravityCompensatedPD, Velocity
     from dynx.control.motors_and_encoders import Encoders, MotorLag
     from dynx.control.observers.momentum_observer import MomentumObserver
+    from dynx.control.observers.tool import SensorMotion, Tool, identify_tool
     from dynx.control.observers.wrench_estimate import WrenchEstimate
     from dynx.control.open_loop import OpenLoop
     from dynx.control.registry import from_document as controller_from_document
@@ -55,10 +56,13 @@ __all__ = [
     "OpenLoop",
     "OperationalSpace",
     "Saturated",
+    "SensorMotion",
+    "Tool",
     "Velocity",
     "WrenchEstimate",
     "controller_from_document",
     "controller_to_document",
+    "identify_tool",
     "model_dynamics",
     "register_controller",
     "unregister_controller",
@@ -89,6 +93,9 @@ _HOME = {
     "PID": "dynx.control.joint_space",
     "Saturated": "dynx.control.saturation",
     "Velocity": "dynx.control.joint_space",
+    "SensorMotion": "dynx.control.observers.tool",
+    "Tool": "dynx.control.observers.tool",
+    "identify_tool": "dynx.control.observers.tool",
     "WrenchEstimate": "dynx.control.observers.wrench_estimate",
     "controller_from_document": "dynx.control.registry:from_document",
     "controller_to_document": "dynx.control.registry:to_document",

@@ -87,6 +87,14 @@ class FrameMotion:
     U: Array
     moments: Array
 
+    @classmethod
+    def of(cls, R: Array, p: Array, d: Array, omega: Array, alpha: Array) -> FrameMotion:
+        """Return the motion of a frame with the proper acceleration d of its origin, the angular velocity and
+        the angular acceleration (..., 3), all in its axes."""
+        d, omega, alpha = np.broadcast_arrays(d, omega, alpha)
+        W = skew(omega)
+        return cls(R, p, d, skew(alpha) + W @ W, _tensor_columns(alpha) + W @ _tensor_columns(omega))
+
     @cached_property
     def wrench(self) -> Array:
         """Matrix A (..., 6, 10) such that A pi is the wrench that gives a body of inertia pi this motion.
@@ -147,11 +155,8 @@ def _move(
 
 def _frame_motion(frame: BodyFrame, body: BodyKinematics) -> FrameMotion:
     R, p = body.R @ frame.R, body.p + rotate(body.R, frame.p)
-    d = rotate_back(R, body.acceleration_at(p))
-    d, omega, alpha = np.broadcast_arrays(d, rotate_back(R, body.omega), rotate_back(R, body.alpha))
-    W = skew(omega)
-    moments = _tensor_columns(alpha) + W @ _tensor_columns(omega)
-    return FrameMotion(R, p, d, skew(alpha) + W @ W, moments)
+    states = body.acceleration_at(p), body.omega, body.alpha
+    return FrameMotion.of(R, p, *(rotate_back(R, x) for x in states))
 
 
 def _row(body: Body, frame: FrameMotion, state: BodyKinematics, axis: Array) -> tuple[Array]:
