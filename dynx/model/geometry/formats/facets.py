@@ -69,7 +69,7 @@ MAX_VERTICES = 6_000_000
 """Largest number of vertices of an OBJ file."""
 
 _LINE_END = re.compile(rb"\r\n|[\r\n]")
-_VERTEX_OR_FACE = re.compile(rb"(?<![^\r\n])[ \t\f\v]*[vf](?:[ \t\f\v][^\r\n]*|(?=[\r\n]|\Z))")
+_VERTEX_FACE_OR_OBJECT = re.compile(rb"(?<![^\r\n])[ \t\f\v]*[vfog](?:[ \t\f\v][^\r\n]*|(?=[\r\n]|\Z))")
 
 
 def obj_triangles(data: bytes) -> tuple[Floats, NDArray[np.intp]]:
@@ -77,18 +77,36 @@ def obj_triangles(data: bytes) -> tuple[Floats, NDArray[np.intp]]:
 
     Raises ValueError, with the line, for a damaged file.
     """
+    vertices, faces, _ = _obj(data)
+    return vertices, faces
+
+
+def obj_objects(data: bytes) -> list[NDArray[np.intp]]:
+    """Return the triangles (m, 3) of each object and group that has some, in the order of the file.
+
+    Raises ValueError, with the line, for a damaged file.
+    """
+    _, faces, starts = _obj(data)
+    return [each for each in np.split(faces, starts) if len(each)]
+
+
+def _obj(data: bytes) -> tuple[Floats, NDArray[np.intp], list[int]]:
+    """Return the vertices (n, 3) and triangles (m, 3) of a file, and the number of triangles before each line
+    that begins an object or a group."""
     # Lists of Python's numbers would take five times the memory.
     numbers, corners = array("d"), array("q")
     text = data.replace(b"\\\r\n", b"  ").replace(b"\\\n", b" ")
-    start = 0
+    start, starts = 0, []
     try:
-        for match in _VERTEX_OR_FACE.finditer(text):
+        for match in _VERTEX_FACE_OR_OBJECT.finditer(text):
             start = match.start()
             if match.end() - start > LONGEST_LINE:
                 raise ValueError(f"it has more than {LONGEST_LINE:,} bytes")
             words = match[0].split()
             if words[0] == b"v":
                 numbers.extend(_vertex(words))
+            elif words[0] != b"f":
+                starts.append(len(corners) // 3)
             else:
                 corners.extend(_fan(words[1:], len(numbers) // 3))
             if len(numbers) > 3 * MAX_VERTICES:
@@ -100,7 +118,7 @@ def obj_triangles(data: bytes) -> tuple[Floats, NDArray[np.intp]]:
     vertices = np.array(numbers, np.float64).reshape(-1, 3)
     if faces.size and faces.max() >= len(vertices):
         raise ValueError(f"a face names vertex {faces.max() + 1}, and the file has {len(vertices)}")
-    return vertices, faces
+    return vertices, faces, starts
 
 
 def _vertex(words: list[bytes]) -> tuple[float, float, float]:
