@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import click
 
 from dynx.cli.shell.lazy import runs
 from dynx.cli.shell.options import (
+    F,
     FiniteRange,
     frame_option,
     json_option,
@@ -14,10 +17,24 @@ from dynx.cli.shell.options import (
     one_of,
     robot_options,
     sample_option,
+    wrench_on_frame,
 )
 
 _q_option = sample_option("q", "Configuration (default: neutral)")
 _v_option = sample_option("v", "Velocity (default: zero)")
+
+
+def reference_option(default: str, quantity: str) -> Callable[[F], F]:
+    """Return the option ``--reference`` for a quantity of a frame."""
+    return click.option(
+        "--reference",
+        type=one_of("local_world_aligned", "local", "world"),
+        default=default,
+        show_default=True,
+        metavar="NAME",
+        help=f"Reference point and axes of the {quantity}: local-world-aligned, the frame's origin in world "
+        "axes; local, its origin in its own axes; or world, the world's origin and axes.",
+    )
 
 
 @click.command
@@ -105,15 +122,7 @@ def fk() -> None:
 @robot_options
 @_q_option
 @frame_option
-@click.option(
-    "--reference",
-    type=one_of("local_world_aligned", "local", "world"),
-    default="local-world-aligned",
-    show_default=True,
-    metavar="NAME",
-    help="Reference point and axes of the velocity: local-world-aligned, the frame's origin in world axes; "
-    "local, its origin in its own axes; or world, the world's origin and axes.",
-)
+@reference_option("local-world-aligned", "velocity")
 @runs("dynx.cli.queries.evaluate:jacobian")
 def jacobian() -> None:
     """Compute the Jacobian J (6, nv) of a frame: J v is the frame's velocity, linear rows first.
@@ -131,16 +140,39 @@ def jacobian() -> None:
 @_v_option
 @sample_option("a", "Acceleration (default: zero)")
 @click.option("--joint-dynamics", is_flag=True, help="Include damping, friction and armature of the joints.")
+@click.option(
+    "--force",
+    "forces",
+    type=wrench_on_frame,
+    multiple=True,
+    metavar="FRAME:fx,fy,fz[,mx,my,mz]",
+    help="External force [N] and moment [N m] at the origin of a frame (three numbers are the force alone), "
+    "in world axes; may be given several times.",
+)
+@click.option(
+    "--wrenches",
+    is_flag=True,
+    help="Also the wrenches that the parents of all joints exert on their children, and that of the base: "
+    "force [N], then moment [N m].",
+)
+@click.option(
+    "--frame",
+    metavar="NAME",
+    help="Frame in which the wrenches are expressed (default: that of the child link of each joint).",
+)
+@reference_option("local", "wrenches")
 @runs("dynx.cli.queries.evaluate:inverse_dynamics")
 def id_() -> None:
     """Compute inverse dynamics: the torque tau (nv) that gives the acceleration a.
 
-    Without --v and --a it is the torque that holds the robot against gravity.
+    Without --v and --a it is the torque that holds the robot against gravity. With --wrenches the forces that
+    its joints and its base transmit are listed too (docs/wrenches.md).
 
     \b
     Examples:
       dynx id ur5 --q 0,-1.57,1.57,0,0,0
       dynx id ur5 --q 0,-1,1,0,0,0 --v 0,0.1,0,0,0,0 --a 1,0,0,0,0,0 --json
+      dynx id ur5 --q 0,-1,1,0,0,0 --force tool0:0,0,-20 --wrenches
     """
 
 

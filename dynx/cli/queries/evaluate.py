@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from dynx.backends.base import Backend
 from dynx.cli.shell.exits import one_line
 from dynx.cli.shell.inputs import (
@@ -16,9 +18,13 @@ from dynx.cli.shell.inputs import (
     velocity,
     velocity_names,
 )
+from dynx.cli.shell.options import spelled
 from dynx.cli.shell.output import Entry, console, number, write_json
 from dynx.cli.shell.tables import Table, listing
+from dynx.errors import ArgumentError
 from dynx.model import Model
+from dynx.rbd.jacobians import LOCAL
+from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation, rpy_from_rotation
 
 
@@ -71,13 +77,50 @@ def jacobian(q: Numbers, frame: str | None, reference: str, json_path: str | Non
 
 
 def inverse_dynamics(
-    q: Numbers, v: Numbers, a: Numbers, joint_dynamics: bool, json_path: str | None, **robot: Any
+    q: Numbers,
+    v: Numbers,
+    a: Numbers,
+    joint_dynamics: bool,
+    forces: Sequence[tuple[str, list[float]]],
+    wrenches: bool,
+    frame: str | None,
+    reference: str,
+    json_path: str | None,
+    **robot: Any,
 ) -> None:
-    """Print the torque that gives an acceleration."""
+    """Print the torque that gives an acceleration, and the wrenches that joints transmit."""
+    if (frame is not None or reference != LOCAL) and not wrenches:
+        raise ArgumentError("--frame and --reference are those of the wrenches; give --wrenches too")
+    on_frames: dict[str, Floats] = {}
+    for name, wrench in forces:
+        on_frames[name] = on_frames.get(name, np.zeros(6)) + wrench
     with open_backend(**robot) as engine:
         sample, result = _sample(engine, q, v=v, a=a)
-        result["tau"] = engine.inverse_dynamics(*sample, joint_dynamics=joint_dynamics).tolist()
-    _report_vectors(result, json_path, "inverse dynamics", ("v", "a", "tau"))
+        result["external_forces"] = {name: wrench.tolist() for name, wrench in on_frames.items()}
+        options: dict[str, Any] = {"external_forces": on_frames or None}
+        result["tau"] = engine.inverse_dynamics(*sample, joint_dynamics=joint_dynamics, **options).tolist()
+        if wrenches:
+            options |= {"frame": frame, "reference": reference}
+            result |= {
+                "frame": frame,
+                "reference": reference,
+                "joint_names_of_wrenches": [joint.name for joint in engine.model.joints],
+                "joint_wrenches": engine.joint_wrenches(*sample, **options).tolist(),
+                "base_wrench": engine.base_wrench(*sample, **options).tolist(),
+            }
+    if _report_vectors(result, json_path, "inverse dynamics", ("v", "a", "tau")) or not wrenches:
+        return
+    out = console()
+    where = "its child link" if frame is None else one_line(frame)
+    out.print(
+        f"wrench of the parent of each joint on its child, at {where}, {spelled(reference)} axes and point"
+    )
+    columns = ("fx [N]", "fy [N]", "fz [N]", "mx [N m]", "my [N m]", "mz [N m]")
+    table = Table("joint", *columns, right=columns, keys=1)
+    rows = zip(result["joint_names_of_wrenches"], result["joint_wrenches"], strict=True)
+    for name, wrench in (("(base)", result["base_wrench"]), *rows):
+        table.add_row(one_line(name), *(f"{value + 0.0:.6g}" for value in wrench))
+    out.print(table)
 
 
 def forward_dynamics(
@@ -121,10 +164,10 @@ def _sample(engine: Backend, q: Numbers, **vectors: Numbers) -> tuple[list[Any],
     return list(sample.values()), {**document_head(engine), **names, **listed}
 
 
-def _report_vectors(result: Entry, json_path: str | None, quantity: str, columns: Sequence[str]) -> None:
-    """Print a table with one row for each entry of v, or the document."""
+def _report_vectors(result: Entry, json_path: str | None, quantity: str, columns: Sequence[str]) -> bool:
+    """Print a table with one row for each entry of v; return True if the document was written instead."""
     if write_json(result, json_path):
-        return
+        return True
     out = console()
     out.print(f"{title(result)}: {quantity}", style="bold")
     out.print(f"q = {' '.join(map(number, result['q']))}")
@@ -132,6 +175,7 @@ def _report_vectors(result: Entry, json_path: str | None, quantity: str, columns
     for name, *values in zip(result["velocity_names"], *(result[key] for key in columns), strict=True):
         table.add_row(one_line(name), *map(number, values))
     out.print(table)
+    return False
 
 
 def _print_matrix(

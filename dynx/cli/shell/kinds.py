@@ -21,6 +21,7 @@ from dynx.cli.shell.options import (
     plain_numbers,
     spelled,
     stacked,
+    wrench_numbers,
 )
 from dynx.errors import shown
 from dynx.sim.scenario import options as declared
@@ -84,8 +85,8 @@ def vector(text: str) -> list[float]:
 def push(text: str) -> PushInput:
     """Read ``FRAME:fx,fy,fz[,mx,my,mz][:start[:duration]]``; a wrench of three numbers is a force."""
     found = _PUSH.fullmatch(text.strip())
-    wrench = [] if found is None else plain_numbers(found["wrench"])
-    if found is None or len(wrench) not in (3, 6):
+    wrench = [] if found is None else wrench_numbers(found["wrench"])
+    if found is None or not wrench:
         raise click.BadParameter(
             f"{shown(text)} is not of the form FRAME:fx,fy,fz[,mx,my,mz][:START[:DURATION]], "
             "such as tool0:20,0,0,0,0,0:0.5:0.1"
@@ -93,7 +94,7 @@ def push(text: str) -> PushInput:
     start, duration = found["start"], found["duration"]
     return PushInput(
         found["frame"],
-        [*wrench, 0.0, 0.0, 0.0][:6],
+        wrench,
         0.0 if start is None else finite_number(start),
         math.inf if duration is None else finite_number(duration),
     )

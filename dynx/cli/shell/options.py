@@ -267,6 +267,24 @@ def sample_option(name: str, quantity: str) -> Callable[[F], F]:
     )
 
 
+def wrench_numbers(text: str) -> list[float]:
+    """Read a force and a moment, six numbers; three are a force alone. Return no number for any other
+    count."""
+    numbers = plain_numbers(text)
+    return [*numbers, 0.0, 0.0, 0.0][:6] if len(numbers) in (3, 6) else []
+
+
+def wrench_on_frame(text: str) -> tuple[str, list[float]]:
+    """Read ``FRAME:fx,fy,fz[,mx,my,mz]``; a wrench of three numbers is a force."""
+    frame, _, numbers = text.strip().rpartition(":")
+    wrench = wrench_numbers(numbers) if frame else []
+    if not wrench:
+        raise click.BadParameter(
+            f"{shown(text)} is not of the form FRAME:fx,fy,fz[,mx,my,mz], such as tool0:0,0,-20"
+        )
+    return frame, wrench
+
+
 frame_option = click.option(
     "--frame",
     metavar="NAME",

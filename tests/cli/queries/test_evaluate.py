@@ -74,6 +74,47 @@ def test_robots_are_all_listed() -> None:
     assert set(names["pendulum"]) == {"name", "aliases", "source", "path"}
 
 
+def test_wrenches_of_joints_under_external_forces() -> None:
+    forces = (
+        "--force",
+        "tool0:0,0,-20",
+        "--force",
+        "wrist_1_link:1,2,3,0.1,0.2,0.3",
+        "--force",
+        "tool0:0,0,1",
+    )
+    given: dict[str, Any] = {
+        "external_forces": {"tool0": [0, 0, -19, 0, 0, 0], "wrist_1_link": [1, 2, 3, 0.1, 0.2, 0.3]}
+    }
+    found = document("id", "ur5", "--q", Q_TEXT, *forces, "--wrenches")
+    at_tool = document(
+        "id", "ur5", "--q", Q_TEXT, *forces, "--wrenches", "--frame", "tool0", "--reference", "world"
+    )
+    with backend(found["backend"], load("ur5")) as engine:
+        sample = Q, np.zeros(6), np.zeros(6)
+        assert found["tau"] == engine.inverse_dynamics(*sample, **given).tolist()
+        assert found["joint_wrenches"] == engine.joint_wrenches(*sample, **given).tolist()
+        assert found["base_wrench"] == engine.base_wrench(*sample, **given).tolist()
+        given |= {"frame": "tool0", "reference": "world"}
+        assert at_tool["joint_wrenches"] == engine.joint_wrenches(*sample, **given).tolist()
+        names = [joint.name for joint in engine.model.joints]
+    assert found["joint_names_of_wrenches"] == names
+    assert "joint_wrenches" not in document("id", "ur5", *forces)
+    text = CliRunner().invoke(cli, ["id", "ur5", *forces, "--wrenches"]).stdout
+    for name in (*names, "(base)", "mz [N m]", "its child link, local axes"):
+        assert name in text
+    for wrong, says in (
+        (["--force", "tool0:1,2"], "not of the form FRAME:fx,fy,fz"),
+        (["--force", "1,2,3"], "not of the form FRAME:fx,fy,fz"),
+        (["--force", "tol0:1,2,3"], "did you mean 'tool0'"),
+        (["--frame", "tool0"], "give --wrenches too"),
+        (["--wrenches", "--frame", "tol0"], "did you mean 'tool0'"),
+    ):
+        result = CliRunner().invoke(cli, ["id", "ur5", *wrong])
+        assert result.exit_code == 2
+        assert says in result.stderr
+
+
 def test_backends() -> None:
     found = {entry["name"]: entry for entry in document("backends")["backends"]}
     assert found["reference"]["installed"] is True
