@@ -76,7 +76,7 @@ def require_agreement(report: AgreementReport, check: str, label: str) -> None:
     lines = [head, *(line for row in wrong for line in _row(row))]
     lines += [f"  suspect: {each.backend} ({'; '.join(each.evidence)})" for each in suspects]
     chosen = ",".join(report.backends)
-    lines.append(f"  to see it again: dynx agree {label} --base {report.base} --backends {chosen}")
+    lines.append(f"  to see it again: dynx agree {label} --base {report.base} --engine {chosen}")
     raise Disagreement("\n".join(lines))
 
 

@@ -8,22 +8,24 @@ from dynx.cli.shell.lazy import runs
 from dynx.cli.shell.options import (
     FiniteRange,
     choice_pair,
+    engine_option,
     frame_option,
     json_option,
     model_options,
     name_list,
     one_of,
     run_options,
+    silent_option,
 )
 
 
 @click.command
 @click.argument("robots", nargs=-1, required=True, metavar="ROBOT...")
-@click.option(
-    "--backends",
+@engine_option(
+    "backends",
+    "Engines to compare (default: all that are installed).",
     type=name_list,
     metavar="A,B,C",
-    help="Backends to compare; with --as-loaded, engines (default: all that are installed).",
 )
 @click.option(
     "--as-loaded",
@@ -66,7 +68,7 @@ def agree() -> None:
     Examples:
       dynx agree ur5
       dynx agree ur5 panda --base floating --samples 100
-      dynx agree all --backends pinocchio,pybullet,reference --json all.json
+      dynx agree all --engine pinocchio,pybullet,reference --json all.json
       dynx agree path/to/urdfs --lock gripper_joint=0.02
       dynx agree my.urdf --as-loaded
     """
@@ -81,12 +83,12 @@ def agree() -> None:
     show_default=True,
     help="Mount of the root link: fixed to the world, floating (free to move), or each in turn with `both`.",
 )
-@click.option(
-    "--engines",
+@engine_option(
+    "engines",
+    "Engines and loading variants to examine (default: all installed engines; beside them, not counted, "
+    "pybullet:plain).",
     type=name_list,
     metavar="A,B,C",
-    help="Engines and loading variants to examine (default: all installed engines; beside them, not counted, "
-    "pybullet:plain).",
 )
 @click.option("--samples", type=click.IntRange(min=1), help="Number of random states per robot (default: 5).")
 @click.option(
@@ -198,8 +200,8 @@ def doctor() -> None:
     help="Number of threads of implementations that can use several; may be given several times "
     "(default: 1, and one per processor).",
 )
-@click.option(
-    "--backends", type=name_list, metavar="A,B,C", help="Backends to time (default: all installed)."
+@engine_option(
+    "backends", "Engines to time (default: all that are installed).", type=name_list, metavar="A,B,C"
 )
 @frame_option
 @model_options
@@ -208,6 +210,7 @@ def doctor() -> None:
 )
 @click.option("--quick", is_flag=True, help="Run with 5 repetitions instead of 20.")
 @json_option
+@silent_option
 @runs("dynx.cli.bench:bench")
 def bench() -> None:
     """Time all backends, and other libraries for comparison, on this machine and this robot.

@@ -8,12 +8,14 @@ from dynx.cli.shell.lazy import LazyGroup, runs
 from dynx.cli.shell.options import (
     FiniteRange,
     GroupedCommand,
+    engine_option,
     engines_option,
     group,
     json_option,
     name_list,
     name_value,
     quiet_option,
+    silent_option,
     task_options,
     whole_numbers,
 )
@@ -34,6 +36,7 @@ def env() -> None:
 @env.command("list")
 @click.argument("modules", nargs=-1, metavar="[MODULE...]")
 @json_option
+@silent_option
 @runs("dynx.cli.learning.env:list_tasks")
 def list_tasks() -> None:
     """List the tasks of dynx, and those that each MODULE of yours registers: id, engines, time limit.
@@ -114,7 +117,7 @@ def distance() -> None:
 @click.argument("task", metavar="TASK")
 @group(
     "Training",
-    click.option("--engine", metavar="NAME", help="Engine of a task of dynx (default: that of the task)."),
+    engine_option("engine", "Engine of a task of dynx (default: that of the task).", metavar="NAME"),
     task_options,
     click.option(
         "--randomize",
@@ -235,12 +238,11 @@ def train() -> None:
 @click.argument("policy", metavar="FILE")
 @group(
     "Episodes",
-    click.option(
-        "--engine",
+    engine_option(
         "engines",
+        "Engines on which the policy is judged (default: that of its training).",
         type=name_list,
         metavar="A,B,C",
-        help="Engines on which the policy is judged (default: that of its training).",
     ),
     click.option(
         "--task",

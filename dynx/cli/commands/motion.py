@@ -10,6 +10,7 @@ from dynx.cli.shell.lazy import runs
 from dynx.cli.shell.options import (
     FiniteRange,
     GroupedCommand,
+    engine_option,
     engines_option,
     finite_number,
     group,
@@ -18,6 +19,7 @@ from dynx.cli.shell.options import (
     quiet_option,
     sample_option,
     settings_option,
+    silent_option,
 )
 from dynx.errors import shown
 
@@ -228,12 +230,11 @@ def compare() -> None:
         is_flag=True,
         help="Lay two motions over each other: two rollouts, or one scene in two engines.",
     ),
-    click.option(
-        "--engine",
+    engine_option(
         "engines",
+        "Engine of a scene (two with --compare), or the one that computes for a robot.",
         type=name_list,
         metavar="A,B",
-        help="Engine of a scene (two with --compare), or the backend that computes for a robot.",
     ),
     click.option(
         "--duration",
@@ -286,6 +287,7 @@ def compare() -> None:
         help="Write a file and end: .html plays without a server and without a network, .gif is a film, "
         ".png a picture, both drawn without a browser.",
     ),
+    silent_option,
 )
 @runs("dynx.cli.view:view")
 def view() -> None:

@@ -11,12 +11,14 @@ from dynx.cli.shell.options import (
     F,
     FiniteRange,
     frame_option,
+    gravity_option,
     json_option,
     model_options,
     number_list,
     one_of,
     robot_options,
     sample_option,
+    silent_option,
     wrench_on_frame,
 )
 
@@ -39,6 +41,7 @@ def reference_option(default: str, quantity: str) -> Callable[[F], F]:
 
 @click.command
 @json_option
+@silent_option
 @runs("dynx.cli.queries.listings:backends")
 def backends() -> None:
     """List every backend: whether its engine is installed, and its version or how to install it.
@@ -53,6 +56,7 @@ def backends() -> None:
 @click.command
 @click.argument("words", nargs=-1, metavar="[WORD]...")
 @json_option
+@silent_option
 @runs("dynx.cli.queries.listings:robots")
 def robots() -> None:
     """List every robot that has a name: the package it comes from, and its file.
@@ -70,7 +74,9 @@ def robots() -> None:
 @click.command
 @click.argument("robot")
 @model_options
+@gravity_option
 @json_option
+@silent_option
 @runs("dynx.cli.queries.listings:info")
 def info() -> None:
     """Show a robot description as dynx reads it: tree, joints, masses, frames, notes.
@@ -88,6 +94,7 @@ def info() -> None:
 @click.command
 @click.argument("rule", required=False)
 @json_option
+@silent_option
 @runs("dynx.cli.queries.explain:explain")
 def explain() -> None:
     """Print the page of a RULE, given by its id or name: cause, behaviour of each engine, remedy.

@@ -6,16 +6,19 @@ from functools import partial
 
 import click
 
-from dynx.cli.shell.kinds import gain, option_groups, vector
+from dynx.cli.shell.kinds import gain, option_groups
 from dynx.cli.shell.lazy import runs
 from dynx.cli.shell.options import (
     GroupedCommand,
+    engine_option,
     finite_number,
+    gravity_option,
     group,
     json_option,
     model_options,
     number_list,
     one_of,
+    silent_option,
 )
 from dynx.registry import DEFAULT_ENGINE
 from dynx.sim.scenario import options as declared
@@ -29,12 +32,7 @@ _configuration_option = partial(click.option, type=number_list, metavar="Q")
 _robot = group(
     "Robot",
     model_options,
-    click.option(
-        "--gravity",
-        type=vector,
-        metavar="X,Y,Z",
-        help="Gravitational acceleration in the world [m/s^2] (default: 0,0,-9.81).",
-    ),
+    gravity_option,
 )
 
 _motion = (
@@ -96,11 +94,12 @@ _controller = (
         metavar="NAME",
         help="Name of the controller, see above (default: computed-torque).",
     ),
-    click.option(
-        "--backend",
+    engine_option(
+        "backend",
+        "Engine with which the controller computes (default: pinocchio); --plant chooses the one that moves "
+        "the robot.",
         default=DEFAULT_ENGINE,
         metavar="NAME",
-        help="Backend with which the controller computes (default: pinocchio).",
     ),
     _gain_option(
         "--kp",
@@ -154,6 +153,7 @@ _results = group(
         "--plot", metavar="FILE", help="File for a plot of joints, errors and torques: .png, .pdf, .svg, ..."
     ),
     json_option,
+    silent_option,
     click.option(
         "--resume",
         metavar="FILE.npz",
@@ -174,7 +174,7 @@ _tutorial = group(
         is_flag=True,
         help="Comparison of every controller on PyBullet's stepper and on that of dynx, instead of one "
         "simulation. Takes ROBOT (ur5), --lock, --gravity (0,0,-9.8), --to, --from, --duration, --dt, "
-        "--backend, --plot and --json.",
+        "--engine, --plot and --json.",
     ),
 )
 

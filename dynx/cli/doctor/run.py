@@ -257,7 +257,7 @@ def doctor_command(task: DoctorTask) -> str:
     if task.base != "fixed":
         words += ["--base", task.base]
     if task.engines is not None:
-        words += ["--engines", ",".join(task.engines)]
+        words += ["--engine", ",".join(task.engines)]
     if task.samples not in (None, DEFAULT_SAMPLES):
         words += ["--samples", str(task.samples)]
     if task.seed:

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dynx.cli.shell.exits import one_line
+from dynx.cli.shell.exits import one_line, remark
 from dynx.errors import ArgumentError, NotInstalledError, UnknownNameError, nearest, shown
 from dynx.model import Model, Pose
 from dynx.model.configuration import checked_q
 from dynx.model.loading import load
 from dynx.model.numbers import checked_array
 from dynx.model.topology import longest_chain_end
-from dynx.model.tree import Base
+from dynx.model.tree import STANDARD_GRAVITY, Base
+from dynx.model.unlikely_inputs import gravity_notes, position_notes
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_quat, rotation_from_rpy
@@ -45,19 +46,26 @@ def load_robot(
 ) -> Model:
     """Load the robot of a command with its options."""
     pose = None if base_pose is None else pose_of(base_pose, "--base-pose")
+    for note in gravity_notes(gravity or STANDARD_GRAVITY):
+        remark(f"--gravity: {note}")
     return load(robot, base=base, lock=dict(lock), gravity=gravity, base_pose=pose)
 
 
 def open_backend(
-    robot: str, base: Base, lock: Locks, base_pose: Sequence[float] | None, backend_name: str | None
+    robot: str,
+    base: Base,
+    lock: Locks,
+    base_pose: Sequence[float] | None = None,
+    engine: str | None = None,
+    gravity: Sequence[float] | None = None,
 ) -> Backend:
     """Open the backend of a robot by its name; None is Pinocchio if it is installed, else `compiled`."""
     # Commands that open none start sooner.
     from dynx.backends import backend
 
-    model = load_robot(robot, base, lock, base_pose)
-    if backend_name is not None:
-        return backend(backend_name, model)
+    model = load_robot(robot, base, lock, base_pose, gravity)
+    if engine is not None:
+        return backend(engine, model)
     try:
         return backend("pinocchio", model)
     except NotInstalledError:
@@ -68,7 +76,11 @@ def configuration(model: Model, given: Numbers, option: str = "--q", default: Fl
     """Return q (nq,): `given`, where joints without a value keep `default` (None: the neutral one)."""
     base = ["x", "y", "z", "qx", "qy", "qz", "qw"] if model.floating else []
     start = model.neutral() if default is None else default.copy()
-    return checked_q(model, _filled(model, given, start, base, option), option)
+    q = checked_q(model, _filled(model, given, start, base, option), option)
+    if given is not None:
+        for note in position_notes(model, q, option):
+            remark(note)
+    return q
 
 
 def velocity(model: Model, given: Numbers, option: str) -> Floats:

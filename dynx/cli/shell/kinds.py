@@ -74,14 +74,6 @@ def coefficients(text: str) -> Coefficients:
     return gain(text)
 
 
-def vector(text: str) -> list[float]:
-    """Read three numbers."""
-    numbers = plain_numbers(text)
-    if len(numbers) != 3:
-        raise click.BadParameter(f"wanted 3 numbers x,y,z; got {len(numbers)}")
-    return numbers
-
-
 def push(text: str) -> PushInput:
     """Read ``FRAME:fx,fy,fz[,mx,my,mz][:start[:duration]]``; a wrench of three numbers is a force."""
     found = _PUSH.fullmatch(text.strip())

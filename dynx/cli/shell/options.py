@@ -177,8 +177,63 @@ def model_options(command: F) -> F:
     )(command)
 
 
-quiet_option = click.option(
-    "--quiet", is_flag=True, help="No tables and no progress: only errors, files and the exit code."
+ENGINE_SPELLINGS = ("--engine", "--engines", "--backend", "--backends")
+"""Names of the option that chooses engines: the first is that of every command, the others are accepted."""
+
+
+class _EngineOption(click.Option):
+    """An option with the names of `ENGINE_SPELLINGS`, of which help and errors have the first."""
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        """Return the line of ``--help``."""
+        spellings, self.opts = self.opts, self.opts[:1]
+        try:
+            return super().get_help_record(ctx)
+        finally:
+            self.opts = spellings
+
+    def get_error_hint(self, ctx: click.Context | None) -> str:
+        """Return the name in an error."""
+        return f"'{self.opts[0]}'"
+
+
+def engine_option(parameter: str, help: str, **options: Any) -> Callable[[F], F]:
+    """Return ``--engine`` with all its spellings, as the parameter of that name."""
+    return click.option(*ENGINE_SPELLINGS, parameter, cls=_EngineOption, help=help, **options)
+
+
+QUIET = "dynx.quiet"
+"""Entry of `click.Context.meta`: whether tables and progress are left out."""
+
+
+def _be_quiet(ctx: click.Context, option: click.Parameter, wanted: bool) -> bool:
+    ctx.meta[QUIET] = wanted
+    return wanted
+
+
+_QUIET_HELP = "No tables and no progress: only errors, files and the exit code."
+
+quiet_option = click.option("--quiet", is_flag=True, callback=_be_quiet, help=_QUIET_HELP)
+
+silent_option = click.option(
+    "--quiet", is_flag=True, callback=_be_quiet, expose_value=False, help=_QUIET_HELP
+)
+"""``--quiet`` of a command whose output is all written through `dynx.cli.shell.output`."""
+
+
+def vector(text: str) -> list[float]:
+    """Read three numbers."""
+    numbers = plain_numbers(text)
+    if len(numbers) != 3:
+        raise click.BadParameter(f"wanted 3 numbers x,y,z; got {len(numbers)}")
+    return numbers
+
+
+gravity_option = click.option(
+    "--gravity",
+    type=vector,
+    metavar="X,Y,Z",
+    help="Gravitational acceleration in the world [m/s^2] (default: 0,0,-9.81).",
 )
 
 
@@ -212,13 +267,9 @@ json_option = click.option(
 
 
 def engines_option(purpose: str) -> Callable[[F], F]:
-    """Return ``--engine``, whose value `engines` is the names of world engines, or None."""
-    return click.option(
-        "--engine",
-        "engines",
-        type=name_list,
-        metavar="A,B,C",
-        help=f"{purpose} (default: all that are installed).",
+    """Return ``--engine``, whose value `engines` is the names of several engines, or None."""
+    return engine_option(
+        "engines", f"{purpose} (default: all that are installed).", type=name_list, metavar="A,B,C"
     )
 
 
@@ -246,17 +297,17 @@ task_options = click.option(
 
 
 def robot_options(command: F) -> F:
-    """Add ROBOT, ``--backend``, ``--base``, ``--lock`` and ``--json``."""
+    """Add ROBOT, ``--engine``, ``--base``, ``--base-pose``, ``--lock``, ``--gravity``, ``--json`` and
+    ``--quiet``."""
     return stacked(
         click.argument("robot"),
-        click.option(
-            "--backend",
-            "backend_name",
-            metavar="NAME",
-            help="Backend that computes (default: pinocchio if installed, else compiled).",
+        engine_option(
+            "engine", "Engine that computes (default: pinocchio if installed, else compiled).", metavar="NAME"
         ),
         model_options,
+        gravity_option,
         json_option,
+        silent_option,
     )(command)
 
 

@@ -15,6 +15,7 @@ import click
 from rich.console import Console
 
 from dynx.cli.shell.exits import failure_of, one_line
+from dynx.cli.shell.options import QUIET
 from dynx.errors import ArgumentError, DynxError, shown
 from dynx.files.documents import json_text
 from dynx.files.writing import write_text
@@ -33,10 +34,25 @@ def console(*, err: bool = False) -> Console:
 
     Lines are not wrapped, so that paths and numbers can be copied: terminals wrap them. Names of robots
     can contain any text, so markup and emoji codes are not interpreted. NO_COLOR, TERM and COLUMNS apply.
+    With ``--quiet`` it writes nothing.
     """
     stream = sys.stderr if err else _standard_output()
     width = None if stream.isatty() or "COLUMNS" in os.environ else PIPE_WIDTH
-    return Console(file=stream, width=width, soft_wrap=True, markup=False, emoji=False, highlight=False)
+    return Console(
+        file=stream,
+        width=width,
+        quiet=is_quiet(),
+        soft_wrap=True,
+        markup=False,
+        emoji=False,
+        highlight=False,
+    )
+
+
+def is_quiet() -> bool:
+    """Check whether the present command was called with ``--quiet``."""
+    context = click.get_current_context(silent=True)
+    return context is not None and bool(context.meta.get(QUIET))
 
 
 def echo_json(document: object) -> None:
@@ -126,7 +142,7 @@ class Advance(Protocol):
 @contextmanager
 def progress_bar(total: int, done: int = 0, words: str = "", *, enabled: bool = True) -> Iterator[Advance]:
     """Show a bar of `total` items during the block."""
-    if not enabled or not sys.stderr.isatty():
+    if not enabled or is_quiet() or not sys.stderr.isatty():
         yield lambda done, words, total=None: None
         return
     # Imported where a bar is shown: it takes a quarter of the time that importing all of rich takes.

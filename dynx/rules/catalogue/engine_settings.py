@@ -78,7 +78,7 @@ class InertiaFromShapes(CallingRule):
     What to do: write ``p.loadURDF(path, useFixedBase=True, flags=p.URDF_USE_INERTIA_FROM_FILE)``.
 
     The file is correct, and no file mends the call. ``dynx doctor`` examines the plain call beside the
-    engines, as ``pybullet:plain``; its difference counts only where ``--engines`` names it.
+    engines, as ``pybullet:plain``; its difference counts only where ``--engine`` names it.
     """
 
     advice = "Write flags=p.URDF_USE_INERTIA_FROM_FILE in the call of loadURDF."
@@ -122,7 +122,7 @@ class LinksMergedWrongly(CallingRule):
 
     What to do: leave the flag out, or merge the links in the file.
 
-    The file is correct, and no file mends the call. ``dynx doctor`` examines this call where ``--engines``
+    The file is correct, and no file mends the call. ``dynx doctor`` examines this call where ``--engine``
     names it, as ``pybullet:merge``.
     """
 

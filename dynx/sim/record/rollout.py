@@ -341,8 +341,18 @@ class Rollout:
         """
         raise NotImplementedError
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on what is hardly meant: joints that start far beyond their limits, gravity that points
+        up."""
+        # Imported here, because `simulate` needs it no more than other programs.
+        from dynx.model.unlikely_inputs import gravity_notes, position_notes
+
+        return (*position_notes(self.model, self.q[0], "q0"), *gravity_notes(self.model.gravity))
+
     def __repr__(self) -> str:
-        return f"<Rollout of {self.model.name}: {len(self)} steps to {self.t[-1]:.6g} s>"
+        notes = f", {len(self.notes)} notes" if self.notes else ""
+        return f"<Rollout of {self.model.name}: {len(self)} steps to {self.t[-1]:.6g} s{notes}>"
 
     def _repr_html_(self) -> str:
         return self.summary().to_html(repr(self)[1:-1])

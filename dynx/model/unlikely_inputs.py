@@ -1,0 +1,48 @@
+"""Notes on inputs that are valid and hardly meant: degrees for radians, millimetres for metres, gravity that
+points up."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from dynx.errors import shown
+from dynx.model.tree import Tree
+from dynx.spatial.scalar import Floats
+
+FAR = {"revolute": 0.5 * math.pi, "prismatic": 1.0}
+"""Distance beyond a limit [rad or m] from which a position is noted: other simulators allow less."""
+
+_OTHER_UNITS = {"revolute": ("rad", "degrees", math.pi / 180.0), "prismatic": ("m", "mm", 1e-3)}
+
+MAX_JOINTS = 3
+"""Largest number of joints that are noted one by one."""
+
+
+def position_notes(model: Tree, q: Floats, name: str = "q") -> Iterator[str]:
+    """Yield a sentence for each joint whose position in q (nq,) is far beyond its limits, with what the
+    number would be in the unit that was perhaps meant. `name` is that of the configuration."""
+    base = 7 if model.floating else 0
+    found = []
+    for k, joint in enumerate(model.coordinate_joints, start=base):
+        x, lower, upper = float(q[k]), float(model.lower[k]), float(model.upper[k])
+        if joint.type in FAR and not lower - FAR[joint.type] <= x <= upper + FAR[joint.type]:
+            unit, other, factor = _OTHER_UNITS[joint.type]
+            meant = f"; {x:g} {other} are {factor * x:.5g} {unit}" if lower <= factor * x <= upper else ""
+            found.append(
+                f"{name}: {shown(joint.name)} is at {x:g} {unit}, far beyond its limits {lower:.4g} to "
+                f"{upper:.4g}{meant}"
+            )
+    yield from found[:MAX_JOINTS]
+    if len(found) > MAX_JOINTS:
+        yield f"{name}: {len(found) - MAX_JOINTS} more are far beyond their limits"
+
+
+def gravity_notes(gravity: Sequence[float]) -> Iterator[str]:
+    """Yield a sentence if gravity (3,) [m/s^2] points up."""
+    if gravity[2] > 0.0:
+        numbers = ", ".join(f"{each:g}" for each in gravity)
+        yield (
+            f"gravity ({numbers}) points up, along z of the world; it is the acceleration of a body that "
+            "falls, (0, 0, -9.81) by default"
+        )
