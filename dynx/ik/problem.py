@@ -19,6 +19,7 @@ from dynx.ik.search import FrameTask, SearchTask, SeveralTasks
 from dynx.ik.step import TargetKind
 from dynx.model import Model
 from dynx.model.configuration import checked_q
+from dynx.model.elements import matrix_of_pair
 from dynx.model.numbers import checked_vector, real_array
 from dynx.model.targets import Targets, checked_targets
 from dynx.spatial.scalar import Floats
@@ -311,7 +312,7 @@ def _requirement(frame: str, target: ArrayLike, options: Options, time_limit: Ti
 def _part_read(target: ArrayLike, options: Options) -> str | None:
     """Return what `free` says on how to read an array that may be positions or rotations."""
     names = (options.free,) if isinstance(options.free, str) else tuple(options.free or ())
-    shape = np.shape(target)
+    shape = np.shape(matrix_of_pair(target, "target"))
     if len(shape) >= 2 and shape[-2:] == (4, 4):
         return None
     return "position" if "position" in names else "rotation" if "rotation" in names else None

@@ -16,10 +16,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, shown
-from dynx.model.numbers import checked_vector, refuse_mask
+from dynx.model.numbers import (
+    checked_entries,
+    checked_quaternion,
+    checked_vector,
+    real_array,
+    refuse_mask,
+)
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import homogeneous
-from dynx.spatial.so3 import rotation_from_rpy, rpy_from_rotation
+from dynx.spatial.so3 import rotation_from_quat, rotation_from_rpy, rpy_from_rotation
 
 JointType = Literal["revolute", "continuous", "prismatic", "fixed"]
 Vector = tuple[float, float, float]
@@ -31,25 +37,57 @@ RIGIDITY_TOLERANCE = 1e-6
 """Largest accepted deviation from orthonormality of a rotation matrix."""
 
 
+def matrix_of_pair(pose: Any, name: str) -> Any:
+    """Return the poses (..., 4, 4) of a pair: positions (..., 3) [m] and unit quaternions (x, y, z, w)
+    (..., 4). Anything else is returned as it is.
+
+    Raises ArgumentError for a quaternion whose length differs from 1 by more than 1e-6, NotFiniteError and
+    its kinds for numbers.
+    """
+    if not isinstance(pose, tuple | list) or len(pose) != 2:
+        return pose
+    try:
+        shapes = [np.shape(part)[-1:] for part in pose]
+    except ValueError:  # ragged
+        return pose
+    if shapes != [(3,), (4,)]:
+        return pose
+    position, quat_xyzw = (checked_entries(name, real_array(name, part)) for part in pose)
+    try:
+        np.broadcast_shapes(position.shape[:-1], quat_xyzw.shape[:-1])
+    except ValueError:
+        raise ShapeError(
+            f"{name} has positions of shape {position.shape} and quaternions of shape {quat_xyzw.shape}, "
+            "whose leading axes do not broadcast"
+        ) from None
+    return homogeneous(rotation_from_quat(checked_quaternion(name, quat_xyzw)), position)
+
+
 def rigid_matrix(T: ArrayLike, name: str) -> Floats:
     """Return a homogeneous matrix (4, 4) as a float64 array, as it is: not with the nearest rotation.
 
-    `name` is how errors call it. Raises ArgumentError unless T is a rigid transform to 1e-6.
+    A pair of a position (3,) and a unit quaternion (x, y, z, w) (4,) is one, too. `name` is how errors call
+    it. Raises ArgumentError unless T is a rigid transform to 1e-6.
     """
     refuse_mask(name, T)
     try:
-        entries = np.asarray(T)
+        entries = np.asarray(matrix_of_pair(T, name))
         if entries.dtype.kind == "c":
             raise DTypeError(f"{name} has dtype {entries.dtype}; wanted real numbers (float64)")
         array = np.asarray(entries, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
-        if isinstance(error, DTypeError):
+        if isinstance(error, ArgumentError):
             raise
-        raise ArgumentError(f"{name} is {shown(T)}; wanted a Pose or a matrix (4, 4)") from None
+        raise ArgumentError(
+            f"{name} is {shown(T)}; wanted a Pose or a matrix (4, 4), or a position and a quaternion"
+        ) from None
     if array.shape != (4, 4):
         position = ", ".join(f"{x:g}" for x in array.tolist()) if array.shape == (3,) else None
         hint = f", such as Pose(({position}))" if position is not None else ""
-        raise ShapeError(f"{name} has shape {array.shape}; wanted a Pose or a matrix (4, 4){hint}")
+        raise ShapeError(
+            f"{name} has shape {array.shape}; wanted a Pose or a matrix (4, 4){hint}, or a pair of position "
+            "and quaternion (x, y, z, w)"
+        )
     rows: list[list[float]] = array.tolist()
     if not all(map(math.isfinite, chain.from_iterable(rows))):
         raise NotFiniteError(f"{name} has an entry that is NaN or infinite")
@@ -72,7 +110,8 @@ class Pose:
 
     @classmethod
     def from_matrix(cls, T: ArrayLike, name: str = "a pose") -> Pose:
-        """Return the pose of a homogeneous matrix (4, 4), such as `forward_kinematics` returns.
+        """Return the pose of a homogeneous matrix (4, 4), such as `forward_kinematics` returns, or of a pair
+        of a position and a quaternion (x, y, z, w).
 
         `name` is how errors call it. Raises ArgumentError unless T is a rigid transform to 1e-6.
         """
@@ -219,7 +258,8 @@ class Note:
 
 
 def checked_pose(name: str, pose: Pose | ArrayLike) -> Pose:
-    """Return a pose, given as a `Pose` or a matrix (4, 4), with finite floats below `MAX_MAGNITUDE`."""
+    """Return a pose, given as a `Pose`, a matrix (4, 4) or a pair of a position and a quaternion
+    (x, y, z, w), with finite floats below `MAX_MAGNITUDE`."""
     if not isinstance(pose, Pose):
         pose = Pose.from_matrix(pose, name)
     xyz, rpy = (checked_vector(f"{part} of {name}", getattr(pose, part)).tolist() for part in ("xyz", "rpy"))

@@ -9,14 +9,17 @@ that name is taken, the first folder of its path in the library is prepended (``
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
 
 from dynx.errors import RobotNotFoundError, nearest, shown
+from dynx.model.package_search import data_folders
 
 EXAMPLE_ROBOT_DATA = "example-robot-data"
 DYNX_MODELS = "dynx"
@@ -96,8 +99,26 @@ def robots() -> tuple[LibraryRobot, ...]:
     return tuple(sorted(entries, key=lambda entry: (entry.source != EXAMPLE_ROBOT_DATA, entry.name)))
 
 
+def in_data_package(name: str) -> Path | None:
+    """Return the URDF file of a Python package of data (``pybullet_data``) that is called `name` there, as
+    ``plane.urdf``, ``kuka_iiwa/model.urdf`` or ``r2d2``; None if no package has it.
+
+    A path never leaves the package; one that begins with a dot is a file of the user's own.
+    """
+    if not name or os.path.isabs(name) or {".", ".."}.intersection(name.split("/")):
+        return None
+    file = name if name.endswith(".urdf") else f"{name}.urdf"
+    for folder in data_folders():
+        with suppress(OSError, ValueError):
+            found = (folder / file).resolve()
+            if found.is_file() and found.is_relative_to(folder):
+                return found
+    return None
+
+
 def find(name: str) -> Path:
-    """Return the path of the description of a robot, by its name or an alias.
+    """Return the path of the description of a robot, by its name or an alias, else by the name without suffix
+    of a file in a package of data (`in_data_package`).
 
     Raises RobotNotFoundError, listing the nearest names.
     """
@@ -106,6 +127,10 @@ def find(name: str) -> Path:
     try:
         return by_name[name]
     except KeyError:
+        # A file of a policy names robots by this function: a path is none.
+        found = in_data_package(name) if re.fullmatch(r"[\w-]+", name) else None
+        if found is not None:
+            return found
         hint = nearest(name, by_name) or "; the library is empty: is example-robot-data installed?"
         raise RobotNotFoundError(f"no robot {shown(name)} in the library, and no such file{hint}") from None
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from dynx.errors import ArgumentError, DescriptionError, RobotNotFoundError, nearest, shown
 from dynx.files.reading import printable, read_file
 from dynx.model.elements import IDENTITY, Pose
-from dynx.model.library import find, robots
+from dynx.model.library import find, in_data_package, robots
 from dynx.model.model import Model
 from dynx.model.package_search import StrPath, data_folders, environment_folders, resolve_package
 from dynx.model.tree import STANDARD_GRAVITY, Base
@@ -48,18 +48,20 @@ def load(
     - a path: any `os.PathLike`, or a `str` with a separator or with the suffix .urdf, .xacro or .xml (.xacro
       needs the extra ``xacro``, which evaluates expressions of a file as Python code: expand only files that
       you trust). Such a string is never looked up as a name. Arguments of a xacro file follow its path in a
-      `str`, as ROS writes them: ``"ur.urdf.xacro name:=ur ur_type:=ur5e"``;
+      `str`, as ROS writes them: ``"ur.urdf.xacro name:=ur ur_type:=ur5e"``. Where a `str` is no file, it may
+      be one of ``pybullet_data``, as PyBullet finds it: ``plane.urdf``, ``kuka_iiwa/model.urdf``;
     - ``package://NAME/FILE``: a file of a package in `package_dirs`, in ROS_PACKAGE_PATH or
       AMENT_PREFIX_PATH, or of the Python package ``pybullet_data``; never one outside the package;
     - the name of a robot in the library, see ``dynx robots``. It takes precedence over a file of that name in
-      the working directory; write ``./name`` for the file. A name that is not in the library may be a file;
+      the working directory; write ``./name`` for the file. A name that is not in the library may be a file
+      of ``pybullet_data`` without its suffix, such as ``r2d2``, or any file;
     - a `Model`, whose base, its pose and gravity are kept unless they are given.
 
     `base` is ``"fixed"`` (default) or ``"floating"``. `lock` fixes joints, by name, at positions [rad or m];
     they are removed from q. `gravity` is (3,) [m/s^2] in world axes, by default (0, 0, -9.81). `base_pose`
-    is the pose of the root link of a fixed base in the world, a `Pose` or a matrix (4, 4), by default the
-    identity. `package_dirs` are the folders in which packages and meshes are searched, besides those around
-    the file.
+    is the pose of the root link of a fixed base in the world, a `Pose`, a matrix (4, 4) or a pair of position
+    and quaternion (x, y, z, w), by default the identity. `package_dirs` are the folders in which packages and
+    meshes are searched, besides those around the file.
 
     Raises RobotNotFoundError if no robot or file is found, DescriptionError if the description is malformed
     (with file and line), UnsupportedFeatureError if it uses a feature that dynx does not support,
@@ -146,6 +148,9 @@ def _path_of(x: StrPath, package_dirs: Iterable[StrPath]) -> str:
     if any(separator in x for separator in separators) or x.endswith(_SUFFIXES):
         path = os.path.expanduser(x)
         if not _exists(path):
+            elsewhere = in_data_package(x)
+            if elsewhere is not None:
+                return str(elsewhere)
             known = [entry.name for entry in robots()]
             stem = PurePath(x).stem
             hint = f"; the library has {shown(stem)}" if stem in known else ""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dynx.errors import ArgumentError, ShapeError, nearest, shown
+from dynx.model.elements import matrix_of_pair
 from dynx.model.numbers import MAX_MAGNITUDE, checked_entries, real_array
 from dynx.spatial.scalar import Floats
 
@@ -71,13 +72,15 @@ class Targets:
 
 
 def checked_targets(target: ArrayLike, free: str | None = None) -> Targets:
-    """Read poses T_world_target (..., 4, 4); positions (..., 3) [m], whose rotation is free; or rotations
-    (..., 3, 3) if the position is `free`.
+    """Read poses T_world_target (..., 4, 4), also as a pair of positions (..., 3) and unit quaternions
+    (x, y, z, w) (..., 4); positions (..., 3) [m], whose rotation is free; or rotations (..., 3, 3) if the
+    position is `free`.
 
     A rotation that is orthonormal only to 1e-6 is replaced by the nearest rotation (Higham, Matrix nearness
     problems, section 3). Raises ShapeError, DTypeError, NotFiniteError, or ArgumentError for a matrix that is
     not a rigid transform, and for three positions that may be a rotation unless the rotation is `free`.
     """
+    target = matrix_of_pair(target, "target")
     if free is not None:
         if not isinstance(free, str) or free not in FREE:
             raise ArgumentError(f"free is {shown(free)}{nearest(str(free), FREE)}")

@@ -19,6 +19,7 @@ from dynx.backends import Backend
 from dynx.errors import ArgumentError, ShapeError, TrajectoryError, shown
 from dynx.model import Model
 from dynx.model.configuration import checked_q
+from dynx.model.elements import matrix_of_pair
 from dynx.model.numbers import real_array
 from dynx.model.targets import checked_targets
 from dynx.registry import DEFAULT_ENGINE
@@ -152,7 +153,7 @@ class _StraightLine:
         self.q0 = checked_q(model, q0, "q0")
         if self.q0.shape != (model.nq,):
             raise ShapeError(f"q0 has shape {self.q0.shape}; wanted ({model.nq},)")
-        goal = real_array("target", target)
+        goal = real_array("target", matrix_of_pair(target, "target"))
         if goal.shape not in ((4, 4), (3,)):
             raise ShapeError(f"target has shape {goal.shape}; wanted a pose (4, 4) or a position (3,)")
         targets = checked_targets(goal)

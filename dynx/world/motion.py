@@ -20,6 +20,7 @@ from dynx.errors import (
 )
 from dynx.model import Pose
 from dynx.model.configuration import checked_q
+from dynx.model.elements import rigid_matrix
 from dynx.model.numbers import DIVERGENCE_SPEED, checked_array, is_real
 from dynx.steppers.forces import NO_FORCES, Forces
 from dynx.steppers.layout import BodyLayout, Layout, RobotLayout
@@ -84,11 +85,8 @@ def _robot_state(robot: RobotLayout, pair: object) -> RobotState:
 
 def _body_state(body: BodyLayout, pair: object) -> BodyState:
     pose, given_twist = _pair(body.name, "(T_world_body, twist) of shapes (4, 4) and (6,)", pair)
-    if isinstance(pose, Pose):
-        pose = pose.matrix
-    # This checks the matrix; converted to roll, pitch, yaw and back it would be rounded.
-    Pose.from_matrix(pose, f"pose of {body.name}")
-    T = np.array(pose, dtype=np.float64)
+    # Converted to roll, pitch, yaw and back the matrix would be rounded.
+    T = rigid_matrix(pose.matrix if isinstance(pose, Pose) else pose, f"pose of {body.name}").copy()
     twist = checked_array(f"twist of {body.name}", given_twist, 6)
     if twist.ndim != 1:
         raise ShapeError(f"twist of {body.name} has shape {twist.shape}; wanted (6,)")

@@ -20,7 +20,6 @@ from dynx.model import Model, Pose
 from dynx.model.geometry import Mesh
 from dynx.model.numbers import checked_bool, positive_seconds
 from dynx.model.package_search import StrPath
-from dynx.model.unlikely_inputs import gravity_notes
 from dynx.option_names import as_object, checks_option_names, refuse_options, right_name
 from dynx.rbd.jacobians import LOCAL, checked_reference
 from dynx.registry import door, explains_names
@@ -672,7 +671,11 @@ class World:
     def _lasting_notes(self, given: Mapping[str, object]) -> Iterator[str]:
         """Yield the notes that hold at every state, with those on the settings `given`."""
         yield from notes_on_engine(self._motion.engine)
-        yield from gravity_notes(self.scene.gravity)
+        if self.scene.gravity[2] > 0.0:
+            # Imported here, because gravity hardly ever points up.
+            from dynx.model.unlikely_inputs import gravity_notes
+
+            yield from gravity_notes(self.scene.gravity)
         yield from self._commands.notes()
         in_effect = self._kind.settings_in_effect(self.settings, self.dt / self.substeps)
         yield from changed_settings(given, self.settings, in_effect)

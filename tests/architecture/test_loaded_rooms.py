@@ -59,14 +59,14 @@ FLOWS = {
         ),
         (),
         71,
-        11750,
+        11800,
     ),
     "inverse kinematics": Flow(
         ENGINE + "engine.inverse_kinematics(engine.forward_kinematics(q, 'tool0'), 'tool0', q)",
         ("world", "sim", "ik.closed_forms"),
         (),
         107,
-        19400,
+        19450,
     ),
     "simulate": Flow(
         ROBOT + "from dynx import control\n"

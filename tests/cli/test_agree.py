@@ -155,7 +155,7 @@ def test_every_command_refuses_a_bad_file_in_one_line(name: str, tmp_path: Path)
     ("arguments", "clue"),
     [
         (["ur5", "--backends", "nosuch"], "nosuch"),
-        (["ur5", "--backends", ","], "--backends"),
+        (["ur5", "--backends", ","], "--engine"),
         (["ur5", "--samples", "0"], "--samples"),
         (["ur5", "--base", "flying"], "--base"),
         (["ur5", "--lock", "elbow_joint"], "joint=value"),

@@ -180,3 +180,61 @@ def test_every_other_file_loads_and_is_read_back_equal() -> None:
         if path.relative_to(ROOT).as_posix() not in DEFECTS:
             model = load(path)
             assert load(model.to_urdf()) == model, path
+
+
+DATA = importlib.util.find_spec("pybullet_data")
+
+
+@pytest.fixture
+def data() -> Path:
+    """Return the folder of pybullet_data."""
+    if DATA is None or DATA.origin is None:
+        pytest.skip("needs pybullet_data")
+    return Path(DATA.origin).resolve().parent
+
+
+@pytest.mark.parametrize(
+    ("name", "file"),
+    [
+        ("r2d2", "r2d2.urdf"),
+        ("plane", "plane.urdf"),
+        ("plane.urdf", "plane.urdf"),
+        ("samurai.urdf", "samurai.urdf"),
+        ("kuka_iiwa/model.urdf", "kuka_iiwa/model.urdf"),
+        ("kuka_iiwa/model", "kuka_iiwa/model.urdf"),
+        ("quadruped/minitaur.urdf", "quadruped/minitaur.urdf"),
+    ],
+)
+def test_files_of_pybullet_data_are_found_as_pybullet_finds_them(name: str, file: str, data: Path) -> None:
+    found = load(name)
+    assert Path(found.source) == data / file
+    assert found == load(f"package://pybullet_data/{file}")
+
+
+def test_a_file_of_the_user_and_a_robot_of_the_library_come_first(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "plane.urdf").write_text('<robot name="mine"><link name="base"/></robot>')
+    assert load("plane.urdf").name == "mine"
+    assert load("pendulum5.urdf").source == str(data / "pendulum5.urdf")
+    assert Path(load("cart_pole").source).is_relative_to(library.own_roots()[0])
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["./r2d2.urdf", "../pybullet_data/r2d2.urdf", "/r2d2.urdf", "kuka_iiwa/../r2d2.urdf", "", "r2\0d2.urdf"],
+)
+def test_other_paths_are_none_of_pybullet_data(
+    name: str, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(RobotNotFoundError):
+        load(name)
+
+
+@pytest.mark.parametrize("name", ["plane.urdf", "kuka_iiwa/model", "kuka_iiwa/model.urdf", "../r2d2"])
+def test_a_name_of_the_library_is_no_path(name: str, data: Path) -> None:
+    """A file of a policy may name a robot that `find` knows, and no file beside it."""
+    with pytest.raises(RobotNotFoundError):
+        find(name)

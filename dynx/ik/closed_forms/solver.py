@@ -36,6 +36,7 @@ from dynx.ik.closed_forms.solutions import FullTurns, IKSolutions
 from dynx.ik.options import SearchLimits
 from dynx.model import Model
 from dynx.model.configuration import checked_q
+from dynx.model.elements import matrix_of_pair
 from dynx.model.model import refuse_other_than_model
 from dynx.model.numbers import checked_bool
 from dynx.model.targets import checked_targets
@@ -148,6 +149,7 @@ class ClosedForm:
         Raises ShapeError, DTypeError, NotFiniteError or ArgumentError for an invalid target or q0.
         """
         ignore_limits = ignore_limits is not False and checked_bool("ignore_limits", ignore_limits)
+        target = matrix_of_pair(target, "target")
         # A kernel finds targets that are no poses in a fraction of the time that NumPy takes.
         is_batch = (
             isinstance(target, np.ndarray)
@@ -372,6 +374,7 @@ def all_solutions(
     compiled = backend.compiles and not given
     positions = () if given is None else _within_limits(backend.model, given)
     form = stored_closed_form(backend.model, frame, positions, compiled)
+    target = matrix_of_pair(target, "target")
     found = form.solve(target, q0, threads=backend.threads)
     if compiled and min(position_tolerance, rotation_tolerance) >= form.accuracy:
         return found

@@ -28,6 +28,7 @@ from dynx.ik.reach import proof_of
 from dynx.ik.tracking.followers import AvoidingFollower, Follower, SampleFollower, path_follower
 from dynx.ik.tracking.path import AT_BOUND, PathTracker, TrackedPath, TrackLimits, TrackResult, TrackStatus
 from dynx.model import Model
+from dynx.model.elements import matrix_of_pair
 from dynx.model.numbers import checked_vector, is_real, positive_seconds, whole_number
 from dynx.model.targets import Targets, checked_targets
 from dynx.option_names import checks_option_names
@@ -334,7 +335,7 @@ def _checked_path(
             )
         poses: ArrayLike = backend.forward_kinematics(q, frame)
     else:
-        poses = targets
+        poses = matrix_of_pair(targets, "targets")
     path = checked_targets(poses, free)
     if not path.batch or not path.batch[-1]:
         raise ShapeError(

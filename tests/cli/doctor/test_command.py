@@ -118,7 +118,7 @@ def test_the_hint_repeats_the_examination(arm: Path, command: str) -> None:
     [hint] = [line for line in first.stdout.splitlines() if "dynx doctor" in line]
     words = shlex.split(hint.partition(": dynx ")[2])
     assert words[:2] == ["doctor", "my arm.urdf"]
-    for option in ["--engines", *own[::2], *more[::2]]:
+    for option in ["--engine", *own[::2], *more[::2]]:
         assert option in words
     fixed = words + ([] if "--fix" in words else ["--fix", "OUT.urdf"])
     again = CliRunner().invoke(cli, [*fixed, "--jobs", "1"])
