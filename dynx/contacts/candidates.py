@@ -76,6 +76,16 @@ CANDIDATES: Mapping[str, tuple[SettingsChange, ...]] = {
             {"contact_slop": (0.0,), SUBSTEPS: (8,)},
             "Bullet leaves penetrations that are no deeper than the slop, and deeper ones in long steps.",
         ),
+        SettingsChange(
+            {
+                "cone_friction": (False,),
+                "contact_erp": (0.0,),
+                "residual_threshold": (0.0,),
+                "solver_iterations": (2000,),
+            },
+            "The friction cone of Bullet is used up by directions in which joints let nothing move; its "
+            "solver is iterative, and pushes apart what penetrates.",
+        ),
     ),
     "mujoco": (
         SettingsChange(
@@ -128,6 +138,16 @@ CANDIDATES: Mapping[str, tuple[SettingsChange, ...]] = {
             {"time_constant": (0.002, 0.001), SUBSTEPS: (16, 64)},
             "A contact of MuJoCo is a damped spring. Gravity acts while it is loaded, and a stiffer one "
             "needs shorter steps.",
+        ),
+        SettingsChange(
+            {
+                "impedance": ((0.02, 0.9, 1.0, 0.5, 2.0),),
+                "time_constant": (1e-6,),
+                "slip_time_constant": (0.003,),
+                SUBSTEPS: (8,),
+            },
+            "Friction of MuJoCo pushes bodies apart that slide, unless contacts give way, and is below its "
+            "limit where slip would end within its time constant.",
         ),
     ),
     "drake": (

@@ -1,4 +1,7 @@
-"""Bodies on supports that move: a wedge that is free to slide."""
+"""Bodies on supports that move: a wedge that is free to slide, a conveyor, and a turntable.
+
+A surface with a prescribed motion is a robot whose joint a `VelocityMotor` of the scene drives.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +12,11 @@ from typing import ClassVar
 import numpy as np
 
 from dynx.contacts.case import ContactCase, Figure
-from dynx.contacts.motion import G, acceleration, inclined, record, slope_axes
+from dynx.contacts.motion import G, acceleration, inclined, mean_contact_force, record, slope_axes
 from dynx.model import Pose
 from dynx.model.geometry import Box, Collision
-from dynx.world import Material, Scene, SceneBody, World, box, ground
+from dynx.model.loading import load
+from dynx.world import Material, Scene, SceneBody, SceneRobot, VelocityMotor, World, box, ground, sphere
 
 WEDGE, BLOCK = 2.0, 1.0
 """Masses of wedge and block [kg]."""
@@ -88,3 +92,160 @@ def wedge_accelerations(friction: float) -> tuple[float, float]:
     normal = BLOCK * G * c / (1.0 + BLOCK / WEDGE * s * (s - friction * c))
     wedge = -normal * (s - friction * c) / WEDGE
     return wedge, G * s - friction * normal / BLOCK - wedge * c
+
+
+DRIVEN_MASS, DRIVE_GAIN = 100.0, 1e6
+"""Mass [kg] and moment of inertia [kg m^2] of a driven surface, and gain of its motor [N s/m, N m s/rad]: its
+velocity does not feel what lies on it."""
+
+
+def driven_surface(kind: str, axis: str, size: tuple[float, float, float]) -> str:
+    """Return the URDF of a box with its top at z = 0 on one joint of this kind and axis."""
+    moments = " ".join(f'{each}="{DRIVEN_MASS}"' for each in ("ixx", "iyy", "izz"))
+    return f"""<robot name="drive">
+  <link name="floor"/>
+  <joint name="drive" type="{kind}">
+    <parent link="floor"/><child link="surface"/><axis xyz="{axis}"/>
+    <limit lower="-10" upper="10" effort="1e6" velocity="100"/>
+  </joint>
+  <link name="surface">
+    <inertial>
+      <mass value="{DRIVEN_MASS}"/>
+      <inertia {moments} ixy="0" ixz="0" iyz="0"/>
+    </inertial>
+    <collision>
+      <origin xyz="0 0 {-0.5 * size[2]}"/><geometry><box size="{size[0]} {size[1]} {size[2]}"/></geometry>
+    </collision>
+  </link>
+</robot>"""
+
+
+def driven(urdf: str, speed: float, material: Material) -> SceneRobot:
+    """Return a driven surface that has this speed [m/s or rad/s] from the start on."""
+    return SceneRobot(
+        "drive", load(urdf), v=(speed,), material=material, motors=(VelocityMotor(speed, DRIVE_GAIN),)
+    )
+
+
+CONVEYOR_FRICTION = 0.4
+CONVEYOR_SPEED = 1.0
+"""Speed of the belt [m/s]."""
+
+CONVEYOR_STARTING, CONVEYOR_SLIDING, CONVEYOR_DURATION = 0.04, 0.16, 0.4
+"""Times [s] after which the block slides steadily, of the measurement of the slide, and until it rests."""
+
+
+class Conveyor(ContactCase):
+    """A block that is placed at rest on a belt, which a motor keeps at its speed."""
+
+    name: ClassVar[str] = "conveyor"
+    title: ClassVar[str] = "A block placed on a conveyor"
+    law: ClassVar[str] = (
+        "dv/dt = mu g until v = V, after the slide V^2 / (2 mu g) on the belt; v = V from then on, for the "
+        "block's speed v, that of the belt V and friction mu"
+    )
+    source: ClassVar[str] = "Newton's second law and Coulomb's law of friction"
+
+    def scene(self, parameters: None) -> Scene:
+        material = Material(friction=CONVEYOR_FRICTION)
+        belt = driven(driven_surface("prismatic", "1 0 0", (4.0, 0.6, 0.1)), CONVEYOR_SPEED, material)
+        block = box("block", (0.2, 0.2, 0.1), mass=1.0, pose=Pose((0.0, 0.0, 0.05)), material=material)
+        return Scene("conveyor", robots=(belt,), bodies=(block,))
+
+    def measure(self, world: World, parameters: None) -> Sequence[Figure]:
+        world.run(CONVEYOR_STARTING)
+        sliding = record(world, CONVEYOR_SLIDING)
+        world.run(CONVEYOR_DURATION)
+        exact = CONVEYOR_FRICTION * G
+        belt, block = world.state.robots["drive"], world.state.bodies["block"]
+        slide = float(belt.q[0]) - float(block.position[0])
+        slide_exact = CONVEYOR_SPEED**2 / (2.0 * exact)
+        gained = acceleration(sliding.times, sliding.velocities("block")[:, 0])
+        slip = float(block.twist[0]) - CONVEYOR_SPEED
+        return [
+            Figure("acceleration of the block", gained, exact, "m/s^2", exact),
+            Figure("length of the slide on the belt", slide, slide_exact, "m", slide_exact),
+            Figure("speed of the block on the belt after it", slip, 0.0, "m/s", CONVEYOR_SPEED),
+            Figure("speed of the belt", float(belt.v[0]), CONVEYOR_SPEED, "m/s", CONVEYOR_SPEED),
+        ]
+
+
+TURNTABLE_SPEED = 3.0
+"""Angular velocity of the table [rad/s]."""
+
+TURNTABLE_RADIUS = 0.3
+"""Distance [m] of block and ball from the axis at the start."""
+
+TURNTABLE_DURATION = 0.5
+TURNTABLE_AVERAGING = 0.02
+"""Time [s] at the end over which forces are averaged, in which the table turns by 3.4 degrees."""
+
+ROLLING_BALL_RADIUS, ROLLING_BALL_SPEED = 0.1, 0.5
+"""Radius of the ball [m], and its speed at the start [m/s], away from the axis."""
+
+
+class Turntable(ContactCase):
+    """A block that turns with a table, and a homogeneous ball that rolls on it without slipping."""
+
+    name: ClassVar[str] = "turntable"
+    title: ClassVar[str] = "A block and a ball on a turntable"
+    law: ClassVar[str] = (
+        "F = m W^2 r towards the axis and no slip where W^2 r < mu g, for a block at the distance r from the "
+        "axis of a table of angular velocity W; dv/dt = 2/7 W x v, a circle, for a homogeneous ball that "
+        "rolls"
+    )
+    source: ClassVar[str] = (
+        "Newton's second law; Weltner, Stable circular orbits of freely moving balls on rotating discs, "
+        "American Journal of Physics 47, 1979"
+    )
+    trials: ClassVar[dict[str, str]] = {"block": "block", "ball": "ball"}
+    contact_interval: ClassVar[float | None] = TURNTABLE_AVERAGING
+
+    def scene(self, parameters: str) -> Scene:
+        material = Material(friction=0.8)
+        table = driven(driven_surface("continuous", "0 0 1", (2.0, 2.0, 0.1)), TURNTABLE_SPEED, material)
+        speed = TURNTABLE_SPEED * TURNTABLE_RADIUS
+        if parameters == "block":
+            at = Pose((TURNTABLE_RADIUS, 0.0, 0.03))
+            twist = (0.0, speed, 0.0, 0.0, 0.0, TURNTABLE_SPEED)
+            body = box("block", (0.1, 0.1, 0.06), mass=1.0, pose=at, twist=twist, material=material)
+        else:
+            r, v = ROLLING_BALL_RADIUS, ROLLING_BALL_SPEED
+            # Its lowest point has the velocity of the table there.
+            twist = (v, 0.0, 0.0, speed / r, v / r, 0.0)
+            at = Pose((TURNTABLE_RADIUS, 0.0, r))
+            body = sphere("ball", r, mass=1.0, pose=at, twist=twist, material=material)
+        return Scene("turntable", robots=(table,), bodies=(body,))
+
+    def measure(self, world: World, parameters: str) -> Sequence[Figure]:
+        world.run(TURNTABLE_DURATION)
+        body, table = world.state.bodies[parameters], world.state.robots["drive"]
+        driving = Figure("speed of the table", float(table.v[0]), TURNTABLE_SPEED, "rad/s", TURNTABLE_SPEED)
+        if parameters == "block":
+            pull = float(np.linalg.norm(mean_contact_force(world, "block")[:2]))
+            # The force turns with the table while it is averaged.
+            half = 0.5 * TURNTABLE_SPEED * TURNTABLE_AVERAGING
+            exact = TURNTABLE_SPEED**2 * TURNTABLE_RADIUS * math.sin(half) / half
+            along = np.array([math.cos(table.q[0]), math.sin(table.q[0])])
+            slip = float(np.linalg.norm(body.position[:2] - TURNTABLE_RADIUS * along))
+            return [
+                driving,
+                Figure("force towards the axis", pull, exact, "N", exact),
+                Figure("slip on the table", slip, 0.0, "m", TURNTABLE_RADIUS),
+            ]
+        x, y = orbit_on_turntable(world.time)
+        radius = ROLLING_BALL_SPEED / (2.0 / 7.0 * TURNTABLE_SPEED)
+        away = float(np.hypot(body.position[0] - x, body.position[1] - y))
+        speed = float(np.linalg.norm(body.twist[:2]))
+        return [
+            driving,
+            Figure("distance of the ball from its orbit", away, 0.0, "m", radius),
+            Figure("speed of the ball", speed, ROLLING_BALL_SPEED, "m/s", ROLLING_BALL_SPEED),
+        ]
+
+
+def orbit_on_turntable(time: float) -> tuple[float, float]:
+    """Return the position [m] of a ball that rolls on the table, at a time [s]."""
+    rate = 2.0 / 7.0 * TURNTABLE_SPEED
+    radius = ROLLING_BALL_SPEED / rate
+    return TURNTABLE_RADIUS + radius * math.sin(rate * time), radius * (1.0 - math.cos(rate * time))
