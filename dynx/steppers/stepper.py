@@ -50,6 +50,25 @@ class TouchingPoint(NamedTuple):
     """Force (3,) on a [N]; None in a query of distances."""
 
 
+class SlidingFace(NamedTuple):
+    """A body that slides on a surface which carries its weight."""
+
+    mass: float
+    """Mass of the body [kg]."""
+    gravity: float
+    """Acceleration of gravity towards the surface [m/s^2], above 0."""
+    friction: float
+    """Coefficient of friction of the two."""
+    slip: float
+    """Speed of the slide [m/s]."""
+    size: tuple[float, float, float]
+    """Extents of the body along the slide, across it, and along the normal [m]."""
+    load: float
+    """Place of the load: from 0, below the centre of mass, to 1, at the front end, where bodies tip."""
+    flat: bool
+    """True if the body touches with a face: all its shapes are boxes or cylinders."""
+
+
 class Stepper(ABC):
     """A scene inside an engine, which advances in steps of `dt` [s].
 
@@ -106,6 +125,11 @@ class Stepper(ABC):
         """Return, by name, the coefficients of contact that the engine does not have for every pair of
         materials as `dynx.steppers.material.geometric_means` gives them."""
         return {}
+
+    def sliding_fault(self, slide: SlidingFace) -> str | None:
+        """Return what the engine does wrong with a slide in steps of this length, as a clause that begins
+        with a verb; None for a slide that it has right."""
+        return None
 
     # -- motion -------------------------------------------------------------------------------
 

@@ -1,7 +1,8 @@
 """Sentences on a world: what is amiss at its start, and the likely causes where it diverged.
 
 At the start these are overlaps, violated constraints, joints beyond their limits, accelerations without a
-bound, and coefficients of contact that the engine does not have. Likely causes of divergence are gains,
+bound, parts that are too fast for the step, and coefficients of contact that the engine does not have. Likely
+causes of divergence are gains,
 torques, forces, overlaps and light parts.
 """
 
@@ -116,7 +117,7 @@ LONG_STEP = 0.1
 
 def notes_on_start(engine: Stepper, state: WorldState) -> tuple[str, ...]:
     """Return one sentence for each overlap, violated constraint and joint beyond its limits of an engine at a
-    state, and for each robot whose accelerations have no bound."""
+    state, for each robot whose accelerations have no bound, and for each part that is too fast."""
     drawn = "so that they are pulled together in the first steps"
     moved = "so that it is pushed back in the first steps"
     return (
@@ -124,7 +125,17 @@ def notes_on_start(engine: Stepper, state: WorldState) -> tuple[str, ...]:
         *(f"{each} at the start, {drawn}" for each in violations(engine.layout, state)),
         *(f"{each} at the start, {moved}" for each in joints_beyond_limits(engine.layout, state)),
         *unbounded_motions(engine.layout, state),
+        *_fast_parts(engine, state),
     )
+
+
+def _fast_parts(engine: Stepper, state: WorldState) -> Iterator[str]:
+    """Yield each part that is too fast for the step; most scenes begin at rest."""
+    of_robots = [robot.v for robot in state.robots.values()]
+    if any(velocity.any() for velocity in (*of_robots, *(body.twist for body in state.bodies.values()))):
+        from dynx.world.fast_parts import fast_parts
+
+        yield from fast_parts(engine, state)
 
 
 def notes_on_engine(engine: Stepper) -> Iterator[str]:

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator
 from functools import lru_cache
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,11 +22,8 @@ from dynx.steppers.native_queries import NativeQueries, RayHit, native_queries_o
 from dynx.steppers.state import WorldState
 from dynx.steppers.stepper import Stepper, TouchingPoint
 from dynx.world.boxes import OwnerPoses, collider_box, shape_box
-from dynx.world.contacts import ClosestPoints, Contact, MeanContact, RayHits
+from dynx.world.contacts import ClosestPoints, Contact, RayHits
 from dynx.world.scene import Scene
-
-if TYPE_CHECKING:
-    from dynx.world.contact_interval import ContactInterval
 
 
 class Distances:
@@ -141,7 +137,7 @@ class Queries:
         """Return the contacts of the last step, of a part or all, ordered by the parts of the scene."""
         points = sorted(map(_ordered, engine.contacts()), key=lambda point: (point.a, point.b))
         if part is not None:
-            own = set(self._colliders(part))
+            own = set(self.colliders(part))
             points = [point for point in points if point.a in own or point.b in own]
         names = self._names
         return tuple(
@@ -158,12 +154,6 @@ class Queries:
             for p in points
         )
 
-    def mean_contacts(
-        self, interval: ContactInterval, engine: Stepper, part: str | None = None
-    ) -> tuple[MeanContact, ...]:
-        """Return the mean contacts of an interval, of a part or all, ordered by the parts of the scene."""
-        return interval.means(engine, None if part is None else set(self._colliders(part)))
-
     def touching_pairs(self, engine: Stepper) -> frozenset[tuple[str, str]]:
         """Return the names of the parts that touch, ordered by the parts of the scene."""
         names = self._names
@@ -177,7 +167,7 @@ class Queries:
         """Return the nearest points of each pair of parts, nearest pair first, by dynx or by the engine."""
         if not is_real(within) or not 0.0 <= within < MAX_MAGNITUDE:
             raise ArgumentError(f"within is {shown(within)}; wanted a number of at least 0 [m]")
-        first, second = self._colliders(a), self._colliders(b)
+        first, second = self.colliders(a), self.colliders(b)
         if len({*first, *second}) == 1:
             raise ArgumentError(f"{shown(a)} and {shown(b)} are one shape, which has no distance from itself")
         points: list[ClosestPoints] = []
@@ -205,7 +195,7 @@ class Queries:
 
     def aabb(self, state: WorldState, name: str) -> tuple[Floats, Floats]:
         """Return the corners of the smallest box that holds the boxes of all links of a part."""
-        boxes = [self._box(state, k) for k in self._colliders(name)]
+        boxes = [self._box(state, k) for k in self.colliders(name)]
         return np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)
 
     def overlapping(self, state: WorldState, lower: ArrayLike, upper: ArrayLike) -> tuple[str, ...]:
@@ -262,7 +252,7 @@ class Queries:
             np.where(missed, np.nan, np.array([hit.normal for hit in hits]).reshape(-1, 3)),
         )
 
-    def _colliders(self, name: str) -> list[int]:
+    def colliders(self, name: str) -> list[int]:
         """Return the numbers of the colliders of a body, a link, or all links of a robot."""
         self._scene.require(name)
         found = [self._number[name]] if name in self._number else []

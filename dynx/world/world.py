@@ -246,9 +246,9 @@ class World:
         at_start = notes_on_start(self._motion.engine, self._motion.state)
         self.notes: tuple[str, ...] = (*at_start, *self._lasting_notes(settings))
         """Parts that overlap at the start, constraints that it violates, joints beyond their limits, robots
-        whose accelerations have no bound, coefficients of contact that the engine does not have, joint
-        dynamics that are not exact, a step that is long, and settings given that the engine changes, one
-        sentence each."""
+        whose accelerations have no bound, parts that are too fast for the step, coefficients of contact that
+        the engine does not have, joint dynamics that are not exact, a step that is long, and settings given
+        that the engine changes, one sentence each."""
 
     @property
     def version(self) -> str:
@@ -573,7 +573,8 @@ class World:
         """
         if self._contact_interval is None:
             raise ArgumentError("this world sums no contacts; make it with contact_interval=, in seconds")
-        return self._queries.mean_contacts(self._contact_interval, self._motion.engine, part)
+        colliders = None if part is None else self._queries.colliders(part)
+        return self._contact_interval.means(self._motion.engine, colliders)
 
     def touching_pairs(self) -> frozenset[tuple[str, str]]:
         """Return the parts that have a contact in `contacts`, as pairs of names in the order of `Contact`.
