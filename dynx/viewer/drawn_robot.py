@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dynx.errors import DynxError
 from dynx.model import Model
@@ -14,7 +15,7 @@ from dynx.model.geometry import Mesh, Shape
 from dynx.model.geometry.links import Collision, Colour, Visual, link_shapes
 from dynx.rbd.kinematics import link_poses
 from dynx.spatial.scalar import Floats
-from dynx.spatial.so3 import quat_from_rotation
+from dynx.spatial.so3 import quat_from_rotation, rotation_from_quat
 from dynx.viewer.colours import GREY, ORANGE, RGB, VERMILION
 from dynx.viewer.triangles import (
     TRIANGLE_BUDGET,
@@ -73,6 +74,30 @@ class DrawnParts:
             body[part] = body[self._rigid[part]] if part in self._rigid else part
         return [part for part in self.parts if body[part] == body[name]]
 
+    def way_out(self, point: Floats, direction: Floats, radius: float, names: Iterable[str]) -> float:
+        """Return the distance [m] from a point (3,) along a unit direction (3,), both in the world, at which
+        a ray leaves the visual shapes of parts, one after another, that it begins in; 0 outside of all.
+
+        Many shapes are open where a joint's axis passes, so that what is within a `radius` [m] of the line
+        counts, too; shapes that are less than that apart are one after another.
+        """
+        across = np.linalg.svd(direction[None])[2][1:]
+        spans = []
+        for name in names:
+            T = self.pose(name)
+            for node in self.visuals.get(name, ()):
+                points = _points_of(node) @ T[:3, :3].T + T[:3, 3] - point
+                along, beside = points @ direction, points @ across.T
+                near = along[np.linalg.norm(beside, axis=1) <= radius]
+                met = np.concatenate([near, _crossings(along, beside, np.asarray(node.faces))])
+                if len(met):
+                    spans.append((float(met.min()), float(met.max())))
+        place = 0.0
+        for begin, end in sorted(spans):
+            if begin - radius <= place:
+                place = max(place, end)
+        return place
+
     def on_placed(self, placed: Callable[[Mapping[str, Floats]], None]) -> None:
         """Call `placed(poses)` whenever parts were placed."""
         self._placed.append(placed)
@@ -115,6 +140,24 @@ class DrawnParts:
     @visible.setter
     def visible(self, shown: bool) -> None:
         self._root.visible = shown
+
+
+def _points_of(node: Any) -> Floats:
+    """Return the vertices (n, 3) of a node with triangles in the frame of its part."""
+    w, *xyz = node.wxyz
+    R = rotation_from_quat(np.array([*xyz, w]))
+    return np.asarray(np.asarray(node.vertices, dtype=np.float64) @ R.T + node.position)
+
+
+def _crossings(along: Floats, across: Floats, faces: NDArray[np.integer[Any]]) -> Floats:
+    """Return where a line crosses triangles: `along` (n,) and `across` (n, 2) are the places of vertices
+    along it and beside it."""
+    y, z = np.moveaxis(across[faces], 2, 0)
+    # The areas opposite the corners, seen along the line, all have one sign where it passes within.
+    areas = np.roll(y, -1, axis=1) * np.roll(z, -2, axis=1) - np.roll(z, -1, axis=1) * np.roll(y, -2, axis=1)
+    whole = areas.sum(axis=1)
+    within = ((areas >= 0.0).all(axis=1) | (areas <= 0.0).all(axis=1)) & (whole != 0.0)
+    return np.asarray(np.einsum("ij,ij->i", areas[within], along[faces[within]]) / whole[within])
 
 
 def wxyz(R: Floats) -> Quaternion:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from dynx.errors import ArgumentError, nearest, shown
 from dynx.spatial.scalar import Floats
-from dynx.spatial.so3 import rotation_from_quat
 from dynx.viewer.drawn_robot import DrawnParts
 from dynx.viewer.library import send_view
 from dynx.viewer.page import Page
@@ -28,6 +27,9 @@ page has only repeated it."""
 
 _BEFORE = 0.002
 """Distance by which a camera that looks from a part lies before its surface [m]."""
+
+_CLEAR = 0.01
+"""Radius around the line of sight within which the part itself is not seen [m]."""
 
 
 class _Sent(NamedTuple):
@@ -131,8 +133,10 @@ class FollowingCamera:
             clients = self._page.server.get_clients()
             self._pages = {number: _FollowingPage(client, origin) for number, client in clients.items()}
             if mode == _FIRST_PERSON:
-                self._outside = self._way_out(part)
-                self._move({part: self._drawn.pose(part)})
+                T = self._drawn.pose(part)
+                leaves = self._drawn.way_out(T[:3, 3], T[:3, 0], _CLEAR, self._drawn.rigid_with(part))
+                self._outside = leaves + _BEFORE if leaves else 0.0
+                self._move({part: T})
             elif mode == _FOLLOWS:
                 for client in clients.values():
                     client.camera.up_direction = (0.0, 0.0, 1.0)
@@ -170,34 +174,3 @@ class FollowingCamera:
                 # Its camera saw the scene as it was at the start.
                 self._pages[number] = _FollowingPage(client, self._start_poses[part][:3, 3])
             self._pages[number].follow(np.array(T[:3, 3]))
-
-    def _way_out(self, part: str) -> float:
-        """Return the distance from the origin of a part along its x axis [m] at which a camera is outside of
-        the shapes around the origin: those of the part and of what is fixed to it."""
-        leaves = [_BEFORE + x for corners in self._shapes_around(part) for x in _crossings(corners)]
-        return max(leaves, default=0.0)
-
-    def _shapes_around(self, part: str) -> Iterator[Floats]:
-        """Yield the corners (m, 3, 3) of the triangles of shapes in whose box the origin of a part lies, in
-        the frame of the part."""
-        T_world_part = self._drawn.pose(part)
-        for other in self._drawn.rigid_with(part):
-            T = np.linalg.inv(T_world_part) @ self._drawn.pose(other)
-            for node in self._drawn.visuals.get(other, ()):
-                w, *xyz = node.wxyz
-                points = np.asarray(node.vertices, dtype=np.float64)
-                points = points @ rotation_from_quat(np.array([*xyz, w])).T + node.position
-                points = points @ T[:3, :3].T + T[:3, 3]
-                if (points.min(axis=0) <= 0.0).all() and (points.max(axis=0) >= 0.0).all():
-                    yield points[np.asarray(node.faces)]
-
-
-def _crossings(corners: Floats) -> list[float]:
-    """Return where the positive x axis crosses triangles (m, 3, 3) [m]."""
-    y, z = corners[:, :, 1], corners[:, :, 2]
-    # The areas opposite the corners, seen along the axis, all have one sign where it passes within.
-    areas = np.roll(y, -1, axis=1) * np.roll(z, -2, axis=1) - np.roll(z, -1, axis=1) * np.roll(y, -2, axis=1)
-    whole = areas.sum(axis=1)
-    within = ((areas >= 0.0).all(axis=1) | (areas <= 0.0).all(axis=1)) & (whole != 0.0)
-    x = np.einsum("ij,ij->i", areas[within], corners[within, :, 0]) / whole[within]
-    return [each for each in x.tolist() if each >= 0.0]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -288,44 +288,59 @@ class FrameHandle:
 
 
 _LONGEST = 0.25
-"""Length of the longest bar and of the longest half axis, as a share of the robot's size."""
+"""Length of the longest arrow and of the longest half axis, as a share of the robot's size."""
+
+_THIN, _HEAD = 0.012, 0.036
+"""Radius of the shaft of an arrow and length of its head, as shares of the robot's size."""
+
+_LEAST = 2e-3
+"""Gravity torque below which a joint has no arrow, as a share of its effort limit."""
 
 
 class GravityTorques:
-    """A bar along the axis of each joint: its gravity torque, relative to the effort limit.
+    """An arrow along the axis of each joint, with a number: its gravity torque, relative to the effort limit.
 
-    Joints without a limit are relative to the largest gravity torque of these. A bar points along the axis
-    for a positive torque.
+    Joints without a limit are relative to the largest gravity torque of these. An arrow points along the axis
+    for a positive torque, and its shaft is as long as the share. It begins where the axis leaves the robot; a
+    joint without torque has none.
     """
 
-    def __init__(self, scene: Any, model: Model, engine: Callable[[], Backend]) -> None:
-        self._model, self._engine, self._scene = model, engine, scene
-        self._size = size_of(model)
-        self._bars: Any = None
+    def __init__(self, scene: Any, robot: DrawnRobot, engine: Callable[[], Backend]) -> None:
+        self._robot, self._model, self._engine, self._scene = robot, robot.model, engine, scene
+        self._size = size_of(robot.model)
+        self._arrows: Any = None
+        self._numbers: dict[str, Any] = {}
         self.shown = False
-        """True while the bars are shown."""
+        """True while the arrows are shown."""
 
     def move(self, q: Floats) -> None:
-        """Show the torques at a configuration (nq,), if they are shown."""
-        if self._bars is not None:
-            self._bars.visible = self.shown
-        if not self.shown:
-            return
-        points = self._points(q).astype(np.float32)
-        if self._bars is None:
-            thin = 0.012 * self._size
-            self._bars = self._scene.add_arrows(
-                "/gravity_torques",
-                points,
-                VERMILION,
-                shaft_radius=thin,
-                head_radius=2.0 * thin,
-                head_length=3.0 * thin,
-            )
-        else:
-            self._bars.points = points
+        """Show the torques at a configuration (nq,), at which the robot stands, if they are shown."""
+        arrows = list(self._arrows_at(q)) if self.shown else []
+        for label in self._numbers.values():
+            label.visible = False
+        for name, text, segment in arrows:
+            if name not in self._numbers:
+                self._numbers[name] = self._scene.add_label(f"/gravity_torque{len(self._numbers)}", text)
+            label = self._numbers[name]
+            label.text, label.position, label.visible = text, segment[1], True
+        if arrows:
+            points = np.array([segment for _, _, segment in arrows], dtype=np.float32)
+            if self._arrows is None:
+                thin = _THIN * self._size
+                self._arrows = self._scene.add_arrows(
+                    "/gravity_torques",
+                    points,
+                    VERMILION,
+                    shaft_radius=thin,
+                    head_radius=2.0 * thin,
+                    head_length=_HEAD * self._size,
+                )
+            self._arrows.points = points
+        if self._arrows is not None:
+            self._arrows.visible = bool(arrows)
 
-    def _points(self, q: Floats) -> Floats:
+    def _arrows_at(self, q: Floats) -> Iterator[tuple[str, str, Floats]]:
+        """Yield the name of each joint with a torque, the number, and the ends (2, 3) of its arrow."""
         model = self._model
         tau = self._engine().gravity_torque(q)[model.nv - len(model.joint_names) :]
         limit = model.effort_limit[model.nv - len(model.joint_names) :]
@@ -333,13 +348,17 @@ class GravityTorques:
         largest = float(np.abs(tau[unlimited]).max(initial=0.0)) or 1.0
         share = np.clip(tau / np.where(unlimited, largest, np.where(limit > 0.0, limit, 1.0)), -1.0, 1.0)
         poses = dict(link_poses(model, q))
-        points = []
         for k, joint in enumerate(model.coordinate_joints):
+            if abs(share[k]) < _LEAST:
+                continue
             T = poses[joint.child]
             axis = np.asarray(joint.axis, dtype=np.float64)
-            along = T[:3, :3] @ (axis / np.linalg.norm(axis))
-            points.append([T[:3, 3], T[:3, 3] + _LONGEST * self._size * share[k] * along])
-        return np.array(points, dtype=np.float64).reshape(-1, 2, 3)
+            along = math.copysign(1.0, share[k]) * T[:3, :3] @ (axis / np.linalg.norm(axis))
+            leaves = self._robot.way_out(T[:3, 3], along, _THIN * self._size, self._robot.links)
+            start = T[:3, 3] + leaves * along
+            unit = "N" if joint.type == "prismatic" else "N m"
+            end = start + (_HEAD + _LONGEST * abs(share[k])) * self._size * along
+            yield joint.name, f"{tau[k]:.3g} {unit}", np.stack([start, end])
 
 
 class Manipulability:
@@ -416,7 +435,7 @@ class RobotView:
         self.notes = self.robot.notes
         """Shapes that cannot be drawn, one sentence each."""
         self._marks = Marks(page, self.robot)
-        self._torques = GravityTorques(page.scene, model, lambda: self._engine)
+        self._torques = GravityTorques(page.scene, self.robot, lambda: self._engine)
         self._ellipsoid = Manipulability(page.scene, model, lambda: self._engine)
         size = size_of(model)
         tip = longest_chain_end(model.links, model.joints)
