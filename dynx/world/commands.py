@@ -134,10 +134,17 @@ class RobotLoads:
             outside = None if rows is None or len(rows) < 4 else (rows[2].copy(), rows[3].copy())
             self.joints.memory = outside
 
-    def set_motors(self, motors: Sequence[Motor]) -> None:
-        """Use these motors in the next calls of `torque`."""
-        if [*map(id, motors)] != [*map(id, self._motors)]:
-            law, implicit = self._law, self._implicit_joints = combine(self.model, motors)
+    def changed_law(self, motors: Sequence[Motor]) -> tuple[JointLaw, Floats] | None:
+        """Return the law of motors and the joints where it is implicit; None for those in use.
+
+        Raises the errors of `combine`.
+        """
+        return None if [*map(id, motors)] == [*map(id, self._motors)] else combine(self.model, motors)
+
+    def set_motors(self, motors: Sequence[Motor], changed: tuple[JointLaw, Floats] | None) -> None:
+        """Use these motors in the next calls of `torque`; `changed` is their `changed_law`."""
+        if changed is not None:
+            law, implicit = self._law, self._implicit_joints = changed
             self._motors = tuple(motors)
             # At the end of the step: q + h v+ in place of q, v+ = v + h a in place of v.
             self._ahead = implicit * self._h * law.kp
@@ -405,7 +412,7 @@ class Commands:
             self._more_than_torques = False
             self._restored, self._engine_commands = None, NO_COMMANDS
             for loads in self._loads:
-                loads.set_motors(())
+                loads.set_motors((), loads.changed_law(()))
             self._wrenches, self._on_frames = self._no_wrench, {}
             self._forget_steps(frozenset())
         return Forces(held)
@@ -419,11 +426,12 @@ class Commands:
     ) -> Act:
         """Check what acts in the next steps, the first of which begins at `time` [s], and return the function
         that returns it before each of them."""
-        self._more_than_torques, self._restored = True, None
-        self._held = checked_torques({} if torques is None else torques, self._torques)
-        held = dict(self._held)
-        commands = self._engine_commands = self._set_motors({} if motors is None else motors)
+        given_torques = checked_torques({} if torques is None else torques, self._torques)
         frames, pushes = self._sort_forces(forces)
+        commands = self._set_motors({} if motors is None else motors)
+        self._more_than_torques, self._restored = True, None
+        self._held, self._engine_commands = given_torques, commands
+        held = dict(given_torques)
         motored = frozenset(k for k, loads in enumerate(self._loads) if loads.has_motors)
         repeated = motored | frames.keys() | self._outside
         of_joints = {k for k in motored - frames.keys() - self._outside if self._loads[k].depends_on_joints}
@@ -477,8 +485,11 @@ class Commands:
                         f"a motor of {name} is {shown(each)}; wanted a Motor or EngineCommand"
                     )
                 given[k].append(each)
-        for k, loads in enumerate(self._loads):
-            loads.set_motors(given.get(k, ()))
+        # All are checked first, so that an error leaves the motors of the step before in place.
+        motored = [(loads, given.get(k, ())) for k, loads in enumerate(self._loads)]
+        laws = [loads.changed_law(each) for loads, each in motored]
+        for (loads, each), law in zip(motored, laws, strict=True):
+            loads.set_motors(each, law)
         return commands or NO_COMMANDS
 
     def _sort_forces(

@@ -117,7 +117,8 @@ def test_a_motor_at_the_end_of_a_step_acts_where_another_joint_moves_no_mass() -
     model = Model("m", links, joints)
     robot = prepare_robot(model)
     loads = RobotLoads(robot, robot, 1e-3, reached=False)
-    loads.set_motors([PositionMotor(0.5, 100.0, 1.0, joints=["shoulder"])])
+    motors = [PositionMotor(0.5, 100.0, 1.0, joints=["shoulder"])]
+    loads.set_motors(motors, loads.changed_law(motors))
     tau = loads.torque(np.zeros(2), np.zeros(2), None, ())
     # kp (q* - q - h v) - kd v at the end of the step, where v = h tau / I.
     assert tau == pytest.approx([50.0 / (1.0 + 1e-3 * (1.0 + 1e-3 * 100.0) / 0.1), 0.0])

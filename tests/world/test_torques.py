@@ -6,6 +6,7 @@ import hashlib
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import dynx
 from dynx.engines.pybullet.motors import BulletMotorCommand
+from dynx.errors import DynxError
 from dynx.spatial.scalar import Floats
 from dynx.world import PDMotor, PositionMotor, Scene, SceneRobot, World
 from dynx.world.snapshot import MAGIC
@@ -64,6 +66,24 @@ def test_given_torques_and_motors_add(engine: str, tmp_path: Path) -> None:
         assert_array_equal(torques(again), both)
         again.step()
         assert not torques(again).any()
+
+
+@pytest.mark.parametrize("engine", WORLDS)
+def test_a_call_that_is_refused_leaves_the_torques(engine: str) -> None:
+    motor, stiff = PDMotor(np.zeros(6), kp=50.0, kd=2.0), PDMotor(np.zeros(6), kp=-1.0, kd=2.0)
+    refused: list[dict[str, Any]] = [
+        {"torques": {"arm": TAU}, "motors": {"arm": PDMotor(np.ones(6), kp=1.0, kd=1.0), "free": stiff}},
+        {"torques": {"arm": TAU}, "motors": {"arm": [motor, motor]}},
+        {"torques": {"arm": TAU}, "forces": [dynx.ExternalForce("arm/tool", np.ones(6))]},
+    ]
+    with World(scene(), engine) as first, World(scene(), engine) as world:
+        for each in (first, world):
+            each.step(3, torques={"arm": 0.5 * TAU}, motors={"free": motor})
+        for arguments in refused:
+            with pytest.raises(DynxError):
+                world.step(**arguments)
+        assert_array_equal(torques(world), torques(first))
+        assert np.abs(torques(world)).max() > 10.0
 
 
 @pytest.mark.parametrize("engine", WORLDS)
