@@ -11,6 +11,7 @@ The first line names the columns, in this order; ``c`` stands for each coordinat
 | `a:c`, `tau:c` | acceleration and torque in the step that starts at this time | per second squared; N m, N |
 | `saturated:c` | 1 if the motor was at its limit in that step, otherwise 0 | |
 | `contact:name:x`, `:y`, `:z` | sum of the contact forces on a body or link in that step, world axes | N |
+| `sensor:name:value` | sample of a sensor that was taken at this time, otherwise empty | |
 
 Coordinates have the names of their joints. A floating base comes first: `x y z qx qy qz qw` in positions (of
 the base frame in the world, quaternion xyzw) and `vx vy vz wx wy wz` in rates (in the base frame). No step
@@ -26,7 +27,7 @@ import math
 import os
 import re
 from collections.abc import Sequence
-from typing import Any, BinaryIO, TextIO
+from typing import TYPE_CHECKING, Any, BinaryIO, TextIO
 
 import numpy as np
 
@@ -36,6 +37,9 @@ from dynx.model import Model
 from dynx.model.configuration import checked_q
 from dynx.sim.record.rollout import Rollout
 from dynx.spatial.scalar import Floats
+
+if TYPE_CHECKING:
+    from dynx.world.sensors.readings import Readings
 
 Block = tuple[str, list[str], Any]
 """Kind of a quantity, the names of its coordinates, and its rows (n, len(names))."""
@@ -47,15 +51,31 @@ def write_csv(rollout: Rollout, file: BinaryIO) -> None:
     if rollout.surroundings is not None:
         contacts = rollout.surroundings.contacts
         steps += [(f"contact:{name}", [*"xyz"], contacts.force_on(name)) for name in contacts.touching]
-    header = ["t", *_header(states), "energy", *_header(steps)]
+    samples: list[Block] = [
+        (f"sensor:{name}", [*readings.sensor.value_names], _in_rows(rollout, readings))
+        for name, readings in rollout.sensors.items()
+    ]
+    header = ["t", *_header(states), "energy", *_header(steps), *_header(samples)]
     file.write((",".join(_quoted(column) for column in header) + "\n").encode())
     columns = [rollout.t[:, None], *(rows for *_, rows in states), rollout.energy[:, None]]
-    acting = [rows.tolist() for *_, rows in steps]
-    nothing = [""] * len(_header(steps))
+    acting = [rows.tolist() for *_, rows in steps] + [rows for *_, rows in samples]
+    nothing = [""] * len([*_header(steps), *_header(samples)])
     for k, state in enumerate(np.concatenate(columns, axis=1).tolist()):
         cells = [repr(x) for x in state]
-        cells += nothing if k == len(rollout) else [repr(x) for rows in acting for x in rows[k]]
+        cells += nothing if k == len(rollout) else [_cell(x) for rows in acting for x in rows[k]]
         file.write((",".join(cells) + "\n").encode())
+
+
+def _in_rows(rollout: Rollout, readings: Readings) -> list[list[float | None]]:
+    """Return the values (n, size) of samples in the rows of the steps in which they were taken, else None."""
+    rows: list[list[float | None]] = [[None] * readings.sensor.size for _ in range(len(rollout))]
+    for k, values in zip(np.searchsorted(rollout.t, readings.t).tolist(), readings.values, strict=True):
+        rows[k] = values.tolist()
+    return rows
+
+
+def _cell(x: float | None) -> str:
+    return "" if x is None else repr(x)
 
 
 def columns(rollout: Rollout) -> dict[str, Floats]:

@@ -139,7 +139,10 @@ def _write_npz(rollout: Rollout, file: BinaryIO) -> None:
         arrays |= of_scene
     if rollout.reference is not None:
         arrays.update(zip(REFERENCE, rollout.reference, strict=True))
-    # The energy is for programs without dynx; `load` computes it again.
+    for name, readings in rollout.sensors.items():
+        arrays |= {f"sensor:{name}:t": readings.t}
+        arrays |= {f"sensor:{name}:{channel}": rows for channel, rows in readings.channels.items()}
+    # Readings and the energy are for programs without dynx; `load` computes them again.
     np.savez(file, schema=SCHEMA, robot=json.dumps(robot), energy=rollout.energy, **arrays)
 
 

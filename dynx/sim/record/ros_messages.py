@@ -31,6 +31,16 @@ allow in names become ``_``:
 |---|---|---|
 | `/contacts/NAME` | geometry_msgs/WrenchStamped | sum of the contact forces on it, in world axes |
 
+Each sensor of `Rollout.sensors` adds a topic of its samples. They are logged when they can be read; the stamp
+of their header is the time at which they were taken, and its frame is called like the sensor:
+
+| topic | type | content |
+|---|---|---|
+| `/sensors/NAME` | sensor_msgs/Imu | of an IMU; covariances of the white noise |
+| `/sensors/NAME` | geometry_msgs/WrenchStamped | force and torque; of contacts without torque |
+| `/sensors/NAME` | sensor_msgs/JointState | of an encoder; of a joint torque, as effort |
+| `/sensors/NAME` | std_msgs/Float64 | distance of a ray |
+
 Every number is the float64 of the record. The torque of a step is stamped with the time at which the step
 begins, so the last state has no effort. Mimic joints are not listed, because the description defines how they
 follow others.
@@ -48,13 +58,16 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import count
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dynx.sim.record.rollout import Rollout
 from dynx.spatial.scalar import Floats
+
+if TYPE_CHECKING:
+    from dynx.world.sensors.readings import Readings
 
 DEFINITIONS = {
     "builtin_interfaces/Time": "int32 sec\nuint32 nanosec\n",
@@ -76,6 +89,11 @@ DEFINITIONS = {
     "nav_msgs/Odometry": (
         "std_msgs/Header header\nstring child_frame_id\n"
         "geometry_msgs/PoseWithCovariance pose\ngeometry_msgs/TwistWithCovariance twist\n"
+    ),
+    "sensor_msgs/Imu": (
+        "std_msgs/Header header\ngeometry_msgs/Quaternion orientation\nfloat64[9] orientation_covariance\n"
+        "geometry_msgs/Vector3 angular_velocity\nfloat64[9] angular_velocity_covariance\n"
+        "geometry_msgs/Vector3 linear_acceleration\nfloat64[9] linear_acceleration_covariance\n"
     ),
     "sensor_msgs/JointState": (
         "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n"
@@ -206,9 +224,19 @@ class Topic(NamedTuple):
     first: int
     last: int
     fields: Fields
+    samples: tuple[Stamps, Stamps] | None = None
+    """Of a sensor, the times at which samples were taken, and the numbers of the states at which they are
+    logged."""
 
     def encoded(self, stamps: Stamps, begin: int, end: int) -> list[tuple[int, bytes]]:
         """Return the messages of the states `begin` to `end` (exclusive), each with its state's number."""
+        if self.samples is not None:
+            taken, states = self.samples
+            first, last = np.searchsorted(states, [begin, end]).tolist()
+            if first == last:
+                return []
+            fields = self.fields(taken[first:last], slice(first, last))
+            return list(zip(states[first:last].tolist(), encode_messages(last - first, fields), strict=True))
         begin, end = max(begin, self.first), min(end, self.last)
         if begin >= end:
             return []
@@ -219,7 +247,7 @@ class Topic(NamedTuple):
 def topics_of(rollout: Rollout) -> list[Topic]:
     """Return all topics of `rollout`; one whose layout differs at the last state appears twice."""
     base = _base_topics(rollout) if rollout.model.floating else []
-    return [*_joint_topics(rollout), *base, *_contact_topics(rollout)]
+    return [*_joint_topics(rollout), *base, *_contact_topics(rollout), *_sensor_topics(rollout)]
 
 
 def _joint_topics(rollout: Rollout) -> list[Topic]:
@@ -285,15 +313,71 @@ def _contact_topics(rollout: Rollout) -> list[Topic]:
         return []
     contacts, n = rollout.surroundings.contacts, len(rollout)
     world = "world" if rollout.model.root != "world" else "map"
-    topics, taken = [], set()
-    for name in contacts.touching:
-        allowed = re.sub(r"[^A-Za-z0-9_/]", "_", name)
-        # Names that differ in other characters only get a number.
-        topic = next(each for each in _numbered(f"/contacts/{allowed}") if each not in taken)
-        taken.add(topic)
+    topics = []
+    for name, topic in _topic_names("/contacts", contacts.touching).items():
         force = np.concatenate([contacts.force_on(name), np.zeros((n, 3))], axis=1)
         topics.append(Topic(topic, "geometry_msgs/WrenchStamped", 0, n, _stamped(world, force)))
     return topics
+
+
+def _sensor_topics(rollout: Rollout) -> list[Topic]:
+    """Return a topic for each sensor whose samples can be read before the end."""
+    topics = []
+    stamps = _nanoseconds(rollout.t)
+    for name, topic in _topic_names("/sensors", rollout.sensors).items():
+        readings = rollout.sensors[name]
+        message, fields = _sensor_message(readings)
+        # Logged at the first state at which they can be read.
+        states = np.searchsorted(stamps, _nanoseconds(readings.available))
+        samples = _nanoseconds(readings.t), states
+        topics.append(Topic(topic, message, 0, len(stamps), fields, samples))
+    return topics
+
+
+def _nanoseconds(times: Floats) -> Stamps:
+    return np.rint(times * 1e9).astype(np.int64)
+
+
+def _sensor_message(readings: Readings) -> tuple[str, Fields]:
+    """Return the type and the fields of the messages of a sensor."""
+    sensor, values = readings.sensor, readings.values
+    _, _, part = sensor.on.rpartition("/")
+    if sensor.kind == "imu":
+        return "sensor_msgs/Imu", _inertial(readings)
+    if sensor.kind == "encoder":
+        return "sensor_msgs/JointState", _joint_states([part], values[:, :1], values[:, 1:])
+    if sensor.kind == "joint_torque":
+        return "sensor_msgs/JointState", _joint_states([part], effort=values)
+    if sensor.kind == "ray":
+        return "std_msgs/Float64", _numbers(values)
+    wrench = np.concatenate([values, np.zeros((len(values), 6 - values.shape[1]))], axis=1)
+    return "geometry_msgs/WrenchStamped", _stamped(sensor.name, wrench)
+
+
+def _inertial(readings: Readings) -> Fields:
+    """Return the fields of messages of an inertial sensor, which has no orientation."""
+    sensor, period = readings.sensor, readings.period
+    unknown = np.array([[0.0, 0.0, 0.0, 1.0, -1.0, *np.zeros(8)]])
+    covariance = {
+        name: np.diag(np.broadcast_to(errors.deviation(period) ** 2, 3)).reshape(1, 9)
+        for name, errors in sensor.errors.items()
+    }
+    rate, force = readings["angular_velocity"], readings["acceleration"]
+    return lambda stamps, rows: [
+        *(*_header(stamps, sensor.name), unknown, rate[rows], covariance["angular_velocity"]),
+        *(force[rows], covariance["acceleration"]),
+    ]
+
+
+def _topic_names(folder: str, names: Iterable[str]) -> dict[str, str]:
+    """Return a topic for each name, in which characters that ROS does not allow are ``_``; names that differ
+    in those alone get a number."""
+    found: dict[str, str] = {}
+    for name in names:
+        allowed = re.sub(r"[^A-Za-z0-9_/]", "_", name)
+        topics = _numbered(f"{folder}/{allowed}")
+        found[name] = next(topic for topic in topics if topic not in found.values())
+    return found
 
 
 def _numbered(name: str) -> Iterator[str]:

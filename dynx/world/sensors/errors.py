@@ -110,6 +110,10 @@ class SensorErrors:
         """True if the bias changes."""
         return bool(np.any(self.random_walk))
 
+    def deviation(self, period: float) -> Floats:
+        """Return the standard deviation, () or (m,), of the white noise of samples `period` [s] apart."""
+        return np.asarray(np.array(self.noise) + np.array(self.noise_density) / math.sqrt(period))
+
     def applied(self, true: Floats, period: float, normal: Floats, walk: Floats) -> Floats:
         """Return the readings of `true` (n, m) in samples with normal numbers (n, m) and the sums (n, m) of
         those of the random walk, `period` [s] apart."""
@@ -119,8 +123,11 @@ class SensorErrors:
             m = true.shape[1]
             found = found + true @ (cross if cross.ndim else cross * (1.0 - np.eye(m))).T
         if self.random:
-            deviation = np.array(self.noise) + np.array(self.noise_density) / math.sqrt(period)
-            found = found + deviation * normal + np.array(self.random_walk) * math.sqrt(period) * walk
+            found = (
+                found
+                + self.deviation(period) * normal
+                + np.array(self.random_walk) * math.sqrt(period) * walk
+            )
         step = np.broadcast_to(np.array(self.resolution), (true.shape[1],))
         coarse = step > 0.0
         found[:, coarse] = np.rint(found[:, coarse] / step[coarse]) * step[coarse]

@@ -53,6 +53,8 @@ class Readings:
     """Times (m,) [s] at which the samples were taken."""
     channels: Mapping[str, Floats]
     """Values (m, size) of each channel."""
+    period: float
+    """Time [s] between two samples; those of steps that are no multiple of it are up to a step late."""
 
     def __len__(self) -> int:
         """Return the number of samples."""
@@ -128,4 +130,4 @@ def read_sensor(
     if numbers is None:
         numbers = SampleNumbers(sensor.name, sensor.seed, rollout, sensor.size)
     found = apply_errors(sensor.errors, true, samples, sensor.period(motion.h), numbers)
-    return Readings(sensor, motion.t[rows], found)
+    return Readings(sensor, motion.t[rows], found, sensor.period(motion.h))
