@@ -337,8 +337,8 @@ def test_the_columns_are_those_that_are_documented(rollout: Rollout, tmp_path: P
     kinds = list(dict.fromkeys(name.split(":")[0] for name in header))
     lines = [line.split("|")[1] for line in str(csv_file.__doc__).splitlines() if line.startswith("| `")]
     documented = [name.strip("`").split(":")[0] for line in lines for name in line.strip().split(", ")]
-    # Contacts are those of a rollout in a scene.
-    assert kinds == [name for name in documented if name not in ("contact", "")]
+    # Contacts are those of a rollout in a scene, samples those of one with sensors.
+    assert kinds == [name for name in documented if name not in ("contact", "sensor", "")]
 
 
 def test_the_topics_are_those_that_are_documented(rollout: Rollout) -> None:
