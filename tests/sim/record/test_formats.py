@@ -349,4 +349,5 @@ def test_the_topics_are_those_that_are_documented(rollout: Rollout) -> None:
     found = [f"| `{topic.name}` | {topic.message} |" for topic in ros_messages.topics_of(moved)]
     lines = [line for line in str(ros_messages.__doc__).splitlines() if line.startswith("| `")]
     documented = {" ".join(line.split(" ")[:4]) + " |" for line in lines}
-    assert {line for line in documented if "/contacts/" not in line} == set(found)
+    always = {line for line in documented if "/contacts/" not in line and "/sensors/" not in line}
+    assert always == set(found)
