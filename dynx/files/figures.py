@@ -4,6 +4,7 @@ matplotlib."""
 from __future__ import annotations
 
 import os
+import sys
 from functools import cache
 from io import BytesIO
 from pathlib import Path
@@ -22,9 +23,27 @@ NOTEBOOK_RESOLUTION = 100
 
 def new_figure(width: float, height: float) -> Any:
     """Make a `matplotlib.figure.Figure` of that size [in]. Raises NotInstalledError without matplotlib."""
-    with importing("a plot needs matplotlib: pip install 'dynx[plot]'"):
-        from matplotlib.figure import Figure
+    Figure = _matplotlib().figure.Figure
     return _notebook_figure(Figure)(figsize=(width, height), layout="constrained")
+
+
+@cache
+def _matplotlib() -> Any:
+    """Import matplotlib, whose settings do not depend on the folder that a program is called in."""
+    is_first = "matplotlib" not in sys.modules
+    with importing("a plot needs matplotlib: pip install 'dynx[plot]'"):
+        import matplotlib.figure
+    read = Path(matplotlib.matplotlib_fname())
+    own = Path(matplotlib.get_configdir())
+    if is_first and read.resolve().parent == Path.cwd() != own.resolve():
+        # A file of the current folder comes first; those that come next are the user's own, and the default.
+        candidates = (os.environ.get("MATPLOTLIBRC", ""), str(own))
+        files = [os.path.join(each, "matplotlibrc") if os.path.isdir(each) else each for each in candidates]
+        found = next((each for each in files if os.path.isfile(each)), None)
+        settings = matplotlib.rcParamsDefault if found is None else matplotlib.rc_params_from_file(found)
+        # As dictionaries: `update` would look for a backend that shows windows, and keep the one of the file.
+        dict.update(matplotlib.rcParams, dict.items(settings))
+    return matplotlib
 
 
 @cache

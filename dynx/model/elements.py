@@ -7,7 +7,7 @@ Values are those of the file, in SI units; inertias are neither merged nor diago
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from itertools import chain
 from typing import Any, Literal, NamedTuple
@@ -211,7 +211,9 @@ class Joint:
     0.
 
     `axis` is a unit vector in the joint frame. `locked_at` is the position at which a movable joint was
-    locked; its type is then ``fixed`` and `origin` includes that position.
+    locked; its type is then ``fixed`` and `origin` includes that position. A joint that is fixed without that
+    has the default axis, limits, dynamics and mimic, whatever is given: they mean nothing there, and no file
+    has them.
     """
 
     name: str
@@ -225,6 +227,12 @@ class Joint:
     mimic: Mimic | None = None
     locked_at: float | None = None
     line: int | None = field(default=None, compare=False)
+
+    def __post_init__(self) -> None:
+        if self.type == "fixed" and self.locked_at is None:
+            for each in fields(self):
+                if each.name in ("axis", "limits", "dynamics", "mimic"):
+                    object.__setattr__(self, each.name, each.default)
 
     @property
     def moves(self) -> bool:

@@ -20,7 +20,7 @@ from dynx.model.numbers import checked_entries, real_array
 from dynx.rbd.jacobians import LOCAL
 from dynx.registry import door
 from dynx.sim.record.csv_file import coordinate_names
-from dynx.sim.scenario.scenario import Scenario
+from dynx.sim.scenario.scenario import RecordedScenario, Scenario
 from dynx.spatial.scalar import Floats
 
 SCHEMA = "dynx.rollouts/2"
@@ -203,6 +203,10 @@ class BatchRollouts:
             "largest error [rad or m], 5 %, 50 %, 95 %": f"{low}, {middle}, {high}",
         }
         return html_table(f"rollouts of {self.scenario.model.name}", rows)
+
+
+# Not in the class, where it would be a default.
+setattr(BatchRollouts, "scenario", RecordedScenario())  # noqa: B010
 
 
 def _spans_decades(errors: Floats) -> bool:

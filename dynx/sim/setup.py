@@ -21,6 +21,7 @@ from dynx.sim.plants.disturbances import Disturbances
 from dynx.sim.plants.registry import default_integrator
 from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.scenario.documents import Unknown
+from dynx.sim.scenario.options import OPTIONS
 from dynx.sim.scenario.scenario import Scenario
 from dynx.simd.machine import require_memory
 from dynx.spatial.scalar import Floats
@@ -56,6 +57,7 @@ class Setup:
     def of(cls, scenario: Scenario) -> Setup:
         """Check a scenario. Raises ArgumentError, LimitError or GainError if it cannot be simulated."""
         controller = known_controller(scenario)
+        refuse_ineffective(scenario)
         clock = clock_of(scenario)
         if controller is not None:
             check_controller(scenario.model, controller, clock)
@@ -93,6 +95,20 @@ def known_controller(scenario: Scenario) -> Controller[Any] | None:
     refuse_unknown(controller)
     assert not isinstance(controller, Unknown)
     return controller
+
+
+def refuse_ineffective(scenario: Scenario) -> None:
+    """Raise ArgumentError for an option that has no effect without another one.
+
+    Not when a scenario is made: files of earlier versions with such options are still read.
+    """
+    for name, each in OPTIONS.items():
+        other, wanted = each.needs
+        if other and getattr(scenario, name) != each.default:
+            value = getattr(scenario, other)
+            if not (value == wanted if wanted else value is not False):
+                needed = f"{other}={wanted!r}" if wanted else other
+                raise ArgumentError(f"{name} is given, and has no effect without {needed}")
 
 
 def refuse_unknown(*parts: object) -> None:

@@ -29,7 +29,7 @@ from dynx.sim.plants.registry import make_plant
 from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.record.rollout import Rollout
 from dynx.sim.scenario.documents import in_words
-from dynx.sim.scenario.scenario import Scenario, ScenarioArguments, innermost
+from dynx.sim.scenario.scenario import RecordedScenario, Scenario, ScenarioArguments, innermost
 from dynx.sim.setup import Setup, require_duration, setpoints_of, step_bytes
 from dynx.sim.step import at_limit
 from dynx.simd.machine import require_memory
@@ -93,6 +93,9 @@ class Simulation:
     the end of a ``with`` block calls.
     """
 
+    scenario = RecordedScenario()
+    """The scenario that is simulated, as it was when the simulation began."""
+
     def __init__(self, scenario: Scenario, *, progress: Progress | None = None) -> None:
         """Raises the errors of `dynx.simulate` for a scenario that cannot be simulated.
 
@@ -103,8 +106,7 @@ class Simulation:
         if not isinstance(scenario, Scenario):
             raise ArgumentError(f"scenario is of type {type(scenario).__name__}; wanted a dynx.Scenario")
         setup = self._setup = Setup.of(scenario)
-        self.scenario = scenario.for_record()
-        """The scenario that is simulated, as it was when the simulation began."""
+        self.scenario = scenario
         self._present = self.scenario
         bounded = scenario.duration is not None or isinstance(scenario.reference, Trajectory)
         self.n_steps = setup.clock.n_steps if bounded else None

@@ -32,8 +32,6 @@ ALLOWED = {
     "sim/own_controllers.py": (1, USERS_CODE),
     "sim/plants/plant.py": (1, ENGINE),
     "sim/record/mcap_file.py": (1, FOREIGN_PARSER),
-    "sim/scenario/documents.py": (1, FOREIGN_PARSER),
-    "sim/scenario/scenario.py": (1, FOREIGN_PARSER),
     "simd/cuts.py": (1, ENGINE),
     "training/library.py": (1, FOREIGN_PARSER),
     "viewer/browser.py": (1, FOREIGN_PARSER),

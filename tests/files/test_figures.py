@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
+import sys
+from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
@@ -61,3 +65,37 @@ def test_equal_figures_have_equal_svg_elements() -> None:
     pytest.importorskip("matplotlib")
     assert drawn("elbow") == drawn("elbow")
     assert drawn("elbow") == drawn("wrist").replace("wrist", "elbow")
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_a_file_of_settings_in_the_current_folder_changes_no_figure(tmp_path: Path, own: bool) -> None:
+    pytest.importorskip("matplotlib")
+    here, settings = tmp_path / "here", tmp_path / "settings"
+    here.mkdir()
+    settings.mkdir()
+    if own:
+        (settings / "matplotlibrc").write_text("lines.linewidth: 5\n", encoding="utf-8")
+    program = (
+        "from dynx.files.figures import new_figure, svg_element\n"
+        "figure = new_figure(2.0, 1.5)\n"
+        "figure.subplots().plot([0.0, 1.0])\n"
+        "import matplotlib\n"
+        "print(svg_element(figure), dict(matplotlib.rcParams))\n"
+    )
+    printed = []
+    for text in ("lines.linewidth: 37\nbackend: module://evil\nfont.size: 3\n", None):
+        file = here / "matplotlibrc"
+        file.unlink(missing_ok=True)
+        if text is not None:
+            file.write_text(text, encoding="utf-8")
+        run = subprocess.run(
+            [sys.executable, "-c", program],
+            capture_output=True,
+            text=True,
+            cwd=here,
+            env={**os.environ, "MPLCONFIGDIR": str(settings)},
+            check=True,
+        )
+        printed.append(run.stdout)
+    assert printed[0] == printed[1]
+    assert ("'lines.linewidth': 5.0" in printed[0]) == own

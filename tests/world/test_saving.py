@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,9 @@ import pytest
 
 import dynx
 from dynx.errors import ArgumentError
+from dynx.model import JointDynamics
 from dynx.spatial.scalar import Floats
-from dynx.world import PositionMotor, Scene, VelocityMotor, World, box, ground
+from dynx.world import PositionMotor, Scene, SceneRobot, VelocityMotor, World, box, ground
 from tests.world.engines import WORLDS
 from tests.world.scenes import crowd
 
@@ -150,3 +152,18 @@ def test_a_suffix_is_checked_before_a_file_is_written(engine: str, tmp_path: Pat
     with World(small(), engine) as world, pytest.raises(ArgumentError, match="a file without a suffix"):
         world.write(tmp_path / "a.txt")
     assert not (tmp_path / "a.txt").exists()
+
+
+def test_a_robot_whose_fixed_joints_were_given_friction_is_read_back(engine: str, tmp_path: Path) -> None:
+    robot = dynx.load("panda")
+    rough = JointDynamics(damping=0.1, friction=0.2, armature=0.01)
+    robot = replace(robot, joints=tuple(replace(joint, dynamics=rough) for joint in robot.joints))
+    scene = Scene("rough", robots=[SceneRobot("arm", robot)])
+    with World(scene, engine) as world:
+        world.step(3)
+        world.write(tmp_path / "rough.world")
+        with World.read(tmp_path / "rough.world") as again:
+            world.step(2)
+            again.step(2)
+            (q, _), (wanted, _) = (each.state.robots["arm"] for each in (again, world))
+            np.testing.assert_array_equal(q, wanted)

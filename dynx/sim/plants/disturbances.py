@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -52,6 +53,13 @@ class Disturbances:
         """Armature (nv, nv), added to the mass matrix."""
         self.has_armature = bool(self.armature.any())
         self._step = step
+
+    if not TYPE_CHECKING:  # type checkers report an unknown attribute themselves
+
+        def __getattr__(self, name: str) -> Any:
+            if name == "names":
+                raise AttributeError("Disturbances.names is now friction.present, pushes and has_armature")
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
     @cached_property
     def sticks(self) -> bool:

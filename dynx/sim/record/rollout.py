@@ -25,7 +25,7 @@ from dynx.registry import door, explains_names
 from dynx.sim.controller_checks import controller_numbers
 from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.scenario.documents import Unknown
-from dynx.sim.scenario.scenario import Scenario
+from dynx.sim.scenario.scenario import RecordedScenario, Scenario
 from dynx.sim.setup import clock_of, disturbances_of, effort_limits_of, refuse_unknown
 from dynx.spatial.scalar import Floats
 from dynx.steppers.forces import ExternalForce
@@ -140,7 +140,7 @@ class Rollout:
     """The setpoint at each time: (n + 1, nq), (n + 1, nv), (n + 1, nv)."""
     rotors: Floats
     """Armature (nv, nv), zero unless the scenario has some."""
-    scenario: Scenario | None = None
+    scenario: Scenario | RecordedScenario | None = RecordedScenario()  # noqa: RUF009  # a descriptor
     """The simulation whose record this is; None for a record made in another way."""
     executor: str = ""
     """Executor of the steps: ``compiled`` (one kernel), ``compiled pieces`` (between the calls of an

@@ -25,7 +25,7 @@ from dynx.backends import Backend
 from dynx.control.base import Controller, chain_of
 from dynx.control.content import attributes_of, entered, is_foreign
 from dynx.control.registry import from_document, to_document
-from dynx.errors import ArgumentError, UnknownNameError, shown
+from dynx.errors import ArgumentError, DynxError, UnknownNameError, shown
 from dynx.model import Model
 from dynx.model.documents import robot_document, robot_from_document
 from dynx.sim.controller_checks import controller_numbers
@@ -162,6 +162,15 @@ def encode(value: Any, model: Model | None = None) -> Document:
     return document | numbers | _code_of(value)
 
 
+DAMAGED = (
+    *(DynxError, TypeError, ValueError, LookupError, AttributeError, ArithmeticError),
+    *(ImportError, RecursionError),
+)
+"""Errors of reading a damaged document: of its forms, of constructors, and of parts of wrong types.
+
+Others are defects of dynx, or come from a class of the user's own, and pass."""
+
+
 def decode(document: Document, model: Model | None = None) -> Any:
     """Return the value of a document that `encode` made; `Unknown` for an object that cannot be rebuilt here.
 
@@ -172,8 +181,7 @@ def decode(document: Document, model: Model | None = None) -> Any:
     try:
         _require_forms(document)
         return _decoded(document, model)
-    # The document may be damaged, and constructors raise any exception for damaged arguments.
-    except Exception as error:
+    except DAMAGED as error:
         text = shown(document)
         raise ArgumentError(f"a part of the scenario cannot be read: {error}; it is {text}") from error
 

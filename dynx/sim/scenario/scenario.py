@@ -6,7 +6,7 @@ import json
 import os
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, fields, make_dataclass, replace
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,6 +27,7 @@ from dynx.sim.scenario.documents import (
     ARRAY,
     CLASS,
     CONTROLLER,
+    DAMAGED,
     FINGERPRINT,
     MODEL,
     Document,
@@ -222,7 +223,7 @@ class Scenario(SimulationOptions):
                     scenario.reference(np.linspace(0.0, float(scenario.reference.duration), count))
         except ArgumentError:
             raise
-        except Exception as error:
+        except DAMAGED as error:
             raise ArgumentError(f"the scenario's document has a part of a wrong type: {error}") from error
         return scenario
 
@@ -238,6 +239,25 @@ class Scenario(SimulationOptions):
         except (TypeError, ValueError) as error:
             raise ArgumentError(f"the text is not JSON: {error}") from error
         return cls.from_dict(document)
+
+
+class RecordedScenario:
+    """Attribute for the scenario of a record, which nobody can change: it is copied when it is set, and again
+    when it is read, by `Scenario.for_record`. As a field of a dataclass its default is None."""
+
+    @overload
+    def __get__(self, instance: None, owner: type) -> None: ...
+    @overload
+    def __get__(self, instance: object, owner: type) -> Scenario: ...
+    def __get__(self, instance: object | None, owner: type) -> Scenario | None:
+        """Return a copy, in which a controller of the user's own may be changed without effect."""
+        if instance is None:
+            return None
+        scenario: Scenario | None = vars(instance).get("scenario")
+        return None if scenario is None else scenario.for_record()
+
+    def __set__(self, instance: object, scenario: Scenario | None) -> None:
+        vars(instance)["scenario"] = None if scenario is None else scenario.for_record()
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -112,3 +112,26 @@ def test_no_line_is_longer_than_pybullet_reads() -> None:
     joint = Joint("j" + long[1:], "revolute", long, "b", limits=Limits(-1 / 3, 1 / 3, 1 / 3, 1 / 3))
     text = Model.build(long, [Link(long), Link("b")], [joint]).to_urdf()
     assert max(map(len, text.splitlines())) < 8191
+
+
+def test_what_means_nothing_of_a_fixed_joint_is_not_kept() -> None:
+    """Otherwise a model would differ from its own file, which cannot have it."""
+    model = load("panda")
+    joints = tuple(
+        replace(
+            joint,
+            dynamics=JointDynamics(damping=0.1, friction=0.2, armature=0.3),
+            axis=(0.0, 1.0, 0.0) if joint.type == "fixed" else joint.axis,
+            limits=Limits(-1.0, 1.0, 2.0, 3.0) if joint.type == "fixed" else joint.limits,
+        )
+        for joint in model.joints
+    )
+    changed = replace(model, joints=joints)
+    assert any(joint.type == "fixed" for joint in joints)
+    assert read_back(changed) == changed
+    assert [joint for joint in changed.joints if joint.type == "fixed"] == [
+        joint for joint in model.joints if joint.type == "fixed"
+    ]
+    locked = load("panda", lock={"panda_joint3": 0.5})
+    (kept,) = (joint for joint in locked.joints if joint.locked_at is not None)
+    assert kept.limits == next(joint for joint in model.joints if joint.name == kept.name).limits

@@ -26,3 +26,9 @@ def test_friction_has_no_torque_before_the_first_step() -> None:
     model, friction = load("pendulum"), np.array([0.5])
     solver = ImplicitJoints(FrictionLaw.of(model, friction), friction, 1e-3)
     np.testing.assert_array_equal(solver.torque, [0.0])
+
+
+def test_the_removed_attribute_names_those_that_replace_it() -> None:
+    with pytest.raises(AttributeError, match=r"names is now friction\.present, pushes and has_armature"):
+        Disturbances(load("ur5")).names  # type: ignore[attr-defined]  # noqa: B018
+    assert not hasattr(Disturbances(load("ur5")), "nothing")

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import inspect
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 
 import dynx
+from dynx import control
 from dynx.errors import ArgumentError, UnknownNameError
 from dynx.option_names import takes
-from dynx.sim import Scenario, simulate, simulate_batch
+from dynx.sim import Scenario, Simulation, simulate, simulate_batch
 from dynx.sim.scenario.options import OPTIONS, SimulationOptions, option, options_of
 
 ARM = dynx.load("pendulum")
@@ -99,3 +101,27 @@ def test_takes_gives_a_function_the_signature_of_a_dataclass() -> None:
 def test_an_invalid_slip_speed_says_what_is_wanted(slip: Any) -> None:
     with pytest.raises(ArgumentError, match=r"friction_slip is .*wanted a speed: 0, or 1e-09 or more"):
         simulate(ARM, friction=0.1, friction_slip=slip, duration=0.01)
+
+
+@pytest.mark.parametrize("name", [name for name, each in OPTIONS.items() if each.needs[0]])
+def test_an_option_without_effect_is_refused_by_name_where_it_would_be_simulated(name: str) -> None:
+    other, wanted = OPTIONS[name].needs
+    given = {"method": "RK45"}.get(name, 1e-3)
+    law = control.PD(ARM, kp=1.0, kd=1.0)
+    options: dict[str, Any] = {name: given}
+    scenario = Scenario(ARM, law, ARM.neutral(), duration=0.01, plant="compiled", **options)
+    # A file of an earlier version may have it.
+    assert getattr(Scenario.from_json(scenario.to_json()), name) == given
+    needed = f"{other}={wanted!r}" if wanted else other
+    runs: tuple[Any, ...] = (simulate, Simulation, partial(simulate_batch, q0=np.zeros((2, ARM.nq))))
+    for run in runs:
+        with pytest.raises(ArgumentError, match=f"{name} is given, and has no effect without {needed}"):
+            run(scenario)
+    effect: dict[str, Any] = {other: wanted or [1e-3] * ARM.nv}
+    assert len(simulate(replace(scenario, **effect))) == 10
+
+
+def test_a_friction_of_each_rollout_makes_its_slip_effective() -> None:
+    law = control.PD(ARM, kp=1.0, kd=1.0)
+    scenario = Scenario(ARM, law, ARM.neutral(), duration=0.01, plant="compiled", friction_slip=0.1)
+    assert simulate_batch(scenario, friction=np.full((2, ARM.nv), 1e-3)).done.all()
