@@ -95,7 +95,7 @@ FLOWS = {
         ("ik", "sim", "envs", "doctor"),
         (),
         112,
-        19800,
+        20000,
     ),
     "step of the cart-pole": Flow(
         "import gymnasium, dynx.envs\n"

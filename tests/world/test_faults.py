@@ -75,8 +75,8 @@ CALLS: dict[str, tuple[Callable[[World], object], type[DynxError], str]] = {
     "torque of text": (lambda w: w.step(torques={"arm": "ab"}), ArgumentError, "dtype"),
     "torque of an unknown robot": (lambda w: w.step(torques={"arn": [0, 0]}), UnknownNameError, "'arm'"),
     "torques in a list": (lambda w: w.step(torques=[1.0]), ArgumentError, "dict by robot"),  # type: ignore[arg-type]
-    "no steps": (lambda w: w.step(0), ArgumentError, "at least 1"),
-    "half a step": (lambda w: w.step(0.5), ArgumentError, "whole number"),  # type: ignore[arg-type]
+    "no steps": (lambda w: w.step(0), ArgumentError, "number of steps"),
+    "half a step": (lambda w: w.step(0.5), ArgumentError, "number of steps"),  # type: ignore[arg-type]
     "negative duration": (lambda w: w.run(-1.0), ArgumentError, "duration"),
     "endless duration": (lambda w: w.run(INF), ArgumentError, "duration"),
     "motor of an unknown robot": (
