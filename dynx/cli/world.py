@@ -179,6 +179,15 @@ class ContactEntry(TypedDict):
     friction_force: list[float]
 
 
+class SensorEntry(TypedDict):
+    """Last reading of a sensor, taken at time `t` [s]; values by what they are, such as ``force:x``."""
+
+    name: str
+    kind: str
+    t: float
+    values: dict[str, float]
+
+
 class EngineEntry(TypedDict):
     """Run of the scene by one engine; `error` is why it ended early, `notes` name overlaps and violated
     constraints of the start."""
@@ -192,6 +201,7 @@ class EngineEntry(TypedDict):
     robots: list[RobotEntry]
     bodies: list[BodyEntry]
     contacts: list[ContactEntry]
+    sensors: list[SensorEntry]
 
 
 class PartedEntry(TypedDict):
@@ -261,6 +271,15 @@ def _engine(comparison: WorldComparison, run: EngineRun) -> EngineEntry:
             for name in moving
         ],
         "contacts": [entry_of(ContactEntry, each) for each in run.contacts],
+        "sensors": [
+            {
+                "name": name,
+                "kind": reading.sensor.kind,
+                "t": reading.t,
+                "values": dict(zip(reading.sensor.value_names, reading.values.tolist(), strict=True)),
+            }
+            for name, reading in run.sensors.items()
+        ],
     }
 
 
@@ -293,6 +312,7 @@ def show(out: Console, report: Entry) -> None:
     _show_bodies(out, engines)
     _show_robots(out, engines)
     _show_contacts(out, engines)
+    _show_sensors(out, engines)
     _show_separations(out, report["separations"])
 
 
@@ -358,6 +378,23 @@ def _show_contacts(out: Console, engines: Sequence[Entry]) -> None:
     out.print("\ncontacts of the last step: normal force")
     out.print(table)
     print_rest(out, len(pairs) - MAX_ROWS, "pair", "pairs")
+
+
+def _show_sensors(out: Console, engines: Sequence[Entry]) -> None:
+    values: dict[tuple[str, str], list[str]] = defaultdict(lambda: ["-" for _ in engines])
+    for k, each in enumerate(engines):
+        for sensor in each["sensors"]:
+            for name, value in sensor["values"].items():
+                values[sensor["name"], name][k] = f"{value:.5g}"
+    if not values:
+        return
+    columns = [each["engine"] for each in engines]
+    table = Table("sensor", "value", *columns, right=tuple(columns))
+    for (sensor_name, name), cells in [*values.items()][:MAX_ROWS]:
+        table.add_row(one_line(sensor_name), name, *cells)
+    out.print("\nlast readings of sensors [SI units]")
+    out.print(table)
+    print_rest(out, len(values) - MAX_ROWS, "value", "values")
 
 
 def _show_separations(out: Console, separations: Sequence[Entry]) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field
 from itertools import combinations, pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from dynx.world.record import Record, position_channel
 from dynx.world.scene.scene import Scene
 from dynx.world.separation import Separation, separation
 from dynx.world.world import World
+
+if TYPE_CHECKING:
+    from dynx.world.sensors.readings import SensorReading
 
 SEPARATIONS = (1e-3, 1e-2, 1e-1)
 """Distances [m]; a comparison reports when each of them is first exceeded."""
@@ -47,6 +50,8 @@ class EngineRun:
     """Why the engine ended early."""
     interrupted: bool = False
     """Whether Ctrl-C ended it, before the states that are missing."""
+    sensors: Mapping[str, SensorReading] = field(default_factory=dict)
+    """Last reading of each sensor of the scene, by name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,13 +143,22 @@ def _run(
         error = raised
     except KeyboardInterrupt:
         interrupted = True
-    contacts = world.contacts()
+    contacts, sensors = world.contacts(), world.read_sensors()
     if finish is not None:
         finish(world)
     times = np.array([state.time for state in states])
     engine, version = world.engine, world.version
     return EngineRun(
-        engine, version, times, tuple(states), contacts, world.settings, world.notes, error, interrupted
+        engine,
+        version,
+        times,
+        tuple(states),
+        contacts,
+        world.settings,
+        world.notes,
+        error,
+        interrupted,
+        sensors,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
+from dynx.registry import door
 from dynx.spatial.scalar import Floats
 from dynx.world.sensors.errors import Integers, SampleNumbers, apply_errors
 from dynx.world.sensors.motion import SensedMotion
@@ -91,6 +93,11 @@ class Readings:
         last = np.searchsorted(self.available, np.asarray(times) + slack, side="right") - 1
         found = self.values[np.maximum(last, 0)] if len(self) else np.zeros((len(last), self.sensor.size))
         return np.where((last >= 0)[:, None], found, np.nan)
+
+    @door("dynx.world.sensors.plot:plot")
+    def plot(self, path: str | os.PathLike[str] | None = None) -> Any:
+        """Plot the samples; return the `matplotlib.figure.Figure`."""
+        raise NotImplementedError
 
     def __repr__(self) -> str:
         return f"<Readings of {self.sensor}: {len(self)} samples of {', '.join(self.channels)}>"
