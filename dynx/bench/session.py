@@ -116,6 +116,7 @@ class Session:
         """Measure the peaks on a number of threads and store them in `peaks`."""
         self.peaks[threads] = self._measure_peak(threads)
 
+    @checks_types
     def measure(self, case: BenchmarkCase) -> list[BenchmarkMeasurement]:
         """Measure one case.
 
@@ -134,6 +135,7 @@ class Session:
         ]
         return measure(case, implementations, self._batch, plan.repetitions)
 
+    @checks_types
     def cost(self, measurement: BenchmarkMeasurement) -> Cost | None:
         """Return the least cost of one sample; None if the operations of the implementation are not known."""
         if measurement.implementation != COMPILED:

@@ -60,7 +60,7 @@ class BulletMotor(JointSpace[None]):
         return checked_gain(name, number, self.n_joints, per="one for each joint")
 
     def _limits(self, force: ArrayLike | None) -> Floats | None:
-        return None if force is None else checked_limit(self.model, force)[self.v_joints]
+        return None if force is None else checked_limit(self.model, force, "force")[self.v_joints]
 
 
 def _forces(limits: Floats | None) -> list[float] | None:

@@ -27,5 +27,8 @@ def feedback_gains(
         w = checked_gain("natural_frequency", natural_frequency, length)
         return w * w, 2.0 * checked_gain("damping_ratio", damping_ratio, length) * w
     if kp is None or kd is None:
-        raise GainError("wanted kp and kd both, or natural_frequency (with damping_ratio)")
+        got = "kp alone" if kd is None and kp is not None else "kd alone" if kd is not None else "none"
+        raise GainError(
+            f"gains: {got} is given; wanted kp and kd both, or natural_frequency (with damping_ratio)"
+        )
     return checked_gain("kp", kp, length), checked_gain("kd", kd, length)

@@ -62,7 +62,7 @@ def checked_limit(
     efforts: Floats = model.effort_limit
     if limit is not None:
         n = model.nv - base
-        refuse_text(name, limit, n, "None" if name == "limit" else "True")
+        refuse_text(name, limit, n, "None" if name in ("limit", "force") else "True")
         given = real_array(name, coefficients_by_joint(model, name, limit, others=np.inf))
         if base and given.shape == (model.nv,) and (given[:base] == np.inf).all():
             given = given[base:]

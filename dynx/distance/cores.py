@@ -199,7 +199,7 @@ class HullCore(Core):
         return np.asarray(self.p + self.vertices[np.concatenate(parts)] @ self.R.T)
 
 
-def core_of(shape: object) -> Core:
+def core_of(shape: object, name: str = "a shape") -> Core:
     """Return the core of a bounded convex shape, to be placed at a pose.
 
     Raises ArgumentError for anything that is not a bounded convex shape, and the errors of `Mesh.hull`.
@@ -217,5 +217,5 @@ def core_of(shape: object) -> Core:
     if isinstance(shape, Hull):
         return HullCore(shape.points)
     raise ArgumentError(
-        f"a shape is {shown(shape)}; wanted a Box, Sphere, Cylinder, Capsule, Mesh, Hull or Plane"
+        f"{name} is {shown(shape)}; wanted a Box, Sphere, Cylinder, Capsule, Mesh, Hull or Plane"
     )

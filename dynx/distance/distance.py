@@ -64,7 +64,7 @@ def distance(
     anything that is no convex shape, the errors of `Mesh.hull`, and those of invalid poses.
     """
     poses = _checked_pose("T_a", T_a), _checked_pose("T_b", T_b)
-    found = distance_of_cores(_core_of(shape_a), poses[0], _core_of(shape_b), poses[1])
+    found = distance_of_cores(_core_of(shape_a, "shape_a"), poses[0], _core_of(shape_b, "shape_b"), poses[1])
     assert found is not None
     return found
 
@@ -78,7 +78,7 @@ def support(shape: ConvexShape | Plane, T: Pose | ArrayLike, direction: ArrayLik
     length = float(np.linalg.norm(n))
     if length == 0.0:
         raise ArgumentError("direction is zero; wanted a vector of any length above zero")
-    n, pose, core = n / length, _checked_pose("T", T), _core_of(shape)
+    n, pose, core = n / length, _checked_pose("T", T), _core_of(shape, "shape")
     if core is None:
         up, p = _normal(pose), pose[:3, 3]
         along = np.abs(n - up).max() <= NORMAL_ROUNDING
@@ -184,8 +184,8 @@ def _normal(T_plane: Floats) -> Floats:
     return np.asarray(up / np.linalg.norm(up))
 
 
-def _core_of(shape: ConvexShape | Plane) -> Core | None:
-    return None if isinstance(shape, Plane) else core_of(shape)
+def _core_of(shape: ConvexShape | Plane, name: str) -> Core | None:
+    return None if isinstance(shape, Plane) else core_of(shape, name)
 
 
 def _tuple(vector: Floats) -> Vector3:

@@ -99,7 +99,8 @@ def real_array(name: str, value: ArrayLike) -> Floats:
     except ValueError as error:
         raise ShapeError(f"{name} is ragged: {error}") from None
     if array.dtype.kind not in "fiu":
-        raise DTypeError(f"{name} has dtype {array.dtype}; wanted real numbers (float64)")
+        origin = "" if array is value else f" (it is {shown(value)}, of type {type(value).__name__})"
+        raise DTypeError(f"{name} has dtype {array.dtype}; wanted real numbers (float64){origin}")
     return np.asarray(array, dtype=np.float64)
 
 

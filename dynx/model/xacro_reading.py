@@ -23,13 +23,13 @@ from contextlib import suppress
 from pathlib import Path
 
 from dynx.errors import DescriptionError, NotInstalledError, escaped, nearest, shown
-from dynx.files.reading import MAX_BYTES, printable, read_file
+from dynx.files.reading import MAX_BYTES, irregularity, printable, read_file
 from dynx.model.package_search import StrPath, environment_folders, find_package, package_of
 
-TIMEOUT = 60.0
+TIMEOUT = 20.0
 """Longest duration of an expansion [s]."""
 
-MAX_MEMORY = 2 * 2**30
+MAX_MEMORY = 2**30
 """Largest memory of an expansion [bytes], besides that of the interpreter; bounded on Linux."""
 
 _SCHEME = "package://"
@@ -193,7 +193,11 @@ def expand_here(path: str, roots: list[str], arguments: dict[str, str]) -> None:
                 f"package {shown(missing)} was not found around the file, nor in "
                 f"{'package_dirs, ' if roots else ''}ROS_PACKAGE_PATH or AMENT_PREFIX_PATH"
             )
-        return str(path_of(named))
+        found = str(path_of(named))
+        other = irregularity(found)
+        if other:
+            raise DescriptionError(f"{shown(found, 200)} {other}")
+        return found
 
     # Text substitution and $(eval ...) both use the function of this module.
     substitution_args._eval_find = find

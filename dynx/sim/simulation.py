@@ -471,7 +471,8 @@ class Simulation:
         if not isinstance(step, int) or not 0 <= step <= most:
             wanted = "any number" if self.n_steps is None else self.n_steps
             raise ArgumentError(
-                f"step is {shown(step)}; the rollout to resume has {len(rollout)} steps and this one {wanted}"
+                f"step is {shown(step)}; wanted a whole number of steps: the rollout to resume has "
+                f"{len(rollout)} steps and this one {wanted}"
             )
         theirs = StateBuffers(rollout.q, rollout.v, rollout.a, rollout.tau)
         if step:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
+from dynx.argument_types import checks_types
 from dynx.envs.library import AutoresetMode, Env, GymnasiumError, make_env, make_vec_env
 from dynx.envs.registration import is_of_dynx, specification
 from dynx.errors import ArgumentError, DynxError
@@ -21,6 +22,7 @@ from dynx.training.specification import TaskSpec, TrainingSpec
 from dynx.training.vectors import BatchedEnvironments
 
 
+@checks_types
 def make(task: TaskSpec, render_mode: str | None = None) -> Env[Any, Any]:
     """Make one environment of a task.
 

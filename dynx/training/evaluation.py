@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.argument_types import checks_types
 from dynx.envs.environment import DIVERGED, Act
 from dynx.envs.library import Env
 from dynx.errors import ArgumentError
@@ -55,6 +56,7 @@ class Evaluation:
         )
 
 
+@checks_types
 def evaluate(
     act: Act,
     envs: Sequence[Env[Any, Any]],

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
+from dynx.argument_types import checks_types
 from dynx.envs.registration import bare_name
 
 NO_VALUES: Mapping[str, Any] = MappingProxyType({})
@@ -76,6 +77,7 @@ PUBLISHED: Mapping[str, Mapping[str, Recipe]] = {"ppo": PPO}
 """Recipes by algorithm and task."""
 
 
+@checks_types
 def recipe_of(algorithm: str, task: str) -> Recipe:
     """Return the published recipe of a task such as ``dynx/CartPole-v0``; without one, the defaults."""
     return PUBLISHED.get(algorithm, {}).get(bare_name(task), Recipe())

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from dynx.argument_types import checks_types
 from dynx.envs.library import Env
 from dynx.training.environments import make
 from dynx.training.evaluation import AT_ONCE, Evaluation, evaluate
@@ -12,6 +13,7 @@ from dynx.training.policy import Policy
 from dynx.training.specification import TaskSpec
 
 
+@checks_types
 def judge(
     policy: Policy,
     task: TaskSpec,

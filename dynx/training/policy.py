@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx._version import __version__
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, shown
 from dynx.files.documents import convert_document, json_text, parse_json, to_json_values
 from dynx.files.reading import irregularity, named_file
@@ -146,6 +147,7 @@ def read_policy_document(path: str | os.PathLike[str]) -> PolicyDocument:
         raise ArgumentError(f"{where}: {error}") from error
 
 
+@checks_types
 def load_policy(path: str | os.PathLike[str], task: TaskSpec | None = None) -> Policy:
     """Load a policy, for the task that it was trained on or for `task`, such as the same on another engine.
 

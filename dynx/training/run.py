@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dynx._version import __version__
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, DescriptionError, RobotNotFoundError, shown
 from dynx.files.documents import json_text, parse_json
 from dynx.files.reading import read_file
@@ -35,6 +36,7 @@ class Trained:
     """Steps that were done before; 0 for a run from its beginning."""
 
 
+@checks_types
 def train(
     spec: TrainingSpec,
     folder: str | os.PathLike[str],

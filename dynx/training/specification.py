@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, shown
 from dynx.files.documents import convert_document, to_json_values
 from dynx.model.numbers import whole_number
 
 
+@checks_types
 @dataclass(frozen=True)
 class TaskSpec:
     """A Gymnasium task: its identifier, the engine of a task of dynx, and options of `gymnasium.make`."""
@@ -32,6 +34,7 @@ class TaskSpec:
         return self if engine is None else replace(self, engine=engine)
 
 
+@checks_types
 @dataclass(frozen=True)
 class TrainingSpec:
     """All that a training run depends on; a run is resumed only with an equal one, or with

@@ -38,14 +38,15 @@ NOT_CALLED = {
     "inertia": "dynx calls it with symbols in a trace",
     "root": "dynx calls it with symbols in a trace",
     "dry_friction": "dynx calls it with parameters that it has checked",
-    "dynx.viewer.Viewer": "starts a server",
-    "dynx.viewer.view": "starts a server",
-    "view": "starts a server",
     "unregister": "changes what later calls find",
     "unregister_case": "changes what later calls find",
     "unregister_controller": "changes what later calls find",
     "unregister_world": "changes what later calls find",
-    "dynx.bench.Session": "times for seconds",
+    "measure_machine": "times for seconds",
+    "<bench session>.measure": "times for seconds",
+    "dynx.training.train": "trains for seconds",
+    "wait": "waits for the end of a page",
+    "screenshot": "waits for a browser",
     "run_case": "times for seconds",
     "conform": "runs for minutes",
     "dynx.testing.strategies": "arguments are strategies of Hypothesis, which raises its own errors",
@@ -312,16 +313,27 @@ def positional(call: Call) -> tuple[list[Any], dict[str, Any]]:
 
 def fault(call: Call) -> str | None:
     """Make a call; return what is wrong with its outcome, or None."""
+    return outcome(call)[0]
+
+
+def _close(result: object) -> None:
+    """End the server of a page that a call opened."""
+    if type(result).__name__ == "Viewer":
+        cast(Any, result).close()
+
+
+def outcome(call: Call) -> tuple[str | None, DynxError | None]:
+    """Make a call; return what is wrong with its outcome, if anything, and the error of dynx, if one."""
     places, names = positional(call)
     try:
         with time_limit(SECONDS):
-            call.function(*places, **names)
+            _close(call.function(*places, **names))
     except DynxError as error:
         if not str(error).strip():
-            return f"{type(error).__name__} without a message"
-        return None
+            return f"{type(error).__name__} without a message", error
+        return None, error
     except TooLong:
-        return f"takes more than {SECONDS} s\n{traceback.format_exc(limit=-3)}"
+        return f"takes more than {SECONDS} s\n{traceback.format_exc(limit=-3)}", None
     except BaseException as error:
-        return f"{type(error).__name__}: {str(error)[:200]}\n{traceback.format_exc(limit=-2)}"
-    return None
+        return f"{type(error).__name__}: {str(error)[:200]}\n{traceback.format_exc(limit=-2)}", None
+    return None, None

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from functools import cache, partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import dynx
-from dynx import control, ik, trajectory, world
+from dynx import bench, control, ik, trajectory, world
 from dynx.model import geometry
 
 MODELS = Path(__file__).parents[2] / "models"
@@ -73,6 +75,23 @@ def open_world(engine: str = "mujoco") -> dynx.World:
     return dynx.World(scene(), engine=engine)
 
 
+def viewer() -> Any:
+    """Return an open page of the arm, which no browser shows."""
+    if not _viewers or _viewers[-1].page.closed:
+        os.environ["BROWSER"] = "true"
+        _viewers.append(arm().view())
+    return _viewers[-1]
+
+
+_viewers: list[Any] = []
+
+
+@cache
+def session() -> Any:
+    """Return a session of benchmarks of the arm."""
+    return bench.Session(bench.Plan(arm(), tip(), bench.benchmark_cases(["mass_matrix"], [1], [1])))
+
+
 def line_target() -> Any:
     """Return a pose of the tip near the start of a line."""
     T = engine().forward_kinematics(np.full(3, 0.3), tip())
@@ -129,6 +148,8 @@ OBJECTS: Mapping[str, Callable[[], Any]] = {
     "box": lambda: geometry.Box((0.1, 0.2, 0.3)),
     "geometry": lambda: arm().geometry,
     "contacts": lambda: rollout().surroundings,
+    **({"viewer": viewer} if find_spec("viser") is not None else {}),
+    "bench session": session,
     **{f"backend {name}": partial(engine, name) for name in dynx.installed_backends()},
 }
 """Makers of the objects whose public methods are called."""
@@ -209,6 +230,8 @@ BY_NAME: Mapping[str, Callable[[], Any]] = {
     "referee_samples": lambda: 1,
     "radius": lambda: 0.1,
     "length": lambda: 0.1,
+    "host": lambda: "127.0.0.1",
+    "port": lambda: 0,
     "mass": lambda: 1.0,
 }
 """Makers of valid arguments by the names of parameters."""

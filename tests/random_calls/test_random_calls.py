@@ -16,19 +16,29 @@ import pytest
 import dynx
 from dynx import trajectory
 from dynx.argument_types import checks_types
-from dynx.errors import DTypeError
-from tests.random_calls.calls import Foreign, doors, fault, random_call
+from dynx.errors import ArgumentError, DTypeError
+from tests.random_calls.calls import Call, Door, Foreign, doors, outcome, random_call
+from tests.random_calls.messages import omissions
 from tests.random_calls.objects import arm, motion, scene
 
 CALLS = 250
 SEED = 20
 
+LARGEST_SHARE = 0.01
+"""Largest share of calls whose errors omit the name of the argument, what was given, or what is valid."""
+
 
 def test_random_calls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    calls = [random_call(SEED, number) for number in range(CALLS)]
-    faults = {str(call): fault(call) for call in calls if call is not None}
-    assert {call: wrong for call, wrong in faults.items() if wrong is not None} == {}
+    outcomes = {}
+    for number in range(CALLS):
+        call = random_call(SEED, number)
+        if call is not None:
+            wrong, error = outcome(call)
+            outcomes[str(call)] = wrong, str(error), [] if error is None else omissions(call, error)
+    assert {call: wrong for call, (wrong, *_) in outcomes.items() if wrong is not None} == {}
+    incomplete = {call: (text, missing) for call, (_, text, missing) in outcomes.items() if missing}
+    assert len(incomplete) <= LARGEST_SHARE * CALLS, incomplete
 
 
 def test_the_calls_reach_every_room() -> None:
@@ -137,3 +147,16 @@ def test_a_matrix_is_a_pose_where_one_is_read() -> None:
     assert untyped.world.Camera(pose=matrix).pose == dynx.Pose()
     assert untyped.world.Weld("a", "b", matrix).T_a_b == dynx.Pose()
     assert untyped.world.box("b", (1.0, 1.0, 1.0), pose=matrix).pose == dynx.Pose()
+
+
+def test_errors_name_the_argument_what_was_given_and_what_is_valid() -> None:
+    """The checker of messages sees what each omits."""
+    call = Call(Door("f", lambda: lambda samples: None), lambda samples: None, {"samples": 1.5}, {})
+    for text, expected in (
+        ("samples is 1.5; wanted a whole number", []),
+        ("wanted a whole number, not 1.5", ["name"]),
+        ("samples must be whole", ["given"]),
+        ("samples is 1.5", ["valid"]),
+        ("no", ["name", "given", "valid"]),
+    ):
+        assert omissions(call, ArgumentError(text)) == expected, text

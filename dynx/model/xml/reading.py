@@ -28,6 +28,10 @@ _NO_LINE_END = re.compile(r"[^\r\n]")
 _DECLARATION = re.compile(r"""<\?xml\s+version\s*=\s*(?:"1\.[0-9]"|'1\.[0-9]')[^?]*\?>""")
 
 
+MAX_REPAIRS = 100_000
+"""Largest number of faults that are repaired; a file of nothing else would take a minute."""
+
+
 @dataclass(frozen=True)
 class Repair:
     """Well-formed text, and a note on the first fault of each kind that was repaired."""
@@ -64,18 +68,19 @@ class _Repairer:
     depth: int = 0
     in_declarations: bool = True
     ended: bool = False
+    count: int = 0
 
     def run(self) -> bool:
         """Repair the whole text; return False where it has a fault that engines do not forgive."""
         at: int | None = 0
-        while at is not None and at < len(self.text):
+        while at is not None and at < len(self.text) and self.count <= MAX_REPAIRS:
             start = self.text.find("<", at)
             if start < 0:
                 # Text at the very end is refused, unlike text in front of further markup.
                 return self.ended and not self.depth and not self.text[at:].strip()
             self._characters(at, start)
             at = self._markup(start)
-        return at is not None and self.ended and not self.depth
+        return at is not None and self.ended and not self.depth and self.count <= MAX_REPAIRS
 
     def _markup(self, at: int) -> int | None:
         """Repair the markup that begins at a position, and return its end; None where it has none."""
@@ -179,6 +184,7 @@ class _Repairer:
 
     def _fault(self, kind: str, at: int) -> None:
         self.faults.setdefault(kind, at)
+        self.count += 1
 
     def _emit(self, text: str, at: int) -> None:
         """Add a part; behind the root element only its line ends, because no engine reads it."""

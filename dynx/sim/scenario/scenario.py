@@ -207,7 +207,8 @@ class Scenario(SimulationOptions):
     def from_dict(cls, document: Mapping[str, Document]) -> Scenario:
         """Return the scenario of a document. Raises ArgumentError for a document of another layout."""
         if not isinstance(document, Mapping) or document.get("schema") != SCHEMA:
-            raise ArgumentError(f"a scenario's document has schema {SCHEMA!r}; this one does not")
+            found = shown(document["schema"]) if "schema" in document else "none"
+            raise ArgumentError(f"the document has the schema {found}; wanted that of a scenario, {SCHEMA!r}")
         given = {name: decode(each) if _is_number(each) else each for name, each in document.items()}
         check_document(given, ScenarioDocument)
         del given["schema"]
@@ -237,7 +238,9 @@ class Scenario(SimulationOptions):
         try:
             document = parse_json(text)
         except (TypeError, ValueError) as error:
-            raise ArgumentError(f"the text is not JSON: {error}") from error
+            raise ArgumentError(
+                f"the text is not JSON: {error}; got {shown(text)}, wanted what to_json returned"
+            ) from error
         return cls.from_dict(document)
 
 

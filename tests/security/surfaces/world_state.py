@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import signal
 import tempfile
 from collections.abc import Callable
 from functools import cache
@@ -189,6 +190,11 @@ def _(box: Box) -> Deed:
     return scene(box, gravity=[1e308, -1e308, 10**300], name=["x"])
 
 
+CRASHES = (-signal.SIGSEGV, -signal.SIGABRT, 139, 134)
+"""Ends of a process by PyBullet, which docs/security.md and `World.read` state: no other program knows its
+format."""
+
+
 def _state(engine: str, number: int) -> Callable[[Box], Deed]:
     def prepare(box: Box) -> Deed:
         header, data = parts(engine)
@@ -197,7 +203,8 @@ def _state(engine: str, number: int) -> Callable[[Box], Deed]:
         for at in rng.integers(len(wrong), size=40 if len(wrong) else 0):
             wrong[at] = int(rng.integers(256))
         content = bytes(wrong) if number else rng.bytes(len(data))
-        return deed(box, file_of(json.dumps(header).encode(), content), (0, 2), "3")
+        ends = (0, 2, *(CRASHES if engine == "pybullet" else ()))
+        return deed(box, file_of(json.dumps(header).encode(), content), ends, "3")
 
     return prepare
 

@@ -1,0 +1,106 @@
+"""Checks of what an error says of a call: the argument's name, what was given, and what is valid."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterator
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+
+from dynx.errors import (
+    BackendError,
+    DynxError,
+    EpisodeError,
+    ModelError,
+    SimulationError,
+    SingularMassMatrixError,
+    TrajectoryError,
+)
+from tests.random_calls.calls import Call
+
+OF_OTHERS = (
+    BackendError,
+    EpisodeError,
+    ModelError,
+    SimulationError,
+    SingularMassMatrixError,
+    TrajectoryError,
+)
+"""Errors of an engine, a description, a motion or a run, which no single argument causes."""
+
+OF_THE_OBJECT = re.compile(
+    r"^(this (world|environment|viewer|page) |no link of robot |method 'engine': <|the page )"
+)
+"""Beginnings of errors of the state of an object, which no argument causes."""
+
+VALID = re.compile(
+    r"\b(wanted|known|did you mean|at most|at least|between|only|must|needs?|has no|there (is|are) no|no such"
+    r"|give|such as|of this|not finite|cannot|one of|takes|beyond|above|below|positive|greater|less|exceeds|"
+    r"allowed|differs?|use|choose|change|accepted|supported|expected|not callable|are not|without|instead|"
+    r"belongs|larger|smaller|more than|fewer|is a str)\b"
+)
+"""Words by which a message says what is valid."""
+
+
+def omissions(call: Call, error: DynxError) -> list[str]:
+    """Return what the message of an error omits: "name", "given" or "valid"."""
+    text = str(error)
+    if isinstance(error, OF_OTHERS) or OF_THE_OBJECT.match(text):
+        return []
+    parameters = inspect.signature(call.function).parameters
+    found = []
+    # A function of names of others takes the name by which an error calls its argument.
+    label = str(call.given["name"]) if "name" in call.given else ""
+    if parameters and not any(_names(name, text) for name in parameters) and not text.startswith(f"{label} "):
+        found.append("name")
+    if call.given and not any(_shows(value, text) for value in call.given.values()) and "given" not in text:
+        found.append("given")
+    if not VALID.search(text):
+        found.append("valid")
+    return found
+
+
+def _names(name: str, text: str) -> bool:
+    """Check whether a text has the name of an argument, or its words, in the singular or the plural."""
+    words = name.strip("_").lower().replace("_", " ")
+    stem = words.removesuffix("s")
+    return re.search(rf"\b{re.escape(stem)}(s|es)?\b", text.lower().replace("_", " ")) is not None
+
+
+def _shows(value: Any, text: str) -> bool:
+    """Check whether a text has a value, a part of it, its type, its shape or its dtype."""
+    return any(each in text for each in _traces(value))
+
+
+def _traces(value: Any) -> Iterator[str]:
+    yield type(value).__name__
+    if value is None:
+        yield from ("None", "nothing", "absent", "lacks", "missing", "without", " no ")
+    if isinstance(value, int) and abs(value) > 10**20:
+        yield from ("digits", "1000000")
+        return
+    for written in (str(value), repr(value)):
+        if written:
+            # Long ones are shortened, and line breaks are escaped.
+            yield written[:25].replace("\n", "\\n").rstrip()
+    if not isinstance(value, np.ndarray):
+        with suppress(ValueError, TypeError, OverflowError):
+            yield f"shape {np.asarray(value).shape}"
+    if isinstance(value, np.ndarray):
+        yield from (f"is {each}" for each in value.ravel()[:9])
+        yield from (str(value.shape), str(value.dtype), f"{value.size} ", "NaN", "nan", "inf")
+        yield from (f"{value.ndim} axes", "infinit", "not finite", "empty", "masked")
+    if isinstance(value, (float, np.floating)) and not np.isfinite(value):
+        yield from ("NaN", "nan", "inf", "not finite")
+    if hasattr(value, "__len__") and not isinstance(value, np.ndarray):
+        yield f"{len(value)} "
+        if not len(value):
+            yield from ("empty", "no ", "nothing")
+        elif not isinstance(value, (str, bytes)):
+            for each in value:
+                yield from (repr(each)[:25], str(each)[:25], type(each).__name__)
+    if isinstance(value, type):
+        yield f"class {value.__name__}"
