@@ -9,6 +9,7 @@ from __future__ import annotations
 import inspect
 import io
 import os
+import pickle
 import sys
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
@@ -314,8 +315,10 @@ def read_weights(algorithm: Any, file: BinaryIO, source: str) -> None:
             _check_optimizer(_part_of(algorithm, name), options[name])
         _set_variables(algorithm, others, variables or {})
     except Exception as error:  # torch raises whatever a damaged or foreign file leads to
-        reason = " ".join(str(error).split())
-        raise ArgumentError(f"{shown(source, 300)} has no weights that fit: {reason[:300]}") from error
+        reason = " ".join(str(error).split())[:300]
+        if isinstance(error, pickle.UnpicklingError):  # PyTorch tells how to run the code of the file
+            reason = "it has other objects than tensors, which are not unpickled"
+        raise ArgumentError(f"{shown(source, 300)} has no weights that fit: {reason}") from error
 
 
 def weights_of_file(file: BinaryIO) -> int:

@@ -209,7 +209,7 @@ def test_nothing_is_imported_from_the_current_directory(
 def test_an_expansion_that_takes_too_much_memory_is_ended(tmp_path: Path) -> None:
     path = tmp_path / "x.xacro"
     path.write_text(f'<robot name="r" {XMLNS}><link name="${{len(\'x\' * 3 * 2**30)}}"/></robot>')
-    with pytest.raises(DescriptionError, match="xacro failed: it needs more than 2 GiB of memory"):
+    with pytest.raises(DescriptionError, match="xacro failed: it needs more than 1 GiB of memory"):
         load(path)
 
 

@@ -311,11 +311,6 @@ def positional(call: Call) -> tuple[list[Any], dict[str, Any]]:
     return by_place, by_name
 
 
-def fault(call: Call) -> str | None:
-    """Make a call; return what is wrong with its outcome, or None."""
-    return outcome(call)[0]
-
-
 def _close(result: object) -> None:
     """End the server of a page that a call opened."""
     if type(result).__name__ == "Viewer":

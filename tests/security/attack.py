@@ -8,14 +8,17 @@ harmless by itself, with its result.
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import re
 import sys
 import unicodedata
+import zipfile
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 TIME = 30.0
 """Longest time of a victim [s]."""
@@ -140,6 +143,7 @@ class Outcome:
     """Exit code; None for a victim that was killed after TIME, negative for a signal."""
     output: str
     seconds: float
+    """Time of the processor in a process of its own, else by the clock."""
     memory: int
     """Largest memory [bytes]."""
     events: list[tuple[str, str]] = field(default_factory=list)
@@ -293,3 +297,22 @@ def sparse(path: Path, size: int, head: bytes = b"") -> None:
     with open(path, "wb") as file:
         file.write(head)
         file.truncate(size)
+
+
+def archive_of(members: dict[str, bytes], compression: int = zipfile.ZIP_STORED) -> bytes:
+    """Return a zip archive."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", compression) as archive:
+        for name, data in members.items():
+            archive.writestr(name, data)
+    return content.getvalue()
+
+
+class Harmful:
+    """An object whose unpickling makes a file."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return os.system, (f"touch {self.path}",)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 import time
@@ -20,7 +21,7 @@ from dynx.sim.record.csv_file import MAX_CELLS, MAX_TABLE
 from dynx.world import World, read_scene
 from dynx.world.scene.files import MAX_KEY_PARTS, MAX_TOML
 from dynx.world.snapshot import MAGIC, MAX_STATE
-from tests.security.attack import sparse
+from tests.security.attack import make_box, sparse
 
 ROOT = Path(__file__).parents[2]
 
@@ -190,3 +191,37 @@ def test_files_are_opened_by_one_room() -> None:
         if READERS.search(path.read_text(encoding="utf-8"))
     }
     assert found == set(OPENS)
+
+
+def test_a_file_of_nothing_but_faults_is_not_repaired() -> None:
+    """Each takes a hundredth of a millisecond to repair: a file of 64 MiB a minute."""
+    from dynx.model.xml.reading import MAX_REPAIRS, repaired
+
+    def text(count: int) -> str:
+        return f"<robot>{'&' * count}<link/></robot>".replace("&", "<!-- -- -->")
+
+    assert repaired(text(100)) is not None
+    begin = time.monotonic()
+    assert repaired(text(5 * MAX_REPAIRS)) is None
+    assert time.monotonic() - begin < 10.0
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes")
+def test_xacro_does_not_wait_for_a_pipe(tmp_path: Path) -> None:
+    pytest.importorskip("xacro")
+    os.mkfifo(tmp_path / "p.xacro")
+    path = tmp_path / "r.xacro"
+    path.write_text(
+        '<robot xmlns:xacro="http://ros.org/wiki/xacro" name="r"><xacro:include filename="p.xacro"/></robot>'
+    )
+    with pytest.raises(DescriptionError, match="is a FIFO; wanted a regular file"):
+        dynx.load(path)
+
+
+def test_the_engine_that_a_world_names_is_no_class_and_its_memory_no_overflow(tmp_path: Path) -> None:
+    from tests.security.surfaces.world_state import changed
+
+    box = make_box(tmp_path / "box")
+    changed(box, lambda header: header.update(memory=[[["0x1p+9999"]]]))
+    with pytest.raises(ArgumentError, match="cannot be read as a world: hexadecimal value too large"):
+        World.read(box.here / "w.world")

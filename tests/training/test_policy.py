@@ -12,6 +12,7 @@ from typing import Any
 import cloudpickle
 import numpy as np
 import pytest
+import torch
 from stable_baselines3 import PPO
 
 from dynx.errors import ArgumentError
@@ -134,6 +135,13 @@ def test_loading_runs_no_code_of_the_file(trained: Path, tmp_path: Path) -> None
     with pytest.raises(ArgumentError, match="no weights that fit"):
         load_policy(written(tmp_path / "worse.zip", {**parts, "policy.pth": buffer.getvalue()}))
     assert not (tmp_path / "executed").exists()
+    inside = io.BytesIO()
+    with zipfile.ZipFile(inside, "w") as archive:
+        for name, data in (("data.pkl", cloudpickle.dumps(Harmful(), 2)), ("version", b"3\n")):
+            archive.writestr(f"archive/{name}", data)
+    with pytest.raises(ArgumentError, match="no weights that fit: it has other objects than tensors"):
+        load_policy(written(tmp_path / "worst.zip", {**parts, "policy.pth": inside.getvalue()}))
+    assert not (tmp_path / "executed").exists()
 
 
 def test_files_that_are_no_policy_are_refused(trained: Path, tmp_path: Path) -> None:
@@ -176,3 +184,26 @@ def test_a_policy_for_other_observations_is_refused(trained: Path) -> None:
     ):
         load_policy(trained, TaskSpec("Acrobot-v1"))
     make(TaskSpec("Acrobot-v1")).close()
+
+
+@pytest.mark.filterwarnings("ignore:.*parse.* invariant")
+@pytest.mark.parametrize("member", ["policy.pth", "pytorch_variables.pth"])
+def test_tensors_and_lists_that_grow_in_memory_are_refused(
+    member: str, trained: Path, tmp_path: Path
+) -> None:
+    """A tensor whose stride is 0, and lists that share their parts, take no space in a file."""
+    nested: Any = torch.zeros(1)
+    for _ in range(100):
+        nested = [nested, nested]
+    for number, (content, message) in enumerate(
+        (
+            ({"log_std": torch.zeros(1).expand(10**12)}, "larger than its numbers"),
+            ({"log_std": torch.sparse_coo_tensor(size=(10**9, 10**9))}, "another layout"),
+            ({"log_std": nested}, "no weights that fit"),
+        )
+    ):
+        data = io.BytesIO()
+        torch.save(content, data)
+        path = written(tmp_path / f"{number}.zip", {**members(trained), member: data.getvalue()})
+        with pytest.raises(ArgumentError, match=message):
+            load_policy(path)

@@ -15,8 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from tests.security.attack import Box, Deed, attacks_on, sparse
-from tests.security.surfaces.policy import Harmful, archive_of
+from tests.security.attack import Box, Deed, Harmful, archive_of, attacks_on, sparse
 
 attack = attacks_on("npz")
 

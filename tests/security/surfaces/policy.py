@@ -15,7 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from tests.security.attack import Box, Deed, attacks_on, sparse
+from tests.security.attack import Box, Deed, Harmful, archive_of, attacks_on, sparse
 
 attack = attacks_on("policy")
 
@@ -32,15 +32,6 @@ def parts() -> dict[str, bytes]:
         train(small_run(32, normalize=True), folder, schedule=Schedule(episodes=1), final_episodes=1)
         with zipfile.ZipFile(Path(folder) / "final.zip") as archive:
             return {name: archive.read(name) for name in archive.namelist()}
-
-
-def archive_of(members: dict[str, bytes], compression: int = zipfile.ZIP_STORED) -> bytes:
-    """Return a zip archive."""
-    content = io.BytesIO()
-    with zipfile.ZipFile(content, "w", compression) as archive:
-        for name, data in members.items():
-            archive.writestr(name, data)
-    return content.getvalue()
 
 
 def deed(box: Box, members: dict[str, bytes], *, ends: tuple[int, ...] = (2,), **options: Any) -> Deed:
@@ -64,16 +55,6 @@ def torch_file(*content: bytes, names: tuple[str, ...] = ("archive/data.pkl",)) 
     """Return a file of tensors in PyTorch's format, with a pickle of the attacker's."""
     members = dict(zip(names, content, strict=True))
     return archive_of({**members, "archive/version": b"3\n", "archive/byteorder": b"little"})
-
-
-class Harmful:
-    """An object whose unpickling makes a file."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return os.system, (f"touch {self.path}",)
 
 
 @attack("code", "pickle in the weights")

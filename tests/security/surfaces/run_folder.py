@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.security.attack import Box, Deed, attacks_on, sparse
-from tests.security.surfaces.policy import Harmful, archive_of, torch_file
+from tests.security.attack import Box, Deed, Harmful, archive_of, attacks_on, sparse
+from tests.security.surfaces.policy import torch_file
 
 attack = attacks_on("run folder")
 
