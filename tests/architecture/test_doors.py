@@ -28,6 +28,7 @@ DOORS = {
     "dynx.sim.record.rollout:Rollout.plot": "dynx.sim.record.plot:plot",
     "dynx.sim.record.rollout:Rollout.save": "dynx.sim.record.formats:save",
     "dynx.sim.record.rollout:Rollout.view": "dynx.viewer.viewer:view",
+    "dynx.world.sensors.readings:Readings.plot": "dynx.world.sensors.plot:plot",
     "dynx.world.world:World.view": "dynx.viewer.viewer:view",
 }
 

@@ -59,14 +59,14 @@ FLOWS = {
         ),
         (),
         71,
-        11800,
+        11850,
     ),
     "inverse kinematics": Flow(
         ENGINE + "engine.inverse_kinematics(engine.forward_kinematics(q, 'tool0'), 'tool0', q)",
         ("world", "sim", "ik.closed_forms"),
         (),
         107,
-        19450,
+        19500,
     ),
     "simulate": Flow(
         ROBOT + "from dynx import control\n"
@@ -87,7 +87,7 @@ FLOWS = {
         ),
         (),
         175,
-        28650,
+        28800,
     ),
     "step of a box": Flow(
         "from dynx.world import Scene, World, box\n"
