@@ -18,7 +18,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -264,7 +263,6 @@ PRIMAL_TOLERANCE = 1e-11
 _SOLVED = 1
 
 
-@cache
 def _daqp() -> Any:
     with importing("velocity_ik needs daqp: pip install 'dynx[qp]'"):
         import daqp
