@@ -44,10 +44,7 @@ REMEDY = "; try a smaller dt or more substeps"
 def fast_parts(engine: Stepper, state: WorldState) -> Iterator[str]:
     """Yield one sentence for each part that is too fast for the step of an engine at a state."""
     layout, h = engine.layout, engine.dt
-    after = _after(layout, state, h)
-    if after is None:
-        return
-    before, then = OwnerPoses(layout, state), OwnerPoses(layout, after)
+    before, then = OwnerPoses(layout, state), OwnerPoses(layout, _after(layout, state, h))
     in_step = f"in a step of {h:g} s"
     for collider in layout.colliders:
         if layout.is_fixed(collider.owner):
@@ -71,21 +68,19 @@ def fast_parts(engine: Stepper, state: WorldState) -> Iterator[str]:
                 yield f"{shown(collider.name)} slides too fast for a step of {h:g} s: it {fault}{REMEDY}"
 
 
-def _after(layout: Layout, state: WorldState, h: float) -> WorldState | None:
-    """Return where the velocities of a state lead in `h` [s]; None if nothing moves."""
-    robots, bodies, moves = {}, {}, False
+def _after(layout: Layout, state: WorldState, h: float) -> WorldState:
+    """Return where the velocities of a state lead in `h` [s]."""
+    robots, bodies = {}, {}
     for robot in layout.robots:
         q, v = state.robots[robot.name]
-        moves = moves or bool(v.any())
         robots[robot.name] = RobotState(robot.model.integrate(q, h * v), v)
     for body in layout.bodies:
         T, twist = state.bodies[body.name]
-        moves = moves or bool(twist.any())
         T_after = T.copy()
         T_after[:3, :3] = rotation_from_quat(quat_exp(h * twist[3:])) @ T[:3, :3]
         T_after[:3, 3] += h * twist[:3]
         bodies[body.name] = BodyState(T_after, twist)
-    return replace(state, robots=PartStates(robots), bodies=PartStates(bodies)) if moves else None
+    return replace(state, robots=PartStates(robots), bodies=PartStates(bodies))
 
 
 def _extent(collider: Collider, T: Floats, axes: Floats) -> tuple[Floats, Floats]:
