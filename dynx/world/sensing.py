@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dynx.backends import backend
-from dynx.errors import UnsupportedFeatureError, shown
+from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
 from dynx.spatial.scalar import Floats
 from dynx.steppers.forces import Forces
 from dynx.steppers.layout import Layout
@@ -126,9 +126,11 @@ class _Pending(NamedTuple):
 
 @dataclass(eq=False)
 class _TakenSample:
-    """One sample of a sensor, which is evaluated when it is read."""
+    """One sample of a sensor, taken at the time `t` [s], which is evaluated when it is read."""
 
-    motion: SceneMotion
+    t: float
+    motion: SceneMotion | None
+    """What it senses; None of one that was restored."""
     reading: SensorReading | None = None
 
 
@@ -166,6 +168,38 @@ class WorldSensors:
         """Forget all samples: the state was set."""
         self._pending: _Pending | None = None
         self._samples: dict[str, deque[_TakenSample]] = {each.name: deque() for each in self._sensors}
+
+    def kept(self) -> dict[Sensor | str, Floats]:
+        """Return the samples (k, 1 + size) of sensors that are held or delayed, each after its time [s]."""
+        return {
+            sensor: np.array(
+                [[each.t, *self._read(sensor, each).values] for each in self._samples[sensor.name]]
+            )
+            for sensor in self._sensors
+            if self._samples[sensor.name]
+        }
+
+    def restore(self, samples: Mapping[Sensor | str, Floats]) -> None:
+        """Continue with the samples of `kept`, by sensors or by their names.
+
+        Raises ArgumentError for samples of another size.
+        """
+        self.forget()
+        for sensor in self._sensors:
+            rows = samples.get(sensor, samples.get(sensor.name))
+            if rows is None:
+                continue
+            if rows.ndim != 2 or rows.shape[1] != 1 + sensor.size or not np.isfinite(rows).all():
+                raise ArgumentError(
+                    f"the samples of {sensor} have shape {rows.shape}; wanted finite numbers (k, "
+                    f"{1 + sensor.size})"
+                )
+            ends = np.cumsum([1, *(len(channel.components) for channel in sensor.channels)])
+            names = [channel.name for channel in sensor.channels]
+            for row in rows:
+                values = dict(zip(names, np.split(row, ends)[1:-1], strict=True))
+                taken = _TakenSample(float(row[0]), None, SensorReading(sensor, float(row[0]), values))
+                self._samples[sensor.name].append(taken)
 
     def watched(self, act: Act) -> Act:
         """Return `act`, which begins the samples of each step, and takes those of the step before."""
@@ -212,7 +246,7 @@ class WorldSensors:
         motion = SceneMotion(np.array([t]), self._h, robots, around, None)
         for sensor in due:
             kept = self._samples[sensor.name]
-            kept.append(_TakenSample(motion))
+            kept.append(_TakenSample(t, motion))
             # Of those that can be read at the end of the step, the last is enough.
             while len(kept) > 1 and self._is_available(sensor, kept[1], t + self._h):
                 kept.popleft()
@@ -223,15 +257,19 @@ class WorldSensors:
         for sensor in self._sensors:
             ready = [each for each in self._samples[sensor.name] if self._is_available(sensor, each, time)]
             if ready:
-                sample = ready[-1]
-                if sample.reading is None:
-                    numbers = self._numbers[sensor.name]
-                    sample.reading = read_sensor(sensor, sample.motion, numbers=numbers).last
-                found[sensor.name] = sample.reading
+                found[sensor.name] = self._read(sensor, ready[-1])
         return found
 
+    def _read(self, sensor: Sensor, sample: _TakenSample) -> SensorReading:
+        """Return the reading of a sample, which is evaluated once."""
+        if sample.reading is None:
+            assert sample.motion is not None
+            numbers = self._numbers[sensor.name]
+            sample.reading = read_sensor(sensor, sample.motion, numbers=numbers).last
+        return sample.reading
+
     def _is_available(self, sensor: Sensor, sample: _TakenSample, time: float) -> bool:
-        return bool(sample.motion.t[0] + sensor.delay <= time + SAME_SAMPLE * self._h)
+        return bool(sample.t + sensor.delay <= time + SAME_SAMPLE * self._h)
 
 
 def _force_on(part: str, contacts: Sequence[Contact]) -> Floats:

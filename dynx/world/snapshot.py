@@ -12,7 +12,7 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from dynx.files.documents import parse_json
 from dynx.files.reading import checked_path, open_regular, printable, require_size
 from dynx.files.writing import write_bytes
 from dynx.spatial.scalar import Floats
+
+if TYPE_CHECKING:
+    from dynx.world.sensors.sensor import Sensor
 
 MAGIC = WORLD_FILE + b"1\n"
 SUFFIX = ".world"
@@ -62,6 +65,9 @@ class Snapshot:
     torques: Mapping[str, Floats] = field(default_factory=dict)
     """Torque (nv,) of each robot of a world in the step before (`WorldState.torques`), on which no later step
     depends; empty in files of earlier versions."""
+    samples: Mapping[Sensor | str, Floats] = field(default_factory=dict)
+    """Samples (k, 1 + size) of the sensors of a world that are held or delayed, each after its time, on which
+    no later step depends; from a file by the sensors' names, and empty in files of earlier versions."""
 
     def _content(self) -> tuple[Any, ...]:
         arrays = tuple((name, x.shape, x.tobytes()) for name, x in self.arrays.items())
@@ -137,6 +143,10 @@ def write_snapshot(path: str | os.PathLike[str], snapshot: Snapshot, world: dict
             for name in _robots(world)
         ],
         "torques": [[x.hex() for x in snapshot.torques[name].tolist()] for name in _robots(world)],
+        "samples": {
+            each if isinstance(each, str) else each.name: [[x.hex() for x in row] for row in rows.tolist()]
+            for each, rows in snapshot.samples.items()
+        },
     }
     text = json.dumps(header, ensure_ascii=True, allow_nan=False).encode("ascii")
     content = len(text).to_bytes(8, "little") + text + snapshot.data
@@ -197,10 +207,18 @@ def _snapshot(header: dict[str, Any], robots: Sequence[str], data: bytes) -> Sna
         for name, row in zip(robots, header.get("torques") or [()] * len(robots), strict=True)
         if row
     }
+    # Nor samples.
+    samples: dict[Sensor | str, Floats] = {
+        str(name): np.array([[float.fromhex(x) for x in row] for row in rows])
+        for name, rows in dict(header.get("samples") or {}).items()
+        if rows
+    }
     engine, version, identity = (str(header[name]) for name in ("engine", "version", "identity"))
     time, start = (float.fromhex(header[name]) for name in ("time", "start"))
     steps = int(header["steps"])
-    return Snapshot(engine, version, identity, time, start, steps, arrays, data, torques=torques)
+    return Snapshot(
+        engine, version, identity, time, start, steps, arrays, data, torques=torques, samples=samples
+    )
 
 
 def _robots(world: Mapping[str, Any]) -> list[str]:

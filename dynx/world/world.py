@@ -403,8 +403,8 @@ class World:
         """Return the last reading of each sensor of the scene, by name.
 
         A sample is taken at the beginning of a step of the engine and can be read after that step, or its
-        delay later; until the next one it is held. A sensor without a reading yet, since the state was set or
-        restored, is absent.
+        delay later; until the next one it is held. A sensor without a reading since the state was set is
+        absent. `save` keeps the samples that are held or delayed.
         """
         _ = self._motion.engine
         return {} if self._sensors is None else self._sensors.readings(self.time)
@@ -472,6 +472,7 @@ class World:
             self._commands.memory(),
             engine.dump(),
             torques=dict(self.state.torques),
+            samples={} if self._sensors is None else self._sensors.kept(),
         )
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -489,6 +490,8 @@ class World:
             engine.load(snapshot.data)
             self._commands.remember(snapshot.arrays, snapshot.torques)
 
+        if self._sensors is not None:
+            self._sensors.restore(snapshot.samples)
         self._motion.change(load, (snapshot.start, snapshot.steps))
 
     @checks_types

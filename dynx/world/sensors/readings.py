@@ -18,7 +18,7 @@ from dynx.world.sensors.motion import SensedMotion
 from dynx.world.sensors.sensor import Sensor
 
 SAME_SAMPLE = 1e-6
-"""Part of a period within which a time counts as that of a sample."""
+"""Part of a step within which a time counts as that of a sample."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +116,8 @@ def sample_numbers(sensor: Sensor, t: Floats, h: float) -> tuple[Integers, Integ
     the numbers of the samples, which depend on the time alone."""
     period = sensor.period(h)
     before = np.concatenate([t[:1] - h, t[:-1]])
-    number, previous = (np.floor(times / period + SAME_SAMPLE).astype(np.int64) for times in (t, before))
+    slack = SAME_SAMPLE * h
+    number, previous = (np.floor((times + slack) / period).astype(np.int64) for times in (t, before))
     rows = np.flatnonzero(number != previous)
     return rows, np.maximum(number[rows], 0)
 

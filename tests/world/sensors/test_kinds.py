@@ -29,7 +29,7 @@ from dynx.world import (
     SensorErrors,
 )
 from dynx.world.sensors.motion import RobotMotion, SensedMotion
-from dynx.world.sensors.readings import Readings, read_sensor
+from dynx.world.sensors.readings import Readings, read_sensor, sample_numbers
 
 ENGINES = ("pybullet", "mujoco", "drake", "pinocchio")
 """Plants that move a robot by an engine's own steps, and by dynx's."""
@@ -255,6 +255,27 @@ def test_samples_have_their_rate_and_are_held_until_the_next(arm: Model) -> None
     for k in range(13, 101):
         taken = np.flatnonzero(samples.t + 0.0125 <= k * 1e-3 + 1e-9)[-1]
         np.testing.assert_array_equal(held[k], samples.values[taken])
+
+
+@pytest.mark.parametrize("rate", [1e-4, 0.01, 3.0, 299.7, 1000.0])
+@pytest.mark.parametrize("h", [1e-3, 1e-5])
+def test_samples_begin_with_the_first_step_at_or_after_each_multiple_of_the_period(
+    rate: float, h: float
+) -> None:
+    """From time 0, also where a period has more than a million steps, up to the rate of the steps."""
+    sensor = Encoder("encoder", "elbow_joint", rate=rate)
+    n = 20_000
+    rows, numbers = sample_numbers(sensor, h * np.arange(n, dtype=np.float64), h)
+    # In whole numbers of 1e-12 s.
+    period, step = round(1e12 / rate), round(1e12 * h)
+    expected = [(-(-k * period // step), k) for k in range(n * step // period + 1)]
+    expected = [(row, k) for row, k in expected if row < n]
+    # A period that is rounded to 1e-12 s drifts from the one that is not, by less than a step.
+    assert list(zip(rows.tolist(), numbers.tolist(), strict=True)) == expected
+    # In other pieces, as a world takes its samples.
+    ones = [sample_numbers(sensor, np.array([k * h]), h) for k in range(3000)]
+    found = [(k, int(number[0])) for k, (row, number) in enumerate(ones) if len(row)]
+    assert found == [each for each in expected if each[0] < 3000]
 
 
 def test_noise_depends_on_name_seed_rollout_and_sample_alone(arm: Model) -> None:
