@@ -6,8 +6,13 @@ import tracemalloc
 from collections.abc import Iterator
 from dataclasses import replace
 
+import pytest
+
 import dynx
+from dynx.backends import backend, installed_backends
 from dynx.backends.joint_dynamics import JointDynamicsTerms
+from dynx.errors import EngineLimitError
+from dynx.model import Inertial, Joint, Link, Model
 from dynx.model.mechanism import Body
 from dynx.rbd.base_parameters import align_frames
 
@@ -51,3 +56,31 @@ def test_frames_of_many_joints_are_aligned_in_few_passes() -> None:
     aligned = align_frames(replace(mechanism, bodies=Counted(mechanism.bodies)))
     assert len(aligned.bodies) == JOINTS
     assert passes <= 3
+
+
+BOUNDED = ("pinocchio", "pybullet", "mujoco")
+"""Engines with a bound on the number of joints."""
+
+
+def robot(joints: int, *, star: bool, floating: bool) -> Model:
+    links = [Link(f"link{k}", Inertial(1.0, ixx=0.1, iyy=0.1, izz=0.1)) for k in range(joints + 1)]
+    tree = [
+        Joint(f"joint{k}", "revolute", "link0" if star else f"link{k}", f"link{k + 1}") for k in range(joints)
+    ]
+    return Model.build("large", links, tree, base="floating" if floating else "fixed")
+
+
+@pytest.mark.parametrize("name", [name for name in BOUNDED if name in installed_backends()])
+@pytest.mark.parametrize("star", [False, True])
+@pytest.mark.parametrize("floating", [False, True])
+def test_a_robot_beyond_a_bound_is_refused_before_its_links_are_merged(
+    name: str, star: bool, floating: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = robot(1200, star=star, floating=floating)
+
+    def merged(*_: object) -> None:
+        raise AssertionError("the links were merged")
+
+    monkeypatch.setattr("dynx.model.model.build_mechanism", merged)
+    with pytest.raises(EngineLimitError, match=r"^large has 120\d .* at most \d+"):
+        backend(name, model)

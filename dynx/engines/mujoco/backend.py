@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 
 from dynx.backends.base import Backend
 from dynx.backends.engine_errors import engine_errors
-from dynx.engines.mujoco.build import ROOT_BODY, build_tree
+from dynx.engines.mujoco.build import ROOT_BODY, build_tree, refuse_large
 from dynx.engines.mujoco.library import mujoco, silent_data
 from dynx.errors import DynxError, EngineError, nonblank_lines
 from dynx.model import Model
@@ -237,6 +237,7 @@ class MujocoBackend(Backend):
 
     def __init__(self, model: Model, *, validate: bool = True) -> None:
         """Raises EngineLimitError for a model that is too large for the engine."""
+        refuse_large(model)
         super().__init__(model, validate=validate)
         try:
             tree = build_tree(model)

@@ -55,13 +55,21 @@ class MujocoTree:
     masses_add: bool
 
 
+def refuse_large(model: Model) -> None:
+    """Raise EngineLimitError for a robot with too many degrees of freedom, mimic joints included.
+
+    They are counted in the description: merging the links of a large robot takes a second.
+    """
+    nv = sum(joint.moves for joint in model.joints) + (6 if model.floating else 0)
+    if nv > MAX_NV:
+        raise EngineLimitError(
+            f"{model.name} has {nv} degrees of freedom; the backend 'mujoco' takes at most {MAX_NV}"
+        )
+
+
 def build_tree(model: Model) -> MujocoTree:
     """Return MuJoCo's tree of a robot. Raises EngineLimitError for a robot that is too large for MuJoCo."""
-    mechanism = model.mechanism
-    if mechanism.nv > MAX_NV:
-        raise EngineLimitError(
-            f"{model.name} has {mechanism.nv} degrees of freedom; the backend 'mujoco' takes at most {MAX_NV}"
-        )
+    refuse_large(model)
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.compiler.fusestatic = False
@@ -90,7 +98,7 @@ def build_tree(model: Model) -> MujocoTree:
     compiled = spec.compile()
     tree = tuple(compiled.body(numbers[name]).id for name in model.frame_names)
     joints = [tree[model.frame_index(joint.child)] for joint in model.joints if joint.moves]
-    if list(compiled.jnt_bodyid[model.floating :]) != joints or compiled.nv != mechanism.nv:
+    if list(compiled.jnt_bodyid[model.floating :]) != joints or compiled.nv != model.mechanism.nv:
         raise EngineError(f"mujoco ordered the joints of {model.name} in an unexpected way")
     # There is nothing to collide or to constrain; the engine does not need to look for it.
     compiled.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_CONSTRAINT

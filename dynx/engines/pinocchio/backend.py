@@ -23,7 +23,14 @@ import numpy as np
 from dynx.backends.base import Backend
 from dynx.backends.engine_errors import engine_errors
 from dynx.backends.straight import BindingCall
-from dynx.engines.pinocchio.engine_model import WORLD, LinkForces, LinkRegressor, engine_model, error_message
+from dynx.engines.pinocchio.engine_model import (
+    WORLD,
+    LinkForces,
+    LinkRegressor,
+    engine_model,
+    error_message,
+    refuse_large,
+)
 from dynx.engines.pinocchio.library import pin
 from dynx.model import Model
 from dynx.rbd.jacobians import Reference
@@ -76,6 +83,7 @@ class PinocchioBackend(Backend):
 
     def __init__(self, model: Model, *, validate: bool = True) -> None:
         """Raises EngineLimitError for a model that the engine cannot represent or that is too large."""
+        refuse_large(model)
         super().__init__(model, validate=validate)
         self._engine, self._frame_ids = engine_model(model)
         self._workspace = _Workspace(self._engine)

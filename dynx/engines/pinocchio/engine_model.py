@@ -39,18 +39,26 @@ def engine_model(model: Model) -> tuple[Any, tuple[int, ...]]:
     included. Raises EngineLimitError for a model that the engine would represent wrongly or that is too
     large, EngineError where the engine refuses it.
     """
-    nv = model.mechanism.nv
-    if nv > MAX_NV:
-        raise EngineLimitError(
-            f"{model.name} has {nv} degrees of freedom; the backend 'pinocchio' "
-            f"takes at most {MAX_NV}, because the engine's memory grows with their cube"
-        )
+    refuse_large(model)
     try:
         return _build(model)
     except DynxError:
         raise
     except Exception as error:
         raise EngineError(f"pinocchio cannot represent {model.name}: {error_message(error)}") from error
+
+
+def refuse_large(model: Model) -> None:
+    """Raise EngineLimitError for a model with too many degrees of freedom, mimic joints included.
+
+    They are counted in the description: merging the links of a large robot takes a second.
+    """
+    nv = sum(joint.moves for joint in model.joints) + (6 if model.floating else 0)
+    if nv > MAX_NV:
+        raise EngineLimitError(
+            f"{model.name} has {nv} degrees of freedom; the backend 'pinocchio' "
+            f"takes at most {MAX_NV}, because the engine's memory grows with their cube"
+        )
 
 
 def _build(model: Model) -> tuple[Any, tuple[int, ...]]:

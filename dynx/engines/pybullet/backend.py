@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 from dynx.argument_types import checks_types
 from dynx.backends.base import Backend
 from dynx.engines.pybullet.canonical_urdf import Ballast, PrincipalBody, ballast_for, bullet_tree
-from dynx.engines.pybullet.client import CanonicalClient
+from dynx.engines.pybullet.client import CanonicalClient, refuse_many_joints
 from dynx.engines.pybullet.library import bullet, bullet_version
 from dynx.errors import ArgumentError, ClosedError, EngineError
 from dynx.model import Model
@@ -340,6 +340,8 @@ class PyBulletBackend(Backend):
     name: ClassVar[str] = "pybullet"
 
     def __init__(self, model: Model, *, validate: bool = True) -> None:
+        # Before the links are merged, which takes seconds for a robot of thousands.
+        refuse_many_joints(model.name, sum(joint.moves for joint in model.joints))
         super().__init__(model, validate=validate)
         engine = bullet()
         self._lock = RLock()

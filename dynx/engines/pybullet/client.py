@@ -297,6 +297,12 @@ it is fixed: joints from the 122nd on are read as 0, and above 128 inverse dynam
 (pybullet 3.2.7)."""
 
 
+def refuse_many_joints(robot: str, count: int) -> None:
+    """Raise EngineLimitError for a robot with more moving joints than Bullet supports."""
+    if count > MAX_JOINTS:
+        raise EngineLimitError(f"{robot} has {count} moving joints; Bullet supports at most {MAX_JOINTS}")
+
+
 class CanonicalClient(RobotClient):
     """A Bullet world with one robot, without motors, joint limits, damping or a speed limit."""
 
@@ -304,10 +310,7 @@ class CanonicalClient(RobotClient):
 
     def __init__(self, engine: ModuleType, tree: BulletTree, robot: str) -> None:
         """Raises EngineLimitError for a robot that Bullet cannot represent, EngineError if Bullet fails."""
-        if len(tree.links) > MAX_JOINTS:
-            raise EngineLimitError(
-                f"{robot} has {len(tree.links)} moving joints; Bullet supports at most {MAX_JOINTS}"
-            )
+        refuse_many_joints(robot, len(tree.links))
         super().__init__(engine, robot)
         self._tree = tree
         self.floating = tree.floating
