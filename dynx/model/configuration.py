@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+from operator import add, sub
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError
 from dynx.model.numbers import (
     MAX_MAGNITUDE,
+    UNIT_NORM_TOLERANCE,
     checked_array,
     checked_generator,
     checked_quaternion,
@@ -15,6 +19,7 @@ from dynx.model.numbers import (
 )
 from dynx.model.tree import Tree
 from dynx.spatial import branchless
+from dynx.spatial.branchless import FLOATS
 from dynx.spatial.scalar import Floats
 
 
@@ -68,28 +73,30 @@ def integrate(tree: Tree, q: ArrayLike, v: ArrayLike) -> Floats:
 
     A floating base moves along the exponential of its body twist.
     """
-    q, v = checked_q(tree, q), checked_array("v", v, tree.nv)
-    if not tree.floating:
-        return q + v
-    if q.ndim == v.ndim == 1:
-        moved = np.empty(tree.nq)
-        moved[:7] = branchless.moved(q[:7].tolist(), v[:6].tolist(), branchless.FLOATS)
-        np.add(q[7:], v[6:], out=moved[7:])
-        return moved
-    return branchless.integrate(*_broadcast(q, v))
+    lists = _valid_lists(tree.nq, q, tree.nv, v) if tree.floating else None
+    if lists is None:
+        q, v = checked_q(tree, q), checked_array("v", v, tree.nv)
+        if not tree.floating:
+            return q + v
+        if not q.ndim == v.ndim == 1:
+            return branchless.integrate(*_broadcast(q, v))
+        lists = q.tolist(), v.tolist()
+    start, step = lists
+    return np.array(branchless.moved(start[:7], step[:6], FLOATS) + list(map(add, start[7:], step[6:])))
 
 
 def difference(tree: Tree, q0: ArrayLike, q1: ArrayLike) -> Floats:
     """Return the velocity v (..., nv) with integrate(q0, v) = q1, whose rotation angle is at most pi."""
-    q0, q1 = checked_q(tree, q0, "q0"), checked_q(tree, q1, "q1")
-    if not tree.floating:
-        return q1 - q0
-    if q0.ndim == q1.ndim == 1:
-        found = np.empty(tree.nv)
-        found[:6] = branchless.twist_between(q0[:7].tolist(), q1[:7].tolist(), branchless.FLOATS)
-        np.subtract(q1[7:], q0[7:], out=found[6:])
-        return found
-    return branchless.difference(*_broadcast(q0, q1))
+    lists = _valid_lists(tree.nq, q0, tree.nq, q1) if tree.floating else None
+    if lists is None or not _has_unit_norm(lists[1]):
+        q0, q1 = checked_q(tree, q0, "q0"), checked_q(tree, q1, "q1")
+        if not tree.floating:
+            return q1 - q0
+        if not q0.ndim == q1.ndim == 1:
+            return branchless.difference(*_broadcast(q0, q1))
+        lists = q0.tolist(), q1.tolist()
+    start, end = lists
+    return np.array(branchless.twist_between(start[:7], end[:7], FLOATS) + list(map(sub, end[7:], start[7:])))
 
 
 def clip(tree: Tree, q: ArrayLike) -> Floats:
@@ -112,6 +119,32 @@ def sampling_range(low: float, high: float, default_range: float) -> tuple[float
     if not (bounded_below or bounded_above):
         return -default_range, default_range
     return (low, low + 2.0 * default_range) if bounded_below else (high - 2.0 * default_range, high)
+
+
+def _valid_lists(nq: int, q: object, size: int, other: object) -> tuple[list[float], list[float]] | None:
+    """Return the entries of a configuration (nq,) of a floating base and of another array (size,), or None
+    where they are not arrays of valid numbers: one check of all of them, and no copy of an array.
+
+    The norm of all entries is below a bound only if every entry is, and no entry is NaN.
+    """
+    if not (
+        type(q) is type(other) is np.ndarray
+        and q.dtype is other.dtype is _FLOAT64
+        and q.shape == (nq,)
+        and other.shape == (size,)
+    ):
+        return None
+    start, entries = q.tolist(), other.tolist()
+    valid = math.hypot(*start, *entries) < MAX_MAGNITUDE and _has_unit_norm(start)
+    return (start, entries) if valid else None
+
+
+def _has_unit_norm(q: list[float]) -> bool:
+    """Check whether the quaternion of a configuration has unit norm, to rounding."""
+    return abs(math.hypot(*q[3:7]) - 1.0) <= UNIT_NORM_TOLERANCE
+
+
+_FLOAT64 = np.dtype(np.float64)
 
 
 def _broadcast(a: Floats, b: Floats) -> tuple[Floats, Floats]:

@@ -46,59 +46,88 @@ ARRAYS = Functions(sqrt, sin, cos, arctan, sign)
 """Functions of arrays of any scalar, which round as NumPy does."""
 
 
-def exponential(linear: Components, angular: Components, f: Functions) -> tuple[Vector, Components]:
-    """Return the position [m] and the quaternion that a body reaches by a constant twist in unit time.
+def moved(pose: Components, twist: Components, f: Functions) -> list[Any]:
+    """Return the pose, position [m] and quaternion, after a constant body twist (6) for unit time.
 
-    `linear` [m] and `angular` [rad] are in the axes of the body, the result in those at the start (Murray, Li
+    Linear velocity [m] comes first, angular velocity [rad] second, both in the axes of the body (Murray, Li
     and Sastry, A Mathematical Introduction to Robotic Manipulation, eq. 2.36).
     """
-    squared, half, sine, cosine = _half_angle(angular, f)
+    # Written out, since a call of a function takes as long as ten products of floats.
+    lx, ly, lz, wx, wy, wz = twist
+    px, py, pz, x, y, z, w = pose
+    squared = wx * wx + wy * wy + wz * wz + TINY
+    half = 0.5 * f.sqrt(squared)
+    sine, cosine = f.sin(half), f.cos(half)
     ratio = sine / half
-    x, y, z = linear
-    ux, uy, uz = turned = _cross(angular, linear)
-    tx, ty, tz = _cross(angular, turned)
+    # The displacement d in the axes of the start: linear + b (angular x linear) + c angular x (...).
+    ux, uy, uz = wy * lz - wz * ly, wz * lx - wx * lz, wx * ly - wy * lx
     b, c = 0.5 * (ratio * ratio), (1.0 - ratio * cosine) / squared
-    position = x + b * ux + c * tx, y + b * uy + c * ty, z + b * uz + c * tz
-    x, y, z = angular
+    dx = lx + b * ux + c * (wy * uz - wz * uy)
+    dy = ly + b * uy + c * (wz * ux - wx * uz)
+    dz = lz + b * uz + c * (wx * uy - wy * ux)
+    # The displacement in the axes of the world: d + 2 w (u x d) + 2 u x (u x d), with u the vector part.
+    tx, ty, tz = 2.0 * (y * dz - z * dy), 2.0 * (z * dx - x * dz), 2.0 * (x * dy - y * dx)
+    # The Hamilton product with the rotation of the step.
     ratio = 0.5 * ratio
-    return position, (ratio * x, ratio * y, ratio * z, cosine)
-
-
-def logarithm(position: Components, quat: Components, f: Functions) -> tuple[Vector, Components]:
-    """Return the twist (linear, angular), of an angle of at most pi, whose `exponential` is this one."""
-    angular = _rotation_vector(quat, f)
-    squared, half, sine, cosine = _half_angle(angular, f)
-    x, y, z = position
-    ux, uy, uz = turned = _cross(angular, position)
-    tx, ty, tz = _cross(angular, turned)
-    c = (1.0 - half * cosine / sine) / squared
-    return (x - 0.5 * ux + c * tx, y - 0.5 * uy + c * ty, z - 0.5 * uz + c * tz), angular
-
-
-def moved(pose: Components, twist: Components, f: Functions) -> list[Any]:
-    """Return the pose, position [m] and quaternion, after a constant body twist (6) for unit time."""
-    step, turn = exponential(twist[:3], twist[3:], f)
-    dx, dy, dz = _rotated(pose[3:], step)
-    x, y, z, w = _product(pose[3:], turn)
-    norm = f.sqrt(x * x + y * y + z * z + w * w)
-    return [pose[0] + dx, pose[1] + dy, pose[2] + dz, x / norm, y / norm, z / norm, w / norm]
+    rx, ry, rz = ratio * wx, ratio * wy, ratio * wz
+    qx = w * rx + cosine * x + y * rz - z * ry
+    qy = w * ry + cosine * y + z * rx - x * rz
+    qz = w * rz + cosine * z + x * ry - y * rx
+    qw = w * cosine - x * rx - y * ry - z * rz
+    norm = f.sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
+    return [
+        px + (dx + w * tx + y * tz - z * ty),
+        py + (dy + w * ty + z * tx - x * tz),
+        pz + (dz + w * tz + x * ty - y * tx),
+        qx / norm,
+        qy / norm,
+        qz / norm,
+        qw / norm,
+    ]
 
 
 def twist_between(start: Components, end: Components, f: Functions) -> list[Any]:
-    """Return the body twist (6) with which `moved` leads from one pose to another."""
-    x, y, z, w = start[3:]
-    back = -x, -y, -z, w
-    step = _rotated(back, (end[0] - start[0], end[1] - start[1], end[2] - start[2]))
-    linear, angular = logarithm(step, _product(back, end[3:]), f)
-    return [*linear, *angular]
+    """Return the body twist (6), of an angle of at most pi, with which `moved` leads from one pose to
+    another."""
+    # Written out like `moved`. The conjugate of the first quaternion leads back.
+    px, py, pz, x, y, z, w = start
+    ex, ey, ez, qx, qy, qz, qw = end
+    x, y, z = -x, -y, -z
+    # The displacement in the axes of the start.
+    ax, ay, az = ex - px, ey - py, ez - pz
+    tx, ty, tz = 2.0 * (y * az - z * ay), 2.0 * (z * ax - x * az), 2.0 * (x * ay - y * ax)
+    dx = ax + w * tx + y * tz - z * ty
+    dy = ay + w * ty + z * tx - x * tz
+    dz = az + w * tz + x * ty - y * tx
+    wx, wy, wz = _rotation_vector(
+        (
+            w * qx + qw * x + y * qz - z * qy,
+            w * qy + qw * y + z * qx - x * qz,
+            w * qz + qw * z + x * qy - y * qx,
+            w * qw - x * qx - y * qy - z * qz,
+        ),
+        f,
+    )
+    squared = wx * wx + wy * wy + wz * wz + TINY
+    half = 0.5 * f.sqrt(squared)
+    c = (1.0 - half * f.cos(half) / f.sin(half)) / squared
+    ux, uy, uz = wy * dz - wz * dy, wz * dx - wx * dz, wx * dy - wy * dx
+    return [
+        dx - 0.5 * ux + c * (wy * uz - wz * uy),
+        dy - 0.5 * uy + c * (wz * ux - wx * uz),
+        dz - 0.5 * uz + c * (wx * uy - wy * ux),
+        wx,
+        wy,
+        wz,
+    ]
 
 
 def quat_exp(rotation_vector: Array) -> Array:
     """Return the unit quaternion (..., 4) of a rotation vector [rad] (..., 3)."""
-    angular = _components(rotation_vector)
-    _, half, sine, cosine = _half_angle(angular, ARRAYS)
-    ratio = 0.5 * (sine / half)
-    return np.stack([*(ratio * w for w in angular), cosine], axis=-1)
+    x, y, z = _components(rotation_vector)
+    half = 0.5 * sqrt(x * x + y * y + z * z + TINY)
+    ratio = 0.5 * (sin(half) / half)
+    return np.stack([ratio * x, ratio * y, ratio * z, cos(half)], axis=-1)
 
 
 def quat_log(quat_xyzw: Array) -> Array:
@@ -144,14 +173,6 @@ def _components(array: Array) -> list[Any]:
     return [array[..., k] for k in range(array.shape[-1])]
 
 
-def _half_angle(angular: Components, f: Functions) -> tuple[Any, Any, Any, Any]:
-    """Return the square of the angle, kept above 0 by `TINY`, half of the angle, its sine and cosine."""
-    x, y, z = angular
-    squared = x * x + y * y + z * z + TINY
-    half = 0.5 * f.sqrt(squared)
-    return squared, half, f.sin(half), f.cos(half)
-
-
 def _rotation_vector(quat: Components, f: Functions) -> Vector:
     x, y, z, w = quat
     squared = x * x + y * y + z * z + TINY
@@ -161,33 +182,6 @@ def _rotation_vector(quat: Components, f: Functions) -> Vector:
     # This is the sign of w, but 1 where w is 0.
     factor = f.sign(f.sign(w) + 0.5) * (angle / norm)
     return factor * x, factor * y, factor * z
-
-
-def _cross(a: Components, b: Components) -> Vector:
-    ax, ay, az = a
-    bx, by, bz = b
-    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-
-
-def _rotated(quat: Components, vector: Components) -> Vector:
-    """Return a vector turned by a unit quaternion: v + 2 w (u x v) + 2 u x (u x v)."""
-    x, y, z, w = quat
-    a, b, c = vector
-    # Twice u x v, with u the vector part.
-    p, q, r = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
-    return a + w * p + y * r - z * q, b + w * q + z * p - x * r, c + w * r + x * q - y * p
-
-
-def _product(a: Components, b: Components) -> Components:
-    """Return the Hamilton product a b."""
-    ax, ay, az, aw = a
-    bx, by, bz, bw = b
-    return (
-        aw * bx + bw * ax + ay * bz - az * by,
-        aw * by + bw * ay + az * bx - ax * bz,
-        aw * bz + bw * az + ax * by - ay * bx,
-        aw * bw - ax * bx - ay * by - az * bz,
-    )
 
 
 def _scaled_quat(R: Array) -> Array:

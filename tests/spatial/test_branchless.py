@@ -20,6 +20,9 @@ ROUNDING = 16 * float(np.finfo(np.float64).eps)
 ANGLES = [0.0, 5e-324, 1e-200, 1e-160, 1e-150, 1e-100, 1e-20, 1e-12, 1e-9, 1e-8, 1e-6, 1e-4]
 ANGLES += [1e-3, 9.9e-3, 1.01e-2, 0.1, 0.5, 1.0, 2.0, 3.0, 3.14, np.pi - 1e-6, np.pi - 1e-9]
 SEEDS = st.integers(0, 2**32 - 1).map(np.random.default_rng)
+AT_WORLD = [0.0] * 6 + [1.0]
+"""Pose of the frame of the world: from there the exponential leads, and to there the logarithm."""
+
 BODY = load(MODELS / "free_body.urdf", base="floating")
 
 
@@ -47,12 +50,11 @@ def test_rotations_and_poses(angle: float, rng: np.random.Generator) -> None:
     ):
         error = np.max(np.abs(found - expected))
         assert min(error, np.max(np.abs(found + expected)) if angle > 3.1415 else np.inf) < ROUNDING
-    for function, rotation in ((branchless.exponential, angular), (branchless.logarithm, quats)):
-        of_arrays = function(list(linear.T), list(rotation.T), branchless.ARRAYS)
-        found = np.concatenate([np.stack(part, axis=-1) for part in of_arrays], axis=-1)
-        for row, a, b in zip(found, linear, rotation, strict=True):
-            of_floats = function(a.tolist(), b.tolist(), branchless.FLOATS)
-            np.testing.assert_allclose(row, np.concatenate(of_floats), rtol=0.0, atol=ROUNDING)
+    for function, rotation in ((branchless.moved, angular), (branchless.twist_between, quats)):
+        of_arrays = function(AT_WORLD, [*linear.T, *rotation.T], branchless.ARRAYS)
+        for row, a, b in zip(np.stack(of_arrays, axis=-1), linear, rotation, strict=True):
+            of_floats = function(AT_WORLD, [*a.tolist(), *b.tolist()], branchless.FLOATS)
+            np.testing.assert_allclose(row, of_floats, rtol=0.0, atol=ROUNDING)
 
 
 @given(SEEDS)
@@ -88,7 +90,7 @@ def test_in_many_digits() -> None:
         linear, angular = exact([1.0, 2.0, 3.0]), exact([0.3, -0.4, 1.2])
         quat = branchless.quat_exp(angular)
         assert max(abs(branchless.quat_log(quat) - angular)) < mpmath.mpf(10) ** -48
-        there = branchless.exponential(list(linear), list(angular), branchless.ARRAYS)
-        linear_back, angular_back = map(np.array, branchless.logarithm(*there, branchless.ARRAYS))
-        assert max(abs(angular_back - angular)) < mpmath.mpf(10) ** -48
-        assert max(abs(linear_back - linear)) < mpmath.mpf(10) ** -47
+        there = branchless.moved(AT_WORLD, [*linear, *angular], branchless.ARRAYS)
+        back = np.array(branchless.twist_between(AT_WORLD, there, branchless.ARRAYS))
+        assert max(abs(back[3:] - angular)) < mpmath.mpf(10) ** -48
+        assert max(abs(back[:3] - linear)) < mpmath.mpf(10) ** -47

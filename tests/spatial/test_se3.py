@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from dynx.spatial.branchless import FLOATS, exponential, logarithm
+from dynx.spatial.branchless import FLOATS, moved, twist_between
 from dynx.spatial.se3 import homogeneous, inverse, pose_error
 from dynx.spatial.so3 import rotation_from_quat, skew
 from dynx.testing.strategies import poses, quaternions, unit_vectors, vectors
@@ -20,6 +20,9 @@ from tests.spatial.test_so3 import lengths
 
 Floats = NDArray[np.float64]
 Triple = tuple[float, float, float]
+
+AT_WORLD = [0.0] * 6 + [1.0]
+"""Pose of the frame of the world: from there the exponential leads, and to there the logarithm."""
 
 # Angles [rad], among them those around the switch between closed forms and series.
 angles = st.one_of(lengths, st.floats(0.009, 0.011))
@@ -34,7 +37,7 @@ def test_inverse_is_the_matrix_inverse(T_AB: Floats) -> None:
 @given(vectors(), unit_vectors(), angles)
 def test_exp_is_the_exponential_of_the_twist(linear: Triple, axis: Triple, angle: float) -> None:
     v, w = np.array(linear), np.array(axis) * angle
-    position, quat = map(np.array, exponential(v.tolist(), w.tolist(), FLOATS))
+    position, quat = np.split(np.array(moved(AT_WORLD, [*v.tolist(), *w.tolist()], FLOATS)), [3])
     with mpmath.workdps(40):
         twist = mpmath.zeros(4)
         for i in range(3):
@@ -49,7 +52,8 @@ def test_exp_is_the_exponential_of_the_twist(linear: Triple, axis: Triple, angle
 @given(vectors(), unit_vectors(), angles.filter(lambda angle: angle < math.pi - 1e-9))
 def test_log_undoes_exp(linear: Triple, axis: Triple, angle: float) -> None:
     v, w = np.array(linear), np.array(axis) * angle
-    linear_back, angular_back = map(np.array, logarithm(*exponential(v.tolist(), w.tolist(), FLOATS), FLOATS))
+    there = moved(AT_WORLD, [*v.tolist(), *w.tolist()], FLOATS)
+    linear_back, angular_back = np.split(np.array(twist_between(AT_WORLD, there, FLOATS)), 2)
     assert_same_to_rounding(angular_back, w, 16, size=4.0)
     # The norm of V^-1 is theta / (2 sin(theta / 2)) <= pi / 2, that of V at most 1.
     assert_same_to_rounding(linear_back, v, 128, size=4.0)
@@ -58,8 +62,8 @@ def test_log_undoes_exp(linear: Triple, axis: Triple, angle: float) -> None:
 @given(poses(), st.sampled_from((1.0, -1.0)))
 def test_exp_undoes_log(T_AB: Floats, sign: float) -> None:
     quat = sign * Rotation.from_matrix(T_AB[:3, :3]).as_quat()
-    twist = logarithm(T_AB[:3, 3].tolist(), quat.tolist(), FLOATS)
-    position, quat_back = map(np.array, exponential(*twist, FLOATS))
+    twist = twist_between(AT_WORLD, [*T_AB[:3, 3].tolist(), *quat.tolist()], FLOATS)
+    position, quat_back = np.split(np.array(moved(AT_WORLD, twist, FLOATS)), [3])
     assert_same_to_rounding(position, T_AB[:3, 3], 128, size=4.0)
     assert_same_to_rounding(rotation_from_quat(quat_back), T_AB[:3, :3], 96)
 
