@@ -379,7 +379,11 @@ class WorldEpisodes(Episodes):
 
     def picture(self, width: int, height: int) -> NDArray[np.uint8]:
         """Draw the world by the task's camera."""
-        return self._world.camera(replace(self._task.camera, size=(width, height))).rgb
+        # Imported here, because most environments draw no picture.
+        from dynx.world.camera import cast_rays_smoothly, draw_picture
+
+        camera = replace(self._task.camera, size=(width, height))
+        return draw_picture(self._world.scene, self._world.state, camera, cast_rays_smoothly).rgb
 
     def scene_and_state(self) -> tuple[Scene, WorldState]:
         """Return the scene of the present episode, and its state."""
@@ -433,10 +437,10 @@ class WorldEpisodes(Episodes):
 def draw_robot(task: RobotTask, state: State, width: int, height: int) -> NDArray[np.uint8]:
     """Draw the robot (height, width, 3), seen by the camera of the task."""
     # Imported here, because most environments draw no picture.
-    from dynx.world.camera import cast_rays, draw_picture
+    from dynx.world.camera import cast_rays_smoothly, draw_picture
 
     camera = replace(task.camera, size=(width, height))
-    return draw_picture(_scene_of_robot(task), _state_of_robot(state), camera, cast_rays).rgb
+    return draw_picture(_scene_of_robot(task), _state_of_robot(state), camera, cast_rays_smoothly).rgb
 
 
 def _scene_of_robot(task: RobotTask) -> Scene:

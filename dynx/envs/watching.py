@@ -27,7 +27,7 @@ from dynx.viewer.colours import SKY_BLUE
 from dynx.viewer.drawn_robot import GHOST_OPACITY, GHOST_SIZE, DrawnScene, Look
 from dynx.viewer.episode_panel import ActionEntry, EpisodePanel, Standing, action_entries
 from dynx.viewer.following import FollowingCamera
-from dynx.viewer.framing import box_around
+from dynx.viewer.framing import SHARE, box_around, points_around
 from dynx.viewer.page import DEFAULT_HOST, Page
 from dynx.viewer.triangles import TRIANGLE_BUDGET, has_graphics_processor
 from dynx.world.camera import part_poses
@@ -41,9 +41,6 @@ PICTURES_PER_SECOND = 30.0
 
 PAUSE = 1.0
 """Time for which the end of an episode is shown [s]."""
-
-_SHARE = 0.6
-"""Share of the picture that what moves takes at the start."""
 
 _BORDER = 128
 """Grey beside a picture whose shape is not that of the page."""
@@ -310,7 +307,7 @@ class EpisodePage:
             self.page.look_from(camera)
             right = camera.pose.matrix[:3, 0]
         else:
-            self.page.look_at(low, high, _SHARE)
+            self.page.look_at(points_around(poses, scene.bodies, robots), SHARE)
         self._apart = size * right
 
     def _place_beside(self, beside: bool) -> None:

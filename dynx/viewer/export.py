@@ -6,6 +6,7 @@ import io
 import math
 import os
 from collections.abc import Callable, Iterable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from dynx.errors import ArgumentError, shown
 from dynx.files.reading import checked_path
 from dynx.files.writing import write_bytes
 from dynx.model import Model
-from dynx.model.geometry import Cylinder, Shape
+from dynx.model.geometry import Cylinder, Plane, Shape
 from dynx.model.geometry.links import Colour, link_shapes
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
@@ -23,11 +24,20 @@ from dynx.steppers.camera import Camera, DrawnShape
 from dynx.viewer.browser import standalone
 from dynx.viewer.colours import GREY, SKY_BLUE
 from dynx.viewer.drawn_robot import size_of
-from dynx.viewer.framing import VIEW_DIRECTION, box_around, fitting_distance
+from dynx.viewer.framing import (
+    SHARE,
+    box_around,
+    fitted_view,
+    ground_height,
+    has_ground,
+    points_around,
+    tile_for,
+)
 from dynx.viewer.library import Image
 from dynx.viewer.motion import MotionFrames
 from dynx.viewer.page import Page
-from dynx.world.camera import cast_rays, png_bytes
+from dynx.world.camera import cast_rays_smoothly, png_bytes
+from dynx.world.scenery import DARK, LIGHT, TILE, Scenery
 
 PICTURES_PER_SECOND = 12.5
 """Rate of the pictures of a film."""
@@ -38,16 +48,10 @@ MAX_PICTURES = 500
 SIZE = (480, 360)
 """Width and height of a picture of a film [pixels]."""
 
-_SHARE = 0.9
-"""Share of the picture that the box around everything that moves takes."""
-
 _OPAQUE_GREY: Colour = (GREY[0] / 255.0, GREY[1] / 255.0, GREY[2] / 255.0, 1.0)
 
 _STICK_RADIUS = 0.015
 """Radius of the sticks of a robot without shapes, as a share of its size."""
-
-_COINCIDENT = 0.005
-"""Share of its depth by which a second motion has to be nearer than the first, to be seen before it."""
 
 Progress = Callable[[int], object]
 """Called with the number of pictures that are drawn."""
@@ -55,32 +59,51 @@ Progress = Callable[[int], object]
 _OPAQUE_SKY_BLUE: Colour = (SKY_BLUE[0] / 255.0, SKY_BLUE[1] / 255.0, SKY_BLUE[2] / 255.0, 1.0)
 
 
-def picture_of(motions: tuple[MotionFrames, ...], time: float, camera: Camera) -> NDArray[np.uint8]:
-    """Return colours (height, width, 3) of motions at a time [s]; all but the first are sky blue."""
-    rgb, depth = None, np.zeros(0)
-    for number, motion in enumerate(motions):
-        shapes = []
-        poses = motion.at(motion.frame_at(time))
-        for part, shape, rgba, T in _shapes(motion):
-            colour = rgba if number == 0 else _OPAQUE_SKY_BLUE
-            if rgba[3] > 0.0 and (part in poses or number == 0):
-                shapes.append(DrawnShape(0, shape, colour, poses.get(part, np.eye(4)) @ T))
-        drawing = cast_rays(shapes, camera.pose.matrix, camera)
-        if rgb is None:
-            rgb, depth = drawing.rgb, drawing.depth
-        else:
-            nearer = drawing.depth < (1.0 - _COINCIDENT) * depth
-            rgb, depth = np.where(nearer[:, None], drawing.rgb, rgb), np.where(nearer, drawing.depth, depth)
-    return np.asarray(rgb).reshape(camera.size[1], camera.size[0], 3)
+class Stage(NamedTuple):
+    """The camera of a picture, and what is around its motions."""
+
+    camera: Camera
+    scenery: Scenery = LIGHT
+    tile: float = TILE
+    """Edge of the tiles of the ground [m]."""
+    floor: float | None = None
+    """Height [m] of a ground that is added; None for motions with a ground of their own."""
 
 
-def camera_for(motion: MotionFrames, size: tuple[int, int] = SIZE) -> Camera:
-    """Return a camera that sees the box around a motion, from the direction in which the page begins."""
+def stage_for(motion: MotionFrames, size: tuple[int, int] = SIZE, *, dark: bool = False) -> Stage:
+    """Return a stage whose camera sees a motion from the direction in which the page begins."""
     low, high = box_around(motion.poses, motion.bodies, motion.robots)
-    middle = 0.5 * (low + high)
-    upward = _SHARE * math.tan(0.5 * Camera.field_of_view)
-    distance = fitting_distance(low, high, upward * size[0] / size[1], upward)
-    return Camera.look_at(middle + distance * VIEW_DIRECTION, middle, size=size)
+    points = points_around(motion.poses, motion.bodies, motion.robots)
+    upward = SHARE * math.tan(0.5 * Camera.field_of_view)
+    camera = Camera.look_at(*fitted_view(points, upward * size[0] / size[1], upward), size=size)
+    floor = None if has_ground(motion.bodies) else ground_height(low, motion.robots)
+    return Stage(camera, DARK if dark else LIGHT, tile_for(low, high), floor)
+
+
+def picture_of(motions: tuple[MotionFrames, ...], time: float, stage: Stage) -> NDArray[np.uint8]:
+    """Return colours (height, width, 3) of motions at a time [s]; all but the first are sky blue, and without
+    a shadow."""
+    groups: list[list[DrawnShape]] = []
+    for number, motion in enumerate(motions):
+        poses = motion.at(motion.frame_at(time))
+        groups.append(
+            [
+                DrawnShape(
+                    0, shape, rgba if number == 0 else _OPAQUE_SKY_BLUE, poses.get(part, np.eye(4)) @ T
+                )
+                for part, shape, rgba, T in _shapes(motion)
+                if rgba[3] > 0.0 and (part in poses or number == 0)
+            ]
+        )
+    if stage.floor is not None:
+        T_floor = homogeneous(np.eye(3), np.array([0.0, 0.0, stage.floor]))
+        groups[0].append(DrawnShape(0, Plane(), (*stage.scenery.ground, 1.0), np.asarray(T_floor)))
+    camera = stage.camera
+    ghosts = [shape for group in groups[1:] for shape in group]
+    drawing = cast_rays_smoothly(
+        groups[0], camera.pose.matrix, camera, stage.scenery, stage.tile, ghosts=ghosts
+    )
+    return drawing.rgb.reshape(camera.size[1], camera.size[0], 3)
 
 
 def write_picture(path: str | os.PathLike[str], rgb: NDArray[np.uint8]) -> None:
@@ -94,29 +117,25 @@ def film_length(motions: tuple[MotionFrames, ...]) -> int:
 
 
 def write_film(
-    path: str | os.PathLike[str], motions: tuple[MotionFrames, ...], progress: Progress = lambda _: None
+    path: str | os.PathLike[str],
+    motions: tuple[MotionFrames, ...],
+    progress: Progress = lambda _: None,
+    *,
+    dark: bool = False,
 ) -> None:
     """Write motions as a GIF file that plays in the time of the longest, again and again.
 
     Raises ArgumentError for a file that cannot be written.
     """
     first, duration = motions[0], _duration(motions)
-    camera, count = camera_for(first), film_length(motions)
-    pictures = []
-    for k, time in enumerate(np.linspace(first.t[0], first.t[0] + duration, count).tolist()):
-        # One table of colours for all pictures would lose the shades of the later ones.
-        pictures.append(Image.fromarray(picture_of(motions, time, camera)).quantize(128))
-        progress(k + 1)
-    stream = io.BytesIO()
-    pictures[0].save(
-        stream,
-        format="GIF",
-        save_all=True,
-        append_images=pictures[1:],
-        duration=max(20, round(1e3 * duration / max(count - 1, 1))),
-        loop=0,
-    )
-    write_bytes(path, stream.getvalue())
+    stage, count = stage_for(first, dark=dark), film_length(motions)
+
+    def pictures() -> Iterator[NDArray[np.uint8]]:
+        for k, time in enumerate(np.linspace(first.t[0], first.t[0] + duration, count).tolist()):
+            yield picture_of(motions, time, stage)
+            progress(k + 1)
+
+    write_gif(path, pictures(), duration / max(count - 1, 1))
 
 
 def _duration(motions: tuple[MotionFrames, ...]) -> float:

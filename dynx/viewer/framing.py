@@ -23,11 +23,21 @@ if TYPE_CHECKING:
 VIEW_DIRECTION = np.array([1.0, -1.0, 0.7]) / math.sqrt(2.49)
 """Unit vector (3,) from what is seen to the camera."""
 
+SHARE = 0.72
+"""Share of the picture that the boxes of the parts take at the start: what is seen of them then takes two
+thirds."""
+
 _INNER = (0.1, 0.9)
 """Shares of the places of parts along an axis between which those lie that a camera has to see."""
 
 _SIGNS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 """Directions (8, 3) from the middle of a box to its corners."""
+
+_MAX_TIMES = 60
+"""Largest number of times at which the corners of a part count."""
+
+_ROUNDING = 1e-9
+"""Distance, relative to the coordinates of points, that is a rounding error."""
 
 _UNSIZED = 0.5
 """Distance of the camera from a point [m]."""
@@ -58,17 +68,10 @@ def box_around(
     """
     if not poses:
         return np.zeros(3), np.zeros(3)
-    given = {body.name: body for body in bodies if body.name in poses}
-    # A floor may be of any size.
-    floors = {name for name, body in given.items() if body.fixed}
-    if not poses.keys() - floors:
-        floors = {name for name in floors if has_plane(given[name])}
-    poses = {name: T for name, T in poses.items() if name not in floors} or poses
-    boxes = {name: _body_box(given[name]) for name in poses if name in given and name not in floors}
-    for robot, model in (robots or {}).items():
-        boxes |= {f"{robot}/{link}": box for link, box in link_boxes(model).items()}
+    bodies = tuple(bodies)
+    boxes = _boxes(poses, bodies, robots)
     lower, upper = [], []
-    for name, T in poses.items():
+    for name, T in _moving(poses, bodies).items():
         box = boxes.get(name, _POINT)
         middle = T[:, :3, :3] @ box.middle + T[:, :3, 3]
         half = np.abs(T[:, :3, :3]) @ box.half
@@ -99,15 +102,81 @@ def has_plane(body: SceneBody) -> bool:
     return any(isinstance(placed.shape, Plane) for placed in body.shapes)
 
 
-def fitting_distance(low: Floats, high: Floats, across: float, upward: float) -> float:
-    """Return the least distance [m] from the middle of a box at which a camera in the `VIEW_DIRECTION` sees
-    all of its corners; `across` and `upward` are the tangents of half the angles that the box may take."""
+def _moving(poses: Mapping[str, Floats], bodies: Iterable[SceneBody]) -> Mapping[str, Floats]:
+    """Return the poses of the parts that count."""
+    # A floor may be of any size.
+    floors = {body.name: body for body in bodies if body.fixed and body.name in poses}
+    if not poses.keys() - floors.keys():
+        floors = {name: body for name, body in floors.items() if has_plane(body)}
+    return {name: T for name, T in poses.items() if name not in floors} or poses
+
+
+def _boxes(
+    poses: Mapping[str, Floats], bodies: Iterable[SceneBody], robots: Mapping[str, Model] | None
+) -> dict[str, PartBox]:
+    """Return the boxes of the parts that count, in their own frames."""
+    moving = _moving(poses, bodies)
+    given = {body.name: body for body in bodies if body.name in moving}
+    boxes = {name: _body_box(body) for name, body in given.items() if not has_plane(body)}
+    for robot, model in (robots or {}).items():
+        boxes |= {f"{robot}/{link}": box for link, box in link_boxes(model).items()}
+    return boxes
+
+
+def points_around(
+    poses: Mapping[str, Floats], bodies: Iterable[SceneBody] = (), robots: Mapping[str, Model] | None = None
+) -> Floats:
+    """Return points (n, 3) [m] between which a motion happens: the corners of the boxes of its parts at some
+    times, moved into the box of `box_around`, whose arguments these are."""
+    bodies = tuple(bodies)
+    low, high = box_around(poses, bodies, robots)
+    found = [np.stack([low, high])] if not poses else []
+    boxes = _boxes(poses, bodies, robots)
+    for name, T in _moving(poses, bodies).items():
+        box = boxes.get(name, _POINT)
+        some = T[np.unique(np.linspace(0, len(T) - 1, min(len(T), _MAX_TIMES)).round().astype(np.intp))]
+        corners = box.middle + box.half * _SIGNS
+        found.append((corners @ some[:, :3, :3].swapaxes(1, 2) + some[:, None, :3, 3]).reshape(-1, 3))
+    return np.clip(np.concatenate(found), low, high)
+
+
+def corners_of(low: Floats, high: Floats) -> Floats:
+    """Return the corners (8, 3) of a box."""
+    return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * _SIGNS)
+
+
+def fitted_view(points: Floats, across: float, upward: float) -> tuple[Floats, Floats]:
+    """Return eye and target (3,) [m] of the nearest camera in the `VIEW_DIRECTION` that sees all points
+    (n, 3) [m] in the middle of its picture; `across` and `upward` are the tangents of half the angles that
+    they may take. They reach the bounds of one of these angles, and of the other one alike on both sides."""
     right = np.array([-VIEW_DIRECTION[1], VIEW_DIRECTION[0], 0.0]) / math.hypot(*VIEW_DIRECTION[:2])
-    corners = 0.5 * (high - low) * _SIGNS
-    nearer = corners @ VIEW_DIRECTION
-    beside = np.abs(corners @ right) / across
-    above = np.abs(corners @ np.cross(VIEW_DIRECTION, right)) / upward
-    return float((nearer + np.maximum(beside, above)).max()) or _UNSIZED
+    axes = np.stack([right, np.cross(VIEW_DIRECTION, right), VIEW_DIRECTION])
+    x, y, z = axes @ points.T
+    centre, distance = [], []
+    for along, tangent in ((x, across), (y, upward)):
+        # At a depth of c - z a point is seen where |along - centre| <= tangent (c - z).
+        most, least = (along + tangent * z).max(), (along - tangent * z).min()
+        centre.append(0.5 * (most + least))
+        distance.append(0.5 * (most - least) / tangent)
+    nearest = float(z.max())
+    eye = np.array([*centre, max(distance)])
+    if eye[2] - nearest <= _ROUNDING * float(np.abs(points).max()):
+        eye[2] = nearest + _UNSIZED
+    target = np.array([*centre, 0.5 * (nearest + float(z.min()))])
+    return eye @ axes, target @ axes
+
+
+def tile_for(low: Floats, high: Floats) -> float:
+    """Return the edge of the tiles of the ground [m] below what stands in a box: a round length of about half
+    its diagonal."""
+    return round_length(0.5 * (float(np.linalg.norm(high - low)) or _UNSIZED))
+
+
+def ground_height(low: Floats, robots: Mapping[str, Model]) -> float:
+    """Return the height [m] of the ground that is added below what stands in a box with the lower corner
+    `low`: at its lower end, but not above the base of a robot that is fixed."""
+    fixed = any(not model.floating for model in robots.values())
+    return min(float(low[2]), 0.0) if fixed else float(low[2])
 
 
 def round_length(length: float) -> float:

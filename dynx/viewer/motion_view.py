@@ -23,7 +23,7 @@ from dynx.viewer.drawn_robot import (
     Look,
 )
 from dynx.viewer.following import FollowingCamera
-from dynx.viewer.framing import box_around, has_ground
+from dynx.viewer.framing import SHARE, box_around, has_ground, points_around
 from dynx.viewer.library import uplot
 from dynx.viewer.marks import NamedParts
 from dynx.viewer.motion import PARTED, MotionFrames, motion_separation
@@ -286,9 +286,6 @@ def _series(k: int, name: str) -> Any:
 
 _NO_PART = "none"
 
-_SHARE = 0.8
-"""Share of the picture that the motion takes at the start."""
-
 _LONGEST_ARROW = 0.3
 """Length of the largest contact force, as a share of the size of the motion."""
 
@@ -351,7 +348,7 @@ class MotionView:
         """The camera of the page."""
         self.names = NamedParts(page, self.drawn.parts, self.drawn.visuals)
         """The names of the part under the pointer and of that which was clicked."""
-        page.look_at(low, high, _SHARE)
+        page.look_at(points_around(motion.poses, motion.bodies, motion.robots), SHARE)
 
     @property
     def motions(self) -> tuple[MotionFrames, ...]:

@@ -18,7 +18,7 @@ from dynx.model.numbers import whole_number
 from dynx.spatial.scalar import Floats
 from dynx.steppers.camera import Camera
 from dynx.viewer.browser import Access, CheckedMessages, Client, is_loopback
-from dynx.viewer.framing import VIEW_DIRECTION, fitting_distance, round_length
+from dynx.viewer.framing import fitted_view, round_length
 from dynx.viewer.library import serve, silent
 
 DEFAULT_HOST = "127.0.0.1"
@@ -60,24 +60,20 @@ _NEAREST = 0.05
 
 
 class _FirstView(NamedTuple):
-    """A box that the camera sees at the start."""
+    """Points that the camera sees at the start."""
 
-    low: Floats
-    high: Floats
-    """Corners (3,) [m]."""
+    points: Floats
+    """Places (n, 3) [m]."""
     tangent: float
-    """Tangent of half the angle that the box may take."""
+    """Tangent of half the angle that they may take."""
 
-    @property
-    def target(self) -> Floats:
-        """The middle of the box (3,) [m]."""
-        return 0.5 * (self.low + self.high)
-
-    def away(self, wide: float = 1.0, high: float = 1.0) -> Floats:
-        """Return the vector (3,) [m] from the target to the camera, in a picture of which the box may take
-        the width and the height given, as shares of the height of the picture."""
-        wanted = fitting_distance(self.low, self.high, wide * self.tangent, high * self.tangent)
-        return max(wanted, _NEAREST) * VIEW_DIRECTION
+    def placed(self, wide: float = 1.0, high: float = 1.0) -> tuple[Floats, Floats]:
+        """Return eye and target (3,) [m] of the camera in a picture of which the points may take the width
+        and the height given, as shares of the height of the picture."""
+        eye, target = fitted_view(self.points, wide * self.tangent, high * self.tangent)
+        away = eye - target
+        distance = float(np.linalg.norm(away))
+        return target + max(distance, _NEAREST) / distance * away, target
 
 
 class Page:
@@ -205,13 +201,14 @@ class Page:
             "/ground", lines, _LINE_COLOUR[self.dark], thickness=1.0, thickness_units="screen"
         )
 
-    def look_at(self, low: Floats, high: Floats, share: float) -> None:
-        """Begin with a camera for which the box between two corners (3,) [m] takes a `share` of the height of
-        the picture, or of its width, and no more."""
+    def look_at(self, points: Floats, share: float) -> None:
+        """Begin with a camera for which points (n, 3) [m] take a `share` of the height of the picture, or of
+        its width, and no more."""
         tangent = share * math.tan(0.5 * self._server.initial_camera.fov)
-        self._view = view = _FirstView(low, high, tangent)
-        self._server.initial_camera.position = tuple((view.target + view.away()).tolist())
-        self._server.initial_camera.look_at = tuple(view.target.tolist())
+        self._view = _FirstView(points, tangent)
+        eye, target = self._view.placed()
+        self._server.initial_camera.position = tuple(eye.tolist())
+        self._server.initial_camera.look_at = tuple(target.tolist())
 
     def look_from(self, camera: Camera) -> None:
         """Begin with the view of a camera in the world, and turn about a point at the distance of the origin
@@ -236,10 +233,11 @@ class Page:
         camera = client.camera
         if self._view is None:
             return
-        view, target = self._view, self._view.target
-        if not (np.allclose(camera.position, target + view.away()) and np.allclose(camera.look_at, target)):
+        eye, target = self._view.placed()
+        if not (np.allclose(camera.position, eye) and np.allclose(camera.look_at, target)):
             return
-        away = view.away(camera.image_width / camera.image_height, 1.0 - _COVERED)
+        eye, target = self._view.placed(camera.image_width / camera.image_height, 1.0 - _COVERED)
+        away = eye - target
         up = np.array(camera.up_direction, dtype=np.float64)
         up -= (up @ away) / (away @ away) * away
         height = 2.0 * float(np.linalg.norm(away)) * math.tan(0.5 * camera.fov)

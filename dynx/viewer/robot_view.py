@@ -27,7 +27,7 @@ from dynx.viewer.colours import BLUE, VERMILION
 from dynx.viewer.controls import slider_step
 from dynx.viewer.drawn_robot import AS_DESCRIBED, DrawnRobot, Look, size_of, wxyz
 from dynx.viewer.following import FollowingCamera
-from dynx.viewer.framing import box_around
+from dynx.viewer.framing import SHARE, box_around, points_around
 from dynx.viewer.marks import Marks, NamedParts
 from dynx.viewer.page import Page
 from dynx.viewer.triangles import triangles_of
@@ -399,9 +399,6 @@ class Manipulability:
         self._node.position = dict(frame_poses(self._model, q))[frame][:3, 3]
 
 
-_SHARE = 0.7
-"""Share of the picture that the robot takes at the start: its joints will move it."""
-
 _FREE = {"pose": None, "position": "rotation", "rotation": "position"}
 """What the handle keeps of a frame, and what `inverse_kinematics` then leaves free."""
 
@@ -454,7 +451,7 @@ class RobotView:
         low, high = box_around(places, robots={model.name: model})
         # A humanoid whose base is its pelvis stands above the ground, too.
         page.add_ground(float(np.linalg.norm(high - low)) or size, min(float(low[2]), 0.0))
-        page.look_at(low, high, _SHARE)
+        page.look_at(points_around(places, robots={model.name: model}), SHARE)
 
     @property
     def title(self) -> str:

@@ -360,19 +360,19 @@ class Viewer(Controls):
         number of pictures drawn). Raises ArgumentError for a live world, whose motion is not known before it
         has happened, for another suffix, and for a file that cannot be written.
         """
-        from dynx.viewer.export import camera_for, picture_of, write_film, write_picture, write_recording
+        from dynx.viewer.export import picture_of, stage_for, write_film, write_picture, write_recording
 
         self.page.check_open()
         view = self.view
         suffix = os.path.splitext(checked_path(path))[1].lower()
         if suffix == ".png":
             motions = view.motions
-            camera = camera_for(motions[0], PICTURE_SIZE)
-            write_picture(path, picture_of(motions, view.time, camera))
+            stage = stage_for(motions[0], PICTURE_SIZE, dark=self.page.dark)
+            write_picture(path, picture_of(motions, view.time, stage))
         elif suffix == ".gif":
             if not view.duration:
                 raise ArgumentError("a film is made of a rollout, or of two motions; write a picture as .png")
-            write_film(path, view.motions, progress)
+            write_film(path, view.motions, progress, dark=self.page.dark)
         elif view.duration is None:
             raise ArgumentError("a live world cannot be exported; simulate it, and export the rollout")
         else:

@@ -17,7 +17,7 @@ from dynx.rbd.kinematics import link_poses
 from dynx.spatial.scalar import Floats
 from dynx.viewer.drawn_robot import AS_DESCRIBED, ContactArrows, DrawnScene, Look
 from dynx.viewer.following import FollowingCamera
-from dynx.viewer.framing import box_around, has_ground
+from dynx.viewer.framing import SHARE, box_around, has_ground, points_around
 from dynx.viewer.marks import NamedParts
 from dynx.viewer.motion import MotionFrames, fixed_bodies, motion_of_state
 from dynx.viewer.page import Page
@@ -136,9 +136,6 @@ _NO_PART = "none"
 
 _NO_PART_CHOSEN = "choose the part that is pushed"
 
-_SHARE = 0.6
-"""Share of the picture that what can move takes at the start."""
-
 _LOADS = ("forces", "motors", "torques")
 
 LoadsOf = Callable[[World], Mapping[str, Any]]
@@ -193,7 +190,7 @@ class WorldView:
         if steps:
             self._spring.hold_by_pointer({name: self.drawn.visuals[name] for name in moving})
         self.draw()
-        page.look_at(low, high, _SHARE)
+        page.look_at(points_around(seen, scene.bodies, robots), SHARE)
         page.at_end(self._running.set)
         if steps:
             self._thread = threading.Thread(target=self._run, name="dynx world", daemon=True)

@@ -1,16 +1,18 @@
 """Pictures of scenes by rays through the shapes of every part at its pose, the same for every engine.
 
-Shapes are shaded by a lamp beside the camera. A picture has colour, depth and segmentation, and PNG files.
+Shapes are lit by the `Scenery`, with shadows, and planes are tiled. A picture has colour, depth and
+segmentation, and PNG files.
 """
 
 from __future__ import annotations
 
+import math
 import os
 import struct
 import zlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +20,7 @@ from numpy.typing import NDArray
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.files.reading import checked_path
 from dynx.files.writing import write_bytes
-from dynx.model.geometry import HeightField, Mesh, Shape
+from dynx.model.geometry import Box, HeightField, Mesh, Plane, Shape
 from dynx.model.geometry.links import link_shapes
 from dynx.model.geometry.ray_casting import cast_on_shape
 from dynx.rbd.kinematics import link_poses
@@ -28,6 +30,7 @@ from dynx.steppers.camera import Camera, Draw, Drawing, DrawnShape
 from dynx.steppers.state import WorldState
 from dynx.world.boxes import shape_box
 from dynx.world.scene import Scene
+from dynx.world.scenery import GAMMA, KEY_DIRECTION, LIGHT, TILE, Scenery, tiles
 
 DEPTH_UNIT = 1e-3
 """Length [m] of one step of the grey values in a PNG file of depths."""
@@ -105,6 +108,15 @@ MAX_PAIRS = 1_000_000
 PIXEL_MARGIN = 1e-6
 """Distance [pixels] from a triangle in the picture within which rounding may place a pixel's centre."""
 
+_FACE_MARGIN = 1e-9
+"""Share by which faces of a box are larger, so that rounding leaves no pixel between two of them."""
+
+_COINCIDENT = 0.005
+"""Share of its depth by which a ghost has to be nearer than a shape, to be seen before it."""
+
+_SMOOTH = math.cos(math.radians(12.0))
+"""Cosine of the angle between normals above which the rays of a pixel see one surface."""
+
 Whole = NDArray[np.intp]
 
 
@@ -130,18 +142,64 @@ class DepthBuffer:
             vertices, faces = shape.triangles if isinstance(shape, Mesh) else shape.triangles()
             self._draw_triangles(number, vertices @ T[:3, :3].T + T[:3, 3], faces)
             return
+        if isinstance(shape, Plane):
+            self._draw_plane(number, T[:3, 2], float(T[:3, 2] @ T[:3, 3]))
+            return
         low, high = shape_box(shape, T)
         first, last = self._window(low[None], high[None])
         columns, rows = (np.arange(first[0, k], last[0, k] + 1) for k in range(2))
         if not len(columns) or not len(rows):
             return
         pixels = (rows[:, None] * self._camera.size[0] + columns).ravel()
-        rays = self._rays(pixels)
+        if isinstance(shape, Box):
+            self._draw_box(number, 0.5 * np.array(shape.size), T, columns, rows, pixels)
+            return
+        rays = self.rays(pixels)
         start = self._camera.near * rays
         distance, normal = cast_on_shape(shape, T, start, rays)
         self._keep(number, pixels, distance + self._camera.near, normal)
 
-    def _rays(self, pixels: Whole) -> Floats:
+    def _draw_box(
+        self, number: int, half: Floats, T: Floats, columns: Whole, rows: Whole, pixels: Whole
+    ) -> None:
+        """Draw the faces of a box with half its edges (3,) that can be seen in the pixels of some rows and
+        columns: those that face the eye, unless it is near enough to look inside."""
+        x, y, R, p = self._x[columns], self._y[rows], T[:3, :3], T[:3, 3]
+        eye = -R.T @ p
+        clear = float(np.linalg.norm(np.maximum(np.abs(eye) - half, 0.0)))
+        outside = clear > self._camera.near * math.sqrt(1.0 + self._x[0] ** 2 + self._y[0] ** 2)
+        # Products of the axes of the box with the rays, by row and column.
+        along = [axis[0] * x + (axis[1] * y + axis[2])[:, None] for axis in R.T]
+        for k, side in ((k, side) for k in range(3) for side in (-1.0, 1.0)):
+            if outside and side * eye[k] <= half[k]:
+                continue
+            with np.errstate(divide="ignore", invalid="ignore"):
+                depth = (side * half[k] - eye[k]) / along[k]
+                inside = depth >= self._camera.near
+                for j in {0, 1, 2} - {k}:
+                    inside &= np.abs(depth * along[j] + eye[j]) <= half[j] * (1.0 + _FACE_MARGIN)
+            found = np.flatnonzero(inside)
+            normal = np.broadcast_to(side * R[:, k], (len(found), 3))
+            self._keep(number, pixels[found], depth.ravel()[found], normal)
+
+    def _draw_plane(self, number: int, normal: Floats, offset: float) -> None:
+        """Draw the plane of the points whose product with a unit normal is `offset` [m]."""
+        slope = normal[0] * self._x + (normal[1] * self._y + normal[2])[:, None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            depth = np.where(slope != 0.0, offset / slope, np.inf).ravel()
+        pixels = np.flatnonzero(depth >= self._camera.near)
+        self._keep(number, pixels, depth[pixels], np.broadcast_to(normal, (len(pixels), 3)))
+
+    def lay_over(self, other: DepthBuffer, first: int) -> None:
+        """Show what another buffer of the same camera sees where it is clearly nearer.
+
+        Its numbers are counted from `first`."""
+        nearer = np.flatnonzero(other.depth < (1.0 - _COINCIDENT) * self.depth)
+        self.depth[nearer], self.normal[nearer] = other.depth[nearer], other.normal[nearer]
+        self.number[nearer] = first + other.number[nearer]
+
+    def rays(self, pixels: Whole) -> Floats:
+        """Return the rays (n, 3) through the centres of pixels (n,), with z = 1."""
         width = self._camera.size[0]
         return np.stack([self._x[pixels % width], self._y[pixels // width], np.ones(len(pixels))], axis=1)
 
@@ -233,25 +291,180 @@ class DepthBuffer:
         self.number[chosen] = number
 
 
-BACKGROUND = (0.85, 0.9, 0.95)
-"""Colour of pixels in which nothing is seen."""
+SHADOW_SIDES = (160, 512)
+"""Least and largest width and height of the picture from the key light, in which shadows are looked up
+[pixels]: half of those of the picture, because edges of shadows are soft."""
 
-AMBIENT = 0.35
-"""Share of the light that does not depend on the direction of a surface."""
+_LIGHT_DISTANCE = 12.0
+"""Distance of the eye of that picture, in radii of the ball around what casts shadows; the key light itself
+is infinitely far away."""
 
-LAMP = np.array([-0.36, -0.48, -0.8])
-"""Unit vector (3,) towards the lamp, above and to the left of the camera, in the axes of the camera."""
+_SOFTNESS = 0.006
+"""Radius of the light around an edge of a shadow, in radii of that ball."""
+
+_SOFT_STEPS = np.array([[x, y] for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)])
+"""Places (9, 2) around a point at which its shadow is looked up, in units of the softness."""
 
 
-def cast_rays(shapes: Sequence[DrawnShape], T_world_camera: Floats, camera: Camera) -> Drawing:
-    """Draw shapes by the rays through the centres of pixels."""
+def cast_rays(
+    shapes: Sequence[DrawnShape],
+    T_world_camera: Floats,
+    camera: Camera,
+    scenery: Scenery = LIGHT,
+    tile: float = TILE,
+) -> Drawing:
+    """Draw shapes by the rays through the centres of pixels; planes have tiles with edges of `tile` [m]."""
+    buffer = _buffer_of(shapes, T_world_camera, camera)
+    shading = _Shading(shapes, shapes, T_world_camera, camera, scenery, tile)
+    colours = shading.colours(buffer, np.arange(len(buffer.depth)))
+    return Drawing(_bytes(colours), buffer.depth, buffer.number)
+
+
+def cast_rays_smoothly(
+    shapes: Sequence[DrawnShape],
+    T_world_camera: Floats,
+    camera: Camera,
+    scenery: Scenery = LIGHT,
+    tile: float = TILE,
+    ghosts: Sequence[DrawnShape] = (),
+) -> Drawing:
+    """Draw shapes as `cast_rays` does, with the mean colour of four rays in pixels at edges, which are not
+    jagged then.
+
+    `ghosts` cast no shadow, and are seen only where they are clearly nearer than the shapes; their numbers
+    follow those of the shapes. Depth and number are those of the first of the four rays, a quarter of a pixel
+    from the centre.
+    """
+    width, height = camera.size
+    fine = replace(camera, size=(2 * width, 2 * height))
+    buffer = _buffer_of(shapes, T_world_camera, fine)
+    if ghosts:
+        buffer.lay_over(_buffer_of(ghosts, T_world_camera, fine), len(shapes))
+    every = np.arange(4 * width * height).reshape(height, 2, width, 2).swapaxes(1, 2).reshape(-1, 4)
+    first = every[:, 0]
+    edge = (buffer.number[every] != buffer.number[first, None]).any(axis=1)
+    flat = np.array([*(isinstance(each.shape, Plane) for each in (*shapes, *ghosts)), True])
+    curved = np.flatnonzero(~edge & ~flat[buffer.number[first]])
+    normals = buffer.normal[every[curved]]
+    size = np.linalg.norm(normals, axis=2)
+    bend = np.einsum("ij,ikj->ik", normals[:, 0], normals[:, 1:])
+    edge[curved] = (bend < _SMOOTH * size[:, :1] * size[:, 1:]).any(axis=1)
+    shading = _Shading([*shapes, *ghosts], shapes, T_world_camera, fine, scenery, tile)
+    colours = np.empty((len(every), 3))
+    colours[~edge] = shading.colours(buffer, first[~edge])
+    colours[edge] = shading.colours(buffer, every[edge].ravel()).reshape(-1, 4, 3).mean(axis=1)
+    return Drawing(_bytes(colours), buffer.depth[first], buffer.number[first])
+
+
+def _bytes(colours: Floats) -> NDArray[np.uint8]:
+    return np.asarray(np.rint(255.0 * colours), dtype=np.uint8)
+
+
+def _buffer_of(shapes: Sequence[DrawnShape], T_world_camera: Floats, camera: Camera) -> DepthBuffer:
     T_camera_world = np.asarray(inverse(T_world_camera))
     buffer = DepthBuffer(camera)
     for number, each in enumerate(shapes):
         buffer.draw(number, each.shape, T_camera_world @ each.T)
-    colours = np.array([BACKGROUND, *(each.rgba[:3] for each in shapes)])[buffer.number + 1]
-    rgb = np.rint(255.0 * colours * _light(buffer, camera)[:, None]).astype(np.uint8)
-    return Drawing(rgb, buffer.depth, buffer.number)
+    return buffer
+
+
+class _Shading(NamedTuple):
+    """What the colours of pixels depend on, beside the shapes that are seen in them."""
+
+    shapes: Sequence[DrawnShape]
+    casters: Sequence[DrawnShape]
+    """Those that cast shadows; planes do not."""
+    T_world_camera: Floats
+    camera: Camera
+    scenery: Scenery
+    tile: float
+
+    def colours(self, buffer: DepthBuffer, pixels: Whole) -> Floats:
+        """Return the colours (n, 3) of pixels (n,), from 0 to 1."""
+        if not len(pixels):
+            return np.zeros((0, 3))
+        rays = buffer.rays(pixels)
+        unit = rays @ self.T_world_camera[:3, :3].T / np.linalg.norm(rays, axis=1)[:, None]
+        seen = np.flatnonzero(buffer.number[pixels] >= 0)
+        colours = self.scenery.sky(unit)
+        if len(seen):
+            pixels, rays, unit = pixels[seen], rays[seen], unit[seen]
+            R, origin = self.T_world_camera[:3, :3], self.T_world_camera[:3, 3]
+            points = origin + (buffer.depth[pixels, None] * rays) @ R.T
+            normal = buffer.normal[pixels] @ R.T
+            away = np.einsum("ij,ij->i", normal, unit)
+            length = np.linalg.norm(normal, axis=1)
+            # Of the side that is seen; zero for a triangle without an area.
+            normal *= (np.where(away > 0.0, -1.0, 1.0) / np.where(length > 0.0, length, 1.0))[:, None]
+            pixel = buffer.depth[pixels] / self.camera.focal_length
+            colours[seen] = self._surfaces(buffer.number[pixels], points, normal, unit, pixel)
+        return colours
+
+    def _surfaces(self, number: Whole, points: Floats, normal: Floats, rays: Floats, pixel: Floats) -> Floats:
+        """Return the colours (n, 3) of points (n, 3) of shapes by their `number` (n,), with the unit normals
+        and the unit rays (n, 3) by which they are seen, and the extent of a pixel there (n,) [m]."""
+        colours = np.array([each.rgba[:3] for each in self.shapes])[number]
+        planes = [k for k, each in enumerate(self.shapes) if isinstance(each.shape, Plane)]
+        slopes = {}
+        for k in planes:
+            on = np.flatnonzero(number == k)
+            slope = np.abs(np.einsum("ij,ij->i", normal[on], rays[on]))
+            slopes[k] = on, slope
+            T = self.shapes[k].T
+            local = (points[on] - T[:3, 3]) @ T[:3, :2]
+            colours[on] *= tiles(local, self.tile, pixel[on] / np.maximum(slope, 1e-6))[:, None]
+        colours = np.minimum(colours, 1.0)
+        casters = [each for each in self.casters if not isinstance(each.shape, Plane)]
+        side = int(np.clip(max(self.camera.size) // 2, *SHADOW_SIDES))
+        colours *= self.scenery.light(normal, _unshadowed(casters, points, normal, side))[:, None] ** (
+            1.0 / GAMMA
+        )
+        for on, slope in slopes.values():
+            colours[on] = self.scenery.haze(colours[on], slope)
+        return np.asarray(np.clip(colours, 0.0, 1.0))
+
+
+def _unshadowed(shapes: Sequence[DrawnShape], points: Floats, normal: Floats, side: int) -> Floats:
+    """Return the share (n,) of the key light that reaches points (n, 3) of surfaces past the shapes: 1 in the
+    light, 0 in the shadow, between them at its edge."""
+    lit = np.ones(len(points))
+    if not shapes:
+        return lit
+    corners = np.array([shape_box(each.shape, each.T) for each in shapes])
+    low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
+    middle, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
+    if not 0.0 < radius < np.inf:
+        return lit
+    angle = 2.0 * math.asin(1.0 / _LIGHT_DISTANCE)
+    reach = _LIGHT_DISTANCE * radius
+    light = Camera.look_at(
+        middle + reach * KEY_DIRECTION,
+        middle,
+        field_of_view=1.02 * angle,
+        size=(side, side),
+        near=0.5 * reach,
+        far=2.0 * reach,
+    )
+    T_light_world = np.asarray(inverse(light.pose.matrix))
+    buffer = DepthBuffer(light)
+    for k, each in enumerate(shapes):
+        buffer.draw(k, each.shape, T_light_world @ each.T)
+    texel = reach / light.focal_length
+    facing = np.flatnonzero(normal @ KEY_DIRECTION > 0.0)
+    # Away from the surface, which would else lie in the shadow of itself.
+    x, y, z = (
+        T_light_world[:3, :3] @ (points[facing] + 2.0 * texel * normal[facing]).T + T_light_world[:3, 3:]
+    )
+    soft = max(1.0, _SOFTNESS * radius / texel)
+    share = np.zeros(len(facing))
+    for across, upward in soft * _SOFT_STEPS:
+        column = np.floor(light.focal_length * x / z + 0.5 * side + across).astype(np.intp)
+        row = np.floor(light.focal_length * y / z + 0.5 * side + upward).astype(np.intp)
+        inside = (column >= 0) & (column < side) & (row >= 0) & (row < side)
+        pixels = np.where(inside, row * side + column, 0)
+        share += ~inside | (z <= buffer.depth[pixels] + 2.0 * texel * soft)
+    lit[facing] = share / len(_SOFT_STEPS)
+    return lit
 
 
 def draw_picture(scene: Scene, state: WorldState, camera: Camera, draw: Draw = cast_rays) -> Picture:
@@ -301,14 +514,3 @@ def drawn_shapes(scene: Scene, frames: dict[str, Floats]) -> Iterator[DrawnShape
     for body in scene.bodies:
         for shape, rgba, T in body.drawn_shapes():
             yield DrawnShape(number[body.name], shape, rgba, frames[body.name] @ T)
-
-
-def _light(buffer: DepthBuffer, camera: Camera) -> Floats:
-    """Return the brightness of each pixel: largest where the visible side of the surface faces the lamp."""
-    columns, rows = camera.rays()
-    x, y = np.meshgrid(columns, rows)
-    normal = buffer.normal
-    along = normal[:, 0] * x.ravel() + normal[:, 1] * y.ravel() + normal[:, 2]
-    length = np.linalg.norm(normal, axis=1)
-    facing = np.where(along > 0.0, -1.0, 1.0) * (normal @ LAMP) / np.where(length > 0.0, length, 1.0)
-    return np.where(buffer.number >= 0, AMBIENT + (1.0 - AMBIENT) * np.maximum(facing, 0.0), 1.0)

@@ -4,22 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import dynx
-from dynx.model.geometry import Box, Sphere
+from dynx.model import Pose
+from dynx.model.geometry import Box, Plane, Sphere
 from dynx.model.geometry.links import link_shapes
 from dynx.rbd.kinematics import link_poses
 from dynx.spatial.scalar import Floats
 from dynx.steppers.camera import Camera
 from dynx.viewer import view
 from dynx.viewer.drawn_robot import GHOST_SIZE
-from dynx.viewer.framing import VIEW_DIRECTION, box_around, fitting_distance, has_ground, round_length
+from dynx.viewer.export import stage_for
+from dynx.viewer.framing import VIEW_DIRECTION, box_around, fitted_view, has_ground, round_length
+from dynx.viewer.motion import motion_of_robot, motion_of_state
 from dynx.viewer.triangles import resized, triangles_of
-from dynx.world import World
-from dynx.world.scene import box, ground, read_scene
-from tests.conftest import needs_examples
+from dynx.world import Scene, World
+from dynx.world.camera import cast_rays, drawn_shapes
+from dynx.world.scene import SceneRobot, box, ground, read_scene
+from tests.conftest import EXAMPLES_INSTALLED, needs_examples
 
 
 def along_x(x: Floats) -> Floats:
@@ -84,18 +88,52 @@ def test_a_mesh_that_cannot_be_read_leaves_a_link_its_origin() -> None:
     assert np.array_equal([low, high], [[1.0, 0.0, 0.0]] * 2)
 
 
-@given(st.lists(st.floats(1e-3, 1e3), min_size=3, max_size=3), st.floats(0.1, 2.0), st.floats(0.1, 2.0))
-def test_a_camera_at_the_fitting_distance_sees_the_corners_and_one_at_the_edge(
-    size: list[float], across: float, upward: float
+POINTS = st.lists(st.tuples(*[st.floats(-100.0, 100.0)] * 3), min_size=2, max_size=12)
+
+
+@given(POINTS, st.floats(0.1, 2.0), st.floats(0.1, 2.0))
+def test_a_fitted_camera_sees_the_points_in_the_middle_up_to_one_edge(
+    places: list[tuple[float, float, float]], across: float, upward: float
 ) -> None:
-    half = 0.5 * np.array(size)
-    eye = fitting_distance(-half, half, across, upward) * VIEW_DIRECTION
-    camera = np.linalg.inv(Camera.look_at(eye, np.zeros(3)).pose.matrix)
-    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-    x, y, depth = camera[:3, :3] @ (signs * half).T + camera[:3, 3:]
-    shares = np.maximum(np.abs(x / depth) / across, np.abs(y / depth) / upward)
-    assert shares.max() == pytest.approx(1.0, rel=1e-9)
-    assert (depth > 0.0).all()
+    points = np.array(places)
+    across_view = points - np.outer(points @ VIEW_DIRECTION, VIEW_DIRECTION)
+    assume(np.ptp(across_view, axis=0).max() > 1e-2)
+    camera = np.linalg.inv(Camera.look_at(*fitted_view(points, across, upward)).pose.matrix)
+    x, y, depth = camera[:3, :3] @ points.T + camera[:3, 3:]
+    size = float(depth.max())
+    assert (depth > -1e-9 * size).all()
+    # How far each point is inside each edge of the picture, times its depth.
+    sides = [across * depth - x, across * depth + x, upward * depth - y, upward * depth + y]
+    left, right, top, bottom = (float(side.min()) for side in sides)
+    assert min(left, right, top, bottom) >= -1e-6 * size
+    assert left == pytest.approx(right, abs=1e-6 * size)
+    assert top == pytest.approx(bottom, abs=1e-6 * size)
+    # Points behind each other are seen from a distance at which they do not reach the edges.
+    assert min(left, top) <= 1e-6 * size or depth.min() == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("name", ["panda", "solo12", "row"])
+def test_what_an_exported_picture_shows_fills_two_thirds_of_it(name: str) -> None:
+    if name == "row":
+        cubes = tuple(
+            box(f"cube{k}", (0.2, 0.2, 0.2), mass=1.0, pose=Pose((0.5 * k, 0.0, 0.1))) for k in range(40)
+        )
+        with World(Scene(bodies=(ground(), *cubes))) as world:
+            motion = motion_of_state(world.scene, world.state)
+    else:
+        if not EXAMPLES_INSTALLED:
+            pytest.skip("needs example-robot-data")
+        model = dynx.load(name)
+        motion = motion_of_robot(model, model.neutral())
+    stage = stage_for(motion, (160, 120))
+    scene = Scene(bodies=motion.bodies, robots=[SceneRobot(n, m) for n, m in motion.robots.items()])
+    shapes = [each for each in drawn_shapes(scene, motion.at(0)) if not isinstance(each.shape, Plane)]
+    seen = cast_rays(shapes, stage.camera.pose.matrix, stage.camera).number.reshape(120, 160) >= 0
+    rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
+    shares = (np.ptp(rows) + 1) / 120, (np.ptp(columns) + 1) / 160
+    assert 0.55 < max(shares) <= 0.75
+    for pixels, side in ((rows, 120), (columns, 160)):
+        assert abs(0.5 * (pixels[0] + pixels[-1] + 1) / side - 0.5) < 0.1
 
 
 @given(st.floats(1e-6, 1e6))
@@ -106,8 +144,8 @@ def test_round_lengths_are_not_greater_and_not_much_smaller(length: float) -> No
 
 
 def test_what_has_no_size_is_seen_from_a_distance() -> None:
-    point = np.ones(3)
-    assert fitting_distance(point, point, 1.0, 1.0) > 0.1
+    eye, target = fitted_view(np.ones((1, 3)), 1.0, 1.0)
+    assert np.linalg.norm(eye - target) > 0.1
     with dynx.load('<robot name="r"><link name="base"/></robot>').view() as viewer:
         camera = viewer.page.server.initial_camera
         assert np.linalg.norm(np.subtract(camera.position, camera.look_at)) > 0.1

@@ -1,0 +1,99 @@
+"""`Scenery`: lights, sky and ground, which are the same in pages, pictures, films and cameras of worlds.
+
+One key light from above shines on every scene, beside the light of the sky and of the ground. Light is
+neutral, so that a surface keeps its hue. Its amounts are linear; colours are those of files and screens,
+whose values grow with the power 1 / `GAMMA` of the light.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from dynx.spatial.scalar import Floats
+
+GAMMA = 2.2
+"""Exponent between the values of a colour and its light."""
+
+KEY_DIRECTION: Floats = np.array([0.2, -0.7, 1.0]) / math.sqrt(1.53)
+"""Unit vector (3,) towards the key light, in world axes."""
+
+FILL_DIRECTION: Floats = np.array([0.8, 0.4, 0.3]) / math.sqrt(0.89)
+"""Unit vector (3,) towards a weak light without shadows, which shapes what the key light does not reach."""
+
+TILE = 1.0
+"""Edge of the tiles of a plane [m], where the size of the scene does not choose another."""
+
+SUBTILES = 5
+"""Number of small tiles along a tile."""
+
+TILE_CONTRAST, SUBTILE_CONTRAST = 0.075, 0.025
+"""Shares by which tiles are lighter or darker than the colour of their plane."""
+
+_HAZE = 0.12
+"""Sine of the angle between a ray and a plane below which the plane vanishes in the colour of the horizon."""
+
+Colour = tuple[float, float, float]
+
+
+class Scenery(NamedTuple):
+    """Colours from 0 to 1 and amounts of light; a white surface that gets the light 1 is white."""
+
+    zenith: Colour
+    horizon: Colour
+    ground: Colour
+    """Colour of a ground that is added to a scene without one."""
+    key: float
+    """Light of the key light on a surface that faces it."""
+    fill: float
+    sky_light: float
+    """Light on a surface that faces upwards, also in the shadow."""
+    ground_light: float
+    """Light on a surface that faces downwards."""
+
+    def light(self, normal: Floats, lit: Floats) -> Floats:
+        """Return the light (n,) on surfaces with unit normals (n, 3), whose share `lit` (n,) from 0 to 1 is
+        not in the shadow of the key light."""
+        upward = 0.5 + 0.5 * normal[:, 2]
+        ambient = self.ground_light + (self.sky_light - self.ground_light) * upward
+        key, fill = (np.maximum(normal @ towards, 0.0) for towards in (KEY_DIRECTION, FILL_DIRECTION))
+        return np.asarray(ambient + self.key * key * lit + self.fill * fill, dtype=np.float64)
+
+    def sky(self, rays: Floats) -> Floats:
+        """Return the colours (n, 3) in the directions of unit vectors (n, 3): of the sky above the horizon,
+        of haze below it."""
+        height = rays[:, 2:]
+        horizon, zenith, ground = (np.array(each) for each in (self.horizon, self.zenith, self.ground))
+        above = horizon + (zenith - horizon) * np.clip(height / 0.6, 0.0, 1.0)
+        below = horizon + 0.6 * (ground - horizon) * np.clip(-height / 0.6, 0.0, 1.0)
+        return np.asarray(np.where(height >= 0.0, above, below), dtype=np.float64)
+
+    def haze(self, colours: Floats, slope: Floats) -> Floats:
+        """Return the colours (n, 3) of planes that rays meet at angles with the sines `slope` (n,): far away
+        they become that of the horizon."""
+        share = np.clip(slope / _HAZE, 0.0, 1.0)[:, None]
+        return np.asarray(np.array(self.horizon) + share * (colours - np.array(self.horizon)))
+
+
+LIGHT = Scenery((0.50, 0.67, 0.86), (0.90, 0.93, 0.96), (0.66, 0.69, 0.72), 0.60, 0.10, 0.36, 0.15)
+DARK = Scenery((0.06, 0.08, 0.11), (0.17, 0.19, 0.22), (0.26, 0.28, 0.31), 0.60, 0.10, 0.34, 0.15)
+
+
+def tiles(points: Floats, tile: float, pixel: Floats) -> Floats:
+    """Return the factor (n,) of the colour of a plane at points (n, 2) [m] in its own axes.
+
+    Light and dark tiles of two sizes alternate. Tiles fade out where they are not much larger than a `pixel`
+    (n,), whose extent on the plane is given [m].
+    """
+    factor = np.ones(len(points))
+    for edge, contrast in ((tile, TILE_CONTRAST), (tile / SUBTILES, SUBTILE_CONTRAST)):
+        place = points / edge
+        within = place % 1.0
+        # From -1 to 1, and between them at the edges of tiles, over the width of a pixel.
+        waves = np.clip(2.0 * np.minimum(within, 1.0 - within) * (edge / pixel)[:, None], 0.0, 1.0)
+        waves *= np.where(place % 2.0 < 1.0, 1.0, -1.0)
+        seen = np.clip((edge / pixel - 2.0) / 6.0, 0.0, 1.0)
+        factor += contrast * seen * waves[:, 0] * waves[:, 1]
+    return factor
