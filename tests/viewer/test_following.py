@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
 import io
 import math
 import time
 from collections import deque
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import SimpleNamespace
 from typing import Any
 
@@ -95,7 +94,9 @@ class DelayedCamera:
         for view in self._to_server.popleft():
             self._state = SimpleNamespace(position=view[0], look_at=view[1])
             for callback in self._heard:
-                asyncio.run(callback(self))
+                # It waits for nothing; a loop of events may run already, where a browser is open.
+                with suppress(StopIteration):
+                    callback(self).send(None)
 
 
 ORANGE = Material(rgba=(1.0, 0.4, 0.0, 1.0))
