@@ -12,6 +12,7 @@ ROOT = Path(__file__).parents[2]
 IDEAS = {
     "random numbers": r"random\.(Philox|SeedSequence)\(",
     "noise of measurements": r"^class Noise\b",
+    "lights, sky and ground of pictures": r"^class Scenery\b",
     "recorded motion": r"^class Record\b",
     "snapshot": r"^class Snapshot\b",
     "distance of two motions": r"^class Separation\b",
