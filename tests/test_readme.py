@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import os
 import re
 import shlex
 import subprocess
 import sys
+from contextlib import redirect_stdout
 from pathlib import Path
 from types import ModuleType
 
@@ -26,6 +28,13 @@ README = PAGES["README.md"]
 def blocks(language: str, text: str = README) -> list[str]:
     """Return the fenced blocks of one language, in order."""
     return re.findall(rf"^```{language}\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
+
+
+def programs(text: str) -> list[tuple[str, str]]:
+    """(program, output shown) of every Python block: the block of text that follows it at once, if any."""
+    return re.findall(
+        r"^```python\n(.*?)^```$(?:\n\n```text\n(.*?)^```$)?", text, flags=re.MULTILINE | re.DOTALL
+    )
 
 
 def section(heading: str) -> str:
@@ -49,8 +58,18 @@ def shape(line: str) -> str:
     return re.sub(r"\s+", " ", re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "#", line)).strip()
 
 
+def check_output(printed: str, shown: str) -> None:
+    """Check that each line shown was printed, but for its numbers."""
+    lines = {shape(line) for line in printed.splitlines()}
+    for line in shown.splitlines():
+        if shape(line) not in ("", "..."):
+            assert shape(line) in lines, f"not printed any more: {line}\n{printed}"
+
+
 @pytest.mark.parametrize("page", [page for page, text in PAGES.items() if blocks("python", text)])
-def test_python_blocks_run_in_order(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_python_blocks_run_in_order_and_print_what_is_shown(
+    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     if page == "reinforcement_learning.md":
         pytest.importorskip("stable_baselines3", reason="needs the extra train")
     monkeypatch.chdir(tmp_path)
@@ -64,8 +83,10 @@ def test_python_blocks_run_in_order(page: str, tmp_path: Path, monkeypatch: pyte
     module = ModuleType("page")
     monkeypatch.setitem(sys.modules, "page", module)
     try:
-        for block in blocks("python", PAGES[page]):
-            exec(compile(block, page, "exec", dont_inherit=True), module.__dict__)
+        for program, shown in programs(PAGES[page]):
+            with redirect_stdout(io.StringIO()) as printed:
+                exec(compile(program, page, "exec", dont_inherit=True), module.__dict__)
+            check_output(printed.getvalue(), shown)
     finally:
         for (names, unregister), known in zip(registries, before, strict=True):
             for name in set(names()) - known:
@@ -99,10 +120,7 @@ def test_console_blocks_print_what_is_shown(command: str, shown: str) -> None:
     )
     # The doctor's answer on a robot on which engines differ is no.
     assert result.returncode == (1 if words[1] == "doctor" else 0), result.stderr
-    printed = {shape(line) for line in result.stdout.splitlines()}
-    for line in shown.splitlines():
-        if shape(line) not in ("", "..."):
-            assert shape(line) in printed, f"not printed any more: {line}\n{result.stdout}"
+    check_output(result.stdout, shown)
 
 
 @pytest.mark.parametrize("heading", ["Quick start", "Run the tests"])
