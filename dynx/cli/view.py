@@ -14,6 +14,7 @@ from dynx.cli.shell.exits import DONE, interruptible, one_line
 from dynx.cli.shell.inputs import Numbers, configuration
 from dynx.cli.shell.output import check_writable, console, progress_bar, simulated_time_bar
 from dynx.errors import ArgumentError, DynxError, RobotNotFoundError, nearest, shown
+from dynx.files.films import WRITERS
 from dynx.files.reading import irregularity
 from dynx.model import Model
 from dynx.model.elements import Joint
@@ -109,7 +110,7 @@ def view(
 def _export(viewer: Viewer, path: str) -> None:
     from dynx.viewer.export import film_length
 
-    film = path.lower().endswith(".gif") and viewer.view.duration
+    film = os.path.splitext(path)[1].lower() in WRITERS and viewer.view.duration
     total = film_length(viewer.view.motions) if film else 0
     with progress_bar(total, words="pictures", enabled=total > 0) as advance:
         viewer.export(path, lambda done: advance(done, "pictures"))

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import io
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dynx.errors import ArgumentError, shown
+from dynx.files.films import write_pictures
 from dynx.files.reading import checked_path
 from dynx.files.writing import write_bytes
 from dynx.model import Model
@@ -33,7 +33,6 @@ from dynx.viewer.framing import (
     points_around,
     tile_for,
 )
-from dynx.viewer.library import Image
 from dynx.viewer.motion import MotionFrames
 from dynx.viewer.page import Page
 from dynx.world.camera import cast_rays_smoothly, png_bytes
@@ -123,10 +122,8 @@ def write_film(
     *,
     dark: bool = False,
 ) -> None:
-    """Write motions as a GIF file that plays in the time of the longest, again and again.
-
-    Raises ArgumentError for a file that cannot be written.
-    """
+    """Write motions as a film that plays in the time of the longest, by the suffix of the file (`.gif`, which
+    begins again, or `.mp4`). Raises the errors of `write_pictures`."""
     first, duration = motions[0], _duration(motions)
     stage, count = stage_for(first, dark=dark), film_length(motions)
 
@@ -135,7 +132,7 @@ def write_film(
             yield picture_of(motions, time, stage)
             progress(k + 1)
 
-    write_gif(path, pictures(), duration / max(count - 1, 1))
+    write_pictures(path, pictures(), duration / max(count - 1, 1))
 
 
 def _duration(motions: tuple[MotionFrames, ...]) -> float:
@@ -170,34 +167,6 @@ def _sticks(model: Model) -> Iterator[tuple[str, Shape, Colour, Floats]]:
             yield joint.parent, Cylinder(_STICK_RADIUS * size_of(model), length), _OPAQUE_GREY, T
 
 
-COLOURS = 128
-"""Number of colours of a picture of a film."""
-
-SHORTEST = 20
-"""Shortest time between two pictures that browsers keep to [ms]."""
-
-
-def write_gif(path: str | os.PathLike[str], pictures: Iterable[NDArray[np.uint8]], period: float) -> None:
-    """Write pictures (height, width, 3) as a GIF file that shows one every `period` [s], again and again.
-
-    Raises ArgumentError without a picture, and for a file that cannot be written.
-    """
-    # One table of colours for all pictures would lose the shades of the later ones.
-    drawn = [Image.fromarray(each).quantize(COLOURS) for each in pictures]
-    if not drawn:
-        raise ArgumentError("a film needs a picture; there is none")
-    stream = io.BytesIO()
-    drawn[0].save(
-        stream,
-        format="GIF",
-        save_all=True,
-        append_images=drawn[1:],
-        duration=max(SHORTEST, round(1e3 * period)),
-        loop=0,
-    )
-    write_bytes(path, stream.getvalue())
-
-
 UPDATES_PER_SECOND = 30.0
 """Rate at which the recorded page moves."""
 
@@ -217,7 +186,7 @@ def write_recording(
     ArgumentError for a file that cannot be written.
     """
     if not checked_path(path).lower().endswith((".html", ".htm")):
-        wanted = "wanted .html (a page), .gif (a film) or .png (a picture)"
+        wanted = "wanted .html (a page), .gif or .mp4 (a film) or .png (a picture)"
         raise ArgumentError(f"{shown(os.path.basename(path))} has no suffix of a page; {wanted}")
     with page.lock:
         show(0.0)

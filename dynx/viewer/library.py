@@ -1,5 +1,5 @@
-"""Imports of viser (the page), rich (its prints), fast-simplification (meshes) and Pillow (films), and the
-start of viser's server."""
+"""Imports of viser (the page), rich (its prints) and fast-simplification (meshes), and the start of viser's
+server."""
 
 from __future__ import annotations
 
@@ -21,14 +21,12 @@ with importing("the viewer needs viser: pip install 'dynx[viewer]' ({error})"):
     import viser._messages
     from fast_simplification import __version__ as SIMPLIFY_VERSION
     from fast_simplification import simplify
-    from PIL import Image
     from viser import uplot
 
 __all__ = [
     "CLIENT",
     "HOTKEYS",
     "SIMPLIFY_VERSION",
-    "Image",
     "send_view",
     "serve",
     "silent",

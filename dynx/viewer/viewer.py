@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, nearest, shown
+from dynx.files.films import WRITERS
 from dynx.files.reading import checked_path
 from dynx.model import Model
 from dynx.model.loading import load
@@ -355,10 +356,11 @@ class Viewer(Controls):
     ) -> None:
         """Write what is shown to a file, by its suffix.
 
-        ``.html`` shows the robot, or plays the motion, without a server and without a network; ``.gif`` is a
-        film of a motion, and ``.png`` a picture, both drawn without a browser (`progress` is called with the
-        number of pictures drawn). Raises ArgumentError for a live world, whose motion is not known before it
-        has happened, for another suffix, and for a file that cannot be written.
+        ``.html`` shows the robot, or plays the motion, without a server and without a network; ``.gif`` and
+        ``.mp4`` (extra ``film``) are films of a motion, and ``.png`` a picture, drawn without a browser
+        (`progress` is called with the number of pictures drawn). Raises ArgumentError for a live world, whose
+        motion is not known before it has happened, for another suffix, and for a file that cannot be written;
+        NotInstalledError without the package that writes the film.
         """
         from dynx.viewer.export import picture_of, stage_for, write_film, write_picture, write_recording
 
@@ -369,7 +371,7 @@ class Viewer(Controls):
             motions = view.motions
             stage = stage_for(motions[0], PICTURE_SIZE, dark=self.page.dark)
             write_picture(path, picture_of(motions, view.time, stage))
-        elif suffix == ".gif":
+        elif suffix in WRITERS:
             if not view.duration:
                 raise ArgumentError("a film is made of a rollout, or of two motions; write a picture as .png")
             write_film(path, view.motions, progress, dark=self.page.dark)

@@ -32,7 +32,7 @@ SUFFIX = ".world"
 _OTHER_SUFFIXES: dict[tuple[str, ...], str] = {
     (".toml", ".json"): "; dynx.world.write_scene writes a scene to .toml and .json",
     (".npz", ".mcap", ".csv"): "; Rollout.save writes the record of a simulation to .npz, .mcap and .csv",
-    (".html", ".png", ".gif"): "; World.view(...).export writes pages and pictures to .html, .png and .gif",
+    (".html", ".png", ".gif", ".mp4"): "; World.view(...).export writes pages and pictures to .html and .png",
 }
 MAX_STATE = 1 << 28
 """Largest file that is read [bytes]; a world of a thousand bodies takes under 2 MiB."""

@@ -23,7 +23,6 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import rotation_from_rpy
 from dynx.viewer import Viewer
 from dynx.viewer.following import _BEFORE
-from dynx.viewer.library import Image
 from dynx.world import World
 from dynx.world.scene import Material, Scene, SceneBody, SceneRobot, ground
 from tests.viewer.conftest import PICTURE, OpenPage, connected, until
@@ -214,7 +213,8 @@ def test_first_person_looks_out_of_what_is_fixed_to_the_link(viewer: Viewer) -> 
 def silhouette(page: Any) -> Floats:
     """Return the middle (2,) and the size (2,) of the orange cube in a picture, as shares of its width; zeros
     where it is not seen."""
-    rgb = np.asarray(Image.open(io.BytesIO(page.screenshot())).convert("RGB"), dtype=np.int16)
+    pillow = pytest.importorskip("PIL.Image")
+    rgb = np.asarray(pillow.open(io.BytesIO(page.screenshot())).convert("RGB"), dtype=np.int16)
     rows, columns = np.nonzero((rgb[..., 0] > 100) & (rgb[..., 0] - rgb[..., 2] > 80))
     if not len(rows):
         return np.zeros(4)

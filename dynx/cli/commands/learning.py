@@ -275,7 +275,9 @@ def train() -> None:
         is_flag=True,
         help="Page in the browser with the episodes, their numbers and controls; on one engine or two.",
     ),
-    click.option("--export", "export_path", metavar="FILE", help="Film of an episode, as .gif."),
+    click.option(
+        "--export", "export_path", metavar="FILE", help="Film of an episode, as .gif or .mp4 (extra film)."
+    ),
     json_option,
     quiet_option,
 )
@@ -296,5 +298,5 @@ def play() -> None:
       dynx play lander/final.zip --engine mujoco,pybullet --episodes 100
       dynx play lander/final.zip --view
       dynx play lander/final.zip --view --engine mujoco,pybullet
-      dynx play lander/final.zip --export lander.gif
+      dynx play lander/final.zip --export lander.mp4
     """

@@ -284,8 +284,8 @@ def compare() -> None:
         "--export",
         "export_path",
         metavar="FILE",
-        help="Write a file and end: .html plays without a server and without a network, .gif is a film, "
-        ".png a picture, both drawn without a browser.",
+        help="Write a file and end: .html plays without a server and without a network, .gif and .mp4 "
+        "(extra film) are films, .png is a picture, drawn without a browser.",
     ),
     silent_option,
 )
@@ -305,7 +305,7 @@ def view() -> None:
     Examples:
       dynx view panda
       dynx view run.npz --shapes panda --export run.html
-      dynx view run.npz --export run.gif
+      dynx view run.npz --export run.mp4
       dynx view stack --engine mujoco
       dynx view --compare a.npz b.npz
       dynx view --compare stack --engine pybullet,mujoco

@@ -17,10 +17,10 @@ from dynx.cli.shell.output import Entry, check_json, check_writable, console, co
 from dynx.cli.shell.tables import Table
 from dynx.envs.registration import is_of_dynx, task_id
 from dynx.errors import ArgumentError
+from dynx.files.films import film_suffix, write_pictures
 from dynx.training import Evaluation, Policy, TaskSpec, judge, load_policy, make
 from dynx.training.file_tasks import task_of_file
 from dynx.training.policy import read_policy_document
-from dynx.viewer.export import write_gif
 
 DEFAULT_EPISODES = 10
 
@@ -133,8 +133,7 @@ def _film(
     policy: Policy, task: TaskSpec, episodes: int, seed: int, deterministic: bool, path: str, quiet: bool
 ) -> int:
     check_writable(path)
-    if not path.lower().endswith(".gif"):
-        raise ArgumentError(f"{one_line(path)}: a film is written as .gif")
+    film_suffix(path)
     pictures: list[Any] = []
     with interruptible(), closing(make(task, "rgb_array")) as env:
         rate = float(env.metadata.get("render_fps") or PICTURES_PER_SECOND)
@@ -147,7 +146,7 @@ def _film(
 
         for k in range(episodes):
             _episode(policy, env, seed + k, deterministic, draw)
-    write_gif(path, pictures, skip / rate)
+    write_pictures(path, pictures, skip / rate)
     if not quiet:
         console().print(f"wrote {one_line(path)}")
     return DONE
