@@ -63,7 +63,7 @@ def test_poses_are_solved_in_kernels() -> None:
 def test_paths_are_followed_in_kernels() -> None:
     finished = run("benchmarks.kinematics.tracking", "z1", "--paths", "2")
     assert finished.returncode == 0, finished.stdout + finished.stderr
-    assert finished.stdout.splitlines()[-1].startswith("| z1 | 100 / 0 / 0 / 0 | 2 |")
+    assert finished.stdout.splitlines()[-1].startswith("| z1 | 100 / 0 / 0 / 0 / 0 | 2 |")
 
 
 def test_obstacles_are_avoided() -> None:

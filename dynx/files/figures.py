@@ -27,15 +27,16 @@ def new_figure(width: float, height: float) -> Any:
     return _notebook_figure(Figure)(figsize=(width, height), layout="constrained")
 
 
-@cache
 def _matplotlib() -> Any:
     """Import matplotlib, whose settings do not depend on the folder that a program is called in."""
     is_first = "matplotlib" not in sys.modules
     with importing("a plot needs matplotlib: pip install 'dynx[plot]'"):
         import matplotlib.figure
+    if not is_first:
+        return matplotlib
     read = Path(matplotlib.matplotlib_fname())
     own = Path(matplotlib.get_configdir())
-    if is_first and read.resolve().parent == Path.cwd() != own.resolve():
+    if read.resolve().parent == Path.cwd() != own.resolve():
         # A file of the current folder comes first; those that come next are the user's own, and the default.
         candidates = (os.environ.get("MATPLOTLIBRC", ""), str(own))
         files = [os.path.join(each, "matplotlibrc") if os.path.isdir(each) else each for each in candidates]
