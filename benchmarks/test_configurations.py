@@ -22,7 +22,7 @@ ROUNDS = 300
 
 
 @pytest.mark.parametrize("function", ["integrate", "difference"])
-@pytest.mark.parametrize("robot", ["ur5", "panda", "anymal", "talos"])
+@pytest.mark.parametrize("robot", ["ur5", "xarm7", "anymal", "talos"])
 def test_one_configuration(benchmark: BenchmarkFixture, robot: str, function: str) -> None:
     model = dynx.load(robot, base="floating" if robot in ("anymal", "talos") else "fixed")
     engine, _ = engine_model(model)
