@@ -45,6 +45,35 @@ _NO_LIFELINE = -1
 """In place of a pipe where a child inherits none, as on Windows."""
 
 
+class Lifeline:
+    """A pipe by which a child process learns that this one has ended, however it ended.
+
+    Start the child with `pass_fds` and the number `inherited`, let it call `end_with_parent`, and call
+    `release` once it has started, `close` once it has ended.
+    """
+
+    def __init__(self) -> None:
+        self.inherited, self._held = (_NO_LIFELINE, _NO_LIFELINE) if os.name == "nt" else os.pipe()
+
+    @property
+    def pass_fds(self) -> tuple[int, ...]:
+        """The files that the child inherits."""
+        return () if self.inherited == _NO_LIFELINE else (self.inherited,)
+
+    def release(self) -> None:
+        """Close the end that the child has inherited."""
+        if self.inherited != _NO_LIFELINE:
+            os.close(self.inherited)
+            self.inherited = _NO_LIFELINE
+
+    def close(self) -> None:
+        """Close both ends: the child ends, if it has not."""
+        self.release()
+        if self._held != _NO_LIFELINE:
+            os.close(self._held)
+            self._held = _NO_LIFELINE
+
+
 class EngineCrash(EngineError):
     """An engine ended the process it ran in."""
 
@@ -207,18 +236,17 @@ class _Worker:
         # Each worker uses one thread for linear algebra, because matrices are small and there are many
         # workers.
         environment = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **os.environ}
-        inherited, self._lifeline = (_NO_LIFELINE, _NO_LIFELINE) if os.name == "nt" else os.pipe()
+        self._lifeline = Lifeline()
         self._process = subprocess.Popen(
-            [sys.executable, "-c", _START, str(inherited), *sys.path],
+            [sys.executable, "-c", _START, str(self._lifeline.inherited), *sys.path],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=environment,
-            pass_fds=() if inherited == _NO_LIFELINE else (inherited,),
+            pass_fds=self._lifeline.pass_fds,
             start_new_session=True,
             creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
         )
-        if inherited != _NO_LIFELINE:
-            os.close(inherited)
+        self._lifeline.release()
         self._target = target
         self._has_target = False
         self._expired = False
@@ -270,8 +298,7 @@ class _Worker:
         assert self._process.stdout is not None
         self._process.kill()
         self._process.wait()
-        if self._lifeline != _NO_LIFELINE:
-            os.close(self._lifeline)
+        self._lifeline.close()
         self._process.stdout.close()
         # Closing a pipe flushes it. That fails if the ended process has not read all data, but the pipe is
         # closed.
@@ -288,8 +315,7 @@ class _Worker:
 def serve(lifeline: int = _NO_LIFELINE) -> None:
     """Run in the child: read the target, confirm it, and compute tasks from standard input until it is
     closed. `lifeline` is the pipe whose other end only the parent holds."""
-    if lifeline != _NO_LIFELINE:
-        _end_with_parent(lifeline)
+    end_with_parent(lifeline)
     replies = os.fdopen(os.dup(1), "wb")
     _silence()
     requests = sys.stdin.buffer
@@ -308,8 +334,11 @@ def serve(lifeline: int = _NO_LIFELINE) -> None:
         send(_reply(target, task))
 
 
-def _end_with_parent(lifeline: int) -> None:
-    """End this process when the other end of a pipe is closed: when its parent has ended."""
+def end_with_parent(lifeline: int) -> None:
+    """End this process when its parent has ended. `lifeline` is the number that a `Lifeline` names, in the
+    child."""
+    if lifeline == _NO_LIFELINE:
+        return
 
     def wait() -> None:
         os.read(lifeline, 1)

@@ -4,8 +4,8 @@ xacro evaluates expressions of the file with Python's ``eval``, reads the files 
 terminal, and finds packages by a function that only ROS provides. It therefore runs in a child process, which
 can be terminated and in which that function can be replaced without affecting the process that uses dynx:
 ``$(find NAME)`` searches around the file as the search for meshes does. The child imports nothing from the
-current directory, and its time, memory and output are bounded. That protects against mistakes, not against
-malice: expand only files that you trust.
+current directory, ends with the process that uses dynx, and its time, memory and output are bounded. That
+protects against mistakes, not against malice: expand only files that you trust.
 """
 
 from __future__ import annotations
@@ -19,12 +19,13 @@ import sys
 import sysconfig
 import threading
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
 
 from dynx.errors import DescriptionError, NotInstalledError, escaped, nearest, shown
 from dynx.files.reading import MAX_BYTES, irregularity, printable, read_file
 from dynx.model.package_search import StrPath, environment_folders, find_package, package_of
+from dynx.workers import Lifeline
 
 TIMEOUT = 20.0
 """Longest duration of an expansion [s]."""
@@ -49,6 +50,8 @@ spec = spec_from_file_location("dynx", task["dynx"])
 sys.modules["dynx"] = module_from_spec(spec)
 spec.loader.exec_module(sys.modules["dynx"])
 from dynx.model.xacro_reading import expand_here
+from dynx.workers import end_with_parent
+end_with_parent(int(sys.argv[2]))
 expand_here(task["file"], task["roots"], task["arguments"])
 """
 
@@ -108,7 +111,8 @@ def _import_path() -> list[str]:
 
 
 def _reply(command: list[str]) -> tuple[bytes | None, int]:
-    """Return what a process writes, None if it takes too long, and its exit code."""
+    """Return what a process writes, None if it takes too long, and its exit code. A lifeline is its last
+    argument."""
     expired = threading.Event()
 
     def expire() -> None:
@@ -117,14 +121,20 @@ def _reply(command: list[str]) -> tuple[bytes | None, int]:
 
     # Linear algebra reserves memory for each of its threads, and expansion needs none.
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    with subprocess.Popen(
-        command,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        env=environment,
-        start_new_session=True,
-    ) as process:
+    lifeline = Lifeline()
+    with (
+        closing(lifeline),
+        subprocess.Popen(
+            [*command, str(lifeline.inherited)],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            env=environment,
+            pass_fds=lifeline.pass_fds,
+            start_new_session=True,
+        ) as process,
+    ):
+        lifeline.release()
         assert process.stdout is not None
         timer = threading.Timer(TIMEOUT, expire)
         timer.daemon = True

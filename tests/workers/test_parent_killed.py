@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import ctypes
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,8 @@ import pytest
 from dynx.workers import Workers
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="processes are looked up in /proc")
+
+ROOT = Path(__file__).parents[2]
 
 LONG = 120
 """Time that a task takes [s], if nothing ends it."""
@@ -51,7 +55,11 @@ def until(condition: Any, most: float = 30.0) -> bool:
     return True
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+KILLING = [signal.SIGTERM, signal.SIGKILL, signal.SIGHUP]
+"""What ends a command: a polite kill, a plain one, and a terminal that closes."""
+
+
+@pytest.mark.parametrize("number", KILLING)
 def test_workers_end_with_a_killed_command(number: signal.Signals, tmp_path: Path) -> None:
     files = {name: tmp_path / name for name in ("sleep", "hold_the_lock")}
     program = (
@@ -64,9 +72,8 @@ def test_workers_end_with_a_killed_command(number: signal.Signals, tmp_path: Pat
         f"threading.Thread(target=run, args=(sleep, {str(files['sleep'])!r}), daemon=True).start()\n"
         f"run(hold_the_lock, {str(files['hold_the_lock'])!r})\n"
     )
-    root = Path(__file__).parents[2]
-    environment = {**os.environ, "PYTHONPATH": str(root)}
-    command = subprocess.Popen([sys.executable, "-c", program], cwd=root, env=environment)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    command = subprocess.Popen([sys.executable, "-c", program], cwd=ROOT, env=environment)
     workers: list[int] = []
     try:
         for file in files.values():
@@ -80,6 +87,81 @@ def test_workers_end_with_a_killed_command(number: signal.Signals, tmp_path: Pat
         command.kill()
         for worker in filter(lives, workers):
             os.kill(worker, signal.SIGKILL)
+
+
+def children(process: int) -> list[int]:
+    """Return the numbers of the processes that a process started."""
+    found = []
+    for entry in os.listdir("/proc"):
+        if entry.isdigit():
+            with suppress(FileNotFoundError, ProcessLookupError):
+                fields = Path(f"/proc/{entry}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+                if int(fields[1]) == process and fields[0] != "Z":
+                    found.append(int(entry))
+    return found
+
+
+ENDLESS = (
+    '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+    '<xacro:property name="n" value="${max(range(10**12))}"/><link name="base${n}"/></robot>'
+)
+"""A file whose expansion counts for hours, in one call that holds the interpreter's lock."""
+
+COMMANDS: dict[str, list[str]] = {
+    "doctor": ["doctor", "ur5", "--jobs", "1"],
+    "agree": ["agree", "ur5", "--jobs", "1"],
+    "contacts": ["contacts", "--jobs", "1"],
+    "xacro": ["id", "endless.xacro"],
+}
+"""A command for each module that starts processes."""
+
+
+def starters() -> set[str]:
+    """Return the modules of dynx that start processes, by their text."""
+    return {
+        path.relative_to(ROOT).as_posix()
+        for path in (ROOT / "dynx").rglob("*.py")
+        if re.search(
+            r"\b(Workers|Popen|Pool|Process)\(|subprocess\.run\(|os\.fork\(", path.read_text("utf-8")
+        )
+    }
+
+
+def test_no_other_module_starts_processes() -> None:
+    assert starters() == {
+        "dynx/workers.py",
+        "dynx/cli/shell/run.py",  # doctor and agree
+        "dynx/contacts/run.py",
+        "dynx/model/xacro_reading.py",
+    }
+
+
+@pytest.mark.parametrize("number", KILLING)
+@pytest.mark.parametrize("name", COMMANDS)
+def test_no_process_outlives_a_killed_command(name: str, number: signal.Signals, tmp_path: Path) -> None:
+    if name == "xacro":
+        pytest.importorskip("xacro")
+    (tmp_path / "endless.xacro").write_text(ENDLESS, encoding="utf-8")
+    line = [sys.executable, "-P", "-m", "dynx", *COMMANDS[name]]
+    quiet = subprocess.DEVNULL
+    command = subprocess.Popen(
+        line, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, stdout=quiet, stderr=quiet
+    )
+    started: list[int] = []
+    try:
+        assert until(lambda: children(command.pid) or command.poll() is not None)
+        started += children(command.pid)
+        assert started, "the command ended without a process of its own"
+        time.sleep(0.5)  # some of them have begun their work by then
+        started += children(command.pid)
+        command.send_signal(number)
+        command.wait()
+        assert until(lambda: not any(map(lives, started)))
+    finally:
+        command.kill()
+        command.wait()
+        for process in filter(lives, started):
+            os.kill(process, signal.SIGKILL)
 
 
 def test_closed_workers_leave_no_file_open() -> None:
