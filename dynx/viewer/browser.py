@@ -372,6 +372,57 @@ _NAMES_ON_HOVER = (
 """
 )
 
+FOLLOWED = "dynx-followed"
+"""Identifier of the element that holds what the camera follows, as JSON."""
+
+# Poses and views that a program sends come in different messages, of which the page may draw one before the
+# other. So the page itself shifts its camera, in each picture, by as much as the part has moved.
+_FOLLOWING = (
+    f"const FOLLOWED = {json.dumps(FOLLOWED)};"
+    + """
+  let followed = null, first = true, last = null;
+  const shift = (camera) => {
+    const page = window.__viserMutable, controls = page.cameraControl;
+    const source = document.getElementById(FOLLOWED)?.dataset.followed;
+    if (source === undefined || controls?.camera !== camera) return;
+    const wanted = JSON.parse(source);
+    const world = page.nodeRefFromName[""], node = page.nodeRefFromName[wanted.path];
+    if (wanted.number !== followed) {
+      if (wanted.number && !(world && node)) return;
+      followed = wanted.number;
+      // A page that is opened later begins with the view of the start.
+      const origin = first ? wanted.start : wanted.origin;
+      last = wanted.number ? world.localToWorld(camera.position.clone().fromArray(origin)) : null;
+    }
+    first = false;
+    if (last === null || !node) return;
+    const place = camera.position.clone().setFromMatrixPosition(node.matrixWorld);
+    const moved = place.clone().sub(last);
+    if (moved.lengthSq() === 0) return;
+    last = place;
+    const target = controls.getTarget(camera.position.clone(), true).add(moved);
+    controls.moveTo(target.x, target.y, target.z, false);
+    camera.position.add(moved);
+    camera.updateMatrixWorld();
+  };
+  setInterval(() => {
+    const scene = window.__viserMutable?.scene;
+    if (!scene || scene.dynxFollows) return;
+    scene.dynxFollows = true;
+    scene.onBeforeRender = (renderer, drawn, camera) => shift(camera);
+  }, 100);
+"""
+)
+
+
+def followed_element(number: int, path: str, origin: Sequence[float], start: Sequence[float]) -> str:
+    """Return the HTML element by which the page knows what its camera follows: the node at a path, whose
+    origin (3,) [m] it has in the views of the pages that are open, and had at the `start`. Each change has
+    another `number`; with 0 the camera follows nothing."""
+    given = {"number": number, "path": path, "origin": list(origin), "start": list(start)}
+    data = escape(json.dumps(given), quote=True)
+    return f'<div id="{FOLLOWED}" style="display: none" data-followed="{data}"></div>'
+
 
 class Client:
     """A folder with the page, for the time of a server."""
@@ -381,7 +432,7 @@ class Client:
         self._kept = ExitStack()
         self.folder = self._kept.enter_context(temporary_folder("dynx-page-"))
         """The folder that is served."""
-        script = _PRESSES + _NAMES_ON_HOVER if antialiasing else _FOR_SOFTWARE + _PRESSES + _NAMES_ON_HOVER
+        script = ("" if antialiasing else _FOR_SOFTWARE) + _PRESSES + _NAMES_ON_HOVER + _FOLLOWING
         policy = ContentPolicy("'self' data: blob:")
         self.headers = tuple(policy.headers([HANDLER_HASH]))
         """Headers with which the page is served."""

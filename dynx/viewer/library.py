@@ -10,15 +10,12 @@ from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import rich
 
 from dynx.errors import NotInstalledError, importing
-from dynx.spatial.scalar import Floats
 
 with importing("the viewer needs viser: pip install 'dynx[viewer]' ({error})"):
     import viser
-    import viser._messages
     from fast_simplification import __version__ as SIMPLIFY_VERSION
     from fast_simplification import simplify
     from viser import uplot
@@ -27,7 +24,6 @@ __all__ = [
     "CLIENT",
     "HOTKEYS",
     "SIMPLIFY_VERSION",
-    "send_view",
     "serve",
     "silent",
     "simplify",
@@ -117,17 +113,3 @@ def serve(
             )
         started.append(server)
         return server
-
-
-def send_view(client: Any, position: Floats, target: Floats) -> None:
-    """Send a page the position (3,) of its camera and the target (3,) that it looks at [m].
-
-    viser's own properties send nothing where the page reported nearly the same before, which may be seconds
-    old, and mix what is sent with a report that arrives meanwhile.
-    """
-    send, messages = client._websock_connection.queue_message, viser._messages
-    with client.atomic():
-        send(messages.SetCameraPositionMessage(tuple(position.tolist())))
-        send(messages.SetCameraLookAtMessage(tuple(target.tolist())))
-    state = client.camera._state
-    state.position, state.look_at = np.array(position), np.array(target)

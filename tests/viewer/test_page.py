@@ -226,11 +226,12 @@ def test_the_camera_moves_with_a_part(open_page: OpenPage) -> None:
         (client,) = connected(viewer)
         part = model.links[0].name
         before, distance = client.camera.position, np.array([0.4, -0.3, 0.2])
+        page.page.wait_for_timeout(PICTURE)
         viewer.follow(part)
         q = model.neutral()
         q[:3] += distance
         viewer.update(q)
-        assert np.allclose(client.camera.position - before, distance, atol=1e-9)
+        until(lambda: np.allclose(client.camera.position - before, distance, atol=1e-4), "the camera to move")
         viewer.follow(part, first_person=True)
         ahead = client.camera.position - distance
         assert np.allclose(ahead[1:], 0.0, atol=1e-9)
