@@ -184,15 +184,22 @@ TABLES = {"PyBullet": PYBULLET, "Pinocchio": PINOCCHIO, "MuJoCo": MUJOCO, "Drake
 
 def call_of_dynx(name: str) -> str | None:
     """Return a clause with the call of dynx for the name that an engine has; None for another name."""
+    spelling = _spelling(name)
     for library, table in TABLES.items():
-        if name in table:
-            return f"; for {name} of {library} dynx has {table[name]}"
+        for known, call in table.items():
+            if _spelling(known) == spelling:
+                return f"; for {known} of {library} dynx has {call}"
     for quantity in QUANTITIES.values():
         for library, other in quantity.other_names.items():
-            if name == other:
+            if _spelling(other) == spelling:
                 call = f"Backend.{quantity.name}({', '.join(quantity.arguments)})"
-                return f"; for {name} of {library} dynx has {call}"
+                return f"; for {other} of {library} dynx has {call}"
     return None
+
+
+def _spelling(name: str) -> str:
+    """Return a name as it is in all ways of writing: ``step_simulation`` is ``stepSimulation``."""
+    return name.replace("_", "").lower()
 
 
 def explained(subject: str, name: str, known: Iterable[str]) -> str:

@@ -52,13 +52,18 @@ def right_name(wrong: str, known: Iterable[str], renamed: Mapping[str, str]) -> 
     return f"; it is now {renamed[wrong]}" if wrong in renamed else nearest(wrong, known)
 
 
-def as_object(given: object, kind: str) -> str:
-    """Make the clause of an error about a mapping that is given for objects of the class `kind`: its first
-    entry as such an object."""
+def as_object(given: object, kind: str, fields: Iterable[str] = ()) -> str:
+    """Make the clause of an error about a mapping that is given for objects of the class `kind`: a mapping of
+    its `fields` as such an object, else its first entry."""
     if not isinstance(given, Mapping) or not given:
         return ""
-    name, value = next(iter(given.items()))
-    return f", such as {kind}({shown(name)}, {escaped(value)})"
+    written = {
+        name: shown(value) if isinstance(value, str) else escaped(value) for name, value in given.items()
+    }
+    if {*given} <= {*fields}:
+        return f", such as {kind}({', '.join(f'{name}={value}' for name, value in written.items())})"
+    name, value = next(iter(written.items()))
+    return f", such as {kind}({shown(name)}, {value})"
 
 
 def refuse_options(

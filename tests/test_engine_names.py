@@ -140,3 +140,11 @@ def test_objects_are_copied_as_before(again: Callable[[Any], Any]) -> None:
     assert again(model) == model
     with dynx.backend("reference", model) as engine:
         assert again(engine).model == model
+
+
+@given(st.sampled_from(NAMES))
+def test_a_name_written_with_underscores_is_the_same(name: str) -> None:
+    """`getContactPoints` is typed as `get_contact_points` by who expects Python's way."""
+    snake = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
+    assert call_of_dynx(snake) is not None
+    assert call_of_dynx(f"{name}x") is None

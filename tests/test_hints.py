@@ -69,6 +69,22 @@ HINTS: dict[str, tuple[Callable[[], object], str]] = {
         lambda: untyped.simulate(ARM, None, ARM.neutral(), duration=0.1, payload={"tool0": 2.5}),
         r"wanted a Payload, or a list of them, such as Payload\('tool0', 2.5\)",
     ),
+    "a payload by its fields": (
+        lambda: untyped.simulate(
+            ARM, None, ARM.neutral(), duration=0.1, payload={"frame": "tool0", "mass": 2.5}
+        ),
+        r"such as Payload\(frame='tool0', mass=2.5\)",
+    ),
+    "an empty payload": (
+        lambda: untyped.simulate(ARM, None, ARM.neutral(), duration=0.1, payload={}),
+        "payload is '{}'; wanted a Payload, or a list of them",
+    ),
+    "pushes by their fields": (
+        lambda: untyped.simulate(
+            ARM, None, ARM.neutral(), duration=0.1, pushes={"on": "tool0", "wrench": [0] * 6}
+        ),
+        r"such as ExternalForce\(on='tool0', wrench=\[0, 0, 0, 0, 0, 0\]\)",
+    ),
     "pushes by frame": (
         lambda: untyped.simulate(
             ARM, None, ARM.neutral(), duration=0.1, pushes={"tool0": [1, 0, 0, 0, 0, 0]}

@@ -116,6 +116,23 @@ def in_data_package(name: str) -> Path | None:
     return None
 
 
+def hint_of_data_package(name: str) -> str:
+    """Return a clause with the URDF files of packages of data whose file or folder is called `name`, else
+    with the nearest names; empty without one."""
+    word = name.removesuffix(".urdf")
+    files = [
+        path.relative_to(folder).as_posix()
+        for folder in data_folders()
+        for depth in ("*", "*/*", "*/*/*")
+        for path in sorted(folder.glob(f"{depth}.urdf"))
+    ]
+    same = [each for each in files if word in (Path(each).stem, Path(each).parent.name)]
+    if same:
+        return f"; did you mean {' or '.join(map(shown, same[:3]))}?"
+    near = nearest(word, [each.removesuffix(".urdf") for each in files])
+    return near if "?" in near else ""
+
+
 def find(name: str) -> Path:
     """Return the path of the description of a robot, by its name or an alias, else by the name without suffix
     of a file in a package of data (`in_data_package`).
@@ -132,6 +149,9 @@ def find(name: str) -> Path:
         if found is not None:
             return found
         hint = nearest(name, by_name) or "; the library is empty: is example-robot-data installed?"
+        of_data = hint_of_data_package(name) if re.fullmatch(r"[\w-]+", name) else ""
+        if of_data and (".urdf" in of_data or "?" not in hint):
+            hint = of_data
         raise RobotNotFoundError(f"no robot {shown(name)} in the library, and no such file{hint}") from None
 
 

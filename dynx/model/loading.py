@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from dynx.errors import ArgumentError, DescriptionError, RobotNotFoundError, nearest, shown
 from dynx.files.reading import printable, read_file
 from dynx.model.elements import IDENTITY, Pose
-from dynx.model.library import find, in_data_package, robots
+from dynx.model.library import find, hint_of_data_package, in_data_package, robots
 from dynx.model.model import Model
 from dynx.model.package_search import StrPath, data_folders, environment_folders, resolve_package
 from dynx.model.tree import STANDARD_GRAVITY, Base
@@ -153,7 +153,7 @@ def _path_of(x: StrPath, package_dirs: Iterable[StrPath]) -> str:
                 return str(elsewhere)
             known = [entry.name for entry in robots()]
             stem = PurePath(x).stem
-            hint = f"; the library has {shown(stem)}" if stem in known else ""
+            hint = f"; the library has {shown(stem)}" if stem in known else hint_of_data_package(x)
             raise RobotNotFoundError(f"no such file: {shown(x, 300)}{hint}")
         return path
     try:

@@ -233,6 +233,25 @@ def test_other_paths_are_none_of_pybullet_data(
         load(name)
 
 
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [
+        ("minitaur", "did you mean 'quadruped/minitaur.urdf'"),
+        ("minitaur.urdf", "did you mean 'quadruped/minitaur.urdf'"),
+        ("kuka_iiwa", "'kuka_iiwa/model.urdf'"),
+        ("plain.urdf", "did you mean 'plane'"),
+        ("cartpol", "did you mean 'cart_pole'"),
+    ],
+)
+def test_a_name_near_a_file_of_pybullet_data_names_it(
+    name: str, hint: str, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(RobotNotFoundError) as error:
+        load(name)
+    assert hint in str(error.value)
+
+
 @pytest.mark.parametrize("name", ["plane.urdf", "kuka_iiwa/model", "kuka_iiwa/model.urdf", "../r2d2"])
 def test_a_name_of_the_library_is_no_path(name: str, data: Path) -> None:
     """A file of a policy may name a robot that `find` knows, and no file beside it."""

@@ -24,7 +24,7 @@ from types import FrameType
 
 import click
 
-from dynx.errors import DynxError, TemporaryFolderError, traceback_wanted
+from dynx.errors import DynxError, TemporaryFolderError, nearest, shown, traceback_wanted
 
 DONE, NEGATIVE_RESULT, BAD_INPUT, DEFECT, NOT_WRITTEN, INTERRUPTED, PIPE_CLOSED = 0, 1, 2, 70, 74, 130, 141
 
@@ -108,7 +108,7 @@ def report_failure(error: BaseException, command: str) -> int:
         return BAD_INPUT
     if isinstance(error, click.UsageError):
         where = command if error.ctx is None else error.ctx.command_path
-        complain(f"{error.format_message()} (see '{where} --help')")
+        complain(f"{_usage_message(error)} (see '{where} --help')")
         return BAD_INPUT
     if isinstance(error, click.ClickException):
         complain(error.format_message())
@@ -126,6 +126,23 @@ def report_failure(error: BaseException, command: str) -> int:
     hint = "" if traceback_wanted() else "; dynx --traceback COMMAND shows where"
     complain(f"defect of dynx, not of your input: {type(error).__name__}: {error}{hint}")
     return DEFECT
+
+
+def _usage_message(error: click.UsageError) -> str:
+    """Return the message of an error of usage, for an unknown option with the nearest of the command."""
+    if not isinstance(error, click.NoSuchOption) or error.ctx is None:
+        return error.format_message()
+    options = [
+        name
+        for each in error.ctx.command.params
+        if isinstance(each, click.Option) and not each.hidden
+        for name in (*each.opts, *each.secondary_opts)
+    ]
+    # Without dashes, which all options share.
+    near = nearest(error.option_name.lstrip("-"), [each.lstrip("-") for each in options])
+    found = [name for name in options if f"'{name.lstrip('-')}'" in near] if "?" in near else []
+    clause = f"; did you mean {' or '.join(found)}?" if found else ""
+    return f"no option {shown(error.option_name)}{clause}"
 
 
 def _discard_output() -> None:

@@ -29,9 +29,17 @@ class LazyGroup(click.Group):
     They are listed with the help of the table, so that listing imports none of them.
     """
 
-    def __init__(self, *args: Any, table: Mapping[str, LazyCommand] | None = None, **extra: Any) -> None:
+    def __init__(
+        self,
+        *args: Any,
+        table: Mapping[str, LazyCommand] | None = None,
+        synonyms: Mapping[str, str] | None = None,
+        **extra: Any,
+    ) -> None:
+        """`synonyms` are words that are no commands, with the command that errors name for them."""
         super().__init__(*args, **extra)
         self.table = dict(table or {})
+        self.synonyms = dict(synonyms or {})
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names of the commands: the table in its order, then those that were added by name."""
@@ -52,7 +60,11 @@ class LazyGroup(click.Group):
         Raises UsageError, which names the nearest command, where there is none.
         """
         if args and self.get_command(ctx, args[0]) is None and not args[0].startswith("-"):
-            ctx.fail(f"no command {shown(args[0])}{nearest(args[0], self.list_commands(ctx))}")
+            word = args[0].lower().replace("_", "-")
+            near = nearest(args[0], self.list_commands(ctx))
+            if self.synonyms.get(word) is not None:
+                near = f"; did you mean {shown(self.synonyms[word])}?"
+            ctx.fail(f"no command {shown(args[0])}{near}")
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -44,6 +44,25 @@ COMMANDS = {
 }
 """The commands of dynx in the order of the list, each with its line there."""
 
+SYNONYMS = {
+    "compute-torque": "id",
+    "diagnose": "doctor",
+    "evaluate": "play",
+    "fix": "doctor",
+    "forward-dynamics": "fd",
+    "forward-kinematics": "fk",
+    "inverse-dynamics": "id",
+    "inverse-kinematics": "ik",
+    "list": "robots",
+    "mass-matrix": "mass",
+    "rules": "explain",
+    "simulate": "sim",
+    "show": "view",
+    "torque": "id",
+    "visualize": "view",
+}
+"""Words of the field, and names of functions of dynx, for commands."""
+
 
 class CommandLine(LazyGroup):
     """The group of commands, which turns every error into one line and an exit code."""
@@ -91,6 +110,7 @@ def _show_traceback(ctx: click.Context, option: click.Parameter, wanted: bool) -
 @click.group(
     cls=CommandLine,
     table=COMMANDS,
+    synonyms=SYNONYMS,
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
     epilog="""

@@ -10,6 +10,7 @@ The command line shows its help by this module, so it imports NumPy and the rest
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, fields, replace
@@ -185,8 +186,9 @@ class Parts(Kind):
             raise ArgumentError(f"{name} is None; wanted {self.values}")
         given = () if value is None else value
         parts = tuple(given) if isinstance(given, Iterable) else (given,)
-        if not all(isinstance(each, known) for each in parts):
-            clause = as_object(given, self.part_class.__name__)
+        if isinstance(given, Mapping) or not all(isinstance(each, known) for each in parts):
+            part = self.part_class
+            clause = as_object(given, part.__name__, inspect.signature(part).parameters)
             raise ArgumentError(f"{name} is {shown(given)}; wanted {self.values}{clause}")
         return parts
 

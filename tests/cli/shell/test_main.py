@@ -12,7 +12,7 @@ from click.testing import CliRunner
 
 from dynx._version import __version__
 from dynx.agreement.agreement import DEFAULT_SAMPLES
-from dynx.cli.shell.main import COMMANDS, CommandLine, cli
+from dynx.cli.shell.main import COMMANDS, SYNONYMS, CommandLine, cli
 from dynx.doctor.diagnosis import DEFAULT_SAMPLES as DEFAULT_STATES
 
 
@@ -143,8 +143,32 @@ def test_no_standard_output_at_all(arguments: str) -> None:
     assert done.stderr.count("\n") == 1
 
 
-@pytest.mark.parametrize(("words", "nearest"), [(["doctr"], "doctor"), (["env", "lst"], "list")])
+@pytest.mark.parametrize(
+    ("words", "nearest"),
+    [
+        (["doctr"], "doctor"),
+        (["env", "lst"], "list"),
+        (["inverse-dynamics"], "id"),
+        (["inverse_kinematics"], "ik"),
+        (["diagnose"], "doctor"),
+        (["simulate"], "sim"),
+    ],
+)
 def test_a_mistyped_command_of_any_group_names_the_nearest(words: list[str], nearest: str) -> None:
     result = CliRunner().invoke(cli, words)
     assert result.exit_code == 2
     assert f"no command '{words[-1]}'; did you mean '{nearest}'?" in result.output
+
+
+def test_words_for_commands_lead_to_commands() -> None:
+    assert not {*SYNONYMS} & {*COMMANDS}
+    assert {*SYNONYMS.values()} <= {*COMMANDS}
+
+
+@pytest.mark.parametrize("command", [name for name in COMMANDS if name != "env"])
+def test_a_mistyped_option_of_every_command_names_the_nearest(command: str) -> None:
+    result = CliRunner().invoke(cli, [command, "--jsn"])
+    assert result.exit_code == 2
+    assert ("--json" in result.output.partition("; did you mean ")[2]) == (command != "view"), result.output
+    result = CliRunner().invoke(cli, [command, "--wholly-else"])
+    assert "no option '--wholly-else' (see" in result.output
