@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from html import escape
 from typing import NamedTuple
 
 import numpy as np
@@ -170,6 +172,39 @@ def _sticks(model: Model) -> Iterator[tuple[str, Shape, Colour, Floats]]:
 UPDATES_PER_SECOND = 30.0
 """Rate at which the recorded page moves."""
 
+MAX_EMBEDDED = 5_000_000
+"""Largest size of a page in a notebook [bytes]: files of notebooks are read and stored as a whole."""
+
+LEAST_UPDATES_PER_SECOND = 7.0
+"""Rate below which a motion in a notebook would be seen as single pictures."""
+
+
+def recording_html(
+    page: Page,
+    show: Callable[[float], None],
+    duration: float,
+    *,
+    title: str,
+    legend: str = "",
+    rate: float = UPDATES_PER_SECOND,
+) -> str:
+    """Return HTML in which the scene of the page plays as `show(time)` places it, for `duration` [s], with
+    `rate` updates a second.
+
+    A duration of 0 gives a still scene; `legend` is HTML over the corner of the picture.
+    """
+    with page.lock:
+        show(0.0)
+        recorder = page.server.get_scene_serializer()
+        count = round(duration * rate)
+        for k in range(1, count + 1):
+            recorder.insert_sleep(duration / count)
+            show(duration * k / count)
+        # The last picture stays for a moment before the recording begins again.
+        recorder.insert_sleep(1.0 if count else 0.0)
+        text = recorder.as_html(page.dark)
+    return standalone(text, title, page.part_names, legend=legend, software=page.plain)
+
 
 def write_recording(
     path: str | os.PathLike[str],
@@ -180,23 +215,61 @@ def write_recording(
     title: str,
     legend: str = "",
 ) -> None:
-    """Write an HTML file in which the scene of the page plays as `show(time)` places it, for `duration` [s].
+    """Write the HTML of `recording_html` to a file.
 
-    A duration of 0 gives a still scene; `legend` is HTML over the corner of the picture. Raises
-    ArgumentError for a file that cannot be written.
-    """
+    Raises ArgumentError for a file that cannot be written."""
     if not checked_path(path).lower().endswith((".html", ".htm")):
         wanted = "wanted .html (a page), .gif or .mp4 (a film) or .png (a picture)"
         raise ArgumentError(f"{shown(os.path.basename(path))} has no suffix of a page; {wanted}")
-    with page.lock:
-        show(0.0)
-        recorder = page.server.get_scene_serializer()
-        count = round(duration * UPDATES_PER_SECOND)
-        for k in range(1, count + 1):
-            recorder.insert_sleep(duration / count)
-            show(duration * k / count)
-        # The last picture stays for a moment before the recording begins again.
-        recorder.insert_sleep(1.0 if count else 0.0)
-        text = recorder.as_html(page.dark)
-    text = standalone(text, title, page.part_names, legend=legend, software=page.plain)
-    write_bytes(path, text.encode())
+    write_bytes(path, recording_html(page, show, duration, title=title, legend=legend).encode())
+
+
+@dataclass(frozen=True, repr=False)
+class EmbeddedPage:
+    """A page without a server, that a notebook stores, and shows where dynx is not installed."""
+
+    title: str
+    html: str
+    """Text of the page."""
+    height: int
+    """Height in the notebook [pixels]."""
+
+    def __repr__(self) -> str:
+        return f"<EmbeddedPage of {self.title}, {len(self.html.encode()) / 1e6:.1f} MB>"
+
+    def _repr_html_(self) -> str:
+        # The text of the page is an attribute: hosts of notebooks serve no other file.
+        return (
+            f'<iframe srcdoc="{escape(self.html, quote=True)}" width="100%" height="{self.height}" '
+            f'title="{escape(self.title, quote=True)}" style="border: 0"></iframe>'
+        )
+
+
+def embedded_page(
+    page: Page,
+    show: Callable[[float], None],
+    duration: float,
+    *,
+    title: str,
+    legend: str = "",
+    height: int,
+) -> EmbeddedPage:
+    """Return the page of `recording_html` for a notebook, with fewer updates a second where it would be
+    larger than `MAX_EMBEDDED`.
+
+    Raises ArgumentError for a page that is larger even so.
+    """
+    rate = UPDATES_PER_SECOND
+    while True:
+        html = recording_html(page, show, duration, title=title, legend=legend, rate=rate)
+        made = EmbeddedPage(title, html, height)
+        size = len(made._repr_html_().encode())
+        if size <= MAX_EMBEDDED:
+            return made
+        rate *= 0.5
+        if duration == 0.0 or rate < LEAST_UPDATES_PER_SECOND:
+            remedy = "" if page.plain else "whole_meshes=False makes meshes smaller; "
+            raise ArgumentError(
+                f"the page has {size / 1e6:.1f} MB; a notebook takes at most {MAX_EMBEDDED / 1e6:g} MB: "
+                f"{remedy}show a part of the motion, or export it to a file"
+            )

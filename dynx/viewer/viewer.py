@@ -25,6 +25,7 @@ from dynx.viewer.triangles import TRIANGLE_BUDGET, has_graphics_processor
 
 if TYPE_CHECKING:
     from dynx.sim import Rollout
+    from dynx.viewer.export import EmbeddedPage
     from dynx.viewer.motion import MotionFrames
     from dynx.viewer.motion_view import Series
 
@@ -380,6 +381,24 @@ class Viewer(Controls):
         else:
             title = f"dynx: {view.title}"
             write_recording(path, self.page, view.go_to, view.duration, title=title, legend=view.legend)
+
+    def embed(self, height: int = 500) -> EmbeddedPage:
+        """Return the robot or the motion as a page without a server, which a notebook shows and stores.
+
+        It needs neither this program nor a network, so that it also plays in a notebook on another machine
+        and in one that is only read. `height` is in pixels. Raises ArgumentError for a live world, whose
+        motion is not known before it has happened, and for a page of more than 5 MB.
+        """
+        from dynx.viewer.export import embedded_page
+
+        self.page.check_open()
+        pixels, view = whole_number("height", height, 1), self.view
+        if view.duration is None:
+            raise ArgumentError("a live world cannot be embedded; simulate it, and embed the rollout")
+        title = f"dynx: {view.title}"
+        return embedded_page(
+            self.page, view.go_to, view.duration, title=title, legend=view.legend, height=pixels
+        )
 
     def wait(self, seconds: float | None = None) -> bool:
         """Wait until the page is closed, or for `seconds`; return True once it is."""

@@ -69,15 +69,16 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture
 def open_page(browser: Any) -> Iterator[Callable[..., Opened]]:
-    """Open addresses in pages of a width and a height [pixels], which are closed after the test."""
+    """Open addresses, or empty pages, of a width and a height [pixels], which are closed after the test."""
     pages = []
 
-    def opened(url: str, size: tuple[int, int] = (900, 450)) -> Opened:
+    def opened(url: str | None = None, size: tuple[int, int] = (900, 450)) -> Opened:
         page = browser.new_page(viewport={"width": size[0], "height": size[1]})
         page.set_default_timeout(1e3 * PATIENCE)
         pages.append(page)
         found = Opened(page)
-        found.go_to(url)
+        if url is not None:
+            found.go_to(url)
         return found
 
     yield opened

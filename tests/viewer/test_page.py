@@ -21,7 +21,8 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
 from dynx.steppers.camera import Camera
 from dynx.steppers.state import RobotState, WorldState
-from dynx.viewer import Viewer, view
+from dynx.viewer import Viewer, export, view
+from dynx.viewer.export import MAX_EMBEDDED
 from dynx.viewer.motion import PARTED, motion_separation
 from dynx.world import Scene, World
 from dynx.world.camera import draw_picture
@@ -287,6 +288,39 @@ def test_an_exported_page_plays_without_a_network(open_page: OpenPage, tmp_path:
     assert not page.errors
 
 
+def test_a_motion_plays_in_a_notebook_without_a_server(open_page: OpenPage, tmp_path: Path) -> None:
+    """The output alone is opened, as hosts of notebooks show it: in a frame with an origin of its own."""
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    pytest.importorskip("ipykernel")
+    code = (
+        "import dynx\n"
+        "with dynx.simulate('six_axis_arm', duration=0.5).view(whole_meshes=False) as viewer:\n"
+        "    made = viewer.embed(400)\n"
+        "made"
+    )
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(code)])
+    client = nbclient.NotebookClient(notebook, timeout=180, kernel_name="python3")
+    with client.setup_kernel():
+        client.execute_cell(notebook.cells[0], 0)
+    (output,) = notebook.cells[0].outputs
+    embedded = output.data["text/html"]
+    assert len(embedded.encode()) < MAX_EMBEDDED
+    assert "127.0.0.1" not in embedded
+    host = f'<iframe sandbox="allow-scripts" width="800" height="500" srcdoc="{escape(embedded)}"></iframe>'
+    (tmp_path / "host.html").write_text(f"<!doctype html><title>host</title>{host}", encoding="utf-8")
+    page = open_page()
+    page.page.goto((tmp_path / "host.html").as_uri())
+    until(lambda: len(page.page.frames) == 3, "the frame in the frame")
+    inner = page.page.frames[2]
+    inner.wait_for_selector("canvas[data-engine]")
+    node = "Object.values(__viserMutable.nodePoseData).map(each => each.wxyz.join()).join()"
+    before = inner.evaluate(node)
+    inner.wait_for_function(f"before => {node} !== before", arg=before)
+    assert inner.title() == "dynx: six_axis_arm"
+    assert [url for url in page.requests if not url.startswith(("file:", "data:", "blob:", "about:"))] == []
+    assert not page.errors
+
+
 def test_an_exported_comparison_says_which_motion_is_solid(open_page: OpenPage, tmp_path: Path) -> None:
     rollout = dynx.simulate("six_axis_arm", duration=0.1)
     path, name = tmp_path / "both.html", "<b id=bold>a.npz"
@@ -359,6 +393,29 @@ def test_a_title_is_no_html() -> None:
     robot = dynx.load(f"<robot name={quoteattr(name)}><link name='base'/></robot>")
     with robot.view() as viewer, urllib.request.urlopen(viewer.url, timeout=30.0) as page:
         assert f"<title>dynx: {escape(name)}</title>".encode() in page.read()
+
+
+def test_an_embedded_page_has_a_size_that_a_notebook_takes(monkeypatch: pytest.MonkeyPatch) -> None:
+    rollout = dynx.simulate("six_axis_arm", duration=2.0)
+    with rollout.view(whole_meshes=False) as viewer:
+        whole = viewer.embed()
+        size = len(whole._repr_html_().encode())
+        assert size <= MAX_EMBEDDED
+        assert repr(whole) == f"<EmbeddedPage of dynx: six_axis_arm, {len(whole.html) / 1e6:.1f} MB>"
+        # Fewer updates a second make it smaller; that is not enough for any bound.
+        monkeypatch.setattr(export, "MAX_EMBEDDED", size - 1)
+        assert len(viewer.embed()._repr_html_().encode()) < size
+        monkeypatch.setattr(export, "MAX_EMBEDDED", 1000)
+        with pytest.raises(ArgumentError, match=r"the page has .* MB; a notebook takes at most 0.001 MB"):
+            viewer.embed()
+        with pytest.raises(ArgumentError, match="height is '0'"):
+            viewer.embed(0)
+    with (
+        World(read_scene("stack")) as world,
+        world.view(steps=False) as viewer,
+        pytest.raises(ArgumentError, match="a live world cannot be embedded"),
+    ):
+        viewer.embed()
 
 
 def test_a_closed_viewer_shows_no_page_in_a_notebook() -> None:
