@@ -6,7 +6,7 @@ The document has lengths in m, angles in rad, forces in N, times in s, and world
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, TypedDict
 
@@ -47,7 +47,7 @@ from dynx.world.comparison import (
     WorldComparison,
     compare_engines,
 )
-from dynx.world.mjcf import scene_to_mjcf
+from dynx.world.mjcf import mjcf_remarks, scene_to_mjcf
 from dynx.world.scene import Scene, body_to_urdf, read_scene, write_scene
 from dynx.world.separation import Separation
 from dynx.world.snapshot import check_world_suffix
@@ -133,10 +133,15 @@ def _export(
             f"--export writes the scene of one world, and --engine has {len(engines)} engines"
         )
     engine = engines[0] if engines else "mujoco"
-    given = settings_by_engine(("mujoco",), settings)["mujoco"] if settings else {}
-    for file in export(read_scene(scene), path, dt, substeps=substeps, engine=engine, **given):
-        if not quiet:
+    given = settings_by_engine(tuple(dict.fromkeys((engine, "mujoco"))), settings)
+    files, notes = export(read_scene(scene), path, engine, dt, substeps, given)
+    if (engines or settings or substeps > 1) and not is_mjcf(path):
+        notes = ["the engine, its steps and its settings are those of a world; MJCF alone has them"]
+    if not quiet:
+        for file in files:
             console().print(f"wrote {one_line(file)}")
+        for note in notes:
+            console().print(f"note: {one_line(note)}", style="yellow")
     return DONE
 
 
@@ -486,6 +491,11 @@ def _plain(text: str) -> str:
 SUFFIXES = (".xml", ".mjcf", ".urdf", ".toml", ".json")
 
 
+def is_mjcf(path: str) -> bool:
+    """Check whether a file is exported as MJCF."""
+    return Path(path).suffix.lower() in (".xml", ".mjcf")
+
+
 def check_suffix(path: str) -> None:
     """Raise ArgumentError unless the suffix of a file is that of a format to which scenes are exported."""
     suffix = Path(path).suffix.lower()
@@ -496,27 +506,46 @@ def check_suffix(path: str) -> None:
         )
 
 
-def export(scene: Scene, path: str, dt: float, **options: Any) -> list[str]:
-    """Write a scene in the format of the suffix of a file; return the files written.
+def export(
+    scene: Scene,
+    path: str,
+    engine: str,
+    dt: float,
+    substeps: int,
+    settings: Mapping[str, Mapping[str, Any]],
+) -> tuple[list[str], Sequence[str]]:
+    """Write a scene in the format of the suffix of a file; return the files written, and notes on what they
+    cannot carry.
 
-    MJCF has the step [s] and the options of `scene_to_mjcf`. In URDF each robot and body has a file of its
-    own, whose name stands before the suffix unless it is the only one. Raises the errors of `scene_to_mjcf`,
-    `body_to_urdf`, `Model.to_urdf` and `write_scene`.
+    MJCF has the step [s] and the settings of the world in an engine. In URDF each robot and body has a file
+    of its own, whose name stands before the suffix unless it is the only one. Raises the errors of `World`
+    and of `World.to_mjcf`, `body_to_urdf`, `Model.to_urdf` and `write_scene`.
     """
     check_suffix(path)
-    suffix = Path(path).suffix.lower()
-    if suffix in (".toml", ".json"):
+    if is_mjcf(path):
+        text = _mjcf(scene, engine, dt, substeps, settings)
+        write_bytes(path, text.encode())
+        return [path], mjcf_remarks(text)
+    if Path(path).suffix.lower() != ".urdf":
         write_scene(scene, path)
-        return [path]
-    if suffix != ".urdf":
-        write_bytes(path, scene_to_mjcf(scene, dt, **options).encode())
-        return [path]
+        return [path], ()
     texts = {robot.name: robot.model.to_urdf(geometry=True) for robot in scene.robots}
     texts |= {body.name: body_to_urdf(body) for body in scene.bodies}
     files = [own_path(path, name, len(texts)) for name in texts]
     for file, text in zip(files, texts.values(), strict=True):
         write_bytes(file, text.encode())
-    return files
+    return files, ()
+
+
+def _mjcf(
+    scene: Scene, engine: str, dt: float, substeps: int, settings: Mapping[str, Mapping[str, Any]]
+) -> str:
+    """Return the document of the world in an engine."""
+    of_mujoco = settings.get("mujoco", {})
+    if engine == "mujoco":
+        return scene_to_mjcf(scene, dt, substeps=substeps, **of_mujoco)
+    with World(scene, engine, dt, substeps=substeps, **settings.get(engine, {})) as world:
+        return world.to_mjcf(**of_mujoco)
 
 
 def own_path(path: str, name: str, count: int) -> str:

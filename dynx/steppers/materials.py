@@ -62,13 +62,17 @@ class EffectiveCoefficient:
     """Why it differs from the wanted one, where it does."""
 
 
-class EngineWithMaterials(Protocol):
-    """The part of `Stepper` that this module needs."""
+class MaterialsInEffect(Protocol):
+    """A scene in an engine or in a document for one, with its coefficients of contact."""
 
     layout: Layout
 
     def effective_materials(self) -> Mapping[str, EffectiveCoefficient]:
         """Return coefficients in effect, by name."""
+
+
+class EngineWithMaterials(MaterialsInEffect, Protocol):
+    """The part of `Stepper` that this module needs."""
 
     def close(self) -> None:
         """Release what the engine holds."""
@@ -82,7 +86,7 @@ def coefficients(layout: Layout, name: str) -> Floats:
     return np.array([getattr(each.material, name) for each in layout.colliders], dtype=np.float64)
 
 
-def inexact_materials(engine: EngineWithMaterials) -> tuple[InexactMaterial, ...]:
+def inexact_materials(engine: MaterialsInEffect) -> tuple[InexactMaterial, ...]:
     """Return the coefficients that the engine does not have as the scene states them, for the pairs of
     colliders that may touch."""
     layout, found = engine.layout, []

@@ -91,6 +91,9 @@ class Stepper(ABC):
     `dynx.world.World` computes these joint dynamics outside of the engine, where they are exact; otherwise
     its notes name them."""
 
+    contact_law: ClassVar[str] = "contacts of its own"
+    """Laws of contacts and joint limits of the engine, as a noun phrase."""
+
     native_queries: ClassVar[str] = ""
     """Class of the engine's own queries (`dynx.steppers.native_queries`), as "package.module:Class"; imported
     when it is used."""

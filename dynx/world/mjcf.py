@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from dynx.argument_types import checks_types
 from dynx.engines.mujoco.materials import SETTINGS
 from dynx.engines.mujoco.mjcf import MjcfDocument
-from dynx.errors import UnknownBackendError, nearest, shown
+from dynx.errors import UnknownNameError
 from dynx.steppers.layout import Layout
-from dynx.steppers.registry import world_names
+from dynx.steppers.materials import STRICT_MATERIALS, inexact_materials
 from dynx.steppers.settings import checked_settings
+from dynx.steppers.stepper import Stepper
 from dynx.world.preparation import checked_options, may_be_reached, prepare
 from dynx.world.scene.scene import Scene
 from dynx.world.sensors.kinds import ForceTorqueSensor
@@ -28,14 +30,12 @@ def scene_to_mjcf(
     joint_damping: bool = True,
     joint_friction: bool = True,
     joint_armature: bool = True,
-    engine: str = "mujoco",
     **settings: object,
 ) -> str:
     """Return a scene as an MJCF document, complete in itself: the model of its world in MuJoCo.
 
-    The options are those of `World`, with the settings of MuJoCo; `World.to_mjcf` has those of a world. Where
-    that runs in another `engine`, a comment says that solver and contacts are MuJoCo's. The step of the
-    document is that of the engine, dt / substeps [s].
+    The options are those of `World`, with the settings of MuJoCo; `World.to_mjcf` has those of a world, also
+    of one that runs in another engine. The step of the document is that of the engine, dt / substeps [s].
 
     Links are bodies named ``robot/link``, bodies as in the scene, joints ``robot/joint``, free joints as the
     robot or body that they move, geoms by their part and number. A motor ``robot/joint`` applies its ctrl
@@ -57,9 +57,22 @@ def scene_to_mjcf(
         "joint_armature": joint_armature,
     }
     options = checked_options(dt, substeps, **switches)
-    if engine not in world_names():
-        raise UnknownBackendError(f"no world engine {shown(engine)}{nearest(engine, world_names())}")
-    return layout_to_mjcf(scene, prepare(scene, **switches), options, settings, engine)
+    if "engine" in settings:
+        raise UnknownNameError(
+            "a document of scene_to_mjcf is that of the world in MuJoCo, so that it takes no engine; "
+            "World(scene, engine).to_mjcf() is that of a world in another engine"
+        )
+    return layout_to_mjcf(scene, prepare(scene, **switches), options, settings)
+
+
+class OtherEngine(NamedTuple):
+    """The engine in which the world of a document runs, where that is not MuJoCo."""
+
+    stepper: Stepper
+    settings: Mapping[str, Any]
+    """Its settings in use."""
+    notes: Sequence[str]
+    """Sentences on joint dynamics that it does not have exactly."""
 
 
 def layout_to_mjcf(
@@ -67,10 +80,9 @@ def layout_to_mjcf(
     layout: Layout,
     options: Mapping[str, Any],
     settings: Mapping[str, object],
-    engine: str = "mujoco",
+    engine: OtherEngine | None = None,
 ) -> str:
-    """Return the document of a prepared scene, with the options of its world in an engine and settings of
-    MuJoCo.
+    """Return the document of a prepared scene, with the options of its world and settings of MuJoCo.
 
     Raises the errors of `scene_to_mjcf`.
     """
@@ -78,29 +90,64 @@ def layout_to_mjcf(
     document = MjcfDocument(layout, h, checked_settings("mujoco", SETTINGS, settings))
     for refused in document.refused:
         raise refused.error
-    remarks = (*_remarks(scene, layout, options, engine), *_remarks_on_sensors(scene, document.left_out))
-    return document.text(remarks)
-
-
-def _remarks(scene: Scene, layout: Layout, options: Mapping[str, Any], engine: str) -> Iterator[str]:
-    """Yield what a reader of the document must know, and what it cannot carry."""
-    yield (
-        "The world of dynx in MuJoCo. The ctrl of a motor is the torque that World.step takes for its joint; "
-        "the keyframe 'start' is the start of the world; free joints are at centres of mass."
-    )
-    if engine != "mujoco":
-        yield (
-            f"The world runs in {engine}. MJCF cannot carry its solver, contacts and settings: those of this "
-            "document are MuJoCo's, with their defaults unless they are given, so the motions differ where "
-            "parts touch."
+    return document.text(
+        (
+            "The world of dynx in MuJoCo. The ctrl of a motor is the torque that World.step takes for its "
+            "joint; the keyframe 'start' is the start of the world; free joints are at centres of mass.",
+            *(() if engine is None else _remarks_on_engine(engine)),
+            *(f"In this document {each}." for each in inexact_materials(document)),
+            *_remarks(scene, layout, options, engine),
+            *_remarks_on_sensors(scene, document.left_out),
         )
+    )
+
+
+def mjcf_remarks(document: str) -> tuple[str, ...]:
+    """Return the comments at the beginning of a document of `scene_to_mjcf`, after the first, which is the
+    same in all: they name what the document cannot carry."""
+    found: list[str] = re.findall("<!-- (.*?) -->", document.partition("<mujoco")[0], re.DOTALL)
+    return tuple(found[1:])
+
+
+def _remarks_on_engine(engine: OtherEngine) -> Iterator[str]:
+    """Yield what the engine of a world has that a document for MuJoCo cannot carry."""
+    stepper = engine.stepper
+    name, version = stepper.name, stepper.version
+    yield (
+        f"The world runs in {version if version.startswith(name) else f'{name} {version}'}, which has "
+        f"{stepper.contact_law}. MJCF cannot carry that: contacts, constraints, joint limits and joint "
+        "dynamics have the coefficients of the world, by the laws and the settings of MuJoCo, so that the "
+        "motions differ where they act."
+    )
+    in_effect = {**engine.settings, **stepper.settings_in_effect(engine.settings, stepper.dt)}
+    values = [
+        f"{each} {value}" for each, value in in_effect.items() if stepper.settings[each] != STRICT_MATERIALS
+    ]
+    if values:
+        yield f"Settings of {name} that are not in the document: {', '.join(values)}."
+    for each in inexact_materials(stepper):
+        yield f"In {name} {each}."
+    for note in engine.notes:
+        yield f"In the world, {note}."
+
+
+def _remarks(
+    scene: Scene, layout: Layout, options: Mapping[str, Any], engine: OtherEngine | None
+) -> Iterator[str]:
+    """Yield what the document of a world cannot carry, whatever its engine."""
     if options["substeps"] > 1:
         yield f"A step of the world, {options['dt']!r} s, is {options['substeps']} steps of the document."
     for number, robot in enumerate(scene.robots):
-        if layout.robots[number].friction.any() and not may_be_reached(layout, number):
+        friction = layout.robots[number].friction
+        if engine is None:
+            name, outside = "MuJoCo", bool(friction.any()) and not may_be_reached(layout, number)
+        else:
+            name = engine.stepper.name
+            outside = bool((friction != engine.stepper.layout.robots[number].friction).any())
+        if outside:
             yield (
-                f"{robot.name}: the dry friction of its joints is MuJoCo's. Where nothing can touch a robot, "
-                "a world of dynx computes it outside of MuJoCo, as torques."
+                f"{robot.name}: the dry friction of its joints is MuJoCo's, under which joints that stick "
+                f"creep. The world computes it outside of {name}, as torques."
             )
         if robot.model.mechanism.coupling is not None:
             yield (

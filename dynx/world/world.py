@@ -505,16 +505,27 @@ class World:
         given = {"engine": self.engine, "options": dict(self.options), "settings": dict(self.settings)}
         write_snapshot(path, self.save(), {"scene": scene_document(self.scene), **given})
 
-    def to_mjcf(self) -> str:
+    def to_mjcf(self, **settings: object) -> str:
         """Return the world at the start of its scene as an MJCF document (`scene_to_mjcf`), with its options.
 
-        For a world in MuJoCo it is the model that runs; for one in another engine that of MuJoCo with its
-        default settings, as a comment in it says. Raises the errors of `scene_to_mjcf`.
-        """
-        from dynx.world.mjcf import layout_to_mjcf
+        For a world in MuJoCo it is the model that runs. For one in another engine it has the step, gravity,
+        joint dynamics and coefficients of contact of the world, under the laws of MuJoCo, with `settings` of
+        MuJoCo. Comments in it name the laws, the settings and the coefficients in effect of that engine.
 
-        settings = self.settings if self.engine == "mujoco" else {}
-        return layout_to_mjcf(self.scene, self._layout, self.options, settings, self.engine)
+        Raises the errors of `scene_to_mjcf`, and ArgumentError for settings of a world in MuJoCo, which has
+        its own.
+        """
+        from dynx.world.mjcf import OtherEngine, layout_to_mjcf
+
+        if self.engine == "mujoco":
+            if settings:
+                raise ArgumentError(
+                    f"{next(iter(settings))} is given to to_mjcf of a world in mujoco, whose document has "
+                    "the settings of the world; give it to World"
+                )
+            return layout_to_mjcf(self.scene, self._layout, self.options, self.settings)
+        engine = OtherEngine(self._motion.engine, self.settings, tuple(self._commands.notes()))
+        return layout_to_mjcf(self.scene, self._layout, self.options, settings, engine)
 
     @classmethod
     @checks_types

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,12 @@ from click.testing import CliRunner
 import dynx
 from dynx import Model, Pose
 from dynx.cli.shell.main import cli
+from dynx.engines.mujoco import materials
 from dynx.errors import ArgumentError, EngineLimitError, UnknownNameError, UnsupportedFeatureError
 from dynx.model import Inertial, Link
 from dynx.model.geometry import Box, Capsule, Collision, Cylinder, HeightField, Sphere
 from dynx.spatial.so3 import rotation_from_quat, skew
+from dynx.steppers.registry import world_class
 from dynx.world import (
     Material,
     PointToPoint,
@@ -31,9 +34,11 @@ from dynx.world import (
     scene_names,
     scene_to_mjcf,
     sphere,
-    world_names,
+    write_scene,
 )
+from dynx.world.mjcf import mjcf_remarks
 from dynx.world.scene.robots import LinkFrames
+from tests.world.engines import WORLDS as ENGINES
 from tests.world.materials import four_materials
 from tests.world.random_scenes.drawing import scene_of
 from tests.world.replay import distance as distance_of
@@ -366,17 +371,118 @@ def test_recorded_torques_move_a_scene_in_mujoco_alone_as_in_the_world(name: str
     assert not differing
 
 
-@pytest.mark.parametrize("engine", world_names())
-def test_a_document_names_the_engine_whose_contacts_it_lacks(engine: str, tmp_path: Path) -> None:
-    scene, remark = read_scene("stack"), f"The world runs in {engine}. MJCF cannot carry its solver"
-    with World(scene, engine) as world:
-        text = world.to_mjcf()
-    assert (remark in text) == (engine != "mujoco")
-    assert text.partition("<mujoco")[2] == scene_to_mjcf(scene).partition("<mujoco")[2]
-    file = tmp_path / "scene.xml"
-    result = CliRunner().invoke(cli, ["world", "stack", "--export", str(file), "--engine", engine])
+OTHERS = [name for name in ENGINES if name != "mujoco" and find_spec(name) is not None]
+"""Engines with contacts other than MuJoCo."""
+
+OF_OTHERS = {"pybullet": ("erp", 0.3), "drake": ("dissipation", 7.0)}
+"""A setting of each, with a value that is not the default."""
+
+
+def lossy(base: Any = "fixed") -> Scene:
+    """Return an arm with damping, dry friction, armature and limits above a ground of another material."""
+    losses = '<dynamics damping="0.3" friction="0.2" armature="0.05"/>'
+    limit = f'<limit lower="-1" upper="2" effort="1" velocity="1"/>{losses}'
+    ball = INERTIAL + '<collision><geometry><sphere radius="0.05"/></geometry></collision>'
+    slippery = Material(friction=0.2, torsional_friction=0.01, restitution=0.5)
+    model = chain(INERTIAL, ball, joint=limit, base=base)
+    arm = SceneRobot("r", model, material=slippery).at(Pose((0.0, 0.0, 1.0)))
+    bodies = (ground(material=slippery), sphere("ball", 0.1, mass=1.0, pose=Pose((2.0, 0.0, 0.1))))
+    return Scene("lossy", robots=(arm,), bodies=bodies, gravity=(0.3, 0.0, -3.7))
+
+
+def other_scenes() -> dict[str, Scene]:
+    """Return scenes that every engine takes, by name."""
+    return {
+        "stack": read_scene("stack"),
+        "slope": read_scene("slope"),
+        "bowling": read_scene("bowling"),
+        "arm": lossy(),
+        "floating": lossy("floating"),
+        "materials": four_materials(),
+        "random": scene_of(4),
+    }
+
+
+@pytest.mark.parametrize("name", other_scenes())
+@pytest.mark.parametrize("engine", OTHERS)
+def test_a_document_names_what_the_engine_of_its_world_has_besides(
+    name: str, engine: str, tmp_path: Path
+) -> None:
+    scene = other_scenes()[name]
+    options: dict[str, Any] = {"dt": 2e-3, "substeps": 2}
+    setting, value = OF_OTHERS[engine]
+    options_of_engine: dict[str, Any] = {setting: value}
+    with World(scene, engine, **options, **options_of_engine) as world:
+        text, version, inexact = world.to_mjcf(impratio=7.0), world.version, world.inexact_materials()
+        in_use = dict(world.settings)
+        law = world_class(engine).contact_law
+    # The model is that of MuJoCo's world: step, gravity, friction and joint dynamics of the scene.
+    expected = scene_to_mjcf(scene, **options, impratio=7.0)
+    assert text.partition("<mujoco")[2] == expected.partition("<mujoco")[2]
+    model = mujoco.MjModel.from_xml_string(text)
+    assert model.opt.timestep == 1e-3
+    np.testing.assert_array_equal(model.opt.gravity, scene.gravity)
+    remarks = " ".join(mjcf_remarks(text))
+    named = version if version.startswith(engine) else f"{engine} {version}"
+    assert f"The world runs in {named}, which has {law}. MJCF cannot carry that" in remarks
+    assert f"{setting} {value}" in remarks
+    assert all(f"{each} " in remarks for each in in_use if each != "strict_materials")
+    assert "A step of the world, 0.002 s, is 2 steps of the document." in remarks
+    for each in inexact:
+        assert f"In {engine} {each}." in remarks
+    # The command prints what the document says.
+    file, written = tmp_path / "scene.xml", tmp_path / "scene.toml"
+    write_scene(scene, written)
+    arguments = ["world", str(written), "--export", str(file), "--engine", engine, "--dt", "0.002"]
+    changes = ["--substeps", "2", "--set", f"{setting}={value}", "--set", "mujoco.impratio=7"]
+    result = CliRunner().invoke(cli, [*arguments, *changes], env={"COLUMNS": "100000"})
     assert result.exit_code == 0, result.output
-    assert (remark in file.read_text()) == (engine != "mujoco")
+    assert file.read_text() == text
+    for remark in mjcf_remarks(text):
+        assert f"note: {remark}" in result.output
+    assert CliRunner().invoke(cli, [*arguments, "--quiet"]).output == ""
+
+
+@pytest.mark.parametrize("engine", OTHERS)
+def test_coefficients_and_joint_dynamics_that_an_engine_has_otherwise_are_named(engine: str) -> None:
+    with World(lossy(), engine) as world:
+        remarks, notes = mjcf_remarks(world.to_mjcf()), world.notes
+    torsion = "In drake torsional_friction of 'r/l1' and 'ground' is 0, not 0.01: Drake has none."
+    assert (torsion in remarks) == (engine == "drake")
+    of_joints = [note for note in notes if "of the joints of" in note or "joint d" in note]
+    assert of_joints
+    assert all(f"In the world, {note}." in remarks for note in of_joints)
+    friction = "r: the dry friction of its joints is MuJoCo's, under which joints that stick creep."
+    outside = f"{friction} The world computes it outside of {engine}, as torques."
+    assert outside in remarks
+
+
+def test_a_document_for_a_world_of_dynx_names_its_integrator() -> None:
+    scene = Scene("s", robots=(SceneRobot("r", chain(INERTIAL, INERTIAL)),))
+    with World(scene, "dynx", integrator="rk4", collisions=False) as world:
+        remarks = " ".join(mjcf_remarks(world.to_mjcf()))
+    assert "The world runs in dynx" in remarks
+    assert "integrator rk4" in remarks
+
+
+def test_a_document_names_the_rebound_that_its_steps_cannot_have(monkeypatch: pytest.MonkeyPatch) -> None:
+    # At 4 ms a ball rebounds with 0.13 at least, of which the height counts as none by default.
+    monkeypatch.setattr(materials, "TOLERANCE", 1e-3)
+    scene = Scene("s", bodies=(ground(), sphere("b", 0.1, mass=1.0)))
+    with World(scene, "mujoco", 4e-3) as world:
+        (inexact,) = world.inexact_materials()
+    remarks = mjcf_remarks(scene_to_mjcf(scene, 4e-3))
+    assert f"In this document {inexact}." in remarks
+
+
+def test_settings_of_a_document_belong_to_the_world_in_mujoco_or_to_the_call() -> None:
+    with (
+        World(read_scene("stack"), "mujoco") as world,
+        pytest.raises(ArgumentError, match="impratio is given to to_mjcf of a world in mujoco"),
+    ):
+        world.to_mjcf(impratio=7.0)
+    with pytest.raises(UnknownNameError, match=r"World\(scene, engine\).to_mjcf\(\)"):
+        scene_to_mjcf(read_scene("stack"), engine="pybullet")
 
 
 def test_a_document_of_a_scene_is_that_of_its_world() -> None:
@@ -384,9 +490,6 @@ def test_a_document_of_a_scene_is_that_of_its_world() -> None:
     with World(scene, "mujoco", 2e-3, substeps=2, joint_friction=False, impratio=7.0) as world:
         expected = world.to_mjcf()
     assert scene_to_mjcf(scene, 2e-3, substeps=2, joint_friction=False, impratio=7.0) == expected
-    with World(scene, "pybullet", 2e-3, substeps=2, joint_friction=False) as world:
-        other = world.to_mjcf()
-    assert other == scene_to_mjcf(scene, 2e-3, substeps=2, joint_friction=False, engine="pybullet")
     with pytest.raises(UnknownNameError, match="has no setting 'impratioo'; did you mean 'impratio'"):
         scene_to_mjcf(scene, impratioo=1.0)
     with pytest.raises(ArgumentError, match="joint_friction is '1'"):
@@ -495,7 +598,10 @@ def damped_mimics(base: Any) -> Model:
 def test_a_document_has_the_friction_that_a_world_computes_outside_of_mujoco_and_names_it() -> None:
     losses = '<limit lower="-9" upper="9" effort="1" velocity="1"/><dynamics friction="0.2" damping="0.3"/>'
     scene = Scene("s", robots=(SceneRobot("r", chain(INERTIAL, INERTIAL, joint=losses)),))
-    assert "r: the dry friction of its joints is MuJoCo's." in scene_to_mjcf(scene)
+    assert (
+        "r: the dry friction of its joints is MuJoCo's, under which joints that stick creep. The world "
+        "computes it outside of MuJoCo, as torques."
+    ) in mjcf_remarks(scene_to_mjcf(scene))
     model, data = load(scene)
     assert model.dof_frictionloss[0] == 0.2
     with World(scene, "mujoco") as world:

@@ -129,6 +129,9 @@ class DrakeStepper(Stepper):
 
     name: ClassVar[str] = "drake"
     settings: ClassVar[Mapping[str, Setting]] = SETTINGS
+    contact_law: ClassVar[str] = (
+        "compliant contacts and joint limits, and friction that grows with the speed up to a tolerance"
+    )
     native_queries: ClassVar[str] = "dynx.engines.drake.native_queries:DrakeQueries"
 
     @engine_errors

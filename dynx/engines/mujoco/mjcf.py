@@ -47,6 +47,7 @@ from dynx.spatial.scalar import FLOAT64_EPS, Array, Floats, jacobi_eigen, longdo
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import cross, quat_from_rotation, rotation_from_quat, skew
 from dynx.steppers.layout import WORLD, BodyLayout, Layout, Owner, RobotLayout, SensorLayout
+from dynx.steppers.materials import EffectiveCoefficient
 
 # -- numbers ------------------------------------------------------------------------------------------------
 
@@ -334,7 +335,7 @@ class MjcfDocument:
     def __init__(self, layout: Layout, dt: float, settings: Mapping[str, Any]) -> None:
         """Raises EngineLimitError for a robot with more than `MAX_DEPTH` links in a row and one whose masses
         cancel, UnsupportedFeatureError for a ground that moves."""
-        self._layout = layout
+        self.layout = layout
         self._settings, self._dt = settings, dt
         self.materials = ContactMaterials(layout, settings, dt)
         self.refused: list[RefusedInertia] = []
@@ -383,6 +384,10 @@ class MjcfDocument:
         for empty in [part for part in root if len(part) == 0 and not part.attrib]:
             root.remove(empty)
         indent(root)
+
+    def effective_materials(self) -> Mapping[str, EffectiveCoefficient]:
+        """Return coefficients of contact in effect, as `Stepper.effective_materials` does."""
+        return self.materials.effective()
 
     def text(self, remarks: Iterable[str] = ()) -> str:
         """Return the document, with remarks as comments at its beginning."""
@@ -513,7 +518,7 @@ class MjcfDocument:
                 SubElement(element, "body", name=body.name, pos=text(-body.center))
         self._carriers[Owner(None, number)] = carrier
         if body.name in self._colliders:
-            shapes = self._layout.colliders[self._colliders[body.name]].shapes
+            shapes = self.layout.colliders[self._colliders[body.name]].shapes
             T = homogeneous(np.eye(3), -carrier.origin)
             self._add_shapes(carrier.body, body.name, ((each.shape, T @ each.T) for each in shapes), None)
 
@@ -540,7 +545,7 @@ class MjcfDocument:
         error = UnsupportedFeatureError(
             f"{shown(name)} {fault}; MuJoCo refuses that: wanted a positive mass and three positive moments, "
             "none above the sum of the others",
-            source=self._layout.name if model is None else model.source,
+            source=self.layout.name if model is None else model.source,
             line=None if model is None or link is None else model.link(link).line,
         )
         self.refused.append(RefusedInertia(body.attrib["name"], inertia, error))
@@ -567,7 +572,7 @@ class MjcfDocument:
         if carrier.attrib.get("name") not in (name, f"{name}/center"):
             body = SubElement(carrier, "body", name=f"{name}/shapes")
         self._bodies_of_colliders[number] = body.get("name", "world")
-        rgba = self._layout.colliders[number].material.rgba if colour is None else colour
+        rgba = self.layout.colliders[number].material.rgba if colour is None else colour
         contype, conaffinity = self._masks[number]
         options = {**self.materials.geom(number), "contype": contype, "conaffinity": conaffinity}
         given = {**attributes(options, self._geom_defaults), "rgba": text(rgba)}
@@ -576,8 +581,8 @@ class MjcfDocument:
 
     def _add_contacts(self) -> None:
         """Add the pairs that have coefficients of their own, and those that may not touch."""
-        colliders = self._layout.colliders
-        excluded = () if self.materials.complete else pairs_to_exclude(self._layout, self._masks)
+        colliders = self.layout.colliders
+        excluded = () if self.materials.complete else pairs_to_exclude(self.layout, self._masks)
         for a, b in excluded:
             ends = {f"body{k}": self._bodies_of_colliders[end] for k, end in ((1, a), (2, b))}
             SubElement(self._contact, "exclude", ends)
@@ -590,7 +595,7 @@ class MjcfDocument:
     def _add_constraints(self) -> None:
         """Add welds and point-to-point constraints, between sites at their anchors."""
         tags = {"weld": "weld", "point": "connect"}
-        for number, constraint in enumerate(self._layout.constraints):
+        for number, constraint in enumerate(self.layout.constraints):
             sites = [f"constraint{number}/{end}" for end in "ab"]
             for name, anchor in zip(sites, (constraint.a, constraint.b), strict=True):
                 carrier = self._carriers[anchor.owner]

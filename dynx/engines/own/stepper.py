@@ -108,6 +108,7 @@ class OwnStepper(Stepper):
         "rtol": Setting(1e-10, "relative tolerance of the integrator `adaptive`", least=1e-14),
         "atol": Setting(1e-12, "absolute tolerance of the integrator `adaptive`", least=1e-300),
     }
+    contact_law: ClassVar[str] = "no contacts, and joint limits at which joints stop without a rebound"
 
     def __init__(self, layout: Layout, dt: float, settings: Mapping[str, Any]) -> None:
         super().__init__(layout, dt, settings)

@@ -138,6 +138,9 @@ class BulletStepper(Stepper):
 
     name = "pybullet"
     settings: ClassVar[Mapping[str, Setting]] = SETTINGS
+    contact_law: ClassVar[str] = (
+        "impulses between rigid bodies at contacts, constraints and joint limits, by iterations"
+    )
     commands: ClassVar[tuple[type[EngineCommand], ...]] = (BulletMotorCommand,)
     inexact: ClassVar[Mapping[Feature, str]] = {
         Feature.DAMPING: "that of the velocity when a step begins, an error of first order in the step",
