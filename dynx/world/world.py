@@ -29,7 +29,7 @@ from dynx.steppers.forces import ExternalForce
 from dynx.steppers.layout import Layout, RobotLayout
 from dynx.steppers.materials import InexactMaterial, inexact_materials, open_engine
 from dynx.steppers.registry import renderer_of, world_class
-from dynx.steppers.settings import changed_settings, checked_settings
+from dynx.steppers.settings import changed_settings, checked_settings, ineffective_settings
 from dynx.steppers.state import BodyState, RobotState, WorldState
 from dynx.steppers.stepper import Stepper
 from dynx.world.commands import Commands, MotorsOf, RobotLoads, with_scene_motors
@@ -694,6 +694,7 @@ class World:
         yield from self._commands.notes()
         in_effect = self._kind.settings_in_effect(self.settings, self.dt / self.substeps)
         yield from changed_settings(given, self.settings, in_effect)
+        yield from ineffective_settings(self._kind.settings, self.settings)
 
     def _build(self) -> Stepper:
         return open_engine(self._kind, self._in_engine, self.dt / self.substeps, self.settings)

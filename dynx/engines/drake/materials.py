@@ -35,6 +35,8 @@ from dynx.steppers.materials import STRICT_MATERIALS, EffectiveCoefficient
 from dynx.steppers.mean_coefficients import CLOSE, pair_terms
 from dynx.steppers.settings import Setting
 
+_HYDROELASTIC = ("contact_model", ("hydroelastic",))
+
 SETTINGS: Mapping[str, Setting] = {
     "contact_approximation": Setting(
         "lagged",
@@ -46,13 +48,25 @@ SETTINGS: Mapping[str, Setting] = {
         "pressure over the surface of contact, or one point",
         choices=("hydroelastic", "point"),
     ),
-    "modulus": Setting(3e6, "hydroelastic modulus of shapes that move [Pa]", 1e-3),
+    "modulus": Setting(3e6, "hydroelastic modulus of shapes that move [Pa]", 1e-3, needs=_HYDROELASTIC),
     "resolution": Setting(
-        0.1, "length of the edges by which cylinders are approximated, relative to the radius", 0.02, 2.0
+        0.1,
+        "length of the edges by which cylinders are approximated, relative to the radius",
+        0.02,
+        2.0,
+        needs=_HYDROELASTIC,
     ),
     "stiffness": Setting(1e6, "stiffness of every shape in contact at a point [N/m]", 1e-3),
-    "relaxation_time": Setting(0.01, "dissipation of contacts under 'sap': time of relaxation [s]", 0.0),
-    "dissipation": Setting(10.0, "dissipation of Hunt and Crossley under 'lagged' and 'similar' [s/m]", 0.0),
+    "relaxation_time": Setting(
+        0.01,
+        "dissipation of contacts under 'sap': time of relaxation [s]",
+        needs=("contact_approximation", ("sap",)),
+    ),
+    "dissipation": Setting(
+        10.0,
+        "dissipation of Hunt and Crossley under 'lagged' and 'similar' [s/m]",
+        needs=("contact_approximation", ("lagged", "similar")),
+    ),
     "stiction_tolerance": Setting(1e-4, "sliding speed below which shapes count as sticking [m/s]", 1e-9),
     "strict_materials": STRICT_MATERIALS,
 }

@@ -97,6 +97,9 @@ class OwnBody(OwnRobot):
         return np.concatenate([force, R.T @ wrench[3:] + cross(self._center, force)])
 
 
+_ADAPTIVE = ("integrator", ("adaptive",))
+
+
 class OwnStepper(Stepper):
     """A scene without contacts, moved by the integrators of dynx."""
 
@@ -104,9 +107,15 @@ class OwnStepper(Stepper):
     settings: ClassVar[Mapping[str, Setting]] = {
         "backend": Setting(DEFAULT_ENGINE, "backend that computes the dynamics", choices=tuple(BACKENDS)),
         "integrator": Setting("semi_implicit", "integration scheme", choices=tuple(SCHEMES)),
-        "method": Setting("DOP853", "SciPy method of the integrator `adaptive`", choices=METHODS),
-        "rtol": Setting(1e-10, "relative tolerance of the integrator `adaptive`", least=1e-14),
-        "atol": Setting(1e-12, "absolute tolerance of the integrator `adaptive`", least=1e-300),
+        "method": Setting(
+            "DOP853", "SciPy method of the integrator `adaptive`", choices=METHODS, needs=_ADAPTIVE
+        ),
+        "rtol": Setting(
+            1e-10, "relative tolerance of the integrator `adaptive`", least=1e-14, needs=_ADAPTIVE
+        ),
+        "atol": Setting(
+            1e-12, "absolute tolerance of the integrator `adaptive`", least=1e-300, needs=_ADAPTIVE
+        ),
     }
     contact_law: ClassVar[str] = "no contacts, and joint limits at which joints stop without a rebound"
 

@@ -120,7 +120,12 @@ SETTINGS = {
     "residual_threshold": Setting(1e-7, "squared residual at which the solver stops iterating"),
     "erp": Setting(0.2, "share of the error of constraints and joint limits removed in a step", most=1.0),
     "contact_erp": Setting(0.05, "share of a penetration removed in a step", most=1.0),
-    "friction_erp": Setting(0.2, "share of the drift of a sticking contact removed in a step", most=1.0),
+    "friction_erp": Setting(
+        0.2,
+        "share of the drift of a sticking contact removed in a step",
+        most=1.0,
+        unused="Bullet reads it for shapes with a friction anchor, and dynx gives none one",
+    ),
     "cone_friction": Setting(True, "whether friction is limited by a cone, not by a pyramid"),
     "restitution_speed": Setting(0.05, "least approach speed [m/s] of an impact that rebounds"),
     "rebound_time_constant": Setting(

@@ -13,10 +13,12 @@ import pytest
 
 import dynx
 from dynx import control
-from dynx.errors import ArgumentError, UnknownNameError
+from dynx.errors import ArgumentError, LimitError, UnknownNameError
 from dynx.option_names import takes
+from dynx.rbd.parameters import Payload
 from dynx.sim import Scenario, Simulation, simulate, simulate_batch
 from dynx.sim.scenario.options import OPTIONS, SimulationOptions, option, options_of
+from dynx.world import Imu
 
 ARM = dynx.load("pendulum")
 
@@ -125,3 +127,56 @@ def test_a_friction_of_each_rollout_makes_its_slip_effective() -> None:
     law = control.PD(ARM, kp=1.0, kd=1.0)
     scenario = Scenario(ARM, law, ARM.neutral(), duration=0.01, plant="compiled", friction_slip=0.1)
     assert simulate_batch(scenario, friction=np.full((2, ARM.nv), 1e-3)).done.all()
+
+
+TWO_LINKS = dynx.load("planar_2r")
+TIP = TWO_LINKS.frame_names[-1]
+OTHERS: dict[str, Any] = {
+    "plant": "mujoco",
+    "integrator": "rk4",
+    "substeps": 3,
+    "method": "RK23",
+    "rtol": 1e-3,
+    "atol": 1e-2,
+    "dt": 2e-3,
+    "duration": 0.02,
+    "control_dt": 5e-3,
+    "delay": 3e-3,
+    "q0": [0.1, 0.2],
+    "v0": [1.0, 0.0],
+    "noise": dynx.Noise(q=0.1),
+    "damping": 0.3,
+    "friction": 0.3,
+    "friction_slip": 0.1,
+    "armature": 0.3,
+    "effort_limits": 0.1,
+    "position_limits": True,
+    "payload": Payload(TIP, 1.0),
+    "mass_scale": 2.0,
+    "pushes": dynx.ExternalForce(TIP, [5.0, 0.0, 5.0, 0.0, 0.0, 0.0]),
+    "sensors": Imu("imu", TIP),
+    "check_reference": False,
+}
+"""Another value of each option."""
+
+
+@pytest.mark.parametrize("plant", ["reference", "compiled"])
+@pytest.mark.parametrize("name", OPTIONS)
+def test_every_option_changes_what_is_recorded(name: str, plant: str) -> None:
+    law = control.PD(TWO_LINKS, kp=20.0, kd=1.0)
+    # The second joint soon reaches its limit, from where the others start.
+    start = [0.3, float(TWO_LINKS.upper[1]) - 1e-3]
+    options: dict[str, Any] = {"plant": plant, "duration": 0.05, "q0": start, "v0": [0.5, 2.0]}
+    needed, wanted = OPTIONS[name].needs
+    if needed:
+        options[needed] = wanted or 0.2
+    reference = np.array([4.0, 0.0]) if name == "check_reference" else TWO_LINKS.neutral()
+
+    def record(**given: Any) -> Any:
+        try:
+            found = simulate(TWO_LINKS, law, reference, **{**options, **given})
+        except LimitError:
+            return "refused"
+        return [x.tobytes() for x in (found.t, found.q, found.v, found.tau)], len(found.sensors)
+
+    assert record(**{name: OTHERS[name]}) != record()
