@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any
@@ -138,69 +138,91 @@ def _rotation(pose: Pose) -> Floats:
     return np.asarray(rotation_from_rpy(np.array(pose.rpy)), dtype=float)
 
 
+class MujocoRobot:
+    """A robot in MuJoCo alone, built from its links and joints, with sensors at sites of its links."""
+
+    def __init__(self, model: Model, sites: Mapping[str, tuple[str, Pose]], kinds: Sequence[str]) -> None:
+        """`sites` are links and poses in them by names; each has sensors of all `kinds`, such as ``force``,
+        in this order."""
+        import mujoco
+
+        self._model = model
+        spec = mujoco.MjSpec()
+        spec.compiler.degree, spec.compiler.fusestatic = False, False
+        spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+        spec.option.gravity = np.array(model.gravity)
+        spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+
+        # A link may have a name that MuJoCo keeps for itself.
+        names = {link.name: str(k) for k, link in enumerate(model.links)}
+
+        def add(parent: Any, link: str, origin: Pose) -> Any:
+            body = parent.add_body(name=names[link], pos=np.array(origin.xyz), quat=_wxyz(_rotation(origin)))
+            body.explicitinertial, body.mass, body.inertia = True, 1.0, np.ones(3)
+            # In other axes than the frame's: else the compiler would take the body's frame for the inertia's.
+            body.ipos, body.iquat = np.array([0.1, 0.2, 0.3]), np.array([0.5, 0.5, 0.5, 0.5])
+            return body
+
+        bodies = {model.root: add(spec.worldbody, model.root, model.base_pose)}
+        if model.floating:
+            bodies[model.root].add_freejoint(align=False)
+        for joint in model.joints:
+            bodies[joint.child] = body = add(bodies[joint.parent], joint.child, joint.origin)
+            if joint.moves:
+                types = mujoco.mjtJoint
+                kind = types.mjJNT_SLIDE if joint.type == "prismatic" else types.mjJNT_HINGE
+                body.add_joint(type=kind, axis=np.array(joint.axis))
+        for number, (part, pose) in enumerate(sites.values()):
+            at = {"pos": np.array(pose.xyz), "quat": _wxyz(_rotation(pose))}
+            bodies[part].add_site(name=f"{number}", **at)
+            for each in kinds:
+                what = getattr(mujoco.mjtSensor, f"mjSENS_{each.upper()}")
+                spec.add_sensor(type=what, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=f"{number}")
+        compiled = spec.compile()
+        self._numbers = {link.name: compiled.body(names[link.name]).id for link in model.links}
+        for link in model.links:
+            k, inertial = self._numbers[link.name], link.inertial or Inertial()
+            center, R, moments = principal(inertial)
+            compiled.body_mass[k], compiled.body_inertia[k] = inertial.mass, moments
+            compiled.body_ipos[k], compiled.body_iquat[k] = center, _wxyz(R)
+        compiled.body_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
+        compiled.body_subtreemass[:] = compiled.body_mass
+        for k in reversed(range(1, compiled.nbody)):
+            compiled.body_subtreemass[compiled.body_parentid[k]] += compiled.body_subtreemass[k]
+        self._compiled, self._data = compiled, mujoco.MjData(compiled)
+
+    def readings(self, q: Floats, v: Floats, a: Floats, forces: Mapping[str, Floats]) -> Floats:
+        """Return what the sensors read in a state with one coordinate for every moving joint.
+
+        `forces` are wrenches (6,) on links, at their origins in the axes of the world.
+        """
+        import mujoco
+
+        model, data, numbers = self._model, self._data, self._numbers
+        q, v, a = (array.copy() for array in (q, v, a))
+        if model.floating:
+            q[3:7] = q[[6, 3, 4, 5]]
+        data.qpos[:] = q
+        mujoco.mj_fwdPosition(self._compiled, data)
+        if model.floating:
+            R = data.xmat[numbers[model.root]].reshape(3, 3)
+            a[:3] = R @ (a[:3] + np.cross(v[3:6], v[:3]))
+            v[:3] = R @ v[:3]
+        data.qvel[:], data.qacc[:] = v, a
+        data.xfrc_applied[:] = 0.0
+        for name, wrench in forces.items():
+            k = numbers[name]
+            lever = data.xipos[k] - data.xpos[k]
+            data.xfrc_applied[k] += [*wrench[:3], *(wrench[3:] - np.cross(lever, wrench[:3]))]
+        mujoco.mj_inverse(self._compiled, data)
+        return np.array(data.sensordata)
+
+
 def mujoco_sensors(case: Moving) -> Floats:
     """Return what MuJoCo's sensors read at the origin of the child of every joint."""
-    import mujoco
-
-    model = case.model
-    spec = mujoco.MjSpec()
-    spec.compiler.degree, spec.compiler.fusestatic = False, False
-    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
-    spec.option.gravity = np.array(model.gravity)
-    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
-
-    # A link may have a name that MuJoCo keeps for itself.
-    names = {link.name: str(k) for k, link in enumerate(model.links)}
-
-    def add(parent: Any, link: str, origin: Pose) -> Any:
-        body = parent.add_body(name=names[link], pos=np.array(origin.xyz), quat=_wxyz(_rotation(origin)))
-        body.explicitinertial, body.mass, body.inertia = True, 1.0, np.ones(3)
-        # In other axes than the frame's: else the compiler would take the body's frame for the inertia's.
-        body.ipos, body.iquat = np.array([0.1, 0.2, 0.3]), np.array([0.5, 0.5, 0.5, 0.5])
-        return body
-
-    bodies = {model.root: add(spec.worldbody, model.root, model.base_pose)}
-    if model.floating:
-        bodies[model.root].add_freejoint(align=False)
-    for joint in model.joints:
-        bodies[joint.child] = body = add(bodies[joint.parent], joint.child, joint.origin)
-        body.add_site(name=names[joint.child])
-        if joint.moves:
-            kinds = mujoco.mjtJoint
-            kind = kinds.mjJNT_SLIDE if joint.type == "prismatic" else kinds.mjJNT_HINGE
-            body.add_joint(type=kind, axis=np.array(joint.axis))
-    for joint in model.joints:
-        for kind in (mujoco.mjtSensor.mjSENS_FORCE, mujoco.mjtSensor.mjSENS_TORQUE):
-            spec.add_sensor(type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=names[joint.child])
-    compiled = spec.compile()
-    numbers = {link.name: compiled.body(names[link.name]).id for link in model.links}
-    for link in model.links:
-        k, inertial = numbers[link.name], link.inertial or Inertial()
-        center, R, moments = principal(inertial)
-        compiled.body_mass[k], compiled.body_inertia[k] = inertial.mass, moments
-        compiled.body_ipos[k], compiled.body_iquat[k] = center, _wxyz(R)
-    compiled.body_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
-    compiled.body_subtreemass[:] = compiled.body_mass
-    for k in reversed(range(1, compiled.nbody)):
-        compiled.body_subtreemass[compiled.body_parentid[k]] += compiled.body_subtreemass[k]
-    data = mujoco.MjData(compiled)
-    q, v, a = (array.copy() for array in case.tree)
-    if model.floating:
-        q[3:7] = q[[6, 3, 4, 5]]
-    data.qpos[:] = q
-    mujoco.mj_fwdPosition(compiled, data)
-    if model.floating:
-        R = data.xmat[numbers[model.root]].reshape(3, 3)
-        a[:3] = R @ (a[:3] + np.cross(v[3:6], v[:3]))
-        v[:3] = R @ v[:3]
-    data.qvel[:], data.qacc[:] = v, a
-    for name, wrench in case.forces.items():
-        k = numbers[name]
-        lever = data.xipos[k] - data.xpos[k]
-        data.xfrc_applied[k] += [*wrench[:3], *(wrench[3:] - np.cross(lever, wrench[:3]))]
-    mujoco.mj_inverse(compiled, data)
-    # The sensors are a force and a torque for each joint.
-    return np.array(data.sensordata).reshape(len(model.joints), 6)
+    sites = {joint.name: (joint.child, Pose()) for joint in case.model.joints}
+    robot = MujocoRobot(case.model, sites, ("force", "torque"))
+    return robot.readings(*case.tree, case.forces).reshape(len(sites), 6)
 
 
 def drake_reactions(case: Moving) -> tuple[Moving, Floats]:

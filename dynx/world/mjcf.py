@@ -97,7 +97,7 @@ def layout_to_mjcf(
             *(() if engine is None else _remarks_on_engine(engine)),
             *(f"In this document {each}." for each in inexact_materials(document)),
             *_remarks(scene, layout, options, engine),
-            *_remarks_on_sensors(scene, document.left_out),
+            *_remarks_on_sensors(scene, layout, document.left_out),
         )
     )
 
@@ -159,7 +159,7 @@ def _remarks(
             yield f"{robot.name}: the laws of its motors ({kinds}) are not in the document."
 
 
-def _remarks_on_sensors(scene: Scene, left_out: Sequence[str]) -> Iterator[str]:
+def _remarks_on_sensors(scene: Scene, layout: Layout, left_out: Sequence[str]) -> Iterator[str]:
     """Yield how the sensors of the document differ from those of the scene."""
     if not scene.sensors:
         return
@@ -177,6 +177,18 @@ def _remarks_on_sensors(scene: Scene, left_out: Sequence[str]) -> Iterator[str]:
         "joint_torque": "Sensors of joint torques read three numbers, of which the last is along the axis.",
     }
     yield from (note for kind, note in notes.items() if kind in kinds)
+    for robot in layout.robots:
+        sensing = {each.kind for each in layout.sensors if each.part.startswith(f"{robot.name}/")}
+        if robot.damping.any() and sensing & {"imu", "force_torque", "joint_torque"}:
+            yield (
+                f"{robot.name}: MuJoCo's sensors read the acceleration before the damping of the joints at "
+                "the end of the step is added, those of dynx the acceleration of the step."
+            )
+        if robot.model.mechanism.coupling is not None and sensing:
+            yield (
+                f"{robot.name}: MuJoCo's sensors read its mimic joints as they follow softly, those of dynx "
+                "as they follow exactly."
+            )
     compensated = [
         sensor.name
         for sensor in scene.sensors

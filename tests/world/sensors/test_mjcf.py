@@ -116,6 +116,26 @@ def test_raw_mujoco_reads_what_the_world_reads() -> None:
     assert "flange/force" not in text
 
 
+def test_the_document_names_robots_whose_accelerations_mujoco_reads_otherwise() -> None:
+    """Damping that MuJoCo adds at the end of a step, and mimic joints that follow softly."""
+    panda, arm = dynx.load("panda"), dynx.load("ur5")
+    robots = (SceneRobot("hand", panda), SceneRobot("arm", arm))
+    sensors = (Imu("imu", "arm/tool0"), Encoder("joint", "hand/panda_joint1"))
+    scene = Scene("two", robots=robots, sensors=sensors)
+
+    def named(scene: Scene, **options: bool) -> list[str]:
+        with World(scene, "mujoco", **options) as world:
+            text = world.to_mjcf()
+        reads = "MuJoCo's sensors read"
+        return [line.split(reads)[1].split()[1] for line in text.splitlines() if f"hand: {reads}" in line]
+
+    assert named(scene) == ["mimic"]
+    moved = replace(scene, sensors=(Imu("imu", "hand/panda_link7"),))
+    assert named(moved) == ["acceleration", "mimic"]
+    assert named(moved, joint_damping=False) == ["mimic"]
+    assert named(replace(scene, sensors=sensors[:1])) == []
+
+
 def test_the_document_of_a_scene_without_sensors_has_none() -> None:
     with World(replace(field(), sensors=()), "mujoco") as world:
         assert "<sensor" not in world.to_mjcf()
