@@ -23,6 +23,7 @@ from dynx.argument_types import checks_types
 from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.model import Model
 from dynx.model.mechanism import Mechanism, build_mechanism
+from dynx.model.numbers import checked_array
 from dynx.rbd import jacobians, kinematics
 from dynx.rbd.kinematics import Poses
 from dynx.spatial.scalar import Array
@@ -54,6 +55,7 @@ class Referee:
 
     def forward_kinematics(self, q: ArrayLike) -> Array:
         """Return T_world_frame of every frame (..., n_frames, 4, 4)."""
+        q = checked_array("q", q, self.model.nq)
         return self._evaluate(kinematics.frame_placements, 3, q)
 
     def __getattr__(self, name: str) -> Callable[..., Array]:

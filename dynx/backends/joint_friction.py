@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from dynx.argument_types import checks_types
 from dynx.backends.joint_dynamics import JointDynamicsTerms
-from dynx.errors import ArgumentError, GainError, UnknownNameError, shown
+from dynx.errors import ArgumentError, DTypeError, GainError, UnknownNameError, shown
 from dynx.model import Model
 from dynx.model.numbers import checked_gain, is_real, read_only, real_array
 from dynx.spatial.scalar import Array, Floats, sign, tanh
@@ -165,8 +165,8 @@ def coefficients_by_joint(
     for joint, value in given.items():
         try:
             column = model.coordinate_index(joint) - base
-        except UnknownNameError as error:
-            raise UnknownNameError(f"{name}: {error}") from None
+        except (UnknownNameError, DTypeError) as error:
+            raise type(error)(f"{name}: {error}") from None
         columns[column] = real_array(f"{name} of {shown(joint)}", value)
     lengths = {column.shape for column in columns if column.shape}
     if len(lengths) > 1 or any(len(shape) > 1 for shape in lengths):

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from dynx.argument_types import checks_types
 from dynx.contacts.attribution import Attributor
 from dynx.contacts.candidates import CANDIDATES, SUBSTEPS, SettingsChange
 from dynx.contacts.case import BUILT_IN, ContactCase, find_case, find_cases
@@ -95,10 +96,14 @@ class Conformance:
     in_effect: Mapping[str, Mapping[str, tuple[float, ...]]] = field(default_factory=dict)
     """Values at each step, by engine, of settings given that the engine changes."""
 
+    @checks_types
     def count(self, kind: VerdictKind, engine: str | None = None) -> int:
         """Return the number of figures with a verdict, of one engine or of all."""
+        if kind not in VERDICTS:
+            raise UnknownNameError(f"no kind {shown(kind)}{nearest(kind, VERDICTS)}")
         return self.counts(engine)[kind]
 
+    @checks_types
     def counts(self, engine: str | None = None) -> dict[VerdictKind, int]:
         """Return the number of figures with each verdict, of one engine or of all."""
         found = Counter(r.verdict.kind for r in self.results if engine in (None, r.engine))

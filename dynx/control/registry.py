@@ -116,4 +116,4 @@ def _read(model: Model, value: Any) -> Any:
         return from_document(model, value)
     if isinstance(value, list):
         return np.array(value, dtype=np.float64)
-    return float(value) if value in ("inf", "-inf", "nan") else value
+    return float(value) if isinstance(value, str) and value in ("inf", "-inf", "nan") else value

@@ -74,11 +74,15 @@ def support(shape: ConvexShape | Plane, T: Pose | ArrayLike, direction: ArrayLik
 
     For a plane h is infinite along all directions but its normal.
     """
-    n = checked_vector("direction", direction)
-    length = float(np.linalg.norm(n))
+    return _support(_core_of(shape, "shape"), _checked_pose("T", T), checked_vector("direction", direction))
+
+
+def _support(core: Core | None, pose: Floats, direction: Floats) -> tuple[float, Floats]:
+    """Return the support of a core, or of a half-space for None."""
+    length = float(np.linalg.norm(direction))
     if length == 0.0:
         raise ArgumentError("direction is zero; wanted a vector of any length above zero")
-    n, pose, core = n / length, _checked_pose("T", T), _core_of(shape, "shape")
+    n = direction / length
     if core is None:
         up, p = _normal(pose), pose[:3, 3]
         along = np.abs(n - up).max() <= NORMAL_ROUNDING
@@ -99,12 +103,13 @@ def separation(
 
     It is a lower bound of the signed distance for every normal, and equal to it for the best.
     """
+    a, b = _core_of(shape_a, "shape_a"), _core_of(shape_b, "shape_b")
     T_a, T_b = _checked_pose("T_a", T_a), _checked_pose("T_b", T_b)
     n = checked_vector("normal", normal)
     # Far from the origin of the world the digits of a difference of heights would be lost.
     near_a, near_b = T_a.copy(), T_b.copy()
     near_a[:3, 3], near_b[:3, 3] = 0.0, T_b[:3, 3] - T_a[:3, 3]
-    return -support(shape_a, near_a, -n)[0] - support(shape_b, near_b, n)[0]
+    return -_support(a, near_a, -n)[0] - _support(b, near_b, n)[0]
 
 
 MIN_RESOLVED_DISTANCE = 1e-12

@@ -231,7 +231,7 @@ def _array_of(action: object) -> Any:
     try:
         return np.asarray(action)
     except ValueError as error:
-        raise ShapeError(f"action is ragged: {error}") from None
+        raise ShapeError(f"action is ragged; wanted rows of one length: {error}") from None
 
 
 def _checked_choice(space: spaces.Discrete, action: Any) -> int:

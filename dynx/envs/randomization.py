@@ -81,7 +81,8 @@ def read_distribution(name: str, given: Any, valid: str = NOT_NEGATIVE) -> Distr
     if (
         not isinstance(pair, Sequence | np.ndarray)
         or isinstance(pair, str)
-        or np.shape(pair) != (2,)
+        or getattr(pair, "ndim", 1) != 1
+        or len(pair) != 2
         or not all(is_real(x) and abs(x) < MAX_MAGNITUDE for x in pair)
     ):
         raise ArgumentError(
@@ -144,28 +145,32 @@ class Randomization:
             self.distributions(each.name)
         if not any(getattr(self, each.name) is not None for each in fields(self)):
             known = ", ".join(each.name for each in fields(self))
-            raise ArgumentError(f"a randomization names no parameter; known: {known}")
+            raise ArgumentError(f"randomize names no parameter; known: {known}")
 
     @classmethod
-    def read(cls, given: Randomization | Mapping[str, Any]) -> Randomization:
+    def read(cls, randomize: Randomization | Mapping[str, Any]) -> Randomization:
         """Return a randomization given itself, or as a mapping of its fields.
 
         Raises UnknownNameError for a field that does not exist, with the nearest one.
         """
-        if isinstance(given, Randomization):
-            return given
-        if not isinstance(given, Mapping):
+        if isinstance(randomize, Randomization):
+            return randomize
+        if not isinstance(randomize, Mapping):
             raise ArgumentError(
-                f"randomize is {shown(given)}; wanted a dict such as {{'mass_scale': (0.8, 1.2)}}"
+                f"randomize is {shown(randomize)}; wanted a dict such as {{'mass_scale': (0.8, 1.2)}}"
             )
         known = [each.name for each in fields(cls)]
-        for name in given:
+        for name in randomize:
             if name not in known:
                 raise UnknownNameError(f"randomize has no parameter {shown(name)}{nearest(str(name), known)}")
-        return cls(**given)
+        return cls(**randomize)
 
+    @checks_types
     def distributions(self, name: str) -> dict[str | None, Distribution]:
         """Return the distributions of a field by the name of the part, which is None for all parts."""
+        known = [each.name for each in fields(self)]
+        if name not in known:
+            raise UnknownNameError(f"randomize has no parameter {shown(name)}{nearest(name, known)}")
         given = getattr(self, name)
         if given is None:
             return {}

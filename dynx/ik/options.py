@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TypedDict, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, ShapeError, UnknownNameError, nearest, shown
 from dynx.model.numbers import real_array, whole_number
 from dynx.model.targets import FREE, Targets
@@ -247,6 +248,7 @@ class Options:
     """Positions [rad or m] of joints that the closed form takes as given."""
 
     @classmethod
+    @checks_types
     def of(cls, options: Mapping[str, Any]) -> Options:
         """Make options from keyword arguments. Raises UnknownNameError for an unknown one."""
         for name in options:
@@ -323,6 +325,7 @@ class FrameTarget:
     rotation_tolerance: ArrayLike | None = None
     axes: str | None = None
 
+    @checks_types
     def options(self, of_call: Options) -> Options:
         """Return the options of the call with those of this frame."""
         own: dict[str, Any] = {"free": self.free, "point": self.point, "weights": self.weights}
@@ -362,7 +365,7 @@ def frame_targets(target: Any, frame: str | None, options: Options) -> list[tupl
         return [(_one_frame(frame), target, options)]
     names = [name for name, _, _ in found]
     if not names:
-        raise ArgumentError("target names no frame")
+        raise ArgumentError("target names no frame; wanted at least one")
     for name in names:
         if names.count(name) > 1:
             raise ArgumentError(f"target names the frame {shown(name)} twice")

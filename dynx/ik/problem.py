@@ -281,7 +281,7 @@ def _secondary(model: Model, options: Options) -> Secondary | None:
     if goal is not None and options.maximize is not None:
         raise ArgumentError("nearest and maximize are both given; a choice has one objective")
     if options.method != "dynx":
-        raise ArgumentError("nearest and maximize need method 'dynx'")
+        raise ArgumentError(f"nearest and maximize need method 'dynx', not {shown(options.method)}")
     if goal is None:
         if options.maximize not in MAXIMA:
             raise ArgumentError(

@@ -15,6 +15,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, shown
 from dynx.model.numbers import (
     checked_entries,
@@ -90,7 +91,7 @@ def rigid_matrix(T: ArrayLike, name: str) -> Floats:
         )
     rows: list[list[float]] = array.tolist()
     if not all(map(math.isfinite, chain.from_iterable(rows))):
-        raise NotFiniteError(f"{name} has an entry that is NaN or infinite")
+        raise NotFiniteError(f"{name} has an entry that is NaN or infinite; wanted finite numbers")
     (a, b, c, _), (d, e, f, _), (g, h, i, _), bottom = rows
     lengths = (a * a + d * d + g * g, b * b + e * e + h * h, c * c + f * f + i * i)
     angles = (a * b + d * e + g * h, b * c + e * f + h * i, c * a + f * d + i * g)
@@ -109,7 +110,7 @@ class Pose:
     rpy: Vector = ZERO
 
     @classmethod
-    def from_matrix(cls, T: ArrayLike, name: str = "a pose") -> Pose:
+    def from_matrix(cls, T: ArrayLike, name: str = "T") -> Pose:
         """Return the pose of a homogeneous matrix (4, 4), such as `forward_kinematics` returns, or of a pair
         of a position and a quaternion (x, y, z, w).
 
@@ -205,6 +206,7 @@ class Mimic:
     offset: float = 0.0
 
 
+@checks_types
 @dataclass(frozen=True)
 class Joint:
     """A joint from link `parent` to link `child`; `origin` is the pose of its frame in the parent at position

@@ -73,6 +73,8 @@ def load(
         )
     if isinstance(x, Model):
         return _with_options(x, base, lock, gravity, base_pose)
+    if not isinstance(package_dirs, str | os.PathLike | Iterable):
+        raise ArgumentError(f"package_dirs is {shown(package_dirs)}; wanted folders")
     folders = [package_dirs] if isinstance(package_dirs, str | os.PathLike) else list(package_dirs)
     data, source, name = read_description(x, folders)
     return read_model(
@@ -100,7 +102,7 @@ def read_description(
     if isinstance(x, str) and x.lstrip("\ufeff \t\r\n").startswith("<"):
         return x, "<string>", None
     if not isinstance(x, str | os.PathLike):
-        raise ArgumentError(f"cannot load {type(x).__name__}; wanted a path, URDF text, a name or a Model")
+        raise ArgumentError(f"x is of type {type(x).__name__}; wanted a path, URDF text, a name or a Model")
     named, arguments = split_arguments(x) if isinstance(x, str) else (x, {})
     path = _path_of(named, package_dirs)
     name = PurePath(path).name.split(".")[0]

@@ -97,7 +97,7 @@ def real_array(name: str, value: ArrayLike) -> Floats:
     try:
         array = np.asarray(value)
     except ValueError as error:
-        raise ShapeError(f"{name} is ragged: {error}") from None
+        raise ShapeError(f"{name} is ragged, {shown(value)}; wanted rows of one length: {error}") from None
     if array.dtype.kind not in "fiu":
         origin = "" if array is value else f" (it is {shown(value)}, of type {type(value).__name__})"
         raise DTypeError(f"{name} has dtype {array.dtype}; wanted real numbers (float64){origin}")

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+from dynx.argument_types import checks_types
 from dynx.errors import DynxError
 from dynx.model import Model
 from dynx.model.elements import Inertial, Vector
@@ -71,10 +72,12 @@ class Case:
         """The inertial of each link as dynx reads it, by the link's name, in depth-first order."""
         return {link.name: link.inertial for link in self.model.links}
 
+    @checks_types
     def choice(self, rule: str, default: str) -> str:
         """Return the user's choice for a rule, or the default."""
         return (self.choices or {}).get(rule, default)
 
+    @checks_types
     def with_source(self, source: XmlSource) -> Case:
         """Return the case with another text."""
         return replace(self, source=source)

@@ -717,7 +717,7 @@ def refuse_uncompiled(scenario: Scenario) -> None:
     ):
         value = getattr(scenario, name)
         if value not in possible:
-            raise ArgumentError(f"{name} is {shown(value)}; in a batch it is {shown(possible[0])}")
+            raise ArgumentError(f"{name} is {shown(value)}; a batch takes only {shown(possible[0])}")
     if scenario.sensors != ():
         raise ArgumentError(
             "sensors were given, and a batch records no accelerations: simulate(..., noise=Noise(rollout=k)) "

@@ -634,10 +634,10 @@ def _compare_rollouts(
     rerun: bool = True,
     progress: Progress | None = None,
 ) -> RolloutComparison:
-    for name, each in (("first", ours), ("second", theirs)):
+    for name, each in (("ours", ours), ("theirs", theirs)):
         if not isinstance(each, Rollout):
             raise ArgumentError(
-                f"the {name} rollout is of type {type(each).__name__}; wanted a dynx.Rollout, which "
+                f"{name} is of type {type(each).__name__}; wanted a dynx.Rollout, which "
                 "simulate returns and Rollout.load reads, or first a Scene and second its engines"
             )
     if not is_real(tolerance) or not 0.0 <= tolerance < math.inf:

@@ -60,6 +60,7 @@ class Noise:
     @checks_types
     def rows(self, model: Model, n_controls: int) -> tuple[Floats, Floats]:
         """Return the noise of q and of v at each control step (n_controls, nv)."""
+        whole_number("n_controls", n_controls, 0)
         deviations = self.deviations(model.nv)
         drawn = self.numbers(Purpose.MEASUREMENT, (n_controls, 2, model.nv))
         return drawn[:, 0] * deviations[0], drawn[:, 1] * deviations[1]

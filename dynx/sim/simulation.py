@@ -190,8 +190,8 @@ class Simulation:
             refuse_too_many_steps("until", until, self._dt)
             if round(until / self._dt) < self._record.steps:
                 raise ArgumentError(
-                    f"until is {until:.12g} s, but {self.time:.12g} s have been simulated; `restore` and "
-                    "`reset` go back"
+                    f"until is {until:.12g} s, but {self.time:.12g} s have been simulated; use `restore` or "
+                    "`reset` to go back"
                 )
             end = multiple("until", until, self._dt) if until else 0
         if end is None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, escaped, shown
 from dynx.model.model import Model
 from dynx.model.numbers import checked_entries, is_real, real_array
@@ -108,6 +109,7 @@ class ExternalForce:
                 "or more, and a positive one"
             )
 
+    @checks_types
     def checked(self, model: Model) -> ExternalForce:
         """Return a copy on a frame of the robot with its wrench as an array.
 

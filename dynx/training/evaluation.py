@@ -15,6 +15,9 @@ from dynx.envs.library import Env
 from dynx.errors import ArgumentError
 from dynx.model.numbers import whole_number
 
+MAX_EPISODES = 10**7
+"""Largest number of episodes of one evaluation."""
+
 CONFIDENCE = 0.95
 """Probability with which an interval holds the true mean."""
 
@@ -69,9 +72,10 @@ def evaluate(
     Episode k begins with ``reset(seed=seed + k)``, the same on every engine. Every episode counts, long or
     short. `progress` is called with the number of episodes that have ended.
     """
-    whole_number("episodes", episodes, 1)
+    whole_number("episodes", episodes, 1, MAX_EPISODES)
+    whole_number("seed", seed, 0)
     if not envs:
-        raise ArgumentError("no environment to judge the policy in")
+        raise ArgumentError("envs is empty; wanted at least one environment to judge the policy in")
     returns, lengths = np.zeros(episodes), np.zeros(episodes, dtype=np.int64)
     running: dict[int, tuple[int, Any]] = {}
     begun = ended = diverged = 0

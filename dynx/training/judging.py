@@ -7,8 +7,9 @@ from typing import Any
 
 from dynx.argument_types import checks_types
 from dynx.envs.library import Env
+from dynx.model.numbers import whole_number
 from dynx.training.environments import make
-from dynx.training.evaluation import AT_ONCE, Evaluation, evaluate
+from dynx.training.evaluation import AT_ONCE, MAX_EPISODES, Evaluation, evaluate
 from dynx.training.policy import Policy
 from dynx.training.specification import TaskSpec
 
@@ -24,6 +25,7 @@ def judge(
     progress: Callable[[int], object] = lambda _: None,
 ) -> Evaluation:
     """Run whole episodes of a policy on a task, as `evaluate` does, in environments made for it."""
+    whole_number("episodes", episodes, 1, MAX_EPISODES)
     envs: list[Env[Any, Any]] = []
     try:
         envs.extend(make(task) for _ in range(min(AT_ONCE, episodes)))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dynx.model.numbers import is_real
+from dynx.model.numbers import is_real, whole_number
 from dynx.training.checkpoints import Checkpoints
 from dynx.training.evaluation import Evaluation, evaluate
 from dynx.training.library import log_to
@@ -57,6 +57,7 @@ class Schedule:
 
     def distances(self, steps: int) -> tuple[int, int]:
         """Return the steps between checkpoints and between evaluations of a run of `steps`."""
+        whole_number("steps", steps, 1)
         return (
             self.checkpoint_every or max(1, steps // CHECKPOINTS_PER_RUN),
             self.evaluate_every or max(1, steps // EVALUATIONS_PER_RUN),

@@ -233,7 +233,8 @@ def action_of(algorithm: Any, observation: Any, deterministic: bool) -> Any:
     try:
         action, _ = algorithm.predict(observation, deterministic=deterministic)
     except ValueError as error:  # of a distribution whose parameters are no numbers
-        raise ArgumentError(f"the policy has no action: {' '.join(str(error).split())[:300]}") from error
+        reason = " ".join(str(error).split())[:300]
+        raise ArgumentError(f"the policy has no action for this observation: {reason}") from error
     finally:
         restore()
     return action

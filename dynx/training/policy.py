@@ -96,6 +96,7 @@ class Policy:
         seen = observation if self.scaling is None else self.scaling(observation)
         return action_of(self.algorithm, seen, deterministic)
 
+    @checks_types
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the policy: a file that stable-baselines3 loads, which acts there as here, with its origin
         added."""

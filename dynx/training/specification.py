@@ -58,6 +58,7 @@ class TrainingSpec:
         for name, least in (("steps", 1), ("envs", 1), ("seed", 0)):
             whole_number(name, getattr(self, name), least)
 
+    @checks_types
     def first_difference(self, other: TrainingSpec) -> str | None:
         """Return a sentence about the first field in which two runs differ; None if they are equal."""
         for each in fields(self):
@@ -66,6 +67,7 @@ class TrainingSpec:
                 return f"{each.name} is {shown(mine, 200)}, there {shown(theirs, 200)}"
         return None
 
+    @checks_types
     def obstacle_to_continuing(self, other: TrainingSpec) -> str | None:
         """Return a sentence about why this run cannot go on from what `other` learned; None if it can.
 

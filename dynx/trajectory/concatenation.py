@@ -53,7 +53,7 @@ def concatenate(*trajectories: Trajectory) -> Trajectory:
     position and velocity at which the previous one ends (to 1e-9); the acceleration may jump.
     """
     if not trajectories:
-        raise ArgumentError("no trajectory was given; wanted at least one")
+        raise ArgumentError("trajectories is empty; wanted at least one")
     for k, part in enumerate(trajectories):
         if not isinstance(part, Trajectory):
             raise ArgumentError(f"argument {k} is of type {type(part).__name__}; wanted a Trajectory")

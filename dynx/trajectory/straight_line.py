@@ -97,7 +97,8 @@ def line(
     elif law is None and duration is not None:
         motion_law = quintic([0.0], [1.0], duration)
     else:
-        raise ArgumentError("wanted either a duration or a law, one of them")
+        which = "neither duration nor law is given" if law is None else "duration and law are both given"
+        raise ArgumentError(f"{which}; wanted either a duration or a law")
     for name, bound in (("deviation", deviation), ("rotation_deviation", rotation_deviation)):
         if not (isinstance(bound, int | float | np.number) and MIN_DEVIATION <= bound < np.inf):
             raise ArgumentError(f"{name} is {shown(bound)}; wanted a number, at least {MIN_DEVIATION:g}")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, nearest, shown
 from dynx.files.films import WRITERS
 from dynx.files.reading import checked_path
@@ -313,6 +314,7 @@ class Viewer(Controls):
         else:
             view.put(q)
 
+    @checks_types
     def follow(self, part: str | None, *, first_person: bool = False) -> None:
         """Let the camera of every page move with a part: a link of a robot, or in a motion or a world a body
         or ``robot/link``. A robot's name stands for its root link. With None the camera stays where it is.

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.files.reading import checked_path
 from dynx.files.writing import write_bytes
@@ -49,6 +50,7 @@ class Picture:
     names: tuple[str, ...]
     """Links as ``robot/link``, and bodies."""
 
+    @checks_types
     def mask(self, name: str) -> NDArray[np.bool_]:
         """Return where a body, ``robot/link``, or any link of a robot is seen (height, width).
 
@@ -59,6 +61,7 @@ class Picture:
             raise UnknownNameError(f"no part {shown(name)} in the picture{nearest(str(name), self.names)}")
         return np.isin(self.segmentation, numbers)
 
+    @checks_types
     def write_png(self, path: str | os.PathLike[str], what: str = "rgb") -> None:
         """Write the picture as a PNG file, atomically.
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynx.argument_types import checks_types
-from dynx.errors import ArgumentError, ShapeError
+from dynx.errors import ArgumentError, ShapeError, shown
+from dynx.model.numbers import is_real
 from dynx.spatial.scalar import Floats
 from dynx.world.record import Record
 
@@ -53,6 +54,8 @@ class Separation:
 
     def first_beyond(self, distance: float) -> tuple[float, str] | None:
         """Return the first time at which something is farther apart than `distance`, and its name."""
+        if not is_real(distance):
+            raise ArgumentError(f"distance is {shown(distance)}; wanted a number")
         beyond = np.flatnonzero(self.distance > distance)
         if not beyond.size:
             return None

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.argument_types import checks_types
 from dynx.errors import UnknownNameError, nearest, shown
 from dynx.files.arrays import ArrayFile
+from dynx.model.numbers import whole_number
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import cross
 from dynx.world.contacts import Contact
@@ -46,6 +48,7 @@ class ContactTable:
     """Forces (m, 3) on a, perpendicular to the normals [N]."""
 
     @classmethod
+    @checks_types
     def of(cls, steps: Sequence[Sequence[Contact]], parts: Sequence[str]) -> ContactTable:
         """Return the table of the contacts of each step; `parts` are the bodies and links of the scene."""
         listed = [(k, contact) for k, contacts in enumerate(steps) for contact in contacts]
@@ -101,6 +104,7 @@ class ContactTable:
         """
         return self.wrenches_on(part)[:, :3]
 
+    @checks_types
     def wrenches_on(self, part: str) -> Floats:
         """Return the sum of the contact forces on a part in each step and of their moments about the origin
         of the world (n_steps, 6) [N, N m], in world axes; see `force_on`."""
@@ -118,6 +122,7 @@ class ContactTable:
 
     def first(self, n: int) -> ContactTable:
         """Return the contacts of the first `n` steps."""
+        whole_number("n", n, 0)
         end = int(np.searchsorted(self.step, n))
         return ContactTable(n, self.names, **{name: getattr(self, name)[:end] for name in _COLUMNS})
 
@@ -134,10 +139,11 @@ class Surroundings:
 
     def first(self, n: int) -> Surroundings:
         """Return the record of the first `n` steps."""
+        contacts = self.contacts.first(n)
         bodies, robots = (
             {name: rows[: n + 1] for name, rows in parts.items()} for parts in (self.bodies, self.robots)
         )
-        return Surroundings(self.contacts.first(n), bodies, robots)
+        return Surroundings(contacts, bodies, robots)
 
     def __repr__(self) -> str:
         counts = f"contacts: {len(self.contacts)}, moving bodies: {len(self.bodies)}"

@@ -6,6 +6,7 @@ import inspect
 import re
 from collections.abc import Iterator
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -40,7 +41,7 @@ VALID = re.compile(
     r"\b(wanted|known|did you mean|at most|at least|between|only|must|needs?|has no|there (is|are) no|no such"
     r"|give|such as|of this|not finite|cannot|one of|takes|beyond|above|below|positive|greater|less|exceeds|"
     r"allowed|differs?|use|choose|change|accepted|supported|expected|not callable|are not|without|instead|"
-    r"belongs|larger|smaller|more than|fewer|is a str)\b"
+    r"belongs|larger|smaller|more than|fewer|is a str|(saved|written) as)\b"
 )
 """Words by which a message says what is valid."""
 
@@ -54,13 +55,30 @@ def omissions(call: Call, error: DynxError) -> list[str]:
     found = []
     # A function of names of others takes the name by which an error calls its argument.
     label = str(call.given["name"]) if "name" in call.given else ""
-    if parameters and not any(_names(name, text) for name in parameters) and not text.startswith(f"{label} "):
+    # What is looked up or opened is known by its own name.
+    quoted = any(
+        _quotes(value, text)
+        for each, value in call.given.items()
+        if each in ("name", "path") or text.startswith("no ")
+    )
+    named = quoted or text.startswith(f"{label} ") or any(_names(name, text) for name in parameters)
+    if parameters and not named:
         found.append("name")
     if call.given and not any(_shows(value, text) for value in call.given.values()) and "given" not in text:
         found.append("given")
     if not VALID.search(text):
         found.append("valid")
     return found
+
+
+def _quotes(value: Any, text: str) -> bool:
+    """Check whether a text has the beginning of a name, or the last part of a path."""
+    if not isinstance(value, str | bytes | Path):
+        return False
+    if isinstance(value, bytes):
+        return repr(value)[:25] in text
+    written = str(value)
+    return (written[:25] if written else "''") in text or (Path(written).name[:25] or "''") in text
 
 
 def _names(name: str, text: str) -> bool:
@@ -75,12 +93,16 @@ def _shows(value: Any, text: str) -> bool:
     return any(each in text for each in _traces(value))
 
 
+def _is_not_finite(value: Any) -> bool:
+    return isinstance(value, float) and not np.isfinite(value)
+
+
 def _traces(value: Any) -> Iterator[str]:
     yield type(value).__name__
     if value is None:
-        yield from ("None", "nothing", "absent", "lacks", "missing", "without", " no ")
+        yield from ("None", "nothing", "absent", "lacks", "missing", "without", " no ", "needs")
     if isinstance(value, int) and abs(value) > 10**20:
-        yield from ("digits", "1000000")
+        yield from ("digits", "1000000", "shape ()")
         return
     for written in (str(value), repr(value)):
         if written:
@@ -91,6 +113,8 @@ def _traces(value: Any) -> Iterator[str]:
             yield f"shape {np.asarray(value).shape}"
     if isinstance(value, np.ndarray):
         yield from (f"is {each}" for each in value.ravel()[:9])
+        yield from (f"is '{each}'" for each in value.ravel()[:9])
+        yield from (str(value[0]), "length 0", "the same") if value.ndim and len(value) else ()
         yield from (str(value.shape), str(value.dtype), f"{value.size} ", "NaN", "nan", "inf")
         yield from (f"{value.ndim} axes", "infinit", "not finite", "empty", "masked")
     if isinstance(value, (float, np.floating)) and not np.isfinite(value):
@@ -98,8 +122,9 @@ def _traces(value: Any) -> Iterator[str]:
     if hasattr(value, "__len__") and not isinstance(value, np.ndarray):
         yield f"{len(value)} "
         if not len(value):
-            yield from ("empty", "no ", "nothing")
+            yield from ("empty", "no ", "nothing", "lacks")
         elif not isinstance(value, (str, bytes)):
+            yield from ("not finite",) if any(map(_is_not_finite, value)) else ()
             for each in value:
                 yield from (repr(each)[:25], str(each)[:25], type(each).__name__)
     if isinstance(value, type):

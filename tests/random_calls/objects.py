@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Callable, Mapping
 from functools import cache, partial
 from importlib.util import find_spec
@@ -12,8 +13,23 @@ from typing import Any
 import numpy as np
 
 import dynx
-from dynx import bench, control, ik, trajectory, world
+from dynx import (
+    agreement,
+    backends,
+    bench,
+    contacts,
+    control,
+    distance,
+    envs,
+    ik,
+    loaded,
+    rules,
+    trajectory,
+    world,
+)
+from dynx.envs.tasks.reach import Reach
 from dynx.model import geometry
+from dynx.rules.registry import trap_case
 
 MODELS = Path(__file__).parents[2] / "models"
 
@@ -70,6 +86,13 @@ batch = cache(
 )
 
 
+@cache
+def surroundings() -> Any:
+    """Return what was around the robot in a short simulation of a scene."""
+    plant = dynx.ScenePlant(scene(), engine="mujoco")
+    return dynx.simulate(arm(), pd(), motion(), plant=plant, duration=0.02, control_dt=0.005).surroundings
+
+
 def open_world(engine: str = "mujoco") -> dynx.World:
     """Return a new world of `scene`."""
     return dynx.World(scene(), engine=engine)
@@ -113,6 +136,63 @@ def environment() -> Any:
     return made
 
 
+@cache
+def conformance() -> Any:
+    """Return what one engine does in one case of contact."""
+    return contacts.conform(["mujoco"], cases=contacts.case_names()[:1], steps=(1e-3,))
+
+
+def closed_solutions() -> Any:
+    """Return the solutions of a closed form."""
+    robot = six_axis_arm()
+    form = ik.closed_form(robot, robot.frame_names[-1])
+    target = dynx.backend("reference", robot).forward_kinematics(np.full(6, 0.3), robot.frame_names[-1])
+    return form.solve(target)
+
+
+SENSORS: Mapping[str, Callable[[], Any]] = {
+    "IMU": lambda: world.Imu("imu", tip()),
+    "force-torque": lambda: world.ForceTorqueSensor("wrist", arm().joint_names[-1]),
+    "joint torque": lambda: world.JointTorqueSensor("torque", arm().joint_names[0]),
+    "encoder": lambda: world.Encoder("angle", arm().joint_names[0]),
+    "contact": lambda: world.ContactSensor("touch", "box"),
+    "ray": lambda: world.RaySensor("eye", "box"),
+}
+"""Makers of sensors."""
+
+TRAINING = find_spec("torch") is not None and find_spec("stable_baselines3") is not None
+"""True where policies can be trained."""
+
+
+def small_run() -> Any:
+    """Return a training of a moment."""
+    from tests.training.runs import small_run as run
+
+    return run(32)
+
+
+@cache
+def policy() -> Any:
+    """Return a policy, hardly trained."""
+    from dynx.training import Schedule, load_policy, train
+
+    folder = tempfile.mkdtemp()
+    train(small_run(), folder, schedule=Schedule(episodes=1), final_episodes=1)
+    return load_policy(Path(folder) / "final.zip")
+
+
+def training_objects() -> Mapping[str, Callable[[], Any]]:
+    """Return makers of the objects of `dynx.training`."""
+    from dynx import training
+
+    return {
+        "policy": policy,
+        "schedule": training.Schedule,
+        "task of a training": lambda: training.TaskSpec("CartPole-v1"),
+        "training": small_run,
+    }
+
+
 OBJECTS: Mapping[str, Callable[[], Any]] = {
     "model": arm,
     "floating model": floating,
@@ -147,7 +227,62 @@ OBJECTS: Mapping[str, Callable[[], Any]] = {
     "torque motor": lambda: dynx.TorqueMotor(0.1),
     "box": lambda: geometry.Box((0.1, 0.2, 0.3)),
     "geometry": lambda: arm().geometry,
-    "contacts": lambda: rollout().surroundings,
+    "surroundings": surroundings,
+    "PID": lambda: control.PID(arm(), kp=1.0, ki=1.0, kd=1.0, control_dt=0.005),
+    "velocity law": lambda: control.Velocity(arm(), kd=1.0),
+    "feed-forward": lambda: control.FeedForward(arm(), backend="reference"),
+    "gravity-compensated PD": lambda: control.GravityCompensatedPD(
+        arm(), kp=1.0, kd=1.0, backend="reference"
+    ),
+    "discrete computed torque": lambda: control.DiscreteComputedTorque(
+        arm(), control_dt=0.005, backend="reference"
+    ),
+    "operational space": lambda: control.OperationalSpace(
+        arm(), tip(), natural_frequency=10.0, backend="reference"
+    ),
+    "open loop": lambda: control.OpenLoop(arm(), np.zeros((4, 3)), control_dt=0.005),
+    "encoders": lambda: control.Encoders(pd(), resolution=0.01, control_dt=0.005),
+    "motor lag": lambda: control.MotorLag(pd(), control_dt=0.005, time_constant=0.01),
+    "friction compensation": lambda: control.FrictionCompensation(pd()),
+    "saturated": lambda: control.Saturated(pd()),
+    "joint friction": lambda: control.JointFriction(arm()),
+    "Bullet PD motor": lambda: control.BulletPDMotor(arm(), kp=1.0, kd=1.0),
+    "Bullet position motor": lambda: control.BulletPositionMotor(arm()),
+    "Bullet velocity motor": lambda: control.BulletVelocityMotor(arm()),
+    "Bullet torque motor": lambda: control.BulletTorqueMotor(pd()),
+    "position motor": lambda: dynx.PositionMotor(0.1, 1.0, 1.0),
+    "velocity motor": lambda: dynx.VelocityMotor(0.1, 1.0),
+    "momentum observer": lambda: control.MomentumObserver(arm(), time_constant=0.1, backend="reference"),
+    "tool": lambda: control.Tool(1.0, np.zeros(3), None, np.zeros(6), 1.0, 0.0),
+    "sensor motion": lambda: control.SensorMotion(np.ones((4, 3)), np.ones((4, 3)), np.ones((4, 3))),
+    "scene plant": lambda: dynx.ScenePlant(scene(), engine="mujoco"),
+    "derived backend": lambda: backends.DerivedBackend(engine()),
+    "distance": lambda: distance.distance(
+        geometry.Box((0.1, 0.2, 0.3)), np.eye(4), geometry.Box((0.1, 0.2, 0.3)), np.eye(4)
+    ),
+    "rule": lambda: rules.all_rules()[0],
+    "case": lambda: trap_case(rules.all_rules()[0]),
+    "task": Reach,
+    "measurement": lambda: control.Measurement(0.0, np.zeros(3), np.zeros(3)),
+    "external force": lambda: dynx.ExternalForce("hand", np.zeros(6)),
+    "referee": lambda: agreement.Referee(arm()),
+    "conformance": conformance,
+    "contact case": lambda: contacts.find_case(contacts.case_names()[0]),
+    "randomization": lambda: envs.Randomization(mass_scale=(0.9, 1.1)),
+    "frame target": lambda: ik.FrameTarget(tip(), np.eye(4)),
+    "ik options": ik.Options,
+    "IK solutions": closed_solutions,
+    "mechanism": lambda: arm().mechanism,
+    "loaded robot": lambda: loaded.load_as(loaded.installed_engines()[0], MODELS / "planar_3r.urdf", arm()),
+    "summary": lambda: rollout().summary(),
+    "camera": lambda: world.Camera(size=(8, 8)),
+    "picture": lambda: open_world().camera(world.Camera(size=(8, 8))),
+    "contact table": lambda: surroundings().contacts,
+    "separation": lambda: world.separation(recorded(), recorded()),
+    "sensor errors": lambda: world.SensorErrors(noise=0.1),
+    "readings": lambda: rollout().read_sensors([world.Imu("imu", tip())])["imu"],
+    **{f"sensor {name}": make for name, make in SENSORS.items()},
+    **(training_objects() if TRAINING else {}),
     **({"viewer": viewer} if find_spec("viser") is not None else {}),
     "bench session": session,
     **{f"backend {name}": partial(engine, name) for name in dynx.installed_backends()},
@@ -158,6 +293,12 @@ OBJECTS: Mapping[str, Callable[[], Any]] = {
 def by_annotation() -> dict[str, Callable[[], Any]]:
     """Return makers of valid arguments by words of annotations, the most specific first."""
     return {
+        **({"TrainingSpec": small_run, "TaskSpec": lambda: small_run().task} if TRAINING else {}),
+        **({"Policy": policy} if TRAINING else {}),
+        "Sensor": SENSORS["IMU"],
+        "ContactCase": lambda: contacts.find_case(contacts.case_names()[0]),
+        "Options": ik.Options,
+        "Randomization": envs.Randomization,
         "VelocityTask": lambda: ik_velocity_task(),
         "FrameTarget": lambda: ik.FrameTarget(tip(), np.eye(4)),
         "ScenePlant": lambda: "reference",

@@ -224,7 +224,7 @@ def test_a_batch_has_the_defaults_of_one_rollout() -> None:
     ("options", "hint"),
     [
         ({"plant": np.zeros(3)}, "plant is of type ndarray"),
-        ({"plant": "pinocchio"}, "plant is 'pinocchio'; in a batch it is 'compiled'"),
+        ({"plant": "pinocchio"}, "plant is 'pinocchio'; a batch takes only 'compiled'"),
         ({"parametric": 3.0}, r"parametric is of type float; wanted dynx\.parametric"),
         ({"noise": 0.1}, r"noise is '0\.1'; wanted a dynx\.Noise"),
         ({"pushes": [1]}, "wanted an ExternalForce"),

@@ -32,7 +32,7 @@ from dynx.control.base import ModelEvaluation, engine_of, parameter, substitute
 from dynx.control.observers.wrench_estimate import MIN_RATIO, WrenchEstimate, estimate_wrenches
 from dynx.errors import ArgumentError, GainError, ShapeError, shown
 from dynx.model import Model
-from dynx.model.numbers import checked_entries, checked_gain, real_array
+from dynx.model.numbers import checked_array, checked_entries, checked_gain, real_array
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Array, Floats
@@ -82,7 +82,8 @@ class MomentumObserver(ModelEvaluation):
         Raises GainError for coefficients, ArgumentError for a backend of another robot.
         """
         if (time_constant is None) is (gain is None):
-            raise GainError("wanted either time_constant [s] or gain [1/s]")
+            given = "neither time_constant nor gain is" if gain is None else "time_constant and gain are both"
+            raise GainError(f"{given} given; wanted either time_constant [s] or gain [1/s]")
         if time_constant is not None:
             seconds = checked_gain("time_constant", time_constant, model.nv)
             if not seconds.all():
@@ -182,6 +183,7 @@ class MomentumObserver(ModelEvaluation):
         """
         frames = [frame] if isinstance(frame, str) else list(frame)
         engine = self._backend
+        q = checked_array("q", q, self.model.nq)
         J = [engine.jacobian(q, name, reference=reference, point=point) for name in frames]
         found = estimate_wrenches(J, frames, residual, force_only=force_only, tolerance=tolerance)
         return found.of_one_frame() if isinstance(frame, str) else found
@@ -206,6 +208,7 @@ class MomentumObserver(ModelEvaluation):
             raise ArgumentError("an observer inside a compiled step has no backend; call it outside")
         return self.dynamics.backend
 
+    @checks_types
     def with_dynamics(self, change: Callable[[Dynamics], Dynamics]) -> MomentumObserver:
         """Return the observer with other dynamics."""
         return substitute(self, dynamics=change(self.dynamics))

@@ -22,6 +22,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from dynx.argument_types import checks_types
 from dynx.engines.drake.coordinates import DrakeCoordinates
 from dynx.engines.drake.library import (
     DRAKE_FAILURES,
@@ -304,6 +305,7 @@ class LoadedDrake(LoadedRobot):
         return drake_version()
 
     @classmethod
+    @checks_types
     def load_call(cls, floating: bool, root: str | None = None) -> str:
         """Return the call: four lines for a fixed base. The line with ``WeldFrames`` is omitted for a
         floating one, and for a root named ``world``, which is Drake's world itself."""
@@ -323,6 +325,7 @@ class LoadedDrake(LoadedRobot):
                     T[k] = self._plant.EvalBodyPoseInWorld(self._context, body).GetAsMatrix4()
         return T
 
+    @checks_types
     def jacobian(self, q: Floats, link: str) -> Floats:
         """Return the result of ``CalcJacobianSpatialVelocity`` with respect to v, linear rows first."""
         if link not in self._bodies:

@@ -19,6 +19,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from dynx.argument_types import checks_types
 from dynx.engines.mujoco.library import MAX_DEPTH, mujoco, silence_warnings
 from dynx.engines.silence import silence
 from dynx.errors import EngineError, UnusableEngineError, nonblank_lines, shown
@@ -286,6 +287,7 @@ class LoadedMujoco(LoadedRobot):
         return str(mujoco.__version__)
 
     @classmethod
+    @checks_types
     def load_call(cls, floating: bool, root: str | None = None) -> str:
         """Return the call: one line for a fixed base, three for a floating one."""
         return loading_lines(floating=floating)
@@ -306,6 +308,7 @@ class LoadedMujoco(LoadedRobot):
                 T[index, :3, 3] = self._data.xpos[body]
         return T
 
+    @checks_types
     def jacobian(self, q: Floats, link: str) -> Floats:
         """Return the Jacobian (6, nv) of a link frame by `mj_jacBody`."""
         body = self._bodies[self._model.frame_index(link)]
@@ -435,6 +438,7 @@ class BalancedMujoco(LoadedMujoco):
     name: ClassVar[str] = "mujoco:balanceinertia"
 
     @classmethod
+    @checks_types
     def load_call(cls, floating: bool, root: str | None = None) -> str:
         """Return the call: three lines for a fixed base, four for a floating one."""
         return loading_lines(floating=floating, options="spec.compiler.balanceinertia = True")

@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from dynx.argument_types import checks_types
 from dynx.engines.pinocchio.engine_model import MAX_NV, WORLD
 from dynx.engines.pinocchio.library import pin
 from dynx.engines.silence import capture_output
@@ -71,6 +72,7 @@ class LoadedPinocchio(LoadedRobot):
         return str(pin.__version__)
 
     @classmethod
+    @checks_types
     def load_call(cls, floating: bool, root: str | None = None) -> str:
         """Return the call: one line; the joint of a floating base is its second argument."""
         root = ", pinocchio.JointModelFreeFlyer()" if floating else ""
@@ -88,6 +90,7 @@ class LoadedPinocchio(LoadedRobot):
                     T[k] = self._data.oMf[self._links[link.name]].homogeneous
         return T
 
+    @checks_types
     def jacobian(self, q: Floats, link: str) -> Floats:
         """Return the result of ``computeFrameJacobian`` in LOCAL_WORLD_ALIGNED."""
         if link not in self._links:

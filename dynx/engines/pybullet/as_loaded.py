@@ -28,6 +28,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from dynx.argument_types import checks_types
 from dynx.engines.pybullet.backend import base_conversion, inverse_base_conversion
 from dynx.engines.pybullet.client import ORIGIN, LoadedClient, Setting
 from dynx.engines.pybullet.file_checks import require_harmless
@@ -266,6 +267,7 @@ class LoadedPyBullet(LoadedRobot):
             return "unknown"
 
     @classmethod
+    @checks_types
     def load_call(cls, floating: bool, root: str | None = None) -> str:
         """Return the call: one line, after ``import pybullet as p`` and ``p.connect(p.DIRECT)``."""
         return f"robot = p.loadURDF(path, useFixedBase={not floating}, flags=p.URDF_USE_INERTIA_FROM_FILE)"
@@ -301,6 +303,7 @@ class LoadedPyBullet(LoadedRobot):
         T[self._held] = T_world_com[self._numbers] @ self._T_com_link
         return T
 
+    @checks_types
     def jacobian(self, q: Floats, link: str) -> Floats:
         """Return the result of `calculateJacobian` at the origin of the link frame.
 
@@ -467,6 +470,7 @@ class PlainPyBullet(LoadedPyBullet):
         return (USE_INERTIA,) if USE_FILE_INERTIA in calls else ()
 
     @classmethod
+    @checks_types
     def load_call(cls, floating: bool, root: str | None = None) -> str:
         """Return the call: one line, after ``import pybullet as p`` and ``p.connect(p.DIRECT)``."""
         return "robot = p.loadURDF(path)" if floating else "robot = p.loadURDF(path, useFixedBase=True)"
@@ -486,6 +490,7 @@ class MergingPyBullet(LoadedPyBullet):
         return (USE_INERTIA,) if KEEP_FIXED_LINKS in calls else (USE_INERTIA, _MERGE)
 
     @classmethod
+    @checks_types
     def load_call(cls, floating: bool, root: str | None = None) -> str:
         """Return the call: one line, after ``import pybullet as p`` and ``p.connect(p.DIRECT)``."""
         return super().load_call(floating, root)[:-1] + f" | p.{_MERGE})"

@@ -59,6 +59,7 @@ class ScenePlant:
         """The robot that is simulated."""
         return next(robot for robot in self.scene.robots if robot.name == self.robot)
 
+    @checks_types
     def require_model(self, model: Model) -> None:
         """Raise ArgumentError unless `model` is that of the simulated robot."""
         own = self.scene_robot.model

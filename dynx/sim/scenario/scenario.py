@@ -207,8 +207,8 @@ class Scenario(SimulationOptions):
     def from_dict(cls, document: Mapping[str, Document]) -> Scenario:
         """Return the scenario of a document. Raises ArgumentError for a document of another layout."""
         if not isinstance(document, Mapping) or document.get("schema") != SCHEMA:
-            found = shown(document["schema"]) if "schema" in document else "none"
-            raise ArgumentError(f"the document has the schema {found}; wanted that of a scenario, {SCHEMA!r}")
+            has = f"has the schema {shown(document['schema'])}" if "schema" in document else "lacks a schema"
+            raise ArgumentError(f"the document {has}; wanted that of a scenario, {SCHEMA!r}")
         given = {name: decode(each) if _is_number(each) else each for name, each in document.items()}
         check_document(given, ScenarioDocument)
         del given["schema"]
@@ -259,6 +259,7 @@ class RecordedScenario:
         scenario: Scenario | None = vars(instance).get("scenario")
         return None if scenario is None else scenario.for_record()
 
+    @checks_types
     def __set__(self, instance: object, scenario: Scenario | None) -> None:
         vars(instance)["scenario"] = None if scenario is None else scenario.for_record()
 

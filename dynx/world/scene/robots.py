@@ -52,7 +52,7 @@ def checked_name(what: str, name: object) -> str:
         raise ArgumentError(f"the name of a {what} is {shown(name)}; wanted a str")
     fault = name_fault(name)
     if fault is not None:
-        raise ArgumentError(f"the name of a {what} {fault}")
+        raise ArgumentError(f"the name of a {what} {fault}; wanted a text of visible characters")
     if "/" in name or name == WORLD:
         raise ArgumentError(
             f"the name of a {what} is {shown(name)}; wanted one other than {WORLD!r} and without '/', which "

@@ -105,6 +105,7 @@ class Scene:
         return dict(self.groups)
 
     @checks_types
+    @checks_types
     def robot(self, name: str) -> SceneRobot:
         """Return the robot of that name; UnknownNameError if there is none."""
         if name not in self._robots:

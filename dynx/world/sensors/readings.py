@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from dynx.argument_types import checks_types
-from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
+from dynx.errors import ArgumentError, ShapeError, UnknownNameError, nearest, shown
+from dynx.model.numbers import real_array
 from dynx.registry import door
 from dynx.spatial.scalar import Floats
 from dynx.world.sensors.errors import Integers, SampleNumbers, apply_errors
@@ -89,8 +90,11 @@ class Readings:
     def held(self, times: Floats) -> Floats:
         """Return the values (n, size) that can be read at some times (n,) [s]: those of the last sample that
         is available then, NaN before the first."""
+        times = real_array("times", times)
+        if times.ndim != 1:
+            raise ShapeError(f"times has shape {times.shape}; wanted (n,)")
         slack = SAME_SAMPLE * float(np.min(np.diff(self.t), initial=1.0))
-        last = np.searchsorted(self.available, np.asarray(times) + slack, side="right") - 1
+        last = np.searchsorted(self.available, times + slack, side="right") - 1
         found = self.values[np.maximum(last, 0)] if len(self) else np.zeros((len(last), self.sensor.size))
         return np.where((last >= 0)[:, None], found, np.nan)
 

@@ -64,7 +64,7 @@ class Sensor(ABC):
             )
         fault = name_fault(self.name)
         if fault is not None:
-            raise ArgumentError(f"the name of a sensor {fault}")
+            raise ArgumentError(f"the name of a sensor {fault}; wanted a text of visible characters")
         if self.rate is not None and not (is_real(self.rate) and 0.0 < self.rate < math.inf):
             raise ArgumentError(
                 f"rate of {self} is {shown(self.rate)}; wanted a positive number [Hz] or None"

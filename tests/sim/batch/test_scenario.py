@@ -101,5 +101,5 @@ def test_what_the_scenario_has_is_not_given_beside_it(run: Any, given: dict[str,
 
 
 def test_a_plant_is_a_name() -> None:
-    with pytest.raises(ArgumentError, match="plant is 'pybullet'; in a batch it is 'compiled'"):
+    with pytest.raises(ArgumentError, match="plant is 'pybullet'; a batch takes only 'compiled'"):
         simulate_batch(ARM, LAW, GOAL, plant="pybullet", **OPTIONS)

@@ -76,7 +76,7 @@ def test_anything_but_a_rollout_is_refused() -> None:
     law = control.PD(ARM, kp=1.0, kd=0.1)
     many = simulate_batch(ARM, law, np.zeros(2), q0=ARM.random(1, 3), duration=0.01, plant="compiled")
     for other in (many, "b.npz", None):
-        with pytest.raises(ArgumentError, match=r"the second rollout is of type .*; wanted a dynx\.Rollout"):
+        with pytest.raises(ArgumentError, match=r"theirs is of type .*; wanted a dynx\.Rollout"):
             compare(OURS, other)  # type: ignore[call-overload]
 
 
