@@ -196,6 +196,11 @@ class CompiledEpisodes(RobotEpisodes):
 
         self._step = TaskStep(self._task, self._varied)
         self._lanes = TaskLanes(self._step, 1)
+        self._action = self._lanes.arrays["action"][0]
+        self._shaped_action = self._action.reshape(self._task.action_space.shape)
+        self._row: Floats = np.zeros(0)
+        self._state_of_row: State | None = None
+        """The state that the last step made, of views of the row."""
 
     def vary(self, randomization: Randomization) -> tuple[Parameter, ...]:
         """Return the parameters of this robot that episodes draw."""
@@ -218,19 +223,21 @@ class CompiledEpisodes(RobotEpisodes):
     def step(self, action: Any) -> Outcome:
         lanes, task = self._lanes, self._task
         now, arrays = lanes.now, lanes.arrays
-        now["state"][0], now["steps"][0] = self._step.layout.row(self._state), float(self._steps)
-        arrays["action"][0] = np.ravel(action)
+        before, layout = self._state, self._step.layout
+        now["state"][0] = self._row if self._state_of_row is before else layout.row(before)
+        now["steps"][0] = self._steps
+        self._action[...] = action if np.ndim(action) == 1 else np.ravel(action)
         lanes.evaluate()
         self._steps += 1
-        after = self._step.layout.state(lanes.end["state"][0].copy())
-        if lanes.flags[0] >= self._step.diverged:
+        row = lanes.end["state"][0].copy()
+        after, flags = layout.state(row), int(lanes.flags[0])
+        if flags >= self._step.diverged:
             self._raise_divergence(after.q, after.v)
         lanes.accept()
-        self._last, self._state = (self._state, arrays["action"][0].reshape(np.shape(action))), after
-        observation = self._shaped(arrays["observation"][0])
-        return Outcome(
-            observation, float(arrays["reward"][0, 0]), bool(lanes.flags[0]), task.info(self._robot, after)
-        )
+        self._last, self._state = (before, self._shaped_action), after
+        self._row, self._state_of_row = row, after
+        observation, reward = self._shaped(arrays["observation"][0]), float(arrays["reward"][0, 0])
+        return Outcome(observation, reward, flags != 0, task.info(self._robot, after))
 
     def _shaped(self, observation: Floats) -> Array:
         return observation.astype(self._dtype).reshape(self._shape)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dynx.envs.environment import DIVERGED as DIVERGED_KEY
 from dynx.envs.environment import checked_action
-from dynx.envs.library import AutoresetMode, Space, VectorEnv, batch_space, np_random, spaces
+from dynx.envs.library import AutoresetMode, Space, VectorEnv, batch_space, spaces
 from dynx.envs.randomization import Randomization, Variation, first_seed
 from dynx.envs.runner import draw_robot
 from dynx.envs.task import RobotTask
@@ -27,43 +27,13 @@ from dynx.errors import (
     shown,
 )
 from dynx.model.numbers import DIVERGENCE_SPEED, checked_array, whole_number
+from dynx.simd.generators import Generators
 from dynx.spatial.scalar import Floats
 
 RENDER_MODES = ("rgb_array",)
 
-EPISODES_AHEAD = 64
-"""Number of episodes for which an environment draws random numbers at a time."""
-
 NONE_ENDED = np.zeros(0, dtype=np.intp)
 """Numbers of the environments whose episode ended, where there are none."""
-
-
-class StartNumbers:
-    """Random numbers of the starts of episodes in several environments: each has those that Gymnasium's
-    generator of a single environment with its seed draws."""
-
-    def __init__(self, count: int, size: int) -> None:
-        self._generators: list[Any] = [None] * count
-        self._ahead: Floats = np.zeros((count, EPISODES_AHEAD, size))
-        self._flat = self._ahead.reshape(count * EPISODES_AHEAD, size)
-        self._used = np.zeros(count, dtype=np.intp)
-
-    def seed(self, seeds: Sequence[int], rows: NDArray[np.intp]) -> None:
-        """Seed some environments, each with its own of `seeds` (count,); their next episode is the first."""
-        for row in rows.tolist():
-            self._generators[row], _ = np_random(seeds[row])
-        self._used[rows] = 0
-
-    def next(self, rows: NDArray[np.intp]) -> Floats:
-        """Return the numbers (n, size) of the next episodes of some environments."""
-        place = self._used.take(rows)
-        fresh = place == 0
-        if fresh.any():
-            for row in rows[fresh].tolist():
-                self._generators[row].random(out=self._ahead[row])
-        self._used[rows] = (place + 1) % EPISODES_AHEAD
-        # NumPy takes rows of a matrix in a third of the time that it takes entries of two axes.
-        return np.asarray(self._flat.take(rows * EPISODES_AHEAD + place, axis=0))
 
 
 def checked_seeds(seed: object, count: int) -> Sequence[int]:
@@ -143,7 +113,6 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
             self._variation = Variation(drawn, varied.drawn_parameters, *spaces_of_one, count=n)
         self._task_step = TaskStep(task, varied)
         self._layout = self._task_step.layout
-        self._starts = StartNumbers(n, task.random_size)
         self._seeded_by: np.random.Generator | None = None
         self._copy = copy
         self._make_buffers(max_episode_steps)
@@ -154,7 +123,8 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         n = self.num_envs
         self._lanes = lanes = TaskLanes(self._task_step, n, max_episode_steps)
         arrays = self._arrays = lanes.arrays
-        self._random = arrays["random"]
+        self._random = arrays["random"][:n]
+        self._generators = Generators(self._random)
         self._actions = arrays["action"][:n, 0] if self._discrete else arrays["action"][:n]
         if not self._discrete:
             self._actions = self._actions.reshape(n, *(self.single_action_space.shape or ()))
@@ -212,8 +182,8 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         if self.np_random is not self._seeded_by:
             first, self._seeded_by = first_seed(self.np_random_seed, self.np_random), self.np_random
             seeds = range(first, first + self.num_envs) if seeds is None else seeds
-            self._starts.seed(seeds, rows)
-            self._random[rows] = self._starts.next(rows)
+            self._generators.seed(seeds, rows)
+            self._generators.fill(rows)
             if self._variation is not None:
                 self._variation.seed(seeds, rows)
         self._start(rows, given)
@@ -318,7 +288,7 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         """Draw the parameters of the episodes that some environments have started, and the random numbers of
         the next ones."""
         if len(rows):
-            self._random[rows] = self._starts.next(rows)
+            self._generators.fill(rows)
             if self._variation is not None:
                 self._variation.start(rows)
                 if "parameters" in self._arrays:
@@ -360,7 +330,7 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
     def close_extras(self, **kwargs: Any) -> None:
         """Release the kernels."""
         self._running = False
-        del self._lanes, self._arrays
+        del self._lanes, self._arrays, self._generators, self._random
 
     def _refuse_closed(self) -> None:
         if self.closed:

@@ -27,8 +27,10 @@ from dynx.simd.rows import (
     Rows,
     Scratch,
     lane_names,
+    load_column,
     row_pointers,
     scratch_functions,
+    store_column,
 )
 from dynx.simd.schedule import ELEMENTARY, Segment, TrigGroup, schedule, spill_slots
 from dynx.simd.target import Processor
@@ -241,6 +243,8 @@ def _prefetch(program: Program, lanes: int) -> list[str]:
 _BINARY: dict[Op, str] = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 _ORDER: dict[Op, str] = {"min": "olt", "max": "ogt"}
 _COMPARISON: dict[Op, str] = {"less": "olt", "less_equal": "ole", "equal": "oeq"}
+_COMBINATION: dict[Op, str] = {"mul": "and", "min": "and", "max": "or"}
+"""Operations on masks that do what those on numbers 1 and 0 do."""
 
 
 class SegmentBody:
@@ -261,11 +265,18 @@ class SegmentBody:
         self._bytes = 8 * settings.lanes
         self._write = Writer(settings.lanes, fma=target.fma)
         self._values: dict[int, str] = {}
+        self._conditions: dict[int, str] = {}
+        """Masks of the nodes that are 1 in some lanes and 0 in the others, as far as they were computed here.
+        LLVM drops the vectors of those that are only selected by."""
         ports = [*program.inputs, *program.outputs]
         self._rows = [
             Rows(self._write, port.size, partial(self._pointers, k)) for k, port in enumerate(ports)
         ]
         self._loaded: set[int] = set()
+        self._columns: set[int] = set()
+        """Inputs of one column."""
+        self._stored_columns: list[str] = []
+        """Code that stores the outputs of one column."""
         self._slot_port = [
             (k, column) for k, port in enumerate(program.inputs) for column in range(port.size)
         ]
@@ -279,8 +290,10 @@ class SegmentBody:
             "(ptr noalias nocapture readonly %arguments, i64 %first, ptr noalias nocapture %kept) {"
         )
         lanes = self._settings.lanes
+        columns = [line for number in sorted(self._columns) for line in load_column(number, lanes)]
         heads = [line for number in sorted(self._loaded) for line in row_pointers(number, lanes)]
-        return "\n".join([head, "entry:", *heads, *self._write.lines, "  ret void", "}"])
+        lines = [*columns, *heads, *self._write.lines, *self._stored_columns]
+        return "\n".join([head, "entry:", *lines, "  ret void", "}"])
 
     # -- values -------------------------------------------------------------------------------------
 
@@ -306,8 +319,33 @@ class SegmentBody:
         self._values[index] = name
         return name
 
+    def _mask(self, index: int) -> str:
+        """Return the name of the mask of the lanes in which a node is not 0."""
+        found = self._conditions.get(index)
+        return found or self._write.compare("une", self._value(index), self._write.splat(0.0))
+
+    def _condition(self, index: int, mask: str) -> str:
+        """Note the mask of a condition; return the name of its vector of 1 and 0."""
+        self._conditions[index] = mask
+        return self._write.choose(mask, self._write.splat(1.0), self._write.splat(0.0))
+
+    def _combined(self, index: int) -> str | None:
+        """Return the name of the mask of a node that combines conditions, or None for another node."""
+        node, conditions = self._program.nodes[index], self._conditions
+        if node.op in _COMBINATION and all(arg in conditions for arg in node.args):
+            one, other = (conditions[arg] for arg in node.args)
+            return self._write.let(f"{_COMBINATION[node.op]} {self._write.mask} {one}, {other}")
+        if node.op != "select" or node.args[0] not in conditions:
+            return None
+        constants = [self._program.nodes[arg] for arg in node.args[1:]]
+        says = all(each.op == "constant" for each in constants) and [each.value for each in constants]
+        return conditions[node.args[0]] if says == [1.0, 0.0] else None
+
     def _input(self, port: int, column: int) -> str:
         """Return the name of the vector of one column of an input."""
+        if self._program.inputs[port].size == 1 < self._settings.lanes:
+            self._columns.add(port)
+            return f"%x{port}"
         return self._rows[port].load(column)
 
     def _compute(self, index: int) -> None:
@@ -318,11 +356,11 @@ class SegmentBody:
         elif node.op in _ORDER:
             name = write.select(_ORDER[node.op], *args, *args)
         elif node.op in _COMPARISON:
-            a, b = args
-            name = write.select(_COMPARISON[node.op], a, b, write.splat(1.0), write.splat(0.0))
+            name = self._condition(index, write.compare(_COMPARISON[node.op], *args))
+        elif (mask := self._combined(index)) is not None:
+            name = self._condition(index, mask)
         elif node.op == "select":
-            condition, yes, no = args
-            name = write.select("une", condition, write.splat(0.0), yes, no)
+            name = write.choose(self._mask(node.args[0]), *args[1:])
         elif node.op in ELEMENTARY:
             name = elementary(write, node.op, args[0])
         elif node.op == "neg":
@@ -356,9 +394,13 @@ class SegmentBody:
 
     def _store_results(self) -> None:
         """Write the tiles of outputs that this segment completes."""
+        lanes = self._settings.lanes
         for output, columns, nodes in self._segment.stores:
-            rows = self._rows[len(self._program.inputs) + output]
-            rows.store_tile(columns.start, [self._value(node) for node in nodes])
+            number, values = len(self._program.inputs) + output, [self._value(node) for node in nodes]
+            if self._program.outputs[output].size == 1 < lanes:
+                self._stored_columns += store_column(number, lanes, *values)
+            else:
+                self._rows[number].store_tile(columns.start, values)
 
     def _pointers(self, port: int) -> list[str]:
         """Return the row pointers of one array, one per lane, which the head of the function computes."""

@@ -83,8 +83,15 @@ class Writer:
 
     def select(self, order: str, a: str, b: str, yes: str, no: str) -> str:
         """Select `yes` in the lanes where `fcmp order a, b` holds, and `no` elsewhere, also for NaN."""
-        chosen = self.let(f"fcmp {order} {self.vector} {a}, {b}")
-        return self.let(f"select {self.mask} {chosen}, {self.vector} {yes}, {self.vector} {no}")
+        return self.choose(self.compare(order, a, b), yes, no)
+
+    def compare(self, order: str, a: str, b: str) -> str:
+        """Return the mask of the lanes where `fcmp order a, b` holds."""
+        return self.let(f"fcmp {order} {self.vector} {a}, {b}")
+
+    def choose(self, mask: str, yes: str, no: str) -> str:
+        """Select `yes` in the lanes of a mask, and `no` elsewhere."""
+        return self.let(f"select {self.mask} {mask}, {self.vector} {yes}, {self.vector} {no}")
 
     def bits(self, x: str) -> str:
         """Return the bits of x as a vector of integers."""

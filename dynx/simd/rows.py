@@ -2,7 +2,8 @@
 
 A vector holds the same scalar of several samples, one per lane, but in memory the scalars of one sample are
 contiguous. Tiles of b by b numbers, b rows of b neighbouring columns, are therefore loaded row by row and
-transposed in registers by shuffles; stores do the reverse.
+transposed in registers by shuffles; stores do the reverse. The numbers of a single column are one vector
+where they are neighbours too, which the code finds out when it runs.
 
 Code that is not optimised has its inputs, constants, results and spilled values in a scratch memory, a vector
 each. LLVM selects the instructions of such code three times as fast if they are loads, stores and arithmetic
@@ -53,20 +54,86 @@ def lane_names(number: int, lanes: int) -> list[str]:
 def row_pointers(number: int, lanes: int) -> list[str]:
     """Return the code that computes the pointers to the rows of array `number` from its address and its
     stride in the arguments."""
-    names = lane_names(number, lanes)
-    lines = [
+    return [*_first_row(number), *_further_rows(lane_names(number, lanes), number)]
+
+
+def _first_row(number: int) -> list[str]:
+    """Return the code that computes the pointer to the first row of array `number`, and its stride."""
+    return [
         f"  %a{number} = getelementptr inbounds i64, ptr %arguments, i64 {1 + 2 * number}",
         f"  %b{number} = load ptr, ptr %a{number}",
         f"  %s{number}_ = getelementptr inbounds i64, ptr %arguments, i64 {2 + 2 * number}",
         f"  %s{number} = load i64, ptr %s{number}_",
         f"  %o{number} = mul i64 %first, %s{number}",
-        f"  {names[0]} = getelementptr inbounds i8, ptr %b{number}, i64 %o{number}",
+        f"  %p{number}_0 = getelementptr inbounds i8, ptr %b{number}, i64 %o{number}",
     ]
-    lines += [
+
+
+def _further_rows(names: Sequence[str], number: int) -> list[str]:
+    """Return the code that computes the pointers to the rows of array `number` after the first."""
+    return [
         f"  {name} = getelementptr inbounds i8, ptr {before}, i64 %s{number}"
         for before, name in pairwise(names)
     ]
-    return lines
+
+
+def load_column(number: int, lanes: int) -> list[str]:
+    """Return the code that loads the only column of array `number` into the vector ``%x`` of this number.
+
+    It consists of several basic blocks. The arithmetic comes after it, so that LLVM finds the products and
+    sums to contract in one block.
+    """
+    vector, names = f"<{lanes} x double>", lane_names(number, lanes)
+    lines = [
+        *_first_row(number),
+        *_if_adjacent(number, "load"),
+        f"  %x{number}_all = load {vector}, ptr %p{number}_0, align 8",
+        f"  br label %loaded{number}",
+        f"load_each{number}:",
+        *_further_rows(names, number),
+    ]
+    before = "poison"
+    for lane, name in enumerate(names):
+        lines += [
+            f"  %x{number}_{lane} = load double, ptr {name}, align 8",
+            f"  %v{number}_{lane} = insertelement {vector} {before}, double %x{number}_{lane}, i32 {lane}",
+        ]
+        before = f"%v{number}_{lane}"
+    return [
+        *lines,
+        f"  br label %loaded{number}",
+        f"loaded{number}:",
+        f"  %x{number} = phi {vector} [%x{number}_all, %load_all{number}], [{before}, %load_each{number}]",
+    ]
+
+
+def store_column(number: int, lanes: int, column: str) -> list[str]:
+    """Return the code that stores a vector in the only column of array `number`; see `load_column`."""
+    vector, names = f"<{lanes} x double>", lane_names(number, lanes)
+    lines = [
+        *_first_row(number),
+        *_if_adjacent(number, "store"),
+        f"  store {vector} {column}, ptr %p{number}_0, align 8",
+        f"  br label %stored{number}",
+        f"store_each{number}:",
+        *_further_rows(names, number),
+    ]
+    for lane, name in enumerate(names):
+        lines += [
+            f"  %x{number}_{lane} = extractelement {vector} {column}, i32 {lane}",
+            f"  store double %x{number}_{lane}, ptr {name}, align 8",
+        ]
+    return [*lines, f"  br label %stored{number}", f"stored{number}:"]
+
+
+def _if_adjacent(number: int, name: str) -> list[str]:
+    """Return the code that goes to a block for all lanes if the rows of array `number` are one number after
+    another, and otherwise to one for each lane."""
+    return [
+        f"  %adjacent{number} = icmp eq i64 %s{number}, 8",
+        f"  br i1 %adjacent{number}, label %{name}_all{number}, label %{name}_each{number}",
+        f"{name}_all{number}:",
+    ]
 
 
 class Rows:

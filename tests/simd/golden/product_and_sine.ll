@@ -8,13 +8,6 @@ entry:
   %o0 = mul i64 %first, %s0
   %p0_0 = getelementptr inbounds i8, ptr %b0, i64 %o0
   %p0_1 = getelementptr inbounds i8, ptr %p0_0, i64 %s0
-  %a1 = getelementptr inbounds i64, ptr %arguments, i64 3
-  %b1 = load ptr, ptr %a1
-  %s1_ = getelementptr inbounds i64, ptr %arguments, i64 4
-  %s1 = load i64, ptr %s1_
-  %o1 = mul i64 %first, %s1
-  %p1_0 = getelementptr inbounds i8, ptr %b1, i64 %o1
-  %p1_1 = getelementptr inbounds i8, ptr %p1_0, i64 %s1
   %0 = load <2 x double>, ptr %p0_0, align 8
   %1 = load <2 x double>, ptr %p0_1, align 8
   %2 = shufflevector <2 x double> %0, <2 x double> %1, <2 x i32> <i32 0, i32 2>
@@ -74,10 +67,25 @@ trig3:
   %50 = phi <2 x double> [%44, %near1], [%48, %far2]
   %51 = fmul <2 x double> %2, %3
   %52 = fadd <2 x double> %51, %49
-  %53 = shufflevector <2 x double> %52, <2 x double> poison, <1 x i32> <i32 0>
-  store <1 x double> %53, ptr %p1_0, align 8
-  %54 = shufflevector <2 x double> %52, <2 x double> poison, <1 x i32> <i32 1>
-  store <1 x double> %54, ptr %p1_1, align 8
+  %a1 = getelementptr inbounds i64, ptr %arguments, i64 3
+  %b1 = load ptr, ptr %a1
+  %s1_ = getelementptr inbounds i64, ptr %arguments, i64 4
+  %s1 = load i64, ptr %s1_
+  %o1 = mul i64 %first, %s1
+  %p1_0 = getelementptr inbounds i8, ptr %b1, i64 %o1
+  %adjacent1 = icmp eq i64 %s1, 8
+  br i1 %adjacent1, label %store_all1, label %store_each1
+store_all1:
+  store <2 x double> %52, ptr %p1_0, align 8
+  br label %stored1
+store_each1:
+  %p1_1 = getelementptr inbounds i8, ptr %p1_0, i64 %s1
+  %x1_0 = extractelement <2 x double> %52, i32 0
+  store double %x1_0, ptr %p1_0, align 8
+  %x1_1 = extractelement <2 x double> %52, i32 1
+  store double %x1_1, ptr %p1_1, align 8
+  br label %stored1
+stored1:
   ret void
 }
 define void @kernel(ptr noalias nocapture readonly %arguments) {
