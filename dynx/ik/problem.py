@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from dynx.backends.base import Backend
 from dynx.errors import ArgumentError, ShapeError, nearest, shown
 from dynx.ik.coordinates import FrameCoordinates
+from dynx.ik.descent import KernelTarget
 from dynx.ik.options import AxisRequirement, Options, SearchLimits, checked_axes, frame_targets
 from dynx.ik.search import FrameTask, SearchTask, SeveralTasks
 from dynx.ik.step import TargetKind
@@ -112,8 +113,18 @@ class Requirement:
         rotation: Floats | None,
     ) -> FrameTask:
         """Return the task of one target: a position (3,) [m] and a rotation (3, 3)."""
-        target = Targets(position, rotation)
-        return FrameTask(backend, self.frame, self.point, coordinates, self.tolerances, target, self.axes)
+        kind = self.kind
+        target = KernelTarget(kind, kind.rows(Targets(position, rotation), ())[0], tuple(self.optional))
+        return FrameTask(backend, self.frame, self.point, coordinates, self.tolerances, target)
+
+    def tasks(
+        self, backend: Backend, coordinates: FrameCoordinates, batch: tuple[int, ...]
+    ) -> Iterator[FrameTask]:
+        """Yield the task of each target, broadcast to the leading axes `batch`."""
+        kind, optional = self.kind, tuple(self.optional)
+        for row in kind.rows(self.targets, batch):
+            target = KernelTarget(kind, row, optional)
+            yield FrameTask(backend, self.frame, self.point, coordinates, self.tolerances, target)
 
     @property
     def kind(self) -> TargetKind:
@@ -206,19 +217,13 @@ class Problem:
 
     def tasks(self, backend: Backend) -> Iterator[tuple[int, SearchTask]]:
         """Yield the index of each sample, and what it has to reach."""
-        rows: list[Iterable[tuple[Floats | None, Floats | None]]]
-        if self.batch:
-            rows = [requirement.targets.rows(self.batch) for requirement in self.requirements]
-        else:
-            targets = [requirement.targets for requirement in self.requirements]
-            rows = [((each.positions, each.rotations),) for each in targets]
-        for k, sample in enumerate(zip(*rows, strict=True)):
-            tasks = [
-                requirement.task(backend, self.coordinates, position, rotation)
-                for requirement, (position, rotation) in zip(self.requirements, sample, strict=True)
-            ]
+        of_frames = [each.tasks(backend, self.coordinates, self.batch) for each in self.requirements]
+        for k, tasks in enumerate(zip(*of_frames, strict=True)):
             several = len(tasks) > 1
-            yield k, SeveralTasks(tasks, self.coordinates, self.limits.time_limit) if several else tasks[0]
+            yield (
+                k,
+                SeveralTasks(list(tasks), self.coordinates, self.limits.time_limit) if several else tasks[0],
+            )
 
 
 def checked_problem(

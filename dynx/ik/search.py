@@ -23,10 +23,9 @@ from dynx.ik.descent import (
     descend_by_kernel,
     descend_on_floats,
 )
-from dynx.ik.options import AxisRequirement, SearchLimits
-from dynx.ik.step import REFINEMENT, SEARCH, Descent, FrameError, TargetKind
+from dynx.ik.options import SearchLimits
+from dynx.ik.step import REFINEMENT, SEARCH, Descent, FrameError
 from dynx.model.model import Model
-from dynx.model.targets import Targets
 from dynx.spatial.scalar import Floats
 from dynx.time_limit import UNLIMITED, TimeLimit
 
@@ -76,17 +75,15 @@ class FrameTask:
         point: Floats | None,
         coordinates: FrameCoordinates,
         tolerances: SearchLimits,
-        targets: Targets,
-        axes: AxisRequirement | None,
+        target: KernelTarget,
     ) -> None:
-        """`targets` is one target, without leading axes."""
+        """`target` is one target of the frame, or of a point (3,) in its axes."""
         self._backend, self._frame, self._point, self._coordinates = backend, frame, point, coordinates
         self._time_limit = tolerances.time_limit
-        kind = TargetKind.of(targets, point, axes)
-        self._target = KernelTarget(kind, kind.rows(targets, ())[0], tuple(kind.optional_values(point, axes)))
-        self._error = ErrorCall(self._target, (tolerances.position_tolerance, tolerances.rotation_tolerance))
+        self._target, kind = target, target.kind
+        self._error = ErrorCall(target, (tolerances.position_tolerance, tolerances.rotation_tolerance))
         rows = slice(0 if kind.position else 3, 6 if kind.rotation else 3)
-        self._part = (rows if axes is None else slice(None), coordinates.columns)
+        self._part = (rows if kind.axes is None else slice(None), coordinates.columns)
 
     def error(self, q: Floats) -> TaskError:
         """Return the error at q (nq,)."""
