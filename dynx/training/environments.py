@@ -29,7 +29,9 @@ def make(task: TaskSpec, render_mode: str | None = None) -> Env[Any, Any]:
     Raises ArgumentError for a task that Gymnasium cannot make, and the errors of the task itself.
     """
     try:
-        return make_env(task.id, render_mode=render_mode, **task.arguments())
+        # An environment of the user's own may have no pictures, and no argument for them.
+        pictures: dict[str, Any] = {} if render_mode is None else {"render_mode": render_mode}
+        return make_env(task.id, **pictures, **task.arguments())
     except DynxError:
         raise
     except (GymnasiumError, TypeError, ImportError) as error:

@@ -14,6 +14,7 @@ from dynx.cli.shell.options import (
     json_option,
     name_list,
     name_value,
+    named_task_option,
     quiet_option,
     silent_option,
     task_options,
@@ -50,10 +51,11 @@ def list_tasks() -> None:
 
 
 @env.command(cls=GroupedCommand)
-@click.argument("task", metavar="TASK")
+@click.argument("task", required=False, metavar="TASK")
 @group(
     "Measurement",
     engines_option("Engines to compare"),
+    named_task_option,
     task_options,
     click.option(
         "--seed",
@@ -108,16 +110,18 @@ def distance() -> None:
     \b
     Examples:
       dynx env distance CartPole
+      dynx env distance --task my_module:mine/Lift-v0
       dynx env distance LunarLander --engine pybullet,mujoco --tolerance 1e-3
       dynx env distance LunarLander --policy on_mujoco.zip --policy on_pybullet.zip --json table.json
     """
 
 
 @click.command(cls=GroupedCommand)
-@click.argument("task", metavar="TASK")
+@click.argument("task", required=False, metavar="TASK")
 @group(
     "Training",
     engine_option("engine", "Engine of a task of dynx (default: that of the task).", metavar="NAME"),
+    named_task_option,
     task_options,
     click.option(
         "--randomize",
@@ -226,6 +230,7 @@ def train() -> None:
     \b
     Examples:
       dynx train CartPole
+      dynx train --task my_module:mine/Lift-v0
       dynx train CartPole --engine compiled --seed 0,1,2 --plot curve.png
       dynx train LunarLander --engine mujoco --out lander
       dynx train LunarLander --engine mujoco --out lander --resume

@@ -279,7 +279,7 @@ class PlayDocument(TypedDict):
 
 
 def play_document(
-    path: str, policy: Policy, judgements: Sequence[tuple[TaskSpec, Evaluation]]
+    path: str, policy: Policy, trained_on: str | None, judgements: Sequence[tuple[TaskSpec, Evaluation]]
 ) -> PlayDocument:
     """Return the JSON document of ``dynx play``: one entry for each task and its evaluation in `judgements`,
     of which there is at least one."""
@@ -287,7 +287,7 @@ def play_document(
         "schema": "dynx.play/1",
         "file": path,
         "task": policy.spec.task.id,
-        "trained_on": policy.spec.task.engine,
+        "trained_on": trained_on,
         "algorithm": policy.spec.algorithm,
         "steps": policy.steps_done,
         "seed": judgements[0][1].seed,

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from dynx.cli.learning.documents import PolicyEntry, TaskEntry, TasksDocument, distance_document, policy_entry
 from dynx.cli.shell.exits import DONE, exit_code, interruptible, one_line
-from dynx.cli.shell.options import json_value
+from dynx.cli.shell.options import json_value, one_task
 from dynx.cli.shell.output import Entry, check_json, console, entry_of, present, progress_bar, write_json
 from dynx.cli.shell.tables import Table
 from dynx.envs.distance import engine_distance
@@ -20,7 +20,8 @@ from dynx.errors import ArgumentError, shown
 
 
 def distance(
-    task: str,
+    task: str | None,
+    named_task: str | None,
     engines: tuple[str, ...] | None,
     options: Sequence[tuple[str, str]],
     seeds: tuple[int, ...] | None,
@@ -33,7 +34,7 @@ def distance(
 ) -> int:
     """Measure how far apart the engines are on a task; return the exit code."""
     check_json(json_path)
-    env_id = task_id(task)
+    env_id = task_id(one_task(task, named_task))
     if not is_of_dynx(env_id):
         raise ArgumentError(f"{env_id} runs on one engine, its own; wanted a task of dynx (dynx env list)")
     chosen = engines or task_class(env_id).engines()

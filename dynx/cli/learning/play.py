@@ -74,7 +74,7 @@ def play(
                 )
                 found.append((each, judged))
         interruption.finishing = True
-        made = play_document(policy, trained, found)
+        made = play_document(policy, trained, task.engine, found)
         error = present(made, show, json_path, quiet=quiet)
     return exit_code(error)
 

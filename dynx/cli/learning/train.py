@@ -10,7 +10,7 @@ from rich.console import Console
 
 from dynx.cli.learning.documents import train_document
 from dynx.cli.shell.exits import exit_code, failure_of, interruptible, one_line
-from dynx.cli.shell.options import json_value
+from dynx.cli.shell.options import json_value, one_task
 from dynx.cli.shell.output import Advance, Entry, check_json, check_writable, log, present, progress_bar
 from dynx.cli.shell.tables import Table
 from dynx.envs.registration import bare_name, task_id
@@ -29,7 +29,8 @@ SECONDS_BETWEEN_LINES = 30.0
 
 
 def train(
-    task: str,
+    task: str | None,
+    named_task: str | None,
     engine: str | None,
     options: Sequence[tuple[str, str]],
     randomize: Sequence[tuple[str, str]],
@@ -59,7 +60,7 @@ def train(
     chosen = {name: json_value(word) for name, word in options}
     if randomize:
         chosen["randomize"] = {name: json_value(word) for name, word in randomize}
-    spec = TaskSpec(task_id(task), engine, chosen)
+    spec = TaskSpec(task_id(one_task(task, named_task)), engine, chosen)
     recipe = recipe_of(algorithm, spec.id)
     given = {name: json_value(word) for name, word in values}
     schedule = Schedule(checkpoint_every, evaluate_every, threads=threads, tensorboard=tensorboard)
@@ -168,7 +169,9 @@ def show(out: Console, report: Entry) -> None:
             f"mean of the runs {report['mean']:.5g}, with 95 % confidence between {report['low']:.5g} and "
             f"{report['high']:.5g}"
         )
-    out.print(f"to see it: dynx play {one_line(report['runs'][0]['folder'])}/final.zip --view")
+    # The file of a policy imports no module.
+    own = f" --task {one_line(report['task'])}" if ":" in report["task"] else ""
+    out.print(f"to see it: dynx play {one_line(report['runs'][0]['folder'])}/final.zip --view{own}")
 
 
 _STYLES, _MARKS = ("-", "--", ":", "-."), "os^v"

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import click
 
 from dynx.cli.shell.lazy import import_object
-from dynx.errors import nearest, shown
+from dynx.errors import ArgumentError, nearest, shown
 
 STANDARD_OUTPUT = "-"
 """Name of standard output as a file of ``--json``."""
@@ -294,6 +294,25 @@ task_options = click.option(
     metavar="NAME=VALUE",
     help="Option of the task, as gymnasium.make takes it; may be given several times.",
 )
+
+
+named_task_option = click.option(
+    "--task",
+    "named_task",
+    metavar="ID",
+    help="The same as TASK, as `dynx play` has it.",
+)
+
+
+def one_task(task: str | None, named_task: str | None) -> str:
+    """Return the task of TASK or ``--task``. Raises ArgumentError unless one of them is given."""
+    if task is not None and named_task is not None:
+        raise ArgumentError(f"TASK is {shown(task)} and --task {shown(named_task)}; wanted one of them")
+    if task is None and named_task is None:
+        raise ArgumentError(
+            "TASK is missing; wanted a task such as CartPole (dynx env list), or module:Env-v0"
+        )
+    return str(task or named_task)
 
 
 def robot_options(command: F) -> F:

@@ -110,7 +110,7 @@ def test_distance_of_engines_and_transfer_of_a_policy(folder: Path) -> None:
     assert "trained on" in shown.output
 
 
-OWN = """
+SWING = """
 from dynx.envs import register_task
 from dynx.envs.tasks.pendulum import Pendulum
 
@@ -122,27 +122,98 @@ class Swing(Pendulum):
 register_task("own/Swing-v0", Swing)
 """
 
+ROLL = """
+from functools import cached_property
+import numpy as np
+from gymnasium import spaces
+from dynx import Pose
+from dynx.envs import WorldTask, register_task
+from dynx.world import ExternalForce, Scene, ground, sphere
 
+class Roll(WorldTask):
+    \"\"\"Bring a ball to rest at the origin.\"\"\"
+
+    control_dt = 0.05
+    max_episode_steps = 20
+    action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
+    observation_space = spaces.Box(-10.0, 10.0, (4,), np.float32)
+
+    def scene(self):
+        return Scene("roll", bodies=(ground(), sphere("ball", 0.1, mass=1.0, pose=Pose((0, 0, 0.1)))))
+
+    def start(self, episode):
+        x, y = episode.rng.uniform(-1.0, 1.0, 2)
+        episode.world.set_state(bodies={"ball": (Pose((x, y, 0.1)), np.zeros(6))})
+
+    def loads(self, episode, action):
+        return {"forces": [ExternalForce("ball", (*action, 0.0, 0.0, 0.0, 0.0))]}
+
+    def observation(self, episode):
+        ball = episode.world.state.bodies["ball"]
+        return np.array([*ball.position[:2], *ball.twist[:2]], dtype=np.float32)
+
+    def reward(self, episode, action):
+        return -float(np.linalg.norm(episode.world.state.bodies["ball"].position[:2]))
+
+register_task("own/Roll-v0", Roll)
+"""
+
+LAMP = """
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+
+class Lamp(gymnasium.Env):
+    action_space = spaces.Discrete(2)
+    observation_space = spaces.Box(0.0, 1.0, (1,), np.float32)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        return np.zeros(1, dtype=np.float32), {}
+
+    def step(self, action):
+        return np.full(1, action, dtype=np.float32), float(action), False, False, {}
+
+gymnasium.register("own/Lamp-v0", Lamp, max_episode_steps=5)
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "module", "engines"),
+    [
+        ("Swing", SWING, ("reference", "compiled")),
+        ("Roll", ROLL, ("pybullet", "mujoco")),
+        ("Lamp", LAMP, ()),
+    ],
+)
 def test_a_task_of_a_module_is_trained_played_and_compared(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    name: str, module: str, engines: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "swings_of_a_test.py").write_text(OWN)
+    (tmp_path / f"own_{name}.py").write_text(module)
     monkeypatch.syspath_prepend(tmp_path)
-    task, policy = "swings_of_a_test:own/Swing-v0", str(tmp_path / "run" / "final.zip")
-    assert "own/Swing-v0" in run("env", "list", "swings_of_a_test").output
-    options = ("--engine", "reference", "--steps", "64", "--out", str(tmp_path / "run"))
-    trained = run("train", task, *options, *FEW)
+    task, policy = f"own_{name}:own/{name}-v0", str(tmp_path / "run" / "final.zip")
+    assert (f"own/{name}-v0" in run("env", "list", f"own_{name}").output) == bool(engines)
+    on = ("--engine", engines[0]) if engines else ()
+    trained = run("train", "--task", task, *on, "--steps", "64", "--out", str(tmp_path / "run"), *FEW)
     assert trained.exit_code == 0, trained.output
+    assert f"final.zip --view --task {task}" in trained.output.replace("\n", " ")
+    resumed = run("train", task, *on, "--steps", "96", "--resume", "--out", str(tmp_path / "run"), *FEW)
+    assert resumed.exit_code == 0, resumed.output
     unnamed = run("play", policy)  # a file imports nothing
     assert unnamed.exit_code == 2
     assert "name the task yourself: --task" in unnamed.output
-    played = run("play", policy, "--task", task, "--engine", "compiled", "--episodes", "1", "--json")
+    last = ("--engine", engines[-1]) if engines else ()
+    played = run("play", policy, "--task", task, *last, "--episodes", "1", "--json")
     assert played.exit_code == 0, played.output
-    engines = ("--engine", "reference,compiled", "--seed", "0", "--steps", "30")
-    apart = run("env", "distance", task, *engines, "--policy", policy, "--episodes", "1", "--json")
-    assert apart.exit_code == 0, apart.output
-    found: dict[str, Any] = json.loads(apart.stdout)
-    assert found["pairs"][0]["largest"] < 1e-9
+    assert json.loads(played.stdout)["trained_on"] == (engines[0] if engines else None)
+    apart = ("--engine", ",".join(engines), "--seed", "0", "--steps", "10") if engines else ()
+    compared = run("env", "distance", "--task", task, *apart, "--policy", policy, "--episodes", "1", "--json")
+    if not engines:
+        assert "runs on one engine, its own" in compared.output
+        return
+    assert compared.exit_code == 0, compared.output
+    found: dict[str, Any] = json.loads(compared.stdout)
+    assert found["pairs"][0]["largest"] < (1e-9 if name == "Swing" else 1.0)
     alone = found["policies"][0]["engines"][1]["mean"]
     assert json.loads(played.stdout)["engines"][0]["mean"] == alone
 
@@ -159,6 +230,10 @@ def test_the_list_names_tasks_and_engines() -> None:
     ("arguments", "message"),
     [
         (["train", "CartPol"], "no task 'CartPol'; did you mean 'CartPole'"),
+        (["train", "--task", "CartPol"], "no task 'CartPol'; did you mean 'CartPole'"),
+        (["train"], "TASK is missing; wanted a task such as CartPole"),
+        (["train", "CartPole", "--task", "CartPole"], "TASK is 'CartPole' and --task 'CartPole'"),
+        (["env", "distance"], "TASK is missing; wanted a task such as CartPole"),
         (["train", "CartPole", "--engine", "pinochio"], "does not run on engine 'pinochio'"),
         (["train", "CartPole-v1", "--engine", "mujoco"], "unexpected keyword argument 'engine'"),
         (["train", "CartPole", "--algo", "pqo"], "no algorithm 'pqo'; did you mean 'ppo'"),
