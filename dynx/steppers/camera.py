@@ -105,6 +105,8 @@ class DrawnShape(NamedTuple):
     shape: Shape
     rgba: tuple[float, float, float, float]
     T: Floats
+    painted: bool = True
+    """Whether a mesh is drawn with its image and the colours of its corners, not in one colour alone."""
 
 
 class Drawing(NamedTuple):

@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from dynx.errors import DynxError
 from dynx.model import Model
 from dynx.model.geometry import Mesh, Shape
-from dynx.model.geometry.links import Collision, Colour, Visual, link_shapes
+from dynx.model.geometry.drawn_shapes import link_shapes, look_notes
+from dynx.model.geometry.links import Collision, Colour, Visual
 from dynx.rbd.kinematics import link_poses
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation, rotation_from_quat
 from dynx.viewer.colours import GREY, ORANGE, RGB, VERMILION
+from dynx.viewer.painted import PaintedNode, glb
 from dynx.viewer.triangles import (
     TRIANGLE_BUDGET,
     Triangles,
@@ -25,6 +27,7 @@ from dynx.viewer.triangles import (
     reduced,
     resized,
     turned_outwards,
+    with_edges,
 )
 from dynx.world.scene import SceneBody
 
@@ -256,18 +259,8 @@ class DrawnRobot(DrawnParts):
                 if rgba[3] == 0.0:
                     continue
                 budget = share.get(shape) if isinstance(shape, Mesh) else None
-                opacity = self._look.opacity or (None if rgba[3] == 1.0 else rgba[3])
-                nodes.append(
-                    add_triangles(
-                        self._scene,
-                        f"{self.links[name].name}/visual{k}",
-                        resized(reduced(shape, budget), self._look.size),
-                        T,
-                        self._look.colour or rgb_of(rgba),
-                        opacity,
-                        flat=budget is not None,
-                    )
-                )
+                path = f"{self.links[name].name}/visual{k}"
+                nodes.append(_add_shape(self._scene, path, shape, rgba, T, self._look, budget))
 
     def _add_sticks(self) -> None:
         """Draw a robot without shapes as lines from each link frame to the frames of its children."""
@@ -293,11 +286,12 @@ class DrawnRobot(DrawnParts):
         try:
             for each in shapes_of(link):
                 _readable(each.shape)
+                self._faults[link] = [*self._faults.get(link, ()), *look_notes(each)]
         except DynxError as error:
             self._faults.setdefault(link, []).append(str(error))
 
     def _shares(self, shapes: Any) -> dict[Mesh, int]:
-        count = Counter(shape for shape in shapes if isinstance(shape, Mesh))
+        count = Counter(shape for shape in shapes if isinstance(shape, Mesh) and not is_painted(shape))
         if self._look.triangles is None:
             return {}
         parts = budgets(count, self._look.triangles)
@@ -370,6 +364,29 @@ def _readable(shape: Shape) -> Shape:
     if isinstance(shape, Mesh):
         _ = shape.triangles
     return shape
+
+
+def is_painted(shape: Shape) -> bool:
+    """Check whether the colour of a shape changes from place to place."""
+    return isinstance(shape, Mesh) and not (shape.surface.texture is None and shape.surface.colours is None)
+
+
+def _add_shape(
+    scene: Any, path: str, shape: Shape, rgba: Colour, T: Floats, look: Look, budget: int | None
+) -> Any:
+    """Add a node with a shape at the pose T (4, 4) in its parent, of at most `budget` triangles unless it is
+    painted, and return it."""
+    opacity = look.opacity or rgba[3]
+    if is_painted(shape) and look.colour is None:
+        assert isinstance(shape, Mesh)
+        content, triangles = glb(shape.surface, (*rgba[:3], opacity))
+        placed = {"wxyz": wxyz(T[:3, :3]), "position": T[:3, 3]}
+        node = scene.add_glb(path, content, cast_shadow=False, receive_shadow=False, **placed)
+        return PaintedNode(node, triangles)
+    triangles, flat = with_edges(shape, budget)
+    colour = look.colour or rgb_of(rgba)
+    alpha = None if opacity == 1.0 else opacity
+    return add_triangles(scene, path, resized(triangles, look.size), T, colour, alpha, flat=flat)
 
 
 def add_triangles(
@@ -446,6 +463,8 @@ class DrawnScene(DrawnParts):
             self._bodies[body.name] = []
             try:
                 self._bodies[body.name] = list(_add_body(scene, node, body, look))
+                for each in body.visuals or body.shapes:
+                    faults += [f"{body.name}: {note}" for note in look_notes(each)]
             except DynxError as error:
                 faults.append(f"{body.name}: {error}")
             start[body.name] = body.pose.matrix
@@ -476,15 +495,7 @@ class DrawnScene(DrawnParts):
 
 def _add_body(scene: Any, node: Any, body: SceneBody, look: Look) -> Iterator[Any]:
     for k, (shape, rgba, T) in enumerate(body.drawn_shapes()):
-        yield add_triangles(
-            scene,
-            f"{node.name}/shape{k}",
-            resized(reduced(shape, look.triangles), look.size),
-            T,
-            look.colour or rgb_of(rgba),
-            look.opacity or (None if rgba[3] == 1.0 else rgba[3]),
-            flat=isinstance(shape, Mesh),
-        )
+        yield _add_shape(scene, f"{node.name}/shape{k}", shape, rgba, T, look, look.triangles)
 
 
 class ContactArrows:

@@ -18,7 +18,8 @@ from dynx.files.reading import checked_path
 from dynx.files.writing import write_bytes
 from dynx.model import Model
 from dynx.model.geometry import Cylinder, Plane, Shape
-from dynx.model.geometry.links import Colour, link_shapes
+from dynx.model.geometry.drawn_shapes import link_shapes
+from dynx.model.geometry.links import Colour
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_rpy
@@ -90,7 +91,11 @@ def picture_of(motions: tuple[MotionFrames, ...], time: float, stage: Stage) -> 
         groups.append(
             [
                 DrawnShape(
-                    0, shape, rgba if number == 0 else _OPAQUE_SKY_BLUE, poses.get(part, np.eye(4)) @ T
+                    0,
+                    shape,
+                    rgba if number == 0 else _OPAQUE_SKY_BLUE,
+                    poses.get(part, np.eye(4)) @ T,
+                    painted=number == 0,
                 )
                 for part, shape, rgba, T in _shapes(motion)
                 if rgba[3] > 0.0 and (part in poses or number == 0)

@@ -12,7 +12,7 @@ import numpy as np
 from dynx.errors import DynxError
 from dynx.model import Model
 from dynx.model.geometry import HeightField, Plane, Shape
-from dynx.model.geometry.links import link_shapes
+from dynx.model.geometry.drawn_shapes import link_shapes
 from dynx.spatial.scalar import Floats
 from dynx.viewer.triangles import triangles_of
 

@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from dynx.files.cache import keep, read_cached, source_hash
 from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
+from dynx.model.geometry.mesh_reading import Surface
 from dynx.spatial.scalar import Floats
 from dynx.viewer.library import SIMPLIFY_VERSION, simplify
 
@@ -111,6 +112,78 @@ def reduced(shape: Shape, budget: int | None) -> Triangles:
     if not isinstance(shape, Mesh) or budget is None or len(shape.triangles[1]) <= budget:
         return triangles_of(shape)
     return _reduced(shape, budget)
+
+
+def with_edges(shape: Shape, budget: int | None) -> tuple[Triangles, bool]:
+    """Return what `reduced` returns, with vertices of their own on both sides of sharp edges, where the file
+    of a mesh says so, and whether all edges are sharp.
+
+    Raises DescriptionError for a mesh that cannot be read.
+    """
+    if not isinstance(shape, Mesh):
+        return triangles_of(shape), False
+    return _with_edges(shape, budget)
+
+
+@lru_cache(maxsize=256)
+def _with_edges(mesh: Mesh, budget: int | None) -> tuple[Triangles, bool]:
+    surface, found = mesh.surface, reduced(mesh, budget)
+    if surface.normals is None:
+        return found, True
+    if len(found.faces) < len(surface.faces):
+        normals = _nearest_normals(found, surface)
+        surface = Surface(found.vertices.astype(np.float64), found.faces.astype(np.intp), normals)
+    return split_at_edges(surface)[0], False
+
+
+_NORMALS_TRIED = 8
+"""Number of the nearest corners of the whole mesh, among whose normals that of a reduced mesh is chosen."""
+
+_NORMAL_STEPS = 64
+"""Number of steps between 0 and 1 by which normals are told apart."""
+
+
+def _nearest_normals(found: Triangles, whole: Surface) -> Floats:
+    """Return normals (m, 3, 3) for the corners of a reduced mesh: of the normals at the nearest corners of
+    the whole one, that which is the nearest to the normal of the triangle."""
+    assert whole.normals is not None
+    points = whole.vertices[whole.faces].reshape(-1, 3)
+    normals = whole.normals.reshape(-1, 3)
+    _, chosen = np.unique(
+        np.concatenate([points, np.rint(4.0 * normals)], axis=1).astype(np.float32), axis=0, return_index=True
+    )
+    _, near = cKDTree(points[chosen]).query(found.vertices, k=min(_NORMALS_TRIED, len(chosen)))
+    near = chosen[near.reshape(len(found.vertices), -1)]
+    a, b, c = np.moveaxis(found.vertices[found.faces].astype(np.float64), 1, 0)
+    tried = normals[near[found.faces]]
+    best = np.argmax(np.einsum("ijkl,il->ijk", tried, np.cross(b - a, c - a)), axis=2)
+    return np.asarray(np.take_along_axis(tried, best[:, :, None, None], axis=2)[:, :, 0])
+
+
+def split_at_edges(surface: Surface, *corners: Floats) -> tuple[Triangles, list[Floats]]:
+    """Return the triangles of a surface with vertices that have one place, one normal and one value of each
+    array of values at corners (m, 3, k), and these values at the vertices (n, k).
+
+    A page computes normals anew as means of the triangles at a vertex, so that edges are smooth between
+    triangles that have a vertex in common, and sharp between others.
+    """
+    faces = surface.faces
+    keys = [np.unique(surface.vertices, axis=0, return_inverse=True)[1].reshape(-1)[faces].reshape(-1)]
+    if surface.normals is None:
+        keys.append(np.repeat(np.arange(len(faces)), 3))
+    else:
+        steps = np.rint(_NORMAL_STEPS * (surface.normals.reshape(-1, 3) + 1.0)).astype(np.int64)
+        keys.append((steps * [1, 4 * _NORMAL_STEPS, (4 * _NORMAL_STEPS) ** 2]).sum(axis=1))
+    for values in corners:
+        rows = np.ascontiguousarray(values.reshape(-1, values.shape[-1]))
+        keys.append(np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1))
+    number = keys[0]
+    for key in keys[1:]:
+        distinct, of = np.unique(key, return_inverse=True)
+        number = np.unique(number * len(distinct) + of.reshape(-1), return_inverse=True)[1].reshape(-1)
+    _, first, number = np.unique(number, return_index=True, return_inverse=True)
+    triangles = Triangles.of(surface.vertices[faces.reshape(-1)[first]], number.reshape(-1, 3))
+    return triangles, [values.reshape(-1, values.shape[-1])[first] for values in corners]
 
 
 @lru_cache(maxsize=256)

@@ -12,7 +12,7 @@ import struct
 import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.files.reading import checked_path
 from dynx.files.writing import write_bytes
 from dynx.model.geometry import Box, HeightField, Mesh, Plane, Shape
-from dynx.model.geometry.links import link_shapes
+from dynx.model.geometry.drawn_shapes import link_look_notes, link_shapes, look_notes
 from dynx.model.geometry.ray_casting import cast_on_shape
 from dynx.rbd.kinematics import link_poses
 from dynx.spatial.scalar import Floats
@@ -32,6 +32,9 @@ from dynx.steppers.state import WorldState
 from dynx.world.boxes import shape_box
 from dynx.world.scene import Scene
 from dynx.world.scenery import GAMMA, KEY_DIRECTION, LIGHT, TILE, Scenery, tiles
+
+if TYPE_CHECKING:
+    from dynx.model.geometry.mesh_reading import Surface
 
 DEPTH_UNIT = 1e-3
 """Length [m] of one step of the grey values in a PNG file of depths."""
@@ -49,6 +52,8 @@ class Picture:
     """Number in `names` of the part that is seen (height, width); -1 where nothing is."""
     names: tuple[str, ...]
     """Links as ``robot/link``, and bodies."""
+    notes: tuple[str, ...] = ()
+    """What parts are drawn without, such as an image that is missing, one sentence each."""
 
     @checks_types
     def mask(self, name: str) -> NDArray[np.bool_]:
@@ -117,6 +122,9 @@ _FACE_MARGIN = 1e-9
 _COINCIDENT = 0.005
 """Share of its depth by which a ghost has to be nearer than a shape, to be seen before it."""
 
+_LEAST_SLOPE = 0.02
+"""Least cosine of the angle between a ray and the normal of a painted mesh."""
+
 _SMOOTH = math.cos(math.radians(12.0))
 """Cosine of the angle between normals above which the rays of a pixel see one surface."""
 
@@ -138,9 +146,17 @@ class DepthBuffer:
         self.depth = np.full(count, np.inf)
         self.normal = np.zeros((count, 3))
         self.number = np.full(count, -1, np.intp)
+        self.factors: Floats | None = None
+        """Factors (n, 3) of the colours of shapes, from images and corners; None where all are 1."""
 
-    def draw(self, number: int, shape: Shape, T: Floats) -> None:
-        """Draw a shape at the pose T (4, 4) in the frame of the camera, scale excluded."""
+    def draw(self, number: int, shape: Shape, T: Floats, *, painted: bool = False) -> None:
+        """Draw a shape at the pose T (4, 4) in the frame of the camera, scale excluded; a mesh that is
+        `painted` with its normals, its image, and the colours of its corners."""
+        if painted and isinstance(shape, Mesh):
+            surface = shape.surface
+            vertices = surface.vertices @ T[:3, :3].T + T[:3, 3]
+            self._draw_triangles(number, vertices, surface.faces, _Paint(surface, T[:3, :3]))
+            return
         if isinstance(shape, Mesh | HeightField):
             vertices, faces = shape.triangles if isinstance(shape, Mesh) else shape.triangles()
             self._draw_triangles(number, vertices @ T[:3, :3].T + T[:3, 3], faces)
@@ -200,6 +216,8 @@ class DepthBuffer:
         nearer = np.flatnonzero(other.depth < (1.0 - _COINCIDENT) * self.depth)
         self.depth[nearer], self.normal[nearer] = other.depth[nearer], other.normal[nearer]
         self.number[nearer] = first + other.number[nearer]
+        if self.factors is not None:
+            self.factors[nearer] = 1.0
 
     def rays(self, pixels: Whole) -> Floats:
         """Return the rays (n, 3) through the centres of pixels (n,), with z = 1."""
@@ -224,7 +242,9 @@ class DepthBuffer:
         last[(high[:, 2] < self._camera.near) | (low[:, 2] > self._camera.far)] = -1
         return first, last
 
-    def _draw_triangles(self, number: int, vertices: Floats, faces: Whole) -> None:
+    def _draw_triangles(
+        self, number: int, vertices: Floats, faces: Whole, paint: _Paint | None = None
+    ) -> None:
         first, last = self._triangle_windows(vertices, faces)
         seen = np.flatnonzero((last >= first).all(axis=1))
         faces, first, sides = faces[seen], first[seen], (last - first + 1)[seen]
@@ -234,7 +254,9 @@ class DepthBuffer:
             done = total[begin - 1] if begin else 0
             end = max(begin + 1, int(np.searchsorted(total, done + MAX_PAIRS, side="right")))
             part = slice(begin, end)
-            self._draw_some(number, vertices[faces[part]], first[part], sides[part])
+            self._draw_some(
+                number, vertices[faces[part]], first[part], sides[part], paint and paint.on(seen[part])
+            )
             begin = end
 
     def _triangle_windows(self, vertices: Floats, faces: Whole) -> tuple[Whole, Whole]:
@@ -260,7 +282,9 @@ class DepthBuffer:
             first[crossing], last[crossing] = self._window(points.min(axis=1), points.max(axis=1))
         return first, last
 
-    def _draw_some(self, number: int, corners: Floats, first: Whole, sides: Whole) -> None:
+    def _draw_some(
+        self, number: int, corners: Floats, first: Whole, sides: Whole, paint: _Paint | None
+    ) -> None:
         a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
         edges = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
         normal = np.cross(b - a, c - a)
@@ -283,15 +307,85 @@ class DepthBuffer:
         order = np.lexsort((depth, pixels))
         ahead = order[depth[order] >= self._camera.near]
         nearest = ahead[np.unique(pixels[ahead], return_index=True)[1]]
-        self._keep(number, pixels[nearest], depth[nearest], normal[triangle[nearest]])
+        seen = self._keep(number, pixels[nearest], depth[nearest], normal[triangle[nearest]])
+        if paint is None:
+            return
+        hits = np.flatnonzero(inside)[nearest[seen]]
+        weights = np.stack([each[hits] for each in signs], axis=1)
+        weights /= weights.sum(axis=1, keepdims=True)
+        triangle, pixels = triangle[nearest[seen]], pixels[nearest[seen]]
+        rays = self.rays(pixels)
+        if paint.surface.normals is not None:
+            self.normal[pixels] = paint.normals(triangle, weights, normal[triangle], rays)
+        pixel = self.depth[pixels] / self._camera.focal_length
+        factors = paint.factors(triangle, weights, corners, normal, rays, pixel)
+        if factors is not None:
+            if self.factors is None:
+                self.factors = np.ones((len(self.depth), 3))
+            self.factors[pixels] = factors
 
-    def _keep(self, number: int, pixels: Whole, depth: Floats, normal: Floats) -> None:
-        """Store what is nearer than all before; each pixel occurs once."""
-        better = (depth < self.depth[pixels]) & (depth <= self._camera.far)
+    def _keep(self, number: int, pixels: Whole, depth: Floats, normal: Floats) -> Whole:
+        """Store what is nearer than all before, and return which pixels these are; each occurs once."""
+        better = np.flatnonzero((depth < self.depth[pixels]) & (depth <= self._camera.far))
         chosen = pixels[better]
         self.depth[chosen] = depth[better]
         self.normal[chosen] = normal[better]
         self.number[chosen] = number
+        if self.factors is not None:
+            self.factors[chosen] = 1.0
+        return better
+
+
+class _Paint(NamedTuple):
+    """What the triangles of a mesh look like."""
+
+    surface: Surface
+    R: Floats
+    """Rotation (3, 3) from the frame of the mesh to that of the camera."""
+    chosen: Whole = np.zeros(0, np.intp)
+    """Numbers of the triangles that are drawn."""
+
+    def on(self, chosen: Whole) -> _Paint:
+        """Return what these triangles look like."""
+        return self._replace(chosen=chosen)
+
+    def normals(self, triangle: Whole, weights: Floats, flat: Floats, rays: Floats) -> Floats:
+        """Return the normals (n, 3), in the axes of the camera and towards it, where rays (n, 3) meet
+        triangles by their number in `chosen` (n,), at mean values of their corners by weights (n, 3); `flat`
+        are those of the triangles."""
+        assert self.surface.normals is not None
+        given = self.surface.normals[self.chosen[triangle]]
+        normal = np.einsum("ij,ijk->ik", weights, given) @ self.R.T
+        flat = flat * np.where(np.einsum("ij,ij->i", flat, rays) > 0.0, -1.0, 1.0)[:, None]
+        normal *= np.where(np.einsum("ij,ij->i", normal, flat) < 0.0, -1.0, 1.0)[:, None]
+        # Near the outline of a round mesh the mean of normals may point away from the camera.
+        unit = rays / np.linalg.norm(rays, axis=1)[:, None]
+        away = np.einsum("ij,ij->i", normal, unit)
+        normal -= np.maximum(away + _LEAST_SLOPE, 0.0)[:, None] * unit
+        return np.asarray(normal)
+
+    def factors(
+        self, triangle: Whole, weights: Floats, corners: Floats, normal: Floats, rays: Floats, pixel: Floats
+    ) -> Floats | None:
+        """Return the factors (n, 3) of the colour there; None without image and colours of corners. `corners`
+        (m, 3, 3) and `normal` (m, 3) are those of all triangles of `chosen`, `pixel` (n,) the extent of a
+        pixel [m]."""
+        number = self.chosen[triangle]
+        if self.surface.colours is not None:
+            return np.asarray(np.einsum("ij,ijk->ik", weights, self.surface.colours[number]))
+        if self.surface.texture is None or self.surface.uv is None:
+            return None
+        uv = self.surface.uv[self.chosen]
+        (a, b), size = (uv[:, 1] - uv[:, 0]).T, self.surface.texture.pixels.shape
+        c, d = (uv[:, 2] - uv[:, 0]).T
+        double_area = np.linalg.norm(normal, axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            density = np.sqrt(np.abs(a * d - b * c) * (size[0] * size[1]) / double_area)[triangle]
+            slope = np.abs(np.einsum("ij,ij->i", normal[triangle], rays)) / (
+                double_area[triangle] * np.linalg.norm(rays, axis=1)
+            )
+            extent = density * pixel / np.sqrt(np.maximum(slope, _LEAST_SLOPE))
+        return self.surface.texture.colours(np.einsum("ij,ijk->ik", weights, self.surface.uv[number]), extent)
 
 
 SHADOW_SIDES = (160, 512)
@@ -367,7 +461,7 @@ def _buffer_of(shapes: Sequence[DrawnShape], T_world_camera: Floats, camera: Cam
     T_camera_world = np.asarray(inverse(T_world_camera))
     buffer = DepthBuffer(camera)
     for number, each in enumerate(shapes):
-        buffer.draw(number, each.shape, T_camera_world @ each.T)
+        buffer.draw(number, each.shape, T_camera_world @ each.T, painted=each.painted)
     return buffer
 
 
@@ -400,13 +494,18 @@ class _Shading(NamedTuple):
             # Of the side that is seen; zero for a triangle without an area.
             normal *= (np.where(away > 0.0, -1.0, 1.0) / np.where(length > 0.0, length, 1.0))[:, None]
             pixel = buffer.depth[pixels] / self.camera.focal_length
-            colours[seen] = self._surfaces(buffer.number[pixels], points, normal, unit, pixel)
+            own = np.array([each.rgba[:3] for each in self.shapes])[buffer.number[pixels]]
+            if buffer.factors is not None:
+                own *= buffer.factors[pixels]
+            colours[seen] = self._surfaces(buffer.number[pixels], own, points, normal, unit, pixel)
         return colours
 
-    def _surfaces(self, number: Whole, points: Floats, normal: Floats, rays: Floats, pixel: Floats) -> Floats:
-        """Return the colours (n, 3) of points (n, 3) of shapes by their `number` (n,), with the unit normals
-        and the unit rays (n, 3) by which they are seen, and the extent of a pixel there (n,) [m]."""
-        colours = np.array([each.rgba[:3] for each in self.shapes])[number]
+    def _surfaces(
+        self, number: Whole, colours: Floats, points: Floats, normal: Floats, rays: Floats, pixel: Floats
+    ) -> Floats:
+        """Return the colours (n, 3) of points (n, 3) of shapes by their `number` (n,), with their own
+        `colours` (n, 3), the unit normals and the unit rays (n, 3) by which they are seen, and the extent of
+        a pixel there (n,) [m]."""
         planes = [k for k, each in enumerate(self.shapes) if isinstance(each.shape, Plane)]
         slopes = {}
         for k in planes:
@@ -474,9 +573,9 @@ def draw_picture(scene: Scene, state: WorldState, camera: Camera, draw: Draw = c
     """Return what a camera sees of a scene in a state.
 
     Links are drawn as their visual shapes, and as their collision shapes where they have none or where one
-    cannot be read; bodies as their shapes, meshes as their triangles. Textures are ignored, and colours are
-    opaque, except for those of opacity 0, which are not drawn. Raises UnknownNameError for an unknown part
-    that carries the camera.
+    cannot be read; bodies as their visual shapes, else as their shapes. Meshes have the materials and images
+    of their files, and `notes` of the picture names what is not drawn. Colours are opaque, except for those
+    of opacity 0, which are not drawn. Raises UnknownNameError for an unknown part that carries the camera.
     """
     if not isinstance(camera, Camera):
         raise ArgumentError(f"camera is of type {type(camera).__name__}; wanted a Camera")
@@ -494,7 +593,19 @@ def draw_picture(scene: Scene, state: WorldState, camera: Camera, draw: Draw = c
         drawing.depth.reshape(rows),
         parts[drawing.number + 1].reshape(rows),
         scene.parts,
+        tuple(_look_notes(scene)),
     )
+
+
+def _look_notes(scene: Scene) -> Iterator[str]:
+    for robot in scene.robots:
+        for link in robot.model.links:
+            for note in link_look_notes(robot.model.geometry, link.name):
+                yield f"{robot.name}/{link.name}: {note}"
+    for body in scene.bodies:
+        for each in body.visuals or body.shapes:
+            for note in look_notes(each):
+                yield f"{body.name}: {note}"
 
 
 def part_poses(scene: Scene, state: WorldState) -> Iterator[tuple[str, Floats]]:

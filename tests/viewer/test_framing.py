@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import dynx
 from dynx.model import Pose
 from dynx.model.geometry import Box, Plane, Sphere
-from dynx.model.geometry.links import link_shapes
+from dynx.model.geometry.drawn_shapes import link_shapes
 from dynx.rbd.kinematics import link_poses
 from dynx.spatial.scalar import Floats
 from dynx.steppers.camera import Camera

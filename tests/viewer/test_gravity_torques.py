@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import dynx
-from dynx.model.geometry.links import link_shapes
+from dynx.model.geometry.drawn_shapes import link_shapes
 from dynx.model.geometry.ray_casting import cast_on_shape
 from dynx.rbd.kinematics import link_poses
 from dynx.spatial.scalar import Floats

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import dynx
 from dynx.model import Inertial, Pose
-from dynx.model.geometry.links import link_shapes
+from dynx.model.geometry.drawn_shapes import link_shapes
 from dynx.spatial.so3 import rotation_from_rpy
 from dynx.viewer.controls import slider_step
 from dynx.viewer.marks import centre_of, equivalent_solid

@@ -17,6 +17,7 @@ import pytest
 import dynx
 from dynx.errors import ArgumentError
 from dynx.model import Model
+from dynx.model.geometry.drawn_shapes import link_shapes
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
 from dynx.steppers.camera import Camera
@@ -89,7 +90,7 @@ def test_the_page_shows_what_the_camera_of_the_world_sees(open_page: OpenPage) -
             until(lambda: common() > SAME, "the picture of the configuration")
         assert antialiased(page)
         shapes = [node.name for nodes in viewer.view.visuals.values() for node in nodes]
-        assert len(shapes) == 8
+        assert len(shapes) == sum(len(list(link_shapes(model.geometry, link.name))) for link in model.links)
         assert page.page.evaluate(
             "names => names.every(name => __viserMutable.nodeRefFromName[name])", shapes
         )

@@ -14,7 +14,7 @@ from dynx.engines.pybullet.library import bullet
 from dynx.engines.pybullet.stepper import BulletStepper, touching_point
 from dynx.errors import EngineError, EngineLimitError
 from dynx.files.temporary import temporary_folder
-from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
+from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Sphere
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import inverse
 from dynx.spatial.so3 import quat_from_rotation
@@ -66,7 +66,7 @@ class BulletQueries(NativeQueries):
         try:
             with temporary_folder() as folder:
                 for number, each in enumerate(shapes):
-                    _add(engine, client, each, Path(folder, f"{number}.stl"))
+                    _add(engine, client, each, Path(folder, str(number)))
                 return _picture(engine, client, T_world_camera, camera)
         except (SystemError, TypeError, ValueError, engine.error) as error:
             raise EngineError(f"pybullet failed to draw: {error}") from error
@@ -77,7 +77,7 @@ class BulletQueries(NativeQueries):
 def _add(engine: ModuleType, client: int, drawn: DrawnShape, file: Path) -> None:
     """Add a body without mass, whose number is that of the shape."""
     visual = engine.createVisualShape(
-        **_visual(engine, drawn.shape, file), rgbaColor=(*drawn.rgba[:3], 1.0), physicsClientId=client
+        **_visual(engine, drawn, file), rgbaColor=(*drawn.rgba[:3], 1.0), physicsClientId=client
     )
     engine.createMultiBody(
         baseVisualShapeIndex=visual,
@@ -87,7 +87,9 @@ def _add(engine: ModuleType, client: int, drawn: DrawnShape, file: Path) -> None
     )
 
 
-def _visual(engine: ModuleType, shape: Shape, file: Path) -> dict[str, Any]:
+def _visual(engine: ModuleType, drawn: DrawnShape, file: Path) -> dict[str, Any]:
+    """Return the arguments of a visual shape; that of a mesh is written to a file with a suffix."""
+    shape = drawn.shape
     if isinstance(shape, Box):
         return {"shapeType": engine.GEOM_BOX, "halfExtents": [0.5 * edge for edge in shape.size]}
     if isinstance(shape, Sphere):
@@ -102,8 +104,31 @@ def _visual(engine: ModuleType, shape: Shape, file: Path) -> dict[str, Any]:
         assert isinstance(shape, Mesh | HeightField)
         vertices, faces = shape.triangles if isinstance(shape, Mesh) else shape.triangles()
         corners = vertices[faces]
-    file.write_bytes(binary_stl(corners))
-    return {"shapeType": engine.GEOM_MESH, "fileName": str(file)}
+        if drawn.painted and isinstance(shape, Mesh) and shape.surface.texture is not None:
+            return {"shapeType": engine.GEOM_MESH, "fileName": _write_obj(shape, file)}
+    written = file.with_suffix(".stl")
+    written.write_bytes(binary_stl(corners))
+    return {"shapeType": engine.GEOM_MESH, "fileName": str(written)}
+
+
+def _write_obj(mesh: Mesh, file: Path) -> str:
+    """Write a mesh with its image as OBJ, MTL and PNG files, and return the path of the first."""
+    surface = mesh.surface
+    assert surface.texture is not None
+    assert surface.uv is not None
+    file.with_suffix(".png").write_bytes(surface.texture.png)
+    file.with_suffix(".mtl").write_text(f"newmtl m\nKd 1 1 1\nmap_Kd {file.name}.png\n")
+    corners = np.arange(1, surface.faces.size + 1).reshape(-1, 3)
+    lines = [f"mtllib {file.name}.mtl", "usemtl m"]
+    lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in surface.vertices[surface.faces.reshape(-1)].tolist()]
+    lines += [f"vt {u!r} {v!r}" for u, v in surface.uv.reshape(-1, 2).tolist()]
+    if surface.normals is not None:
+        lines += [f"vn {x!r} {y!r} {z!r}" for x, y, z in surface.normals.reshape(-1, 3).tolist()]
+    corner = "{0}/{0}" if surface.normals is None else "{0}/{0}/{0}"
+    lines += ["f " + " ".join(corner.format(each) for each in face) for face in corners.tolist()]
+    written = file.with_suffix(".obj")
+    written.write_text("\n".join(lines) + "\n")
+    return str(written)
 
 
 def _picture(engine: ModuleType, client: int, T_world_camera: Floats, camera: Camera) -> Drawing:

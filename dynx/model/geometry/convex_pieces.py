@@ -19,7 +19,8 @@ from dynx.errors import ArgumentError, DescriptionError, importing, shown
 from dynx.files.reading import printable, read_file
 from dynx.files.writing import write_bytes
 from dynx.model.geometry.formats.facets import obj_objects
-from dynx.model.geometry.mesh import Mesh, read_triangles
+from dynx.model.geometry.mesh import Mesh
+from dynx.model.geometry.mesh_reading import read_triangles
 from dynx.model.numbers import positive_number
 from dynx.spatial.scalar import Floats
 

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
-from functools import cached_property, lru_cache, partial
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dynx.errors import ArgumentError, DescriptionError, DynxError, shown
-from dynx.files.reading import checked_path, printable, read_file
+from dynx.errors import ArgumentError, DescriptionError, shown
+from dynx.files.reading import checked_path
 from dynx.model.elements import Vector
-from dynx.model.numbers import MAX_MAGNITUDE, finite_vector
+from dynx.model.numbers import finite_vector
 from dynx.spatial.scalar import Floats
+
+if TYPE_CHECKING:
+    from dynx.model.geometry.mesh_reading import Surface, SurfacePart
 
 # Convex hulls of points. No other module of geometry imports SciPy.
 
@@ -62,91 +66,6 @@ def _hull_of_solid(points: Floats) -> tuple[Floats, NDArray[np.intp]]:
     return vertices, faces.astype(np.intp)
 
 
-# Triangles of mesh files, checked before any engine sees them.
-
-
-Triangles = tuple[Floats, NDArray[np.intp]]
-
-MAX_TRIANGLES = 2_000_000
-"""Largest number of triangles of a mesh."""
-
-FORMATS = (".stl", ".obj", ".dae", ".gltf", ".glb")
-"""Suffixes of the files that are read."""
-
-
-def read_triangles(path: str) -> Triangles:
-    """Return the vertices (n, 3) [m] and triangles (m, 3) of a mesh file, unscaled.
-
-    The result is shared between calls until the file changes. Raises RobotNotFoundError for a missing file,
-    DescriptionError for one that is too large, damaged, empty or of another format, NotInstalledError for
-    glTF without trimesh.
-    """
-    try:
-        status = os.stat(path)
-    except (OSError, ValueError):
-        return _checked(path)
-    return _cached(path, status.st_mtime_ns, status.st_size)
-
-
-# A robot names its meshes twice, and is often loaded into several engines.
-@lru_cache(maxsize=64)
-def _cached(path: str, changed: int, size: int) -> Triangles:
-    return _checked(path)
-
-
-def _checked(path: str) -> Triangles:
-    suffix = os.path.splitext(path)[1].lower()
-    if suffix not in FORMATS:
-        raise _fault(path, f"has the suffix {shown(suffix)}; meshes are read from {', '.join(FORMATS)}")
-    data = read_file(path)
-    vertices, faces = _parsed(path, data, suffix)
-    if len(faces) == 0:
-        raise _fault(path, "holds no triangle")
-    if len(faces) > MAX_TRIANGLES:
-        raise _fault(path, f"holds {len(faces)} triangles; at most {MAX_TRIANGLES} are read")
-    if not np.abs(vertices).max() < MAX_MAGNITUDE:
-        raise _fault(path, f"holds a vertex that is not finite or not below {MAX_MAGNITUDE:g}")
-    if faces.min() < 0 or faces.max() >= len(vertices):
-        raise _fault(path, f"holds a triangle of a vertex that is not among its {len(vertices)}")
-    vertices.flags.writeable = faces.flags.writeable = False
-    return vertices, faces
-
-
-def _parsed(path: str, data: bytes, suffix: str) -> Triangles:
-    try:
-        # Imported here, because nobody asks for the triangles of most robots, or they have no such meshes.
-        if suffix in (".stl", ".obj"):
-            from dynx.model.geometry.formats.facets import obj_triangles, stl_triangles
-
-            return stl_triangles(data) if suffix == ".stl" else obj_triangles(data)
-        if suffix == ".dae":
-            from dynx.model.geometry.formats.collada import collada_triangles
-
-            return collada_triangles(data)
-        from dynx.model.geometry.formats.gltf import gltf_triangles
-
-        return gltf_triangles(data, partial(_read_beside, path))
-    except DynxError:
-        raise
-    # trimesh raises whatever exception damaged data lead to, as do lookups in the tree of such a file.
-    except Exception as error:
-        reason = str(error) if type(error) is ValueError else f"{type(error).__name__}: {error}"
-        raise _fault(path, f"cannot be read as {suffix}: {reason}") from error
-
-
-def _read_beside(path: str, name: str) -> bytes:
-    """Return the bytes of a file in the folder of a mesh; ValueError for one outside."""
-    folder = os.path.realpath(os.path.dirname(path))
-    found = os.path.realpath(os.path.join(folder, name))
-    if not found.startswith(os.path.join(folder, "")):
-        raise ValueError(f"{shown(name, 200)} is outside the folder of the mesh")
-    return read_file(found)
-
-
-def _fault(path: str, message: str) -> DescriptionError:
-    return DescriptionError(message, source=printable(path))
-
-
 Faces = NDArray[np.intp]
 
 
@@ -162,6 +81,8 @@ class Mesh:
     scale: Vector = (1.0, 1.0, 1.0)
     fault: DescriptionError | None = field(default=None, compare=False, repr=False)
     """The error of a description whose mesh was not found; raised when the mesh is read."""
+    part: int | None = None
+    """Number of those triangles of the file that alone are meant, by their look; None for all, of any."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "file", checked_path(self.file))
@@ -206,10 +127,47 @@ class Mesh:
         except ArgumentError as error:
             raise DescriptionError(str(error), source=shown(self.file, 300)) from None
 
-    def _read(self) -> Triangles:
+    @cached_property
+    def parts(self) -> tuple[tuple[Mesh, SurfacePart], ...]:
+        """The triangles as the file divides them by their look: meshes of those of one colour or image.
+
+        Raises the errors of `triangles`.
+        """
+        # Imported here and below, because meshes of most robots are never read.
+        from dynx.model.geometry.mesh_reading import mesh_file
+
         if self.fault is not None:
             raise self.fault
-        return read_triangles(self.file)
+        found = mesh_file(self.file).parts
+        if self.part is not None:
+            return ((self, found[self.part]),)
+        return tuple((replace(self, part=k), each) for k, each in enumerate(found))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What of the look that the file describes is not drawn, one sentence each."""
+        from dynx.model.geometry.mesh_reading import mesh_file
+
+        if self.fault is not None:
+            raise self.fault
+        return mesh_file(self.file).notes
+
+    @cached_property
+    def surface(self) -> Surface:
+        """The triangles with normals, and with images and colours that vary over a part. Raises the errors of
+        `triangles`."""
+        from dynx.model.geometry.mesh_reading import mesh_file
+
+        if self.fault is not None:
+            raise self.fault
+        return mesh_file(self.file).surface(self.part, np.array(self.scale))
+
+    def _read(self) -> tuple[Floats, Faces]:
+        from dynx.model.geometry.mesh_reading import read_triangles
+
+        if self.fault is not None:
+            raise self.fault
+        return read_triangles(self.file, self.part)
 
     def __getstate__(self) -> dict[str, object]:
         return {name: value for name, value in self.__dict__.items() if name in self.__dataclass_fields__}

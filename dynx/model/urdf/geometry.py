@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from functools import partial
 from typing import TypeVar
 
@@ -163,6 +164,13 @@ class _ShapeReader:
             raise known
         return known
 
+    def _image(self, filename: str) -> str:
+        """Return the path of an image, which is found as meshes are; the name as it stands if it is not."""
+        with suppress(MeshNotFoundError):
+            found = find_mesh(filename, self._reading.source, self._package_dirs)
+            return filename if found is None else str(found)
+        return filename
+
     def _material_or_fault(self, element: Element) -> Appearance | DescriptionError:
         try:
             return self._own_material(element)
@@ -178,7 +186,7 @@ class _ShapeReader:
             rgba = (red, green, blue, opacity)
         texture = None
         for each in element.all("texture")[:1]:
-            texture = each.attributes.get("filename")
+            texture = self._image(each.attributes.get("filename", ""))
         try:
             return Appearance(name, rgba, texture)
         except ArgumentError as error:

@@ -124,12 +124,15 @@ class SceneBody:
     def drawn_shapes(self) -> Iterator[tuple[Shape, Colour, Floats]]:
         """Yield the shapes by which the body is drawn, each with its colour and its pose in the body (4, 4).
 
-        A visual without a colour of its own has that of the material of the body.
+        `coloured_shapes` says how, with the colour of the material of the body for shapes without one of
+        their own; a mesh is drawn as its file says where the body has the default colour, grey.
         """
+        # Imported here, because most scenes are never drawn.
+        from dynx.model.geometry.drawn_shapes import coloured_shapes
+
+        grey, rgba = Material().rgba, self.material.rgba
         for each in self.visuals or self.shapes:
-            own = each.material if isinstance(each, Visual) else None
-            rgba = self.material.rgba if own is None or own.rgba is None else own.rgba
-            yield each.shape, rgba, each.origin.matrix
+            yield from coloured_shapes(each, None if rgba == grey else rgba, grey)
 
     @property
     def fixed(self) -> bool:

@@ -10,7 +10,7 @@ import pytest
 
 from dynx.errors import DescriptionError, ModelError
 from dynx.model.geometry import Mesh
-from dynx.model.geometry import mesh as mesh_module
+from dynx.model.geometry import mesh_reading as mesh_module
 from dynx.spatial.scalar import Floats
 from tests.model.geometry.mesh_files import accessor, dae, gltf, obj, stl, text_stl
 

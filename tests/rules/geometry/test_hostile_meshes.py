@@ -90,8 +90,8 @@ def test_nested_instances_are_followed_up_to_a_limit(tmp_path: Path, monkeypatch
 
 
 def test_a_source_that_many_geometries_share_is_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    positions = Mock(wraps=collada._positions)
-    monkeypatch.setattr(collada, "_positions", positions)
+    positions = Mock(wraps=collada._source_values)
+    monkeypatch.setattr(collada, "_source_values", positions)
     text = dae(FACET).decode()
     again = text.replace("<instance_geometry", '<instance_geometry url="#part"/>' * 50 + "<instance_geometry")
     found = collada.collada_points(again.encode())

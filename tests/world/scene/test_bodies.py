@@ -13,7 +13,7 @@ import dynx
 from dynx import Pose
 from dynx.errors import ArgumentError, DescriptionError
 from dynx.model.geometry import Appearance, Box, Collision, Cylinder, HeightField, Plane, Sphere, Visual
-from dynx.model.geometry.links import link_shapes
+from dynx.model.geometry.drawn_shapes import link_shapes
 from dynx.testing.strategies.geometry import origins
 from dynx.world import Material, Scene, SceneBody, body_to_urdf
 from dynx.world.camera import drawn_shapes

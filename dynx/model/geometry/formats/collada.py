@@ -14,11 +14,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
+from urllib.parse import unquote, urlsplit
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dynx.errors import DescriptionError, shown
+from dynx.model.geometry.formats.surface import FileMaterial, FileSurface, ImageFile
 from dynx.model.xml.reading import Element, read_xml
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import rotation_about
@@ -38,11 +40,15 @@ _TO_Z_UP = {
 _UNREADABLE = frozenset({"lookat", "skew", "instance_controller"})
 _MOVING = frozenset({"matrix", "translate", "rotate", "scale"})
 _WITH_TEXT = frozenset({"float_array", "up_axis", *_MOVING})
+_OF_LOOK = frozenset({"color", "float", "init_from", "ref", "source", "wrap_s", "wrap_t"})
+_SHADINGS = ("phong", "lambert", "blinn", "constant")
 _SURFACES = ("triangles", "polylist", "polygons", "trifans", "tristrips")
 _OF_BULLET = ("triangles", "polylist")
 _DIGITS_AND_SPACES = b"0123456789 \t\r\n"
 _LAYOUT = (("stride", "1"), ("offset", "0"))
 """Attributes of an <accessor> with their defaults."""
+
+Rows = NDArray[np.intp]
 
 
 def collada_points(data: bytes, *, by_bullet: bool = False) -> Floats | None:
@@ -55,7 +61,7 @@ def collada_points(data: bytes, *, by_bullet: bool = False) -> Floats | None:
         with_text = _tags(data, _WITH_TEXT | {"p"} if by_bullet else _WITH_TEXT)
         scene = _ColladaScene(read_xml(data, "<mesh>", [], with_text=with_text))
         points_of = scene.points_of_faces if by_bullet else scene.points
-        found = [points_of(geometry) @ T[:3, :3].T + T[:3, 3] for geometry, T in scene.placed()]
+        found = [points_of(geometry) @ T[:3, :3].T + T[:3, 3] for _, geometry, T in scene.placed()]
     except (_NotSupported, DescriptionError, ValueError):
         return None
     if not found:
@@ -70,27 +76,111 @@ def collada_triangles(data: bytes) -> tuple[Floats, NDArray[np.intp]]:
 
     Raises ValueError, with the reason, for a file that is damaged or has elements that are not supported.
     """
+    found = _surface(data, drawn=False)
+    return found.vertices, found.faces
+
+
+def collada_surface(data: bytes) -> FileSurface:
+    """Return the triangles of the scene with their normals, images and colours.
+
+    A material gives the diffuse colour or image of its effect. Colours of corners (COLOR) come before those
+    of materials, images before both. Materials are opaque: writers disagree about <transparent>. Raises
+    ValueError, with the reason, for a file that is damaged or has elements that are not supported.
+    """
+    return _surface(data, drawn=True)
+
+
+def _surface(data: bytes, *, drawn: bool) -> FileSurface:
+    """Return the triangles; what they look like is read if they are to be `drawn`."""
+    tags = _tags(data, _WITH_TEXT | {"p", "vcount"} | (_OF_LOOK if drawn else set()))
+    parts: list[_Part] = []
     try:
-        scene = _ColladaScene(
-            read_xml(data, "<mesh>", [], with_text=_tags(data, _WITH_TEXT | {"p", "vcount"}))
-        )
-        vertices, faces, count, placed = [np.zeros((0, 3))], [np.zeros((0, 3), np.intp)], 0, 0
-        for geometry, T in scene.placed():
+        scene = _ColladaScene(read_xml(data, "<mesh>", [], with_text=tags))
+        vertices, count, placed = [np.zeros((0, 3))], 0, 0
+        for instance, geometry, T in scene.placed():
             points = scene.points(geometry)
-            # A mirrored triangle is seen from behind.
-            order = -1 if np.linalg.det(T[:3, :3]) < 0.0 else 1
             for primitive in _primitives(geometry, _SURFACES):
-                faces.append(_triangles(primitive, len(points))[:, ::order] + count)
-                placed += len(faces[-1])
+                lists = _vertex_rows(primitive, len(points))
+                corner, rows = _fans(primitive, lists), np.concatenate([np.zeros(0, np.intp), *lists])
+                # A mirrored triangle is seen from behind.
+                corner = corner[:, ::-1] if np.linalg.det(T[:3, :3]) < 0.0 else corner
+                part = _Part(rows[corner] + count)
+                placed += len(part.faces)
                 if placed > MAX_POINTS:
                     raise _NotSupported(f"it places more than {MAX_POINTS} triangles")
+                if drawn:
+                    part.add_look(scene, instance, geometry, primitive, corner, rows[corner], T[:3, :3])
+                parts.append(part)
             vertices.append(points @ T[:3, :3].T + T[:3, 3])
             count += len(points)
     except _NotSupported as error:
         raise ValueError(str(error)) from None
     except DescriptionError as error:
         raise ValueError(error.message) from None
-    return scene.unit * np.concatenate(vertices), np.concatenate(faces)
+    faces = np.concatenate([np.zeros((0, 3), np.intp), *(part.faces for part in parts)])
+    if not drawn or not parts:
+        return FileSurface(scene.unit * np.concatenate(vertices), faces)
+    materials = tuple(dict.fromkeys(part.material for part in parts))
+    return FileSurface(
+        scene.unit * np.concatenate(vertices),
+        faces,
+        _joined([part.normals for part in parts], faces, 3),
+        _joined([part.uv for part in parts], faces, 2),
+        _joined([part.colours for part in parts], faces, 3),
+        materials,
+        np.repeat([materials.index(part.material) for part in parts], [len(part.faces) for part in parts]),
+        tuple(dict.fromkeys(note for part in parts for note in part.notes)),
+    )
+
+
+class _Part:
+    """The triangles of one primitive, and what they look like."""
+
+    def __init__(self, faces: Rows) -> None:
+        self.faces = faces
+        self.material = FileMaterial()
+        self.normals: Floats | Rows = faces
+        self.uv: Floats | Rows = faces
+        self.colours: Floats | Rows = faces
+        self.notes: list[str] = []
+
+    def add_look(
+        self,
+        scene: _ColladaScene,
+        instance: Element,
+        geometry: Element,
+        primitive: Element,
+        corner: Rows,
+        rows: Rows,
+        M: Floats,
+    ) -> None:
+        """Read materials, normals, places in the image, and colours, of corners by their numbers (m, 3) in
+        the lists of the primitive, and at their points (m, 3)."""
+        self.material, channel = scene.material(instance, primitive, self.notes)
+        for semantic, wanted, width in (("NORMAL", None, 3), ("TEXCOORD", channel, 2), ("COLOR", None, 3)):
+            try:
+                found = scene.values(geometry, primitive, semantic, wanted, width, corner, rows)
+            except (_NotSupported, ValueError) as error:
+                self.notes.append(f"{semantic} is not read: {error}")
+                continue
+            if found is None:
+                continue
+            if semantic == "NORMAL":
+                with np.errstate(all="ignore"):
+                    self.normals = found @ np.linalg.pinv(M)
+            elif semantic == "TEXCOORD":
+                self.uv = found
+            else:
+                self.colours = np.clip(found, 0.0, 1.0)
+
+
+def _joined(values: list[Floats | Rows], faces: Rows, width: int) -> Floats | None:
+    """Return the values (m, 3, `width`) of all triangles, NaN for those of parts that have none, whose
+    triangles stand in the list instead; None where no part has any."""
+    if not any(each.ndim == 3 for each in values):
+        return None
+    none = [np.full((len(each), 3, width), np.nan) if each.ndim == 2 else each for each in values]
+    return np.concatenate(none)
 
 
 def _tags(data: bytes, names: Iterable[str]) -> set[str]:
@@ -98,9 +188,6 @@ def _tags(data: bytes, names: Iterable[str]) -> set[str]:
     prefix = re.search(rb"<(\w+:)COLLADA\b", data[:1000])
     before = "" if prefix is None else prefix.group(1).decode("ascii", "replace")
     return {f"{before}{name}" for name in names}
-
-
-Rows = NDArray[np.intp]
 
 
 class _NotSupported(Exception):
@@ -119,14 +206,15 @@ class _ColladaScene:
         self._root = root
         self._nodes, self._points_placed = 0, 0
         self._points_of: dict[int, Floats] = {}
+        self._values: dict[tuple[int, int], Floats] = {}
 
-    def placed(self) -> Iterator[tuple[Element, Floats]]:
-        """Yield each placed geometry, and its pose (4, 4) in the scene, scale included."""
+    def placed(self) -> Iterator[tuple[Element, Element, Floats]]:
+        """Yield each <instance_geometry>, its geometry, and its pose (4, 4) in the scene, scale included."""
         for scene in _path(self._root, "library_visual_scenes", "visual_scene"):
             for node in scene.all("node"):
                 yield from self._of_node(node, np.eye(4), 0)
 
-    def _of_node(self, node: Element, T: Floats, depth: int) -> Iterator[tuple[Element, Floats]]:
+    def _of_node(self, node: Element, T: Floats, depth: int) -> Iterator[tuple[Element, Element, Floats]]:
         self._nodes += 1
         if depth > _DEEPEST or self._nodes > MAX_NODES:
             raise _NotSupported(f"its nodes are more than {MAX_NODES}, or nested deeper than {_DEEPEST}")
@@ -140,7 +228,7 @@ class _ColladaScene:
             self._points_placed += len(self.points(geometry))
             if self._points_placed > MAX_POINTS:
                 raise _NotSupported(f"it places more than {MAX_POINTS} points")
-            yield geometry, T
+            yield instance, geometry, T
         for instance in node.all("instance_node"):
             yield from self._of_node(self._target(instance, "url"), T, depth + 1)
         for below in node.all("node"):
@@ -153,10 +241,101 @@ class _ColladaScene:
         if len(sources) != 1:
             raise _NotSupported("a geometry has no mesh with one source of positions")
         source = self._target(sources[0], "source")
+        return self._values_of(source, 3)
+
+    def _values_of(self, source: Element, width: int) -> Floats:
         # Many geometries may share one source.
-        if id(source) not in self._points_of:
-            self._points_of[id(source)] = _positions(source)
-        return self._points_of[id(source)]
+        if (id(source), width) not in self._values:
+            self._values[id(source), width] = _source_values(source, width)
+        return self._values[id(source), width]
+
+    def values(
+        self,
+        geometry: Element,
+        primitive: Element,
+        semantic: str,
+        number: str | None,
+        width: int,
+        corner: Rows,
+        points: Rows,
+    ) -> Floats | None:
+        """Return the values (m, 3, `width`) of an input, of those with a set the one of this `number`, at
+        corners by their numbers (m, 3) in the lists of a primitive and the points (m, 3) there; None without
+        such an input."""
+        inputs = [each for each in primitive.all("input") if each.attributes.get("semantic") == semantic]
+        chosen = [each for each in inputs if each.attributes.get("set", "0") == number] or inputs
+        if chosen:
+            values = self._values_of(self._target(chosen[0], "source"), width)
+            column = int(chosen[0].attributes.get("offset", "0"))
+            lists = _rows_of(primitive, column, len(values))
+            rows = np.concatenate([np.zeros(0, np.intp), *lists])[corner]
+        else:
+            of_vertices = _path(geometry, "mesh", "vertices", "input")
+            inputs = [each for each in of_vertices if each.attributes.get("semantic") == semantic]
+            if not inputs:
+                return None
+            values, rows = self._values_of(self._target(inputs[0], "source"), width), points
+            if rows.size and rows.max() >= len(values):
+                raise _NotSupported(f"it has {len(values)} values for more points")
+        found = values[rows]
+        return found if np.isfinite(found).all() else None
+
+    def material(
+        self, instance: Element, primitive: Element, notes: list[str]
+    ) -> tuple[FileMaterial, str | None]:
+        """Return the material of a primitive of a placed geometry, and the set of places in its image."""
+        symbol = primitive.attributes.get("material")
+        for bound in _path(instance, "bind_material", "technique_common", "instance_material"):
+            material = self._by_id.get(bound.attributes.get("target", "")[1:])
+            if bound.attributes.get("symbol") != symbol or material is None:
+                continue
+            used = _first(material, "instance_effect")
+            effect = None if used is None else self._by_id.get(used.attributes.get("url", "")[1:])
+            for diffuse in (
+                found
+                for shading in _SHADINGS
+                if effect is not None
+                for found in _path(
+                    effect,
+                    "profile_COMMON",
+                    "technique",
+                    shading,
+                    "diffuse" if shading != "constant" else "emission",
+                )
+            ):
+                texture, color = _first(diffuse, "texture"), _first(diffuse, "color")
+                if texture is not None and effect is not None:
+                    image = self._image(effect, texture.attributes.get("texture", ""))
+                    if image is None:
+                        notes.append(f"image {shown(texture.attributes.get('texture', ''))} is not defined")
+                    return FileMaterial(None, image), _set_of(bound, texture.attributes.get("texcoord", ""))
+                rgb = np.zeros(0) if color is None else _numbers(color)[:3]
+                if len(rgb) == 3 and np.isfinite(rgb).all():
+                    red, green, blue = np.clip(rgb, 0.0, 1.0).tolist()
+                    return FileMaterial((red, green, blue, 1.0)), None
+        return FileMaterial(), None
+
+    def _image(self, effect: Element, name: str) -> ImageFile | None:
+        """Return the image of a sampler, or of that name; None for one that is not defined."""
+        given = {each.attributes.get("sid"): each for each in _path(effect, "profile_COMMON", "newparam")}
+        sampler = _first(given.get(name, effect), "sampler2D")
+        wraps = (True, True)
+        if sampler is not None:
+            u, v = (_text(_first(sampler, wrap)) for wrap in ("wrap_s", "wrap_t"))
+            wraps = (u not in ("CLAMP", "BORDER"), v not in ("CLAMP", "BORDER"))
+            surface = given.get(_text(_first(sampler, "source")), effect)
+            of_image = _first(sampler, "instance_image")
+            name = _text(_first(surface, "surface", "init_from"))
+            if of_image is not None:
+                name = of_image.attributes.get("url", "")[1:]
+        image = self._by_id.get(name)
+        if image is None or image.tag != "image":
+            return None
+        from_file = _first(image, "init_from")
+        inside = None if from_file is None else _first(from_file, "ref")
+        path = _text(from_file if inside is None else inside)
+        path = unquote(urlsplit(path).path if path.startswith("file:") else path).replace("\\", "/")
+        return ImageFile(path, None, wraps) if path else None
 
     def points_of_faces(self, geometry: Element) -> Floats:
         """Return the points of a geometry that triangles and lists of polygons use, as PyBullet loads it."""
@@ -184,10 +363,16 @@ def _primitives(geometry: Element, kinds: Iterable[str]) -> Iterator[Element]:
 def _vertex_rows(primitive: Element, count: int) -> list[Rows]:
     """Return the numbers of the points, `count` in all, in each list of a primitive."""
     columns = {each.attributes.get("semantic"): each for each in primitive.all("input")}
-    offsets = [int(each.attributes.get("offset", "0")) for each in primitive.all("input")]
-    if "VERTEX" not in columns or min(offsets) < 0:
+    if "VERTEX" not in columns:
         raise _NotSupported(f"<{primitive.tag}> has no input of vertices")
-    column = int(columns["VERTEX"].attributes.get("offset", "0"))
+    return _rows_of(primitive, int(columns["VERTEX"].attributes.get("offset", "0")), count)
+
+
+def _rows_of(primitive: Element, column: int, count: int) -> list[Rows]:
+    """Return the numbers of the values, `count` in all, in a column of each list of a primitive."""
+    offsets = [int(each.attributes.get("offset", "0")) for each in primitive.all("input")]
+    if min(offsets) < 0:
+        raise _NotSupported(f"<{primitive.tag}> has no input of vertices")
     lists = [_whole_numbers(indices)[column :: 1 + max(offsets)] for indices in primitive.all("p")]
     for rows in lists:
         if not ((rows >= 0) & (rows < count) & (rows == np.floor(rows))).all():
@@ -197,48 +382,59 @@ def _vertex_rows(primitive: Element, count: int) -> list[Rows]:
     return [rows.astype(np.intp) for rows in lists]
 
 
-def _triangles(primitive: Element, count: int) -> Rows:
-    """Return the triangles (m, 3) of a primitive over `count` points."""
+def _fans(primitive: Element, lists: list[Rows]) -> Rows:
+    """Return the corners of the triangles (m, 3) of a primitive, as numbers in its lists of points, which
+    are one after another."""
     if primitive.all("ph"):
         raise _NotSupported("polygons with holes are not supported")
-    lists = _vertex_rows(primitive, count)
-    rows = np.concatenate([np.zeros(0, np.intp), *lists])
+    total = sum(map(len, lists))
     if primitive.tag == "triangles":
-        corners = np.full(len(rows) // 3, 3)
+        corners = np.full(total // 3, 3)
     elif primitive.tag == "polylist":
         numbers = [_whole_numbers(each) for each in primitive.all("vcount")]
         given = np.concatenate([np.zeros(0, np.int64), *numbers])
         # A number too large for what counts the corners would come out as another.
-        if not ((given >= 0) & (given <= len(rows)) & (given == np.floor(given))).all():
+        if not ((given >= 0) & (given <= total) & (given == np.floor(given))).all():
             raise _NotSupported(
-                f"<{primitive.tag}> has a polygon whose number of corners is none of 0 to {len(rows)}"
+                f"<{primitive.tag}> has a polygon whose number of corners is none of 0 to {total}"
             )
         corners = given.astype(np.intp)
     else:
         corners = np.array([len(each) for each in lists], np.intp)
-    if corners.sum() != len(rows):
-        raise _NotSupported(f"<{primitive.tag}> has {len(rows)} corners, not {corners.sum()}")
+    if corners.sum() != total:
+        raise _NotSupported(f"<{primitive.tag}> has {total} corners, not {corners.sum()}")
     fans = np.maximum(corners - 2, 0)
     first = np.repeat(np.cumsum(corners) - corners, fans)
     within = np.arange(fans.sum()) - np.repeat(np.cumsum(fans) - fans, fans)
     if primitive.tag != "tristrips":
-        corner = np.stack([first, first + within + 1, first + within + 2], axis=-1)
-    else:
-        odd = within % 2
-        corner = first[:, None] + np.stack([within, within + 1 + odd, within + 2 - odd], axis=-1)
-    return np.asarray(rows[corner], np.intp)
+        return np.stack([first, first + within + 1, first + within + 2], axis=-1).astype(np.intp)
+    odd = within % 2
+    strip: Rows = first[:, None] + np.stack([within, within + 1 + odd, within + 2 - odd], axis=-1)
+    return strip
 
 
-def _positions(source: Element) -> Floats:
+def _set_of(bound: Element, channel: str) -> str | None:
+    """Return the set of places in an image that a material binds to a channel; None for the first."""
+    for each in bound.all("bind_vertex_input"):
+        if each.attributes.get("semantic") == channel:
+            return each.attributes.get("input_set", "0")
+    return None
+
+
+def _source_values(source: Element, width: int) -> Floats:
     array, accessor = _first(source, "float_array"), _first(source, "technique_common", "accessor")
     if array is None or accessor is None:
-        raise _NotSupported("a source of positions has no array or no accessor")
+        raise _NotSupported("a source has no array or no accessor")
     numbers = _numbers(array)
     stride, offset = (int(accessor.attributes.get(key, default)) for key, default in _LAYOUT)
-    if not (3 <= stride <= _LARGEST_STRIDE and 0 <= offset <= len(numbers)):
+    if not (width <= stride <= _LARGEST_STRIDE and 0 <= offset <= len(numbers)):
         raise _NotSupported(f"an accessor has the stride {stride} and the offset {offset}")
     rows = (len(numbers) - offset) // stride
-    return numbers[offset : offset + rows * stride].reshape(rows, stride)[:, :3]
+    return numbers[offset : offset + rows * stride].reshape(rows, stride)[:, :width]
+
+
+def _text(element: Element | None) -> str:
+    return "" if element is None else element.text.strip()
 
 
 def _numbers(element: Element) -> Floats:
