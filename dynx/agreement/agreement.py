@@ -40,7 +40,7 @@ from dynx.backends.solvability import singular_coordinates
 from dynx.errors import ArgumentError, DynxError
 from dynx.model import Model, Pose
 from dynx.model.loading import load
-from dynx.model.numbers import whole_number
+from dynx.model.numbers import checked_seed, whole_number
 from dynx.model.tree import Base
 from dynx.option_names import checks_option_names
 
@@ -207,9 +207,9 @@ def _notes(model: Model, names: list[str]) -> tuple[str, ...]:
 def _check_arguments(
     backends: Sequence[str | Backend] | None, samples: int, seed: int, referee_samples: int
 ) -> list[str | Backend]:
-    numbers = (("samples", samples, 1), ("seed", seed, 0), ("referee_samples", referee_samples, 0))
-    for name, value, least in numbers:
+    for name, value, least in (("samples", samples, 1), ("referee_samples", referee_samples, 0)):
         whole_number(name, value, least)
+    checked_seed("seed", seed)
     if isinstance(backends, (str, Backend)):
         backends = [backends]
     chosen = list(installed_backends() if backends is None else backends)

@@ -25,7 +25,7 @@ from dynx.errors import (
     nearest,
     shown,
 )
-from dynx.model.numbers import whole_number
+from dynx.model.numbers import checked_seed, whole_number
 
 Act = Callable[[NDArray[Any]], NDArray[Any]]
 """A policy: observations (n, ...) in, actions (n, ...) out."""
@@ -115,7 +115,7 @@ class TaskEnvironment(Env[Any, Any]):
         Raises UnknownNameError for an option that the task does not have.
         """
         episodes = self.episodes
-        super().reset(seed=None if seed is None else whole_number("seed", seed, 0))
+        super().reset(seed=None if seed is None else checked_seed("seed", seed))
         if not isinstance(options, Mapping | None):
             raise ArgumentError(f"options is {shown(options)}; wanted a dict of options by name")
         if self._variation is not None:

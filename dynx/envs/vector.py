@@ -26,7 +26,7 @@ from dynx.errors import (
     nearest,
     shown,
 )
-from dynx.model.numbers import DIVERGENCE_SPEED, checked_array, whole_number
+from dynx.model.numbers import DIVERGENCE_SPEED, checked_array, checked_seed, whole_number
 from dynx.simd.generators import Generators
 from dynx.spatial.scalar import Floats
 
@@ -42,13 +42,13 @@ def checked_seeds(seed: object, count: int) -> Sequence[int]:
     Raises ArgumentError for anything else.
     """
     if not isinstance(seed, list | tuple | np.ndarray) or np.ndim(seed) == 0:
-        first = whole_number("seed", seed, 0)
+        first = checked_seed("seed", seed)
         return range(first, first + count)
     if len(seed) != count:
         raise ArgumentError(
             f"seed has {len(seed)} numbers; wanted that of the first environment, or {count}, one for each"
         )
-    return tuple(whole_number(f"seed[{k}]", each, 0) for k, each in enumerate(seed))
+    return tuple(checked_seed(f"seed[{k}]", each) for k, each in enumerate(seed))
 
 
 class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):

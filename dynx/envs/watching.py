@@ -19,7 +19,7 @@ from dynx.envs.environment import DIVERGED, Act, TaskEnvironment
 from dynx.envs.library import Env, spaces
 from dynx.envs.task import Episodes, Task
 from dynx.errors import ArgumentError
-from dynx.model.numbers import whole_number
+from dynx.model.numbers import checked_seed
 from dynx.spatial.scalar import Floats
 from dynx.steppers.camera import Camera
 from dynx.steppers.state import WorldState
@@ -146,7 +146,7 @@ class EpisodePage:
         if len(envs) not in (1, 2):
             raise ArgumentError(f"{len(envs)} environments are given; a page shows one or two")
         named = [""] * len(envs) if names is None else list(names)
-        self._act, self._seed = act, whole_number("seed", seed, 0)
+        self._act, self._seed = act, checked_seed("seed", seed)
         self._runs = [_Run(env, name) for env, name in zip(envs, named, strict=True)]
         whole = has_graphics_processor()
         self._look = Look(triangles=None if whole else TRIANGLE_BUDGET)

@@ -58,12 +58,23 @@ def checked_vector(name: str, value: ArrayLike) -> Floats:
     return array
 
 
-def whole_number(name: str, value: object, least: int, most: float = np.inf) -> int:
+MAX_COUNT = 2**53
+"""Largest whole number up to which a float holds all."""
+
+
+def whole_number(name: str, value: object, least: int, most: float = MAX_COUNT) -> int:
     """Return a whole number from `least` to `most`; raise ArgumentError for anything else."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
-        end = "" if most == np.inf else f" and at most {most}"
+        # Nobody asks for so many; only who did is told that there is an end.
+        too_many = most < MAX_COUNT or (isinstance(value, int) and value > most)
+        end = f" and at most {most}" if too_many else ""
         raise ArgumentError(f"{name} is {shown(value)}; wanted a whole number, at least {least}{end}")
     return int(value)
+
+
+def checked_seed(name: str, value: object) -> int:
+    """Return a seed of random numbers, a whole number of any size; raise ArgumentError for anything else."""
+    return whole_number(name, value, 0, np.inf)
 
 
 def is_real(value: object) -> TypeGuard[float]:

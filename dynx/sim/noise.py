@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from dynx.argument_types import checks_types
 from dynx.model import Model
-from dynx.model.numbers import checked_gain, checked_size, whole_number
+from dynx.model.numbers import checked_gain, checked_seed, checked_size, whole_number
 from dynx.spatial.scalar import Floats
 from dynx.steppers.random import Purpose, stream_normals
 
@@ -48,7 +48,7 @@ class Noise:
         Raises GainError for an invalid standard deviation, ArgumentError for an invalid seed or rollout.
         """
         whole_number("nv", nv, 0, MAX_COORDINATES)
-        whole_number("seed", self.seed, 0)
+        checked_seed("seed", self.seed)
         whole_number("rollout", self.rollout, 0, MAX_ROLLOUT)
         return checked_gain("noise.q", self.q, nv), checked_gain("noise.v", self.v, nv)
 

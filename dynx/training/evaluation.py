@@ -13,7 +13,7 @@ from dynx.argument_types import checks_types
 from dynx.envs.environment import DIVERGED, Act
 from dynx.envs.library import Env
 from dynx.errors import ArgumentError
-from dynx.model.numbers import whole_number
+from dynx.model.numbers import checked_seed, whole_number
 
 MAX_EPISODES = 10**7
 """Largest number of episodes of one evaluation."""
@@ -73,7 +73,7 @@ def evaluate(
     short. `progress` is called with the number of episodes that have ended.
     """
     whole_number("episodes", episodes, 1, MAX_EPISODES)
-    whole_number("seed", seed, 0)
+    checked_seed("seed", seed)
     if not envs:
         raise ArgumentError("envs is empty; wanted at least one environment to judge the policy in")
     returns, lengths = np.zeros(episodes), np.zeros(episodes, dtype=np.int64)

@@ -8,7 +8,7 @@ from typing import Any, Literal
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, shown
 from dynx.files.documents import convert_document, to_json_values
-from dynx.model.numbers import whole_number
+from dynx.model.numbers import checked_seed, whole_number
 
 
 @checks_types
@@ -55,8 +55,9 @@ class TrainingSpec:
     hyperparameters: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name, least in (("steps", 1), ("envs", 1), ("seed", 0)):
-            whole_number(name, getattr(self, name), least)
+        for name in ("steps", "envs"):
+            whole_number(name, getattr(self, name), 1)
+        checked_seed("seed", self.seed)
 
     @checks_types
     def first_difference(self, other: TrainingSpec) -> str | None:

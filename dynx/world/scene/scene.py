@@ -86,7 +86,7 @@ class Scene:
                 self.require(name)
         for constraint in self.constraints:
             self._check_constraint(constraint)
-        if self.sensors != ():
+        if not isinstance(self.sensors, tuple) or self.sensors:
             # Imported here, because most scenes have none.
             from dynx.world.sensors.sensor import checked_sensors
 

@@ -9,7 +9,7 @@ from dataclasses import KW_ONLY, dataclass
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 from dynx.errors import ArgumentError, shown
-from dynx.model.numbers import is_real, whole_number
+from dynx.model.numbers import checked_seed, is_real
 from dynx.model.urdf.values import name_fault
 from dynx.spatial.scalar import Floats
 from dynx.world.sensors.errors import SensorErrors
@@ -71,7 +71,7 @@ class Sensor(ABC):
             )
         if not is_real(self.delay) or not 0.0 <= self.delay < math.inf:
             raise ArgumentError(f"delay of {self} is {shown(self.delay)}; wanted seconds of at least 0")
-        whole_number(f"seed of {self}", self.seed, 0)
+        checked_seed(f"seed of {self}", self.seed)
         for channel in self.channels:
             errors = getattr(self, channel.errors)
             if not isinstance(errors, SensorErrors):
