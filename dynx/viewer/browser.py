@@ -17,13 +17,13 @@ import secrets
 import socket
 import types
 from base64 import b64encode
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from functools import cache
 from hashlib import sha256
 from html import escape
 from http import HTTPStatus
-from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Any, Literal, NamedTuple, Union, get_args, get_origin, get_type_hints
 from urllib.parse import urlsplit
 
 from dynx.files.temporary import temporary_folder, writing_in
@@ -375,10 +375,13 @@ _NAMES_ON_HOVER = (
 FOLLOWED = "dynx-followed"
 """Identifier of the element that holds what the camera follows, as JSON."""
 
+TEXTS = "dynx-texts"
+"""Identifier of the element that holds coloured text of a program, as JSON: viser's text is black."""
+
 # Poses and views that a program sends come in different messages, of which the page may draw one before the
 # other. So the page itself shifts its camera, in each picture, by as much as the part has moved.
-_FOLLOWING = (
-    f"const FOLLOWED = {json.dumps(FOLLOWED)};"
+_BEFORE_PICTURES = (
+    f"const FOLLOWED = {json.dumps(FOLLOWED)}, TEXTS = {json.dumps(TEXTS)};"
     + """
   let followed = null, first = true, last = null;
   const shift = (camera) => {
@@ -405,14 +408,124 @@ _FOLLOWING = (
     camera.position.add(moved);
     camera.updateMatrixWorld();
   };
+  let written = "[]", texts = [];
+  const writing = () => document.getElementById(TEXTS)?.dataset.texts ?? written;
+  const write = (canvas, camera) => {
+    const page = window.__viserMutable, world = page.nodeRefFromName[""];
+    if (page.cameraControl?.camera !== camera || !world) return;
+    if (writing() !== written) {
+      for (const each of texts) each.node.remove();
+      written = writing();
+      texts = JSON.parse(written).map((each) => {
+        const node = document.createElement("div");
+        node.className = "dynx-text";
+        node.textContent = each.text;
+        node.style.cssText = "position: absolute; left: 0; top: 0; pointer-events: none; white-space: pre;"
+          + "font-family: sans-serif; line-height: 1";
+        node.style.color = each.colour;
+        node.style.fontSize = each.size + "px";
+        canvas.parentNode.append(node);
+        return {node, point: each.point};
+      });
+    }
+    const box = canvas.getBoundingClientRect();
+    for (const {node, point} of texts) {
+      const place = camera.position.clone().fromArray(point).applyMatrix4(world.matrixWorld).project(camera);
+      const x = (0.5 + 0.5 * place.x) * box.width, y = (0.5 - 0.5 * place.y) * box.height;
+      node.style.visibility = Math.abs(place.z) <= 1 ? "visible" : "hidden";
+      node.style.transform = `translate(${x}px, ${y}px)`;
+    }
+  };
   setInterval(() => {
-    const scene = window.__viserMutable?.scene;
-    if (!scene || scene.dynxFollows) return;
-    scene.dynxFollows = true;
-    scene.onBeforeRender = (renderer, drawn, camera) => shift(camera);
+    const page = window.__viserMutable, scene = page?.scene;
+    if (!scene) return;
+    if (writing() !== written) page.requestRender?.();
+    if (scene.dynxPrepares) return;
+    scene.dynxPrepares = true;
+    scene.onBeforeRender = (renderer, drawn, camera) => {
+      shift(camera);
+      write(renderer.domElement, camera);
+    };
   }, 100);
 """
 )
+
+
+class WrittenText(NamedTuple):
+    """Text on the picture, whose upper left corner is at a point of the world."""
+
+    text: str
+    point: tuple[float, float, float]
+    """[m]."""
+    colour: str
+    """As CSS writes it."""
+    size: float
+    """Of the letters [pixels]."""
+
+
+def texts_element(texts: Iterable[WrittenText]) -> str:
+    """Return the HTML element by which the page knows the text that it writes on its picture."""
+    data = escape(json.dumps([each._asdict() for each in texts]), quote=True)
+    return f'<div id="{TEXTS}" style="display: none" data-texts="{data}"></div>'
+
+
+INPUT = "dynx-input"
+"""Identifier of the element that names the control by which the page tells of keys and of the pointer."""
+
+_INPUT = (
+    f"const INPUT = {json.dumps(INPUT)};"
+    + """
+  const held = new Set();
+  let told = 0, moving = null;
+  const tell = (data) => {
+    const control = document.getElementById(INPUT)?.dataset.control, page = window.__viserMutable;
+    if (!control || !page?.sendMessage) return;
+    const value = JSON.stringify({...data, number: ++told});
+    page.sendMessage({type: "GuiUpdateMessage", uuid: control, updates: {value}});
+  };
+  const tellKeys = () => tell({held: [...held]});
+  const nameOf = (event) => event.code.replace(/^(Key|Digit|Numpad(?=\\d))/, "").toLowerCase();
+  addEventListener("keydown", (event) => {
+    const fields = "textarea, select, [contenteditable=true], input:not([type=checkbox])";
+    const typed = event.target.closest?.(fields);
+    if (event.repeat || typed || event.ctrlKey || event.metaKey || event.altKey) return;
+    held.add(nameOf(event));
+    tellKeys();
+  }, true);
+  addEventListener("keyup", (event) => { if (held.delete(nameOf(event))) tellKeys(); }, true);
+  // A key that is released while another window has the focus is told to that one.
+  const release = () => { if (held.size) { held.clear(); tellKeys(); } };
+  addEventListener("blur", release);
+  document.addEventListener("visibilitychange", release);
+  const tellPointer = () => {
+    const event = moving, page = window.__viserMutable;
+    moving = null;
+    const picture = page?.scene?.__r3f?.root?.getState?.(), world = page?.nodeRefFromName[""];
+    const canvas = picture?.gl.domElement;
+    if (!world || !canvas.parentNode.contains(event.target)) return;
+    const box = canvas.getBoundingClientRect();
+    const x = (event.clientX - box.left) / box.width, y = (event.clientY - box.top) / box.height;
+    picture.raycaster.setFromCamera({x: 2 * x - 1, y: 1 - 2 * y}, picture.camera);
+    const ray = picture.raycaster.ray.clone().applyMatrix4(world.matrixWorld.clone().invert());
+    const part = hovered(event);
+    tell({ray: [ray.origin.toArray(), ray.direction.toArray()], part});
+  };
+  addEventListener("pointermove", (event) => {
+    if (!document.getElementById(INPUT)?.dataset.pointer) return;
+    if (moving === null) setTimeout(tellPointer, 33);
+    moving = event;
+  });
+"""
+)
+
+
+def input_element(control: str, *, pointer: bool) -> str:
+    """Return the HTML element by which the page knows that it tells of keys, and of the `pointer`, by a
+    control."""
+    wanted = ' data-pointer="1"' if pointer else ""
+    return (
+        f'<div id="{INPUT}" style="display: none" data-control="{escape(control, quote=True)}"{wanted}></div>'
+    )
 
 
 def followed_element(number: int, path: str, origin: Sequence[float], start: Sequence[float]) -> str:
@@ -432,7 +545,9 @@ class Client:
         self._kept = ExitStack()
         self.folder = self._kept.enter_context(temporary_folder("dynx-page-"))
         """The folder that is served."""
-        script = ("" if antialiasing else _FOR_SOFTWARE) + _PRESSES + _NAMES_ON_HOVER + _FOLLOWING
+        script = (
+            ("" if antialiasing else _FOR_SOFTWARE) + _PRESSES + _NAMES_ON_HOVER + _BEFORE_PICTURES + _INPUT
+        )
         policy = ContentPolicy("'self' data: blob:")
         self.headers = tuple(policy.headers([HANDLER_HASH]))
         """Headers with which the page is served."""

@@ -29,6 +29,20 @@ DASHES: tuple[tuple[str, tuple[float, ...] | None], ...] = (
 """Names, and lengths of strokes and gaps [pixels], of the curves that use the colours for the first, second
 and third time."""
 
+NAMED: dict[str, RGB] = {
+    "black": (0, 0, 0),
+    "blue": BLUE,
+    "green": GREEN,
+    "grey": GREY,
+    "orange": ORANGE,
+    "red": (200, 40, 40),
+    "sky blue": SKY_BLUE,
+    "vermilion": VERMILION,
+    "white": (255, 255, 255),
+    "yellow": YELLOW,
+}
+"""Colours that a program may give by name."""
+
 
 def css(colour: RGB) -> str:
     """Return a colour as CSS writes it."""

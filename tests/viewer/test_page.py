@@ -16,7 +16,7 @@ import pytest
 
 import dynx
 from dynx.errors import ArgumentError
-from dynx.model import Model
+from dynx.model import Model, Pose
 from dynx.model.geometry.drawn_shapes import link_shapes
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
@@ -27,7 +27,7 @@ from dynx.viewer.export import MAX_EMBEDDED
 from dynx.viewer.motion import PARTED, motion_separation
 from dynx.world import Scene, World
 from dynx.world.camera import draw_picture
-from dynx.world.scene import SceneRobot, read_scene
+from dynx.world.scene import SceneRobot, box, ground, read_scene
 from tests.conftest import needs_examples
 from tests.viewer.conftest import (
     PATIENCE,
@@ -130,6 +130,67 @@ def test_sliders_buttons_and_keys_reach_the_program(open_page: OpenPage) -> None
         until(lambda: len(viewer.page.server.get_clients()) == 1, "one page after the other closed")
         assert not page.errors
         assert not again.errors
+
+
+def test_held_keys_the_pointer_and_choices_reach_the_program(open_page: OpenPage) -> None:
+    cube = box("cube", (0.4, 0.4, 0.4), mass=1.0, pose=Pose((0.0, 0.0, 0.2)))
+    with World(Scene(bodies=(ground(), cube))) as world, world.view(steps=False) as viewer:
+        page = open_page(viewer.url)
+        (client,) = connected(viewer)
+        told: list[Any] = []
+        viewer.on_key("k", lambda: told.append("pressed"), lambda: told.append("released"))
+        viewer.on_pointer_moved(lambda part, origin, direction: told.append((part, origin, direction)))
+        wind = viewer.checkbox("wind", changed=told.append)
+        number = viewer.number("mass", 1.0, changed=told.append)
+        text = viewer.text("<i>here</i>", (0.0, 0.0, 0.5), colour=(255, 0, 0), size=30.0)
+        page.page.get_by_label("wind").check()
+        page.page.get_by_role("textbox", name="mass").fill("2.5")
+        until(lambda: {True, 2.5} <= {each for each in told if not isinstance(each, tuple)}, "both controls")
+        assert (wind.value, number.value) == (True, 2.5)
+        written = page.page.get_by_text("<i>here</i>")
+        written.wait_for()
+        style = written.evaluate("node => [getComputedStyle(node).color, getComputedStyle(node).fontSize]")
+        assert style == ["rgb(255, 0, 0)", "30px"]
+
+        # Letters that are typed into a field are no keys.
+        page.page.keyboard.press("k")
+        page.page.mouse.click(40, 350)
+        page.page.wait_for_timeout(500.0)
+        assert "released" not in told
+        told.clear()
+        page.page.keyboard.down("k")
+        page.page.keyboard.down("ArrowUp")
+        until(lambda: viewer.keys == {"k", "arrowup"}, "the keys that are held")
+        until(lambda: "pressed" in told, "the press")
+        assert "released" not in told
+        page.page.keyboard.up("k")
+        until(lambda: "released" in told, "the release")
+        assert viewer.keys == {"arrowup"}
+        page.page.keyboard.up("ArrowUp")
+        until(lambda: not viewer.keys, "no key")
+
+        target = cube.pose.matrix[:3, 3]
+        page.page.wait_for_timeout(PICTURE)
+
+        def seen() -> Any:
+            page.page.mouse.move(*(pixel_of(client, target) + np.array([len(told) % 2, 0.0])))
+            page.page.wait_for_timeout(200.0)
+            return [each for each in told if isinstance(each, tuple) and each[0] == "cube"]
+
+        until(seen, "the part under the pointer")
+        _, origin, direction = seen()[-1]
+        assert np.allclose(origin, client.camera.position, atol=1e-3)
+        towards = target - client.camera.position
+        assert direction @ towards / np.linalg.norm(towards) > 0.999
+        assert np.linalg.norm(direction) == pytest.approx(1.0)
+
+        text.remove()
+        until(lambda: written.count() == 0, "the text to go")
+        page.page.keyboard.down("k")
+        until(lambda: viewer.keys == {"k"}, "the key")
+        assert not page.errors
+        page.page.close()
+        until(lambda: not viewer.keys, "no key of a page that was closed")
 
 
 def poses_in_page(page: Opened, paths: Mapping[str, str]) -> dict[str, Floats]:

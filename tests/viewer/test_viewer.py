@@ -18,6 +18,7 @@ from dynx.errors import ArgumentError
 from dynx.model import Model
 from dynx.model.tree import Base
 from dynx.viewer import Viewer, view
+from dynx.viewer.colours import NAMED, RGB
 from dynx.world import World
 from dynx.world.scene import read_scene
 from tests.conftest import EXAMPLES_INSTALLED, needs_examples
@@ -125,6 +126,19 @@ def test_wrong_controls_are_told(arm: Model) -> None:
             lambda: viewer.text("x", [0.0, 1.0]),
             lambda: viewer.line([[0.0, 0.0, 0.0]]),
             lambda: viewer.line([[0.0] * 3, [1.0] * 3], colour=(1, 2, 300)),
+            lambda: viewer.line([[0.0] * 3, [1.0] * 3], colour="blu"),
+            lambda: viewer.line([[0.0] * 3, [1.0] * 3], colour="#12345g"),
+            lambda: viewer.line([[0.0] * 3, [1.0] * 3], width=0.0),
+            lambda: viewer.text("x", [0.0] * 3, size=-1.0),
+            lambda: viewer.text("x", [0.0] * 3, colour=(0.5, 0.5, 2.5)),
+            lambda: viewer.checkbox("x", 1),  # type: ignore[arg-type]
+            lambda: viewer.dropdown("x", []),
+            lambda: viewer.dropdown("x", "ab"),
+            lambda: viewer.dropdown("x", ["a", "b"], "c"),
+            lambda: viewer.number("x", np.nan),
+            lambda: viewer.number("x", 2.0, upper=1.0),
+            lambda: viewer.on_key("k", print, 3),  # type: ignore[arg-type]
+            lambda: viewer.on_pointer_moved(None),  # type: ignore[arg-type]
             lambda: viewer.screenshot(),
         ]
         for call in wrong:
@@ -138,9 +152,53 @@ def test_controls_of_a_program_have_values(arm: Model) -> None:
         assert slider.value == 5.0
         slider.value = 12.0
         assert slider.value == 10.0
+        box, choice = viewer.checkbox("wind", True), viewer.dropdown("gait", ["walk", "trot"])
+        number = viewer.number("mass [kg]", 2.0, lower=0.0)
+        assert (box.value, choice.value, number.value) == (True, "walk", 2.0)
+        box.value, choice.value, number.value = False, "trot", -1.0
+        assert (box.value, choice.value, number.value) == (False, "trot", 0.0)
+        with pytest.raises(ArgumentError, match="did you mean 'walk'"):
+            choice.value = "wal"
         viewer.text("here", (0.0, 0.0, 1.0)).remove()
         viewer.line([[0.0] * 3, [1.0] * 3]).remove()
         slider.remove()
+
+
+def test_everything_of_a_program_is_removed_at_once(arm: Model) -> None:
+    with view(arm) as viewer:
+        gui, scene = viewer.page.gui, viewer.page.scene
+        before = set(gui._gui_input_handle_from_uuid), set(scene._handle_from_node_name)
+        viewer.slider("gain", 0.0, 1.0).remove()
+        viewer.number("x", 0.0)
+        viewer.checkbox("x")
+        viewer.dropdown("x", ["a"])
+        viewer.button("x", print)
+        viewer.text("x", [0.0] * 3)
+        viewer.text("x", [0.0] * 3, colour="red", size=20.0)
+        viewer.line([[0.0] * 3, [1.0] * 3], colour="#102030", width=2.0)
+        viewer.remove_all()
+        assert (set(gui._gui_input_handle_from_uuid), set(scene._handle_from_node_name)) == before
+        viewer.checkbox("x")
+        viewer.show(arm)
+        # What was shown before has gone, with its controls.
+        viewer.remove_all()
+
+
+@pytest.mark.parametrize(
+    ("given", "wanted"),
+    [
+        ("Red", NAMED["red"]),
+        ("#0a10ff", (10, 16, 255)),
+        ((1, 0, 0), (255, 0, 0)),
+        ((0.0, 0.5, 1.0), (0, 128, 255)),
+        ((0, 114, 178), (0, 114, 178)),
+        ([200, 1, 1], (200, 1, 1)),
+    ],
+)
+def test_colours_are_given_in_the_usual_ways(arm: Model, given: Any, wanted: RGB) -> None:
+    with view(arm) as viewer:
+        line = viewer.line([[0.0] * 3, [1.0] * 3], colour=given)
+        assert np.array_equal(np.unique(np.reshape(line._node.colors, (-1, 3)), axis=0), [wanted])
 
 
 def test_sliders_show_a_configuration_beyond_their_ranges() -> None:
