@@ -51,8 +51,8 @@ class Capstan(ContactCase):
     title: ClassVar[str] = "A chain around a drum that turns"
     law: ClassVar[str] = (
         "T' / T = ((1 + mu tan(d / 2)) / (1 - mu tan(d / 2)))^n, for the forces T and T' at the ends of a "
-        "chain with n joints on the drum, at each of which it bends by d, and friction mu; exp(mu n d) for "
-        "small d"
+        "chain with n joints on the drum, at each of which it bends by d, where the drum slides below all of "
+        "them, for friction mu with mu tan(d / 2) < 1; exp(mu n d) for small d"
     )
     source: ClassVar[str] = (
         "balance of forces at each joint with Coulomb's law; for a rope it is the equation of Euler and "

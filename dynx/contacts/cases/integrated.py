@@ -43,7 +43,7 @@ class FallingRod(ContactCase):
         "(k^2 + d^2 + s^2) w^2 = 2 g l (cos(a0) - cos(a)) where the end rolls without slipping; "
         "k^2 dw/dt = (d - mu s) N / m with N / m = g - l (dw/dt sin(a) + w^2 cos(a)) where it slides back; "
         "for the angle a from the vertical, d = l sin(a), s = r + l cos(a), half length l, end radius r, "
-        "radius of gyration k and friction mu"
+        "radius of gyration k and friction mu, which is below 4/3, where Painleve's paradox begins"
     )
     source: ClassVar[str] = (
         "conservation of energy, and Newton's and Euler's equations with Coulomb's law; Genot and Brogliato, "

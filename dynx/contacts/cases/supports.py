@@ -41,8 +41,8 @@ class FreeWedge(ContactCase):
     title: ClassVar[str] = "A block on a wedge that is free to slide"
     law: ClassVar[str] = (
         "N = m g cos(a) / (1 + m / M sin(a) (sin(a) - mu cos(a))), M dV/dt = -N (sin(a) - mu cos(a)), and "
-        "m (dv/dt + dV/dt cos(a)) = m g sin(a) - mu N, for the block m at the speed v down the face of the "
-        "wedge M of angle a, and friction mu between the two"
+        "m (dv/dt + dV/dt cos(a)) = m g sin(a) - mu N where mu < tan(a), for the block m at the speed v down "
+        "the face of the wedge M of angle a, and friction mu between the two"
     )
     source: ClassVar[str] = "Newton's laws for block and wedge, and Coulomb's law of friction"
     trials: ClassVar[dict[str, float]] = {"friction 0": 0.0, "friction 0.2": 0.2}
@@ -192,7 +192,7 @@ class Turntable(ContactCase):
     law: ClassVar[str] = (
         "F = m W^2 r towards the axis and no slip where W^2 r < mu g, for a block at the distance r from the "
         "axis of a table of angular velocity W; dv/dt = 2/7 W x v, a circle, for a homogeneous ball that "
-        "rolls"
+        "rolls, without slip where 2/7 W v < mu g, for friction mu"
     )
     source: ClassVar[str] = (
         "Newton's second law; Weltner, Stable circular orbits of freely moving balls on rotating discs, "
