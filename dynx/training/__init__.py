@@ -17,6 +17,7 @@ from dynx.training.learning import Progress, Schedule
 from dynx.training.policy import Policy, load_policy
 from dynx.training.run import Trained, train
 from dynx.training.specification import TaskSpec, TrainingSpec
+from dynx.training.unpickling import load_stable_baselines
 
 __all__ = [
     "Evaluation",
@@ -29,6 +30,7 @@ __all__ = [
     "evaluate",
     "judge",
     "load_policy",
+    "load_stable_baselines",
     "make",
     "recipe_of",
     "train",

@@ -43,6 +43,7 @@ __all__ = [
     "VecMonitor",
     "VecNormalize",
     "action_of",
+    "hyperparameters_of",
     "log_to",
     "new_algorithm",
     "read_weights",
@@ -106,6 +107,12 @@ _ALGORITHM_REFUSES = (
 """Exceptions of stable-baselines3 and PyTorch for values of hyperparameters."""
 
 
+def hyperparameters_of(name: str) -> list[str]:
+    """Return the names of the hyperparameters of an algorithm."""
+    parameters = inspect.signature(ALGORITHMS[name].__init__).parameters
+    return [each for each in parameters if each not in _GIVEN]
+
+
 def new_algorithm(
     name: str,
     env: VecEnv,
@@ -123,7 +130,7 @@ def new_algorithm(
     if name not in ALGORITHMS:
         raise UnknownNameError(f"no algorithm {shown(name)}{nearest(name, ALGORITHMS)}")
     algorithm = ALGORITHMS[name]
-    known = [each for each in inspect.signature(algorithm.__init__).parameters if each not in _GIVEN]
+    known = hyperparameters_of(name)
     for each in hyperparameters:
         if each not in known:
             raise UnknownNameError(f"{name} has no hyperparameter {shown(each)}{nearest(each, known)}")

@@ -132,7 +132,10 @@ def read_policy_document(path: str | os.PathLike[str]) -> PolicyDocument:
     try:
         with named_file(path) as file, zipfile.ZipFile(file) as archive:
             if DOCUMENT not in archive.namelist():
-                raise ArgumentError(f"{where} was not written by dynx train: it does not name its task")
+                raise ArgumentError(
+                    f"{where} was not written by dynx train: it does not name its task; dynx play --unpickle "
+                    "and load_stable_baselines read a file of stable-baselines3, which runs the code in it"
+                )
             if archive.getinfo(DOCUMENT).file_size > MAX_DOCUMENT:
                 raise ArgumentError(f"{where}: {DOCUMENT} is larger than {MAX_DOCUMENT:,} bytes")
             document = parse_json(archive.read(DOCUMENT))

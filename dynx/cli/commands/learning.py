@@ -274,6 +274,27 @@ def train() -> None:
     ),
 )
 @group(
+    "Files of stable-baselines3",
+    click.option(
+        "--unpickle",
+        is_flag=True,
+        help="Read FILE as stable-baselines3 saved it, for the task of --task. This runs the code that is in "
+        "the file: use it for files that you trust.",
+    ),
+    click.option(
+        "--algo",
+        "algorithm",
+        metavar="NAME",
+        help="Its algorithm: ppo, a2c, dqn, sac or td3 (default: the one whose hyperparameters it has).",
+    ),
+    click.option(
+        "--statistics",
+        metavar="PICKLE",
+        help="Statistics of VecNormalize by which observations were scaled; with --unpickle, which runs the "
+        "code in this file, too.",
+    ),
+)
+@group(
     "Output",
     click.option(
         "--view",
@@ -303,5 +324,6 @@ def play() -> None:
       dynx play lander/final.zip --engine mujoco,pybullet --episodes 100
       dynx play lander/final.zip --view
       dynx play lander/final.zip --view --engine mujoco,pybullet
+      dynx play ppo.zip --unpickle --task CartPole-v1 --statistics vec_normalize.pkl
       dynx play lander/final.zip --export lander.mp4
     """

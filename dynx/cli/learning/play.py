@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing, suppress
+from functools import partial
 from itertools import count
 from typing import Any
 
@@ -18,7 +19,7 @@ from dynx.cli.shell.tables import Table
 from dynx.envs.registration import is_of_dynx, task_id
 from dynx.errors import ArgumentError
 from dynx.files.films import film_suffix, write_pictures
-from dynx.training import Evaluation, Policy, TaskSpec, judge, load_policy, make
+from dynx.training import Evaluation, Policy, TaskSpec, judge, load_policy, load_stable_baselines, make
 from dynx.training.file_tasks import task_of_file
 from dynx.training.policy import read_policy_document
 
@@ -36,6 +37,9 @@ def play(
     episodes: int | None,
     seed: int,
     stochastic: bool,
+    unpickle: bool,
+    algorithm: str | None,
+    statistics: str | None,
     view: bool,
     export_path: str | None,
     json_path: str | None,
@@ -49,13 +53,24 @@ def play(
     if (view or export_path is not None) and (json_path is not None or len(engines or ()) > most):
         shown_only = "--view shows episodes of one or two engines" if view else "--export films one engine"
         raise ArgumentError(f"{shown_only}; --json and more engines judge them")
-    task = _task_of(policy, options, own_task)
+    load: Callable[[TaskSpec], Policy]
+    if unpickle:
+        task = _given_task(options, own_task)
+        load = partial(_load_unpickled, policy, algorithm, statistics)
+    else:
+        for name, value in (("--algo", algorithm), ("--statistics", statistics)):
+            if value is not None:
+                raise ArgumentError(
+                    f"{name} has an effect on a file of stable-baselines3 alone; wanted --unpickle"
+                )
+        task = _task_of(policy, options, own_task)
+        load = partial(load_policy, policy)
     if engines is not None and not is_of_dynx(task.id):
         raise ArgumentError(f"--engine chooses the engine of a task of dynx; {task.id} has its own")
     tasks = [task.on(engine) for engine in engines or (None,)]
     first = tasks[0]
     if view or export_path is not None:
-        trained = load_policy(policy, first)
+        trained = load(first)
         if export_path is not None:
             return _film(trained, first, episodes or 1, seed, not stochastic, export_path, quiet)
         return _show(trained, tasks, episodes, seed, not stochastic)
@@ -64,7 +79,7 @@ def play(
         per_engine = episodes or DEFAULT_EPISODES
         with progress_bar(per_engine * len(tasks), words="episodes", enabled=not quiet) as advance:
             for each in tasks:
-                trained = load_policy(policy, each)
+                trained = load(each)
 
                 def progress(done: int) -> None:
                     advance(len(found) * per_engine + done, "episodes")
@@ -74,7 +89,7 @@ def play(
                 )
                 found.append((each, judged))
         interruption.finishing = True
-        made = play_document(policy, trained, task.engine, found)
+        made = play_document(policy, trained, None if unpickle else task.engine, found)
         error = present(made, show, json_path, quiet=quiet)
     return exit_code(error)
 
@@ -84,6 +99,19 @@ def _task_of(policy: str, options: Sequence[tuple[str, str]], own_task: str | No
     task = read_policy_document(policy).spec.task
     given = {name: json_value(word) for name, word in options}
     return task_of_file(task, policy, given, None if own_task is None else task_id(own_task))
+
+
+def _given_task(options: Sequence[tuple[str, str]], own_task: str | None) -> TaskSpec:
+    """Return the task of a file that names none."""
+    if own_task is None:
+        raise ArgumentError(
+            "a file of stable-baselines3 names no task; wanted --task, such as --task CartPole-v1"
+        )
+    return TaskSpec(task_id(own_task), None, {name: json_value(word) for name, word in options})
+
+
+def _load_unpickled(path: str, algorithm: str | None, statistics: str | None, task: TaskSpec) -> Policy:
+    return load_stable_baselines(path, task, algorithm, statistics)
 
 
 def _show(
