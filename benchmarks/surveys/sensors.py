@@ -412,7 +412,12 @@ def export(scene: Scene, name: str, seed: int, worst: Worst) -> None:
     damped = any(joint.dynamics.damping for model in models for joint in model.joints if joint.moves)
     exactly = not damped and all(model.mechanism.coupling is None for model in models)
     with World(scene, "mujoco") as world:
-        model = mujoco.MjModel.from_xml_string(world.to_mjcf())
+        try:
+            document = world.to_mjcf()
+        except UnsupportedFeatureError as error:
+            print(f"{name}: {error}")
+            return
+        model = mujoco.MjModel.from_xml_string(document)
         data = mujoco.MjData(model)
         if model.nkey:
             mujoco.mj_resetDataKeyframe(model, data, model.key("start").id)

@@ -135,7 +135,7 @@ class _TakenSample:
 
 
 class WorldSensors:
-    """Samples of the sensors of a scene, taken as steps of the engine of `h` [s] begin.
+    """Samples of the sensors of a scene, taken as steps of the engine begin.
 
     A sample needs the acceleration and the contacts of its step, so it can be read after that step. Those
     that a delay still holds back are kept.
@@ -145,20 +145,24 @@ class WorldSensors:
         self,
         layout: Layout,
         sensors: Sequence[Sensor],
-        h: float,
+        dt: float,
+        substeps: int,
         last_step: LastStep,
-        clock: Callable[[], float],
+        clock: Callable[[], tuple[float, int]],
         contacts: Callable[[Stepper], Sequence[Contact]],
     ) -> None:
-        """`clock` returns the time [s] of the world, `contacts` those of the engine's last step.
+        """A step of the world takes `dt` [s] and is `substeps` steps of the engine; `clock` returns the time
+        [s] from which the world's steps are counted, and their number, `contacts` those of the engine's last
+        step.
 
         Raises ArgumentError for a rate above that of the steps, UnsupportedFeatureError for a sensor of
         contacts where nothing can be touched."""
-        self._layout, self._sensors, self._h = layout, sensors, h
+        self._layout, self._sensors = layout, sensors
+        self._dt, self._substeps, self._h = dt, substeps, dt / substeps
         self._last_step, self._clock, self._contacts = last_step, clock, contacts
         parts = parts_of(layout)
         for sensor in sensors:
-            sensor.period(h)
+            sensor.period(self._h)
             if isinstance(sensor, ContactSensor):
                 require_shapes(sensor.place(parts), layout)
         self._numbers = {each.name: SampleNumbers(each.name, each.seed, 0, each.size) for each in sensors}
@@ -203,11 +207,13 @@ class WorldSensors:
 
     def watched(self, act: Act) -> Act:
         """Return `act`, which begins the samples of each step, and takes those of the step before."""
-        steps, time = itertools.count(), self._clock()
+        taken, (start, steps) = itertools.count(), self._clock()
 
         def act_and_sample(engine: Stepper) -> Forces | None:
             self.complete(engine)
-            self._begin(engine, time + next(steps) * self._h)
+            # The time of the world where a step of it begins, to the last bit.
+            whole, part = divmod(next(taken), self._substeps)
+            self._begin(engine, start + (steps + whole) * self._dt + part * self._h)
             return act(engine)
 
         return act_and_sample

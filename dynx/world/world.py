@@ -225,9 +225,10 @@ class World:
             self._sensors = WorldSensors(
                 self._layout,
                 scene.sensors,
-                self.dt / self.substeps,
+                self.dt,
+                self.substeps,
                 self._last_step,
-                lambda: self._motion.time,
+                lambda: self._motion.clock,
                 lambda engine: self._queries.contacts(engine),
             )
         self._contact_interval: ContactInterval | None = None

@@ -23,6 +23,9 @@ from dynx.world.sensors.places import SensedParts
 from dynx.world.sensors.readings import Readings, read_sensor
 from dynx.world.sensors.sensor import Sensor, checked_sensors
 
+SHORT_STEP = 1e-6
+"""Length [s] of a step for a log without steps, in which no sensor takes a sample."""
+
 
 def read_sensors(rollout: Rollout, sensors: Sensor | Iterable[Sensor]) -> dict[str, Readings]:
     """Return the readings of sensors along the recorded motion, by their names.
@@ -112,7 +115,10 @@ def check_sensors(scenario: Scenario, model: Model) -> None:
 def sensed_motion(rollout: Rollout) -> SensedMotion:
     """Return what the sensors of a rollout sense as each step begins."""
     robot = RobotMotion(rollout.model, rollout.q[:-1], rollout.v[:-1], rollout.a, rollout.external_forces)
-    h = float(np.median(np.diff(rollout.t))) if len(rollout) else 1.0
+    if len(rollout):
+        h = float(np.median(np.diff(rollout.t)))
+    else:
+        h = SHORT_STEP if rollout.scenario is None else rollout.scenario.dt
     name = _robot_name(rollout.scenario, rollout.model)
     scene, around = _scene_of(rollout.scenario), rollout.surroundings
     if scene is None or around is None:

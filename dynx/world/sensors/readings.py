@@ -118,9 +118,12 @@ def _of_channel(sensor: Sensor, channels: Mapping[str, Floats], name: str) -> Fl
 def sample_numbers(sensor: Sensor, t: Floats, h: float) -> tuple[Integers, Integers]:
     """Return the rows of the instants `t` (n,), steps of `h` [s] apart, at which a sensor takes samples, and
     the numbers of the samples, which depend on the time alone."""
-    period = sensor.period(h)
+    period, slack = sensor.period(h), SAME_SAMPLE * h
+    if sensor.rate is None:
+        # In each step, also where the steps of a log are not alike.
+        first = np.maximum(np.floor((t[:1] + slack) / period).astype(np.int64), 0)
+        return np.arange(len(t)), first + np.arange(len(t))
     before = np.concatenate([t[:1] - h, t[:-1]])
-    slack = SAME_SAMPLE * h
     number, previous = (np.floor((times + slack) / period).astype(np.int64) for times in (t, before))
     rows = np.flatnonzero(number != previous)
     return rows, np.maximum(number[rows], 0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -128,3 +129,27 @@ def _values(kind: str, message: object) -> list[float]:
 def _vector(message: object, name: str) -> list[float]:
     vector = getattr(message, name)
     return [vector.x, vector.y, vector.z]
+
+
+def test_a_record_without_steps_has_no_samples(rollout: dynx.Rollout) -> None:
+    """Of a simulation at its start, and of a log."""
+    for record in (rollout.first(0), replace(rollout.first(0), scenario=None, surroundings=None)):
+        found = record.read_sensors(Imu("slow", "dog/trunk" if record.scenario else "trunk", rate=200.0))
+        assert len(found["slow"]) == 0
+        assert found["slow"].values.shape == (0, 6)
+        assert np.isnan(found["slow"].held(np.zeros(2))).all()
+    own = rollout.first(0).sensors
+    assert [len(own[name]) for name in own] == [0] * len(rollout.sensors)
+
+
+def test_a_sensor_without_a_rate_samples_every_step_of_a_log() -> None:
+    """Whose steps are not alike, with numbers of its noise that do not repeat."""
+    arm = dynx.load("ur5")
+    even = dynx.simulate(arm, None, duration=0.1)
+    rng = np.random.default_rng(0)
+    t = 5.0 + np.concatenate([[0.0], np.cumsum(rng.uniform(2e-4, 1.8e-3, len(even)))])
+    log = replace(even, t=t, scenario=None)
+    readings = log.read_sensors(Encoder("knee", "elbow_joint", position=NOISE))["knee"]
+    np.testing.assert_array_equal(readings.t, t[:-1])
+    errors = readings["position"] - log.q[:-1, 2]
+    assert len(np.unique(errors)) == len(log)

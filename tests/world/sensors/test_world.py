@@ -158,6 +158,21 @@ def test_a_state_that_is_set_has_no_readings_before_the_next_step() -> None:
 
 
 @pytest.mark.parametrize("engine", WORLDS)
+@pytest.mark.parametrize("substeps", [1, 3])
+def test_readings_do_not_depend_on_how_many_steps_a_call_takes(engine: str, substeps: int) -> None:
+    scene, _ = field()
+    found = []
+    for n in (1, 5, 20):
+        with World(scene, engine, substeps=substeps) as world:
+            for _ in range(20 // n):
+                world.step(n)
+            found.append({k: (each.t, each.values.tobytes()) for k, each in world.read_sensors().items()})
+    assert found[0] == found[1] == found[2]
+    t, h = found[0]["imu"][0], 1e-3 / substeps
+    assert t == 19 * 1e-3 + (substeps - 1) * h
+
+
+@pytest.mark.parametrize("engine", WORLDS)
 def test_a_saved_world_continues_with_its_readings_bit_for_bit(engine: str, tmp_path: Path) -> None:
     """With a delay over several samples, rates that do not divide that of the steps, and walking biases."""
     scene, q = field()
