@@ -90,6 +90,16 @@ class Camera:
         """Distance from the pinhole to the picture [pixels]."""
         return 0.5 * self.size[1] / math.tan(0.5 * self.field_of_view)
 
+    @property
+    def intrinsics(self) -> Floats:
+        """Matrix (3, 3) that takes a point in the axes of the camera to its column and row, times its depth.
+
+        The centre of the pixel in the first column and the first row is at (0, 0), as OpenCV and ROS have it.
+        """
+        width, height = self.size
+        f = self.focal_length
+        return np.array([[f, 0.0, 0.5 * (width - 1)], [0.0, f, 0.5 * (height - 1)], [0.0, 0.0, 1.0]])
+
     def rays(self) -> tuple[Floats, Floats]:
         """Return x of the rays through the centres of the columns, and y of those of the rows, at z = 1."""
         width, height = self.size

@@ -375,13 +375,16 @@ _NAMES_ON_HOVER = (
 FOLLOWED = "dynx-followed"
 """Identifier of the element that holds what the camera follows, as JSON."""
 
+OPACITIES = "dynx-opacities"
+"""Identifier of the element that holds the opacity of shapes by the paths of their nodes, as JSON."""
+
 TEXTS = "dynx-texts"
 """Identifier of the element that holds coloured text of a program, as JSON: viser's text is black."""
 
 # Poses and views that a program sends come in different messages, of which the page may draw one before the
 # other. So the page itself shifts its camera, in each picture, by as much as the part has moved.
 _BEFORE_PICTURES = (
-    f"const FOLLOWED = {json.dumps(FOLLOWED)}, TEXTS = {json.dumps(TEXTS)};"
+    f"const [FOLLOWED, TEXTS, OPACITIES] = {json.dumps([FOLLOWED, TEXTS, OPACITIES])};"
     + """
   let followed = null, first = true, last = null;
   const shift = (camera) => {
@@ -436,19 +439,44 @@ _BEFORE_PICTURES = (
       node.style.transform = `translate(${x}px, ${y}px)`;
     }
   };
+  const given = new WeakMap();
+  let faded = "{}", fading = {};
+  const seenThrough = () => document.getElementById(OPACITIES)?.dataset.opacities ?? faded;
+  const fade = () => {
+    if (seenThrough() !== faded) fading = {...fading, ...JSON.parse(faded = seenThrough())};
+    for (const [path, opacity] of Object.entries(fading))
+      window.__viserMutable.nodeRefFromName[path]?.traverse((each) => {
+        for (const material of each.isMesh ? [each.material].flat() : []) {
+          if (!given.has(material)) given.set(material, [material.opacity, material.transparent]);
+          const [own, transparent] = given.get(material);
+          if (material.opacity === own * opacity) continue;
+          material.opacity = own * opacity;
+          material.transparent = transparent || opacity < 1;
+          material.needsUpdate = true;
+        }
+      });
+  };
   setInterval(() => {
     const page = window.__viserMutable, scene = page?.scene;
     if (!scene) return;
-    if (writing() !== written) page.requestRender?.();
+    if (writing() !== written || seenThrough() !== faded) page.requestRender?.();
     if (scene.dynxPrepares) return;
     scene.dynxPrepares = true;
     scene.onBeforeRender = (renderer, drawn, camera) => {
       shift(camera);
       write(renderer.domElement, camera);
+      fade();
     };
   }, 100);
 """
 )
+
+
+def opacities_element(opacities: Mapping[str, float]) -> str:
+    """Return the HTML element by which the page knows the opacity of shapes, relative to their own, by the
+    paths of their nodes."""
+    data = escape(json.dumps(opacities), quote=True)
+    return f'<div id="{OPACITIES}" style="display: none" data-opacities="{data}"></div>'
 
 
 class WrittenText(NamedTuple):

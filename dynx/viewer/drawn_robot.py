@@ -69,6 +69,14 @@ class DrawnParts:
         self._poses = np.tile(np.eye(4), (len(parts) + 1, 1, 1))
         self._sent = np.full((len(parts), 3, 4), np.nan)
         self._placed: list[Callable[[Mapping[str, Floats]], None]] = []
+        self.hidden = set[str]()
+        """Parts whose shapes are hidden, whichever shapes are shown."""
+
+    def set_visible(self, name: str, visible: bool) -> None:
+        """Show or hide the shapes of a part."""
+        (self.hidden.discard if visible else self.hidden.add)(name)
+        for node in self.visuals.get(name, ()):
+            node.visible = visible
 
     def rigid_with(self, name: str) -> list[str]:
         """Return the parts that fixed joints connect to a part, itself among them."""
@@ -216,7 +224,9 @@ class DrawnRobot(DrawnParts):
         """The parent of each link that a fixed joint connects to it."""
         super().__init__(root, self.links, self.above, {model.name: model.root}, self.fixed)
         self.visuals = {}
-        self._collisions: list[Any] | None = None
+        self._collisions: dict[str, list[Any]] | None = None
+        self._shows = True, False
+        """Whether visual and collision shapes are shown."""
         self._add_visuals()
         self.move(model.neutral())
 
@@ -240,12 +250,21 @@ class DrawnRobot(DrawnParts):
 
     def show(self, *, visuals: bool, collisions: bool) -> None:
         """Show or hide the visual shapes and the collision shapes."""
-        for nodes in self.visuals.values():
-            for node in nodes:
-                node.visible = visuals
+        self._shows = visuals, collisions
         if collisions and self._collisions is None:
             self._collisions = self._add_collisions()
-        for node in self._collisions or ():
+        for name in self.links:
+            self._show_link(name)
+
+    def set_visible(self, name: str, visible: bool) -> None:
+        super().set_visible(name, visible)
+        self._show_link(name)
+
+    def _show_link(self, name: str) -> None:
+        visuals, collisions = (each and name not in self.hidden for each in self._shows)
+        for node in self.visuals.get(name, ()):
+            node.visible = visuals
+        for node in (self._collisions or {}).get(name, ()):
             node.visible = collisions
 
     def _add_visuals(self) -> None:
@@ -301,20 +320,22 @@ class DrawnRobot(DrawnParts):
         )
         return {mesh: part for mesh, part in parts.items() if part < len(mesh.triangles[1])}
 
-    def _add_collisions(self) -> list[Any]:
-        return [
-            add_triangles(
-                self._scene,
-                f"{self.links[link.name].name}/collision{k}",
-                triangles,
-                T,
-                ORANGE,
-                COLLISION_OPACITY,
-                flat=flat,
-            )
+    def _add_collisions(self) -> dict[str, list[Any]]:
+        return {
+            link.name: [
+                add_triangles(
+                    self._scene,
+                    f"{self.links[link.name].name}/collision{k}",
+                    triangles,
+                    T,
+                    ORANGE,
+                    COLLISION_OPACITY,
+                    flat=flat,
+                )
+                for k, (triangles, T, flat) in enumerate(self._colliding_shapes(link.name))
+            ]
             for link in self.model.links
-            for k, (triangles, T, flat) in enumerate(self._colliding_shapes(link.name))
-        ]
+        }
 
     def _colliding_shapes(self, link: str) -> list[tuple[Triangles, Floats, bool]]:
         """Return the collision shapes of a link, where all can be read, with their poses in the link, and
@@ -486,6 +507,13 @@ class DrawnScene(DrawnParts):
         self.place(start)
         self.faults = tuple(faults)
         """Shapes that cannot be drawn, one sentence each."""
+
+    def set_visible(self, name: str, visible: bool) -> None:
+        super().set_visible(name, visible)
+        for robot, drawn in self.robots.items():
+            link = name.removeprefix(f"{robot}/")
+            if link != name and link in drawn.links:
+                drawn.set_visible(link, visible)
 
     def show(self, *, visuals: bool, collisions: bool) -> None:
         """Show or hide the visual shapes and the collision shapes of the robots."""

@@ -459,6 +459,11 @@ class RobotView:
         return self.model.name
 
     @property
+    def drawn(self) -> DrawnRobot:
+        """The nodes of the links."""
+        return self.robot
+
+    @property
     def visuals(self) -> Mapping[str, Sequence[Any]]:
         """The nodes of the visual shapes of each link."""
         return self.robot.visuals

@@ -19,8 +19,10 @@ from dynx.model import Model
 from dynx.model.loading import load
 from dynx.model.numbers import whole_number
 from dynx.spatial.scalar import Floats
+from dynx.steppers.camera import Camera
+from dynx.viewer.appearance import PartVisibility, SavedViews, camera_of, look_from
 from dynx.viewer.controls import Controls
-from dynx.viewer.drawn_robot import Look
+from dynx.viewer.drawn_robot import DrawnParts, Look
 from dynx.viewer.page import DEFAULT_HOST, DEFAULT_PORT, Page
 from dynx.viewer.triangles import TRIANGLE_BUDGET, has_graphics_processor
 
@@ -56,6 +58,10 @@ class View(Protocol):
     @property
     def legend(self) -> str:
         """HTML that says which of two motions is solid; empty for one."""
+
+    @property
+    def drawn(self) -> DrawnParts:
+        """The nodes of the parts."""
 
     @property
     def visuals(self) -> Mapping[str, Sequence[Any]]:
@@ -212,6 +218,14 @@ def _curves(rollout: Rollout) -> list[Series]:
     return curves
 
 
+def _checked_camera(camera: object) -> Camera:
+    if not isinstance(camera, Camera):
+        raise ArgumentError(f"camera is of type {type(camera).__name__}; wanted a Camera")
+    if camera.part is not None:
+        raise ArgumentError(f"camera is on the part {shown(camera.part)}; wanted one in the world")
+    return camera
+
+
 PICTURE_SIZE = (960, 720)
 """Width and height of an exported picture [pixels]."""
 
@@ -257,6 +271,7 @@ class Viewer(Controls):
             # The browser starts and loads the page while the shapes are read.
             threading.Thread(target=webbrowser.open, args=(self.url,), daemon=True).start()
         super().__init__(self.page)
+        self._views = SavedViews()
         self.view: Any = self._view_of(opened, shown, options)
         """A `RobotView`, `MotionView` or `WorldView`: what is shown, to be moved by the program."""
 
@@ -277,7 +292,10 @@ class Viewer(Controls):
             self.page.at_end(opened.close)
         try:
             with self.page.lock:
-                return view_of(self.page, opened, self._look, options)
+                view = view_of(self.page, opened, self._look, options)
+                self._views.add_controls(self.page)
+                self._appearance = PartVisibility(self.page, view)
+                return view
         except BaseException:
             self.page.close()
             raise
@@ -326,6 +344,64 @@ class Viewer(Controls):
         self.page.check_open()
         self.view.camera.follow(part, first_person=first_person)
 
+    def set_visible(self, part: str | None, visible: bool = True) -> None:
+        """Show or hide a part, as those of `follow`; None for all. Raises ArgumentError for an unknown part.
+
+        Exported pages show what is shown; pictures and films show all parts.
+        """
+        self.page.check_open()
+        self._appearance.set_visible(part, visible)
+
+    def set_opacity(self, opacity: float, part: str | None = None) -> None:
+        """Let a part, or all, be seen through in the page: 1 is as described, 0 is not seen.
+
+        Exported pages, pictures and films have the opacity of the description. Raises ArgumentError for an
+        unknown part and for an opacity that is not from 0 to 1.
+        """
+        self.page.check_open()
+        self._appearance.set_opacity(part, opacity)
+
+    @property
+    def camera(self) -> Camera:
+        """The camera of the first open page, in the world, with the size of its picture; its `intrinsics` are
+        those of the page.
+
+        Raises ArgumentError where no page is open.
+        """
+        return camera_of(self._first_page())
+
+    def look_from(self, camera: Camera) -> None:
+        """Give all open pages the view of a camera in the world. Raises ArgumentError for one on a part."""
+        self.page.check_open()
+        for client in self.page.server.get_clients().values():
+            look_from(client, _checked_camera(camera))
+
+    def save_view(self, name: str, camera: Camera | None = None) -> None:
+        """Keep a view under a name, by default that of the first open page; the page has a choice of them.
+
+        Raises ArgumentError without a camera where no page is open.
+        """
+        self.page.check_open()
+        if not isinstance(name, str) or not name:
+            raise ArgumentError(f"name of a view is {shown(name)}; wanted a str that is not empty")
+        self._views.save(name, self.camera if camera is None else _checked_camera(camera))
+
+    def show_view(self, name: str) -> None:
+        """Give all open pages a view that was saved. Raises ArgumentError for an unknown name."""
+        self.look_from(self._views.find(name))
+
+    @property
+    def views(self) -> Mapping[str, Camera]:
+        """The cameras of the saved views by name."""
+        return dict(self._views.cameras)
+
+    def _first_page(self) -> Any:
+        self.page.check_open()
+        clients = self.page.server.get_clients()
+        if not clients:
+            raise ArgumentError(f"no page is open at {self.url}; World.camera draws pictures without one")
+        return clients[min(clients)]
+
     def on_part_clicked(self, clicked: Any) -> None:
         """Call `clicked(part, origin, direction)` when a part is clicked: its name, and the ray (3,), (3,)
         from the camera through the pointer, in world axes."""
@@ -336,11 +412,7 @@ class Viewer(Controls):
 
         Raises ArgumentError where no page is open: `World.camera` draws without a browser.
         """
-        self.page.check_open()
-        clients = self.page.server.get_clients()
-        if not clients:
-            raise ArgumentError(f"no page is open at {self.url}; World.camera draws pictures without one")
-        client = clients[min(clients)]
+        client = self._first_page()
         if not isinstance(size, tuple | list) or len(size) != 2:
             raise ArgumentError(f"size is {shown(size)}; wanted width and height")
         width, height = (whole_number(f"size[{k}]", side, 1) for k, side in enumerate(size))
