@@ -65,7 +65,9 @@ def task_of_file(
             _check_robot(value, where)
         else:
             _check_words(f"option {name}", value, where)
-    return replace(task, id=chosen, options={**task.options, **given})
+    # The caller's own choice may be an environment that has no engines.
+    engine = task.engine if env_id is None or of_dynx else None
+    return replace(task, id=chosen, engine=engine, options={**task.options, **given})
 
 
 def _check_words(what: str, value: object, where: str) -> None:

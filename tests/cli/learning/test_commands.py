@@ -265,6 +265,37 @@ def test_wrong_input_is_one_line_and_exit_code_2(
     assert not (tmp_path / "runs").exists(), "a run that cannot begin leaves a folder"
 
 
+def test_the_lander_of_gymnasium_is_trained_judged_shown_and_filmed(tmp_path: Path) -> None:
+    pytest.importorskip("Box2D", reason="needs the extra train, where Box2D has wheels")
+    policy = str(tmp_path / "lander" / "final.zip")
+    trained = run("train", "LunarLander-v3", "--steps", "64", "--out", str(tmp_path / "lander"), *FEW)
+    assert trained.exit_code == 0, trained.output
+    document = json.loads((tmp_path / "lander" / "run.json").read_text())
+    assert document["spec"]["hyperparameters"]["gamma"] == 0.999  # published
+    judged = run("play", policy, "--episodes", "2", "--json")
+    assert judged.exit_code == 0, judged.output
+    seen = run("play", policy, "--view", "--episodes", "1")
+    assert seen.exit_code == 0, seen.output
+    total = json.loads(judged.stdout)["engines"][0]["returns"][0]
+    assert f"return {total:.5g} in" in seen.output
+    film = tmp_path / "lander.gif"
+    assert run("play", policy, "--export", str(film)).exit_code == 0
+    assert film.read_bytes()[:6] == b"GIF89a"
+
+
+def test_a_policy_of_an_engine_is_judged_on_the_task_of_gymnasium(tmp_path: Path) -> None:
+    out = str(tmp_path / "run")
+    trained = run("train", "CartPole", "--engine", "reference", "--steps", "64", "--out", out, *FEW)
+    assert trained.exit_code == 0, trained.output
+    arguments = ("play", f"{out}/final.zip", "--episodes", "2", "--json")
+    own, gymnasiums = run(*arguments), run(*arguments, "--task", "CartPole-v1")
+    assert gymnasiums.exit_code == 0, gymnasiums.output
+    # Gymnasium's cart-pole state by state, so that the returns are equal.
+    first, second = (json.loads(each.stdout)["engines"][0] for each in (own, gymnasiums))
+    assert first["returns"] == second["returns"]
+    assert second["engine"] is None
+
+
 def test_other_films_are_refused(folder: Path, tmp_path: Path) -> None:
     result = run("play", str(folder / "final.zip"), "--export", str(tmp_path / "film.avi"))
     assert result.exit_code == 2
