@@ -29,7 +29,6 @@ VECTOR_ENTRY_POINT = "dynx.envs.registration:make_vector_environment"
 TASKS = {
     "Acrobot-v0": "dynx.envs.tasks.acrobot:Acrobot",
     "CartPole-v0": "dynx.envs.tasks.cart_pole:CartPole",
-    "LunarLander-v0": "dynx.envs.tasks.lunar_lander.task:LunarLander",
     "Pendulum-v0": "dynx.envs.tasks.pendulum:Pendulum",
     "Push-v0": "dynx.envs.tasks.push:Push",
     "Stand-v0": "dynx.envs.tasks.stand:Stand",
@@ -37,6 +36,9 @@ TASKS = {
     "Reach-v0": "dynx.envs.tasks.reach:Reach",
 }
 """Tasks of dynx by the name of their environment, as ``"package.module:Class"``."""
+
+LANDER, GYMNASIUMS_LANDER = "LunarLander", "LunarLander-v3"
+"""Name of a task that dynx had, and the environment of Gymnasium whose copy it was."""
 
 
 def task_class(task: str | type[Task]) -> type[Task]:
@@ -149,9 +151,21 @@ def register_task(env_id: str, task: str | type[Task]) -> None:
 
 
 def register_tasks() -> None:
-    """Register the tasks of dynx."""
+    """Register the tasks of dynx, and the id of the lander that it had, which names Gymnasium's."""
     for name, task in TASKS.items():
         register_task(f"{NAMESPACE}/{name}", task)
+    gone = f"{NAMESPACE}/{LANDER}-v0"
+    registry.pop(gone, None)
+    register(gone, entry_point=f"{__name__}:refuse_lander")
+
+
+def refuse_lander(*_: Any, **__: Any) -> TaskEnvironment:
+    """Raise UnknownNameError, which names Gymnasium's lander."""
+    raise UnknownNameError(
+        f"dynx has no lander of its own any more: Gymnasium's {GYMNASIUMS_LANDER} (extra train), with the "
+        "same observations, actions and rewards, is trained, judged, shown and filmed instead, policies of "
+        f"the old one by --task {GYMNASIUMS_LANDER}"
+    )
 
 
 def task_id(name: str) -> str:
@@ -161,6 +175,8 @@ def task_id(name: str) -> str:
     registers the task: the name must be the caller's, never that of a file. Raises UnknownNameError with the
     nearest name.
     """
+    if name in (LANDER, f"{NAMESPACE}/{LANDER}-v0"):
+        refuse_lander()
     module, colon, own = name.rpartition(":")
     if colon:
         held = getattr(import_tasks(module), own, None)

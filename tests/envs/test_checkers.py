@@ -23,7 +23,6 @@ PAIRS = [(name, engine) for name, task in TASKS.items() for engine in task_class
 
 VARIANTS: list[tuple[str, dict[str, Any]]] = [
     ("CartPole-v0", {"sutton_barto_reward": True}),
-    ("LunarLander-v0", {"continuous": True, "enable_wind": True}),
     ("Pendulum-v0", {"randomize": {"mass_scale": (0.5, 2.0), "delay": (0.0, 0.1), "action_noise": 3.0}}),
     ("Push-v0", {"randomize": {"mass_scale": (0.5, 2.0), "observation_noise": 3.0, "action_noise": 3.0}}),
     ("Push-v0", {"reward_kind": "sparse"}),

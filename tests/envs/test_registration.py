@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import gymnasium
 import numpy as np
 import pytest
 
@@ -90,3 +91,19 @@ def test_a_module_of_the_current_folder_says_how_it_is_found(
     (tmp_path / "only_in_this_folder.py").write_text(OWN)
     with pytest.raises(UnknownNameError, match=r"PYTHONPATH=\. adds"):
         task_id("only_in_this_folder:own/Short-v0")
+
+
+def test_the_lander_that_dynx_had_names_gymnasiums() -> None:
+    words = r"Gymnasium's LunarLander-v3 \(extra train\)"
+    for call in (
+        lambda: task_id("LunarLander"),
+        lambda: task_id("dynx/LunarLander-v0"),
+        lambda: make_environment("LunarLander"),
+        lambda: gymnasium.make("dynx/LunarLander-v0", engine="mujoco"),
+        lambda: gymnasium.make("dynx/LunarLander-v0"),
+        lambda: gymnasium.make_vec("dynx/LunarLander-v0", num_envs=2, vectorization_mode="sync"),
+    ):
+        with pytest.raises(UnknownNameError, match=words):
+            call()
+    assert not is_of_dynx("dynx/LunarLander-v0")
+    assert task_id("LunarLander-v3") == "LunarLander-v3"

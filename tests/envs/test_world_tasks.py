@@ -18,6 +18,7 @@ from dynx.envs.tasks.stand import Stand
 from dynx.envs.tasks.walk import Walk
 from dynx.errors import ArgumentError, EpisodeError, UnknownNameError
 from dynx.steppers.registry import installed_worlds
+from tests.envs.hail import Hail
 from tests.envs.scripted import Controller, posture, pushing, run, trot
 
 ENGINES = installed_worlds()
@@ -250,3 +251,22 @@ def test_a_part_of_a_task_that_is_no_method_is_named() -> None:
 
     with pytest.raises(ArgumentError, match="scene of Wrong is a property; wanted a method"):
         register_task("test/Wrong-v0", Wrong)
+
+
+def test_an_episode_with_a_scene_of_its_own_is_that_of_its_seed(engine: str) -> None:
+    env, again = TaskEnvironment(Hail(), engine), TaskEnvironment(Hail(), engine)
+    actions = np.random.default_rng(1).uniform(-1.0, 1.0, (10, 3)).astype(np.float32)
+    try:
+        seen: dict[int, list[Any]] = {}
+        for seed in (0, 1, 2, 0):
+            found = [env.reset(seed=seed)[0], *(env.step(each)[0] for each in actions)]
+            if seed in seen:
+                np.testing.assert_array_equal(seen[seed], found)
+            seen[seed] = found
+        np.testing.assert_array_equal(
+            seen[2], [again.reset(seed=2)[0], *(again.step(each)[0] for each in actions)]
+        )
+        assert len({each[0][3] for each in seen.values()}) > 1, "the seeds draw different numbers of stones"
+    finally:
+        env.close()
+        again.close()

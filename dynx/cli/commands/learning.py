@@ -30,7 +30,7 @@ def env() -> None:
     Examples:
       dynx env list
       dynx env distance CartPole
-      dynx env distance LunarLander --engine pybullet,mujoco --tolerance 1e-3
+      dynx env distance Stand --engine pybullet,mujoco --tolerance 1e-3
     """
 
 
@@ -111,8 +111,8 @@ def distance() -> None:
     Examples:
       dynx env distance CartPole
       dynx env distance --task my_module:mine/Lift-v0
-      dynx env distance LunarLander --engine pybullet,mujoco --tolerance 1e-3
-      dynx env distance LunarLander --policy on_mujoco.zip --policy on_pybullet.zip --json table.json
+      dynx env distance Stand --engine pybullet,mujoco --tolerance 1e-3
+      dynx env distance Stand --policy on_mujoco.zip --policy on_pybullet.zip --json table.json
     """
 
 
@@ -232,8 +232,9 @@ def train() -> None:
       dynx train CartPole
       dynx train --task my_module:mine/Lift-v0
       dynx train CartPole --engine compiled --seed 0,1,2 --plot curve.png
-      dynx train LunarLander --engine mujoco --out lander
-      dynx train LunarLander --engine mujoco --out lander --resume
+      dynx train Stand --engine mujoco --out stand
+      dynx train LunarLander-v3 --out lander
+      dynx train Stand --engine mujoco --out stand --resume
       dynx train CartPole --engine compiled --randomize mass_scale=[0.5,2]
       dynx train Pendulum --algo sac --steps 20000 --set learning_rate=0.001
     """
@@ -321,9 +322,9 @@ def play() -> None:
     \b
     Examples:
       dynx play runs/CartPole-compiled-ppo/final.zip
-      dynx play lander/final.zip --engine mujoco,pybullet --episodes 100
+      dynx play stand/final.zip --engine mujoco,pybullet --episodes 100
       dynx play lander/final.zip --view
-      dynx play lander/final.zip --view --engine mujoco,pybullet
+      dynx play stand/final.zip --view --engine mujoco,pybullet
       dynx play ppo.zip --unpickle --task CartPole-v1 --statistics vec_normalize.pkl
       dynx play lander/final.zip --export lander.mp4
     """

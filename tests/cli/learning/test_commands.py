@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,8 @@ from dynx.cli.shell.main import cli
 from tests.test_schemas import errors
 
 pytest.importorskip("stable_baselines3", reason="needs the extra train")
+
+from dynx.training.policy import DOCUMENT
 
 FEW = ("--set", "n_steps=16", "--set", "batch_size=32", "--envs", "2", "--episodes", "2")
 
@@ -281,6 +284,23 @@ def test_the_lander_of_gymnasium_is_trained_judged_shown_and_filmed(tmp_path: Pa
     film = tmp_path / "lander.gif"
     assert run("play", policy, "--export", str(film)).exit_code == 0
     assert film.read_bytes()[:6] == b"GIF89a"
+    # A policy for the lander that dynx had acts on Gymnasium's, too.
+    old = str(tmp_path / "old.zip")
+    with zipfile.ZipFile(policy) as read, zipfile.ZipFile(old, "w") as written:
+        for name in read.namelist():
+            content = read.read(name)
+            if name == DOCUMENT:
+                parts = json.loads(content)
+                parts["spec"]["task"] = {"id": "dynx/LunarLander-v0", "engine": "mujoco", "options": {}}
+                content = json.dumps(parts).encode()
+            written.writestr(name, content)
+    refused = run("play", old, "--episodes", "2")
+    assert (refused.exit_code, "by --task LunarLander-v3" in refused.output) == (2, True), refused.output
+    again = run("play", old, "--task", "LunarLander-v3", "--episodes", "2", "--json")
+    assert (
+        json.loads(again.stdout)["engines"][0]["returns"]
+        == json.loads(judged.stdout)["engines"][0]["returns"]
+    )
 
 
 def test_a_policy_of_an_engine_is_judged_on_the_task_of_gymnasium(tmp_path: Path) -> None:
