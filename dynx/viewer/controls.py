@@ -152,6 +152,11 @@ class Controls:
         self._added.append(handle)
         return handle
 
+    def _added_control(self, control: Any) -> None:
+        """Let `remove_all` remove a control, too."""
+        self._open_page.check_open()
+        self._added.append(control)
+
     def _add_control(self, handle: Any, changed: Callable[[Any], object] | None) -> Any:
         if changed is not None:
             call = _checked_function("changed", changed)

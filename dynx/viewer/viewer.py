@@ -28,6 +28,7 @@ from dynx.viewer.triangles import TRIANGLE_BUDGET, has_graphics_processor
 
 if TYPE_CHECKING:
     from dynx.sim import Rollout
+    from dynx.viewer.camera_pane import CameraPane
     from dynx.viewer.export import EmbeddedPage
     from dynx.viewer.motion import MotionFrames
     from dynx.viewer.motion_view import Series
@@ -401,6 +402,25 @@ class Viewer(Controls):
         if not clients:
             raise ArgumentError(f"no page is open at {self.url}; World.camera draws pictures without one")
         return clients[min(clients)]
+
+    def camera_pane(self, camera: Camera, name: str = "camera", shows: str = "colours") -> CameraPane:
+        """Add a picture of a camera in the scene, which follows what the page shows: its ``"colours"``, its
+        ``"depth"``, or its ``"parts"`` in colours that tell them apart.
+
+        It is drawn as `World.camera` draws it, by this machine, at most 8 times a second; small pictures,
+        such as 160 x 120 pixels, come sooner. `remove_all` removes it. Raises ArgumentError for another kind, and
+        UnknownNameError for an unknown part that carries the camera.
+        """
+        from dynx.viewer.camera_pane import CameraPane
+
+        self.page.check_open()
+        if not isinstance(name, str) or not name:
+            raise ArgumentError(f"name of a pane is {shown(name)}; wanted a str that is not empty")
+        view = self.view
+        pane = CameraPane(self.page, lambda: (view.motions[0], view.time), camera, name, shows)
+        view.drawn.on_placed(lambda _: pane.changed())
+        self._added_control(pane)
+        return pane
 
     def on_part_clicked(self, clicked: Any) -> None:
         """Call `clicked(part, origin, direction)` when a part is clicked: its name, and the ray (3,), (3,)

@@ -577,9 +577,13 @@ def draw_picture(scene: Scene, state: WorldState, camera: Camera, draw: Draw = c
     of their files, and `notes` of the picture names what is not drawn. Colours are opaque, except for those
     of opacity 0, which are not drawn. Raises UnknownNameError for an unknown part that carries the camera.
     """
+    return draw_frames(scene, dict(part_poses(scene, state)), camera, draw)
+
+
+def draw_frames(scene: Scene, frames: dict[str, Floats], camera: Camera, draw: Draw = cast_rays) -> Picture:
+    """Return what a camera sees of a scene whose parts are at the poses (4, 4) given, as `draw_picture`."""
     if not isinstance(camera, Camera):
         raise ArgumentError(f"camera is of type {type(camera).__name__}; wanted a Camera")
-    frames = dict(part_poses(scene, state))
     T_world_camera = camera.pose.matrix
     if camera.part is not None:
         scene.material(camera.part)
