@@ -52,12 +52,12 @@ CANDIDATES: Mapping[str, tuple[SettingsChange, ...]] = {
             "Bullet pushes shapes that penetrate apart by this share in every step, which adds speed.",
         ),
         SettingsChange(
-            {"friction_erp": (0.05, 0.0)},
-            "Bullet pulls a sticking contact back by this share of its drift in every step.",
-        ),
-        SettingsChange(
             {"residual_threshold": (1e-12, 0.0), "solver_iterations": (400, 2000)},
             "Bullet's solver of impulses is iterative and stops at this residual or number of iterations.",
+        ),
+        SettingsChange(
+            {"friction_anchors": (True,)},
+            "Bullet lets contacts that stick creep, unless it draws them back to where they formed.",
         ),
         SettingsChange(
             {"contact_erp": (0.0,), "contact_slop": (0.0,)},

@@ -26,10 +26,8 @@ class Setting:
     least: float = 0.0
     most: float = np.inf
     choices: tuple[str, ...] = ()
-    needs: tuple[str, tuple[str, ...]] | None = None
+    needs: tuple[str, tuple[str | bool, ...]] | None = None
     """Setting, and the values of it with which this one has an effect; None for any."""
-    unused: str = ""
-    """Why the setting never has an effect; empty for one that may have."""
 
     def checked(self, name: str, value: object) -> Any:
         """Return the value in the type of the default. Raises ArgumentError for any other."""
@@ -104,13 +102,11 @@ def ineffective_settings(known: Mapping[str, Setting], in_use: Mapping[str, Any]
         value = in_use[name]
         if value == setting.default:
             continue
-        if setting.unused:
-            yield f"setting {name} is {value}, and has no effect: {setting.unused}"
-        elif setting.needs is not None and in_use[setting.needs[0]] not in setting.needs[1]:
+        if setting.needs is not None and in_use[setting.needs[0]] not in setting.needs[1]:
             other, values = setting.needs
             yield (
-                f"setting {name} is {value}, and has no effect with {other}={in_use[other]!r}; it has one with "
-                f"{' or '.join(map(repr, values))}"
+                f"setting {name} is {value}, and has no effect with {other}={in_use[other]!r}; it has one "
+                f"with {' or '.join(map(repr, values))}"
             )
 
 

@@ -560,7 +560,7 @@ class World:
         if self._identity is None:
             options = {**self.options, **self.settings}
             # Files of earlier versions do not have these.
-            added = {"joint_armature": False, "link_damping": 0.0}
+            added = {"joint_armature": False, "link_damping": 0.0, "friction_anchors": False}
             for name in added.keys() & options.keys():
                 if options[name] == added[name]:
                     del options[name]

@@ -202,7 +202,7 @@ def test_errors_name_the_argument_what_was_given_and_what_is_valid() -> None:
 
 def test_a_number_that_no_float_holds_is_refused_and_a_seed_may_be_one() -> None:
     engine = dynx.backend("reference", arm())
-    with pytest.raises(ArgumentError, match="max_iterations is .* at most 9007199254740992"):
+    with pytest.raises(ArgumentError, match=r"max_iterations is .* at most 9007199254740992"):
         engine.inverse_kinematics(np.eye(4), "tip", max_iterations=10**400)
     assert dynx.Noise(0.1, 0.1, seed=2**128).seed == 2**128
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import dynx
+from dynx.contacts import find_case
 from dynx.errors import ArgumentError, UnknownNameError
 from dynx.steppers.registry import world_class
 from dynx.steppers.settings import Setting, checked_settings
@@ -231,6 +232,7 @@ def acts_or_is_named(engine: str, name: str, setting: Setting, usual: list[float
     ("engine", "others"),
     [
         ("dynx", {"integrator": "adaptive"}),
+        ("pybullet", {"friction_anchors": True}),
         ("drake", {"contact_approximation": "sap"}),
         ("drake", {"contact_approximation": "similar"}),
     ],
@@ -245,3 +247,25 @@ def test_a_setting_that_needs_another_acts_with_it(engine: str, others: dict[str
             motion, notes = moved_by(engine, {**others, name: value})
             assert any("no effect" in note for note in notes) is idle
             assert (motion == usual) is idle, name
+
+
+def test_anchored_contacts_do_not_creep_and_saved_worlds_without_them_are_the_same(tmp_path: Path) -> None:
+    pytest.importorskip("pybullet")
+    case = find_case("slope")
+    scene, moved = case.scene(0.4), {}
+    for anchors in (False, True):
+        with World(scene, "pybullet", 2e-3, friction_anchors=anchors) as world:
+            world.run(0.6)
+            before = world.state.bodies["box"].position
+            world.run(0.5)
+            moved[anchors] = float(np.linalg.norm(world.state.bodies["box"].position - before))
+    assert moved[False] > 1e-7
+    assert moved[True] < 1e-3 * moved[False]
+    # A world of a version without the setting has the same identity, so that its states are continued.
+    with World(scene, "pybullet") as world:
+        expected = world.identity
+        del world.settings["friction_anchors"]  # type: ignore[attr-defined]
+        world._identity = None
+        assert world.identity == expected
+    with World(scene, "pybullet", friction_anchors=True) as world:
+        assert world.identity != expected

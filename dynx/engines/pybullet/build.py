@@ -120,11 +120,14 @@ SETTINGS = {
     "residual_threshold": Setting(1e-7, "squared residual at which the solver stops iterating"),
     "erp": Setting(0.2, "share of the error of constraints and joint limits removed in a step", most=1.0),
     "contact_erp": Setting(0.05, "share of a penetration removed in a step", most=1.0),
+    "friction_anchors": Setting(
+        False, "whether sticking contacts are drawn back to where they formed; this slows rolling bodies, too"
+    ),
     "friction_erp": Setting(
         0.2,
-        "share of the drift of a sticking contact removed in a step",
+        "share of the drift of a sticking contact removed in a step, with `friction_anchors`",
         most=1.0,
-        unused="Bullet reads it for shapes with a friction anchor, and dynx gives none one",
+        needs=("friction_anchors", (True,)),
     ),
     "cone_friction": Setting(True, "whether friction is limited by a cone, not by a pyramid"),
     "restitution_speed": Setting(0.05, "least approach speed [m/s] of an impact that rebounds"),
@@ -200,6 +203,8 @@ class BulletMaterials:
             "rollingFriction": float(self.rolling[number]),
             "restitution": float(self.restitution[number]),
         }
+        if settings["friction_anchors"]:
+            found["frictionAnchor"] = 1
         if self.rebounds[number]:
             found["contactProcessingThreshold"] = REBOUND_GAP * settings["restitution_speed"] * dt
             found["contactStiffness"] = STIFFNESS
