@@ -231,6 +231,9 @@ class World:
                 lambda: self._motion.clock,
                 lambda engine: self._queries.contacts(engine),
             )
+        kept = {"keep_last_step": keep_last_step, "contact_interval": contact_interval}
+        self._kept = {name: value for name, value in kept.items() if value}
+        """Options on which no later step depends, as far as they are given."""
         self._contact_interval: ContactInterval | None = None
         if contact_interval is not None:
             from dynx.world.contact_interval import ContactInterval
@@ -498,12 +501,14 @@ class World:
     @checks_types
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the world and its state to a file, from which `read` continues bit for bit; its suffix is
-        .world, or it has none.
+        .world, or it has none. The world that is read has `keep_last_step` and `contact_interval` of this
+        one, and begins a new interval.
 
         Raises DescriptionError for a collision shape that a file cannot have, and ArgumentError for another
         suffix and for a file that cannot be written.
         """
-        given = {"engine": self.engine, "options": dict(self.options), "settings": dict(self.settings)}
+        options = {**self.options, **self._kept}
+        given = {"engine": self.engine, "options": options, "settings": dict(self.settings)}
         write_snapshot(path, self.save(), {"scene": scene_document(self.scene), **given})
 
     def to_mjcf(self, **settings: object) -> str:

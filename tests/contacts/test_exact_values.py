@@ -84,6 +84,11 @@ def test_exact_values_are_those_of_other_computations(name: str, trial: str) -> 
             x, y, _ = world.state.bodies["ball"].position.tolist()
             away = float(((x - AT_TURNTABLE[0]) ** 2 + (y - AT_TURNTABLE[1]) ** 2) ** 0.5)
             assert figures[1].measured == pytest.approx(away, abs=2e-6)
+            # Its error is relative to the radius of the orbit.
+            assert figures[1].scale == pytest.approx(0.583333, rel=1e-5)
+        if name == "free_wedge":
+            gained = 2.0 * abs(float(world.state.bodies["wedge"].twist[0]))
+            assert figures[2].scale == pytest.approx(gained)
 
 
 def test_no_case_of_these_has_a_trial_that_is_not_compared() -> None:

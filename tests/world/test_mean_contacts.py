@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -195,3 +196,27 @@ def test_what_cannot_be_averaged_is_named() -> None:
         assert world.mean_contacts()[0].normal_force == pytest.approx(9.81, rel=1e-3)
         with pytest.raises(UnknownNameError, match="'cub'"):
             world.mean_contacts("cub")
+
+
+def test_a_world_that_is_read_keeps_what_its_world_kept(tmp_path: Path) -> None:
+    dog, q = quadruped("a1")
+    scene = Scene("s", robots=(SceneRobot("dog", dog, q=tuple(q)),), bodies=(ground(),))
+    with World(scene, ENGINES[0], contact_interval=0.01, keep_last_step=True) as world:
+        world.run(0.05)
+        world.write(tmp_path / "kept.world")
+        with World.read(tmp_path / "kept.world") as again:
+            assert again.mean_contacts() == ()
+            assert again.identity == world.identity
+            for each in (world, again):
+                each.run(0.02)
+            assert again.state == world.state
+            found, expected = again.mean_contacts(), world.mean_contacts()
+            assert [each.force.tolist() for each in found] == [each.force.tolist() for each in expected]
+            np.testing.assert_array_equal(again.joint_wrenches(), world.joint_wrenches())
+    with World(scene, ENGINES[0]) as world:
+        world.write(tmp_path / "plain.world")
+    with World.read(tmp_path / "plain.world") as again:
+        with pytest.raises(ArgumentError, match="contact_interval="):
+            again.mean_contacts()
+        with pytest.raises(ArgumentError, match="keep_last_step=True"):
+            again.joint_wrenches()
