@@ -25,7 +25,7 @@ class ContactTable:
     """All contacts of a rollout, a row each, in the order of the steps.
 
     Row k is a contact between ``names[a[k]]`` and ``names[b[k]]`` during step ``step[k]``, which begins at
-    ``t[step[k]]``; all else is as in `dynx.world.Contact`, in world axes.
+    ``t[step[k]]``, in the last of its sub-steps; all else is as in `dynx.world.Contact`, in world axes.
     """
 
     n_steps: int
@@ -136,6 +136,8 @@ class Surroundings:
     """Pose (n + 1, 4, 4) of each body of the scene that moves."""
     robots: Mapping[str, Floats]
     """Configurations (n + 1, nq) of the other robots of the scene."""
+    notes: tuple[str, ...] = ()
+    """Notes of the world at the start (`dynx.world.World.notes`); none in files of earlier versions."""
 
     def first(self, n: int) -> Surroundings:
         """Return the record of the first `n` steps."""
@@ -143,7 +145,7 @@ class Surroundings:
         bodies, robots = (
             {name: rows[: n + 1] for name, rows in parts.items()} for parts in (self.bodies, self.robots)
         )
-        return Surroundings(contacts, bodies, robots)
+        return Surroundings(contacts, bodies, robots, self.notes)
 
     def __repr__(self) -> str:
         counts = f"contacts: {len(self.contacts)}, moving bodies: {len(self.bodies)}"
@@ -153,7 +155,7 @@ class Surroundings:
 def to_document(surroundings: Surroundings) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the names as a document, and the arrays of a file by name; `from_document` is the inverse."""
     table = surroundings.contacts
-    names: dict[str, Any] = {"contacts": list(table.names)}
+    names: dict[str, Any] = {"contacts": list(table.names), "notes": list(surroundings.notes)}
     names |= {kind: [*getattr(surroundings, kind)] for kind in _PARTS}
     arrays = {f"contact_{name}": getattr(table, name) for name in _COLUMNS}
     for kind in _PARTS:
@@ -179,7 +181,8 @@ def from_document(document: Mapping[str, Any], file: ArrayFile, n: int) -> Surro
         kind: {str(name): file.array(f"{kind}_{k}", (n + 1, *shape)) for k, name in enumerate(document[kind])}
         for kind, shape in _PARTS.items()
     }
-    return Surroundings(ContactTable(n, names, **arrays), parts["bodies"], parts["robots"])
+    notes = tuple(map(str, document.get("notes", ())))
+    return Surroundings(ContactTable(n, names, **arrays), parts["bodies"], parts["robots"], notes)
 
 
 _COLUMNS: dict[str, tuple[tuple[int | None, ...], type]] = {

@@ -247,8 +247,8 @@ class World:
         watchers = (self._last_step, self._sensors, self._contact_interval)
         self._watchers = [each for each in watchers if each is not None]
         """What is read around every step of the engine."""
-        at_start = notes_on_start(self._motion.engine, self._motion.state)
-        self.notes: tuple[str, ...] = (*at_start, *self._lasting_notes(settings))
+        self._given = settings
+        self.notes: tuple[str, ...] = self.notes_on_present_state()
         """Parts that overlap at the start, constraints that it violates, joints beyond their limits, robots
         whose accelerations have no bound, parts that are too fast for the step, coefficients of contact that
         the engine does not have, joint dynamics that are not exact, a step that is long, and settings given
@@ -688,6 +688,11 @@ class World:
     def __repr__(self) -> str:
         notes = f", {len(self.notes)} notes" if self.notes else ""
         return f"<World {self.scene.name} in {self.engine} at {self.time:.6g} s{notes}>"
+
+    def notes_on_present_state(self) -> tuple[str, ...]:
+        """Return the `notes` that the world would have if it started at the present state."""
+        at_start = notes_on_start(self._motion.engine, self._motion.state)
+        return (*at_start, *self._lasting_notes(self._given))
 
     def _lasting_notes(self, given: Mapping[str, object]) -> Iterator[str]:
         """Yield the notes that hold at every state, with those on the settings `given`."""

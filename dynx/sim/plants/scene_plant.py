@@ -22,7 +22,8 @@ class ScenePlant:
         dynx.simulate(arm, controller, motion, plant=ScenePlant(scene, "arm", engine="mujoco"))
 
     `robot` is the name of the simulated robot in the scene; it may be left out if the scene has one robot
-    only. The other robots have no motors. `engine` and `settings` are those of `dynx.world.World`; with
+    only. The motors of the scene drive the other robots; in the place of those of the simulated robot the
+    controller acts. `engine` and `settings` are those of `dynx.world.World`; with
     `joint_limits` joints stop at the limits of the description, by the engine's own law.
 
     Raises ArgumentError and its kinds for a robot, an engine or a setting that does not exist.

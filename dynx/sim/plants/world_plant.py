@@ -162,13 +162,17 @@ class WorldPlant(Plant):
         self._forces = tuple(replace(push, on=f"{self._robot}/{push.on}") for push in disturbances.pushes)
         self._others = tuple(robot.name for robot in place.scene.robots if robot.name != place.robot)
         self._moving = tuple(body.name for body in place.scene.bodies if not body.fixed)
+        self._notes = self._world.notes
         self._contacts: list[tuple[Contact, ...]] = []
         self._states: list[WorldState] = []
 
     def reset(self, q: Floats, v: Floats) -> None:
         """Put the scene at its start, and the robot at q, v."""
         self._world.reset()
+        start = self._world.state.robots[self._robot]
         self._world.set_state(robots={self._robot: (q, v)})
+        as_in_scene = np.array_equal(start.q, q) and np.array_equal(start.v, v)
+        self._notes = self._world.notes if as_in_scene else self._world.notes_on_present_state()
         self._contacts, self._states = [], [self._world.state]
 
     def recover(self, q: Floats, v: Floats) -> None:
@@ -214,6 +218,7 @@ class WorldPlant(Plant):
             ContactTable.of(self._contacts[:n], self._world.scene.parts),
             {name: np.array([each.bodies[name].T_world_body for each in states]) for name in self._moving},
             {name: np.array([each.robots[name].q for each in states]) for name in self._others},
+            self._notes,
         )
 
     def close(self) -> None:

@@ -344,11 +344,12 @@ class Rollout:
     @property
     def notes(self) -> tuple[str, ...]:
         """Sentences on what is hardly meant: joints that start far beyond their limits, gravity that points
-        up."""
+        up; in a scene also those of its world at the start (`dynx.world.World.notes`)."""
         # Imported here, because `simulate` needs it no more than other programs.
         from dynx.model.unlikely_inputs import gravity_notes, position_notes
 
-        return (*position_notes(self.model, self.q[0], "q0"), *gravity_notes(self.model.gravity))
+        own = (*position_notes(self.model, self.q[0], "q0"), *gravity_notes(self.model.gravity))
+        return tuple(dict.fromkeys((*own, *(self.surroundings.notes if self.surroundings else ()))))
 
     def __repr__(self) -> str:
         notes = f", {len(self.notes)} notes" if self.notes else ""

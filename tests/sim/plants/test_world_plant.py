@@ -17,7 +17,7 @@ from dynx.backends import backend, installed_backends
 from dynx.control import BulletPositionMotor
 from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError
 from dynx.sim import Scenario, ScenePlant, Simulation
-from dynx.world import Material, Scene, SceneRobot, box, ground
+from dynx.world import Material, Scene, SceneRobot, VelocityMotor, World, box, ground
 from tests.backends.robots import mixed_robot
 from tests.sim.bars import tutorial_robot
 from tests.world.engines import WORLDS
@@ -182,6 +182,40 @@ def test_the_plot_shows_the_contact_forces(engine: str) -> None:
     labels = [axis.get_ylabel() for axis in figure.axes]
     assert labels[0] == "contact force [N]"
     assert len(labels) == 4
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_the_notes_of_the_world_are_in_the_record_and_its_files(engine: str, tmp_path: Path) -> None:
+    slider = dynx.load(SLIDER)
+    fast = replace(CUBE, twist=(90.0, 0.0, 0.0, 0.0, 0.0, 0.0), pose=dynx.Pose((1.0, 0.0, 0.1)))
+    scene = Scene("noted", robots=(SceneRobot("slider", slider),), bodies=(ground(), fast))
+    plant = ScenePlant(scene, engine=engine)
+    rollout = dynx.simulate(slider, plant=plant, dt=2e-3, duration=0.01, damping=True, friction=True)
+    with World(scene, engine, 2e-3) as world:
+        expected = world.notes
+    assert any("moves by" in note for note in expected)
+    assert set(expected) <= set(rollout.notes)
+    assert f"{len(rollout.notes)} notes" in repr(rollout)
+    rollout.save(tmp_path / "run.npz")
+    assert dynx.Rollout.load(tmp_path / "run.npz").notes == rollout.notes
+    # From another start the notes are those of that start: the slider is inside of the cube.
+    other = dynx.simulate(slider, plant=plant, q0=[1.0], dt=2e-3, duration=0.01)
+    assert any("overlap by" in note for note in other.notes)
+    assert not any("overlap by" in note for note in rollout.notes)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_motors_of_the_scene_drive_the_other_robots_and_the_controller_its_own(engine: str) -> None:
+    slider = dynx.load(SLIDER)
+    driven = SceneRobot("belt", dynx.load(SLIDER), v=(1.0,), motors=(VelocityMotor(1.0, 1e4),))
+    own = SceneRobot("slider", slider, motors=(VelocityMotor(1.0, 1e4),))
+    scene = Scene("driven", robots=(own, driven.at(dynx.Pose((0.0, 3.0, 0.0)))))
+    rollout = dynx.simulate(
+        scene.robot("slider").model, plant=ScenePlant(scene, "slider", engine=engine), duration=0.2
+    )
+    assert rollout.surroundings is not None
+    assert rollout.surroundings.robots["belt"][-1, 0] == pytest.approx(0.2, abs=1e-3)
+    assert not rollout.q.any()
 
 
 @pytest.mark.parametrize("engine", ENGINES)
