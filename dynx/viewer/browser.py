@@ -320,6 +320,16 @@ _PRESSES = """
 """Lets viser prevent the default of a press on a part that is dragged: react-three-fiber listens passively,
 and a browser then reports an error."""
 
+_OWN_COLOURS = """
+  setInterval(() => {
+    const page = window.__viserMutable, renderer = page?.scene?.__r3f?.root?.getState?.()?.gl;
+    if (!renderer || renderer.toneMapping === 0) return;
+    renderer.toneMapping = 0;
+    page.requestRender?.();
+  }, 50);
+"""
+"""Shows colours as they are: react-three-fiber makes them greyer, as films of analogue cameras do."""
+
 # A program is not told what the pointer is over. Where a version of viser keeps its scene elsewhere, no name
 # is shown.
 _NAMES_ON_HOVER = (
@@ -573,9 +583,8 @@ class Client:
         self._kept = ExitStack()
         self.folder = self._kept.enter_context(temporary_folder("dynx-page-"))
         """The folder that is served."""
-        script = (
-            ("" if antialiasing else _FOR_SOFTWARE) + _PRESSES + _NAMES_ON_HOVER + _BEFORE_PICTURES + _INPUT
-        )
+        script = "" if antialiasing else _FOR_SOFTWARE
+        script += _PRESSES + _OWN_COLOURS + _NAMES_ON_HOVER + _BEFORE_PICTURES + _INPUT
         policy = ContentPolicy("'self' data: blob:")
         self.headers = tuple(policy.headers([HANDLER_HASH]))
         """Headers with which the page is served."""
@@ -610,7 +619,7 @@ def standalone(
     With `software` the page does not say that software draws it: its meshes were reduced for that.
     """
     policy = ContentPolicy("data: blob:")
-    page = _guarded(page, _NAMES_ON_HOVER, policy)
+    page = _guarded(page, _OWN_COLOURS + _NAMES_ON_HOVER, policy)
     meta = f'<meta http-equiv="Content-Security-Policy" content="{escape(policy.text(), quote=True)}">'
     page = page.replace("<head>", f"<head>{meta}", 1)
     body = page.rfind("</body>")

@@ -20,18 +20,10 @@ from dynx.steppers.camera import Camera
 from dynx.viewer.browser import Access, CheckedMessages, Client, is_loopback
 from dynx.viewer.framing import fitted_view, round_length
 from dynx.viewer.library import serve, silent
+from dynx.world.scenery import DARK, FILL_DIRECTION, GAMMA, KEY_DIRECTION, LIGHT
 
 DEFAULT_HOST = "127.0.0.1"
 DEFAULT_PORT = 8080
-
-_SKY = 1.8
-"""Intensity of the light from above and, in another colour, from below, in a plain picture."""
-_GROUND_COLOUR = (150, 150, 150)
-"""Colour of the light from below."""
-_SUN = 2.2
-"""Intensity of the lamp of a plain picture."""
-_SUN_PLACE = (1.0, -2.0, 3.0)
-"""Place of the lamp relative to what it shines on."""
 
 _CELLS = 12
 """Number of cells along each side of the ground."""
@@ -139,12 +131,24 @@ class Page:
         self._server.gui.main_panel.dock_right()
         self._server.scene.set_up_direction("+z")
         self._server.gui.add_html(_STYLE % (NARROW, round(100.0 * _COVERED)), order=math.inf)
-        if self.plain:
-            scene = self._server.scene
-            scene.configure_environment_map(None)
-            scene.configure_default_lights(False)
-            scene.add_light_hemisphere("/sky", ground_color=_GROUND_COLOUR, intensity=_SKY)
-            scene.add_light_directional("/sun", intensity=_SUN, position=_SUN_PLACE)
+        self._add_lights()
+
+    def _add_lights(self) -> None:
+        """Light what is shown as pictures and films are: a matte surface reflects 1 / pi of a light's
+        intensity."""
+        scene, scenery = self._server.scene, DARK if self.dark else LIGHT
+        scene.configure_environment_map(None)
+        scene.configure_default_lights(False)
+        below = round(255.0 * (scenery.ground_light / scenery.sky_light) ** (1.0 / GAMMA))
+        lights = (("/sun", scenery.key, KEY_DIRECTION), ("/fill", scenery.fill, FILL_DIRECTION))
+        for name, amount, towards in lights:
+            scene.add_light_directional(name, intensity=math.pi * amount, position=tuple(towards.tolist()))
+        scene.add_light_hemisphere(
+            "/sky",
+            ground_color=(below, below, below),
+            intensity=math.pi * scenery.sky_light,
+            position=(0.0, 0.0, 1.0),
+        )
 
     @property
     def url(self) -> str:

@@ -426,7 +426,7 @@ def cast_rays_smoothly(
     ghosts: Sequence[DrawnShape] = (),
 ) -> Drawing:
     """Draw shapes as `cast_rays` does, with the mean colour of four rays in pixels at edges, which are not
-    jagged then.
+    jagged then, and in those of images on meshes.
 
     `ghosts` cast no shadow, and are seen only where they are clearly nearer than the shapes; their numbers
     follow those of the shapes. Depth and number are those of the first of the four rays, a quarter of a pixel
@@ -446,11 +446,22 @@ def cast_rays_smoothly(
     size = np.linalg.norm(normals, axis=2)
     bend = np.einsum("ij,ikj->ik", normals[:, 0], normals[:, 1:])
     edge[curved] = (bend < _SMOOTH * size[:, :1] * size[:, 1:]).any(axis=1)
+    # An image changes within a pixel.
+    varied = np.array([*(_is_varied(each) for each in (*shapes, *ghosts)), False])
+    edge |= varied[buffer.number[first]]
     shading = _Shading([*shapes, *ghosts], shapes, T_world_camera, fine, scenery, tile)
     colours = np.empty((len(every), 3))
     colours[~edge] = shading.colours(buffer, first[~edge])
     colours[edge] = shading.colours(buffer, every[edge].ravel()).reshape(-1, 4, 3).mean(axis=1)
     return Drawing(_bytes(colours), buffer.depth[first], buffer.number[first])
+
+
+def _is_varied(drawn: DrawnShape) -> bool:
+    """Check whether a shape is drawn with an image or colours of corners."""
+    if not drawn.painted or not isinstance(drawn.shape, Mesh):
+        return False
+    surface = drawn.shape.surface
+    return surface.texture is not None or surface.colours is not None
 
 
 def _bytes(colours: Floats) -> NDArray[np.uint8]:
