@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -55,6 +57,59 @@ def test_one_joint_or_joints_at_one_point_have_no_unit() -> None:
     assert MILLIMETRES.detect(arm(1000.0, 1.0, (0.0, 0.0, 0.0))) == []
 
 
+SIZES = [(1000.0, True), (1.0, False)]
+
+
+@pytest.mark.parametrize(("unit", "found"), SIZES)
+@pytest.mark.parametrize("mass", [0.5, 0.0])
+@pytest.mark.parametrize("offset", [0.3, 0.0])
+def test_a_robot_with_one_joint_distance_or_none_is_judged_by_its_shapes(
+    unit: float, found: bool, mass: float, offset: float
+) -> None:
+    box = visual(f'<box size="{0.1 * unit} {0.05 * unit} {0.2 * unit}"/>')
+    links = [link(name, box, mass=mass) for name in ("base", "wheel")]
+    one = joint("axle", "base", "wheel", f'<origin xyz="{offset * unit} 0 0"/>')
+    place = [(None, "axle") if offset else ("base", None)] if found else []
+    assert [(each.link, each.joint) for each in MILLIMETRES.detect(case_of(*links, one))] == place
+
+
+@pytest.mark.parametrize(("unit", "found"), SIZES)
+def test_a_robot_without_shapes_is_judged_by_its_centres_of_mass(unit: float, found: bool) -> None:
+    links = [link(name, mass=0.5, center=(0.0, 0.0, 0.08 * unit)) for name in ("base", "table")]
+    detections = MILLIMETRES.detect(case_of(*links, joint("axle", "base", "table")))
+    assert bool(detections) == found
+    for each in detections:
+        assert each.message == "centres of mass are 80 m from their joints in the median; the robot has 1 kg"
+
+
+@pytest.mark.parametrize("mass", [20.0, 0.0])
+def test_meshes_count_with_their_scale(tmp_path: Path, mass: float) -> None:
+    points = "v 0 0 0\nv 100 0 0\nv 0 60 0\nv 0 0 80\nf 1 2 3\nf 1 2 4\n"
+    (tmp_path / "part.obj").write_text(points)
+    for scale, found in (("", True), (' scale="0.001 0.001 0.001"', False)):
+        shape = visual(f'<mesh filename="part.obj"{scale}/>')
+        links = [link(name, shape, mass=mass / 2.0) for name in ("base", "wheel")]
+        path = tmp_path / "robot.urdf"
+        case = case_of(*links, joint("axle", "base", "wheel"), source=path)
+        path.write_bytes(case.source.data)
+        assert bool(MILLIMETRES.detect(case)) == found
+
+
+def test_a_length_in_metres_speaks_against_millimetres() -> None:
+    large = visual('<box size="100 50 200"/>')
+    near = joint("axle", "base", "wheel", '<origin xyz="0.3 0 0"/>')
+    assert MILLIMETRES.detect(case_of(link("base", large), link("wheel", large), near)) == []
+    center = link("wheel", large, center=(0.0, 0.0, 0.1))
+    assert MILLIMETRES.detect(case_of(link("base", large), center, joint("axle", "base", "wheel"))) == []
+
+
+def test_a_hall_with_a_light_door_and_an_object_without_joints_are_not_reported() -> None:
+    hall, door = visual('<box size="20 30 8"/>'), visual('<box size="1 0.05 2"/>')
+    hinge = joint("hinge", "hall", "door", '<origin xyz="10 15 0"/>')
+    assert MILLIMETRES.detect(case_of(link("hall", hall), link("door", door), hinge)) == []
+    assert MILLIMETRES.detect(case_of(link("cup", visual('<box size="80 80 100"/>')))) == []
+
+
 def test_the_furthest_joint_is_named_with_its_line() -> None:
     (found,) = MILLIMETRES.detect(arm(1000.0, 2.0))
     assert found.line == 7
@@ -97,6 +152,44 @@ def test_other_names_are_no_twins(left: str, right: str) -> None:
 def test_links_in_other_places_are_no_twins(places: tuple[str, str]) -> None:
     one, other = link("left", mass=1.0), link("right", mass=2.0)
     assert TWINS.detect(pair("left", "right", one, other, places)) == []
+
+
+def test_equal_bodies_at_unequal_distances_differ() -> None:
+    one, other = link("left", mass=1.0), link("right", mass=1.0)
+    (found,) = TWINS.detect(pair("left", "right", one, other, ("0 0.2 0", "0 -0.25 0")))
+    assert (found.link, found.line) == ("left", 5)
+    assert found.message == "the joint is 0.2 m from its parent, and 0.25 m on its twin right (line 6)"
+
+
+def test_equal_bodies_below_twins_at_unequal_distances_differ() -> None:
+    arms = [link(name) for name in ("torso", "left_arm", "right_arm", "left_hand", "right_hand")]
+    shoulders = [joint(f"{side}_shoulder", "torso", f"{side}_arm") for side in ("left", "right")]
+    wrists = [
+        joint(f"{side}_wrist", f"{side}_arm", f"{side}_hand", f'<origin xyz="{x} 0 0"/>')
+        for side, x in (("left", 0.3), ("right", 0.31))
+    ]
+    (found,) = TWINS.detect(case_of(*arms, *shoulders, *wrists))
+    assert found.link == "left_hand"
+
+
+@pytest.mark.parametrize(
+    ("places", "kind", "mass"),
+    [
+        (("0 0.2 0", "0 -0.2005 0"), "revolute", 1.0),  # half a millimetre
+        (("0 0.2 0", "0 -0.25 0"), "fixed", 1.0),  # a pair of cameras need not be mirrored
+        (("0 0.2 0", "0 -0.25 0"), "prismatic", 1.0),  # the zero of a slide may be anywhere along it
+        (("0 0.2 0", "0 -0.25 0"), "revolute", 1.02),  # another part
+    ],
+)
+def test_small_shifts_other_joints_and_other_parts_are_no_unequal_twins(
+    places: tuple[str, str], kind: str, mass: float
+) -> None:
+    links = [link("torso"), link("left"), link("right", mass=mass)]
+    joints = [
+        joint(f"joint of {name}", "torso", name, f'<origin xyz="{place}"/>', type=kind)
+        for name, place in zip(("left", "right"), places, strict=True)
+    ]
+    assert TWINS.detect(case_of(*links, *joints)) == []
 
 
 numbers = st.floats(-0.3, 0.3)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from statistics import median
 
 import numpy as np
@@ -14,15 +14,19 @@ from dynx.model.elements import Inertial, Joint
 from dynx.model.xml.source import SourceElement
 from dynx.rules import Case, Detection, Rule
 from dynx.rules.attributes import number_of, vector_of
-from dynx.rules.geometry import geometry_elements
+from dynx.rules.geometry import body_extents, geometry_elements, link_extent
 from dynx.rules.inertia import line_of
 from dynx.spatial.scalar import Floats
 
 _LONG, _LONG_WITHOUT_MASS = 5.0, 20.0
-"""Median distance of joints [m] from which a robot is examined: with masses, and without any."""
+"""Median length [m] from which a robot is examined: with masses, and without any."""
 
 _LEAST_ROBOT_DENSITY = 1e-3
 """Least mass of a robot per cube of the sum of its joint distances [kg/m^3]."""
+
+_LEAST_DENSITY_OF_FEW = 1e-5
+"""The same per cube of the sum of all its lengths, where it has fewer than two joint distances: a hall with a
+door that weighs a kilogram is not reported."""
 
 
 class RobotInMillimetres(Rule):
@@ -33,6 +37,13 @@ class RobotInMillimetres(Rule):
     has less than 1e-3 kg per cube of the sum of these distances (air has 1.2 kg per cubic metre). Without any
     mass the median must be 20 m or more. In example-robot-data and pybullet_data the largest median is 1.2 m,
     and the least mass per cube 0.017 kg/m^3.
+
+    A robot with a joint that moves and fewer distances, as many wheels, grippers and turntables have, is
+    judged by three kinds of length: that distance, the distances of centres of mass from their joints, and
+    the diagonals of the shapes of its bodies, meshes included. It is reported if it has two lengths or more,
+    each kind that it has is 5 m or more in the median, and the robot has less than 1e-5 kg per cube of the
+    sum of all. Without any mass the shapes must be 20 m or more. So a mesh alone that lacks its scale is not
+    reported here (DX517 does).
 
     Usual causes: a program that exports the drawing's unit; a file written from a data sheet.
 
@@ -47,27 +58,73 @@ class RobotInMillimetres(Rule):
     advice = "Give every length in metres, and tensors in kg m^2."
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
-        """Yield the joint that is furthest from its parent, where the robot is in millimetres."""
-        distances = {
-            joint: length
-            for joint in case.model.joints
-            if joint.moves and (length := math.hypot(*joint.origin.xyz)) > 0.0
-        }
-        if len(distances) < 2:
-            return
-        middle, total = median(distances.values()), math.fsum(distances.values())
+        """Yield the joint that is furthest from its parent, or else the link with the largest length, where
+        the robot is in millimetres."""
+        moving = [joint for joint in case.model.joints if joint.moves]
+        distances = {joint: length for joint in moving if (length := math.hypot(*joint.origin.xyz)) > 0.0}
         mass = math.fsum(link.inertial.mass for link in case.model.links if link.inertial is not None)
-        if mass > 0.0:
-            found = middle >= _LONG and mass < _LEAST_ROBOT_DENSITY * total**3
-        else:
-            found = middle >= _LONG_WITHOUT_MASS
-        if found:
+        long = _LONG if mass > 0.0 else _LONG_WITHOUT_MASS
+        if len(distances) >= 2:
+            middle, total = median(distances.values()), math.fsum(distances.values())
+            if middle < long or (mass > 0.0 and mass >= _LEAST_ROBOT_DENSITY * total**3):
+                return
             furthest = max(distances, key=lambda joint: distances[joint])
             message = (
                 f"{len(distances)} joints are {middle:.3g} m from their parents in the median, and this one "
                 f"{distances[furthest]:.3g} m; the robot has {mass:.3g} kg"
             )
             yield Detection(None, furthest.name, furthest.line, message)
+        elif moving:
+            yield from _few_distances(case, distances, mass, long)
+
+
+def _few_distances(
+    case: Case, distances: Mapping[Joint, float], mass: float, long: float
+) -> Iterator[Detection]:
+    """Yield what is furthest in a robot in millimetres with at most one joint distance."""
+    centers = {
+        link.name: length
+        for link in case.model.links
+        if link.inertial is not None
+        and link.inertial.mass > 0.0
+        and (length := math.hypot(*link.inertial.origin.xyz)) > 0.0
+    }
+    kinds = {
+        "the joint is {} m from its parent": list(distances.values()),
+        "centres of mass are {} m from their joints in the median": list(centers.values()),
+    }
+    # Meshes are read only where nothing else speaks against it.
+    if any(lengths and median(lengths) < long for lengths in kinds.values()):
+        return
+    sizes = _sizes_of_bodies(case) if mass > 0.0 else _sizes_of_links(case)
+    kinds["shapes are {} m across in the median"] = list(sizes.values())
+    found = {text: lengths for text, lengths in kinds.items() if lengths}
+    total = math.fsum(map(math.fsum, found.values()))
+    if sum(map(len, found.values())) < 2 or any(median(lengths) < long for lengths in found.values()):
+        return
+    if mass > 0.0 and mass >= _LEAST_DENSITY_OF_FEW * total**3:
+        return
+    texts = [text.format(f"{median(lengths):.3g}") for text, lengths in found.items()]
+    message = f"{', '.join(texts)}; the robot has {mass:.3g} kg"
+    if distances:
+        (joint,) = distances
+        yield Detection(None, joint.name, joint.line, message)
+    else:
+        largest = max((sizes or centers), key=lambda name: (sizes or centers)[name])
+        yield Detection(largest, None, case.links[largest].line, message)
+
+
+def _sizes_of_bodies(case: Case) -> dict[str, float]:
+    """Return the diagonals [m] of the shapes of rigid bodies with mass, by the names of their first links."""
+    return {group.head: extent.diagonal() for group, extent in body_extents(case)}
+
+
+def _sizes_of_links(case: Case) -> dict[str, float]:
+    """Return the diagonals [m] of the shapes of links."""
+    extents = {name: link_extent(link, case.source.source) for name, link in case.links.items()}
+    return {
+        name: extent.diagonal() for name, extent in extents.items() if extent is not None and not extent.empty
+    }
 
 
 # Twins: the left and the right one of two links, by their names.
@@ -96,27 +153,37 @@ _MOMENTS_ALIKE = 0.1
 _CENTERS_ALIKE, _LEAST_OFFSET = 0.1, 0.005
 """Difference of the distances of their centres of mass from their joints: relative, and in metres."""
 
-_PLACES_ALIKE = 0.01
-"""Relative difference of the distances of their joints from their parents, up to which links are twins."""
+_PLACES_ALIKE, _LEAST_SHIFT = 0.01, 0.001
+"""Difference of the distances of their joints from their parents, up to which they are equal: relative, and
+from which they are reported: in metres, too."""
+
+_MASSES_EQUAL = 0.01
+"""Relative difference of masses up to which links with unequal distances are twins."""
 
 
 class TwinsDiffer(Rule):
-    """DX521 twins-differ: A left and a right link differ in mass, in principal moments or in the place of
-    their centre of mass.
+    """DX521 twins-differ: A left and a right link differ in mass, in principal moments, in the place of
+    their centre of mass or in the distance of their joint.
 
     Twins are links whose names differ in words such as ``left`` and ``right``, ``L`` and ``R``, ``FL`` and
-    ``FR``, on joints of one type that are equally far from their parents (to 1 %). Compared are numbers that
-    neither a reflection nor another choice of link frames changes: the mass, the principal moments and the
-    distance of the centre of mass from the joint. Reported are masses or moments that differ by more than 10
-    %, and distances that differ by more than 10 % and 5 mm. Of 108 files of example-robot-data eight are
-    reported: three in which the moments of forearms differ by 11 to 14 %, two in which those of one leg are
-    zero, and three in which the moments of an arm are exchanged. Of more than 1,000 files of pybullet_data
-    one is: a bracket's centre of mass is at 2 cm on the left and at 3 cm on the right.
+    ``FR``, on joints of one type. Compared are numbers that neither a reflection nor another choice of link
+    frames changes. Where the joints are equally far from their parents (to 1 %), these are the mass, the
+    principal moments and the distance of the centre of mass from the joint. Reported are masses or moments
+    that differ by more than 10 %, and distances that differ by more than 10 % and 5 mm.
+
+    Where the joints are not equally far, links are twins if their joints rotate, their parents are one link
+    or twins by name, and masses (to 1 %), moments and centres of mass are alike. Reported are distances of
+    the joints that differ by more than 1 % and 1 mm. (The zero of a sliding joint may be anywhere along it.)
+
+    Of 108 files of example-robot-data eight are reported: three in which the moments of forearms differ by 11
+    to 14 %, two in which those of one leg are zero, and three in which the moments of an arm are exchanged.
+    Of more than 1,000 files of pybullet_data eight are: a bracket's centre of mass is at 2 cm on the left and
+    at 3 cm on the right; the upper legs of five Laikagos are 2 mm further from the hips on the left, and
+    motors of two minitaurs 2 and 26 mm further from the body on one side.
 
     Usual causes: one side was measured or exported again and the other was not; an extra digit; moments in
     another unit; one of several signs of products of inertia was lost in reflecting the file. A sign that is
-    lost alone, of a product or of the centre of mass, changes none of these numbers, and links on joints that
-    differ in their distance from the parent are not compared.
+    lost alone, of a product or of the centre of mass, changes none of these numbers.
 
     All engines use the numbers unchanged. The robot leans to one side, and a gait that was tuned on one leg
     fails on the other. Where the parts differ (a tool in one hand), nothing is wrong.
@@ -129,11 +196,16 @@ class TwinsDiffer(Rule):
 
     def occurrences(self, case: Case) -> Iterable[Detection]:
         """Yield the left link of each pair of twins that differ."""
+        joints = {joint.child: joint for joint in case.model.joints}
         for left, right in _twins(case):
-            message = _difference_of_twins(case.model.inertial(left), case.model.inertial(right))
+            one, other = joints[left], joints[right]
+            message = _difference_of_places(one, other)
+            line, line_of_twin = one.line, other.line
+            if _placed_alike(one, other):
+                message = _difference_of_twins(case.model.inertial(left), case.model.inertial(right))
+                line, line_of_twin = line_of(case, left, "inertia"), line_of(case, right, "inertia")
             if message:
-                place = f"its twin {right} (line {line_of(case, right, 'inertia')})"
-                yield Detection(left, None, line_of(case, left, "inertia"), f"{message} on {place}")
+                yield Detection(left, None, line, f"{message} on its twin {right} (line {line_of_twin})")
 
 
 def _twins(case: Case) -> Iterator[tuple[str, str]]:
@@ -146,8 +218,11 @@ def _twins(case: Case) -> Iterator[tuple[str, str]]:
         twin = next(candidates, link.name)
         if twin in seen or twin == link.name or not {link.name, twin} <= joints.keys():
             continue
-        masses = case.model.inertial(link.name).mass, case.model.inertial(twin).mass
-        if min(masses) > 0.0 and _placed_alike(joints[link.name], joints[twin]):
+        one, other = joints[link.name], joints[twin]
+        inertials = case.model.inertial(link.name), case.model.inertial(twin)
+        if one.type != other.type or min(each.mass for each in inertials) <= 0.0:
+            continue
+        if _placed_alike(one, other) or (_attached_alike(one, other) and _equal_bodies(*inertials)):
             seen |= {link.name, twin}
             yield link.name, twin
 
@@ -166,8 +241,39 @@ def _reflected_names(name: str) -> Iterator[str]:
 
 
 def _placed_alike(one: Joint, other: Joint) -> bool:
-    distances = math.hypot(*one.origin.xyz), math.hypot(*other.origin.xyz)
-    return one.type == other.type and math.isclose(*distances, rel_tol=_PLACES_ALIKE, abs_tol=1e-6)
+    """Check whether two joints are equally far from their parents."""
+    return math.isclose(*_distances(one, other), rel_tol=_PLACES_ALIKE, abs_tol=1e-6)
+
+
+def _attached_alike(one: Joint, other: Joint) -> bool:
+    """Check whether two joints rotate links of one parent, or of parents that are twins by name."""
+    parents = one.parent.lower(), other.parent.lower()
+    rotate = one.type in ("revolute", "continuous")
+    return rotate and (parents[0] == parents[1] or parents[1] in _names_of_twins(one.parent))
+
+
+def _names_of_twins(name: str) -> set[str]:
+    """Return the names, in lower case, that the twin of a left or of a right link may have."""
+    words = [word.lower() for word in _WORD.findall(name)]
+    return {"".join(_RIGHT.get(word) or _LEFT.get(word, word) for word in words), *_reflected_names(name)}
+
+
+def _equal_bodies(left: Inertial, right: Inertial) -> bool:
+    """Check whether two links are copies of one part by their inertia."""
+    alike = math.isclose(left.mass, right.mass, rel_tol=_MASSES_EQUAL)
+    return alike and not _difference_of_twins(left, right)
+
+
+def _distances(one: Joint, other: Joint) -> tuple[float, float]:
+    return math.hypot(*one.origin.xyz), math.hypot(*other.origin.xyz)
+
+
+def _difference_of_places(one: Joint, other: Joint) -> str:
+    """Describe the difference of the distances of two joints; empty where it is small."""
+    left, right = _distances(one, other)
+    if abs(left - right) <= _LEAST_SHIFT:
+        return ""
+    return f"the joint is {left:.4g} m from its parent, and {right:.4g} m"
 
 
 def _difference_of_twins(left: Inertial, right: Inertial) -> str:
