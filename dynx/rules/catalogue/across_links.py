@@ -162,8 +162,8 @@ _MASSES_EQUAL = 0.01
 
 
 class TwinsDiffer(Rule):
-    """DX521 twins-differ: A left and a right link differ in mass, in principal moments, in the place of
-    their centre of mass or in the distance of their joint.
+    """DX521 twins-differ: A left and a right link differ in mass, moments, centre of mass or distance of
+    the joint.
 
     Twins are links whose names differ in words such as ``left`` and ``right``, ``L`` and ``R``, ``FL`` and
     ``FR``, on joints of one type. Compared are numbers that neither a reflection nor another choice of link
