@@ -128,11 +128,12 @@ def write_film(
     progress: Progress = lambda _: None,
     *,
     dark: bool = False,
+    stage: Stage | None = None,
 ) -> None:
     """Write motions as a film that plays in the time of the longest, by the suffix of the file (`.gif`, which
     begins again, or `.mp4`). Raises the errors of `write_pictures`."""
     first, duration = motions[0], _duration(motions)
-    stage, count = stage_for(first, dark=dark), film_length(motions)
+    stage, count = stage or stage_for(first, dark=dark), film_length(motions)
 
     def pictures() -> Iterator[NDArray[np.uint8]]:
         for k, time in enumerate(np.linspace(first.t[0], first.t[0] + duration, count).tolist()):

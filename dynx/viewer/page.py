@@ -252,8 +252,12 @@ class Page:
 
     def on_own_key(self, key: str, what: str, pressed: Callable[[], None]) -> None:
         """Call `pressed()` when a key is pressed that the page itself uses, for `what`."""
+        self.on_own_key_of(key, what, lambda _: pressed())
+
+    def on_own_key_of(self, key: str, what: str, pressed: Callable[[Any], None]) -> None:
+        """Call `pressed(client)` with the page in which a key is pressed that the page itself uses."""
         self.reserved_keys[key] = what
-        self.gui.add_command(what, hotkey=key).on_trigger(lambda _: pressed())
+        self.gui.add_command(what, hotkey=key).on_trigger(lambda event: pressed(event.client))
 
     def at_end(self, action: Callable[[], None]) -> None:
         """Call `action` when what is shown at present is removed or the page is closed."""

@@ -6,6 +6,7 @@ import os
 import threading
 import webbrowser
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -24,6 +25,7 @@ from dynx.viewer.appearance import PartVisibility, SavedViews, camera_of, look_f
 from dynx.viewer.controls import Controls
 from dynx.viewer.drawn_robot import DrawnParts, Look
 from dynx.viewer.page import DEFAULT_HOST, DEFAULT_PORT, Page
+from dynx.viewer.recording import RecordingControls
 from dynx.viewer.triangles import TRIANGLE_BUDGET, has_graphics_processor
 
 if TYPE_CHECKING:
@@ -296,6 +298,7 @@ class Viewer(Controls):
                 view = view_of(self.page, opened, self._look, options)
                 self._views.add_controls(self.page)
                 self._appearance = PartVisibility(self.page, view)
+                RecordingControls(self.page, view)
                 return view
         except BaseException:
             self.page.close()
@@ -408,8 +411,8 @@ class Viewer(Controls):
         ``"depth"``, or its ``"parts"`` in colours that tell them apart.
 
         It is drawn as `World.camera` draws it, by this machine, at most 8 times a second; small pictures,
-        such as 160 x 120 pixels, come sooner. `remove_all` removes it. Raises ArgumentError for another kind, and
-        UnknownNameError for an unknown part that carries the camera.
+        such as 160 x 120 pixels, come sooner. `remove_all` removes it. Raises ArgumentError for another kind,
+        and UnknownNameError for an unknown part that carries the camera.
         """
         from dynx.viewer.camera_pane import CameraPane
 
@@ -493,6 +496,21 @@ class Viewer(Controls):
         return embedded_page(
             self.page, view.go_to, view.duration, title=title, legend=view.legend, height=pixels
         )
+
+    def record(
+        self, path: str | os.PathLike[str], progress: Callable[[int], object] = lambda _: None
+    ) -> AbstractContextManager[None]:
+        """Record what the page shows in a ``with`` block as a film, which is drawn at its end without a
+        browser: ``.gif``, or ``.mp4`` (extra ``film``).
+
+        A film of a live world plays in the time of the world, any other in that of the clock; it has 12.5
+        pictures a second and ends after 40 s. Raises ArgumentError for another suffix and for a file that
+        cannot be written, and NotInstalledError without the package that writes the film.
+        """
+        from dynx.viewer.recording import recorded_film
+
+        self.page.check_open()
+        return recorded_film(self.page, self.view, path, progress, dark=self.page.dark)
 
     def wait(self, seconds: float | None = None) -> bool:
         """Wait until the page is closed, or for `seconds`; return True once it is."""
