@@ -40,19 +40,21 @@ RIGIDITY_TOLERANCE = 1e-6
 
 def matrix_of_pair(pose: Any, name: str) -> Any:
     """Return the poses (..., 4, 4) of a pair: positions (..., 3) [m] and unit quaternions (x, y, z, w)
-    (..., 4). Anything else is returned as it is.
+    (..., 4); or those (n, ..., 4, 4) of n such pairs. Anything else is returned as it is.
 
     Raises ArgumentError for a quaternion whose length differs from 1 by more than 1e-6, NotFiniteError and
     its kinds for numbers.
     """
-    if not isinstance(pose, tuple | list) or len(pose) != 2:
-        return pose
-    try:
-        shapes = [np.shape(part)[-1:] for part in pose]
-    except ValueError:  # ragged
-        return pose
-    if shapes != [(3,), (4,)]:
-        return pose
+    if not _is_pair(pose):
+        # The first alone is looked at, because a path may have thousands of other targets.
+        if not (isinstance(pose, tuple | list) and pose and _is_pair(pose[0]) and all(map(_is_pair, pose))):
+            return pose
+        poses = [matrix_of_pair(each, f"{name}[{k}]") for k, each in enumerate(pose)]
+        if len({each.shape for each in poses}) > 1:
+            raise ShapeError(
+                f"{name} has pairs of poses with shapes {sorted({each.shape for each in poses})}"
+            )
+        return np.stack(poses)
     position, quat_xyzw = (checked_entries(name, real_array(name, part)) for part in pose)
     try:
         np.broadcast_shapes(position.shape[:-1], quat_xyzw.shape[:-1])
@@ -62,6 +64,16 @@ def matrix_of_pair(pose: Any, name: str) -> Any:
             "whose leading axes do not broadcast"
         ) from None
     return homogeneous(rotation_from_quat(checked_quaternion(name, quat_xyzw)), position)
+
+
+def _is_pair(pose: Any) -> bool:
+    """Check whether an object is a pair of positions (..., 3) and quaternions (..., 4)."""
+    if not isinstance(pose, tuple | list) or len(pose) != 2:
+        return False
+    try:
+        return [np.shape(part)[-1:] for part in pose] == [(3,), (4,)]
+    except ValueError:  # ragged
+        return False
 
 
 def rigid_matrix(T: ArrayLike, name: str) -> Floats:

@@ -73,8 +73,8 @@ class Targets:
 
 def checked_targets(target: ArrayLike, free: str | None = None) -> Targets:
     """Read poses T_world_target (..., 4, 4), also as a pair of positions (..., 3) and unit quaternions
-    (x, y, z, w) (..., 4); positions (..., 3) [m], whose rotation is free; or rotations (..., 3, 3) if the
-    position is `free`.
+    (x, y, z, w) (..., 4), or as a list of such pairs; positions (..., 3) [m], whose rotation is free; or
+    rotations (..., 3, 3) if the position is `free`.
 
     A rotation that is orthonormal only to 1e-6 is replaced by the nearest rotation (Higham, Matrix nearness
     problems, section 3). Raises ShapeError, DTypeError, NotFiniteError, or ArgumentError for a matrix that is
@@ -98,8 +98,9 @@ def checked_targets(target: ArrayLike, free: str | None = None) -> Targets:
         return Targets(array, None)
     if array.ndim < 2 or array.shape[-2:] != (4, 4):
         raise ShapeError(
-            f"target has shape {array.shape}; wanted a pose (..., 4, 4), a position (..., 3), or with "
-            "free='position' a rotation (..., 3, 3)"
+            f"target has shape {array.shape}; wanted a pose (..., 4, 4), a pair of a position (..., 3) and a "
+            "quaternion (x, y, z, w) (..., 4), a position (..., 3), or with free='position' a rotation "
+            "(..., 3, 3)"
         )
     return Targets(array[..., :3, 3], _checked_rotations(array))
 

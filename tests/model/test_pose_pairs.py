@@ -45,6 +45,37 @@ def test_a_pair_is_the_matrix(seed: int, batch: tuple[int, ...], listed: bool) -
         assert np.abs(checked_pose("pose", pair).matrix - T).max() < 1e-14
 
 
+@given(st.integers(0, 2**32 - 1), st.sampled_from([(), (3,)]), st.integers(1, 4), st.booleans())
+def test_a_list_of_pairs_is_a_stack_of_matrices(
+    seed: int, batch: tuple[int, ...], count: int, listed: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+    pairs: list[Any] = []
+    for _ in range(count):
+        quat = rng.normal(size=(*batch, 4))
+        quat /= np.linalg.norm(quat, axis=-1, keepdims=True)
+        pairs.append((rng.normal(size=(*batch, 3)), quat))
+    expected = np.stack([matrix_of_pair(each, "pose") for each in pairs])
+    given_pairs = [[each.tolist() for each in pair] for pair in pairs] if listed else tuple(pairs)
+    assert np.array_equal(matrix_of_pair(given_pairs, "pose"), expected)
+
+
+@pytest.mark.parametrize(
+    ("target", "message"),
+    [
+        ([((0, 0, 1), (0, 0, 0, 1)), ((0, 0, 1), (0, 0, 1, 1))], r"target\[1\] is a quaternion"),
+        (
+            [((0, 0, 1), (0, 0, 0, 1)), (np.zeros((2, 3)), (0, 0, 0, 1))],
+            "target has pairs of poses with shapes",
+        ),
+        ([0, 0, 1, 0, 0, 0, 1], r"a pair of a position \(..., 3\) and a quaternion \(x, y, z, w\)"),
+    ],
+)
+def test_what_is_no_pair_is_named(target: Any, message: str) -> None:
+    with dynx.backend("reference", ARM) as engine, pytest.raises(ArgumentError, match=message):
+        engine.inverse_kinematics(target, "tool0", Q)
+
+
 @pytest.mark.parametrize("backend", BACKENDS)
 @pytest.mark.parametrize("name", MODELS)
 def test_inverse_kinematics_takes_it_in_every_form(backend: str, name: str) -> None:
@@ -65,8 +96,9 @@ def test_inverse_kinematics_takes_it_in_every_form(backend: str, name: str) -> N
             found, expected = solve(pair_of(T)), solve(T)
             assert found.success
             assert np.abs(found.q - expected.q).max() < 1e-6
-        several = engine.inverse_kinematics(pair_of(np.stack([T, T])), frame, q)
-        assert several.success.tolist() == [True, True]
+        for pairs in (pair_of(np.stack([T, T])), [pair_of(T), pair_of(T)]):
+            several = engine.inverse_kinematics(pairs, frame, q)
+            assert several.success.tolist() == [True, True]
 
 
 def test_closed_forms_paths_lines_and_velocities_take_it() -> None:
@@ -77,8 +109,9 @@ def test_closed_forms_paths_lines_and_velocities_take_it() -> None:
         by_form = dynx.ik.closed_form(ARM, "tool0").solve(pair_of(T))
         assert len(by_form.q) == len(dynx.ik.closed_form(ARM, "tool0").solve(T).q)
         path = engine.forward_kinematics(Q + np.linspace(0.0, 0.1, 5)[:, None], "tool0")
-        tracked = engine.track(pair_of(path), "tool0", Q)
-        assert np.abs(tracked.q - engine.track(path, "tool0", Q).q).max() < 1e-9
+        for pairs in (pair_of(path), [pair_of(each) for each in path]):
+            tracked = engine.track(pairs, "tool0", Q)
+            assert np.abs(tracked.q - engine.track(path, "tool0", Q).q).max() < 1e-9
         end = engine.forward_kinematics(Q + 0.1, "tool0")
         reached = line(ARM, "tool0", Q, pair_of(end), 2.0)(2.0)[0]
         assert np.abs(engine.forward_kinematics(reached, "tool0") - end).max() < 1e-4
