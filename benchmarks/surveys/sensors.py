@@ -33,6 +33,7 @@ from benchmarks.surveys.joint_wrenches import ROBOTS, MujocoRobot, moved_mass
 from dynx.backends import Backend, backend
 from dynx.control import MomentumObserver, SensorMotion, identify_tool
 from dynx.control.observers.tool import Tool
+from dynx.control.observers.wrench_estimate import MIN_RATIO
 from dynx.errors import EngineLimitError, UnsupportedFeatureError
 from dynx.model import Joint, JointDynamics, Link, Model, Pose
 from dynx.model.loading import load
@@ -505,22 +506,22 @@ def observe(name: str, base: Base, seed: int, worst: Worst) -> None:
             observer = MomentumObserver(model, time_constant=duration / 5.0, backend=engine)
             found = observer.residuals(t, Q, V, tau)[-1]
             J = engine.jacobian(Q[-1], link.name)
-            # The force alone and together with a moment, as far as the torques show it.
+            # The smallest wrench with these torques, without directions that hardly have any.
             where = f"{name}, {base} base, {link.name}"
             error = float(np.linalg.norm(found - J.T @ wrench) / np.linalg.norm(J.T @ wrench))
             note(worst, "external torque", error, where)
             estimate = observer.wrench(Q[-1], found, link.name)
-            shown = np.linalg.pinv(J.T, rcond=1e-6) @ (J.T @ wrench)
+            shown = np.linalg.pinv(J.T, rcond=MIN_RATIO) @ (J.T @ wrench)
             note(worst, "wrench", float(np.linalg.norm(estimate.wrench - shown)) / FORCE, where)
     print(f"{name}, {base} base: 20 N on {seen} of {len(model.links)} links; the others are the base")
 
 
 def time_constant(engine: Backend, q: Floats, frame: str, torque: Floats) -> float:
     """Return a time constant [s] of at most 1 ms, in five of which the force moves nothing by more than about
-    a millimetre or a milliradian: what it acts on turns and falls away."""
+    0.1 mm or 0.1 mrad: what it acts on turns and falls away, and its torques change."""
     a = np.linalg.solve(engine.mass_matrix(q), torque)
     fastest = max(float(np.abs(engine.jacobian(q, frame) @ a).max()), float(np.abs(a).max()))
-    return min(1e-3, math.sqrt(2.0 * 1e-3 / fastest) / 5.0)
+    return min(1e-3, math.sqrt(2.0 * 1e-4 / fastest) / 5.0)
 
 
 def moved(

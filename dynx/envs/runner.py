@@ -363,6 +363,9 @@ class WorldEpisodes(Episodes):
             world = self._open(scene)
             self._world.close()
             self._world = world
+        if self._world.scene.sensors:
+            # Otherwise their errors would be the same in all episodes and copies.
+            self._world.rollout = int(rng.integers(2**53))
         self._episode = episode = Episode(self._world, rng, memory)
         task.start(episode, **options)
         return task.observation(episode), task.info(episode)

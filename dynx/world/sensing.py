@@ -165,8 +165,25 @@ class WorldSensors:
             sensor.period(self._h)
             if isinstance(sensor, ContactSensor):
                 require_shapes(sensor.place(parts), layout)
-        self._numbers = {each.name: SampleNumbers(each.name, each.seed, 0, each.size) for each in sensors}
+        self._rollout = 0
+        self._draw_for(0)
         self.forget()
+
+    @property
+    def rollout(self) -> int:
+        """Number of the rollout, on which the random numbers depend."""
+        return self._rollout
+
+    @rollout.setter
+    def rollout(self, number: int) -> None:
+        self.kept()  # samples that were taken have the numbers of their own rollout
+        self._draw_for(number)
+
+    def _draw_for(self, rollout: int) -> None:
+        self._rollout = rollout
+        self._numbers = {
+            each.name: SampleNumbers(each.name, each.seed, rollout, each.size) for each in self._sensors
+        }
 
     def forget(self) -> None:
         """Forget all samples: the state was set."""

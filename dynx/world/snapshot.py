@@ -68,6 +68,8 @@ class Snapshot:
     samples: Mapping[Sensor | str, Floats] = field(default_factory=dict)
     """Samples (k, 1 + size) of the sensors of a world that are held or delayed, each after its time, on which
     no later step depends; from a file by the sensors' names, and empty in files of earlier versions."""
+    rollout: int = 0
+    """Number of the rollout of a world (`World.rollout`)."""
 
     def _content(self) -> tuple[Any, ...]:
         arrays = tuple((name, x.shape, x.tobytes()) for name, x in self.arrays.items())
@@ -143,6 +145,7 @@ def write_snapshot(path: str | os.PathLike[str], snapshot: Snapshot, world: dict
             for name in _robots(world)
         ],
         "torques": [[x.hex() for x in snapshot.torques[name].tolist()] for name in _robots(world)],
+        "rollout": snapshot.rollout,
         "samples": {
             each if isinstance(each, str) else each.name: [[x.hex() for x in row] for row in rows.tolist()]
             for each, rows in snapshot.samples.items()
@@ -217,7 +220,17 @@ def _snapshot(header: dict[str, Any], robots: Sequence[str], data: bytes) -> Sna
     time, start = (float.fromhex(header[name]) for name in ("time", "start"))
     steps = int(header["steps"])
     return Snapshot(
-        engine, version, identity, time, start, steps, arrays, data, torques=torques, samples=samples
+        engine,
+        version,
+        identity,
+        time,
+        start,
+        steps,
+        arrays,
+        data,
+        torques=torques,
+        samples=samples,
+        rollout=int(header.get("rollout", 0)),
     )
 
 

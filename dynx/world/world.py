@@ -18,7 +18,7 @@ from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, UnknownNameError, shown
 from dynx.model import Model, Pose
 from dynx.model.geometry import Mesh
-from dynx.model.numbers import checked_bool, positive_seconds
+from dynx.model.numbers import checked_bool, positive_seconds, whole_number
 from dynx.model.package_search import StrPath
 from dynx.option_names import as_object, checks_option_names, refuse_options, right_name
 from dynx.rbd.jacobians import LOCAL, checked_reference
@@ -214,6 +214,7 @@ class World:
         self._motion = Motion(self._layout, self._commands, self._build, self.dt, self.substeps)
         self._last_step: LastStep | None = None
         self._sensors: WorldSensors | None = None
+        self._rollout = 0
         if keep_last_step or scene.sensors:
             # Imported here, because most worlds do not need it.
             from dynx.world.last_step import LastStep
@@ -403,6 +404,18 @@ class World:
         step, engine = self._kept_step(), self._motion.engine
         return step.reactions(engine, self.state, self.contacts())
 
+    @property
+    def rollout(self) -> int:
+        """Number of the rollout, 0 at first, on which the random numbers of the sensors depend, as those of a
+        simulation on `Noise.rollout`. Set it where a world takes several runs, whose noise is to differ."""
+        return self._rollout
+
+    @rollout.setter
+    def rollout(self, number: int) -> None:
+        self._rollout = whole_number("rollout", number, 0)
+        if self._sensors is not None:
+            self._sensors.rollout = self._rollout
+
     def read_sensors(self) -> dict[str, SensorReading]:
         """Return the last reading of each sensor of the scene, by name.
 
@@ -477,6 +490,7 @@ class World:
             engine.dump(),
             torques=dict(self.state.torques),
             samples={} if self._sensors is None else self._sensors.kept(),
+            rollout=self._rollout,
         )
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -494,6 +508,7 @@ class World:
             engine.load(snapshot.data)
             self._commands.remember(snapshot.arrays, snapshot.torques)
 
+        self.rollout = snapshot.rollout
         if self._sensors is not None:
             self._sensors.restore(snapshot.samples)
         self._motion.change(load, (snapshot.start, snapshot.steps))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from dynx.envs.tasks.stand import Stand
 from dynx.envs.tasks.walk import Walk
 from dynx.errors import ArgumentError, EpisodeError, UnknownNameError
 from dynx.steppers.registry import installed_worlds
+from dynx.world import Imu, SensorErrors
 from tests.envs.hail import Hail
 from tests.envs.scripted import Controller, posture, pushing, run, trot
 
@@ -270,3 +272,32 @@ def test_an_episode_with_a_scene_of_its_own_is_that_of_its_seed(engine: str) -> 
     finally:
         env.close()
         again.close()
+
+
+class Noisy(Stand):
+    """A robot that sees its acceleration by a sensor with noise, and by one without."""
+
+    def scene(self) -> Any:
+        errors = SensorErrors(noise=1.0, random_walk=1.0)
+        scene = super().scene()
+        (robot,) = scene.robots
+        exact = Imu("exact", f"{robot.name}/{robot.model.root}")
+        return replace(scene, sensors=(exact, replace(exact, name="noisy", accelerometer=errors)))
+
+    def info(self, episode: Any) -> dict[str, Any]:
+        return {name: each.values for name, each in episode.world.read_sensors().items()}
+
+
+def test_the_noise_of_sensors_differs_between_episodes_and_follows_the_seed() -> None:
+    with TaskEnvironment(Noisy(), "mujoco") as env:
+        still = np.zeros(env.action_space.shape or (), dtype=np.float32)
+
+        def errors(seed: int | None) -> Any:
+            env.reset(seed=seed)
+            found = [env.step(still)[-1] for _ in range(3)]
+            return np.array([each["noisy"] - each["exact"] for each in found])[:, :3]
+
+        first, second = errors(3), errors(None)
+        assert np.abs(first).min() > 1e-6 < np.abs(first - second).min()
+        np.testing.assert_array_equal(errors(3), first)
+        np.testing.assert_array_equal(errors(None), second)

@@ -92,9 +92,15 @@ class SensorErrors:
         for each in fields(self):
             value = np.array(getattr(self, each.name), dtype=np.float64)
             if each.name == "cross_axis":
-                if value.shape not in ((), (size, size)) or (size == 1 and value.any()):
-                    wanted = "0" if size == 1 else f"one number or a matrix ({size}, {size})"
-                    raise GainError(f"cross_axis of {name} has shape {value.shape}; wanted {wanted}")
+                if size == 1 and value.any():
+                    raise GainError(
+                        f"cross_axis of {name} is {value.tolist()}; wanted 0, because it measures one number"
+                    )
+                if value.shape not in ((), (size, size)):
+                    raise GainError(
+                        f"cross_axis of {name} has shape {value.shape}; wanted one number or a matrix "
+                        f"({size}, {size})"
+                    )
             elif each.name not in ("saturation", "bias", "scale"):
                 checked_gain(f"{each.name} of {name}", value, size, per="one for each component")
             elif value.shape not in ((), (size,)):

@@ -154,5 +154,5 @@ def test_invalid_errors_are_refused(given: dict[str, object], kind: type[Excepti
 def test_errors_that_do_not_fit_the_components_are_refused() -> None:
     with pytest.raises(GainError, match=r"bias of gyro has shape \(2,\); wanted one number or 3"):
         SensorErrors(bias=[1.0, 2.0]).require("gyro", 3)
-    with pytest.raises(GainError, match="cross_axis of the encoder"):
+    with pytest.raises(GainError, match=r"cross_axis of the encoder is 0.1; wanted 0, because it"):
         SensorErrors(cross_axis=0.1).require("the encoder", 1)

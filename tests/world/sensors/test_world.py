@@ -142,6 +142,30 @@ def test_a_world_reads_what_its_record_reads(engine: str) -> None:
                     np.testing.assert_allclose(found[name].values, values, rtol=1e-9, atol=1e-9)
 
 
+def test_the_number_of_a_rollout_is_that_of_a_simulation() -> None:
+    arm = dynx.load("ur5")
+    encoder = Encoder("elbow", "arm/elbow_joint", position=replace(NOISY, cross_axis=0.0))
+    scene = Scene("cell", robots=(SceneRobot("arm", arm, q=Q0),), sensors=(encoder,))
+    plant = ScenePlant(scene, "arm", "mujoco")
+    rollouts = [
+        dynx.simulate(arm, None, duration=0.005, plant=plant, noise=dynx.Noise(rollout=k)) for k in (0, 7)
+    ]
+    with World(scene, "mujoco") as world:
+        for number, rollout in zip((0, 7), rollouts, strict=True):
+            world.reset()
+            world.rollout = number
+            world.step(5)
+            found = world.read_sensors()["elbow"]
+            np.testing.assert_allclose(found.values, rollout.sensors["elbow"].values[-1], rtol=0, atol=1e-12)
+            # What was read keeps its number.
+            world.rollout = 3
+            assert world.read_sensors()["elbow"].values.tolist() == found.values.tolist()
+        with pytest.raises(ArgumentError, match="rollout is '-1'; wanted a whole number"):
+            world.rollout = -1
+    values = [each.sensors["elbow"]["position"] for each in rollouts]
+    assert (values[0] != values[1]).any()
+
+
 def test_a_state_that_is_set_has_no_readings_before_the_next_step() -> None:
     scene, _ = field()
     with World(scene, "mujoco") as world:
@@ -210,6 +234,20 @@ def test_a_saved_world_continues_with_its_readings_bit_for_bit(engine: str, tmp_
             assert other.read_sensors() == {}
     with World.read(tmp_path / "mid.world") as world:
         assert readings(world) == now
+        assert later(world) == expected
+    # The number of the rollout, of which those that were taken before do not depend, is saved too.
+    with World(scene, engine) as world:
+        world.rollout = 5
+        world.step(37, motors=motors)
+        assert readings(world) != now
+        saved = world.save()
+        world.write(tmp_path / "fifth.world")
+        fifth, expected = readings(world), later(world)
+        world.rollout = 0
+        world.restore(saved)
+        assert (world.rollout, readings(world)) == (5, fifth)
+        assert later(world) == expected
+    with World.read(tmp_path / "fifth.world") as world:
         assert later(world) == expected
     wrong = replace(saved, samples={"imu": np.zeros((2, 5))})
     with World(scene, engine) as world, pytest.raises(ArgumentError, match=r"imu.* have shape \(2, 5\)"):
