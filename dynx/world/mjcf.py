@@ -102,10 +102,17 @@ def layout_to_mjcf(
     )
 
 
+_COMMENT = re.compile("<!-- (.*?) -->\n", re.DOTALL)
+
+
 def mjcf_remarks(document: str) -> tuple[str, ...]:
     """Return the comments at the beginning of a document of `scene_to_mjcf`, after the first, which is the
     same in all: they name what the document cannot carry."""
-    found: list[str] = re.findall("<!-- (.*?) -->", document.partition("<mujoco")[0], re.DOTALL)
+    found, end = [], 0
+    # One after the other, because a name may look like an element.
+    while (comment := _COMMENT.match(document, end)) is not None:
+        found.append(comment[1])
+        end = comment.end()
     return tuple(found[1:])
 
 

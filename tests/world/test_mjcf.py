@@ -475,6 +475,16 @@ def test_a_document_names_the_rebound_that_its_steps_cannot_have(monkeypatch: py
     assert f"In this document {inexact}." in remarks
 
 
+def test_remarks_are_read_whatever_the_names() -> None:
+    losses = '<limit lower="-9" upper="9" effort="1" velocity="1"/><dynamics friction="0.2"/>'
+    model = chain(INERTIAL, INERTIAL, joint=losses)
+    names = ("<mujoco", "a --> b", "-", "--")
+    scene = Scene("s", robots=tuple(SceneRobot(name, model) for name in names))
+    remarks = mjcf_remarks(scene_to_mjcf(scene, substeps=2))
+    assert [each.partition(": the dry")[0] for each in remarks[1:]] == ["<mujoco", "a - -> b", "-", "- -"]
+    assert remarks[0].startswith("A step of the world")
+
+
 def test_settings_of_a_document_belong_to_the_world_in_mujoco_or_to_the_call() -> None:
     with (
         World(read_scene("stack"), "mujoco") as world,
