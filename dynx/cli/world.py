@@ -60,6 +60,7 @@ def world(
     dt: float,
     substeps: int,
     settings: Sequence[tuple[str, str]],
+    contact_interval: float | None,
     within: float | None,
     json_path: str | None,
     plot_path: str | None,
@@ -69,8 +70,14 @@ def world(
 ) -> int:
     """Export the scene, or run it in each engine and compare; return the exit code."""
     if export_path is not None:
-        for option, path in (("--json", json_path), ("--plot", plot_path), ("--save", save_path)):
-            if path is not None:
+        given_options = {
+            "--json": json_path,
+            "--plot": plot_path,
+            "--save": save_path,
+            "--contact-interval": contact_interval,
+        }
+        for option, value in given_options.items():
+            if value is not None:
                 raise ArgumentError(f"{option} is given with --export, which runs nothing")
         return _export(scene, export_path, engines, dt, substeps, settings, quiet=quiet)
     check_json(json_path)
@@ -101,6 +108,7 @@ def world(
                     dt,
                     substeps=substeps,
                     settings=given,
+                    contact_interval=contact_interval,
                     finish=save,
                     progress=progress,
                 )
@@ -184,6 +192,18 @@ class ContactEntry(TypedDict):
     friction_force: list[float]
 
 
+class MeanContactEntry(TypedDict):
+    """Mean over the contact interval of what two parts that touched exert on each other: force on `a`, its
+    moment about the origin of the world, normal force, and the share of time in which they touched."""
+
+    a: str
+    b: str
+    force: list[float]
+    moment: list[float]
+    normal_force: float
+    touching: float
+
+
 class SensorEntry(TypedDict):
     """Last reading of a sensor, taken at time `t` [s]; values by what they are, such as ``force:x``."""
 
@@ -206,6 +226,7 @@ class EngineEntry(TypedDict):
     robots: list[RobotEntry]
     bodies: list[BodyEntry]
     contacts: list[ContactEntry]
+    mean_contacts: list[MeanContactEntry]
     sensors: list[SensorEntry]
 
 
@@ -234,6 +255,7 @@ class WorldDocument(TypedDict):
     dt: float
     substeps: int
     duration: float
+    contact_interval: float | None
     engines: list[EngineEntry]
     separations: list[SeparationEntry]
 
@@ -276,6 +298,7 @@ def _engine(comparison: WorldComparison, run: EngineRun) -> EngineEntry:
             for name in moving
         ],
         "contacts": [entry_of(ContactEntry, each) for each in run.contacts],
+        "mean_contacts": [entry_of(MeanContactEntry, each) for each in run.mean_contacts],
         "sensors": [
             {
                 "name": name,
@@ -316,7 +339,11 @@ def show(out: Console, report: Entry) -> None:
     _show_notes(out, engines)
     _show_bodies(out, engines)
     _show_robots(out, engines)
-    _show_contacts(out, engines)
+    _show_contacts(out, engines, "contacts", "contacts of the last step: normal force")
+    if report["contact_interval"] is not None:
+        interval = min(report["contact_interval"], report["duration"])
+        mean = f"contacts, mean of the last {interval:g} s: normal force"
+        _show_contacts(out, engines, "mean_contacts", mean)
     _show_sensors(out, engines)
     _show_separations(out, report["separations"])
 
@@ -365,24 +392,29 @@ def _show_robots(out: Console, engines: Sequence[Entry]) -> None:
         print_rest(out, len(names) - MAX_ROWS, "coordinate", "coordinates")
 
 
-def _show_contacts(out: Console, engines: Sequence[Entry]) -> None:
+def _show_contacts(out: Console, engines: Sequence[Entry], kind: str, title: str) -> None:
     pairs: dict[tuple[str, str], list[list[float]]] = defaultdict(lambda: [[] for _ in engines])
     for k, each in enumerate(engines):
-        for contact in each["contacts"]:
+        for contact in each[kind]:
             pairs[min(contact["a"], contact["b"]), max(contact["a"], contact["b"])][k].append(
                 contact["normal_force"]
             )
     if not pairs:
-        out.print("\nno contacts at the end")
+        out.print(f"\n{title}: none" if kind == "mean_contacts" else "\nno contacts at the end")
         return
     columns = [f"{each['engine']} [N]" for each in engines]
     table = Table("between", *columns, right=tuple(columns))
     for (a, b), forces in sorted(pairs.items())[:MAX_ROWS]:
-        cells = (f"{sum(each):.5g} at {counted(len(each), 'point')}" if each else "-" for each in forces)
+        cells = (f"{sum(each):.5g}{_points(kind, each)}" if each else "-" for each in forces)
         table.add_row(f"{one_line(a)}, {one_line(b)}", *cells)
-    out.print("\ncontacts of the last step: normal force")
+    out.print(f"\n{title}")
     out.print(table)
     print_rest(out, len(pairs) - MAX_ROWS, "pair", "pairs")
+
+
+def _points(kind: str, forces: Sequence[float]) -> str:
+    """Return the number of points of the contacts of a step; a mean is of all of them."""
+    return f" at {counted(len(forces), 'point')}" if kind == "contacts" else ""
 
 
 def _show_sensors(out: Console, engines: Sequence[Entry]) -> None:

@@ -16,7 +16,7 @@ from dynx.model.numbers import positive_seconds, whole_number
 from dynx.rbd.kinematics import body_poses
 from dynx.spatial.scalar import Floats
 from dynx.steppers.state import WorldState
-from dynx.world.contacts import Contact
+from dynx.world.contacts import Contact, MeanContact
 from dynx.world.record import Record, position_channel
 from dynx.world.scene.scene import Scene
 from dynx.world.separation import Separation, separation
@@ -52,6 +52,8 @@ class EngineRun:
     """Whether Ctrl-C ended it, before the states that are missing."""
     sensors: Mapping[str, SensorReading] = field(default_factory=dict)
     """Last reading of each sensor of the scene, by name."""
+    mean_contacts: tuple[MeanContact, ...] = ()
+    """Mean force of each pair that touched in the last `contact_interval`, if that is given."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +68,8 @@ class WorldComparison:
     separations: tuple[Separation, ...] = field(default=())
     """Distances between the positions of each body that moves, and of each moving link as ``robot/link``, for
     each two engines, whose names are the `records`."""
+    contact_interval: float | None = None
+    """Interval [s] of `EngineRun.mean_contacts`; None where contacts were not summed."""
 
     def __repr__(self) -> str:
         engines = ", ".join(run.engine for run in self.runs)
@@ -90,12 +94,14 @@ def compare_engines(
     substeps: int = 1,
     settings: Mapping[str, Mapping[str, Any]] | None = None,
     samples: int = SAMPLES,
+    contact_interval: float | None = None,
     finish: Callable[[World], object] | None = None,
     progress: Callable[[str, float], object] | None = None,
 ) -> WorldComparison:
     """Run a scene for `duration` [s] in each engine, and compare the states at `samples` times.
 
-    The engines step `dt` / `substeps`; `settings` are those of `World` by engine. `finish` is called with
+    The engines step `dt` / `substeps`; `settings` are those of `World` by engine, and `contact_interval` [s]
+    is that of `World`, for the mean contact forces at the end. `finish` is called with
     each world at its end, and `progress` with the name of the engine and the time reached. An engine that
     fails in a step ends its run there. Raises the errors of `World` for a scene that cannot be opened, and
     ComparisonInterrupted, with what is done, after Ctrl-C.
@@ -109,18 +115,30 @@ def compare_engines(
         # All are opened first, so that a scene that one engine refuses costs no time in the others.
         worlds = [
             stack.enter_context(
-                closing(World(scene, name, dt, substeps=substeps, **dict((settings or {}).get(name, {}))))
+                closing(
+                    World(
+                        scene,
+                        name,
+                        dt,
+                        substeps=substeps,
+                        contact_interval=contact_interval,
+                        **dict((settings or {}).get(name, {})),
+                    )
+                )
             )
             for name in engines
         ]
         runs: list[EngineRun] = []
         for world in worlds:
-            runs.append(_run(world, ends.tolist(), finish, progress))
+            summed = contact_interval is not None
+            runs.append(_run(world, ends.tolist(), finish, progress, summed=summed))
             if runs[-1].interrupted:
                 break
     records = [_record(scene, run) for run in runs]
     separations = tuple(separation(a, b) for a, b in combinations(records, 2))
-    comparison = WorldComparison(scene, dt, substeps, n_steps * dt, tuple(runs), separations)
+    comparison = WorldComparison(
+        scene, dt, substeps, n_steps * dt, tuple(runs), separations, contact_interval
+    )
     if runs and runs[-1].interrupted:
         raise ComparisonInterrupted(comparison)
     return comparison
@@ -131,6 +149,8 @@ def _run(
     ends: Sequence[int],
     finish: Callable[[World], object] | None,
     progress: Callable[[str, float], object] | None,
+    *,
+    summed: bool,
 ) -> EngineRun:
     states, error, interrupted = [world.state], None, False
     try:
@@ -144,6 +164,7 @@ def _run(
     except KeyboardInterrupt:
         interrupted = True
     contacts, sensors = world.contacts(), world.read_sensors()
+    means = world.mean_contacts() if summed else ()
     if finish is not None:
         finish(world)
     times = np.array([state.time for state in states])
@@ -159,6 +180,7 @@ def _run(
         error,
         interrupted,
         sensors,
+        means,
     )
 
 

@@ -14,9 +14,10 @@ from click.testing import CliRunner, Result
 from rich.console import Console
 
 import dynx
+from dynx import Pose
 from dynx.cli.shell.main import cli
 from dynx.cli.world import _lowest, _show_separations
-from dynx.world import World, read_scene, world_names
+from dynx.world import Material, Scene, World, box, ground, read_scene, world_names, write_scene
 from tests.world.engines import WORLDS
 
 ENGINES = [name for name in WORLDS if find_spec(name) is not None]
@@ -165,9 +166,33 @@ def test_a_scene_is_exported_by_the_suffix_and_not_run(overlapping: str, tmp_pat
     assert (tmp_path / "out.b.urdf").is_file()
 
 
+def test_contact_forces_are_averaged_over_an_interval(tmp_path: Path) -> None:
+    rough = Material(friction=0.5)
+    start = (3.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    slider = box("slider", (0.4, 0.4, 0.2), mass=1.0, pose=Pose((0, 0, 0.1)), twist=start, material=rough)
+    file, path = tmp_path / "slide.toml", tmp_path / "run.json"
+    write_scene(Scene("slide", bodies=(ground(material=rough), slider)), file)
+    arguments = (str(file), "--engine", ENGINES[0], "--duration", "0.4", "--json", str(path))
+    result = run(*arguments, "--contact-interval", "0.2")
+    assert result.exit_code == 0, result.output
+    assert "contacts, mean of the last 0.2 s: normal force" in result.output
+    report = json.loads(path.read_text())
+    (mean,) = report["engines"][0]["mean_contacts"]
+    assert report["contact_interval"] == 0.2
+    assert (mean["a"], mean["b"]) == ("ground", "slider")
+    assert mean["normal_force"] == pytest.approx(9.81, rel=0.02)
+    assert mean["force"][0] == pytest.approx(0.5 * 9.81, rel=0.02)
+    result = run(*arguments)
+    assert "mean of the last" not in result.output
+    report = json.loads(path.read_text())
+    assert (report["contact_interval"], report["engines"][0]["mean_contacts"]) == (None, [])
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (["stack", "--contact-interval", "0.1", "--export", "x.xml"], "--contact-interval is given with"),
+        (["stack", "--contact-interval", "0"], "not in the range x>0"),
         (["stack", "--export", "scene.xmll"], "did you mean '.xml'"),
         (["stack", "--export", "/no/such/folder/x.xml"], "no directory"),
         (

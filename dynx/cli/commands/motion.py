@@ -52,6 +52,12 @@ from dynx.errors import shown
     ),
     settings_option("Setting of an engine (docs/world.md)"),
     click.option(
+        "--contact-interval",
+        type=FiniteRange(min=0.0, min_open=True),
+        metavar="SECONDS",
+        help="Time at the end over which contact forces are averaged: those of one step rattle.",
+    ),
+    click.option(
         "--within",
         type=FiniteRange(min=0.0),
         metavar="METRES",
