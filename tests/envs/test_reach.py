@@ -104,3 +104,26 @@ def test_unknown_names_are_refused() -> None:
         Reach(actions="torqe")
     with pytest.raises(UnknownNameError, match="frame"):
         Reach(robot="planar_2r", frame="tipp")
+
+
+@pytest.mark.parametrize("robot", ["planar_3r", "six_axis_arm", "ur5", "panda", "z1"])
+def test_the_camera_sees_the_arm_from_the_front(robot: str) -> None:
+    task = Reach(robot=robot)
+    camera, low, high = task.camera, *task._range
+    with dynx.backend("reference", task.model) as engine:
+        middle = engine.forward_kinematics(0.5 * (low + high), task.tool)[:3, 3]
+        near_middle = 0.5 * (low + high) + 0.1 * (high - low) * np.linspace(-1.0, 1.0, 9)[:, None]
+        reached = engine.forward_kinematics(near_middle, task.tool)[:, :3, 3]
+    T_world_camera = camera.pose.matrix
+    x, y, z = T_world_camera[:3, 3]
+    assert y < 0.0 < min(x, z)
+    # It is a metre farther along x than the frame is from the origin, and looks halfway to the frame.
+    assert x == pytest.approx(z) == pytest.approx(1.0 + np.linalg.norm(middle))
+    for point in (np.zeros(3), middle, *reached):
+        right, down, ahead = T_world_camera[:3, :3].T @ (point - T_world_camera[:3, 3])
+        half = np.tan(0.5 * camera.field_of_view)
+        assert ahead > 0.0
+        assert abs(down) < half * ahead
+        assert abs(right) < half * ahead * camera.size[0] / camera.size[1]
+    right, down, _ = T_world_camera[:3, :3].T @ (0.5 * middle - T_world_camera[:3, 3])
+    assert max(abs(right), abs(down)) < 1e-9

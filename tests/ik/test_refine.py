@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
 import pytest
 
+import dynx
 from dynx.backends import Backend, backend
 from dynx.errors import ArgumentError, NotFiniteError, ShapeError
+from dynx.ik import refine
 from dynx.model.loading import load
 from dynx.spatial.scalar import Floats
+from dynx.world import Scene, SceneRobot, box
 from tests.oracles.closed_form import MODELS
 
 TOLERANCE = 1e-6
@@ -97,3 +101,42 @@ def test_an_unreachable_target_keeps_its_proof() -> None:
 def test_invalid_objectives(options: dict[str, Any], error: type[Exception], message: str) -> None:
     with backend("compiled", SEVEN) as engine, pytest.raises(error, match=message):
         engine.inverse_kinematics(np.ones((3, 3)) * 0.2, SEVEN.frame_names[-1], **options)
+
+
+@pytest.mark.parametrize("name", ["reference", "compiled"])
+def test_further_starts_give_no_solution_that_was_tried_before(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A planar arm reaches a point in two ways, which each round of starts finds again."""
+    rounds: list[list[Floats]] = []
+    distinct = refine._distinct
+
+    def recorded(found: Any, seen: Any, *others: Any) -> list[Floats]:
+        new = distinct(found, seen, *others)
+        # The first solution is a row of the result, into which the best is written.
+        rounds.append([q.copy() for q in (*seen, *new)])
+        return new
+
+    monkeypatch.setattr(refine, "_distinct", recorded)
+    ball = '<collision><geometry><sphere radius="0.02"/></geometry></collision>'
+    joint = '<axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="9" velocity="9"/><origin xyz="0.5 0 0"/>'
+    model = dynx.load(
+        '<robot name="arm"><link name="base"/><link name="upper"/><link name="lower"/>'
+        f'<link name="tip">{ball}</link>'
+        f'<joint name="a" type="revolute"><parent link="base"/><child link="upper"/>{joint}</joint>'
+        f'<joint name="b" type="revolute"><parent link="upper"/><child link="lower"/>{joint}</joint>'
+        '<joint name="c" type="fixed"><parent link="lower"/><child link="tip"/><origin xyz="0.4 0 0"/>'
+        "</joint></robot>"
+    )
+    tip = "tip"
+    with dynx.backend(name, model) as engine:
+        target = engine.forward_kinematics([0.3, 0.9], tip)[:3, 3]
+        wall = box("wall", (0.2, 0.2, 0.2), pose=dynx.Pose(tuple(target.tolist())))
+        blocked = Scene("s", robots=(SceneRobot("arm", model),), bodies=(wall,))
+        engine.inverse_kinematics(target, tip, avoid=blocked, max_restarts=120)
+    assert len(rounds) >= 3
+    for before, after in pairwise(rounds):
+        assert len(before) <= len(after)
+        np.testing.assert_array_equal(before, after[: len(before)])
+    for a, b in combinations(rounds[-1], 2):
+        assert np.abs(a - b).max() > 1e-6

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import FrozenInstanceError
 from pathlib import Path
 
 import numpy as np
@@ -228,3 +229,11 @@ def test_terms_are_exact_on_a_star_and_never_negative(
     star[0, 1:] = star[1:, 0] = True
     terms = pair_terms(materials, sums, star)
     np.testing.assert_allclose(terms[0] + terms[1:], sums[materials[0], materials[1:]], rtol=1e-12)
+
+
+def test_the_default_surface_has_friction_alone() -> None:
+    default = Material()
+    assert (default.friction, default.torsional_friction, default.rolling_friction) == (0.5, 0.0, 0.0)
+    assert default.restitution == 0.0
+    with pytest.raises(FrozenInstanceError):
+        default.friction = 1.0  # type: ignore[misc]

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from dynx.doctor.formats import html_page, junit_xml, sarif_document, wording
 from dynx.doctor.formats.causes import ROUNDING, causes, severity
-from dynx.doctor.report import Effect
+from dynx.doctor.report import Effect, EngineResult
 from tests.doctor.formats.reports import alike, differing, refused
 
 
@@ -104,3 +104,19 @@ def test_an_effect_that_engines_share_is_written_once() -> None:
     assert wording.finding_effect(first) == "the file is refused"
     (result, *_) = sarif_document([replace(differing(), findings=(first,))])["runs"][0]["results"]
     assert "(the file is refused, fixed base: pybullet, mujoco)." in result["message"]["text"]
+
+
+@given(st.text(alphabet="abc", min_size=1, max_size=1200))
+def test_why_an_engine_has_no_results_is_said_with_its_reason(reason: str) -> None:
+    engine = EngineResult("pinocchio", "4.1.0", "pinocchio.buildModelFromUrdf(path)")
+    told = wording.name(reason, 1000)
+    for result, start in (
+        (replace(engine, refused=reason), "refuses the file: "),
+        (replace(engine, not_used=reason), "not used: "),
+    ):
+        assert wording.refusal(result) == start + told
+    for result, start in (
+        (replace(engine, refused_after=reason), "refuses the mended file too: "),
+        (replace(engine, not_used_after=reason), "not used on the mended file either: "),
+    ):
+        assert wording.refusal(result, mended=True) == start + told
