@@ -85,7 +85,7 @@ def moved_names(
         # Not what Python itself asks every module for, such as `__path__`.
         if not name.startswith("_") and find_spec(f"{package}.{name}") is not None:
             return import_module(f"{package}.{name}")
-        known = getattr(sys.modules[package], "__all__", ())
+        known = vars(sys.modules[package]).get("__all__", ())
         raise AttributeError(unknown_name(f"module {package!r}", name, known))
 
     return getattr_of_package

@@ -190,7 +190,7 @@ def _rounded(x: Array) -> Any:
 
 def _check_state(state: Floats, least: int) -> None:
     """Raise ShapeError for a state that has not the numbers of `initial_state`."""
-    if state.dtype == object and None in state.ravel().tolist():
+    if state.dtype == object and any(each is None for each in state.flat):
         raise DTypeError("state has an entry that is None; wanted numbers")
     if state.ndim != 1 or len(state) < least:
         raise ShapeError(f"state has shape {state.shape}; wanted one that initial_state or torque returned")

@@ -139,7 +139,7 @@ def test_nothing_is_compiled_for_a_large_tree(n: int, monkeypatch: pytest.Monkey
     model = tree(n)
     engine: Any = made(model)
     small = made(ROBOTS["fixed"])
-    for quantity in ("mass_matrix", "coriolis_matrix", "forward_dynamics"):
+    for quantity in ("mass_matrix", "inverse_dynamics", "coriolis_matrix", "forward_dynamics"):
         getattr(small, quantity)(*_arguments(ROBOTS["fixed"], quantity, ()))
     monkeypatch.setattr("dynx.simd.cache.compile_image", _refuse)
     monkeypatch.setattr("dynx.simd.cache.compile_routines", _refuse)
