@@ -54,6 +54,27 @@ def hull(path: str) -> None:
     print(len(Mesh(path).hull[0]))
 
 
+def drawn(path: str) -> None:
+    """Read what a mesh looks like."""
+    from dynx.model.geometry import Mesh
+
+    mesh = Mesh(path)
+    for part, look in mesh.parts:
+        print(look.rgba, part.surface.texture and part.surface.texture.pixels.shape, len(part.surface.faces))
+    print(*mesh.notes, sep="\n")
+
+
+def seen(path: str) -> None:
+    """Draw the shapes of a robot, and print what they are drawn without."""
+    import dynx
+    from dynx.model.geometry.drawn_shapes import link_look_notes, link_shapes
+
+    model = dynx.load(path)
+    for link in model.links:
+        print(*link_shapes(model.geometry, link.name))
+        print(*link_look_notes(model.geometry, link.name), sep="\n")
+
+
 def resumed(folder: str) -> None:
     """Go on with the run of `tests.security.surfaces.run_folder`."""
     from tests.security.surfaces.run_folder import train_to

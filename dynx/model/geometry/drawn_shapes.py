@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Sequence
 
-from dynx.errors import DynxError
+from dynx.errors import DynxError, shown
 from dynx.model.geometry.imaged import image_fault, imaged_shape
 from dynx.model.geometry.links import Appearance, Collision, Colour, Geometry, Visual
 from dynx.model.geometry.mesh import Mesh
@@ -41,7 +42,7 @@ def coloured_shapes(
     shape, T = placed.shape, placed.origin.matrix
     own = placed.material if isinstance(placed, Visual) and placed.material is not None else Appearance()
     colour = own.rgba or rgba
-    imaged = None if own.texture is None else imaged_shape(shape, own.texture)
+    imaged = None if own.texture is None or own.fault else imaged_shape(shape, own.texture)
     if imaged is not None:
         yield imaged, colour or (1.0, 1.0, 1.0, 1.0), T
         return
@@ -69,7 +70,9 @@ def look_notes(placed: Visual | Collision) -> tuple[str, ...]:
     """
     found: tuple[str, ...] = ()
     if isinstance(placed, Visual) and placed.material is not None and placed.material.texture is not None:
-        fault = image_fault(placed.shape, placed.material.texture)
+        name, fault = os.path.basename(placed.material.texture), placed.material.fault
+        fault = f"image {shown(name)} is not shown: {fault}" if fault else ""
+        fault = fault or image_fault(placed.shape, placed.material.texture)
         if not fault:
             return ()
         found = (fault,)

@@ -9,7 +9,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from dynx.errors import DynxError
+from dynx.errors import DynxError, shown
 from dynx.files.reading import read_file
 from dynx.model.geometry.images import Texture, read_texture
 from dynx.model.geometry.mesh import Faces, Mesh
@@ -61,11 +61,11 @@ def imaged_shape(shape: Shape, image: str) -> ImagedShape | None:
 def image_fault(shape: Shape, image: str) -> str:
     """Return the reason why an image of a material is not shown on a shape; empty for one that is."""
     if not isinstance(shape, Mesh | Box | Sphere | Cylinder):
-        return f"image {os.path.basename(image)} is not shown on a {type(shape).__name__}"
+        return f"image {shown(os.path.basename(image))} is not shown on a {type(shape).__name__}"
     try:
         _ = ImagedShape(image, shape=shape).surface
     except (DynxError, ValueError) as error:
-        return f"image {os.path.basename(image)} is not shown: {error}"
+        return f"image {shown(os.path.basename(image))} is not shown: {error}"
     return ""
 
 

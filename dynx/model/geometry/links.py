@@ -26,6 +26,8 @@ class Appearance:
     name: str = ""
     rgba: Colour | None = None
     texture: str | None = None
+    fault: str = field(default="", compare=False)
+    """The reason why the texture of a description is not read."""
 
     def __post_init__(self) -> None:
         if self.rgba is not None:

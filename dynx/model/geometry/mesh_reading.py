@@ -8,6 +8,7 @@ and for images the `enclosing_folder` of what belongs to it.
 from __future__ import annotations
 
 import os
+from collections.abc import Collection
 from functools import cached_property, lru_cache, partial
 from pathlib import Path
 from typing import NamedTuple
@@ -17,22 +18,19 @@ from numpy.typing import NDArray
 
 from dynx.errors import DescriptionError, DynxError, shown
 from dynx.files.reading import printable, read_file
-from dynx.model.geometry.formats.surface import Colour, FileSurface, ImageFile
-from dynx.model.geometry.images import Texture, read_texture
+from dynx.model.geometry.formats.surface import MAX_TRIANGLES, Colour, FileSurface, ImageFile
+from dynx.model.geometry.images import MAX_PIXELS, Texture, read_texture
 from dynx.model.numbers import MAX_MAGNITUDE
 from dynx.model.package_search import enclosing_folder
 from dynx.spatial.scalar import Floats
 
 Faces = NDArray[np.intp]
 
-MAX_TRIANGLES = 2_000_000
-"""Largest number of triangles of a mesh."""
-
 MAX_PARTS = 100
 """Largest number of parts of one colour; more colours are those of corners."""
 
 MAX_IMAGES = 32
-"""Largest number of images of a mesh that are read."""
+"""Largest number of images of a mesh that are read; together they may have as many pixels as two can have."""
 
 FORMATS = (".stl", ".obj", ".dae", ".gltf", ".glb")
 """Suffixes of the files that are read."""
@@ -235,7 +233,7 @@ def _divided(path: str, found: FileSurface) -> tuple[tuple[SurfacePart, ...], tu
         texture = None
         if material.image is not None:
             if material.image not in textures:
-                textures[material.image] = _texture(path, material.image, notes, len(textures))
+                textures[material.image] = _texture(path, material.image, notes, textures.values())
             texture = textures[material.image]
         if texture is not None and not placed[of].all():
             notes.append(f"{int((of & ~placed).sum())} triangles have no places in their image")
@@ -266,11 +264,15 @@ def _complete(values: Floats | None, count: int) -> NDArray[np.bool_]:
     return np.asarray(np.isfinite(values).all(axis=(1, 2)))
 
 
-def _texture(path: str, image: ImageFile, notes: list[str], read: int) -> Texture | None:
-    """Return the image of a material; None, with a note, for one that cannot be read."""
+def _texture(
+    path: str, image: ImageFile, notes: list[str], known: Collection[Texture | None]
+) -> Texture | None:
+    """Return the image of a material beside those that are `known`; None, with a note, for one that cannot be
+    read."""
+    pixels = sum(each.pixels.size // 3 for each in known if each is not None)
     try:
-        if read >= MAX_IMAGES:
-            raise ValueError(f"at most {MAX_IMAGES} images of a mesh are read")
+        if len(known) >= MAX_IMAGES or pixels > MAX_PIXELS:
+            raise ValueError(f"the images of a mesh are at most {MAX_IMAGES}, of {2 * MAX_PIXELS} pixels")
         content = image_content(path, image.name) if image.content is None else image.content
         return read_texture(content, image.wraps)
     except (DynxError, ValueError) as error:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from contextlib import suppress
 from functools import partial
 from typing import TypeVar
 
@@ -164,12 +163,14 @@ class _ShapeReader:
             raise known
         return known
 
-    def _image(self, filename: str) -> str:
-        """Return the path of an image, which is found as meshes are; the name as it stands if it is not."""
-        with suppress(MeshNotFoundError):
-            found = find_mesh(filename, self._reading.source, self._package_dirs)
-            return filename if found is None else str(found)
-        return filename
+    def _image(self, filename: str) -> tuple[str, str]:
+        """Return the path of an image, found as meshes are; else its name, and why it is not found."""
+        source = self._reading.source
+        try:
+            found = find_mesh(filename, source, self._package_dirs)
+        except MeshNotFoundError as error:
+            return filename, str(error)
+        return (filename, reason_unknown(filename, source)) if found is None else (str(found), "")
 
     def _material_or_fault(self, element: Element) -> Appearance | DescriptionError:
         try:
@@ -184,10 +185,10 @@ class _ShapeReader:
         for color in element.all("color")[:1]:
             red, green, blue, opacity = reading.numbers(color, "rgba", what, 4)
             rgba = (red, green, blue, opacity)
-        texture = None
+        texture, fault = None, ""
         for each in element.all("texture")[:1]:
-            texture = self._image(each.attributes.get("filename", ""))
+            texture, fault = self._image(each.attributes.get("filename", ""))
         try:
-            return Appearance(name, rgba, texture)
+            return Appearance(name, rgba, texture, fault)
         except ArgumentError as error:
             raise reading.error(element, str(error)) from None

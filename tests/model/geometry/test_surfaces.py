@@ -350,3 +350,24 @@ def test_the_image_of_a_named_material_is_found_in_the_package(tmp_path: Path) -
     ((drawn, _, _),) = coloured_shapes(visual, None, GREY)
     assert isinstance(drawn, Mesh)
     assert drawn.surface.texture is not None
+
+
+OUTSIDE = ("../outside.png", "/{folder}/outside.png", "file:///{folder}/outside.png", "absent.png")
+
+
+@pytest.mark.parametrize("name", OUTSIDE)
+def test_no_image_of_a_material_is_read_outside_of_the_package(tmp_path: Path, name: str) -> None:
+    (tmp_path / "outside.png").write_bytes(png())
+    (tmp_path / "inside").mkdir()
+    name = name.format(folder=str(tmp_path).lstrip("/"))
+    (tmp_path / "inside" / "a.urdf").write_text(
+        '<robot name="a"><link name="l"><visual><geometry><box size="1 1 1"/></geometry>'
+        f'<material name="m"><texture filename="{name}"/></material></visual></link></robot>'
+    )
+    model = dynx.load(tmp_path / "inside" / "a.urdf")
+    (visual,) = model.geometry.visuals("l")
+    assert visual.material is not None
+    assert visual.material.texture == name
+    assert [shape for shape, _, _ in coloured_shapes(visual, None, GREY)] == [Box((1.0, 1.0, 1.0))]
+    (note,) = look_notes(visual)
+    assert "is not shown" in note

@@ -122,6 +122,14 @@ def _(box: Box) -> Deed:
     )
 
 
+@attack("path", "image of a material outside")
+def _(box: Box) -> Deed:
+    material = f'<material name="m"><texture filename="{box.outside}/secret.bin"/></material>'
+    shape = f"<visual><geometry><box size='1 1 1'/></geometry>{material}</visual>"
+    other = shape.replace(f"{box.outside}", "package://../outside").replace('"m"', '"n"')
+    return Deed((box.file("a.urdf", arm(extra=shape + other)),), "seen", (0,))
+
+
 @attack("path", "mesh in a package above")
 def _(box: Box) -> Deed:
     return examined(

@@ -6,6 +6,7 @@ import base64
 import json
 import os
 import struct
+import zlib
 from typing import Any
 
 from tests.security.attack import Box, Deed, attacks_on, sparse
@@ -18,6 +19,11 @@ TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 
 def deed(box: Box, name: str, content: str | bytes, ends: tuple[int, ...] = (2,)) -> Deed:
     """Write a mesh, of which the victim makes a convex hull."""
     return Deed((box.file(name, content),), "hull", ends)
+
+
+def drawn(box: Box, name: str, content: str | bytes, ends: tuple[int, ...] = (0, 2)) -> Deed:
+    """Write a mesh whose look the victim reads."""
+    return Deed((box.file(name, content),), "drawn", ends)
 
 
 def simulated(box: Box, name: str, content: str | bytes, ends: tuple[int, ...] = (0, 2)) -> Deed:
@@ -84,6 +90,113 @@ def _(box: Box) -> Deed:
 def _(box: Box) -> Deed:
     head = f"mtllib {box.outside}/secret.txt\nmtllib ../outside/secret.txt\nusemtl {box.outside}/secret.bin\n"
     return simulated(box, "m.obj", head + TETRAHEDRON, (0,))
+
+
+PLACED = TETRAHEDRON.replace("f 1 2 3", "vt 0 0\nf 1/1 2/1 3/1")
+
+
+def with_image(box: Box, name: str) -> Deed:
+    """Write a mesh with an image of that name, whose look the victim reads."""
+    box.file("m.mtl", f"newmtl a\nKd 1 0 0\nmap_Kd {name}\n")
+    return drawn(box, "m.obj", f"mtllib m.mtl\nusemtl a\n{PLACED}", (0,))
+
+
+def png(width: int, height: int, pixels: bytes) -> bytes:
+    """Return a PNG file of grey values, compressed."""
+    parts = (
+        (b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)),
+        (b"IDAT", pixels),
+        (b"IEND", b""),
+    )
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(each)) + kind + each + struct.pack(">I", zlib.crc32(kind + each))
+        for kind, each in parts
+    )
+
+
+@attack("path", "materials of OBJ outside, drawn")
+def _(box: Box) -> Deed:
+    head = f"mtllib {box.outside}/secret.txt\nmtllib ../outside/secret.txt\nusemtl {box.outside}/secret.bin\n"
+    return drawn(box, "m.obj", head + TETRAHEDRON, (0,))
+
+
+@attack("path", "image of OBJ outside")
+def _(box: Box) -> Deed:
+    return with_image(box, f"{box.outside}/secret.bin")
+
+
+@attack("path", "image of COLLADA outside")
+def _(box: Box) -> Deed:
+    library = (
+        "<library_images><image id='i'><init_from>../outside/secret.bin</init_from></image></library_images>"
+    )
+    return drawn(box, "m.dae", collada(library), (2,))
+
+
+@attack("path", "image of glTF outside, drawn")
+def _(box: Box) -> Deed:
+    images: dict[str, Any] = {"images": [{"uri": f"{box.outside}/secret.bin"}], "textures": [{"source": 0}]}
+    materials = [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}]
+    tree = json.loads(gltf([INLINE], materials=materials, **images))
+    tree["meshes"][0]["primitives"][0] |= {"material": 0}
+    return drawn(box, "m.gltf", json.dumps(tree), (0,))
+
+
+@attack("link", "image that leads outside")
+def _(box: Box) -> Deed:
+    (box.here / "p.png").symlink_to(box.outside / "secret.bin")
+    return with_image(box, "p.png")
+
+
+@attack("device", "image that is an endless device")
+def _(box: Box) -> Deed:
+    (box.here / "p.png").symlink_to("/dev/zero")
+    return with_image(box, "p.png")
+
+
+@attack("device", "image that is a pipe")
+def _(box: Box) -> Deed:
+    os.mkfifo(box.here / "p.png")
+    return with_image(box, "p.png")
+
+
+@attack("bomb", "image of many pixels")
+def _(box: Box) -> Deed:
+    box.file("p.png", png(2**15, 2**15, zlib.compress(bytes(2**15 * (2**15 + 1)), 1)))
+    return with_image(box, "p.png")
+
+
+@attack("bomb", "many images of the largest size")
+def _(box: Box) -> Deed:
+    box.file("p.png", png(2**12, 2**12, zlib.compress(bytes(2**12 * (2**12 + 1)), 1)))
+    library, faces = "", ""
+    for k in range(100):
+        (box.here / f"{k}.png").symlink_to("p.png")
+        library += f"newmtl {k}\nmap_Kd {k}.png\n"
+        faces += f"usemtl {k}\nf 1/1 2/1 3/1\n"
+    box.file("m.mtl", library)
+    return drawn(box, "m.obj", f"mtllib m.mtl\n{PLACED}{faces}", (0,))
+
+
+@attack("bomb", "materials of OBJ of many empty lines")
+def _(box: Box) -> Deed:
+    box.file("m.mtl", "\n" * (6 * 10**7))
+    return drawn(box, "m.obj", f"mtllib m.mtl\n{TETRAHEDRON}", (0,))
+
+
+@attack("bomb", "uses of materials of OBJ")
+def _(box: Box) -> Deed:
+    return drawn(box, "m.obj", TETRAHEDRON + "usemtl a\ns 1\n" * (4 * 10**6), (0,))
+
+
+@attack("bomb", "OBJ of one polygon of thirty million corners, drawn")
+def _(box: Box) -> Deed:
+    return drawn(box, "m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n" + ("f" + " 1" * (4 * 10**5) + "\n") * 70, (2,))
+
+
+@attack("terminal", "escape sequences in names of images")
+def _(box: Box) -> Deed:
+    return with_image(box, "\x1b[2J\u202e.png")
 
 
 @attack("path", "entity of COLLADA that is a file")

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.errors import DescriptionError, shown
-from dynx.model.geometry.formats.surface import FileMaterial, FileSurface, ImageFile
+from dynx.model.geometry.formats.surface import MAX_TRIANGLES, FileMaterial, FileSurface, ImageFile
 from dynx.model.xml.reading import Element, read_xml
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import rotation_about
@@ -93,7 +93,7 @@ def collada_surface(data: bytes) -> FileSurface:
 def _surface(data: bytes, *, drawn: bool) -> FileSurface:
     """Return the triangles; what they look like is read if they are to be `drawn`."""
     tags = _tags(data, _WITH_TEXT | {"p", "vcount"} | (_OF_LOOK if drawn else set()))
-    parts: list[_Part] = []
+    parts, most = list[_Part](), MAX_TRIANGLES if drawn else MAX_POINTS
     try:
         scene = _ColladaScene(read_xml(data, "<mesh>", [], with_text=tags))
         vertices, count, placed = [np.zeros((0, 3))], 0, 0
@@ -106,8 +106,8 @@ def _surface(data: bytes, *, drawn: bool) -> FileSurface:
                 corner = corner[:, ::-1] if np.linalg.det(T[:3, :3]) < 0.0 else corner
                 part = _Part(rows[corner] + count)
                 placed += len(part.faces)
-                if placed > MAX_POINTS:
-                    raise _NotSupported(f"it places more than {MAX_POINTS} triangles")
+                if placed > most:
+                    raise _NotSupported(f"it places more than {most} triangles")
                 if drawn:
                     part.add_look(scene, instance, geometry, primitive, corner, rows[corner], T[:3, :3])
                 parts.append(part)

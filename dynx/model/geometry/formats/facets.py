@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.errors import DynxError, shown
-from dynx.model.geometry.formats.surface import FileMaterial, FileSurface, ImageFile
+from dynx.model.geometry.formats.surface import MAX_TRIANGLES, FileMaterial, FileSurface, ImageFile
 from dynx.spatial.scalar import Floats
 
 # Triangles of STL files, binary or text.
@@ -99,8 +99,8 @@ MAX_VERTICES = 6_000_000
 MAX_LIBRARIES = 16
 """Largest number of files of materials of an OBJ file that are read."""
 
-MAX_MATERIALS = 10_000
-"""Largest number of materials of an OBJ file."""
+MAX_LIBRARY = 2**22
+"""Largest size of a file of materials [bytes]."""
 
 ReadBeside = Callable[[str], bytes]
 
@@ -144,15 +144,15 @@ def obj_surface(data: bytes, read_beside: ReadBeside) -> FileSurface:
         known |= dict(_materials(_text_beside(library, read_beside, notes)))
     numbers = {"": 0} | {name: k for k, name in enumerate(known, 1)}
     material_of = np.zeros(len(found.faces), np.intp)
-    for start, name in found.materials:
-        material_of[start:] = numbers.get(name, 0)
+    for (start, name), (end, _) in pairwise([*found.materials, (len(found.faces), "")]):
+        material_of[start:end] = numbers.get(name, 0)
         if name not in numbers and not notes:
             notes.append(f"material {shown(name)} is in none of its files of materials")
     uv = _corners_of(found.places, found.place_of)
     normals = _corners_of(found.normals, found.normal_of)
     smooth = np.zeros(len(found.faces), np.intp)
-    for start, group in found.smoothing:
-        smooth[start:] = group
+    for (start, group), (end, _) in pairwise([*found.smoothing, (len(found.faces), 0)]):
+        smooth[start:end] = group
     if smooth.any() and (normals is None or np.isnan(normals).any()):
         normals = _with_means(found.vertices, found.faces, smooth, normals)
     colours = None
@@ -167,7 +167,10 @@ def obj_surface(data: bytes, read_beside: ReadBeside) -> FileSurface:
 def _text_beside(name: str, read_beside: ReadBeside, notes: list[str]) -> str:
     """Return the text of a file of materials; nothing, with a note, for one that is not read."""
     try:
-        return read_beside(name).decode("utf-8", "replace")
+        content = read_beside(name)
+        if len(content) > MAX_LIBRARY:
+            raise ValueError(f"it has more than {MAX_LIBRARY:,} bytes")
+        return content.decode("utf-8", "replace")
     except (DynxError, ValueError) as error:
         notes.append(f"materials {shown(name, 200)} are not read: {error}")
         return ""
@@ -205,9 +208,8 @@ _OPTIONS_OF_MAPS = {"-mm": 2, "-o": 3, "-s": 3, "-t": 3}
 
 def _materials(text: str) -> Iterator[tuple[str, FileMaterial]]:
     """Yield the name and the content of each material of an MTL file."""
-    lines = [line.split() for line in text.replace("\\\n", " ").splitlines()]
-    lines = [words for words in lines if words]
-    starts = [k for k, words in enumerate(lines) if words[0] == "newmtl"][:MAX_MATERIALS]
+    lines = [words for line in text.replace("\\\n", " ").splitlines() if (words := line.split())]
+    starts = [k for k, words in enumerate(lines) if words[0] == "newmtl"]
     for start, end in pairwise([*starts, len(lines)]):
         given = {words[0]: words[1:] for words in lines[start + 1 : end]}
         rgb, opacity, clear = (_shares(given.get(key, [])) for key in ("Kd", "d", "Tr"))
@@ -294,11 +296,14 @@ def _obj(data: bytes, *, drawn: bool = False) -> _Obj:
             elif key == b"usemtl":
                 materials.append((len(corners) // 3, b" ".join(words[1:]).decode("utf-8", "replace")))
             elif key == b"mtllib":
-                libraries.append(b" ".join(words[1:]).decode("utf-8", "replace"))
+                if len(libraries) < MAX_LIBRARIES:
+                    libraries.append(b" ".join(words[1:]).decode("utf-8", "replace"))
             else:
                 objects.append(len(corners) // 3)
             if max(len(numbers), len(places), len(normals)) > 3 * MAX_VERTICES:
                 raise ValueError(f"the file has more than {MAX_VERTICES:,} vertices")
+            if drawn and len(corners) > 3 * MAX_TRIANGLES:
+                raise ValueError(f"the file has more than {MAX_TRIANGLES:,} triangles")
     except ValueError as error:
         line = 1 + sum(1 for _ in _LINE_END.finditer(text, 0, start))
         raise ValueError(f"line {line}: {error}") from None
@@ -317,7 +322,7 @@ def _obj(data: bytes, *, drawn: bool = False) -> _Obj:
         np.array(normal_of, np.intp).reshape(-1, 3),
         smoothing,
         materials,
-        libraries[:MAX_LIBRARIES],
+        libraries,
     )
 
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from dynx.errors import importing, shown
 from dynx.files.documents import parse_json
 from dynx.files.reading import MAX_BYTES
-from dynx.model.geometry.formats.surface import Colour, FileMaterial, FileSurface, ImageFile
+from dynx.model.geometry.formats.surface import MAX_TRIANGLES, Colour, FileMaterial, FileSurface, ImageFile
 from dynx.spatial.scalar import Floats
 
 MAX_NUMBERS = 20_000_000
@@ -94,8 +94,9 @@ def _surface(data: bytes, read_beside: ReadBeside, *, drawn: bool) -> FileSurfac
         io.BytesIO(json.dumps(tree).encode()), file_type="gltf", resolver=buffers, process=False
     )
     placed = [scene.graph[node] for node in scene.graph.nodes_geometry]
-    if sum(len(getattr(scene.geometry[name], "faces", ())) for _, name in placed) > MAX_PLACED:
-        raise ValueError(f"it places more than {MAX_PLACED} triangles")
+    most = MAX_TRIANGLES if drawn else MAX_PLACED
+    if sum(len(getattr(scene.geometry[name], "faces", ())) for _, name in placed) > most:
+        raise ValueError(f"it places more than {most} triangles")
     vertices, faces, count = [np.zeros((0, 3))], [np.zeros((0, 3), np.intp)], 0
     looks, notes = list[_PrimitiveLook](), list[str]()
     materials = _Materials(look, tree, list(buffers.values()), notes) if drawn else None

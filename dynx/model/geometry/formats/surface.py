@@ -12,6 +12,10 @@ from dynx.spatial.scalar import Floats
 Colour = tuple[float, float, float, float]
 
 
+MAX_TRIANGLES = 2_000_000
+"""Largest number of triangles of a mesh."""
+
+
 class ImageFile(NamedTuple):
     """An image that a file names or holds."""
 
