@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
-from enum import IntFlag
 from typing import NamedTuple
 
+from dynx.compiled.status import Status
 from dynx.errors import TraceError, UnsupportedFeatureError
 from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.call_sequence import CallSequence, Integers, StridedRows
@@ -24,20 +24,6 @@ MAX_CACHED_KERNELS = 32
 
 STATUS = "status"
 """Name of the output with the status of each lane."""
-
-
-class Status(IntFlag):
-    """What ended the steps of a lane; `DONE` is none of it."""
-
-    DONE = 0
-    TORQUE = 1
-    """The torque of the controller is not finite."""
-    DIVERGED = 2
-    """The velocity after the step is not finite or too large to be meaningful."""
-    AT_LIMIT = 4
-    """A joint is beyond a position limit, to which it is to be stopped before the next step."""
-    UNSETTLED = 8
-    """It is not settled which joints stick: the step is to be repeated with corrected modes."""
 
 
 class Stop(NamedTuple):

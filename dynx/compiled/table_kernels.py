@@ -27,8 +27,8 @@ from dynx.compiled.model_coordinates import argument_shapes
 from dynx.compiled.table_loops import MASSLESS, ArgumentRow, StepRoutines, TableLoops
 from dynx.model.mechanism import ROOT, Body, BodyFrame, Mechanism
 from dynx.rbd import aba, coriolis, crba, derivatives, regressor, rnea
-from dynx.simd.cache import load_routines, source_version
-from dynx.simd.call_table import CallTable, RoutineCode, TableKernel
+from dynx.simd.cache import source_version
+from dynx.simd.call_table import CallTable, RoutineCode, TableKernel, load_routines
 from dynx.simd.program import Port
 from dynx.simd.routines import Routine, RoutineSet
 

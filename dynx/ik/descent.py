@@ -19,7 +19,7 @@ from dynx.ik.step import SEARCH, Descent, FrameError, TargetKind, frame_error
 from dynx.simd.cache import load_kernel, source_version
 from dynx.simd.emit import Settings
 from dynx.simd.image import COMPILE_LOCK
-from dynx.simd.iteration import RUNNING
+from dynx.simd.iteration_status import RUNNING
 from dynx.simd.kernel import Kernel
 from dynx.simd.target import host
 from dynx.simd.trace import trace

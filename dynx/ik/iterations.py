@@ -41,7 +41,8 @@ from dynx.model.mechanism import Mechanism
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, frame_jacobian
 from dynx.rbd.kinematics import ancestry, body_poses, frame_pose
 from dynx.rbd.linear import solve_positive_definite
-from dynx.simd.iteration import GIVEN_UP, NO_RESTART, REACHED, RUNNING, Iteration
+from dynx.simd.iteration import Iteration
+from dynx.simd.iteration_status import GIVEN_UP, NO_RESTART, REACHED, RUNNING
 from dynx.simd.trace import trace
 from dynx.spatial.scalar import Array, Floats, less, less_equal, maximum, minimum, select
 

@@ -33,7 +33,7 @@ from dynx.backends.hooks import cholesky_solver
 from dynx.ik.options import AxisRequirement, SearchLimits
 from dynx.model.targets import Targets
 from dynx.rbd.linear import solve_positive_definite
-from dynx.simd.iteration import GIVEN_UP, REACHED, RUNNING
+from dynx.simd.iteration_status import GIVEN_UP, REACHED, RUNNING
 from dynx.spatial.scalar import Array, Floats, arctan, less, less_equal, maximum, minimum, select, sqrt
 from dynx.spatial.so3 import cross, rotate
 

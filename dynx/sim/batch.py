@@ -27,7 +27,8 @@ from dynx.backends import backend
 from dynx.backends.joint_friction import coefficients_by_joint, refuse_text
 from dynx.backends.solvability import Solvability
 from dynx.compiled.parametric import ParametricDynamics
-from dynx.compiled.step import BoundSteps, CompiledStep, Status, Stop
+from dynx.compiled.status import Status
+from dynx.compiled.step import BoundSteps, CompiledStep, Stop
 from dynx.errors import ArgumentError, GainError, shown
 from dynx.files.arrays import read_arrays, write_arrays
 from dynx.files.reading import checked_path

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from dynx.backends import Backend, backend
-from dynx.compiled.step import Status
+from dynx.compiled.status import Status
 from dynx.control.base import Controller, Measurement
 from dynx.control.bullet import BulletMotor
 from dynx.errors import ControlError, DivergedError, DynxError, SimulationError, shown

@@ -18,7 +18,8 @@ import numpy as np
 
 from dynx.backends.dynamics import EngineDynamics
 from dynx.compiled.backend import CompiledBackend
-from dynx.compiled.step import BoundSteps, CompiledStep, Status, Stop
+from dynx.compiled.status import Status
+from dynx.compiled.step import BoundSteps, CompiledStep, Stop
 from dynx.control.base import Controller, chain_of
 from dynx.control.bullet import BulletMotor
 from dynx.control.content import attributes_of

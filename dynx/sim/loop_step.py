@@ -22,7 +22,8 @@ from dynx.compiled.array_dynamics import ArrayDynamics
 from dynx.compiled.kernels import evaluate_quantity
 from dynx.compiled.parametric import ParametricDynamics
 from dynx.compiled.simplification import simplify_mechanism
-from dynx.compiled.step import Status, StepText
+from dynx.compiled.status import Status
+from dynx.compiled.step import StepText
 from dynx.control.base import Controller, chain_of, gains_of, rebind
 from dynx.control.content import attributes_of, content_of, fields_of, is_foreign
 from dynx.errors import ArgumentError, TraceError, UnsupportedFeatureError, shown

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx import control
-from dynx.backends import Backend, backend
+from dynx.backends import Backend
 from dynx.control import registry
 from dynx.control.base import Controller
 from dynx.control.gains import feedback_gains
@@ -24,6 +24,7 @@ from dynx.errors import GainError, UnknownNameError, nearest, shown
 from dynx.model import Model
 from dynx.model.numbers import checked_gain
 from dynx.registry import DEFAULT_ENGINE
+from dynx.sim.overshoot import joint_inertia
 from dynx.spatial.scalar import Floats
 
 NATURAL_FREQUENCY = 20.0
@@ -111,20 +112,6 @@ class NamedController:
     make: Callable[[ControllerRequest], Controller[Any]]
     controls: Literal["joints", "frame"] = "joints"
     """Object of the control law: all joints, or one frame."""
-
-
-def joint_inertia(model: Model, q: Floats) -> Floats:
-    """Return the inertia (n,) [kg m^2 or kg] of each joint at `q`, with the others at rest.
-
-    With a floating base it is 1 / (M^-1)_ii, the inertia with all other coordinates free: the smallest
-    possible, so that gains scaled by it do not overshoot.
-    """
-    with backend("reference", model, validate=False) as bodies:
-        M: Floats = bodies.mass_matrix(q)
-    if not model.floating:
-        return np.maximum(np.diag(M), 0.0)
-    yielding = np.diag(np.linalg.pinv(M))[6:]
-    return np.divide(1.0, yielding, out=np.zeros_like(yielding), where=yielding > 0.0)
 
 
 def named_controller(name: str, request: ControllerRequest) -> Controller[Any]:

@@ -15,7 +15,7 @@ from dynx.backends import backend
 from dynx.backends.joint_friction import JointFriction
 from dynx.control.base import Controller, chain_of
 from dynx.control.content import attributes_of, fields_of
-from dynx.sim.named_controllers import joint_inertia
+from dynx.model import Model
 from dynx.spatial.scalar import Floats
 
 UNSTABLE_RATIO = 2.0
@@ -87,6 +87,20 @@ def sustained_overshoot(
         if each.joint in names and each.ratio > UNSTABLE_RATIO
     )
     return max(unstable, key=lambda each: each.ratio, default=None)
+
+
+def joint_inertia(model: Model, q: Floats) -> Floats:
+    """Return the inertia (n,) [kg m^2 or kg] of each joint at `q`, with the others at rest.
+
+    With a floating base it is 1 / (M^-1)_ii, the inertia with all other coordinates free: the smallest
+    possible, so that gains scaled by it do not overshoot.
+    """
+    with backend("reference", model, validate=False) as bodies:
+        M: Floats = bodies.mass_matrix(q)
+    if not model.floating:
+        return np.maximum(np.diag(M), 0.0)
+    yielding = np.diag(np.linalg.pinv(M))[6:]
+    return np.divide(1.0, yielding, out=np.zeros_like(yielding), where=yielding > 0.0)
 
 
 def _overshoots(

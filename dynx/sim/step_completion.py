@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 
 from dynx.compiled.kernels import evaluate_quantity
 from dynx.compiled.simplification import simplify_mechanism
-from dynx.compiled.step import BoundSteps, Status, StepText, compiled
+from dynx.compiled.status import Status
+from dynx.compiled.step import BoundSteps, StepText, compiled
 from dynx.rbd.joint_friction import FrictionLaw
 from dynx.sim.loop_step import LoopStep
 from dynx.simd.kernel import Kernel

@@ -22,12 +22,10 @@ import numpy as np
 from dynx._version import __version__
 from dynx.errors import CompileError
 from dynx.files.cache import keep, read_cached, source_hash
-from dynx.simd.call_table import RoutineCode
 from dynx.simd.emit import Settings
-from dynx.simd.image import Code, Image, compile_image, compile_routines
+from dynx.simd.image import Image, compile_image
 from dynx.simd.kernel import Kernel
 from dynx.simd.program import Port, Program
-from dynx.simd.routines import RoutineSet
 from dynx.simd.target import Processor, compiler_version, host
 from dynx.time_limit import not_counted
 
@@ -45,24 +43,6 @@ def load_kernel(
     target = host() if target is None else target
     settings = Settings(target.lanes) if settings is None else settings
     return load_code(recipe, lambda: compile_image(program(), target, settings), target, settings, Kernel)
-
-
-def load_routines(recipe: bytes, routines: RoutineSet) -> RoutineCode:
-    """Load a set of routines, which `recipe` determines, from the cache, or compile it and store it there."""
-    target = host()
-
-    def load(lanes: int) -> tuple[Image, Code]:
-        settings = Settings(lanes)
-        return load_code(
-            recipe,
-            lambda: compile_routines(routines, target, settings),
-            target,
-            settings,
-            lambda image: (image, Code(image)),
-        )
-
-    (_, single), (image, several) = load(1), load(target.lanes)
-    return RoutineCode(single, several, image)
 
 
 def load_code(

@@ -8,10 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.simd.cache import load_code
+from dynx.simd.emit import Settings
 from dynx.simd.image import Code, Image
 from dynx.simd.kernel import Kernel, Workspace, arguments_of_parts, max_samples_of_one_part, part_count
 from dynx.simd.program import Port
-from dynx.simd.routines import RoutineSet
+from dynx.simd.routines import RoutineSet, compile_routines
+from dynx.simd.target import host
 from dynx.simd.threads import run_parts
 from dynx.spatial.scalar import Array, Floats
 
@@ -79,6 +82,24 @@ class RoutineCode:
     several: Code
     image: Image
     """Image of the latter."""
+
+
+def load_routines(recipe: bytes, routines: RoutineSet) -> RoutineCode:
+    """Load a set of routines, which `recipe` determines, from the cache, or compile it and store it there."""
+    target = host()
+
+    def load(lanes: int) -> tuple[Image, Code]:
+        settings = Settings(lanes)
+        return load_code(
+            recipe,
+            lambda: compile_routines(routines, target, settings),
+            target,
+            settings,
+            lambda image: (image, Code(image)),
+        )
+
+    (_, single), (image, several) = load(1), load(target.lanes)
+    return RoutineCode(single, several, image)
 
 
 class TableKernel(Kernel):

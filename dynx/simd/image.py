@@ -16,7 +16,6 @@ from llvmlite import binding
 from dynx.errors import CompileError
 from dynx.simd.emit import ENTRY, Settings, emit_modules
 from dynx.simd.program import Port, Program, collection_paused
-from dynx.simd.routines import RoutineSet, emit_routines
 from dynx.simd.schedule import program_length
 from dynx.simd.target import Processor, host
 
@@ -65,12 +64,6 @@ def compile_image(
         modules = emit_modules(program, target, settings)
         objects = tuple(compile_text(text, target, quick=quick) for text, quick in modules)
     return Image(program.inputs, program.outputs, settings.lanes, target, objects)
-
-
-def compile_routines(routines: RoutineSet, target: Processor, settings: Settings) -> Image:
-    """Compile a set of routines to an image, whose ports are those of the tables that call them."""
-    code = compile_text(emit_routines(routines, target, settings), target)
-    return Image((), (), settings.lanes, target, (code,))
 
 
 def compile_text(text: str, target: Processor, *, quick: bool = False) -> bytes:

@@ -36,6 +36,7 @@ from dynx.simd.arrays import check_arrays
 from dynx.simd.cache import load_code
 from dynx.simd.emit import ENTRY, Settings
 from dynx.simd.image import Code, Image, compile_text
+from dynx.simd.iteration_status import REACHED, RUNNING
 from dynx.simd.kernel import arguments_of_parts
 from dynx.simd.program import Port, Program, collection_paused
 from dynx.simd.routines import Place, Routine, RoutineBody, argument_word
@@ -43,12 +44,6 @@ from dynx.simd.target import Processor, host
 from dynx.simd.threads import run_parts
 from dynx.simd.trigonometry import declarations, replacements
 from dynx.spatial.scalar import Floats
-
-RUNNING, GIVEN_UP, REACHED = 0.0, 1.0, 2.0
-"""Values of ``status``."""
-
-NO_RESTART = -1.0
-"""Value of ``restart`` for a task that goes on."""
 
 _OUTPUTS = ("x", "memory", "status", "restart")
 

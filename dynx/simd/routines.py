@@ -25,6 +25,7 @@ from functools import partial
 from typing import Any, Literal
 
 from dynx.simd.emit import ENTRY, SegmentBody, Settings
+from dynx.simd.image import Image, compile_text
 from dynx.simd.program import Port, Program, scalar_ranges
 from dynx.simd.rows import Rows, tiles
 from dynx.simd.schedule import Segment, schedule
@@ -80,6 +81,12 @@ class RoutineSet:
     def table_width(self) -> int:
         """Number of entries in a row of the table of calls: the routine and its operands."""
         return 1 + max(len(routine.places) for routine in self.routines.values())
+
+
+def compile_routines(routines: RoutineSet, target: Processor, settings: Settings) -> Image:
+    """Compile a set of routines to an image, whose ports are those of the tables that call them."""
+    code = compile_text(emit_routines(routines, target, settings), target)
+    return Image((), (), settings.lanes, target, (code,))
 
 
 def emit_routines(routines: RoutineSet, target: Processor, settings: Settings) -> str:

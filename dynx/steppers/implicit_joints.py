@@ -6,20 +6,13 @@ has their effect.
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 
 from dynx.backends.dynamics import EngineDynamics
 from dynx.rbd.joint_friction import TOLERANCE, FrictionLaw, damped_equation
-from dynx.simd.cache import load_kernel, program_recipe
-from dynx.simd.emit import Settings
-from dynx.simd.kernel import Kernel
-from dynx.simd.simplify import STRICT
-from dynx.simd.target import host
-from dynx.simd.trace import trace
-from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.scalar import Floats
 from dynx.steppers.layout import RobotLayout
 
 MAX_COMPILED_OPERATIONS = 8000
@@ -65,8 +58,11 @@ class ImplicitJoints:
         """Torque (nv,) that the robot without armature needed for the acceleration of the last step."""
         self._kernel = None
         if law.operations <= MAX_COMPILED_OPERATIONS:
+            # Imported here, because robots without joint friction need no compiler.
+            from dynx.steppers.step_kernels import friction_kernel
+
             # The workspace is kept because its calls do not keep it.
-            space = self._workspace = _kernel(law.joints, law.below).workspace()
+            space = self._workspace = friction_kernel(law.joints, law.below).workspace()
             self._kernel = space.run
             slices = space.input_slices
             self._M, self._bias, self._tau, self._v, self._shift, self._single = slices[:6]
@@ -230,36 +226,3 @@ class OutsideJoints:
         now, then = tree_q(q)[first:], tree_q(ahead)[first:]
         below, above = np.minimum(now, then) <= robot.lower, np.maximum(now, then) >= robot.upper
         return bool(below.any() or above.any())
-
-
-@cache
-def _kernel(joints: tuple[int, ...], below: tuple[tuple[int, ...], ...]) -> Kernel:
-    """Compile a step of the law, with `CORRECTIONS` corrections of the modes or none for a large robot;
-    coefficients, step and estimated inertias are inputs.
-
-    The first modes are the signs of the velocities plus ``shift``.
-    """
-    n, nv, rows = len(joints), len(below), list(joints)
-    law = FrictionLaw(joints, below, (0.0,) * n)
-
-    def step(**given: Array) -> dict[str, Array]:
-        v, h, friction, single = given["v"], given["h"][0], given["friction"], given["one_by_one"][0]
-        damping, armature = given["damping"], given["armature"]
-        A, r = damped_equation(given["M"], given["tau"] - given["bias"], v, h, damping, armature)
-        first, found, next_shift = law.step(A, r, v, friction, h, given["shift"], single, given["inertia"])
-        net = given["tau"] - damping * (v + h * found.a) - armature * found.a
-        net[rows] = net[rows] - found.torque
-        return {
-            "motion": np.array([found.a, found.moves]),
-            "torque": found.torque,
-            "net_torque": net,
-            "next_shift": next_shift,
-            "first_a": first.a,
-            "unsettled": np.array([found.changes], dtype=object),
-        }
-
-    sizes: dict[str, tuple[int, ...]] = {"M": (nv, nv), "bias": (nv,), "tau": (nv,), "v": (nv,)}
-    sizes |= {"shift": (n,), "one_by_one": (1,), "friction": (n,), "inertia": (n,)}
-    sizes |= {"damping": (nv,), "armature": (nv,), "h": (1,)}
-    program = trace(step, sizes, simplify=STRICT)
-    return load_kernel(program_recipe(program), lambda: program, settings=Settings(host().lanes, fast=False))

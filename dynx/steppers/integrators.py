@@ -5,21 +5,18 @@ The schemes themselves are array code (`dynx.rbd.integration`).
 
 from __future__ import annotations
 
-from functools import cache, cached_property
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dynx.errors import ArgumentError, EngineError, nearest, shown
 from dynx.model import Model
-from dynx.rbd.integration import Accelerate, Flow, MotionState, SemiImplicitEuler, floating_step
-from dynx.simd.cache import load_kernel, program_recipe
-from dynx.simd.emit import Settings
-from dynx.simd.kernel import Kernel, Workspace
-from dynx.simd.simplify import STRICT
-from dynx.simd.target import host
-from dynx.simd.trace import trace
+from dynx.rbd.integration import Accelerate, Flow, MotionState, SemiImplicitEuler
 from dynx.spatial.scalar import Array, Floats
+
+if TYPE_CHECKING:
+    from dynx.simd.kernel import Workspace
 
 METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 """SciPy's integrators by name."""
@@ -32,7 +29,10 @@ class CompiledBaseEuler(SemiImplicitEuler):
     @cached_property
     def _base(self) -> Workspace:
         """Compiled `floating_step`, for floats."""
-        base = _base_step().workspace()
+        # Imported here, because robots with a fixed base need no compiler.
+        from dynx.steppers.step_kernels import base_kernel
+
+        base = base_kernel().workspace()
         base.input_rows[3][:], base.input_rows[4][:] = self._step, self._center
         return base
 
@@ -48,18 +48,6 @@ class CompiledBaseEuler(SemiImplicitEuler):
         pose, twist = base.results
         joints = held * (v[6:] + h * a[6:])
         return np.concatenate([pose, q[7:] + h * joints]), np.concatenate([twist, joints]), a
-
-
-@cache
-def _base_step() -> Kernel:
-    """Compile `floating_step` of a base alone, rounded as in every other kernel that contains it."""
-
-    def step(q: Array, v: Array, a: Array, h: Array, center: Array) -> dict[str, Array]:
-        return dict(zip(("q", "v"), floating_step(q, v, a, h[0], center), strict=True))
-
-    sizes = {"q": (7,), "v": (6,), "a": (6,), "h": (1,), "center": (3,)}
-    program = trace(step, sizes, simplify=STRICT)
-    return load_kernel(program_recipe(program), lambda: program, settings=Settings(host().lanes, fast=False))
 
 
 class Adaptive:

@@ -65,8 +65,8 @@ FLOWS = {
         ENGINE + "engine.inverse_kinematics(engine.forward_kinematics(q, 'tool0'), 'tool0', q)",
         ("world", "sim", "ik.closed_forms"),
         (),
-        107,
-        19500,
+        105,
+        18850,
     ),
     "simulate": Flow(
         ROBOT + "from dynx import control\n"
@@ -81,13 +81,15 @@ FLOWS = {
             "sim.compiled_loop",
             "sim.record.formats",
             "compiled.kernels",
+            "compiled.step",
+            "simd.kernel",
             "distance",
             "ik",
             "envs",
         ),
         (),
-        175,
-        28800,
+        152,
+        24300,
     ),
     "step of a box": Flow(
         "from dynx.world import Scene, World, box\n"
@@ -104,8 +106,8 @@ FLOWS = {
         "environment.step(environment.action_space.sample())",
         ("distance", "ik", "world.camera", "steppers.camera"),
         (),
-        167,
-        27950,
+        153,
+        26250,
     ),
 }
 

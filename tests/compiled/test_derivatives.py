@@ -178,7 +178,7 @@ def test_nothing_is_compiled_for_the_derivatives_of_a_large_robot(monkeypatch: p
     with form("routines"):
         Derivatives(small).inverse_dynamics_derivatives(*motion(small))
     monkeypatch.setattr("dynx.simd.cache.compile_image", _refuse)
-    monkeypatch.setattr("dynx.simd.cache.compile_routines", _refuse)
+    monkeypatch.setattr("dynx.simd.call_table.compile_routines", _refuse)
     q, v, a = motion(large)
     found = Derivatives(large).inverse_dynamics_derivatives(q, v, a)
     plain = closed_form(large.mechanism, q, v, a)

@@ -142,7 +142,7 @@ def test_nothing_is_compiled_for_a_large_tree(n: int, monkeypatch: pytest.Monkey
     for quantity in ("mass_matrix", "inverse_dynamics", "coriolis_matrix", "forward_dynamics"):
         getattr(small, quantity)(*_arguments(ROBOTS["fixed"], quantity, ()))
     monkeypatch.setattr("dynx.simd.cache.compile_image", _refuse)
-    monkeypatch.setattr("dynx.simd.cache.compile_routines", _refuse)
+    monkeypatch.setattr("dynx.simd.call_table.compile_routines", _refuse)
     q, v, a = state(model)
     M = engine.mass_matrix(q)
     np.testing.assert_array_equal(M, M.T)

@@ -13,7 +13,8 @@ from dynx.errors import GainError, LimitError, UnknownNameError
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.sim import simulate
-from dynx.sim.named_controllers import CONTROLLERS, ControllerRequest, Gains, joint_inertia, named_controller
+from dynx.sim.named_controllers import CONTROLLERS, ControllerRequest, Gains, named_controller
+from dynx.sim.overshoot import joint_inertia
 from dynx.trajectory import Setpoint
 from tests.sim.bars import tutorial_robot
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dynx.simd.cache import load_routines
-from dynx.simd.call_table import CallTable, TableKernel
+from dynx.simd.call_table import CallTable, TableKernel, load_routines
 from dynx.simd.program import Port
 from dynx.simd.routines import Routine, RoutineSet
 from dynx.simd.target import host
