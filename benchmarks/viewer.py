@@ -300,7 +300,7 @@ def main() -> None:
                 f"{best.processor:.2f} s), best of {given.repeats}, load {os.getloadavg()[0]:.1f}",
                 flush=True,
             )
-        for robot in given.robots.split(","):
+        for robot in filter(None, given.robots.split(",")):
             runs = [
                 rates(browser, robot, folder, seconds=given.seconds, whole=given.whole_meshes)
                 for _ in range(given.repeats)

@@ -17,7 +17,7 @@ from dynx.model.geometry.links import Collision, Colour, Visual
 from dynx.rbd.kinematics import link_poses
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation, rotation_from_quat
-from dynx.viewer.colours import GREY, ORANGE, RGB, VERMILION
+from dynx.viewer.colours import GREY, ORANGE, RGB, VERMILION, YELLOW
 from dynx.viewer.painted import PaintedNode, glb
 from dynx.viewer.triangles import (
     TRIANGLE_BUDGET,
@@ -534,9 +534,13 @@ class ContactArrows:
         self._node: Any = None
         self.shown = True
         """True while the arrows are shown."""
+        self._points: Any = None
+        self.points_shown = False
+        """True while the points are shown, also those without a force."""
 
     def put(self, points: Floats, forces: Floats) -> None:
         """Show forces (m, 3) [N] at points (m, 3) [m], in world axes."""
+        self._put_points(points if self.points_shown else points[:0])
         if not self.shown or not len(points):
             if self._node is not None:
                 self._node.visible = False
@@ -555,3 +559,18 @@ class ContactArrows:
         else:
             self._node.points = segments
             self._node.visible = True
+
+    def _put_points(self, points: Floats) -> None:
+        if self._points is None and len(points):
+            self._points = self._scene.add_point_cloud(
+                "/contact_points",
+                points.astype(np.float32),
+                YELLOW,
+                point_size=3.0 * self._thickness,
+                point_shape="circle",
+                precision="float32",
+            )
+        elif self._points is not None:
+            self._points.visible = bool(len(points))
+            if len(points):
+                self._points.points = points.astype(np.float32)

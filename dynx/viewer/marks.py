@@ -15,7 +15,7 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import rotation_from_quat
 from dynx.viewer.browser import names_element
 from dynx.viewer.colours import BLUE, RGB, SKY_BLUE, VERMILION, YELLOW
-from dynx.viewer.drawn_robot import DrawnRobot, size_of, wxyz
+from dynx.viewer.drawn_robot import DrawnRobot, DrawnScene, size_of, wxyz
 from dynx.viewer.page import Page
 from dynx.viewer.triangles import triangles_of
 
@@ -283,6 +283,36 @@ class Marks:
             inertial = self._model.inertial(link.name)
             if inertial.mass > 0.0:
                 yield link.name, inertial
+
+
+class SceneMarks:
+    """Marks of all robots of a scene, which are switched together; names would lie over each other."""
+
+    kinds = tuple(kind for kind in Marks.kinds if kind != "names")
+    """What can be shown."""
+
+    def __init__(self, page: Page, drawn: DrawnScene) -> None:
+        self._page, self._shown = page, dict.fromkeys(self.kinds, False)
+        self._marks = [Marks(page, robot) for robot in drawn.robots.values()]
+
+    def add_switches(self) -> None:
+        """Add a box for each kind, where there is a robot."""
+        for kind in self.kinds if self._marks else ():
+            box = self._page.gui.add_checkbox(kind, initial_value=False)
+            box.on_update(lambda _, kind=kind, box=box: self.show(kind, box.value))
+
+    def show(self, kind: str, shown: bool) -> None:
+        """Show or hide the marks of one kind."""
+        with self._page.lock, self._page.together():
+            self._shown[kind] = shown
+            for marks in self._marks:
+                marks.show(kind, shown)
+
+    def watch(self, drawn: DrawnScene) -> None:
+        """Mark the robots of another drawing, whose marks before went with it."""
+        self._marks = [Marks(self._page, robot) for robot in drawn.robots.values()]
+        for kind, shown in self._shown.items():
+            self.show(kind, shown)
 
 
 class NamedParts:

@@ -25,7 +25,7 @@ from dynx.viewer.drawn_robot import (
 from dynx.viewer.following import FollowingCamera
 from dynx.viewer.framing import SHARE, box_around, has_ground, points_around
 from dynx.viewer.library import uplot
-from dynx.viewer.marks import NamedParts
+from dynx.viewer.marks import NamedParts, SceneMarks
 from dynx.viewer.motion import PARTED, MotionFrames, motion_separation
 from dynx.viewer.page import Page
 
@@ -410,6 +410,9 @@ class MotionView:
                 if any(len(a.points) for a in self.motion.contacts)
                 else None
             )
+            points = None if forces is None else gui.add_checkbox("contact points", initial_value=False)
+            self._marks = SceneMarks(self._page, self.drawn)
+            self._marks.add_switches()
             trace = gui.add_dropdown("trace of", (_NO_PART, *self.motion.poses), initial_value=_NO_PART)
 
         def show(_: Any = None) -> None:
@@ -417,8 +420,8 @@ class MotionView:
                 self.drawn.show(visuals=not collisions.value, collisions=collisions.value)
                 if ghost is not None and self._ghost_drawn is not None:
                     self._ghost_drawn.visible = ghost.value
-                if forces is not None:
-                    self._arrows.shown = forces.value
+                if forces is not None and points is not None:
+                    self._arrows.shown, self._arrows.points_shown = forces.value, points.value
                 self._show(self.timeline.time)
 
         def draw_trace(_: Any) -> None:
@@ -429,7 +432,7 @@ class MotionView:
                 if trace.value != _NO_PART:
                     self._trace = self._line(self.motion.poses[trace.value][:, :3, 3])
 
-        for box in (collisions, ghost, forces):
+        for box in (collisions, ghost, forces, points):
             if box is not None:
                 box.on_update(show)
         trace.on_update(draw_trace)

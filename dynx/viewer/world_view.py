@@ -18,7 +18,7 @@ from dynx.spatial.scalar import Floats
 from dynx.viewer.drawn_robot import AS_DESCRIBED, ContactArrows, DrawnScene, Look
 from dynx.viewer.following import FollowingCamera
 from dynx.viewer.framing import SHARE, box_around, has_ground, points_around
-from dynx.viewer.marks import NamedParts
+from dynx.viewer.marks import NamedParts, SceneMarks
 from dynx.viewer.motion import MotionFrames, fixed_bodies, motion_of_state
 from dynx.viewer.page import Page
 from dynx.world import ExternalForce, World
@@ -219,6 +219,7 @@ class WorldView:
             self.drawn.remove()
             self.drawn = self._draw_scene()
             self.camera.watch(self.drawn)
+            self._marks.watch(self.drawn)
             self.names = NamedParts(self._page, self.drawn.parts, self.drawn.visuals)
             self.draw()
             return True
@@ -279,7 +280,7 @@ class WorldView:
             state = self.world.state
             self.drawn.place(dict(part_poses(self.world.scene, state)))
             self._clock.value = f"{state.time:.3f} s"
-            if self._arrows.shown:
+            if self._arrows.shown or self._arrows.points_shown:
                 found, fixed = self.world.contacts(), fixed_bodies(self.world.scene)
                 self._arrows.put(
                     np.array([c.point for c in found]).reshape(-1, 3),
@@ -365,6 +366,9 @@ class WorldView:
         with gui.add_folder("show"):
             collisions = gui.add_checkbox("collision shapes", initial_value=False)
             forces = gui.add_checkbox("contact forces", initial_value=True)
+            points = gui.add_checkbox("contact points", initial_value=False)
+            self._marks = SceneMarks(self._page, self.drawn)
+            self._marks.add_switches()
         with gui.add_folder("pull and push", visible=steps):
             self._part = gui.add_dropdown("part", (_NO_PART, *moving), initial_value=_NO_PART)
             self._pull = gui.add_checkbox("pull by a spring", initial_value=False)
@@ -379,8 +383,8 @@ class WorldView:
         def show(_: Any) -> None:
             with self._page.lock:
                 self.drawn.show(visuals=not collisions.value, collisions=collisions.value)
-                self._arrows.shown = forces.value
-                if not forces.value:
+                self._arrows.shown, self._arrows.points_shown = forces.value, points.value
+                if not (forces.value or points.value):
                     self._arrows.put(np.zeros((0, 3)), np.zeros((0, 3)))
                 self.draw()
 
@@ -400,6 +404,7 @@ class WorldView:
 
         collisions.on_update(show)
         forces.on_update(show)
+        points.on_update(show)
         self._part.on_update(hold)
         self._pull.on_update(hold)
         push.on_click(pushed)

@@ -75,7 +75,9 @@ def test_two_engines_play_step_and_begin_again_in_the_page(open_page: OpenPage) 
         opened = open_page(page.url)
         until(lambda: page.standings[0].step > 0, "a step")
         panel = opened.page.locator(".mantine-Paper-root", has_text="episode").first
-        for words in ("reference", "pinocchio", "return", "step", "reward", "+ torque", "action 0"):
+        for name in ("reference", "pinocchio"):
+            panel.get_by_text(name).first.wait_for()
+        for words in ("return", "step", "reward", "+ torque", "action 0"):
             panel.get_by_text(words, exact=True).first.wait_for()
         opened.page.get_by_role("button", name="pause").click()
         until(lambda: not page.panel.playing, "the pause")
@@ -88,11 +90,28 @@ def test_two_engines_play_step_and_begin_again_in_the_page(open_page: OpenPage) 
         # The same start and actions: the engines agree, and the drawings lie over each other.
         assert page.standings[0].total == pytest.approx(page.standings[1].total, rel=1e-9)
         panel.get_by_text(f"{page.standings[0].total:.5g}").first.wait_for()
+        # The bar reaches from zero, in the middle, to half of the upper half, on both engines.
+        bars = panel.locator("[title='0.5'] > span")
+        assert bars.count() == 2
+        for k in range(2):
+            box, around = bars.nth(k).bounding_box(), bars.nth(k).locator("..").bounding_box()
+            assert (box["x"] - around["x"]) / around["width"] == pytest.approx(0.5, abs=0.02)
+            assert box["width"] / around["width"] == pytest.approx(0.25, abs=0.02)
+        opened.page.get_by_label("speed", exact=True).click()
+        opened.page.get_by_role("option", name="4", exact=True).click()
+        until(lambda: page.panel.speed == 4.0, "the speed")
+        opened.page.get_by_role("textbox", name="seed").fill("11")
+        opened.page.get_by_role("button", name="begin with this seed").click()
+        until(lambda: page._seed == 11 and page.standings[0].step == 0, "the episode with the seed")
+        env = TaskEnvironment(task(), "reference")
+        assert np.array_equal(page._runs[1].observation, env.reset(seed=11)[0])
+        opened.page.get_by_role("button", name="next episode").click()
+        until(lambda: page._seed == 12 and page.standings[0].step == 0, "the next episode")
         opened.page.get_by_label("side by side").check()
         until(lambda: page._drawn[1]._root.position[0] > 0.0, "the second beside the first")
         opened.page.mouse.click(40, 350)
         opened.page.keyboard.press("n")
-        until(lambda: page._seed == 4 and page.standings[0].step == 0, "the next episode")
+        until(lambda: page._seed == 13 and page.standings[0].step == 0, "the episode after it")
         assert not opened.errors
 
 

@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+import dynx
 from dynx.errors import ArgumentError, DynxError
+from dynx.model import Pose
 from dynx.viewer.world_view import _NO_PART_CHOSEN, Pull
 from dynx.world import ExternalForce, Scene, World, box, ground
-from dynx.world.scene import read_scene
+from dynx.world.scene import SceneRobot, read_scene
 from tests.viewer.conftest import until
 
 
@@ -52,6 +54,35 @@ def test_the_pointer_drags_a_part_by_the_point_taken() -> None:
         viewer.view.step(600)
         assert not viewer.view._spring.pulls
         assert world.state.bodies[body.name].position[2] < lifted
+
+
+def test_joints_and_contacts_are_marked_in_a_world_that_is_replaced_too() -> None:
+    robot = dynx.load("six_axis_arm")
+    cube = box("cube", (0.2, 0.2, 0.2), mass=1.0, pose=Pose((1.0, 0.0, 0.1)))
+    scene = Scene("two", robots=(SceneRobot("a", robot), SceneRobot("b", robot)), bodies=(ground(), cube))
+    with World(scene) as world, World(scene) as second, world.view(steps=False) as viewer:
+        world.step(50)
+        second.step(50)
+        handles = viewer.page.scene._handle_from_node_name
+
+        def marks(end: str) -> list[str]:
+            return [path for path, node in handles.items() if path.endswith(end) and node.visible]
+
+        assert not marks("/joint_axis")
+        viewer.view._marks.show("joint axes", True)
+        count = 2 * sum(joint.moves for joint in robot.joints)
+        assert len(marks("/joint_axis")) == count
+        viewer.view._arrows.points_shown = True
+        viewer.view.draw()
+        (points,) = (handles[path] for path in marks("/contact_points"))
+        assert np.allclose(points.points, [c.point for c in world.contacts()], atol=1e-5)
+        assert viewer.view.replace(second)
+        assert len(marks("/joint_axis")) == count
+        viewer.view._marks.show("joint axes", False)
+        assert not marks("/joint_axis")
+        viewer.view._arrows.points_shown = False
+        viewer.view.draw()
+        assert not marks("/contact_points")
 
 
 def test_a_push_gives_a_body_its_impulse_once() -> None:
