@@ -530,7 +530,8 @@ def refuse_scene(scenario: Scenario) -> None:
 
 
 def refuse_other_scenario(rollout: Rollout, scenario: Scenario) -> None:
-    """Raise ArgumentError if the scenario of `rollout` differs from `scenario` in more than the duration."""
+    """Raise ArgumentError if the scenario of `rollout` differs from `scenario` in more than the duration and
+    the sensors, on which no step depends."""
     then = rollout.scenario
     if then is None:
         raise ArgumentError("the rollout to resume has no scenario, so it cannot be compared")
@@ -545,7 +546,7 @@ def refuse_other_scenario(rollout: Rollout, scenario: Scenario) -> None:
             f"now it is {new}"
         )
     for each in then.differences(scenario):
-        if each.field != "duration":
+        if each.field not in ("duration", "sensors"):
             name, old, new = innermost(each)
             raise ArgumentError(
                 f"the rollout to resume had {name} {in_words(old)}; now it is {in_words(new)}"
@@ -553,9 +554,9 @@ def refuse_other_scenario(rollout: Rollout, scenario: Scenario) -> None:
 
 
 def changed_parts(theirs: Scenario, ours: Scenario) -> list[str]:
-    """Return the names of the fields in which two scenarios differ, with the fields inside them; a
-    controller is one field."""
-    names = (each.field for each in theirs.differences(ours))
+    """Return the names of the fields in which two scenarios differ and on which steps depend, with the fields
+    inside them; a controller is one field."""
+    names = (each.field for each in theirs.differences(ours) if each.field != "sensors")
     return list(dict.fromkeys("controller" if name.startswith("controller.") else name for name in names))
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 import numpy as np
 
 from dynx.argument_types import checks_types
-from dynx.errors import ArgumentError, escaped, shown
+from dynx.errors import ArgumentError, escaped, nearest, shown
 from dynx.model.model import Model
 from dynx.model.numbers import checked_entries, is_real, real_array
 from dynx.option_names import checks_field_names
@@ -88,25 +88,31 @@ class ExternalForce:
         what = f"an external force on {shown(self.on)}"
         wrench = checked_entries(f"the wrench of {what}", real_array(f"the wrench of {what}", self.wrench))
         point = checked_entries(f"the point of {what}", real_array(f"the point of {what}", self.point))
-        known = isinstance(self.reference, str) and self.reference in REFERENCES
-        if wrench.shape != (6,) or not known:
+        if wrench.shape != (6,):
             raise ArgumentError(
-                f"{what} has a wrench of shape {wrench.shape} in {shown(self.reference)}; wanted (6,) in one "
-                f"of {', '.join(REFERENCES)}"
+                f"the wrench of {what} has shape {wrench.shape}; wanted (6,), a force [N] and then a moment "
+                "[N m], such as (0, 0, -10, 0, 0, 0)"
             )
-        if point.shape != (3,) or (point.any() and self.reference == WORLD):
+        if not isinstance(self.reference, str) or self.reference not in REFERENCES:
             raise ArgumentError(
-                f"{what} has a point of shape {point.shape} in {shown(self.reference)}; wanted (3,) in the "
-                f"frame, and none for the wrench about the origin of the world"
+                f"the reference of {what} is {shown(self.reference)}{nearest(self.reference, REFERENCES)}"
             )
-        seconds = is_real(self.start) and is_real(self.duration)
-        if not seconds or not self.duration > 0.0 or not 0.0 <= self.start < math.inf:
-            start, duration = (
-                shown(x) if isinstance(x, str) else escaped(x) for x in (self.start, self.duration)
-            )
+        if point.shape != (3,):
+            raise ArgumentError(f"the point of {what} has shape {point.shape}; wanted (3,) in its frame")
+        if point.any() and self.reference == WORLD:
             raise ArgumentError(
-                f"{what} starts at {start} and lasts {duration}; wanted a finite number of seconds that is 0 "
-                "or more, and a positive one"
+                f"{what} has the point {point.tolist()} in the reference {WORLD}, whose wrenches are about "
+                f"the origin of the world; wanted {LOCAL_WORLD_ALIGNED} or {LOCAL}, or no point"
+            )
+        if not is_real(self.start) or not 0.0 <= self.start < math.inf:
+            raise ArgumentError(
+                f"the start of {what} is {_as_given(self.start)}; wanted a finite time [s] of at least 0, "
+                "that of the beginning"
+            )
+        if not is_real(self.duration) or not self.duration > 0.0:
+            raise ArgumentError(
+                f"the duration of {what} is {_as_given(self.duration)}; wanted a positive number of seconds, "
+                "or inf for a force that does not end"
             )
 
     @checks_types
@@ -166,6 +172,10 @@ class ExternalForce:
         if T.ndim > 2:
             force, moment, lever = np.broadcast_arrays(force, moment, lever)
         return np.concatenate([force, moment + cross(lever, force)], axis=-1)
+
+
+def _as_given(value: object) -> str:
+    return shown(value) if isinstance(value, str) else escaped(value)
 
 
 class Forces(NamedTuple):

@@ -16,7 +16,8 @@ from dynx.control.base import Controller
 from dynx.errors import ArgumentError
 from dynx.model import Model
 from dynx.model.loading import load
-from dynx.sim import Noise, Rollout, simulate
+from dynx.sim import Noise, Rollout, Scenario, Simulation, simulate
+from dynx.world import Imu, SensorErrors
 from tests.sim.bars import tutorial_motion, tutorial_robot
 
 needs_bullet = pytest.mark.skipif("pybullet" not in installed_backends(), reason="PyBullet is not installed")
@@ -101,3 +102,24 @@ def test_a_record_of_something_else_is_refused() -> None:
         simulate(other, LAWS["computed torque"], tutorial_motion(), resume=whole, **OPTIONS)
     with pytest.raises(ArgumentError, match="resume"):
         simulate(ARM, LAWS["computed torque"], tutorial_motion(), step=3)
+
+
+def test_with_other_sensors(tmp_path: Path) -> None:
+    """On which no step depends: those of the scenario are read along the whole record."""
+    frame = ARM.links[-1].name
+    imu = Imu("imu", frame, rate=300.0, gyroscope=SensorErrors(noise=0.1, random_walk=1.0))
+    whole = run("pid", "pinocchio", sensors=[imu])
+    path = tmp_path / "half.npz"
+    run("pid", "pinocchio", sensors=[Imu("other", frame)]).first(STEPS // 2).save(path)
+    again = run("pid", "pinocchio", sensors=[imu], resume=Rollout.load(path))
+    the_same(again, whole)
+    assert list(again.sensors) == ["imu"]
+    np.testing.assert_array_equal(again.sensors["imu"].values, whole.sensors["imu"].values)
+    scenarios = whole.scenario, run("pid", "pinocchio").scenario
+    assert all(isinstance(each, Scenario) for each in scenarios)
+    simulation, other = (Simulation(each) for each in scenarios if isinstance(each, Scenario))
+    simulation.step(STEPS // 2)
+    other.restore(simulation.save())
+    assert other.rollout.departures == ()
+    simulation.close()
+    other.close()

@@ -48,12 +48,16 @@ def test_a_single_push_and_a_name_are_accepted() -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ((WRENCH, "1"), "external force on 'tool0' starts at '1'"),
-        ((WRENCH, np.nan), "starts at nan"),
-        ((WRENCH, np.inf), "starts at inf"),
-        ((WRENCH, 0.0, -1.0), "lasts -1"),
-        ((WRENCH, 0.0, 1.0, "here"), "'here'; wanted"),
-        ((np.zeros(3),), r"external force on 'tool0' has a wrench of shape \(3,\)"),
+        ((WRENCH, "1"), "start of an external force on 'tool0' is '1'; wanted a finite time"),
+        ((WRENCH, np.nan), "start of .* is nan"),
+        ((WRENCH, np.inf), "start of .* is inf"),
+        ((WRENCH, -1), "start of .* is -1; wanted a finite time .s. of at least 0"),
+        ((WRENCH, 0.0, -1.0), "duration of .* is -1.0; wanted a positive number of seconds, or inf"),
+        ((WRENCH, 0.0, 1.0, "here"), "reference of .* is 'here'; known: local_world_aligned, local, world"),
+        ((WRENCH, 0.0, 1.0, "wrold"), "'wrold'; did you mean 'world'"),
+        ((WRENCH, 0.0, 1.0, "local", [1.0]), r"point of .* has shape \(1,\); wanted \(3,\)"),
+        ((WRENCH, 0.0, 1.0, "world", [1.0, 0.0, 0.0]), r"the point \[1.0, 0.0, 0.0\] in the reference world"),
+        ((np.zeros(3),), r"wrench of an external force on 'tool0' has shape \(3,\); wanted \(6,\), a force"),
         (([0.0, 0.0, np.nan, 0.0, 0.0, 0.0],), r"wrench of an external force on 'tool0'\[2\] is nan"),
     ],
 )

@@ -125,7 +125,7 @@ def test_old_names_of_the_force_name_the_new_one() -> None:
         ({"reference": "body"}, "local_world_aligned"),
         ({"reference": "world", "point": POINT}, "point"),
         ({"point": (1.0, 2.0)}, "point"),
-        ({"duration": 0.0}, "lasts"),
+        ({"duration": 0.0}, "duration of"),
         ({"on": 3}, "acts on"),
     ],
 )

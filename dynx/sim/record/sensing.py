@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -71,6 +72,14 @@ class OwnReadings(Mapping[str, Readings]):
                 f"the rollout has no sensor {shown(name)}{nearest(str(name), self._found)}"
             )
         return self._found[name]
+
+    def __contains__(self, name: object) -> bool:
+        # A mapping asks for the item, and expects a KeyError.
+        return name in self._found
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """Return the readings of a sensor, or `default` where there is no such sensor."""
+        return self[name] if name in self._found or name in self._reasons else default
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._found)

@@ -340,7 +340,7 @@ ELBOW = ["ur5", "--to", "elbow_joint=0.1"]
         ([*ELBOW, "--push", "tool0"], "--push"),
         ([*ELBOW, "--push", "tool0:1,2"], "--push"),
         ([*ELBOW, "--push", "tool:1,2,3"], "did you mean 'tool0'"),
-        ([*ELBOW, "--push", "tool0:1,2,3:0:-1"], "lasts -1.0"),
+        ([*ELBOW, "--push", "tool0:1,2,3:0:-1"], "is -1.0; wanted a positive number"),
         ([*ELBOW, "--payload", "tool0"], "--payload"),
         ([*ELBOW, "--payload", "tool0:1:2"], "tool0:1"),
         ([*ELBOW, "--payload", "tool0:-1"], "mass of a payload"),

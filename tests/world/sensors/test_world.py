@@ -301,6 +301,10 @@ def test_a_scenario_keeps_its_sensors() -> None:
     np.testing.assert_array_equal(dynx.simulate(again).sensors["imu"].values, rollout.sensors["imu"].values)
     with pytest.raises(UnknownNameError, match="no sensor 'imo'; did you mean 'imu'"):
         _ = rollout.sensors["imo"]
+    assert "imu" in rollout.sensors
+    assert "imo" not in rollout.sensors
+    assert rollout.sensors.get("imo") is None
+    assert rollout.sensors.get("imu") is rollout.sensors["imu"]
     with pytest.raises(ArgumentError, match="sensors were given, and a batch records no accelerations"):
         dynx.simulate_batch(arm, law, np.array(Q0), duration=0.02, q0=np.array([Q0, Q0]), sensors=sensors)
 
