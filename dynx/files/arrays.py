@@ -72,6 +72,10 @@ class ArrayFile:
         return array
 
 
+MAX_REASON = 500
+"""Characters of a reason of NumPy that are shown; it repeats headers of any length."""
+
+
 def write_arrays(path: str | os.PathLike[str], arrays: Mapping[str, Any]) -> None:
     """Write arrays and texts by name, as `atomic_file` does."""
     with atomic_file(path) as file:
@@ -106,7 +110,7 @@ def read_arrays(path: str | os.PathLike[str], what: str, schema: str | None = No
         reason = (
             (error.strerror if isinstance(error, OSError) else None) or str(error) or type(error).__name__
         )
-        raise ArgumentError(f"{content.path} cannot be read as {what}: {reason}") from error
+        raise ArgumentError(f"{content.path} cannot be read as {what}: {reason[:MAX_REASON]}") from error
     found = content.texts.get(SCHEMA_ENTRY)
     if schema is not None and found != schema:
         loader = _LOADERS.get(str(found).partition("/")[0])

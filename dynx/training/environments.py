@@ -34,7 +34,9 @@ def make(task: TaskSpec, render_mode: str | None = None) -> Env[Any, Any]:
         return make_env(task.id, **pictures, **task.arguments())
     except DynxError:
         raise
-    except (GymnasiumError, TypeError, ImportError) as error:
+    except Exception as error:  # the class of another package raises whatever its options lead to
+        if is_of_dynx(task.id) and not isinstance(error, GymnasiumError | TypeError | ImportError):
+            raise  # a defect
         raise ArgumentError(f"{task.name} cannot be made: {_line(error)}") from error
 
 

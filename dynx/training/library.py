@@ -167,6 +167,10 @@ def _memory() -> int:
     return int(os.sysconf("SC_PAGE_SIZE")) * int(os.sysconf("SC_PHYS_PAGES"))
 
 
+MAX_LAYERS = 1000
+"""Largest number of layers of networks; each takes a tenth of a millisecond in every call."""
+
+
 def _check_weights(options: Mapping[str, Any], env: VecEnv, most: int | None) -> None:
     """Raise ArgumentError for layers that are no numbers, or have more weights than `most` or the memory."""
     layers = options.get("net_arch", [])
@@ -179,6 +183,8 @@ def _check_weights(options: Mapping[str, Any], env: VecEnv, most: int | None) ->
                 f"number, all above 0; got {shown(options)}"
             )
     inputs = int(spaces.flatdim(env.observation_space)) + int(spaces.flatdim(env.action_space))
+    if critics * max(map(len, lists), default=0) > MAX_LAYERS:
+        raise ArgumentError(f"net_arch has more than {MAX_LAYERS} layers; wanted fewer")
     weights = critics * max((sum(a * b for a, b in pairwise([inputs, *each])) for each in lists), default=0)
     if most is not None and weights > most:
         raise ArgumentError(f"net_arch describes {weights:,} weights, more than the file holds")
@@ -334,16 +340,28 @@ def weights_of_file(file: BinaryIO) -> int:
     return file.seek(0, os.SEEK_END) // 4
 
 
+def check_compression(archive: zipfile.ZipFile) -> None:
+    """Raise ValueError for an archive with members that grow without bound as they are read.
+
+    `zipfile` expands what bzip2 and LZMA compressed in one piece, whatever size the member states.
+    """
+    for part in archive.infolist():
+        if part.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise ValueError(f"{shown(part.filename)} is compressed in another way than by deflate")
+
+
 def _check_archive(file: BinaryIO) -> None:
     """Raise ValueError for an archive, or one inside it, that is larger when it is expanded."""
     size = file.seek(0, os.SEEK_END)
     with zipfile.ZipFile(file) as archive:
+        check_compression(archive)
         parts = archive.infolist()
         if sum(part.file_size for part in parts) > size:
             raise ValueError("it is compressed: its members are larger than the file")
         for part in parts:
             if part.filename.endswith(".pth"):
                 with zipfile.ZipFile(io.BytesIO(archive.read(part))) as inner:
+                    check_compression(inner)
                     if sum(each.file_size for each in inner.infolist()) > part.file_size:
                         raise ValueError(f"{part.filename} is compressed: its members are larger than it")
     file.seek(0)

@@ -28,6 +28,7 @@ from dynx.training.library import (
     DummyVecEnv,
     VecNormalize,
     action_of,
+    check_compression,
     new_algorithm,
     read_weights,
     weights_of_file,
@@ -131,6 +132,7 @@ def read_policy_document(path: str | os.PathLike[str]) -> PolicyDocument:
         raise ArgumentError(f"{where}: {irregularity(path) or 'there is no such file'}")
     try:
         with named_file(path) as file, zipfile.ZipFile(file) as archive:
+            check_compression(archive)
             if DOCUMENT not in archive.namelist():
                 raise ArgumentError(
                     f"{where} was not written by dynx train: it does not name its task; dynx play --unpickle "

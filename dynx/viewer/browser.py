@@ -13,6 +13,7 @@ from __future__ import annotations
 import ipaddress
 import json
 import math
+import re
 import secrets
 import socket
 import types
@@ -24,7 +25,6 @@ from hashlib import sha256
 from html import escape
 from http import HTTPStatus
 from typing import Any, Literal, NamedTuple, Union, get_args, get_origin, get_type_hints
-from urllib.parse import urlsplit
 
 from dynx.files.temporary import temporary_folder, writing_in
 from dynx.viewer.library import CLIENT
@@ -43,6 +43,10 @@ def is_loopback(host: str) -> bool:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
         return False
+
+
+_HOST = re.compile(r"(\[[0-9a-f:.]+\]|[^@:/?#\\\[\]%,\s]+)(?::\d+)?")
+"""A host as a browser writes it: a name or an address, and perhaps a port."""
 
 
 class Access:
@@ -72,7 +76,7 @@ class Access:
         host = hosts[0].strip().lower()
         if not self._is_known(host):
             return False
-        return all(urlsplit(each.strip().lower()).netloc == host for each in origins)
+        return all(each.strip().lower() == f"http://{host}" for each in origins)
 
     def guard(self, answer: Any, headers: Sequence[tuple[str, str]]) -> Any:
         """Return a function that answers requests of the page as `answer` does, with `headers` added, and
@@ -94,10 +98,10 @@ class Access:
         return guarded
 
     def _is_known(self, host: str) -> bool:
-        try:
-            name = urlsplit(f"//{host}").hostname or ""
-        except ValueError:
+        written = _HOST.fullmatch(host)
+        if written is None:
             return False
+        name = written[1].strip("[]")
         if name in self._names:
             return True
         try:
@@ -106,6 +110,10 @@ class Access:
             return False
         # A page cannot have an address for its name, unless it comes from there.
         return self._any_address or address.is_loopback
+
+
+_FRAMES = "'self' http://127.0.0.1:* http://localhost:* vscode-webview:"
+"""Sites that may show a page in a frame: notebooks and editors of this machine."""
 
 
 class ContentPolicy:
@@ -141,7 +149,8 @@ class ContentPolicy:
 
     def headers(self, handlers: Sequence[str]) -> Iterator[tuple[str, str]]:
         """Yield the headers of a page with this policy."""
-        yield "Content-Security-Policy", self.text(handlers)
+        # In a page's own text this directive has no effect.
+        yield "Content-Security-Policy", f"{self.text(handlers)}; frame-ancestors {_FRAMES}"
         yield "Referrer-Policy", "no-referrer"
         yield "X-Content-Type-Options", "nosniff"
         yield "Cross-Origin-Resource-Policy", "same-origin"

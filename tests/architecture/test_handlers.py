@@ -37,6 +37,7 @@ ALLOWED = {
     "sim/plants/plant.py": (1, ENGINE),
     "sim/record/mcap_file.py": (1, FOREIGN_PARSER),
     "simd/cuts.py": (1, ENGINE),
+    "training/environments.py": (1, ENGINE),
     "training/library.py": (1, FOREIGN_PARSER),
     "training/unpickling.py": (1, USERS_CODE),
     "viewer/browser.py": (1, FOREIGN_PARSER),

@@ -17,6 +17,7 @@ import unicodedata
 import zipfile
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +47,9 @@ KINDS = (
 """Kinds of attacks."""
 
 URDF = '<robot name="r"><link name="base"/></robot>'
+
+TRAINING = find_spec("torch") is not None and find_spec("stable_baselines3") is not None
+"""True where policies can be trained."""
 
 REPOSITORY = Path(__file__).parents[2]
 

@@ -1,9 +1,9 @@
 """All attacks, each against a process of its own under strace::
 
-    python -m tests.security.attacks [SURFACE ...]
+    python -m tests.security.attacks [--published] [SURFACE ...]
 
 prints a table by surface and kind, and what is wrong with the end of each victim; exits with 1 if there is
-anything.
+anything. With --published only those of the modules `published_...`.
 """
 
 from __future__ import annotations
@@ -18,8 +18,14 @@ from tests.security.surfaces.every import ATTACKS
 from tests.security.victims import attacked_apart
 
 
-def main(surfaces: list[str]) -> int:
-    chosen = [each for each in ATTACKS if not surfaces or any(each.key.startswith(name) for name in surfaces)]
+def main(words: list[str]) -> int:
+    surfaces = [each for each in words if each != "--published"]
+    chosen = [
+        each
+        for each in ATTACKS
+        if (not surfaces or any(each.key.startswith(name) for name in surfaces))
+        and ("--published" not in words or ".published_" in each.prepare.__module__)
+    ]
     done: Counter[tuple[str, str]] = Counter()
     failed: Counter[tuple[str, str]] = Counter()
     with tempfile.TemporaryDirectory(prefix="dynx-attacks-") as folder:

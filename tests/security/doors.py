@@ -93,6 +93,7 @@ def policy(path: str) -> None:
 
 def socket(name: str) -> None:
     """Open the page of a robot, and attack its socket."""
+    from tests.security.surfaces import published_pages  # noqa: F401  # registers its own
     from tests.security.surfaces import socket as attacks
 
     print(attacks.SENT[name]())

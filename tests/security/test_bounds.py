@@ -6,6 +6,7 @@ import os
 import re
 import sys
 import time
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,9 @@ from dynx.files.documents import MAX_LISTS_AND_TABLES, parse_json
 from dynx.files.reading import MAX_BINARY_BYTES, named_file
 from dynx.model.geometry import Mesh
 from dynx.sim.record.csv_file import MAX_CELLS, MAX_TABLE
-from dynx.world import World, read_scene
+from dynx.world import ContactSensor, Scene, World, box, read_scene
 from dynx.world.scene.files import MAX_KEY_PARTS, MAX_TOML
+from dynx.world.sensors.sensor import MAX_SENSORS
 from dynx.world.snapshot import MAGIC, MAX_STATE
 from tests.security.attack import make_box, sparse
 
@@ -225,3 +227,37 @@ def test_the_engine_that_a_world_names_is_no_class_and_its_memory_no_overflow(tm
     changed(box, lambda header: header.update(memory=[[["0x1p+9999"]]]))
     with pytest.raises(ArgumentError, match="cannot be read as a world: hexadecimal value too large"):
         World.read(box.here / "w.world")
+
+
+def test_arrays_that_bzip2_and_lzma_compressed_are_not_expanded(tmp_path: Path) -> None:
+    """`zipfile` expands them in one piece, whatever size they state."""
+    for method in (zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA, zipfile.ZIP_DEFLATED):
+        with zipfile.ZipFile(tmp_path / "r.npz", "w", method) as archive:
+            archive.writestr("q.npy", bytes(10**6))
+        with pytest.raises(ArgumentError, match="cannot be read as"):
+            dynx.Rollout.load(tmp_path / "r.npz")
+
+
+def test_a_scene_has_at_most_some_thousand_sensors() -> None:
+    body = box("b", (0.1, 0.1, 0.1), mass=1.0)
+    sensors = tuple(ContactSensor(f"s{k}", "b") for k in range(MAX_SENSORS + 1))
+    with pytest.raises(ArgumentError, match="sensors has 10001 sensors; wanted at most 10000"):
+        Scene("s", bodies=(body,), sensors=sensors)
+
+
+def test_pairs_that_are_named_again_and_again_are_looked_up_once() -> None:
+    bodies = [box(name, (0.1, 0.1, 0.1), mass=1.0) for name in "abc"]
+    scene = Scene("s", bodies=bodies, groups={"g": ("a", "b")}, ignored=[("g", "c"), ("a", "b")] * 10**4)
+    assert len(scene.collision_filter._ignored) == 2
+    assert not scene.collision_filter.pairs(["a", "b", "c"]).any()
+    assert not scene.may_collide("c", "b")
+    assert Scene("s", bodies=bodies, ignored=[("a", "b")]).may_collide("a", "c")
+
+
+def test_what_numpy_says_of_a_long_header_is_shortened(tmp_path: Path) -> None:
+    header = b"{'descr': '<f8', 'fortran_order': False, 'shape': " + b"(" * 4000 + b")" * 4000 + b"}\n"
+    with zipfile.ZipFile(tmp_path / "r.npz", "w") as archive:
+        archive.writestr("q.npy", b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header)
+    with pytest.raises(ArgumentError, match="cannot be read as") as error:
+        dynx.Rollout.load(tmp_path / "r.npz")
+    assert len(str(error.value)) < 1000

@@ -207,3 +207,30 @@ def test_tensors_and_lists_that_grow_in_memory_are_refused(
         path = written(tmp_path / f"{number}.zip", {**members(trained), member: data.getvalue()})
         with pytest.raises(ArgumentError, match=message):
             load_policy(path)
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_members_that_grow_without_bound_are_refused(method: int, trained: Path, tmp_path: Path) -> None:
+    """`zipfile` expands them in one piece, whatever size they state."""
+    for name in ("dynx.json", "policy.pth"):
+        path = tmp_path / f"{name}.zip"
+        with zipfile.ZipFile(path, "w") as archive:
+            for each, data in members(trained).items():
+                archive.writestr(each, data, method if each == name else zipfile.ZIP_STORED)
+        with pytest.raises(ArgumentError, match="is compressed in another way than by deflate"):
+            load_policy(path)
+
+
+def test_networks_of_very_many_layers_are_refused(trained: Path, tmp_path: Path) -> None:
+    parts = members(trained)
+    document = json.loads(parts["dynx.json"])
+    document["spec"]["hyperparameters"]["policy_kwargs"] = {"net_arch": [1] * 10_000}
+    path = written(tmp_path / "deep.zip", {**parts, "dynx.json": json.dumps(document).encode()})
+    with pytest.raises(ArgumentError, match="net_arch has more than 1000 layers"):
+        load_policy(path)
+
+
+def test_an_environment_that_cannot_be_made_is_an_error_of_the_task(trained: Path, tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    with pytest.raises(ArgumentError, match=r"HalfCheetah-v5.* cannot be made: .*nothing"):
+        make(TaskSpec("HalfCheetah-v5", options={"xml_file": "nothing"}))

@@ -126,6 +126,9 @@ def test_hosts_of_an_address(host: str, known: tuple[str, ...], unknown: tuple[s
     assert all(access.is_ours([each], []) for each in known)
     assert not any(access.is_ours([each], []) for each in unknown)
     assert not access.is_ours([], [])
+    assert not any(access.is_ours([f"{each}{known[0]}"], []) for each in ("evil.test@", "evil.test#", "x, "))
+    assert not access.is_ours([known[0]], [f"https://{known[0]}"])
+    assert not access.is_ours([known[0]], [f"http://{known[0]}@evil.test"])
     assert not access.is_ours([known[0]] * 2, [])
     assert not access.is_ours([known[0]], [f"http://{known[0]}"] * 2)
 

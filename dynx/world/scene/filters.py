@@ -29,7 +29,13 @@ class CollisionFilter:
             name: _joined(robot.model, self._merged[name]) for name, robot in self._robots.items()
         }
         self._fixed_bodies = {body.name for body in bodies if body.fixed}
-        self._ignored = list(ignored)
+        self._ignored = list(dict.fromkeys(ignored))
+        self._first: dict[str, set[int]] = {}
+        self._second: dict[str, set[int]] = {}
+        for k, pair in enumerate(self._ignored):
+            for numbers, part in zip((self._first, self._second), pair, strict=True):
+                for name in part:
+                    numbers.setdefault(name, set()).add(k)
 
     def is_fixed(self, part: str) -> bool:
         """Check whether a part is fixed in the world."""
@@ -43,8 +49,10 @@ class CollisionFilter:
         """Check whether two parts collide where they touch."""
         if a == b or (self.is_fixed(a) and self.is_fixed(b)):
             return False
-        if any((a in one and b in two) or (b in one and a in two) for one, two in self._ignored):
-            return False
+        none: set[int] = set()
+        for one, two in ((a, b), (b, a)):
+            if not self._first.get(one, none).isdisjoint(self._second.get(two, none)):
+                return False
         (robot, link_a), (other, link_b) = split_name(a), split_name(b)
         if robot != other or link_a is None or link_b is None:
             return True
@@ -56,9 +64,11 @@ class CollisionFilter:
         """Return which of the parts named may collide with which (n, n), as `may_collide` says of two."""
         fixed = np.array([self.is_fixed(name) for name in names], dtype=bool)
         found: NDArray[np.bool_] = ~(fixed[:, None] & fixed)
+        number = {name: k for k, name in enumerate(names)}
         for one, two in self._ignored:
-            in_one, in_two = (np.array([name in part for name in names], dtype=bool) for part in (one, two))
-            found[np.ix_(in_one, in_two)] = found[np.ix_(in_two, in_one)] = False
+            firsts, seconds = ([number[name] for name in part if name in number] for part in (one, two))
+            for k in firsts:
+                found[k, seconds] = found[seconds, k] = False
         parts_of: dict[str, list[int]] = {}
         for k, name in enumerate(names):
             parts_of.setdefault(split_name(name)[0], []).append(k)

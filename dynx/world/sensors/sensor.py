@@ -135,6 +135,10 @@ class Sensor(ABC):
         return f"the {self.kind.replace('_', ' ')} sensor {shown(self.name)}"
 
 
+MAX_SENSORS = 10_000
+"""Largest number of sensors of a scene; each takes a part of a millisecond in every step."""
+
+
 def checked_sensors(sensors: object, parts: SensedParts) -> tuple[Sensor, ...]:
     """Return sensors as a tuple.
 
@@ -144,6 +148,8 @@ def checked_sensors(sensors: object, parts: SensedParts) -> tuple[Sensor, ...]:
     if isinstance(given, str) or not isinstance(given, Iterable):
         raise ArgumentError(f"sensors is {shown(sensors)}; wanted a sequence of sensors")
     found = tuple(given)
+    if len(found) > MAX_SENSORS:
+        raise ArgumentError(f"sensors has {len(found)} sensors; wanted at most {MAX_SENSORS}")
     names: set[str] = set()
     for each in found:
         if not isinstance(each, Sensor):

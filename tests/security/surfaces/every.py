@@ -1,13 +1,13 @@
 """All attacks; those on policies and runs where training is installed."""
 
-from importlib.util import find_spec
-
-from tests.security.attack import ATTACKS
+from tests.security.attack import ATTACKS, TRAINING
 from tests.security.surfaces import (
     arrays,
     description,
     mesh,
     page,
+    published_files,
+    published_pages,
     recording,
     scene,
     socket,
@@ -17,19 +17,19 @@ from tests.security.surfaces import (
 
 __all__ = [
     "ATTACKS",
+    "TRAINING",
     "arrays",
     "description",
     "mesh",
     "page",
+    "published_files",
+    "published_pages",
     "recording",
     "scene",
     "socket",
     "table",
     "world_state",
 ]
-
-TRAINING = find_spec("torch") is not None and find_spec("stable_baselines3") is not None
-"""True where policies can be trained."""
 
 if TRAINING:
     from tests.security.surfaces import policy as policy

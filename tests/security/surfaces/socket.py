@@ -39,6 +39,7 @@ def sent(kind: str, name: str) -> Callable[[Callable[[Any], object]], Callable[[
         def prepare(_: Box) -> Deed:
             return Deed((name,), "socket", (0,))
 
+        prepare.__module__ = act.__module__
         attack(kind, name)(prepare)
         return act
 
@@ -83,7 +84,7 @@ def refused(url: str, **options: Any) -> None:
 
     try:
         with open_socket(url, **options):
-            raise AssertionError(f"the socket of {url} opened")
+            raise AssertionError(f"the socket of {url} opened with {options}")
     except (InvalidHandshake, InvalidMessage, ConnectionError, EOFError):
         pass
 
