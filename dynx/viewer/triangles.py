@@ -79,6 +79,9 @@ _SURFACE_CHANGED, _VOLUME_CHANGED, _MOVED = 0.05, 0.02, 0.01
 """Largest effects of a reduction: on the surface and on the enclosed volume as shares of them, and the
 distance by which the box or any point moves as a share of the diagonal of the box."""
 
+_TRIED = 20_000
+"""Number of random points on a surface whose distance from another one is measured."""
+
 _SAMPLES = 100_000
 """Number of random points that stand for a surface where distances to it are measured. They lie so densely
 that the nearest of them is farther away than the surface by less than half of the distance allowed."""
@@ -246,9 +249,11 @@ class _Measures:
         )
 
     def distance(self, other: _Measures) -> float:
-        """Return the largest distance of a corner from the other surface, or a little more."""
+        """Return the largest distance of a corner, or of a point on the surface, from the other surface, or a
+        little more."""
+        # A triangle that closes a hole has its corners on the other surface.
         corners = np.unique(self.corners.reshape(-1, 3), axis=0)
-        return float(np.max(other._points.query(corners)[0]))
+        return float(np.max(other._points.query(np.concatenate([corners, self._points.data[:_TRIED]]))[0]))
 
     def _enclosed(self) -> float:
         from_middle = self.a - self._box.mean(axis=0)

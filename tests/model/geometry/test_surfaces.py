@@ -304,18 +304,17 @@ def test_facets_of_stl_files_may_have_colours(tmp_path: Path, materialise: bool)
     red = 31 if materialise else 31 << 10 | 1 << 15
     facets = b"".join(struct.pack("<12fH", *range(12), each) for each in (red, 1 << 15 if materialise else 0))
     (tmp_path / "a.stl").write_bytes(head.ljust(80) + struct.pack("<I", 2) + facets)
-    found = {
-        tuple(np.rint(255 * part.surface.colours[0, 0])) if part.surface.colours is not None else None: len(
-            part.surface.faces
-        )
-        for part, _ in Mesh(str(tmp_path / "a.stl")).parts
-    }
-    if materialise:
-        (mesh, _), *_ = Mesh(str(tmp_path / "a.stl")).parts
-        assert mesh.surface.colours is not None
-        assert np.array_equal(np.rint(255 * mesh.surface.colours[:, 0]), [[255, 0, 0], [10, 20, 30]])
-    else:
-        assert found == {(255, 0, 0): 1, None: 1}
+    found = {look.rgba: part.surface.faces.tolist() for part, look in Mesh(str(tmp_path / "a.stl")).parts}
+    other = (10 / 255, 20 / 255, 30 / 255, 1.0) if materialise else None
+    assert found == {(1.0, 0.0, 0.0, 1.0): [[0, 1, 2]], other: [[0, 1, 2]]}
+
+
+def test_empty_attributes_of_stl_files_are_no_colours(tmp_path: Path) -> None:
+    facet = struct.pack("<12fH", *range(12), 0)
+    (tmp_path / "a.stl").write_bytes(b"COLOR=\xff\xff\xff\xff".ljust(80) + struct.pack("<I", 1) + facet)
+    ((_, look),) = Mesh(str(tmp_path / "a.stl")).parts
+    assert look.rgba is None
+    assert not look.is_varied
 
 
 @pytest.mark.parametrize("shape", [Box((1.0, 2.0, 3.0)), Sphere(0.5), Cylinder(0.5, 2.0)])

@@ -24,6 +24,9 @@ STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attrib
 STL_HEAD = 84
 """Length of the head of a binary STL file [bytes], whose last four hold the number of facets."""
 
+MAX_FACET_COLOURS = 64
+"""Largest number of colours of facets that are materials; more are colours of corners."""
+
 # Each line is matched in time proportional to its length: a pattern must not run across lines.
 STL_VERTEX = re.compile(rb"^[ \t]*vertex[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE | re.IGNORECASE)
 _END = re.compile(rb"^[ \t]*endloop\b", re.MULTILINE | re.IGNORECASE)
@@ -74,6 +77,9 @@ def stl_surface(data: bytes) -> FileSurface:
     if len(data) < STL_HEAD + STL_FACET.itemsize * len(faces) or data[:6].lower() == b"solid ":
         return FileSurface(vertices, faces)
     attributes = np.frombuffer(data, STL_FACET, len(faces), STL_HEAD)["attribute"].astype(np.intp)
+    # Programs that know no colours of facets write that head and empty attributes.
+    if not attributes.any():
+        return FileSurface(vertices, faces)
     whole = data[:80].partition(b"COLOR=")[2][:4]
     fives = np.stack([attributes >> shift & 31 for shift in (10, 5, 0)], axis=1) / 31.0
     marked = attributes >> 15 == 1
@@ -84,7 +90,13 @@ def stl_surface(data: bytes) -> FileSurface:
         colours = np.where(marked[:, None], fives, np.nan)
     else:
         return FileSurface(vertices, faces)
-    return FileSurface(vertices, faces, colours=np.repeat(colours[:, None], 3, axis=1))
+    distinct, number = np.unique(np.nan_to_num(colours, nan=-1.0), axis=0, return_inverse=True)
+    if len(distinct) > MAX_FACET_COLOURS:
+        return FileSurface(vertices, faces, colours=np.repeat(colours[:, None], 3, axis=1))
+    materials = tuple(
+        FileMaterial(None if red < 0.0 else (red, green, blue, 1.0)) for red, green, blue in distinct.tolist()
+    )
+    return FileSurface(vertices, faces, materials=materials, material_of=number.reshape(-1))
 
 
 # Triangles of Wavefront OBJ files, and what they look like.
