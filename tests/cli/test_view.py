@@ -43,6 +43,21 @@ def test_a_rollout_a_robot_and_two_rollouts_are_exported(saved: str, tmp_path: P
         page.unlink()
 
 
+def test_a_film_is_exported_by_its_suffix(
+    saved: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    film = tmp_path / "run.mp4"
+    with monkeypatch.context() as patch:
+        patch.setitem(sys.modules, "imageio_ffmpeg", None)
+        code, output = run(saved, "--export", str(film))
+        assert (code, film.exists()) == (2, False)
+        assert "pip install 'dynx[film]'" in output
+    pytest.importorskip("imageio_ffmpeg", reason="needs the extra film")
+    code, output = run(saved, "--export", str(film))
+    assert code == 0, output
+    assert film.read_bytes()[4:8] == b"ftyp"
+
+
 def test_a_robot_is_shown_at_a_configuration(tmp_path: Path) -> None:
     pictures = []
     robot = tmp_path / "door.urdf"
