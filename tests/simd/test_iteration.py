@@ -9,15 +9,8 @@ from hypothesis import strategies as st
 
 from dynx.errors import CompileError, ShapeError
 from dynx.simd.emit import Settings
-from dynx.simd.iteration import (
-    GIVEN_UP,
-    NO_RESTART,
-    REACHED,
-    RUNNING,
-    Iteration,
-    IterationKernel,
-    compile_iteration,
-)
+from dynx.simd.iteration import Iteration, IterationKernel, compile_iteration
+from dynx.simd.iteration_status import GIVEN_UP, NO_RESTART, REACHED, RUNNING
 from dynx.simd.target import host
 from dynx.simd.trace import trace
 from dynx.spatial.scalar import Array, Floats, less, select
