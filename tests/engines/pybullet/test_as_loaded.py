@@ -13,14 +13,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import dynx
+from dynx.agreement.tolerances import BAR
 from dynx.engines.pybullet.as_loaded import LoadedPyBullet
 from dynx.errors import EngineError
 from dynx.loaded.difference import model_difference
 from dynx.model import Inertial, Joint, Link, Model, Pose
 from dynx.model.tree import Base
+from dynx.reference.backend import ReferenceBackend
 from tests.backends.robots import chain, motion
 from tests.loaded import fork
-from tests.loaded.files import TILTED, assert_alike, clean, clean_robots, loaded
+from tests.loaded.files import TILTED, assert_alike, clean, clean_robots, error, loaded
 from tests.loaded.fork import BASES, BODY
 
 bullet = pytest.importorskip("pybullet")
@@ -119,6 +121,28 @@ def test_robots_of_equal_size_in_one_process_keep_apart() -> None:
 def _heavier(model: Model, by: float) -> list[Link]:
     body = Inertial(by, Pose((0.1, 0.0, 0.0)), ixx=0.3 * by, iyy=0.4 * by, izz=0.5 * by)
     return [replace(link, inertial=body) for link in model.links]
+
+
+@pytest.mark.parametrize("mass", [1e-5, 1e-6])
+def test_rounding_on_a_light_floating_base_is_no_difference(mass: float) -> None:
+    light = Inertial(mass, ixx=mass, iyy=mass, izz=mass)
+    heavy = Inertial(1.5, ixx=1.0, iyy=1.0, izz=1.0)
+    links = (Link("base", light), Link("upper", replace(heavy, mass=0.05)), Link("lower", heavy))
+    axes = ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+    places = (Pose((-0.1, 1.0, 0.7)), Pose((0.0, -0.5, 0.0)))
+    joints = tuple(
+        Joint(f"joint{k}", "revolute", links[k].name, links[k + 1].name, origin=places[k], axis=axes[k])
+        for k in range(2)
+    )
+    model = Model("light", links, joints, base="floating")
+    reference = ReferenceBackend(model)
+    with loaded(LoadedPyBullet, model, calls=UNHINDERED) as robot:
+        for seed in range(5):
+            q, v, a = motion(model, seed)
+            tau = reference.inverse_dynamics(q, v, a)
+            found = robot.forward_dynamics(q, v, tau)
+            assert error(reference.inverse_dynamics(q, v, found), tau) < BAR
+            assert error(robot.mass_matrix(q), reference.mass_matrix(q)) < BAR
 
 
 def test_a_state_that_overflows_is_left_behind() -> None:
