@@ -501,7 +501,7 @@ def observe(name: str, base: Base, seed: int, worst: Worst) -> None:
             if not np.abs(torque).max() > 1e-9 * FORCE:
                 continue  # nothing between the base and the link moves
             seen += 1
-            duration = 5.0 * time_constant(engine, q, link.name, torque)
+            duration = 5.0 * time_constant(engine, q, v, link.name, torque)
             t, Q, V, tau = moved(engine, q, v, link.name, wrench, duration)
             observer = MomentumObserver(model, time_constant=duration / 5.0, backend=engine)
             found = observer.residuals(t, Q, V, tau)[-1]
@@ -516,12 +516,12 @@ def observe(name: str, base: Base, seed: int, worst: Worst) -> None:
     print(f"{name}, {base} base: 20 N on {seen} of {len(model.links)} links; the others are the base")
 
 
-def time_constant(engine: Backend, q: Floats, frame: str, torque: Floats) -> float:
-    """Return a time constant [s] of at most 1 ms, in five of which the force moves nothing by more than about
-    0.1 mm or 0.1 mrad: what it acts on turns and falls away, and its torques change."""
+def time_constant(engine: Backend, q: Floats, v: Floats, frame: str, torque: Floats) -> float:
+    """Return a time constant [s] of at most 1 ms, in five of which nothing moves by more than about 0.1 mm or
+    0.1 mrad: what the force acts on turns and falls away, and its torques are no step."""
     a = np.linalg.solve(engine.mass_matrix(q), torque)
     fastest = max(float(np.abs(engine.jacobian(q, frame) @ a).max()), float(np.abs(a).max()))
-    return min(1e-3, math.sqrt(2.0 * 1e-4 / fastest) / 5.0)
+    return min(1e-3, math.sqrt(2.0 * 1e-4 / fastest) / 5.0, 1e-4 / float(np.abs(v).max()) / 5.0)
 
 
 def moved(

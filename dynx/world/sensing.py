@@ -23,7 +23,7 @@ from dynx.world.contacts import Contact
 from dynx.world.last_step import LastStep
 from dynx.world.queries import first_hits
 from dynx.world.sensors.errors import SampleNumbers
-from dynx.world.sensors.kinds import ContactSensor
+from dynx.world.sensors.kinds import ContactSensor, RaySensor
 from dynx.world.sensors.motion import RobotMotion, SensedMotion
 from dynx.world.sensors.places import SensedParts, SensorPlace
 from dynx.world.sensors.readings import SAME_SAMPLE, SensorReading, read_sensor, sample_numbers
@@ -67,11 +67,12 @@ class SceneMotion(SensedMotion):
         return np.broadcast_to(self._bodies[place.name], (n, 4, 4))
 
     def contact_force(self, place: SensorPlace) -> Floats:
-        require_shapes(place, self._around.layout)
+        require_shapes(place, self._around.layout, own=True)
         return self._around.force_on(_part(place))
 
     def ray_distances(self, place: SensorPlace, origins: Floats, directions: Floats, length: float) -> Floats:
         layout = self._around.layout
+        require_shapes(place, layout, own=False)
         others = tuple(each for each in layout.colliders if each.name != _part(place))
         seen, found = replace(layout, colliders=others), np.empty(len(self.t))
         for k in range(len(self.t)):
@@ -104,11 +105,18 @@ def parts_of(layout: Layout, alone: str | None = None) -> SensedParts:
     return SensedParts(robots, tuple(body.name for body in layout.bodies), alone)
 
 
-def require_shapes(place: SensorPlace, layout: Layout) -> None:
-    """Raise UnsupportedFeatureError for a sensor of contacts on a part that nothing can touch."""
-    if _part(place) not in {each.name for each in layout.colliders}:
-        why = "has no collision shape" if layout.colliders else "has no shapes where collisions=False"
-        raise UnsupportedFeatureError(f"{place.sensor} is on {shown(_part(place))}, which {why}")
+def require_shapes(place: SensorPlace, layout: Layout, *, own: bool) -> None:
+    """Raise UnsupportedFeatureError for a sensor in a scene without shapes, or with `own` on a part without
+    any."""
+    if not layout.colliders:
+        raise UnsupportedFeatureError(
+            f"{place.sensor} is on {shown(_part(place))}; wanted a scene whose parts have collision shapes, "
+            "in a world without collisions=False"
+        )
+    if own and _part(place) not in {each.name for each in layout.colliders}:
+        raise UnsupportedFeatureError(
+            f"{place.sensor} is on {shown(_part(place))}, which has no collision shape"
+        )
 
 
 def _part(place: SensorPlace) -> str:
@@ -163,8 +171,8 @@ class WorldSensors:
         parts = parts_of(layout)
         for sensor in sensors:
             sensor.period(self._h)
-            if isinstance(sensor, ContactSensor):
-                require_shapes(sensor.place(parts), layout)
+            if isinstance(sensor, ContactSensor | RaySensor):
+                require_shapes(sensor.place(parts), layout, own=sensor.touches)
         self._rollout = 0
         self._draw_for(0)
         self.forget()

@@ -632,7 +632,7 @@ class MjcfDocument:
         for name, element in SENSOR_ELEMENTS[sensor.kind].items():
             along = sensor.joint is not None and sensor.joint.type == "prismatic"
             kind = "force" if along and sensor.kind == "joint_torque" else element
-            SubElement(self._sensor, kind, name=names[name], site=sensor.name)
+            SubElement(self._sensor, kind, name=names[name], site=site_name(sensor))
 
     def _add_site(self, sensor: SensorLayout, body: str) -> None:
         """Add the site of a sensor to a body that is rigidly connected with its part."""
@@ -651,7 +651,12 @@ class MjcfDocument:
         pose = placement(T[:3, :3], T[:3, 3])
         if sensor.kind == "joint_torque" and sensor.joint is not None:
             pose = attributes({"zaxis": sensor.joint.axis})
-        SubElement(elements[body], "site", {"name": sensor.name, "group": "3", **pose})
+        SubElement(elements[body], "site", {"name": site_name(sensor), "group": "3", **pose})
+
+
+def site_name(sensor: SensorLayout) -> str:
+    """Return the name of the site of a sensor, which no site of a constraint has."""
+    return f"{sensor.name}/site"
 
 
 SENSOR_ELEMENTS: dict[str, dict[str, str]] = {

@@ -117,8 +117,7 @@ def check_sensors(scenario: Scenario, model: Model) -> None:
             place = sensor.place(parts)
             if layout is None:
                 raise place.without_scene
-            if isinstance(sensor, ContactSensor):
-                require_shapes(place, layout)
+            require_shapes(place, layout, own=sensor.touches)
 
 
 def sensed_motion(rollout: Rollout) -> SensedMotion:

@@ -18,6 +18,7 @@ from dynx.world import (
     ForceTorqueSensor,
     Imu,
     JointTorqueSensor,
+    PointToPoint,
     RaySensor,
     Scene,
     SceneRobot,
@@ -134,6 +135,21 @@ def test_the_document_names_robots_whose_accelerations_mujoco_reads_otherwise() 
     assert named(moved) == ["acceleration", "mimic"]
     assert named(moved, joint_damping=False) == ["mimic"]
     assert named(replace(scene, sensors=sensors[:1])) == []
+
+
+def test_a_sensor_may_be_called_like_an_anchor_of_a_constraint() -> None:
+    arm = dynx.load("ur5")
+    cup = box("cup", (0.1, 0.1, 0.1), mass=1.0, pose=Pose((2.0, 0.0, 1.0)))
+    scene = Scene(
+        "tied",
+        robots=(SceneRobot("arm", arm),),
+        bodies=(cup,),
+        constraints=(PointToPoint("cup", "world", (0.0, 0.0, 0.0), (2.0, 0.0, 1.0)),),
+        sensors=(Imu("constraint0/a", "arm/tool0"), Imu("constraint0/a/site", "arm/tool0")),
+    )
+    with World(scene, "mujoco") as world:
+        world.step()
+        assert set(world.read_sensors()) == {"constraint0/a", "constraint0/a/site"}
 
 
 def test_the_document_of_a_scene_without_sensors_has_none() -> None:

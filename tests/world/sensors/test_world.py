@@ -323,6 +323,13 @@ def test_what_cannot_be_sensed_is_refused_before_the_first_step() -> None:
     touch = replace(scene, sensors=(ContactSensor("touch", "arm/tool0"),))
     with pytest.raises(UnsupportedFeatureError, match="'touch' is on 'arm/tool0', which has no collision"):
         World(touch, "mujoco")
+    for kind in (ContactSensor, RaySensor):
+        blind = replace(scene, sensors=(kind("blind", "arm/wrist_3_link"),))
+        World(blind, "mujoco").close()
+        with pytest.raises(
+            UnsupportedFeatureError, match=r"'blind' is on .* a world without collisions=False"
+        ):
+            World(blind, "mujoco", collisions=False)
     with pytest.raises(UnsupportedFeatureError, match="needs a scene"):
         dynx.simulate(arm, None, duration=0.01, sensors=RaySensor("ray", "tool0"))
     # Of the other robot of a scene neither velocity nor acceleration is recorded.
