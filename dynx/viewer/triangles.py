@@ -133,10 +133,16 @@ def _with_edges(mesh: Mesh, budget: int | None) -> tuple[Triangles, bool]:
     surface, found = mesh.surface, reduced(mesh, budget)
     if surface.normals is None:
         return found, True
-    if len(found.faces) < len(surface.faces):
+    if len(found.faces) == len(surface.faces):
+        return split_at_edges(surface)[0], False
+    name = _hash(found.vertices, found.faces, surface.vertices, surface.faces, surface.normals)
+    split = _unpacked(read_cached(name))
+    if split is None:
         normals = _nearest_normals(found, surface)
-        surface = Surface(found.vertices.astype(np.float64), found.faces.astype(np.intp), normals)
-    return split_at_edges(surface)[0], False
+        vertices, faces = found.vertices.astype(np.float64), found.faces.astype(np.intp)
+        split, _ = split_at_edges(Surface(vertices, faces, normals))
+        keep(name, _packed(split))
+    return split, False
 
 
 _NORMALS_TRIED = 8
@@ -192,7 +198,7 @@ def split_at_edges(surface: Surface, *corners: Floats) -> tuple[Triangles, list[
 @lru_cache(maxsize=256)
 def _reduced(mesh: Mesh, budget: int) -> Triangles:
     vertices, faces = mesh.triangles
-    name = _name(vertices, faces, budget)
+    name = _hash(vertices, faces, np.array(budget))
     found = _unpacked(read_cached(name))
     if found is None:
         found = _simplified(vertices, faces, budget)
@@ -279,11 +285,12 @@ def _is_closed(faces: NDArray[np.integer[Any]]) -> bool:
     return np.array_equal(np.sort(first * count + second), np.sort(second * count + first))
 
 
-def _name(vertices: Floats, faces: NDArray[np.intp], budget: int) -> str:
-    """Return the name in the cache of what a mesh is reduced to: a hash of all that determines it."""
-    digest = sha256(f"{_version()} {vertices.dtype} {faces.dtype} {len(vertices)} {budget}".encode())
-    digest.update(vertices.tobytes())
-    digest.update(faces.tobytes())
+def _hash(*arrays: NDArray[Any]) -> str:
+    """Return the name in the cache of what is made of a mesh: a hash of all that determines it."""
+    digest = sha256(_version().encode())
+    for array in arrays:
+        digest.update(f" {array.dtype} {array.shape} ".encode())
+        digest.update(array.tobytes())
     return f"{digest.hexdigest()}.triangles"
 
 
