@@ -85,7 +85,7 @@ def renderer_of(name: str) -> Draw:
         )
     if name not in world_names():
         raise UnknownBackendError(
-            f"no renderer {shown(name)}; wanted None, for that of dynx, or 'pybullet', for PyBullet's in "
-            f"software{nearest(name, ['pybullet'])}"
+            f"no renderer {shown(name)}; wanted None, for that of dynx, 'mujoco' for MuJoCo's by OpenGL, "
+            f"or 'pybullet', for PyBullet's in software{nearest(name, ['mujoco', 'pybullet'])}"
         )
     return native_queries_of(world_class(name)).draw

@@ -672,7 +672,8 @@ class World:
 
     @checks_types
     def camera(self, camera: Camera, renderer: str | None = None) -> Picture:
-        """Return what a camera sees, drawn by dynx or by the renderer of an engine (``"pybullet"``)."""
+        """Return what a camera sees, drawn by dynx or by the renderer of an engine: ``"pybullet"``, or
+        ``"mujoco"`` with EGL or OSMesa."""
         # Imported here, because few worlds are drawn.
         from dynx.world.camera import cast_rays, draw_picture
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import importlib
+import os
 import re
 import sys
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
-from dynx.errors import importing
+from dynx.errors import EngineLimitError, importing
 from dynx.safe_path import isolated_children
 
 # The further errors are raised while its renderer is set up, because of a wrong MUJOCO_GL or missing
@@ -21,7 +25,7 @@ with (
 ):
     import mujoco
 
-__all__ = ["MAX_DEPTH", "mujoco", "silence_warnings", "silent_data"]
+__all__ = ["MAX_DEPTH", "mujoco", "offscreen_context", "silence_warnings", "silent_data"]
 
 MAX_DEPTH = 1000
 """Largest depth of a tree of links for MuJoCo. Its compiler has a limit of 1,024 bodies, and its file
@@ -69,3 +73,34 @@ def _pass_on(message: str) -> None:
 if mujoco.get_mju_user_warning() is None:
     # Without a handler, MuJoCo appends its warnings to a file MUJOCO_LOG.TXT in the working directory.
     mujoco.set_mju_user_warning(_pass_on)
+
+
+@contextmanager
+def offscreen_context(width: int, height: int) -> Iterator[None]:
+    """Make a context of OpenGL without a display current in this thread, in a ``with`` block: by EGL or
+    OSMesa on Linux, or as the environment variable ``MUJOCO_GL`` says, and MuJoCo's own elsewhere.
+
+    Raises EngineLimitError where there is none.
+    """
+    chosen = os.environ.get("MUJOCO_GL", "").lower()
+    names = [chosen] if chosen in ("egl", "osmesa") else ["egl", "osmesa"]
+    if not sys.platform.startswith("linux"):
+        names = ["gl_context"]
+    reasons = []
+    for name in names:
+        try:
+            made = importlib.import_module(f"mujoco.{name}").GLContext(width, height)
+            made.make_current()
+        # Without their libraries they raise what their bindings happen to.
+        except (AttributeError, ImportError, OSError, RuntimeError, TypeError) as error:
+            reasons.append(f"{name}: {error or type(error).__name__}")
+            continue
+        try:
+            yield
+        finally:
+            made.free()
+        return
+    raise EngineLimitError(
+        f"MuJoCo has no picture without a display here ({'; '.join(reasons)}); install EGL or OSMesa, or "
+        "leave renderer out to draw without it"
+    )

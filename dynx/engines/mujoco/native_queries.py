@@ -13,6 +13,7 @@ from dynx.engines.mujoco.stepper import MujocoStepper, engine_errors
 from dynx.model.geometry import HeightField
 from dynx.model.geometry.ray_casting import cast_on_shape
 from dynx.spatial.scalar import Floats
+from dynx.steppers.camera import Camera, Drawing, DrawnShape
 from dynx.steppers.native_queries import NativeQueries, RayHit
 from dynx.steppers.stepper import TouchingPoint
 
@@ -85,6 +86,13 @@ class MujocoQueries(NativeQueries):
                 collider, at, outward = nearest[0][ray], float(nearest[1][ray]), nearest[2][ray]
             hits.append(_MISS if collider is None else RayHit(collider, at, outward))
         return hits
+
+    @classmethod
+    def draw(cls, shapes: Sequence[DrawnShape], T_world_camera: Floats, camera: Camera) -> Drawing:
+        # Imported here, because few worlds are drawn by it.
+        from dynx.engines.mujoco.renderer import draw
+
+        return draw(shapes, T_world_camera, camera)
 
     def _cast_on_fields(self, origins: Floats, directions: Floats) -> tuple[Any, Floats, Floats] | None:
         """Return the collider, distance and normal of each ray on height fields; None if there are none."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,8 @@ from PIL import Image
 import dynx
 from dynx.errors import ArgumentError, EngineLimitError, UnknownBackendError
 from dynx.model import Pose
-from dynx.world import Camera, Material, Picture, Scene, SceneRobot, World, box, ground, sphere
+from dynx.model.geometry import HeightField
+from dynx.world import Camera, Material, Picture, Scene, SceneBody, SceneRobot, World, box, ground, sphere
 
 pytest.importorskip("pybullet")
 
@@ -77,6 +79,65 @@ def test_pybullet_renders_the_same_depth_and_parts(mesh: bool) -> None:
     assert np.abs(picture.depth[ball] - other.depth[ball]).max() < 0.05
 
 
+def mujoco_picture(world: World, camera: Camera) -> Picture:
+    """Return MuJoCo's picture; the test is skipped where OpenGL needs a display."""
+    pytest.importorskip("mujoco")
+    try:
+        return world.camera(camera, "mujoco")
+    except EngineLimitError as error:
+        if "without a display" not in str(error):
+            raise
+        pytest.skip(str(error))
+
+
+@pytest.mark.parametrize("mesh", [False, True])
+def test_mujoco_renders_the_same_depth_and_parts(mesh: bool) -> None:
+    camera = Camera.look_at((1.6, 0.3, 1.2), (0.4, 0.0, 0.2), size=(160, 120), near=0.2, far=6.0)
+    robots = scene().robots if mesh else ()
+    with World(Scene("s", robots, scene().bodies), "pybullet") as world:
+        picture, other = world.camera(camera), mujoco_picture(world, camera)
+    inner = away_from_edges(picture) & away_from_edges(other)
+    assert inner.mean() > 0.8
+    assert np.array_equal(picture.segmentation[inner], other.segmentation[inner])
+    ball = inner & picture.mask("ball")
+    flat = inner & (picture.segmentation >= 0) & ~picture.mask("ball")
+    assert np.abs(picture.depth[flat] - other.depth[flat]).max() < 1e-4
+    assert np.abs(picture.depth[ball] - other.depth[ball]).max() < 0.05
+    cube = other.rgb[inner & other.mask("cube")].astype(int)
+    assert (cube[:, 0] > cube[:, 1] + 30).all()
+
+
+def test_a_height_field_an_empty_scene_and_a_camera_on_a_part_are_drawn_by_mujoco() -> None:
+    heights = 0.2 * np.sin(np.arange(20.0))[:, None] * np.ones(16)
+    field = SceneBody("hill", (HeightField(heights, (2.0, 1.6)),))
+    camera = Camera(Pose((0.0, 0.0, 2.0), (np.pi, 0.0, 0.3)), size=(80, 60), part="eye", near=0.1, far=10.0)
+    eye = box("eye", (0.01, 0.01, 0.01), mass=1.0, pose=Pose((0.1, 0.0, 0.5)))
+    with World(Scene("hills", bodies=(field, eye)), "mujoco") as world:
+        picture, other = world.camera(camera), mujoco_picture(world, camera)
+    both = np.isfinite(picture.depth) & np.isfinite(other.depth)
+    assert both.mean() > 0.2
+    assert (np.isfinite(picture.depth) == np.isfinite(other.depth)).mean() > 0.97
+    assert np.median(np.abs(picture.depth - other.depth)[both]) < 1e-4
+    with World(Scene("nothing"), "mujoco") as world:
+        assert (mujoco_picture(world, Camera(size=(8, 6))).segmentation == -1).all()
+
+
+def test_an_unknown_way_to_open_gl_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    library = pytest.importorskip("dynx.engines.mujoco.library")
+    if not sys.platform.startswith("linux"):
+        pytest.skip("MuJoCo has one way elsewhere")
+
+    def missing(name: str) -> None:
+        raise ImportError(f"no {name}")
+
+    monkeypatch.setattr(library.importlib, "import_module", missing)
+    with (
+        pytest.raises(EngineLimitError, match=r"without a display here \(egl: no mujoco.egl; osmesa: "),
+        library.offscreen_context(8, 8),
+    ):
+        pass
+
+
 def away_from_edges(picture: Picture) -> NDArray[np.bool_]:
     """Return the pixels around which one part is seen, whose depths lie in one plane."""
     seen, depth = picture.segmentation, 1.0 / picture.depth
@@ -91,10 +152,10 @@ def away_from_edges(picture: Picture) -> NDArray[np.bool_]:
 
 
 def test_engines_without_a_renderer_are_refused() -> None:
-    pytest.importorskip("mujoco")
+    pytest.importorskip("pydrake")
     with World(scene(), "pybullet") as world:
         with pytest.raises(EngineLimitError, match="no renderer"):
-            world.camera(Camera(), "mujoco")
+            world.camera(Camera(), "drake")
         with pytest.raises(UnknownBackendError, match="did you mean 'pybullet'"):
             world.camera(Camera(), "bullet")
         with pytest.raises(UnknownBackendError, match=r"'opengl'; wanted None, .* or 'pybullet'"):
