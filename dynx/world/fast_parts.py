@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from dynx.errors import shown
 from dynx.model.geometry import Box, Cylinder
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_exp, rotation_from_quat
-from dynx.steppers.layout import BodyLayout, Collider, Layout
+from dynx.steppers.layout import Collider, Layout, Owner
 from dynx.steppers.material import contact_material
 from dynx.steppers.state import BodyState, PartStates, RobotState, WorldState
 from dynx.steppers.stepper import SlidingFace, Stepper
@@ -62,7 +63,7 @@ def fast_parts(engine: Stepper, state: WorldState) -> Iterator[str]:
             if turn > MAX_TURN and not _spins_evenly(R @ body.inertia @ R.T, spin):
                 yield f"{shown(body.name)} turns by {turn:.2g} rad {in_step}, so that it gains energy{REMEDY}"
     for number, collider in enumerate(layout.colliders):
-        if collider.owner.robot is None and not layout.is_fixed(collider.owner):
+        if not layout.is_fixed(collider.owner):
             fault = _sliding_fault(engine, state, number, before, then)
             if fault is not None:
                 yield f"{shown(collider.name)} slides too fast for a step of {h:g} s: it {fault}{REMEDY}"
@@ -126,9 +127,8 @@ def _sliding_fault(
     """Return what an engine does wrong with the slide of a body on what carries it, or None."""
     layout, h = engine.layout, engine.dt
     collider = layout.colliders[number]
-    body = layout.bodies[collider.owner.body]
-    T = state.bodies[body.name].T_world_body
-    if not state.bodies[body.name].twist.any():
+    body = _rigid_body(layout, state, collider.owner)
+    if body is None or not body.moves:
         return None
     partners = np.flatnonzero(layout.collides[number]).tolist()
     for _, other, near in Distances(layout).closest(state, [number], partners, CLOSE):
@@ -142,15 +142,37 @@ def _sliding_fault(
         if gravity <= 0.0 or np.linalg.norm(slip) < MIN_SLIP:
             continue
         friction = contact_material(collider.material, layout.colliders[other].material).friction
-        fault = engine.sliding_fault(_face(collider, body, T, slip, normal, friction, gravity))
+        fault = engine.sliding_fault(
+            _face(collider, body, before[collider.owner], slip, normal, friction, gravity)
+        )
         if fault is not None:
             return fault
     return None
 
 
+class RigidPart(NamedTuple):
+    """A body of the scene, or a robot without joints that move: its mass [kg] and the centre (3,) of that."""
+
+    mass: float
+    center: Floats
+    moves: bool
+
+
+def _rigid_body(layout: Layout, state: WorldState, owner: Owner) -> RigidPart | None:
+    """Return what an owner is; None for a link of a robot whose joints move, because they share its load."""
+    if owner.robot is None:
+        body = layout.bodies[owner.body]
+        return RigidPart(body.mass, body.center, bool(state.bodies[body.name].twist.any()))
+    robot = layout.robots[owner.robot]
+    if robot.model.joint_names:
+        return None
+    center = np.asarray(robot.model.mechanism.root_center, dtype=float)
+    return RigidPart(robot.model.total_mass, center, bool(state.robots[robot.name].v.any()))
+
+
 def _face(
     collider: Collider,
-    body: BodyLayout,
+    body: RigidPart,
     T: Floats,
     slip: Floats,
     normal: Floats,

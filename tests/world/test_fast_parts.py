@@ -157,6 +157,39 @@ def test_an_engine_gets_the_mechanics_of_the_slide_in_any_frame(
     assert face.flat
 
 
+def test_a_robot_without_joints_slides_as_a_body_of_its_mass() -> None:
+    friction = Material(friction=0.6)
+    tensor = '<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>'
+    brick = dynx.load(
+        f"""<robot name="brick"><link name="body">
+          <inertial><origin xyz="0.02 0 -0.01"/><mass value="2"/>{tensor}</inertial>
+          <collision><geometry><box size="0.2 0.1 0.2"/></geometry></collision></link></robot>""",
+        base="floating",
+    )
+    at, speed = Pose((0.0, 0.0, 0.1), (0.0, 0.0, 0.4)), (10.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    robot = SceneRobot("brick", brick, v=speed, material=friction).at(at)
+    turned = (10.0 * math.cos(0.4), 10.0 * math.sin(0.4), 0.0, 0.0, 0.0, 0.0)
+    body = box("brick", (0.2, 0.1, 0.2), mass=2.0, pose=at, twist=turned, material=friction)
+    moments = ((0.01, 0.0, 0.0), (0.0, 0.01, 0.0), (0.0, 0.0, 0.01))
+    body = replace(body, center_of_mass=(0.02, 0.0, -0.01), inertia=moments)
+    plane = ground(material=friction)
+    scenes = Scene("s", (robot,), (plane,)), Scene("s", bodies=(plane, body))
+    faces: list[SlidingFace] = []
+    with patch.object(world_class(ENGINES[0]), "sliding_fault", lambda _, face: faces.append(face)):
+        for scene in scenes:
+            World(scene, ENGINES[0]).close()
+    one, other = faces
+    assert one[:4] == pytest.approx(other[:4])
+    assert one.size == pytest.approx(other.size)
+    assert one.load == pytest.approx(other.load)
+    for engine in ENGINES:
+        counts = []
+        for scene in scenes:
+            with World(scene, engine, 4e-3) as world:
+                counts.append(sum("slides too fast" in note for note in world.notes))
+        assert counts[0] == counts[1]
+
+
 def test_round_bodies_have_no_face() -> None:
     faces: list[SlidingFace] = []
     ball = sphere("ball", 0.1, mass=1.0, pose=Pose((0.0, 0.0, 0.1)), twist=(2.0, 0.0, 0.0, 0.0, 0.0, 0.0))
