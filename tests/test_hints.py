@@ -126,7 +126,7 @@ def test_forces_by_part_name_the_object(movers: list[Any]) -> None:
 
 @given(st.floats(max_value=0.0, exclude_max=True) | st.just(-np.inf))
 def test_a_force_from_before_the_start_is_refused(start: float) -> None:
-    with pytest.raises(ArgumentError, match=r"starts at .*0 or more"):
+    with pytest.raises(ArgumentError, match=r"the start of an external force .* at least 0"):
         dynx.ExternalForce("tool0", [0.0] * 6, start=start)
 
 

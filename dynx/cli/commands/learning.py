@@ -325,6 +325,6 @@ def play() -> None:
       dynx play stand/final.zip --engine mujoco,pybullet --episodes 100
       dynx play lander/final.zip --view
       dynx play stand/final.zip --view --engine mujoco,pybullet
-      dynx play ppo.zip --unpickle --task CartPole-v1 --statistics vec_normalize.pkl
+      dynx play ppo.zip --unpickle --task CartPole-v1 --statistics stats.pkl
       dynx play lander/final.zip --export lander.mp4
     """
