@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
 from dynx.model import Mechanism
+from dynx.model.mechanism import Body, BodyFrame
 from dynx.rbd.base_parameters import align_frames
-from dynx.spatial.scalar import Floats
 
 
 def simplify_mechanism(mechanism: Mechanism) -> Mechanism:
@@ -28,10 +29,24 @@ def simplify_mechanism(mechanism: Mechanism) -> Mechanism:
 def _zero_rounding_residue(mechanism: Mechanism) -> Mechanism:
     return replace(
         mechanism,
-        bodies=tuple(replace(body, R=_rounded_to_zero(body.R)) for body in mechanism.bodies),
-        frames=tuple(replace(frame, R=_rounded_to_zero(frame.R)) for frame in mechanism.frames),
+        bodies=_without_residue(mechanism.bodies),
+        frames=_without_residue(mechanism.frames),
     )
 
 
-def _rounded_to_zero(R: Floats) -> Floats:
-    return np.where(np.abs(R) < 0.5 * np.finfo(np.float64).eps, 0.0, R)
+T = TypeVar("T", Body, BodyFrame)
+
+
+def _without_residue(parts: tuple[T, ...]) -> tuple[T, ...]:
+    """Return bodies or frames, those anew whose rotation has residues: others stay as they are, for the sake
+    of robots with thousands of them."""
+    if not parts:
+        return parts
+    rotations = np.array([part.R for part in parts])
+    rounded = np.where(np.abs(rotations) < 0.5 * np.finfo(np.float64).eps, 0.0, rotations)
+    # In the bits, since -0 becomes 0, too.
+    changed = (rounded.view(np.int64) != rotations.view(np.int64)).any(axis=(1, 2))
+    return tuple(
+        replace(part, R=R) if is_changed else part
+        for part, R, is_changed in zip(parts, rounded, changed.tolist(), strict=True)
+    )

@@ -48,8 +48,13 @@ class RigidInertia:
         h = rotate(R, self.first_moment)
         P, H = skew(p), skew(h)
         rotated = R @ self.rotational_inertia @ np.swapaxes(R, -1, -2)
-        shifted = rotated - P @ H - H @ P - self.mass * (P @ P)
-        return RigidInertia(self.mass, h + p * self.mass, symmetric_from_upper(shifted))
+        mass = append_axis(self.mass)
+        shifted = rotated - P @ H - H @ P - append_axis(mass) * (P @ P)
+        return RigidInertia(self.mass, h + p * mass, symmetric_from_upper(shifted))
+
+    def __getitem__(self, index: int) -> RigidInertia:
+        """Return one of several inertias."""
+        return RigidInertia(self.mass[index, ...], self.first_moment[index], self.rotational_inertia[index])
 
     def momentum(self, linear: Array, angular: Array) -> tuple[Array, Array]:
         """Return linear and angular momentum about O, given the velocity of O and the angular velocity."""
@@ -65,8 +70,8 @@ def inertia_about_origin(mass: Array, center: Array, rotation: Array, tensor: Ar
     `tensor` (..., 3, 3) is about `center` (..., 3), in the axes `rotation` (..., 3, 3).
     """
     central = rotation @ tensor @ np.swapaxes(rotation, -1, -2)
-    C = skew(center)
-    return RigidInertia(np.asarray(mass), center * mass, central - (C @ C) * mass)
+    C, along = skew(center), append_axis(mass)
+    return RigidInertia(np.asarray(mass), center * along, central - (C @ C) * append_axis(along))
 
 
 _UPPER = np.array([[0, 0, 0], [0, 1, 1], [0, 1, 2]]), np.array([[0, 1, 2], [1, 1, 2], [2, 2, 2]])

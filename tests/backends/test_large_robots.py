@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import tracemalloc
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
+import numpy as np
 import pytest
 
 import dynx
+import dynx.model.mechanism as model_mechanism
 from dynx.backends import backend, installed_backends
 from dynx.backends.joint_dynamics import JointDynamicsTerms
+from dynx.compiled.simplification import _zero_rounding_residue, simplify_mechanism
 from dynx.errors import EngineLimitError
 from dynx.model import Inertial, Joint, Link, Model
 from dynx.model.mechanism import Body
 from dynx.rbd.base_parameters import align_frames
+from dynx.spatial.inertia import RigidInertia
 
 JOINTS = 1000
 
@@ -84,3 +90,33 @@ def test_a_robot_beyond_a_bound_is_refused_before_its_links_are_merged(
     monkeypatch.setattr("dynx.model.model.build_mechanism", merged)
     with pytest.raises(EngineLimitError, match=r"^large has 120\d .* at most \d+"):
         backend(name, model)
+
+
+def test_poses_and_inertias_of_many_links_are_computed_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    counts: Counter[str] = Counter()
+
+    def counted(name: str, function: Any) -> Any:
+        def call(*arguments: Any) -> Any:
+            counts[name] += 1
+            return function(*arguments)
+
+        return call
+
+    for name in ("rotation_from_rpy", "inertia_about_origin"):
+        monkeypatch.setattr(model_mechanism, name, counted(name, getattr(model_mechanism, name)))
+    monkeypatch.setattr(RigidInertia, "transform", counted("transform", RigidInertia.transform))
+    mechanism = robot(300, star=False, floating=True).mechanism
+    assert counts == {"rotation_from_rpy": 3, "inertia_about_origin": 1, "transform": 1}
+    simplified = simplify_mechanism(mechanism)
+    assert counts["transform"] == 2
+    assert len(simplified.bodies) == 300
+
+
+def test_rotations_without_rounding_residues_are_kept_as_they_are() -> None:
+    turned = dynx.load("ur5").mechanism
+    kept = _zero_rounding_residue(turned)
+    again = _zero_rounding_residue(kept)
+    assert all(a is b for a, b in zip(kept.bodies, again.bodies, strict=True))
+    assert all(a is b for a, b in zip(kept.frames, again.frames, strict=True))
+    for part in kept.bodies:
+        assert ((part.R == 0.0) | (abs(part.R) >= 0.5 * np.finfo(float).eps)).all()
