@@ -405,7 +405,7 @@ TEXTS = "dynx-texts"
 _BEFORE_PICTURES = (
     f"const [FOLLOWED, TEXTS, OPACITIES] = {json.dumps([FOLLOWED, TEXTS, OPACITIES])};"
     + """
-  let followed = null, first = true, last = null;
+  let followed = null, first = true, last = null, reset = false;
   const shift = (camera) => {
     const page = window.__viserMutable, controls = page.cameraControl;
     const source = document.getElementById(FOLLOWED)?.dataset.followed;
@@ -419,7 +419,9 @@ _BEFORE_PICTURES = (
       const origin = first ? wanted.start : wanted.origin;
       last = wanted.number ? world.localToWorld(camera.position.clone().fromArray(origin)) : null;
     }
-    first = false;
+    else if (reset && last !== null && world)
+      last = world.localToWorld(camera.position.clone().fromArray(wanted.start));
+    first = reset = false;
     if (last === null || !node) return;
     const place = camera.position.clone().setFromMatrixPosition(node.matrixWorld);
     const moved = place.clone().sub(last);
@@ -481,6 +483,13 @@ _BEFORE_PICTURES = (
     if (writing() !== written || seenThrough() !== faded) page.requestRender?.();
     if (scene.dynxPrepares) return;
     scene.dynxPrepares = true;
+    // The page may return to the view of the start, from which it has to follow anew.
+    let resetting = page.resetCameraPose;
+    Object.defineProperty(page, "resetCameraPose", {
+      configurable: true,
+      get: () => resetting && ((...given) => { resetting(...given); reset = true; page.requestRender?.(); }),
+      set: (given) => { resetting = given; },
+    });
     scene.onBeforeRender = (renderer, drawn, camera) => {
       shift(camera);
       write(renderer.domElement, camera);

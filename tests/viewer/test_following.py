@@ -125,6 +125,10 @@ def test_the_subject_stays_where_it_is_in_each_picture(open_page: OpenPage) -> N
             connected(viewer, 2)
             until(lambda: alike(silhouette(later.page), start, BOUND), "the view of the start")
             assert alike(silhouette(later.page), start, BOUND)
+            # A page takes over the view of the start late, and again with its button.
+            later.page.evaluate("__viserMutable.resetCameraPose(false)")
+            later.page.wait_for_timeout(PICTURE)
+            assert alike(silhouette(later.page), start, BOUND)
             page.page.mouse.move(20, 20)
             page.page.mouse.wheel(0.0, -300.0)
             page.page.wait_for_timeout(2.0 * PICTURE)
