@@ -142,11 +142,12 @@ class BulletQuantities:
         M[:, :6] = M[:, :6] @ self._X
         return np.asarray(0.5 * self._unit * (M + M.T))
 
-    def forward_dynamics(self, q: Floats, v: Floats, tau: Floats) -> Floats:
-        """Return a (nv,): the change of velocity in one step of Bullet's articulated-body algorithm."""
+    def forward_dynamics(self, q: Floats, v: Floats, tau: Floats, *, weightless: bool = False) -> Floats:
+        """Return a (nv,): the change of velocity in one step of Bullet's articulated-body algorithm, with
+        `weightless` without gravity."""
         if not v.size:
             return np.zeros(0)
-        gravity = self._gravity_in_C(q)
+        gravity = [0.0, 0.0, 0.0] if weightless else self._gravity_in_C(q)
         if self._unit != 1.0:
             tau = tau / self._unit
         if not self._floating:
@@ -484,7 +485,8 @@ class PyBulletBackend(Backend):
         not applied, because the error then has another cause, which refinement must not hide. Raises
         EngineError if too few digits are left.
         """
-        refined = self._robot().forward_dynamics(q, v, tau + residual)
+        # At rest and without gravity the rounding errors are relative to the residual.
+        refined = a + self._robot().forward_dynamics(q, np.zeros_like(v), residual, weightless=True)
         if np.max(np.abs(refined - a)) <= MAX_REFINEMENT * np.max(np.abs(a)):
             return refined
         # Weight and velocity products may cancel, so a bound on them is used as the scale.
