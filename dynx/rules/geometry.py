@@ -19,7 +19,7 @@ from dynx.files.reading import read_file
 from dynx.model import Link
 from dynx.model.geometry.formats.collada import collada_points
 from dynx.model.geometry.formats.facets import STL_FACET, STL_HEAD, STL_VERTEX
-from dynx.model.geometry.mesh import convex_hull
+from dynx.model.geometry.hulls import convex_hull
 from dynx.model.geometry.mesh_files import (
     MeshNotFoundError,
     find_by_bullet,

@@ -23,7 +23,7 @@ from dynx.model.geometry import (
     Sphere,
     solid_properties,
 )
-from dynx.model.geometry.mesh import convex_hull
+from dynx.model.geometry.hulls import convex_hull
 from dynx.spatial.scalar import Floats
 from tests.model.geometry.mesh_files import stl
 
