@@ -141,13 +141,7 @@ def jacobian() -> None:
     """
 
 
-@click.command("id")
-@robot_options
-@_q_option
-@_v_option
-@sample_option("a", "Acceleration (default: zero)")
-@click.option("--joint-dynamics", is_flag=True, help="Include damping, friction and armature of the joints.")
-@click.option(
+_force_option = click.option(
     "--force",
     "forces",
     type=wrench_on_frame,
@@ -156,6 +150,15 @@ def jacobian() -> None:
     help="External force [N] and moment [N m] at the origin of a frame (three numbers are the force alone), "
     "in world axes; may be given several times.",
 )
+
+
+@click.command("id")
+@robot_options
+@_q_option
+@_v_option
+@sample_option("a", "Acceleration (default: zero)")
+@click.option("--joint-dynamics", is_flag=True, help="Include damping, friction and armature of the joints.")
+@_force_option
 @click.option(
     "--wrenches",
     is_flag=True,
@@ -189,6 +192,7 @@ def id_() -> None:
 @_v_option
 @sample_option("tau", "Torque (default: zero)")
 @click.option("--joint-dynamics", is_flag=True, help="Include damping, friction and armature of the joints.")
+@_force_option
 @runs("dynx.cli.queries.evaluate:forward_dynamics")
 def fd() -> None:
     """Compute forward dynamics: the acceleration a (nv) that the torque tau gives.
@@ -197,6 +201,7 @@ def fd() -> None:
     Examples:
       dynx fd ur5 --q 0,-1.57,1.57,0,0,0
       dynx fd ur5 --tau shoulder_pan_joint=10 --json
+      dynx fd ur5 --q 0,-1,1,0,0,0 --force tool0:0,0,-20
     """
 
 

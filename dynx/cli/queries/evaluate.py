@@ -91,13 +91,9 @@ def inverse_dynamics(
     """Print the torque that gives an acceleration, and the wrenches that joints transmit."""
     if (frame is not None or reference != LOCAL) and not wrenches:
         raise ArgumentError("--frame and --reference are those of the wrenches; give --wrenches too")
-    on_frames: dict[str, Floats] = {}
-    for name, wrench in forces:
-        on_frames[name] = on_frames.get(name, np.zeros(6)) + wrench
     with open_backend(**robot) as engine:
         sample, result = _sample(engine, q, v=v, a=a)
-        result["external_forces"] = {name: wrench.tolist() for name, wrench in on_frames.items()}
-        options: dict[str, Any] = {"external_forces": on_frames or None}
+        options = _external_forces(forces, result)
         result["tau"] = engine.inverse_dynamics(*sample, joint_dynamics=joint_dynamics, **options).tolist()
         if wrenches:
             options |= {"frame": frame, "reference": reference}
@@ -124,12 +120,19 @@ def inverse_dynamics(
 
 
 def forward_dynamics(
-    q: Numbers, v: Numbers, tau: Numbers, joint_dynamics: bool, json_path: str | None, **robot: Any
+    q: Numbers,
+    v: Numbers,
+    tau: Numbers,
+    joint_dynamics: bool,
+    forces: Sequence[tuple[str, list[float]]],
+    json_path: str | None,
+    **robot: Any,
 ) -> None:
     """Print the acceleration that a torque gives."""
     with open_backend(**robot) as engine:
         sample, result = _sample(engine, q, v=v, tau=tau)
-        result["a"] = engine.forward_dynamics(*sample, joint_dynamics=joint_dynamics).tolist()
+        options = _external_forces(forces, result)
+        result["a"] = engine.forward_dynamics(*sample, joint_dynamics=joint_dynamics, **options).tolist()
     _report_vectors(result, json_path, "forward dynamics", ("v", "tau", "a"))
 
 
@@ -141,6 +144,16 @@ def mass_matrix(q: Numbers, joint_dynamics: bool, json_path: str | None, **robot
     if not write_json(result, json_path):
         names = result["velocity_names"]
         _print_matrix(f"{title(result)}: mass matrix", names, names, result["mass_matrix"])
+
+
+def _external_forces(forces: Sequence[tuple[str, list[float]]], result: dict[str, Any]) -> dict[str, Any]:
+    """Return the forces of ``--force`` as an argument of a quantity, those on one frame added up, and list
+    them in the document."""
+    on_frames: dict[str, Floats] = {}
+    for name, wrench in forces:
+        on_frames[name] = on_frames.get(name, np.zeros(6)) + wrench
+    result["external_forces"] = {name: wrench.tolist() for name, wrench in on_frames.items()}
+    return {"external_forces": on_frames or None}
 
 
 def document_head(engine: Backend) -> dict[str, Any]:

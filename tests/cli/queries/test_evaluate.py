@@ -115,6 +115,21 @@ def test_wrenches_of_joints_under_external_forces() -> None:
         assert says in result.stderr
 
 
+def test_fd_under_external_forces() -> None:
+    """It inverts id with the same forces; those on one frame add up."""
+    forces = ("--force", "tool0:0,0,-20", "--force", "tool0:0,0,1,0.1,0.2,0.3")
+    found = document("fd", "ur5", "--q", Q_TEXT, *forces)
+    assert found["external_forces"] == {"tool0": [0, 0, -19, 0.1, 0.2, 0.3]}
+    with backend(found["backend"], load("ur5")) as engine:
+        given: Any = found["external_forces"]
+        a = engine.forward_dynamics(Q, np.zeros(6), np.zeros(6), external_forces=given)
+        tau = engine.inverse_dynamics(Q, np.zeros(6), a, external_forces=given)
+    assert found["a"] == a.tolist()
+    np.testing.assert_allclose(tau, 0.0, rtol=0, atol=1e-10)
+    wrong = CliRunner().invoke(cli, ["fd", "ur5", "--force", "tol0:1,2,3"])
+    assert (wrong.exit_code, "did you mean 'tool0'" in wrong.stderr) == (2, True)
+
+
 def test_backends() -> None:
     found = {entry["name"]: entry for entry in document("backends")["backends"]}
     assert found["reference"]["installed"] is True
