@@ -245,7 +245,7 @@ def action_of(algorithm: Any, observation: Any, deterministic: bool) -> Any:
     restore = set_threads(1)
     try:
         action, _ = algorithm.predict(observation, deterministic=deterministic)
-    except ValueError as error:  # of a distribution whose parameters are no numbers
+    except (ValueError, AssertionError) as error:  # of a distribution whose parameters are no numbers, say
         reason = " ".join(str(error).split())[:300]
         raise ArgumentError(f"the policy has no action for this observation: {reason}") from error
     finally:

@@ -19,7 +19,7 @@ from dynx.errors import ArgumentError, shown
 from dynx.files.documents import convert_document, json_text, parse_json, to_json_values
 from dynx.files.reading import irregularity, named_file
 from dynx.files.writing import atomic_file
-from dynx.model.numbers import whole_number
+from dynx.model.numbers import real_array, whole_number
 from dynx.training.environments import make
 from dynx.training.file_tasks import task_of_file
 from dynx.training.library import (
@@ -54,7 +54,7 @@ class Scaling:
 
     def __call__(self, observation: NDArray[Any]) -> NDArray[np.float32]:
         """Scale an observation as in training."""
-        scaled = (observation - self.mean) / np.sqrt(self.variance + EPSILON)
+        scaled = (real_array("observation", observation) - self.mean) / np.sqrt(self.variance + EPSILON)
         return np.clip(scaled, -CLIPPED_AT, CLIPPED_AT).astype(np.float32)
 
     @staticmethod

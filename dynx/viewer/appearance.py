@@ -148,7 +148,8 @@ class SavedViews:
     def find(self, name: str) -> Camera:
         """Return a view. Raises ArgumentError for an unknown name."""
         if name not in self.cameras:
-            raise ArgumentError(f"no view {shown(name)}{nearest(str(name), self.cameras)}")
+            known = nearest(name, self.cameras) if self.cameras else "; there is none, `save_view` keeps one"
+            raise ArgumentError(f"no view {shown(name)}{known}")
         return self.cameras[name]
 
     def _new_name(self) -> str:

@@ -241,7 +241,8 @@ class Controls:
         """Add a choice of one of the `options`, at first of `value` or the first one; `changed(value)` is
         called when another is chosen in the page."""
         _checked_label("name of a dropdown", name)
-        texts = tuple(options) if not isinstance(options, str) else ()
+        listed = isinstance(options, Iterable) and getattr(options, "ndim", 1) > 0
+        texts = tuple(options) if listed and not isinstance(options, str) else ()
         if not texts or not all(isinstance(each, str) and each for each in texts):
             raise ArgumentError(f"options of dropdown {shown(name)} are {shown(options)}; wanted texts")
         start = texts[0] if value is None else value

@@ -4,6 +4,7 @@ server."""
 from __future__ import annotations
 
 import io
+import logging
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
@@ -60,6 +61,11 @@ def silent() -> Iterator[None]:
         console.quiet = before
 
 
+def _is_not_of_a_stranger(record: logging.LogRecord) -> bool:
+    """Leave out what websockets logs of a request that is none: its traceback has the stranger's own text."""
+    return record.getMessage() != "opening handshake failed"
+
+
 def serve(
     host: str,
     port: int,
@@ -77,6 +83,7 @@ def serve(
     in another way.
     """
     infra: Any = viser.infra
+    logging.getLogger("websockets.server").addFilter(_is_not_of_a_stranger)
     with _starting, silent():
         server_class, listening = infra.WebsockServer, infra._infra.websockets.asyncio.server
         listen, guarded = listening.serve, threading.Event()

@@ -348,6 +348,7 @@ class Viewer(Controls):
         self.page.check_open()
         self.view.camera.follow(part, first_person=first_person)
 
+    @checks_types
     def set_visible(self, part: str | None, visible: bool = True) -> None:
         """Show or hide a part, as those of `follow`; None for all. Raises ArgumentError for an unknown part.
 
@@ -356,6 +357,7 @@ class Viewer(Controls):
         self.page.check_open()
         self._appearance.set_visible(part, visible)
 
+    @checks_types
     def set_opacity(self, opacity: float, part: str | None = None) -> None:
         """Let a part, or all, be seen through in the page: 1 is as described, 0 is not seen.
 
@@ -374,12 +376,14 @@ class Viewer(Controls):
         """
         return camera_of(self._first_page())
 
+    @checks_types
     def look_from(self, camera: Camera) -> None:
         """Give all open pages the view of a camera in the world. Raises ArgumentError for one on a part."""
         self.page.check_open()
         for client in self.page.server.get_clients().values():
             look_from(client, _checked_camera(camera))
 
+    @checks_types
     def save_view(self, name: str, camera: Camera | None = None) -> None:
         """Keep a view under a name, by default that of the first open page; the page has a choice of them.
 
@@ -390,6 +394,7 @@ class Viewer(Controls):
             raise ArgumentError(f"name of a view is {shown(name)}; wanted a str that is not empty")
         self._views.save(name, self.camera if camera is None else _checked_camera(camera))
 
+    @checks_types
     def show_view(self, name: str) -> None:
         """Give all open pages a view that was saved. Raises ArgumentError for an unknown name."""
         self.look_from(self._views.find(name))
@@ -406,6 +411,7 @@ class Viewer(Controls):
             raise ArgumentError(f"no page is open at {self.url}; World.camera draws pictures without one")
         return clients[min(clients)]
 
+    @checks_types
     def camera_pane(self, camera: Camera, name: str = "camera", shows: str = "colours") -> CameraPane:
         """Add a picture of a camera in the scene, which follows what the page shows: its ``"colours"``, its
         ``"depth"``, or its ``"parts"`` in colours that tell them apart.

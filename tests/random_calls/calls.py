@@ -40,6 +40,7 @@ NOT_CALLED = {
     "dry_friction": "dynx calls it with parameters that it has checked",
     "<momentum observer>.update": "dynx calls it with symbols in a trace",
     "<momentum observer>.residual": "its argument is a state of `update`",
+    "<momentum observer>.with_dynamics": "dynx calls it with functions of its own",
     "torque_for": "dynx calls it with symbols in a trace",
     "<joint friction>.__call__": "dynx calls it with symbols in a trace",
     "command": "a plant calls it with a measurement and a setpoint of its own",

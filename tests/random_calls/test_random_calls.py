@@ -210,3 +210,17 @@ def test_a_number_that_no_float_holds_is_refused_and_a_seed_may_be_one() -> None
 def test_an_array_in_the_place_of_sensors_is_named() -> None:
     with pytest.raises(ArgumentError, match="sensor"):
         untyped.Scene("s", sensors=np.eye(3))
+
+
+def test_wrong_names_and_choices_of_a_page_are_named() -> None:
+    pytest.importorskip("viser")
+    page: Any = OBJECTS["viewer"]()
+    calls: tuple[tuple[Callable[[], Any], str], ...] = (
+        (lambda: page.show_view(np.eye(4)), "name is"),
+        (lambda: page.show_view("no"), "no view 'no'"),
+        (lambda: page.camera_pane(dynx.world.Camera(), shows=np.eye(4)), "shows is"),
+        (lambda: page.dropdown("d", np.array(Foreign())), "options of dropdown 'd'"),
+    )
+    for call, message in calls:
+        with pytest.raises(ArgumentError, match=message):
+            call()

@@ -234,3 +234,11 @@ def test_an_environment_that_cannot_be_made_is_an_error_of_the_task(trained: Pat
     pytest.importorskip("mujoco")
     with pytest.raises(ArgumentError, match=r"HalfCheetah-v5.* cannot be made: .*nothing"):
         make(TaskSpec("HalfCheetah-v5", options={"xml_file": "nothing"}))
+
+
+def test_an_observation_of_another_kind_is_refused(trained: Path) -> None:
+    observation: Any = {}
+    with pytest.raises(
+        ArgumentError, match="no action for this observation: The observation provided is a dict"
+    ):
+        load_policy(trained)(observation)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import http.client
 import http.server
 import socket
@@ -325,3 +326,17 @@ def test_the_button_that_copies_is_allowed(viewer: Viewer, open_page: Callable[.
     button.click()
     until(lambda: button.inner_text() == "copied", "the button")
     assert page.errors == []
+
+
+def test_what_strangers_send_is_not_written_to_the_terminal(capfd: pytest.CaptureFixture[str]) -> None:
+    with dynx.load("double_pendulum").view(open_browser=False) as viewer:
+        where = urlsplit(viewer.url)
+        for line in (b"\x1b]0;owned\x07 / HTTP/1.1", b"POST / HTTP/1.1", b"GET / HTTP/0.9", b"\x16\x03\x01"):
+            with socket.create_connection((str(where.hostname), int(where.port or 0)), 10.0) as opened:
+                opened.sendall(line + b"\r\nHost: evil.test\r\n\r\n")
+                opened.settimeout(5.0)
+                with contextlib.suppress(OSError):
+                    opened.recv(4096)
+    written = "".join(capfd.readouterr())
+    assert "Traceback" not in written
+    assert "owned" not in written

@@ -111,7 +111,7 @@ def _(box: Box) -> Deed:
 
 @attack("bomb", "name of a million characters")
 def _(box: Box) -> Deed:
-    return page.Deed(page.robot(box, "<" * 10**6).words, ends=(2,))
+    return Deed(page.robot(box, "<" * 10**6).words, ends=(2,))
 
 
 # -- the socket -----------------------------------------------------------------------------------
@@ -295,7 +295,7 @@ def _(viewer: Any) -> None:
     import viser._messages as known
 
     wrong: tuple[Any, ...] = (float("nan"), 1e308, -1, 2**63, None, "x", [], {}, [float("inf")] * 4)
-    names = (
+    names: tuple[str, ...] = (
         "ViewerCameraMessage",
         "ScenePointerMessage",
         "SceneNodeClickMessage",
