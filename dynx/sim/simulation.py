@@ -656,7 +656,8 @@ def simulate(given: SimulateArguments) -> Rollout:
     this one in every field but `duration`. The controller must have no state but the one that it returns.
 
     **Long runs.** `progress` is called regularly with the number of steps taken and the total number. Ctrl-C
-    raises RolloutInterrupted, which has the record until then in ``.rollout`` and can be resumed.
+    raises RolloutInterrupted, which has the record until then in ``.rollout`` and can be resumed; before the
+    simulation is set up (setpoints, plant) there is none, and it stays Python's KeyboardInterrupt.
 
     Raises ArgumentError for a scenario that cannot be simulated, or that differs from the scenario of the
     record to resume; LimitError for a reference outside the limits of position and velocity (unless

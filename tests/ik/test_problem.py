@@ -49,3 +49,24 @@ def test_a_batch_has_the_results_that_its_samples_have_alone(backend: str) -> No
             alone = engine.inverse_kinematics(target, "base_link")
             np.testing.assert_array_equal(found.q[k], alone.q)
             assert found.position_error[k] == alone.position_error == float(k == 2)
+
+
+@pytest.mark.parametrize(
+    ("robot", "frame"),
+    [
+        ("kinova", "j2s6s200_link_finger_tip_1"),
+        ("kinova", "j2s6s200_end_effector"),
+        ("so101", "moving_jaw_so101_v1_link"),
+        ("talos_arm", "gripper_left_fingertip_3_link"),
+        ("panda", "panda_leftfinger"),
+        ("centauro", "arm1_8"),
+    ],
+)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_every_pose_that_the_robot_has_is_reached_from_few_starts(robot: str, frame: str, seed: int) -> None:
+    model = dynx.load(robot)
+    with dynx.backend("compiled", model) as engine:
+        targets = engine.forward_kinematics(model.random(np.random.default_rng(seed), 300), frame)
+        found = engine.inverse_kinematics(targets, frame)
+    assert found.success.all()
+    assert np.median(found.restarts) <= 2

@@ -449,3 +449,19 @@ def test_a_gain_that_the_caller_changes_acts_from_then_on_and_is_a_departure(pla
         assert again.departures == ()
         assert again.scenario == scenario
         assert np.array_equal(again.q, simulate(scenario).q)
+
+
+def test_ctrl_c_while_setpoints_are_prepared_stays_a_keyboard_interrupt(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    scenario = replace(SCENARIOS["passive"], plant="compiled", duration=0.02)
+    whole = simulate(scenario)
+    with monkeypatch.context() as patch:
+        patch.setattr("dynx.sim.simulation.setpoints_of", interrupted)
+        with pytest.raises(KeyboardInterrupt) as caught:
+            simulate(scenario)
+        assert caught.type is KeyboardInterrupt
+    np.testing.assert_array_equal(simulate(scenario).q, whole.q)
