@@ -79,6 +79,8 @@ def test_exact_values_are_those_of_other_computations(name: str, trial: str) -> 
             least, most = value if isinstance(value, tuple) else (value, None)
             assert figure.exact == pytest.approx(least, rel=INTEGRATED, abs=1e-12)
             assert figure.most == most
+            # Bounds are relative to the distance of the farthest point.
+            assert most is None or figure.scale == 1.0
         if (name, trial) == ("turntable", "ball"):
             # The figure is the distance from the orbit, which is exact where the ball of an integration is.
             x, y, _ = world.state.bodies["ball"].position.tolist()
