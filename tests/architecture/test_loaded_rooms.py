@@ -97,7 +97,7 @@ FLOWS = {
         ("ik", "sim", "envs", "doctor"),
         (),
         112,
-        20000,
+        20150,
     ),
     "step of the cart-pole": Flow(
         "import gymnasium, dynx.envs\n"
