@@ -288,7 +288,7 @@ def _secondary(model: Model, options: Options) -> Secondary | None:
     if options.method != "dynx":
         raise ArgumentError(f"nearest and maximize need method 'dynx', not {shown(options.method)}")
     if goal is None:
-        if options.maximize not in MAXIMA:
+        if not isinstance(options.maximize, str) or options.maximize not in MAXIMA:
             raise ArgumentError(
                 f"maximize is {shown(options.maximize)}{nearest(str(options.maximize), MAXIMA)}"
             )

@@ -224,3 +224,9 @@ def test_wrong_names_and_choices_of_a_page_are_named() -> None:
     for call, message in calls:
         with pytest.raises(ArgumentError, match=message):
             call()
+
+
+def test_an_array_in_the_place_of_an_objective_is_named() -> None:
+    solve: Any = dynx.backend("reference", arm()).inverse_kinematics
+    with pytest.raises(ArgumentError, match="maximize"):
+        solve(np.eye(4), "tip", maximize=np.zeros((2, 3)))
