@@ -585,7 +585,8 @@ def simulate_batch(given: BatchArguments) -> BatchRollouts:
     stand_ins: dict[str, Any] = dict.fromkeys(varied, PLACEHOLDER)
     if "q0" in own:
         stand_ins["q0"] = scenario.model.neutral()
-    setup = Setup.of(replace(scenario, **stand_ins))
+    rubbing = isinstance(parametric, ParametricDynamics) and parametric.has_joint_dynamics
+    setup = Setup.of(replace(scenario, **stand_ins), ("friction",) if rubbing else ())
     recorded = scenario.for_record()
     controller, moved, clock = setup.controller, setup.model, setup.clock
     limit = setup.limit

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -54,10 +54,13 @@ class Setup:
     """q (nq,) and v (nv,) at time 0."""
 
     @classmethod
-    def of(cls, scenario: Scenario) -> Setup:
-        """Check a scenario. Raises ArgumentError, LimitError or GainError if it cannot be simulated."""
+    def of(cls, scenario: Scenario, given_elsewhere: Collection[str] = ()) -> Setup:
+        """Check a scenario. Raises ArgumentError, LimitError or GainError if it cannot be simulated.
+
+        `given_elsewhere`: names of options whose values the caller has beside the scenario.
+        """
         controller = known_controller(scenario)
-        refuse_ineffective(scenario)
+        refuse_ineffective(scenario, given_elsewhere)
         clock = clock_of(scenario)
         if controller is not None:
             check_controller(scenario.model, controller, clock)
@@ -97,14 +100,14 @@ def known_controller(scenario: Scenario) -> Controller[Any] | None:
     return controller
 
 
-def refuse_ineffective(scenario: Scenario) -> None:
+def refuse_ineffective(scenario: Scenario, given_elsewhere: Collection[str]) -> None:
     """Raise ArgumentError for an option that has no effect without another one.
 
     Not when a scenario is made: files of earlier versions with such options are still read.
     """
     for name, each in OPTIONS.items():
         other, wanted = each.needs
-        if other and getattr(scenario, name) != each.default:
+        if other and other not in given_elsewhere and getattr(scenario, name) != each.default:
             value = getattr(scenario, other)
             if not (value == wanted if wanted else value is not False):
                 needed = f"{other}={wanted!r}" if wanted else other

@@ -17,7 +17,7 @@ BALL, BRICK = Sphere(0.5), Box((1.0, 1.0, 1.0))
 MIRRORED = np.diag([1.0, 1.0, -1.0, 1.0])
 
 FAULTS: dict[str, tuple[Callable[[], object], type[DynxError], str]] = {
-    "no shape": (lambda: distance("ball", HERE, BALL, HERE), ArgumentError, "a shape is 'ball'"),  # type: ignore[arg-type]
+    "no shape": (lambda: distance("ball", HERE, BALL, HERE), ArgumentError, "shape_a is 'ball'"),  # type: ignore[arg-type]
     "not convex": (
         lambda: distance(HeightField(((0, 0), (0, 0)), (1, 1)), HERE, BALL, HERE),  # type: ignore[arg-type]
         ArgumentError,

@@ -15,7 +15,7 @@ import dynx.envs  # noqa: F401  (registers the environments)
 from dynx.cli.learning.documents import distance_document as document
 from dynx.cli.learning.env import show
 from dynx.envs.distance import engine_distance
-from dynx.envs.registration import bare_name, task_class, task_id
+from dynx.envs.registration import bare_name, is_of_dynx, task_class, task_id
 from dynx.errors import ArgumentError, UnknownNameError
 
 
@@ -94,7 +94,7 @@ def test_short_names_of_tasks() -> None:
         task_id("CartPol")
 
 
-@pytest.mark.parametrize("env_id", [each for each in gymnasium.registry if each.startswith("dynx/")])
+@pytest.mark.parametrize("env_id", [each for each in gymnasium.registry if is_of_dynx(each)])
 def test_the_tasks_of_dynx_name_each_entry_of_their_observation(env_id: str) -> None:
     task = task_class(gymnasium.registry[env_id].kwargs["task"])()
     names = task.observation_names

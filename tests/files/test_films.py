@@ -83,6 +83,8 @@ def test_a_film_without_pictures_and_one_that_cannot_be_written_are_errors(
     assert not list(tmp_path.iterdir())
 
 
+# imageio-ffmpeg leaves the pipe of a process that has ended to the garbage collector.
+@pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
 def test_an_encoder_that_fails_is_an_error_without_a_traceback(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

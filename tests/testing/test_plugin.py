@@ -156,7 +156,7 @@ def test_a_difference_is_told(run: Run, home: Path) -> None:
     assert told
     assert 0.0 < float(told.group(1)) < 1e-6
     assert "suspect: heavy" in result.stdout
-    assert "dynx agree pendulum --base fixed --backends reference,heavy" in result.stdout
+    assert "dynx agree pendulum --base fixed --engine reference,heavy" in result.stdout
     # Nothing of dynx's own code is shown, and kinematics is none of this engine's faults.
     assert "robot_checks.py" not in result.stdout
     assert "forward_kinematics of" not in result.stdout

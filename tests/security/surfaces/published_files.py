@@ -561,7 +561,7 @@ def _(box: Box) -> Deed:
     return mesh.deed(box, "m.obj", f"{lines}shadow_obj ../outside/secret.obj\n{mesh.TETRAHEDRON}", (0, 2))
 
 
-@attack("path", "image of COLLADA outside")
+@attack("path", "image of COLLADA by its address")
 def _(box: Box) -> Deed:
     library = (
         "<library_images><image id='i'><init_from>../outside/secret.txt</init_from></image></library_images>"

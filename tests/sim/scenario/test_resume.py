@@ -18,6 +18,7 @@ from dynx.model.loading import load
 from dynx.sim import Noise, Payload, Rollout, Scenario, simulate
 from dynx.sim.scenario.options import OPTIONS
 from dynx.trajectory import cycloidal
+from dynx.world import Encoder
 
 ARM = load("ur5")
 START, END = np.zeros(6), np.full(6, 0.02)
@@ -69,8 +70,12 @@ CHANGES: dict[str, Any] = {
     "mass_scale": {"forearm_link": 1.2},
     "pushes": [ExternalForce("tool0", [1.0, 0, 0, 0, 0, 1e-9], start=0.002, duration=0.01)],
     "check_reference": False,
+    "sensors": Encoder("elbow", "elbow_joint"),
 }
 """Another value of each field."""
+
+FREE = {"duration", "sensors"}
+"""Fields that may differ: no step depends on them."""
 
 WHOLE = simulate(SCENARIO)
 
@@ -82,7 +87,7 @@ def test_every_field_has_another_value_here() -> None:
             assert replace(SCENARIO, **{name: value}) != SCENARIO, name
 
 
-@pytest.mark.parametrize("name", [each.name for each in fields(Scenario) if each.name != "duration"])
+@pytest.mark.parametrize("name", [each.name for each in fields(Scenario) if each.name not in FREE])
 def test_another_value_of_any_field_is_refused_by_name(name: str) -> None:
     other = replace(SCENARIO, **{name: CHANGES[name]})
     if name == "model":
@@ -90,6 +95,12 @@ def test_another_value_of_any_field_is_refused_by_name(name: str) -> None:
     with pytest.raises(ArgumentError, match=rf"the rollout to resume .*{name}.*") as caught:
         simulate(other, resume=WHOLE)
     assert "now it is" in str(caught.value) or "not of" in str(caught.value)
+
+
+def test_other_sensors_read_the_resumed_simulation() -> None:
+    resumed = simulate(replace(SCENARIO, sensors=CHANGES["sensors"]), resume=WHOLE)
+    assert resumed.q.tobytes() == WHOLE.q.tobytes()
+    assert "elbow" in resumed.sensors
 
 
 INNER: dict[type, tuple[str, dict[str, Any]]] = {
