@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping
 from importlib import import_module
@@ -208,7 +209,7 @@ def import_tasks(module: str) -> ModuleType:
     except (ImportError, ValueError) as error:
         top = module.partition(".")[0]
         missing = isinstance(error, ModuleNotFoundError) and error.name == top
-        here = missing and (Path(f"{top}.py").exists() or Path(top).is_dir())
+        here = missing and (os.path.exists(f"{top}.py") or os.path.isdir(top))
         clause = "; the current folder has it, which PYTHONPATH=. adds" if here else ""
         raise UnknownNameError(f"module {shown(module)} cannot be imported: {error}{clause}") from error
 

@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import BinaryIO
+from typing import IO
 
 from dynx.errors import TemporaryFolderError
 from dynx.files.reading import printable
@@ -32,7 +32,7 @@ def temporary_folder(prefix: str = "dynx-") -> Iterator[Path]:
 
 
 @contextmanager
-def temporary_file() -> Iterator[BinaryIO]:
+def temporary_file() -> Iterator[IO[bytes]]:
     """Open a file without a name that exists while the block lasts. Raises TemporaryFolderError."""
     with ExitStack() as stack:
         with writing_in():

@@ -45,9 +45,9 @@ def atomic_file(path: str | os.PathLike[str], mode: int = 0o666, *, sync: bool =
     target = Path(os.path.realpath(path))
     partial: Path | None = None
     try:
-        if target.is_dir():
+        if os.path.isdir(target):
             raise IsADirectoryError(errno.EISDIR, "it is a directory")
-        if target.exists() and not target.is_file():
+        if os.path.exists(target) and not os.path.isfile(target):
             with open(target, "wb", opener=_require_reader) as stream:
                 yield stream
             return
@@ -60,7 +60,7 @@ def atomic_file(path: str | os.PathLike[str], mode: int = 0o666, *, sync: bool =
             file.flush()
             if sync:
                 _sync(file.fileno())
-            if target.exists():
+            if os.path.exists(target):
                 shutil.copymode(target, partial)
             if sys.platform != "win32":
                 # The file is still locked, so that nobody takes it for an abandoned one.

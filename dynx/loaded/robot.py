@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -178,7 +179,7 @@ class LoadedRobot(ABC):
 
 def require_file(path: Path) -> None:
     """Raise EngineError for anything but a regular file: engines crash on a folder and hang on a pipe."""
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise EngineError(f"no regular file to load: {shown(path, 300)}")
 
 

@@ -46,7 +46,7 @@ def find_package(name: str, roots: Iterable[StrPath]) -> Path:
     if name and name == os.path.basename(name) and name not in (".", ".."):
         for root in tried:
             for folder in ([root] if root.name == name else []) + [root / name]:
-                if folder.is_dir() and folder.resolve().is_relative_to(root):
+                if os.path.isdir(folder) and folder.resolve().is_relative_to(root):
                     return folder.resolve()
     where = ", ".join(str(root) for root in tried) or "no folder (give package_dirs=)"
     raise DescriptionError(f"package {shown(name)} was not found; looked in {where}")
@@ -66,7 +66,7 @@ def resolve_package(uri: str, roots: Iterable[StrPath]) -> Path:
     found = (package / inside).resolve()
     if not found.is_relative_to(package):
         raise DescriptionError(f"{shown(uri)} leaves the package {shown(name)}, which is not allowed")
-    if not found.is_file():
+    if not os.path.isfile(found):
         other = irregularity(found)
         if other:
             raise DescriptionError(f"{shown(uri)} {other}")
@@ -127,8 +127,8 @@ def package_of(name: str, folder: Path, elsewhere: tuple[Path, ...]) -> Path | N
         found = _find(name, [root]) if _is_private(root) else None
         if found is None:
             continue
-        marked = any((found / marker).is_file() for marker in MANIFESTS)
-        above = folder.is_relative_to(found) and any((found / part).is_dir() for part in _PACKAGE_PARTS)
+        marked = any(os.path.isfile(found / marker) for marker in MANIFESTS)
+        above = folder.is_relative_to(found) and any(os.path.isdir(found / part) for part in _PACKAGE_PARTS)
         if marked or above or found.is_relative_to(enclosing):
             return found
     return _by_manifest(name, folder, enclosing) or _find(name, elsewhere)

@@ -111,7 +111,7 @@ def pytest_make_collect_report(
 def _everything_is_run(config: pytest.Config) -> bool:
     """Check that some argument is a directory: ``pytest test_one.py`` runs that file alone."""
     named = [Path(os.path.join(config.invocation_params.dir, arg.split("::")[0])) for arg in config.args]
-    return not named or not all(path.is_file() for path in named)
+    return not named or not all(os.path.isfile(path) for path in named)
 
 
 def _refuse_idle_options(config: pytest.Config) -> None:

@@ -126,8 +126,8 @@ def read_policy_document(path: str | os.PathLike[str]) -> PolicyDocument:
     Raises ArgumentError for a file that is no policy of dynx.
     """
     where = shown(os.fspath(path), 300)
-    if not Path(path).is_file():
-        if Path(path, "final.zip").is_file():
+    if not os.path.isfile(path):
+        if os.path.isfile(Path(path, "final.zip")):
             raise ArgumentError(f"{where} is the folder of a run; its policy is {Path(path, 'final.zip')}")
         raise ArgumentError(f"{where}: {irregularity(path) or 'there is no such file'}")
     try:

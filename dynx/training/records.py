@@ -43,7 +43,7 @@ def read_lines(path: Path) -> list[dict[str, Any]]:
     Raises DescriptionError for a device, a FIFO, and a file that is too large.
     """
     found: list[dict[str, Any]] = []
-    if not path.exists():
+    if not os.path.exists(path):
         return found
     for line in read_file(str(path)).decode("ascii", "replace").splitlines():
         with contextlib.suppress(ValueError):

@@ -101,7 +101,7 @@ def read_run(folder: str | os.PathLike[str]) -> TrainingSpec:
 
 def _check_folder(place: Path, spec: TrainingSpec, resume: bool) -> None:
     """Check that the folder is free for a run, or has this one where it is to be resumed."""
-    if not (place / RUN).exists():
+    if not os.path.exists(place / RUN):
         if resume:
             raise ArgumentError(f"{shown(place, 300)} has no training run that could be resumed")
         return

@@ -240,3 +240,9 @@ def test_an_observation_of_another_kind_is_refused(trained: Path) -> None:
     observation: Any = {}
     with pytest.raises(ArgumentError, match="observation has dtype object; wanted real numbers"):
         load_policy(trained)(observation)
+
+
+@pytest.mark.parametrize("name", ["x" * 5000, f"{'x' * 5000}.zip"])
+def test_a_name_longer_than_a_system_allows_is_an_error_of_dynx(name: str, tmp_path: Path) -> None:
+    with pytest.raises(ArgumentError, match=r"\.{3}"):
+        load_policy(tmp_path / name)

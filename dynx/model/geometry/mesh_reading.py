@@ -291,7 +291,7 @@ def image_content(path: str, name: str) -> bytes:
         real = Path(os.path.realpath(folder / each))
         if not real.is_relative_to(root):
             continue
-        if real.is_file():
+        if os.path.isfile(real):
             return read_file(str(real))
     outside = not Path(os.path.realpath(folder / name)).is_relative_to(root)
     raise ValueError(f"it is outside the folder {shown(root.name)}" if outside else "no such file")

@@ -41,8 +41,9 @@ class ScenePaths:
         other = irregularity(found)
         if other:
             raise DescriptionError(f"{what} is {shown(name, 200)}, which {other}")
-        if not found.is_file():
-            hint = nearest(found.name, sorted(os.listdir(found.parent))) if found.parent.is_dir() else ""
+        if not os.path.isfile(found):
+            siblings = sorted(os.listdir(found.parent)) if os.path.isdir(found.parent) else []
+            hint = nearest(found.name, siblings)
             raise DescriptionError(f"{what} is {shown(name, 200)}, which is no file{hint}")
         return str(found)
 
