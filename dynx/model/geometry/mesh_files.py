@@ -85,7 +85,7 @@ def find_above(filename: str, source: str) -> Path | None:
             if not above.is_relative_to(root):
                 break
             real = Path(os.path.realpath(above / inside))
-            if real.is_relative_to(root) and os.path.isfile(real):
+            if real.is_relative_to(root) and real.is_file():
                 return real
     return None
 
@@ -145,7 +145,7 @@ def _in_user_folder(filename: str, root: Path) -> Path | None:
             return resolve_package(filename, [root])
         full = filename.removeprefix("file://")
         found = Path(os.path.realpath(full)) if os.path.isabs(full) else None
-        inside = found is not None and found.is_relative_to(os.path.realpath(root)) and os.path.isfile(found)
+        inside = found is not None and found.is_relative_to(os.path.realpath(root)) and found.is_file()
         return found if inside else None
     except (DescriptionError, OSError, ValueError, RuntimeError):
         return None
@@ -156,13 +156,13 @@ def _existing(path: Path, root: Path, described: str) -> Path | None:
     real = Path(os.path.realpath(path))
     if not real.is_relative_to(root):
         return None
-    if os.path.isfile(real):
+    if real.is_file():
         return real
     other = irregularity(real)
     if other:
         raise MeshNotFoundError(f"{described} {other}")
     slashed = Path(os.path.realpath(str(path).replace("\\", "/")))
-    if slashed != real and slashed.is_relative_to(root) and os.path.isfile(slashed):
+    if slashed != real and slashed.is_relative_to(root) and slashed.is_file():
         raise MeshNotFoundError(f"no file {described}; with / in place of each backslash it is there")
     # A path such as "." leads to the root itself, and what lies beside that is not listed.
     hint = _similar(real) if real != root else ""
