@@ -77,7 +77,7 @@ def test_runs_count_once_however_many_episodes_they_have() -> None:
 
 
 def test_wrong_arguments_are_refused() -> None:
-    with pytest.raises(ArgumentError, match="no environment"):
+    with pytest.raises(ArgumentError, match="at least one environment"):
         evaluate(nothing, [], 3)
     with pytest.raises(ArgumentError, match="episodes"):
         evaluate(nothing, [Countdown()], 0)
