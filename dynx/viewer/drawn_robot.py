@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +14,7 @@ from numpy.typing import NDArray
 from dynx.errors import DynxError
 from dynx.model import Model
 from dynx.model.geometry import Mesh, Shape
-from dynx.model.geometry.drawn_shapes import link_shapes, look_notes
+from dynx.model.geometry.drawn_shapes import colliding_geometry, link_shapes, look_notes
 from dynx.model.geometry.links import Collision, Colour, Visual
 from dynx.rbd.kinematics import link_poses
 from dynx.spatial.scalar import Floats
@@ -244,9 +246,23 @@ class DrawnRobot(DrawnParts):
                 f"{self.model.name} is drawn with {drawn} of the {whole} triangles of its meshes, for a "
                 "machine without a graphics processor; whole_meshes=True (--whole-meshes) draws all"
             )
+        if self._collisions is not None and any(self.visuals.values()) and not any(self._collisions.values()):
+            faults.append(f"{self.model.name} has no collision shapes that can be shown")
         if any(self.visuals.values()) or faults:
             return tuple(faults)
         return (f"{self.model.name} has no shapes; it is drawn as lines between its frames",)
+
+    @property
+    def seen_model(self) -> Model:
+        """The robot as pictures show it: with its collision shapes where they alone are shown."""
+        return self._colliding_model if self._shows == (False, True) else self.model
+
+    @cached_property
+    def _colliding_model(self) -> Model:
+        red, green, blue = (value / 255.0 for value in ORANGE)
+        links = [link.name for link in self.model.links]
+        geometry = colliding_geometry(self.model.geometry, links, (red, green, blue, 1.0))
+        return replace(self.model, geometry=geometry)
 
     def show(self, *, visuals: bool, collisions: bool) -> None:
         """Show or hide the visual shapes and the collision shapes."""

@@ -429,8 +429,6 @@ class RobotView:
         with page.together():
             self.robot = DrawnRobot(page.scene, "/robot", model, look)
             self.robot.move(start)
-        self.notes = self.robot.notes
-        """Shapes that cannot be drawn, one sentence each."""
         self._marks = Marks(page, self.robot)
         self._torques = GravityTorques(page.scene, self.robot, lambda: self._engine)
         self._ellipsoid = Manipulability(page.scene, model, lambda: self._engine)
@@ -438,6 +436,8 @@ class RobotView:
         tip = longest_chain_end(model.links, model.joints)
         self._handle = FrameHandle(page.scene, model, lambda: self._engine, tip, 0.25 * size, self._dragged)
         self._add_switches(collisions=collisions)
+        self.notes = self.robot.notes
+        """Shapes that cannot be drawn, one sentence each."""
         self._add_frame_controls()
         self._sliders = JointSliders(page.gui, model, start, self._slid)
         self._add_configuration()
@@ -470,10 +470,10 @@ class RobotView:
 
     @property
     def motions(self) -> tuple[MotionFrames, ...]:
-        """The robot as it stands."""
+        """The robot as it stands, with its collision shapes where they alone are shown."""
         from dynx.viewer.motion import motion_of_robot
 
-        return (motion_of_robot(self.model, self.q),)
+        return (motion_of_robot(self.robot.seen_model, self.q),)
 
     @property
     def time(self) -> float:

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -41,6 +42,40 @@ def test_a_rollout_a_robot_and_two_rollouts_are_exported(saved: str, tmp_path: P
         assert "wrote" in output
         assert page.read_bytes().startswith(b"<!")
         page.unlink()
+
+
+def test_a_picture_shows_the_collision_shapes_where_they_are_asked_for(tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image")
+    # The hull of two triangles that are apart fills the room between them.
+    corners = [f"v {x} {y} {z}" for x in (-0.3, 0.3) for y, z in ((-0.1, 0.0), (0.1, 0.0), (0.0, 0.2))]
+    (tmp_path / "two.obj").write_text("\n".join([*corners, "f 1 2 3", "f 4 5 6"]))
+    blue = '<material name="b"><color rgba="0 0 1 1"/></material>'
+    robot = """<robot name="r">
+      <link name="a"><visual><geometry><sphere radius="0.1"/></geometry>{blue}</visual>{colliding}</link>
+      <link name="b"><visual><geometry><sphere radius="0.2"/></geometry>{blue}</visual></link>
+      <joint name="j" type="fixed"><parent link="a"/><child link="b"/><origin xyz="0 0 0.5"/></joint>
+    </robot>"""
+    colliding = '<collision><geometry><mesh filename="two.obj"/></geometry></collision>'
+    path, picture = tmp_path / "robot.urdf", tmp_path / "picture.png"
+
+    def pixels(*options: str) -> tuple[int, int]:
+        """Return the number of orange and of blue pixels."""
+        code, output = run(str(path), *options, "--export", str(picture))
+        assert code == 0, output
+        assert ("note: r has no collision shapes" in output) == (bool(options) and not has_shape)
+        r, g, b = np.moveaxis(np.asarray(image.open(picture).convert("RGB")).astype(int), 2, 0)
+        return int(((r > g + 30) & (g > b + 30)).sum()), int((b > r + 60).sum())
+
+    has_shape = True
+    path.write_text(robot.format(blue=blue, colliding=colliding))
+    assert pixels()[0] == 0 < pixels()[1]
+    orange, other = pixels("--collisions")
+    # The triangles alone take less than half of that.
+    assert orange > 0.08 * 960 * 720
+    assert other == 0
+    has_shape = False
+    path.write_text(robot.format(blue=blue, colliding=""))
+    assert pixels("--collisions") == (0, 0)
 
 
 def test_a_film_is_exported_by_its_suffix(

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 from dynx.errors import DynxError, shown
 from dynx.model.geometry.imaged import image_fault, imaged_shape
-from dynx.model.geometry.links import Appearance, Collision, Colour, Geometry, Visual
-from dynx.model.geometry.mesh import Mesh
+from dynx.model.geometry.links import Appearance, Collision, Colour, Geometry, LinkGeometry, Visual
+from dynx.model.geometry.mesh import Faces, Mesh
+from dynx.model.geometry.mesh_reading import Surface
 from dynx.model.geometry.solids import Shape
 from dynx.spatial.scalar import Floats
 
@@ -52,6 +55,48 @@ def coloured_shapes(
         return
     for mesh, part in parts:
         yield mesh, colour or part.rgba or otherwise, T
+
+
+@dataclass(frozen=True)
+class _HullMesh(Mesh):
+    """The convex hull of a mesh, which has one colour."""
+
+    parts = ()
+
+    @cached_property
+    def triangles(self) -> tuple[Floats, Faces]:
+        """Vertices (n, 3) [m] and triangles (m, 3) of the hull."""
+        return Mesh(self.file, self.scale, self.fault, self.part).hull
+
+    @cached_property
+    def surface(self) -> Surface:
+        """The hull, flat between its edges."""
+        return Surface(*self.triangles)
+
+
+def colliding_geometry(geometry: Geometry, links: Iterable[str], rgba: Colour) -> Geometry:
+    """Return a geometry whose visual shapes are the collision shapes of another, as engines collide them: of
+    a mesh the convex hull. A link has none where one of its collision shapes cannot be read."""
+    look = Appearance(rgba=rgba)
+
+    def visuals(link: str) -> tuple[Visual, ...]:
+        try:
+            return tuple(
+                Visual(_collided(each.shape), each.origin, look) for each in geometry.collisions(link)
+            )
+        except DynxError:
+            return ()
+
+    return Geometry({link: LinkGeometry(visuals(link)) for link in links})
+
+
+def _collided(shape: Shape) -> Shape:
+    """Return a shape as engines collide it; raises DescriptionError for a mesh that cannot be read."""
+    if not isinstance(shape, Mesh):
+        return shape
+    hull = _HullMesh(shape.file, shape.scale, shape.fault, shape.part)
+    _ = hull.triangles
+    return hull
 
 
 def link_look_notes(geometry: Geometry, link: str) -> Iterator[str]:
