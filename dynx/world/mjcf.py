@@ -177,10 +177,7 @@ def _remarks_on_sensors(scene: Scene, layout: Layout, left_out: Sequence[str]) -
     kinds = {sensor.kind for sensor in scene.sensors if sensor.name not in left_out}
     notes = {
         "contact": "Sensors of contacts read in the axes of the world, those of dynx in axes of their own.",
-        "ray": (
-            "Sensors of rays read -1 where nothing is hit, those of dynx their length; from inside a shape "
-            "they read the distance to its other side, those of dynx 0."
-        ),
+        "ray": "Sensors of rays read -1 where nothing is hit, those of dynx their length.",
         "joint_torque": "Sensors of joint torques read three numbers, of which the last is along the axis.",
     }
     yield from (note for kind, note in notes.items() if kind in kinds)

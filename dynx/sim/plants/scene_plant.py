@@ -60,6 +60,20 @@ class ScenePlant:
         """The robot that is simulated."""
         return next(robot for robot in self.scene.robots if robot.name == self.robot)
 
+    def unrecorded(self, base: bool = False) -> str:
+        """Return why a record does not tell what the joints of the robot transmit, with `base` what its
+        foundation does: a constraint, whose forces no record has; else ""."""
+        for each in self.scene.constraints:
+            ends = [end.partition("/")[0] == self.robot for end in (each.a, each.b)]
+            # A constraint between two links of the robot is internal to it.
+            if any(ends) and not (base and all(ends)):
+                return (
+                    f"a {type(each).__name__} holds {shown(each.a)} to {shown(each.b)}, and a rollout has no "
+                    "forces of constraints; World(keep_last_step=True) has them in joint_wrenches() and its "
+                    "sensors"
+                )
+        return ""
+
     @checks_types
     def require_model(self, model: Model) -> None:
         """Raise ArgumentError unless `model` is that of the simulated robot."""

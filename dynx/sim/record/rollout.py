@@ -14,7 +14,7 @@ import numpy as np
 from dynx.argument_types import checks_types
 from dynx.backends import Backend, backend
 from dynx.control.base import Controller
-from dynx.errors import ArgumentError, DynxError
+from dynx.errors import ArgumentError, DynxError, UnsupportedFeatureError
 from dynx.files.pages import html_grid
 from dynx.model import Model
 from dynx.model.numbers import whole_number
@@ -199,8 +199,10 @@ class Rollout:
         children as each step begins.
 
         They follow from the recorded motion and from `external_forces`. `Backend.joint_wrenches` describes
-        the order, the signs and the options.
+        the order, the signs and the options. Raises UnsupportedFeatureError where a constraint of the scene
+        acts on the robot, whose forces are not recorded.
         """
+        self._require_recorded()
         return self._bodies.joint_wrenches(
             self.q[:-1],
             self.v[:-1],
@@ -214,6 +216,7 @@ class Rollout:
     def base_wrench(self, *, frame: str | None = None, reference: str = LOCAL) -> Floats:
         """Return the wrench (n, 6) [N, N m] that the world exerts on the root link, besides
         `external_forces`, as each step begins; see `joint_wrenches`."""
+        self._require_recorded(base=True)
         return self._bodies.base_wrench(
             self.q[:-1],
             self.v[:-1],
@@ -223,6 +226,12 @@ class Rollout:
             external_forces=self.external_forces,
             force_reference="world",
         )
+
+    def _require_recorded(self, base: bool = False) -> None:
+        plant = None if self.scenario is None else self.scenario.plant
+        unrecorded = plant.unrecorded(base) if isinstance(plant, ScenePlant) else ""
+        if unrecorded:
+            raise UnsupportedFeatureError(unrecorded)
 
     @cached_property
     def sensors(self) -> Mapping[str, Readings]:

@@ -321,7 +321,7 @@ def _contact_topics(rollout: Rollout) -> list[Topic]:
 
 
 def _sensor_topics(rollout: Rollout) -> list[Topic]:
-    """Return a topic for each sensor whose samples can be read before the end."""
+    """Return a topic for each sensor, of the samples that can be read by the end."""
     topics = []
     stamps = _nanoseconds(rollout.t)
     for name, topic in _topic_names("/sensors", rollout.sensors).items():
@@ -329,7 +329,8 @@ def _sensor_topics(rollout: Rollout) -> list[Topic]:
         message, fields = _sensor_message(readings)
         # Logged at the first state at which they can be read.
         states = np.searchsorted(stamps, _nanoseconds(readings.available))
-        samples = _nanoseconds(readings.t), states
+        readable = int(np.searchsorted(states, len(stamps)))
+        samples = _nanoseconds(readings.t)[:readable], states[:readable]
         topics.append(Topic(topic, message, 0, len(stamps), fields, samples))
     return topics
 

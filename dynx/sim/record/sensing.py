@@ -122,7 +122,11 @@ def check_sensors(scenario: Scenario, model: Model) -> None:
 
 def sensed_motion(rollout: Rollout) -> SensedMotion:
     """Return what the sensors of a rollout sense as each step begins."""
-    robot = RobotMotion(rollout.model, rollout.q[:-1], rollout.v[:-1], rollout.a, rollout.external_forces)
+    plant = None if rollout.scenario is None else rollout.scenario.plant
+    unknown = [plant.unrecorded(base) if isinstance(plant, ScenePlant) else "" for base in (False, True)]
+    robot = RobotMotion(
+        rollout.model, rollout.q[:-1], rollout.v[:-1], rollout.a, rollout.external_forces, *unknown
+    )
     if len(rollout):
         h = float(np.median(np.diff(rollout.t)))
     else:

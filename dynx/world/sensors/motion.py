@@ -29,6 +29,10 @@ class RobotMotion:
     """Accelerations (n, nv)."""
     external_forces: Mapping[str, Floats]
     """Wrenches (n, 6) by frames, about the origin of the world in its axes [N, N m]."""
+    unknown: str = ""
+    """Why what joints transmit is not known."""
+    unknown_base: str = ""
+    """Why what the foundation transmits is not known."""
 
     @cached_property
     def _bodies(self) -> Backend:
@@ -63,7 +67,13 @@ class RobotMotion:
 
     def transmitted(self, joint: int | None) -> Floats:
         """Return the wrenches (n, 6) that a joint transmits to its child, in the frame of the child link;
-        for None those of the foundation of a fixed base, in the frame of the root link."""
+        for None those of the foundation of a fixed base, in the frame of the root link.
+
+        Raises UnsupportedFeatureError where that is not known.
+        """
+        unknown = self.unknown_base if joint is None else self.unknown
+        if unknown:
+            raise UnsupportedFeatureError(unknown)
         return self._base_wrench if joint is None else self._joint_wrenches[:, joint]
 
     def weight(self, joint: int | None) -> Floats:

@@ -11,9 +11,10 @@ import pytest
 import dynx
 from dynx import control
 from dynx.backends import backend
+from dynx.errors import UnsupportedFeatureError
 from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.spatial.scalar import Floats
-from dynx.world import Scene, SceneRobot, ground
+from dynx.world import ForceTorqueSensor, PointToPoint, Scene, SceneRobot, ground
 from tests.world.engines import WORLDS
 from tests.world.standing import quadruped
 
@@ -111,3 +112,22 @@ def test_a_record_without_a_scenario_has_no_external_forces() -> None:
     )
     assert rollout.external_forces == {}
     np.testing.assert_allclose(along_axes(rollout), rollout.tau, rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize(("end", "internal"), [("world", False), ("arm/base", True)])
+@pytest.mark.parametrize("engine", WORLDS)
+def test_a_robot_that_a_constraint_holds_is_refused_since_its_forces_are_not_recorded(
+    engine: str, end: str, internal: bool
+) -> None:
+    model = dynx.load("planar_2r")
+    scene = Scene("held", [SceneRobot("arm", model)], constraints=[PointToPoint("arm/forearm", end)])
+    sensor = ForceTorqueSensor("wrench", model.joint_names[1])
+    rollout = dynx.simulate(model, plant=ScenePlant(scene, engine=engine), duration=0.01, sensors=sensor)
+    for refused in (rollout.joint_wrenches, lambda: rollout.sensors["wrench"]):
+        with pytest.raises(UnsupportedFeatureError, match=r"a PointToPoint holds .*'arm/forearm'"):
+            refused()
+    if internal:
+        assert rollout.base_wrench().shape == (len(rollout), 6)
+    else:
+        with pytest.raises(UnsupportedFeatureError, match="World"):
+            rollout.base_wrench()

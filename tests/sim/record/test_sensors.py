@@ -112,6 +112,18 @@ def test_a_recording_has_messages_of_ros_when_samples_can_be_read(
     np.testing.assert_allclose(np.reshape(covariance, (3, 3)), 0.02**2 * 200.0 * np.eye(3), rtol=1e-12)
 
 
+@pytest.mark.parametrize(("rate", "delay"), [(500.0, 0.004), (None, 0.004), (None, 0.0), (250.0, 1.0)])
+def test_a_recording_leaves_out_samples_that_can_be_read_after_its_end_only(
+    rate: float | None, delay: float, tmp_path: Path
+) -> None:
+    pytest.importorskip("mcap")
+    arm = dynx.load("ur5")
+    encoder = Encoder("elbow", "elbow_joint", rate=rate, delay=delay)
+    late = dynx.simulate(arm, q0=arm.neutral(), duration=0.01, sensors=encoder)
+    late.save(tmp_path / "late.mcap")
+    assert len(dynx.Rollout.load(tmp_path / "late.mcap")) == len(late)
+
+
 def _values(kind: str, message: object) -> list[float]:
     """Return the values of a message in the order of a reading."""
     if kind == "sensor_msgs/msg/Imu":
