@@ -62,8 +62,11 @@ def silent() -> Iterator[None]:
 
 
 def _is_not_of_a_stranger(record: logging.LogRecord) -> bool:
-    """Leave out what websockets logs of a request that is none: its traceback has the stranger's own text."""
-    return record.getMessage() != "opening handshake failed"
+    """Leave out what websockets logs of a request that is none, whose traceback has the stranger's own text,
+    and of a message that is text, which viser asserts that it is not."""
+    error = record.exc_info[0] if record.exc_info else None
+    is_text = record.getMessage() == "connection handler failed" and error is AssertionError
+    return not is_text and record.getMessage() != "opening handshake failed"
 
 
 def serve(
