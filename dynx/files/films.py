@@ -70,10 +70,18 @@ def _gif(pictures: Iterable[NDArray[np.uint8]], period: float) -> bytes | None:
         format="GIF",
         save_all=True,
         append_images=drawn[1:],
-        duration=max(SHORTEST, round(1e3 * period)),
+        duration=_delays(len(drawn), period),
         loop=0,
     )
     return stream.getvalue()
+
+
+def _delays(count: int, period: float) -> list[int]:
+    """Return how long each picture of a GIF file is shown [ms]: multiples of 10, so that each picture begins
+    as near to its time as that allows."""
+    ends = np.rint(100.0 * period * np.arange(count + 1))
+    delays: list[int] = np.maximum(SHORTEST, 10 * np.diff(ends)).astype(int).tolist()
+    return delays
 
 
 def _mp4(pictures: Iterable[NDArray[np.uint8]], period: float) -> bytes | None:

@@ -42,7 +42,7 @@ from dynx.world.camera import cast_rays_smoothly, png_bytes
 from dynx.world.scenery import DARK, LIGHT, TILE, Scenery
 
 PICTURES_PER_SECOND = 12.5
-"""Rate of the pictures of a film."""
+"""Rate of the pictures of a film, nearly: the motion is a whole number of them."""
 
 MAX_PICTURES = 500
 """Largest number of pictures of a film; a longer motion has fewer a second."""
@@ -130,17 +130,19 @@ def write_film(
     dark: bool = False,
     stage: Stage | None = None,
 ) -> None:
-    """Write motions as a film that plays in the time of the longest, by the suffix of the file (`.gif`, which
+    """Write motions as a film that lasts as long as the longest, by the suffix of the file (`.gif`, which
     begins again, or `.mp4`). Raises the errors of `write_pictures`."""
-    first, duration = motions[0], _duration(motions)
-    stage, count = stage or stage_for(first, dark=dark), film_length(motions)
+    first, count = motions[0], film_length(motions)
+    stage = stage or stage_for(first, dark=dark)
+    # A film of next to no time is one picture, which has to be seen.
+    period = max(_duration(motions) / count, 0.5 / PICTURES_PER_SECOND)
 
     def pictures() -> Iterator[NDArray[np.uint8]]:
-        for k, time in enumerate(np.linspace(first.t[0], first.t[0] + duration, count).tolist()):
-            yield picture_of(motions, time, stage)
+        for k in range(count):
+            yield picture_of(motions, float(first.t[0]) + k * period, stage)
             progress(k + 1)
 
-    write_pictures(path, pictures(), duration / max(count - 1, 1))
+    write_pictures(path, pictures(), period)
 
 
 def _duration(motions: tuple[MotionFrames, ...]) -> float:

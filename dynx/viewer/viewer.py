@@ -509,9 +509,10 @@ class Viewer(Controls):
         """Record what the page shows in a ``with`` block as a film, which is drawn at its end without a
         browser: ``.gif``, or ``.mp4`` (extra ``film``).
 
-        A film of a live world plays in the time of the world, any other in that of the clock; it has 12.5
-        pictures a second and ends after 40 s. Raises ArgumentError for another suffix and for a file that
-        cannot be written, and NotInstalledError without the package that writes the film.
+        A film of a live world plays in the time of the world, any other in that of the clock; it lasts as
+        long, with about 12.5 pictures a second, and ends after 40 s. Raises ArgumentError for another
+        suffix and for a file that cannot be written, and NotInstalledError without the package that writes
+        the film.
         """
         from dynx.viewer.recording import recorded_film
 

@@ -52,6 +52,21 @@ def test_a_gif_file_has_the_pictures_at_their_rate(tmp_path: Path) -> None:
         assert (film.n_frames, film.size, film.info["duration"]) == (4, (6, 5), 50)
 
 
+@pytest.mark.parametrize(("count", "period"), [(12, 1.0 / 12.0), (30, 1.0 / 30.0), (25, 0.025), (1, 0.1)])
+def test_pictures_of_a_gif_file_begin_at_their_times(count: int, period: float, tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image")
+    write_pictures(tmp_path / "a.gif", flat(count, 5, 6), period)
+    ends, elapsed = [], 0
+    with image.open(tmp_path / "a.gif") as film:
+        assert film.n_frames == count
+        for k in range(count):
+            film.seek(k)
+            elapsed += film.info["duration"]
+            ends.append(1e-3 * elapsed)
+    # The file counts hundredths of a second.
+    assert np.abs(np.array(ends) - period * np.arange(1, count + 1)).max() <= 0.005 + 1e-9
+
+
 @pytest.mark.parametrize("name", ["a.avi", "a", "mp4"])
 def test_other_suffixes_are_refused_before_a_picture_is_drawn(name: str, tmp_path: Path) -> None:
     def drawn() -> Iterator[NDArray[np.uint8]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +12,7 @@ import dynx
 from dynx.errors import ArgumentError
 from dynx.sim import ScenePlant
 from dynx.spatial.scalar import Floats
+from dynx.viewer import export
 from dynx.viewer.export import film_length, picture_of, stage_for
 from dynx.viewer.motion import (
     MAX_FRAMES,
@@ -106,6 +108,30 @@ def test_the_longer_of_two_motions_is_shown_to_its_end(rollout: dynx.Rollout) ->
             for name, T in motion.at(-1).items():
                 assert np.allclose(shown.pose(name), T)
     assert film_length((short, long)) == film_length((long,)) > film_length((short,))
+
+
+@pytest.mark.parametrize("duration", [0.0, 1e-4, 0.06, 0.2, 1.0, 2.0, 7.77, 60.0])
+def test_a_film_lasts_as_long_as_its_motion_and_shows_each_time_at_that_time(
+    duration: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    films, times = [], []
+
+    def written(path: object, pictures: Iterable[object], period: float) -> None:
+        films.append((len(list(pictures)), period))
+
+    def drawn(motions: object, time: float, stage: object) -> None:
+        times.append(time)
+
+    monkeypatch.setattr(export, "write_pictures", written)
+    monkeypatch.setattr(export, "picture_of", drawn)
+    motion = accelerated("a", 3.0 + np.linspace(0.0, duration, 200))
+    export.write_film("a.gif", (motion,))
+    ((count, period),) = films
+    assert count == film_length((motion,))
+    assert np.allclose(times, 3.0 + period * np.arange(count))
+    shortest = 0.5 / export.PICTURES_PER_SECOND
+    assert count * period == pytest.approx(max(duration, shortest), rel=1e-12)
+    assert period >= shortest
 
 
 @pytest.mark.parametrize(

@@ -76,6 +76,31 @@ def test_a_program_records_a_film_without_a_browser(tmp_path: Path) -> None:
             assert np.allclose(motion.poses[part][-1], T[0])
 
 
+# imageio-ffmpeg leaves the pipe of a process that has ended to the garbage collector.
+@pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
+def test_a_film_of_a_world_plays_in_its_time(tmp_path: Path) -> None:
+    pillow = pytest.importorskip("PIL.Image")
+    ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="needs the extra film")
+    gif, mp4, still = tmp_path / "a.gif", tmp_path / "a.mp4", tmp_path / "still.mp4"
+    with World(SCENE) as world, world.view(steps=False) as viewer:
+        with viewer.record(gif), viewer.record(mp4):
+            for _ in range(20):
+                world.step(10)
+                viewer.update()
+        duration = 200 * world.dt
+        with viewer.record(still):
+            viewer.update()
+    with pillow.open(gif) as film:
+        delays = []
+        for k in range(film.n_frames):
+            film.seek(k)
+            delays.append(film.info["duration"])
+    assert 1e-3 * sum(delays) == pytest.approx(duration, abs=0.005)
+    pictures, seconds = ffmpeg.count_frames_and_secs(str(mp4))
+    assert (pictures, seconds) == (len(delays), pytest.approx(duration, abs=0.005))
+    assert ffmpeg.count_frames_and_secs(str(still))[0] == 1
+
+
 def test_the_page_saves_pictures_and_films(open_page: OpenPage, tmp_path: Path) -> None:
     pillow = pytest.importorskip("PIL.Image")
     with World(SCENE) as world, world.view(steps=False) as viewer:
