@@ -30,6 +30,7 @@ from dynx.engines.pybullet.client import BulletClient
 from dynx.engines.pybullet.library import bullet, bullet_version
 from dynx.engines.pybullet.motors import BulletMotorCommand
 from dynx.engines.pybullet.robot import BulletBody, BulletRobot
+from dynx.engines.silence import silence
 from dynx.files.temporary import temporary_folder
 from dynx.model.mechanism import ROOT
 from dynx.spatial.scalar import Floats
@@ -320,7 +321,9 @@ class BulletStepper(Stepper):
         with temporary_folder() as folder:
             path = folder / "world.bullet"
             path.write_bytes(data[1 + size :])
-            self.client.call(self.client.engine.restoreState, fileName=str(path))
+            # What Bullet writes of a state that it refuses is in the error.
+            with silence():
+                self.client.call(self.client.engine.restoreState, fileName=str(path))
         for robot, quat in zip(self.robots, near, strict=True):
             robot.near = quat.tolist()
         (self.contact_reader.fresh,) = struct.unpack("<?", data[:1])
