@@ -48,6 +48,9 @@ MAX_SECONDS = 10.0
 LONGEST = 20
 """Number of rows that are printed again at the end."""
 
+WITHOUT: dict[str, Any] = {"joint_damping": False, "joint_friction": False, "joint_armature": False}
+"""Joint dynamics of the description, which only the kinds with dry friction have."""
+
 ROBOTS = (
     "tiago_dual",
     "tiago",
@@ -152,7 +155,7 @@ def _batch(model: Model, controller: control.Controller[Any], **options: Any) ->
         dt=DT,
         threads=1,
         check_reference=False,
-        **options,
+        **WITHOUT | options,
     )
 
 
@@ -172,7 +175,7 @@ def _batch_with_everything(model: Model) -> object:
     noise = Noise(q=1e-4, v=1e-3, seed=0)
     options: dict[str, Any] = {"parametric": _everything_a_parameter(model), "pushes": push, "noise": noise}
     options["effort_limits"] = 100.0
-    return _batch_with(model, delay=2 * DT, position_limits=True, **options)
+    return _batch_with(model, delay=2 * DT, joint_limits=True, **options)
 
 
 def _batch_in_operational_space(model: Model) -> object:
@@ -192,7 +195,7 @@ def _simulation(model: Model, **options: Any) -> object:
         duration=LONG_ENOUGH * DT,
         dt=DT,
         check_reference=False,
-        **options,
+        **WITHOUT | options,
     )
 
 
@@ -207,13 +210,17 @@ KINDS: dict[str, Kind] = {
         for name in ("inverse_dynamics", "forward_dynamics", "mass_matrix")
     },
     "batch, plain": _batch_with,
-    "batch, dry friction": partial(_batch_with, friction=0.1, damping=0.1, armature=0.01),
-    "batch, smooth friction": partial(_batch_with, friction=0.1, damping=0.1, friction_slip=100.0),
-    "batch, position limits": partial(_batch_with, position_limits=True),
+    "batch, dry friction": partial(_batch_with, joint_friction=0.1, joint_damping=0.1, joint_armature=0.01),
+    "batch, smooth friction": partial(
+        _batch_with, joint_friction=0.1, joint_damping=0.1, friction_slip=100.0
+    ),
+    "batch, position limits": partial(_batch_with, joint_limits=True),
     "batch, all parameters, noise, limits, pushes": _batch_with_everything,
     "batch, operational space": _batch_in_operational_space,
     "simulation, plain": _simulation,
-    "simulation, dry friction": partial(_simulation, friction=0.1, damping=0.1, armature=0.01),
+    "simulation, dry friction": partial(
+        _simulation, joint_friction=0.1, joint_damping=0.1, joint_armature=0.01
+    ),
 }
 """Functions that compile each kind of kernel for a robot."""
 

@@ -10,6 +10,7 @@ import argparse
 import sys
 from collections.abc import Callable, Sequence
 from time import process_time
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +25,8 @@ ROBOTS = ("ur5", "panda", "talos")
 PLANTS = ("pinocchio", "compiled", "pybullet", "mujoco", "drake")
 FRICTION = (0.0, 0.5)
 """Dry friction of every joint [N m]."""
+WITHOUT: dict[str, Any] = {"joint_damping": False, "joint_armature": False}
+"""Joint dynamics of the description that neither of the two has."""
 STEPS, DT = 300, 1e-3
 BATCH = 1024
 """Rollouts of a batch."""
@@ -79,9 +82,8 @@ def _simulation(model: Model, plant: str, friction: float, integrator: str | Non
     start = model.clip(model.neutral())
     goal = model.clip(model.integrate(start, np.full(model.nv, 0.1)))
     law = ComputedTorque(model, kp=100, kd=20, backend="compiled")
-    return Simulation(
-        Scenario(model, law, goal, q0=start, plant=plant, friction=friction, integrator=integrator)
-    )
+    options: dict[str, Any] = WITHOUT | {"joint_friction": friction, "integrator": integrator}
+    return Simulation(Scenario(model, law, goal, q0=start, plant=plant, **options))
 
 
 def _advance(simulation: Simulation) -> Callable[[], object]:
@@ -95,7 +97,14 @@ def _batch(model: Model, friction: float) -> Callable[[], object]:
 
     def run() -> object:
         return simulate_batch(
-            model, law, goal, q0=start, friction=friction, rollouts=BATCH, duration=STEPS * DT, threads=1
+            model,
+            law,
+            goal,
+            q0=start,
+            **WITHOUT | {"joint_friction": friction},
+            rollouts=BATCH,
+            duration=STEPS * DT,
+            threads=1,
         )
 
     return run

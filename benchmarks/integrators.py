@@ -127,6 +127,8 @@ def late(integrator: str, steps: int, tolerance: float) -> float:
         integrator=integrator,
         rtol=tolerance,
         atol=tolerance / 100,
+        joint_damping=False,
+        joint_friction=False,
     )
     return float(abs(rollout.q[-1, 0] / rollout.v[-1, 0]) / quarter)
 

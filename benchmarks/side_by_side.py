@@ -197,7 +197,7 @@ def _loop(plant: str, *, friction: bool = False) -> tuple[Call, Answer]:
     model, controller, motion = _task()
     engine = plant if plant != "pybullet" else "pinocchio"
     law = controller(model, kp=400.0, kd=40.0, backend=engine)
-    more: dict[str, Any] = {"friction": 0.5} if friction else {}
+    more: dict[str, Any] = {"joint_friction": 0.5} if friction else {}
     # Algorithms in Python take hundreds of times as long.
     duration = 0.01 if plant == "reference" else 0.5
     run = partial(dynx.simulate, model, law, motion, plant=plant, dt=1e-3, duration=duration, **more)

@@ -86,15 +86,17 @@ def check_arguments(
     given: Iterable[Any],
     options: Mapping[str, Any],
     elsewhere: Mapping[str, str] = MappingProxyType({}),
+    renamed: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
     """Raise UnknownNameError for a keyword of `options` that the signature of the function `name` does not
     have, TypeError for other arguments that do not fit it.
 
-    `elsewhere` has the option for each name under which other functions have it.
+    `elsewhere` has the option for each name under which other functions have it, `renamed` the present names
+    of former keywords.
     """
     for each in options:
         if each not in signature.parameters:
-            near = nearest(each, signature.parameters)
+            near = right_name(each, signature.parameters, renamed)
             clause = f"; here it is {elsewhere[each]}" if each in elsewhere else near
             raise UnknownNameError(f"{name} has no option {shown(each)}{clause}")
     try:
@@ -103,10 +105,13 @@ def check_arguments(
         raise TypeError(f"{name}: {error}") from None
 
 
-def takes(arguments: Callable[P, A], **elsewhere: str) -> Callable[[Callable[[A], R]], Callable[P, R]]:
+def takes(
+    arguments: Callable[P, A], renamed: Mapping[str, str] = MappingProxyType({}), **elsewhere: str
+) -> Callable[[Callable[[A], R]], Callable[P, R]]:
     """Decorate a function of one object, so that it has the signature of the dataclass `arguments`.
 
-    `elsewhere` has the option for each name under which other functions have it.
+    `renamed` has the present names of former keywords, `elsewhere` the option for each name under which other
+    functions have it.
 
     Type checkers and `help` see the fields as arguments. A keyword that is no field raises UnknownNameError,
     other arguments that do not fit TypeError. The docstring gets a line for each field that `option`
@@ -119,7 +124,7 @@ def takes(arguments: Callable[P, A], **elsewhere: str) -> Callable[[Callable[[A]
 
         @wraps(function)
         def called(*given: P.args, **options: P.kwargs) -> R:
-            check_arguments(name, signature, given, options, elsewhere)
+            check_arguments(name, signature, given, options, elsewhere, renamed)
             return function(arguments(*given, **options))
 
         lines = [

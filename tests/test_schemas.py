@@ -109,7 +109,7 @@ def test_comparisons_of_rollouts_keep_their_schema() -> None:
     rest = np.zeros(model.nv)
     law = PD(model, kp=1.0, kd=0.1)
     runs = [
-        simulate(model, law, rest, q0=rest + 0.1, plant="reference", duration=0.01, damping=damping)
+        simulate(model, law, rest, q0=rest + 0.1, plant="reference", duration=0.01, joint_damping=damping)
         for damping in (0.0, 0.5)
     ]
     for rerun in (True, False):
@@ -129,9 +129,9 @@ def test_documents_of_scenarios_keep_their_schema() -> None:
             cycloidal(rest, rest + 1.0, duration=1.0),
             q0=rest,
             noise=Noise(q=1e-3),
-            damping=True,
-            armature=[0.1, 0.2],
-            friction=0.5,
+            joint_damping=True,
+            joint_armature=[0.1, 0.2],
+            joint_friction=0.5,
             payload=Payload(tip, 2.0),
             mass_scale={tip: 1.1},
             pushes=[ExternalForce(tip, rest.tolist() * 3, start=0.1, duration=0.1)],

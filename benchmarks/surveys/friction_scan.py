@@ -129,9 +129,9 @@ def run(case: Case) -> Finding:
 
 
 def _single(model: Model, case: Case, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    options: dict[str, Any] = {"friction": True, "damping": True, "armature": True}
+    options: dict[str, Any] = {"joint_friction": True, "joint_damping": True, "joint_armature": True}
     if case.friction == "drawn":
-        options = {"friction": _drawn(model, rng, 1)[0]}
+        options = {**dict.fromkeys(options, False), "joint_friction": _drawn(model, rng, 1)[0]}
     options |= {"duration": LENGTH * case.dt, "plant": "compiled"}
     options |= {"q0": _start(model, rng), "v0": rng.uniform(-1.0, 1.0, model.nv)}
     try:
@@ -144,9 +144,9 @@ def _single(model: Model, case: Case, rng: np.random.Generator) -> tuple[Floats,
 
 
 def _batch(model: Model, case: Case, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    options: dict[str, Any] = {"friction": True, "damping": True, "armature": True}
+    options: dict[str, Any] = {"joint_friction": True, "joint_damping": True, "joint_armature": True}
     if case.friction == "drawn":
-        options = {"friction": _drawn(model, rng, ROWS)}
+        options = {**dict.fromkeys(options, False), "joint_friction": _drawn(model, rng, ROWS)}
     options |= {"duration": LENGTH * case.dt, "record_every": 1, "check_reference": False}
     options |= {"q0": _start(model, rng), "v0": rng.uniform(-1.0, 1.0, (ROWS, model.nv))}
     law = PD(model, kp=0.0, kd=0.0)

@@ -59,18 +59,43 @@ class JointFriction:
         for a joint of a mapping without a coordinate; DTypeError or ShapeError for a value of a mapping that
         is no real number or array; ArgumentError for a slip speed that is neither 0 nor at least `MIN_SLIP`.
         """
-        own, of_model = JointDynamicsTerms(model), (damping is True, friction is True)
-        coupling = model.mechanism.coupling
+        self._set(model, ("damping", damping), ("friction", friction), checked_slip("slip", slip))
+
+    @classmethod
+    def of_options(
+        cls,
+        model: Model,
+        joint_damping: Coefficients = True,
+        joint_friction: Coefficients = True,
+        friction_slip: float = 0.0,
+    ) -> JointFriction:
+        """Return the friction of the options of a simulation, which errors name."""
+        made = cls.__new__(cls)
+        slip = checked_slip("friction_slip", friction_slip)
+        made._set(model, ("joint_damping", joint_damping), ("joint_friction", joint_friction), slip)
+        return made
+
+    def _set(
+        self, model: Model, damping: tuple[str, Coefficients], friction: tuple[str, Coefficients], slip: float
+    ) -> None:
+        """Set the fields; coefficients have the name of their argument."""
+        own, coupling = JointDynamicsTerms(model), model.mechanism.coupling
+        pairs = ((damping, own.damping), (friction, own.friction))
+        # A description without coefficients is treated like False, so that nothing is computed of them.
+        given = [
+            value is True and bool(theirs.any()) if isinstance(value, bool) else value
+            for (_, value), theirs in pairs
+        ]
         # The coefficients of the description belong to the joints of the tree, given ones to the coordinates.
-        in_tree_coordinates = coupling is not None and any(of_model)
-        values = {
-            "model": model,
-            "damping": self._coefficients("damping", damping, own.damping, model, in_tree_coordinates),
-            "friction": self._coefficients("friction", friction, own.friction, model, in_tree_coordinates),
-            "slip": checked_slip("slip", slip),
-            "to_tree": coupling.matrix() if coupling is not None and in_tree_coordinates else None,
-        }
-        for name, value in values.items():
+        in_tree_coordinates = coupling is not None and any(each is True for each in given)
+        values = [
+            self._coefficients(name, each, theirs, model, in_tree_coordinates)
+            for ((name, _), theirs), each in zip(pairs, given, strict=True)
+        ]
+        to_tree = coupling.matrix() if coupling is not None and in_tree_coordinates else None
+        for name, value in zip(
+            ("model", "damping", "friction", "slip", "to_tree"), (model, *values, slip, to_tree), strict=True
+        ):
             object.__setattr__(self, name, read_only(value) if isinstance(value, np.ndarray) else value)
 
     @cached_property
@@ -174,17 +199,18 @@ def coefficients_by_joint(
     return np.stack(np.broadcast_arrays(*columns), axis=-1) if columns else np.zeros(0)
 
 
-def armature_matrix(model: Model, armature: Coefficients) -> Floats:
-    """Return what an armature [kg m^2 or kg], as `Coefficients`, adds to the mass matrix (nv, nv).
+def armature_matrix(model: Model, armature: Coefficients, name: str = "armature") -> Floats:
+    """Return what an armature [kg m^2 or kg], as `Coefficients`, adds to the mass matrix (nv, nv); errors
+    have the `name` of the argument.
 
     Raises GainError and UnknownNameError as `JointFriction` does.
     """
     if isinstance(armature, bool):
         return JointDynamicsTerms(model).armature if armature else np.zeros((model.nv, model.nv))
     base = 6 if model.floating else 0
-    refuse_text("armature", armature, model.nv - base)
-    numbers = coefficients_by_joint(model, "armature", armature)
-    joints = checked_gain("armature", numbers, model.nv - base, per="one for each joint")
+    refuse_text(name, armature, model.nv - base)
+    numbers = coefficients_by_joint(model, name, armature)
+    joints = checked_gain(name, numbers, model.nv - base, per="one for each joint")
     return np.diag(np.concatenate([np.zeros(base), joints]))
 
 

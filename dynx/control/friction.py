@@ -43,8 +43,8 @@ class FrictionCompensation(Wrapper[ControllerState], pure=True):
     ) -> None:
         """The coefficients are those of `JointFriction`. Without both they are those of the description.
 
-        Of one alone the other is not compensated, because a plant without damping, as is the default of
-        `simulate`, is driven away by a torque along its speed.
+        Of one alone the other is not compensated, because a plant without damping is driven away by a torque
+        along its speed.
         """
         if damping is None and friction is None:
             damping = friction = True
@@ -54,8 +54,8 @@ class FrictionCompensation(Wrapper[ControllerState], pure=True):
         super().__init__(inner)
         losses = JointFriction(inner.model, damping, friction, slip)
         self._set(
-            damping=_coefficients(inner.model, "damping", damping),
-            friction=_coefficients(inner.model, "friction", friction),
+            damping=kept_coefficients(inner.model, "damping", damping),
+            friction=kept_coefficients(inner.model, "friction", friction),
             slip=losses.slip,
             speed=speed,
             losses=losses,
@@ -75,8 +75,9 @@ class FrictionCompensation(Wrapper[ControllerState], pure=True):
         return f"{self.inner.name}, friction compensated"
 
 
-def _coefficients(model: Model, name: str, given: Coefficients) -> bool | Floats:
-    """True or False as given, numbers as an array with one for each joint."""
+def kept_coefficients(model: Model, name: str, given: Coefficients) -> bool | Floats:
+    """Return coefficients as an object keeps them: True or False as given, numbers as an array with one for
+    each joint. Raises GainError and UnknownNameError for invalid ones."""
     if isinstance(given, bool):
         return given
     return checked_gain(name, coefficients_by_joint(model, name, given), len(model.joint_names))

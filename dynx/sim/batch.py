@@ -43,7 +43,7 @@ from dynx.sim.noise import Noise
 from dynx.sim.plants.disturbances import refuse_unstable
 from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.scenario.options import COEFFICIENTS as COEFFICIENTS_KIND
-from dynx.sim.scenario.options import OPTIONS, option
+from dynx.sim.scenario.options import FORMER_NAMES, OPTIONS, option
 from dynx.sim.scenario.scenario import Scenario, ScenarioArguments
 from dynx.sim.setup import Setup, require_duration
 from dynx.sim.step_completion import LaneStops, Settling
@@ -349,7 +349,7 @@ def split_rows(given: ScenarioArguments) -> tuple[Scenario, dict[str, Any]]:
     If a scenario is given instead of a model, arguments of `PER_ROLLOUT` replace its fields.
     """
     own = {name: getattr(given, name) for name in PER_ROLLOUT}
-    own = {name: value for name, value in own.items() if value is not None and value is not False}
+    own = {name: value for name, value in own.items() if value is not OPTIONS[name].default}
     scenario = given.scenario(PER_ROLLOUT)
     own |= {
         name: coefficients_by_joint(scenario.model, name, own[name]) for name in COEFFICIENTS if name in own
@@ -460,7 +460,7 @@ def refuse_small_slips(
     model, slip = acting.model, acting.joint_friction.slip
     if not slip or not (acting.joint_friction.present or (parametric and parametric.has_joint_dynamics)):
         return
-    inputs = ("friction", "armature", "parameters")
+    inputs = ("joint_friction", "joint_armature", "parameters")
     given = {"q": q, **{name: rows[name] for name in inputs if name in rows}}
     spread = {name: np.atleast_2d(array) for name, array in given.items()}
     n = max(map(len, spread.values()))
@@ -485,7 +485,7 @@ def _coefficients(acting: ArrayDisturbances, rows: Mapping[str, Floats]) -> tupl
     own = acting.joint_friction
     friction, armature = (
         np.array([_in_place(constant, row) for row in rows[name]]) if name in rows else constant[None]
-        for name, constant in (("friction", own.friction), ("armature", acting.armature))
+        for name, constant in (("joint_friction", own.friction), ("joint_armature", acting.armature))
     )
     dry = np.array([own.dry_for(row) for row in friction])
     return dry, armature[:, :, None] * np.eye(acting.model.nv)
@@ -539,7 +539,7 @@ class BatchArguments(ScenarioArguments):
     progress: Progress | None = None
 
 
-@takes(BatchArguments, external_forces="pushes", forces="pushes")
+@takes(BatchArguments, FORMER_NAMES, external_forces="pushes", forces="pushes")
 def simulate_batch(given: BatchArguments) -> BatchRollouts:
     """Simulate many rollouts of `model` under `controller` along `reference`, by semi-implicit Euler.
 
@@ -550,8 +550,9 @@ def simulate_batch(given: BatchArguments) -> BatchRollouts:
       friction and armature that the controller does not know
     - `gains`: arrays (n,) or (n, size) by the name of a gain of the controller, as ``{"kp": ...}``; of a
       controller of your own by the name of a public attribute that is a number or an array of numbers
-    - `damping`, `friction`, `armature` (n,), (n, 1) or (n, joints); a number, numbers (joints,) or True hold
-      for all rollouts, as in `simulate`; numbers by joint can be (n,), ``{"elbow_joint": [0.1, 0.2]}``
+    - `joint_damping`, `joint_friction`, `joint_armature` (n,), (n, 1) or (n, joints); a number, numbers
+      (joints,) or True hold for all rollouts, as in `simulate`; numbers by joint can be (n,),
+      ``{"elbow_joint": [0.1, 0.2]}``. True, the default, stands for the `parameters` where these have them
     - `q0` (n, nq), `v0` (n, nv); one row holds for all rollouts. The default is the start of the reference,
       and rest if `q0` is given
     - `noise` of the measurements: rollout k has the noise of ``simulate`` with ``Noise(..., rollout=k)``
@@ -586,7 +587,11 @@ def simulate_batch(given: BatchArguments) -> BatchRollouts:
     if "q0" in own:
         stand_ins["q0"] = scenario.model.neutral()
     rubbing = isinstance(parametric, ParametricDynamics) and parametric.has_joint_dynamics
-    setup = Setup.of(replace(scenario, **stand_ins), ("friction",) if rubbing else ())
+    if rubbing:
+        # The parameters have those of the description as defaults; they count once.
+        own_joints = (name for name in COEFFICIENTS if getattr(scenario, name) is True and name not in varied)
+        stand_ins |= dict.fromkeys(own_joints, False)
+    setup = Setup.of(replace(scenario, **stand_ins), ("joint_friction",) if rubbing else ())
     recorded = scenario.for_record()
     controller, moved, clock = setup.controller, setup.model, setup.clock
     limit = setup.limit
@@ -631,7 +636,7 @@ def simulate_batch(given: BatchArguments) -> BatchRollouts:
         noisy,
         delayed,
         limit,
-        scenario.position_limits,
+        scenario.joint_limits,
         acting,
     )
     rows = RolloutRows(rollouts)
@@ -668,7 +673,7 @@ def simulate_batch(given: BatchArguments) -> BatchRollouts:
         wrenches = acting.wrenches(clock.dt, np.arange(clock.n_steps))
     pushed = step.pushed_steps(wrenches).tolist()
     kernels = _step_kernels(step, clock, pushed)
-    stops = LaneStops.of(step) if scenario.position_limits else None
+    stops = LaneStops.of(step) if scenario.joint_limits else None
     references = setup.setpoint_of(clock.times()[1:]).q
     setpoints = Setpoint(*setup.setpoint_of(clock.control_times(controller.lead)))
     parts = [

@@ -145,13 +145,13 @@ class ArrayDisturbances:
     def _coefficients(self, given: Mapping[str, Array]) -> tuple[Array, Array]:
         own = self.joint_friction
         return (
-            self._in_place("damping", own.damping, given),
-            self._in_place("friction", own.friction, given),
+            self._in_place("joint_damping", own.damping, given),
+            self._in_place("joint_friction", own.friction, given),
         )
 
     def armature_of(self, given: Mapping[str, Array]) -> Array:
         """Return the armature (nv,)."""
-        return self._in_place("armature", self.armature, given)
+        return self._in_place("joint_armature", self.armature, given)
 
     def _in_place(self, name: str, constant: Floats, given: Mapping[str, Array]) -> Array:
         """Replace placeholders by the coefficients of the rollout; constants stay."""

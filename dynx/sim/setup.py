@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from dynx.backends.joint_friction import JointFriction
 from dynx.control.base import Controller
 from dynx.control.bullet import BulletMotor
 from dynx.control.saturation import checked_limit
@@ -107,11 +108,18 @@ def refuse_ineffective(scenario: Scenario, given_elsewhere: Collection[str]) -> 
     """
     for name, each in OPTIONS.items():
         other, wanted = each.needs
-        if other and other not in given_elsewhere and getattr(scenario, name) != each.default:
-            value = getattr(scenario, other)
-            if not (value == wanted if wanted else value is not False):
-                needed = f"{other}={wanted!r}" if wanted else other
-                raise ArgumentError(f"{name} is given, and has no effect without {needed}")
+        if not other or other in given_elsewhere or getattr(scenario, name) == each.default:
+            continue
+        if not in_effect(scenario.model, other, getattr(scenario, other), wanted):
+            needed = f"{other}={wanted!r}" if wanted else other
+            raise ArgumentError(f"{name} is given, and has no effect without {needed}")
+
+
+def in_effect(model: Model, option: str, value: object, wanted: str) -> bool:
+    """Check whether an option has the value that another one needs; any that acts where `wanted` is empty."""
+    if option == "joint_friction" and value is True:
+        return JointFriction(model, damping=False).present
+    return bool(value == wanted) if wanted else value is not False
 
 
 def refuse_unknown(*parts: object) -> None:
@@ -146,10 +154,10 @@ def disturbances_of(scenario: Scenario, moved: Model) -> Disturbances:
     """Return the friction, armature and pushes of a scenario on `moved`, the model of its plant."""
     return Disturbances(
         moved,
-        scenario.damping,
-        scenario.friction,
+        scenario.joint_damping,
+        scenario.joint_friction,
         scenario.friction_slip,
-        scenario.armature,
+        scenario.joint_armature,
         scenario.all_pushes,
         scenario.dt / whole_number("substeps", scenario.substeps, 1, MAX_STEPS),
     )

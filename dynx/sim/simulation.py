@@ -29,6 +29,7 @@ from dynx.sim.plants.registry import make_plant
 from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.record.rollout import Rollout
 from dynx.sim.scenario.documents import in_words
+from dynx.sim.scenario.options import FORMER_NAMES
 from dynx.sim.scenario.scenario import RecordedScenario, Scenario, ScenarioArguments, innermost
 from dynx.sim.setup import Setup, require_duration, setpoints_of, step_bytes
 from dynx.sim.step import at_limit
@@ -145,7 +146,7 @@ class Simulation:
             self._plant.refuse(setup.controller)
             step = clock.dt / scenario.substeps
             refuse_small_slip(setup.disturbances, setup.integrator, step, setup.start[0])
-            stops = stops_of(self._plant, setup.disturbances.armature) if scenario.position_limits else None
+            stops = stops_of(self._plant, setup.disturbances.armature) if scenario.joint_limits else None
             self._loop = ClosedLoop(
                 self._plant, setup.controller, setpoints, clock, sensors, setup.limit, stops
             )
@@ -614,7 +615,7 @@ class SimulateArguments(ScenarioArguments):
         return replace(self, controller=self.controller.on(self.controller_backend)).scenario()
 
 
-@takes(SimulateArguments, external_forces="pushes", forces="pushes")
+@takes(SimulateArguments, FORMER_NAMES, external_forces="pushes", forces="pushes")
 def simulate(given: SimulateArguments) -> Rollout:
     """Simulate `model` under `controller` along `reference`, and return the record.
 
@@ -639,13 +640,15 @@ def simulate(given: SimulateArguments) -> Rollout:
     multiples of `dt`. The default `duration` is that of the reference. It is rounded up to a multiple of
     `dt`; a reference that has ended before is held at its end.
 
-    **Joints**, the same in every plant: `damping`, dry `friction` and `armature`, each True for those of the
-    description, one number, one for each joint, or numbers by joint, ``{"elbow_joint": 0.5}``, where joints
-    that are not named have none. Dry friction holds a joint at rest up to its magnitude and opposes the
-    motion beyond (`dynx.rbd.joint_friction`), at any step; with `friction_slip` [rad/s or m/s] above 0
-    it is smoothed over that speed instead, so that loaded joints creep (`JointFriction`).
-    `effort_limits`, True for the model's, saturate torques and are recorded; `position_limits` are inelastic
-    stops (`dynx.steppers.joint_stops`); `pushes` are external wrenches.
+    **Joints**, the same in every plant: `joint_damping`, dry `joint_friction` and `joint_armature`, each True
+    for those of the description (the default, as in a world), False for none, one number, one for each joint,
+    or numbers by joint, ``{"elbow_joint": 0.5}``, where joints that are not named have none. Dry friction
+    holds a joint at rest up to its magnitude and opposes the motion beyond (`dynx.rbd.joint_friction`), at
+    any step; with `friction_slip` [rad/s or m/s] above 0 it is smoothed over that speed instead, so that
+    loaded joints creep (`JointFriction`). `effort_limits`, True for the model's, saturate torques and are
+    recorded. `joint_limits` are inelastic stops (`dynx.steppers.joint_stops`), False by default; in a scene
+    joints stop by the engine's own law, unless ``ScenePlant(joint_limits=False)``. `pushes` are external
+    wrenches.
 
     **Model error.** The plant has a `payload` and masses scaled by `mass_scale` (all links, or some) that the
     controller does not know; `noise` is added to the measurements. `sensors` and those of a scene are read

@@ -144,8 +144,8 @@ def _impact_kernel(step: LoopStep) -> Kernel:
     sizes = {"q": step.model.nq, "v": step.model.nv, "struck": step.model.nv}
     if step.plant is not None:
         sizes["parameters"] = len(step.plant.parameters.names)
-    if "armature" in disturbances.varied:
-        sizes["armature"] = disturbances.varied["armature"]
+    if "joint_armature" in disturbances.varied:
+        sizes["joint_armature"] = disturbances.varied["joint_armature"]
 
     def impact(**given: Array) -> dict[str, Array]:
         v, stuck = given["v"], abs(given["struck"])

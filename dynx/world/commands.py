@@ -181,12 +181,14 @@ class RobotLoads:
         """Raise UnsupportedFeatureError for joint dynamics that the engine's own motors cannot have."""
         if self.joints is not None and self._robot.armature.any():
             raise UnsupportedFeatureError(
-                f"{motors} is a motor inside the engine, without armature; use a torque controller"
+                f"{motors} is a motor inside the engine, without armature: give joint_armature=False, "
+                "or use a torque controller"
             )
         if self._robot.friction.any():
             raise UnsupportedFeatureError(
                 f"{motors} is a motor inside the engine, whose torque is unknown before the step, so that "
-                "joints cannot stick: give friction_slip above 0, or use a torque controller"
+                "joints cannot stick: give joint_friction=False, in a simulation friction_slip above 0, "
+                "or use a torque controller"
             )
 
     def _pushed(

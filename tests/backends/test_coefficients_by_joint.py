@@ -43,9 +43,9 @@ def test_rollouts_and_batches_are_those_of_an_array() -> None:
     law = FrictionCompensation(PD(ARM, kp=100.0, kd=10.0), friction={NAMES[2]: 1.0}, damping=False)
     assert law.friction[2] == 1.0  # type: ignore[index]  # an array, as numbers were given
     names = {
-        "friction": {NAMES[2]: 1.0, NAMES[4]: 0.5},
-        "armature": {NAMES[0]: 0.1},
-        "damping": {NAMES[1]: 2.0},
+        "joint_friction": {NAMES[2]: 1.0, NAMES[4]: 0.5},
+        "joint_armature": {NAMES[0]: 0.1},
+        "joint_damping": {NAMES[1]: 2.0},
     }
     arrays = {name: coefficients_by_joint(ARM, name, given) for name, given in names.items()}
     limits = {NAMES[1]: 5.0}
@@ -61,7 +61,9 @@ def test_rollouts_and_batches_are_those_of_an_array() -> None:
         {NAMES[2]: [0.0, 1.0], NAMES[4]: 0.5},
         [[0, 0, 0, 0, 0.5, 0], [0, 0, 1.0, 0, 0.5, 0]],
     )
-    many = [dynx.simulate_batch(ARM, law, q0, q0=0.9 * q0, duration=0.02, friction=each) for each in rows]
+    many = [
+        dynx.simulate_batch(ARM, law, q0, q0=0.9 * q0, duration=0.02, joint_friction=each) for each in rows
+    ]
     assert len(many[0]) == 2
     np.testing.assert_array_equal(many[0].q, many[1].q)
 

@@ -31,13 +31,14 @@ from tests.backends.robots import mixed_robot
 from tests.oracles.closed_form import MODELS, G
 from tests.oracles.pendulums import Pendulum
 from tests.sim.bars import tutorial_robot
+from tests.sim.rigid_bodies import RIGID_BODIES
 
 POSTURE = np.array([0.3, -1.2, 1.0, 0.2, 0.4, 0.1])
 
 
 def test_a_pd_hangs_below_its_setpoint_by_what_the_weight_takes() -> None:
     robot = load(MODELS / "pendulum.urdf")
-    rollout = simulate(robot, PD(robot, kp=100.0, kd=30.0), [0.5], duration=4.0, dt=2e-3)
+    rollout = simulate(robot, PD(robot, kp=100.0, kd=30.0), [0.5], duration=4.0, dt=2e-3, **RIGID_BODIES)
     rest = rollout.q[-1, 0]
     assert 100.0 * (0.5 - rest) == pytest.approx(Pendulum.m * G * Pendulum.c * np.sin(rest), rel=1e-6)
 
@@ -47,7 +48,8 @@ def test_an_integral_takes_that_away_and_the_weight_s_knowledge_too() -> None:
     pid = PID(robot, kp=100.0, ki=200.0, kd=30.0, control_dt=2e-3)
     held = GravityCompensatedPD(robot, kp=100.0, kd=30.0)
     for law in (pid, held):
-        assert abs(simulate(robot, law, [0.5], q0=[0.4], duration=6.0, dt=2e-3).error[-1, 0]) < 1e-4
+        rollout = simulate(robot, law, [0.5], q0=[0.4], duration=6.0, dt=2e-3, **RIGID_BODIES)
+        assert abs(rollout.error[-1, 0]) < 1e-4
 
 
 def test_an_integral_does_not_wind_up_while_the_motor_is_at_its_limit() -> None:
@@ -56,7 +58,8 @@ def test_an_integral_does_not_wind_up_while_the_motor_is_at_its_limit() -> None:
 
     def overshoot(tracking_time: float) -> float:
         law = PID(robot, **gains, tracking_time=tracking_time)
-        error = simulate(robot, law, [1.5], q0=[0.0], duration=6.0, dt=2e-3).error[:, 0]
+        rollout = simulate(robot, law, [1.5], q0=[0.0], duration=6.0, dt=2e-3, **RIGID_BODIES)
+        error = rollout.error[:, 0]
         return float(-error.min())
 
     # Without anti-windup: the integral is never told what the limit cut off.
@@ -175,5 +178,5 @@ def test_a_number_is_for_joints_and_not_for_a_base(base: str) -> None:
         np.testing.assert_array_equal(lost, np.concatenate([on_base, 2.0 * v[-joints:]]))
         limit = checked_limit(robot, number)
         np.testing.assert_array_equal(limit, np.concatenate([on_base + np.inf, np.full(joints, 2.0)]))
-    rollout = simulate(robot, duration=1e-3, armature=0.5)
+    rollout = simulate(robot, duration=1e-3, joint_armature=0.5)
     np.testing.assert_array_equal(np.diag(rollout.rotors), np.concatenate([on_base, np.full(joints, 0.5)]))

@@ -124,7 +124,7 @@ def test_motors_move_joints_whatever_else_acts() -> None:
         np.zeros(6),
         plant="pybullet",
         duration=0.02,
-        damping=5.0,
+        joint_damping=5.0,
         v0=np.ones(6),
     )
     # The first step stops the arm: the motor gives all that is missing.
@@ -164,7 +164,12 @@ def test_what_motors_cannot_be() -> None:
         BulletPositionMotor(robot, position_gain=-1.0)
     with pytest.raises(UnsupportedFeatureError, match="armature"):
         simulate(
-            robot, BulletPositionMotor(robot), np.zeros(6), plant="pybullet", duration=0.01, armature=0.1
+            robot,
+            BulletPositionMotor(robot),
+            np.zeros(6),
+            plant="pybullet",
+            duration=0.01,
+            joint_armature=0.1,
         )
     floating = load("solo12", base="floating")
     moved = simulate(

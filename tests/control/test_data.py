@@ -134,7 +134,7 @@ def test_a_controller_prints_its_gains_with_units() -> None:
     assert repr(Plain(2.0)) == "<Plain of ur5>"
 
 
-FACTOR = r"(?:1|[Nms]|rad)(?:\^2)?"
+FACTOR = r"(?:1|kg|[Nms]|rad)(?:\^2)?"
 UNIT = rf"{FACTOR}(?:[ /]{FACTOR}|/\({FACTOR} {FACTOR}\))*"
 
 

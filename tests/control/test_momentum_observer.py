@@ -24,9 +24,11 @@ from dynx.control import (
 from dynx.errors import ArgumentError, GainError, ShapeError, UnknownNameError
 from dynx.model import Model
 from dynx.sim import simulate, simulate_batch
+from dynx.sim.scenario.documents import decode, encode
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 from dynx.world import Scene, SceneRobot, World
+from tests.sim.rigid_bodies import RIGID_BODIES
 from tests.world.engines import WORLDS
 
 BAR = 0.01
@@ -74,7 +76,8 @@ def test_a_step_of_20_newtons_is_found_after_5_time_constants(
         pytest.skip(f"needs {plant}")
     robot = dynx.load(name, base=base)
     rng = np.random.default_rng(7)
-    observer = MomentumObserver(robot, time_constant=T)
+    # A joint that its dry friction holds does not show a force.
+    observer = MomentumObserver(robot, time_constant=T, **RIGID_BODIES)
     # Forces on links of a few grams accelerate them beyond any sensor.
     heavy = [link.name for link in robot.links if link.inertial is not None and link.inertial.mass > 0.05]
     for link in rng.choice(heavy, 3, replace=False).tolist():
@@ -91,6 +94,7 @@ def test_a_step_of_20_newtons_is_found_after_5_time_constants(
             v0=0.2 * rng.standard_normal(robot.nv),
             plant=plant,
             pushes=dynx.ExternalForce(link, wrench, start=START),
+            **RIGID_BODIES,
         )
         found = observer.residuals(rollout.t, rollout.q, rollout.v, rollout.tau)
         before = np.abs(found[round(START / DT)]).max()
@@ -132,7 +136,7 @@ def test_the_response_to_a_constant_force_is_exponential(
     """A slider under constant forces, sampled at any times, with armature and damping."""
     slider = dynx.load(SLIDER)
     t = np.concatenate([[0.0], np.cumsum(steps)])
-    observer = MomentumObserver(slider, gain=gain, armature=armature, backend="reference")
+    observer = MomentumObserver(slider, gain=gain, joint_armature=armature, backend="reference")
     mass = 2.0 + armature
     a = (3.0 + force) / mass
     v = a * t
@@ -150,7 +154,12 @@ SLIDER = """<robot name="slider"><link name="rail"/>
 
 def test_friction_and_armature_that_are_not_told_are_an_external_torque() -> None:
     arm = dynx.load("panda")
-    joints: dict[str, Any] = {"damping": 3.0, "friction": 2.0, "friction_slip": 0.05, "armature": 0.3}
+    joints: dict[str, Any] = {
+        "joint_damping": 3.0,
+        "joint_friction": 2.0,
+        "friction_slip": 0.05,
+        "joint_armature": 0.3,
+    }
     rng = np.random.default_rng(3)
     rollout = simulate(
         arm,
@@ -164,12 +173,12 @@ def test_friction_and_armature_that_are_not_told_are_an_external_torque() -> Non
     )
     log = rollout.t, rollout.q, rollout.v, rollout.tau
     told = MomentumObserver(arm, time_constant=T, **joints).residuals(*log)
-    untold = MomentumObserver(arm, time_constant=T).residuals(*log)
+    untold = MomentumObserver(arm, time_constant=T, **RIGID_BODIES).residuals(*log)
     size = np.abs(rollout.tau).max()
     assert np.abs(told).max() < 0.01 * size
     assert np.abs(untold).max() > 0.1 * size
     with pytest.raises(GainError, match="armature"):
-        MomentumObserver(arm, gain=10.0, armature=-1.0)
+        MomentumObserver(arm, gain=10.0, joint_armature=-1.0)
 
 
 class StopOnContact(Controller[Floats], pure=True):
@@ -196,7 +205,7 @@ class StopOnContact(Controller[Floats], pure=True):
 def test_a_controller_that_uses_it_runs_alike_in_every_executor() -> None:
     """It lets go of a payload that it does not know."""
     arm = dynx.load("ur5")
-    law = StopOnContact(MomentumObserver(arm, time_constant=0.05, damping=True), threshold=4.0)
+    law = StopOnContact(MomentumObserver(arm, time_constant=0.05, joint_damping=True), threshold=4.0)
     options: dict[str, Any] = {"duration": 0.3, "payload": dynx.Payload("tool0", 2.0)}
     by_kernel = simulate(arm, law, Q0, q0=Q0, plant="compiled", **options)
     assert by_kernel.executor == "compiled", by_kernel.executor
@@ -312,3 +321,23 @@ def test_arguments_that_no_observer_has() -> None:
         observer.wrench(rows[0], rows[0], "tool0", tolerance=2.0)
     with pytest.raises(ArgumentError, match="empty"):
         observer.wrench(rows[0], rows[0], [])
+
+
+def test_a_document_keeps_the_joint_dynamics_that_an_observer_knows() -> None:
+    """Documents of earlier versions did not have them, and observers none by default."""
+    arm = dynx.load("panda")
+    given: dict[str, Any] = {
+        "joint_damping": 3.0,
+        "joint_friction": {"panda_joint2": 0.4},
+        "friction_slip": 0.1,
+    }
+    observer = MomentumObserver(arm, gain=10.0, joint_armature=0.2, **given)
+    document = encode(observer, arm)
+    again = decode(document, arm)
+    np.testing.assert_array_equal(again.losses(np.ones(arm.nv)), observer.losses(np.ones(arm.nv)))
+    np.testing.assert_array_equal(again.armature, observer.armature)
+    former = {name: each for name, each in document["fields"].items() if name in ("model", "gain")}
+    told = decode({**document, "fields": former}, arm)
+    assert not told.losses.present
+    assert not told.armature.any()
+    assert MomentumObserver(arm, gain=10.0).losses.present

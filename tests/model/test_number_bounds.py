@@ -161,9 +161,9 @@ def test_no_backend_drops_a_mask(name: str, batch: tuple[int, ...]) -> None:
         lambda: ExternalForce("tool0", MASKED).checked(UR5),
         lambda: Scenario(UR5, q0=MASKED),
         lambda: simulate(UR5, PD(UR5, kp=1.0, kd=1.0), MASKED, duration=0.01),
-        lambda: simulate(UR5, PD(UR5, kp=1.0, kd=1.0), MOTION, friction=MASKED),
+        lambda: simulate(UR5, PD(UR5, kp=1.0, kd=1.0), MOTION, joint_friction=MASKED),
         lambda: simulate_batch(UR5, PD(UR5, kp=1.0, kd=1.0), MOTION, gains={"kp": MASKED}),
-        lambda: simulate_batch(UR5, PD(UR5, kp=1.0, kd=1.0), MOTION, friction=MASKED),
+        lambda: simulate_batch(UR5, PD(UR5, kp=1.0, kd=1.0), MOTION, joint_friction=MASKED),
         lambda: simulate_batch(UR5, PD(UR5, kp=1.0, kd=1.0), MOTION, q0=MASKED),
     ],
 )

@@ -23,22 +23,22 @@ from tests.sim.bars import EXACT_ON_DYNX, PLANTS_AGREE, apart, tutorial_robot
 needs_bullet = pytest.mark.skipif("pybullet" not in installed_backends(), reason="PyBullet is not installed")
 POSTURE = np.array([0.3, -1.2, 1.0, 0.2, 0.4, 0.1])
 OPTIONS: dict[str, dict[str, Any]] = {
-    "damping": {"damping": [1.0, 1.0, 1.0, 0.1, 0.1, 0.1]},
-    "friction": {"friction": 0.5},
-    "armature": {"armature": 0.1},
+    "damping": {"joint_damping": [1.0, 1.0, 1.0, 0.1, 0.1, 0.1]},
+    "friction": {"joint_friction": 0.5},
+    "armature": {"joint_armature": 0.1},
     "payload": {"payload": Payload("tool0", 2.0, (0.0, 0.0, 0.1), np.diag([0.01, 0.02, 0.015]))},
     "masses": {"mass_scale": {"forearm_link": 1.5}},
     "pushes": {"pushes": [ExternalForce("tool0", [10, 5, 0, 1, 0, 0], 0.02, 0.04, "local")]},
-    "stops": {"position_limits": True, "v0": [20.0, 0.0, 40.0, 30.0, 10.0, 60.0]},
+    "stops": {"joint_limits": True, "v0": [20.0, 0.0, 40.0, 30.0, 10.0, 60.0]},
     "efforts": {"effort_limits": [150, 35, 18, 2.5, 2, 2]},
     "noise": {"noise": Noise(1e-3, 1e-2, seed=3)},
     "delay": {"delay": 3e-3},
     "rate": {"control_dt": 4e-3},
     "substeps": {"substeps": 3},
     "all": {
-        "damping": 0.3,
-        "friction": 0.2,
-        "armature": 0.05,
+        "joint_damping": 0.3,
+        "joint_friction": 0.2,
+        "joint_armature": 0.05,
         "payload": Payload("tool0", 1.0),
         "mass_scale": 1.1,
         "pushes": [ExternalForce("tool0", [5, 0, 0, 0, 0, 0], 0.03)],
@@ -77,7 +77,12 @@ def test_bullet_s_plant_knows_mimic_joints_and_the_description_s_losses(base: st
     robot = mixed_robot(base, mimic=True)
     rng = np.random.default_rng(0)
     law = OpenLoop(robot, rng.uniform(-2.0, 2.0, (50, robot.nv)), control_dt=1e-3)
-    options: dict[str, Any] = {"damping": True, "friction": True, "armature": True, "substeps": 2}
+    options: dict[str, Any] = {
+        "joint_damping": True,
+        "joint_friction": True,
+        "joint_armature": True,
+        "substeps": 2,
+    }
     start: dict[str, Any] = {"q0": robot.random(rng), "v0": rng.uniform(-1, 1, robot.nv)}
     by_dynx, by_bullet = (
         simulate(
@@ -95,7 +100,9 @@ def test_the_description_s_losses_are_those_of_the_backends() -> None:
     rng = np.random.default_rng(1)
     q0, v0 = robot.random(rng), rng.uniform(-1.0, 1.0, robot.nv)
     dt = 1e-11
-    rollout = simulate(robot, q0=q0, v0=v0, dt=dt, duration=dt, damping=True, friction=True, armature=True)
+    rollout = simulate(
+        robot, q0=q0, v0=v0, dt=dt, duration=dt, joint_damping=True, joint_friction=True, joint_armature=True
+    )
     with backend("pinocchio", robot) as engine:
         a = engine.forward_dynamics(q0, v0, np.zeros(robot.nv), joint_dynamics=True)
     np.testing.assert_allclose(rollout.a[0], a, rtol=1e-9)
@@ -105,7 +112,7 @@ def test_a_stop_is_an_inelastic_impact() -> None:
     arm = tutorial_robot()
     q0, v0 = np.zeros(6), np.zeros(6)
     q0[2], v0[2] = 3.0, 10.0
-    rollout = simulate(arm, q0=q0, v0=v0, duration=0.1, position_limits=True)
+    rollout = simulate(arm, q0=q0, v0=v0, duration=0.1, joint_limits=True)
     assert np.all(rollout.q <= arm.upper)
     assert np.all(rollout.q >= arm.lower)
     first = int(np.argmax(rollout.q[:, 2] == arm.upper[2]))

@@ -196,7 +196,7 @@ def test_a_law_of_one_s_own_is_asked_in_every_step() -> None:
 @pytest.mark.parametrize(
     "options",
     [
-        {"friction": 0.1, "integrator": "rk4"},
+        {"joint_friction": 0.1, "integrator": "rk4"},
         {"integrator": "adaptive"},
         {"pushes": [ExternalForce("tool0", [1, 0, 0, 0, 0, 0])]},
         {"substeps": 17},
@@ -269,7 +269,7 @@ def test_errors_of_one_lane_are_those_of_the_plain_loop(kd: float, limits: Any) 
 def test_a_rollout_of_a_batch_is_that_of_simulate_with_its_noise() -> None:
     law = PID(ARM, kp=300, ki=2000, kd=30, control_dt=2e-3, limit=500.0)
     options: dict[str, Any] = {"control_dt": 2e-3, "delay": 4e-3, "effort_limits": 40.0, "duration": 0.3}
-    options |= {"friction": 0.3, "pushes": [ExternalForce("tool0", [5, 0, 0, 0, 1, 0], 0.01, 0.1)]}
+    options |= {"joint_friction": 0.3, "pushes": [ExternalForce("tool0", [5, 0, 0, 0, 1, 0], 0.01, 0.1)]}
     many = simulate_batch(
         ARM, law, tutorial_motion(), rollouts=11, record_every=1, noise=Noise(1e-3, 1e-2, 4, 5), **options
     )

@@ -14,7 +14,11 @@ from tests.sim.test_compiled_loop import ARM, both
 
 @pytest.mark.parametrize("plant", ["pinocchio", "compiled"])
 @pytest.mark.parametrize(
-    "options", [{"friction": 1.0}, {"damping": 0.5, "friction": 0.2, "armature": 0.1, "substeps": 2}]
+    "options",
+    [
+        {"joint_friction": 1.0},
+        {"joint_damping": 0.5, "joint_friction": 0.2, "joint_armature": 0.1, "substeps": 2},
+    ],
 )
 @pytest.mark.parametrize("name", ["ur5", "solo12"])
 def test_joint_friction_and_armature(plant: str, options: dict[str, Any], name: str) -> None:
@@ -24,4 +28,4 @@ def test_joint_friction_and_armature(plant: str, options: dict[str, Any], name: 
 
 
 def test_smoothed_friction() -> None:
-    both(ARM, PD(ARM, kp=5, kd=0.1), np.zeros(6), duration=0.06, friction=0.1, friction_slip=1.0)
+    both(ARM, PD(ARM, kp=5, kd=0.1), np.zeros(6), duration=0.06, joint_friction=0.1, friction_slip=1.0)

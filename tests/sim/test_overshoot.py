@@ -98,8 +98,8 @@ def test_friction_that_is_compensated_beyond_that_of_the_plant_is_named() -> Non
     law = control.FrictionCompensation(control.PD(model, kp=20.0, kd=0.5), damping=[0, 0, 0, 0, 9, 0])
     options: dict[str, Any] = {"duration": 0.5, "q0": np.zeros(6), "plant": "compiled"}
     with pytest.raises(DivergedError, match=r"of 9 N m s/rad .* at wrist_2_joint, where the plant has 2"):
-        simulate(model, law, np.full(6, 0.1), damping=2.0, **options)
-    damped = simulate(model, law, np.full(6, 0.1), damping=9.0, **options)
+        simulate(model, law, np.full(6, 0.1), joint_damping=2.0, **options)
+    damped = simulate(model, law, np.full(6, 0.1), joint_damping=9.0, **options)
     assert np.abs(damped.v).max() < 100.0
 
 
@@ -203,8 +203,8 @@ def test_an_oscillation_that_the_joint_limits_of_drake_bound_is_named() -> None:
     "options",
     [
         {"noise": Noise(v=0.05, seed=1)},
-        {"friction": 5.0},
-        {"armature": 1.0, "kd": 30.0},
+        {"joint_friction": 5.0},
+        {"joint_armature": 1.0, "kd": 30.0},
     ],
     ids=["noise", "friction", "armature"],
 )

@@ -89,9 +89,9 @@ def test_a_record_of_something_else_is_refused() -> None:
         {"dt": 5e-4},
         {"plant": "compiled"},
         {"mass_scale": 1.1},
-        {"damping": 1.0},
+        {"joint_damping": 1.0},
         {"noise": Noise(1e-4, 1e-3, seed=6)},
-        {"position_limits": True},
+        {"joint_limits": True},
         {"step": STEPS + 1},
     ]
     for change in cases:

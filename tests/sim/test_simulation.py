@@ -44,12 +44,12 @@ SCENARIOS: dict[str, Scenario] = {
         ARM,
         PD(ARM, kp=300, kd=30),
         np.zeros(6),
-        damping=0.3,
-        friction=0.2,
-        armature=0.05,
+        joint_damping=0.3,
+        joint_friction=0.2,
+        joint_armature=0.05,
         payload=Payload("tool0", 1.0),
         pushes=[ExternalForce("tool0", [5, 0, 0, 0, 0, 0], start=0.01, duration=0.01)],
-        position_limits=True,
+        joint_limits=True,
         duration=0.04,
     ),
     "floating": Scenario(DOG, PD(DOG, kp=3.0, kd=0.1), DOG.neutral(), duration=0.04),
@@ -339,8 +339,8 @@ def test_the_record_says_how_its_steps_were_computed() -> None:
         assert simulation.rollout.executor == "compiled pieces; plain: stepped by the caller"
     assert executor(plant="compiled", dt=0.01) == "compiled"
     assert executor(plant="compiled", integrator="rk4", dt=1e-4) == "compiled pieces"
-    assert executor(position_limits=True) == "compiled pieces"
-    assert executor(damping=1.0, friction=0.1, armature=0.1) == "compiled pieces"
+    assert executor(joint_limits=True) == "compiled pieces"
+    assert executor(joint_damping=1.0, joint_friction=0.1, joint_armature=0.1) == "compiled pieces"
     push = ExternalForce("tool0", [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     assert executor(pushes=[push]) == "plain: pushes are not compiled"
     few = closed_loop.MIN_STEPS_TO_COMPILE

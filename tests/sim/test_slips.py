@@ -87,7 +87,7 @@ SIMULATIONS: dict[str, tuple[dict[str, Any], type[DynxError], str]] = {
             GainError,
             f"^{name} is 'much'; wanted one number, an array .* or True for the values of the description",
         )
-        for name in ("damping", "friction", "armature", "effort_limits")
+        for name in ("joint_damping", "joint_friction", "joint_armature", "effort_limits")
     },
     "friction_slip='much'": (
         {"friction_slip": "much"},

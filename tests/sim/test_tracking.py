@@ -57,7 +57,7 @@ def test_friction_that_is_compensated_leaves_no_error(plant: str) -> None:
     # The setpoint is that of the end of the step, at which dry friction acts.
     law = FrictionCompensation(exact, damping=False, friction=friction, slip=0.0, speed="setpoint")
     without, rollout = (
-        simulate(robot, law, tutorial_motion(), plant=plant, duration=0.3, friction=friction)
+        simulate(robot, law, tutorial_motion(), plant=plant, duration=0.3, joint_friction=friction)
         for law in (exact, law)
     )
     assert np.abs(rollout.error).max() <= EXACT_ON_BULLET < np.abs(without.error).max()

@@ -93,8 +93,8 @@ def test_stops_in_compiled_stages_are_those_of_the_plain_loop(options: dict[str,
     start = ARM.clip(beyond) + np.where(beyond > q0, -0.02, np.where(beyond < q0, 0.02, 0.0))
     options = {"duration": 0.1, **options}
     law = PD(ARM, kp=100, kd=10)
-    both(ARM, law, beyond, q0=start, position_limits=True, check_reference=False, **options)
-    rollout = simulate(ARM, law, beyond, q0=start, position_limits=True, check_reference=False, **options)
+    both(ARM, law, beyond, q0=start, joint_limits=True, check_reference=False, **options)
+    rollout = simulate(ARM, law, beyond, q0=start, joint_limits=True, check_reference=False, **options)
     assert (rollout.q[-1] == ARM.clip(beyond))[[2, 4]].all()
     assert np.all((rollout.q <= ARM.upper) & (rollout.q >= ARM.lower))
 
@@ -106,21 +106,21 @@ def test_mimic_joints_and_floating_bases_stop_alike_in_both_loops(robot: str) ->
     v0[-3:] = 40.0
 
     def run(plant: str) -> Rollout:
-        return simulate(model, v0=v0, duration=0.3, position_limits=True, plant=plant)
+        return simulate(model, v0=v0, duration=0.3, joint_limits=True, plant=plant)
 
     pieces = run("pinocchio")
     assert pieces.executor == "compiled pieces"
     joints = slice(7 if model.floating else 0, None)
     reached = (pieces.q == model.upper) | (pieces.q == model.lower)
     assert reached[:, joints].any()
-    resumed = simulate(model, v0=v0, duration=0.3, position_limits=True, resume=pieces, step=40)
+    resumed = simulate(model, v0=v0, duration=0.3, joint_limits=True, resume=pieces, step=40)
     the_same(pieces, resumed)
 
 
 @pytest.mark.parametrize("plant", ["compiled", "reference"])
 def test_a_stop_hides_no_divergence(plant: str) -> None:
     """A velocity beyond all meaning ends the simulation, also where a stop would have taken it away."""
-    scenario = Scenario(ARM, plant=plant, q0=ARM.clip(ARM.upper), position_limits=True)
+    scenario = Scenario(ARM, plant=plant, q0=ARM.clip(ARM.upper), joint_limits=True)
     with Simulation(scenario) as simulation:
         simulation.step()
         with pytest.raises(DivergedError) as caught:

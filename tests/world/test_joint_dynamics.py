@@ -14,6 +14,7 @@ from dynx.model.elements import JointDynamics
 from dynx.model.tree import Base
 from dynx.world import PDMotor, PositionMotor, Scene, SceneRobot, World, ground
 from tests.backends.robots import mixed_robot
+from tests.sim.rigid_bodies import RIGID_BODIES
 from tests.world.engines import WORLDS
 
 TURNTABLE = """<robot name="turntable">
@@ -84,8 +85,7 @@ def test_worlds_move_as_simulations_do(engine: str, base: str) -> None:
     model = mixed_robot(base, mimic=True)
     rng = np.random.default_rng(3)
     q, v = model.random(rng), 0.5 * rng.standard_normal(model.nv)
-    joints: dict[str, Any] = {"damping": True, "friction": True, "armature": True}
-    exact = dynx.simulate(model, plant="pinocchio", q0=q, v0=v, duration=0.2, dt=1e-4, **joints)
+    exact = dynx.simulate(model, plant="pinocchio", q0=q, v0=v, duration=0.2, dt=1e-4)
     errors = []
     for dt in (2e-3, 1e-3):
         robot = SceneRobot("robot", model, q=tuple(q), v=tuple(v))
@@ -132,7 +132,8 @@ def test_joint_dynamics_are_exact_where_nothing_reaches_the_robot(name: str, bas
     q, v = 0.3 * model.random(rng) if base == "fixed" else model.random(rng), rng.standard_normal(model.nv)
     for chosen in (*([law] for law in laws), list(laws)):
         given: dict[str, Any] = {law: laws[law] for law in chosen}
-        exact = dynx.simulate(model, plant="pinocchio", q0=q, v0=v, duration=0.1, **given)
+        options = RIGID_BODIES | {f"joint_{law}": laws[law] for law in chosen}
+        exact = dynx.simulate(model, plant="pinocchio", q0=q, v0=v, duration=0.1, **options)
         dynamics = JointDynamics(**given)
         joints = [
             replace(joint, dynamics=dynamics if joint.mimic is None else JointDynamics())

@@ -136,9 +136,9 @@ _controller = (
 )
 
 _joint_dynamics = click.option(
-    "--joint-dynamics",
+    "--no-joint-dynamics",
     is_flag=True,
-    help="Damping, friction and armature of the joints as in the robot description.",
+    help="Joints without the damping, friction and armature of the robot description.",
 )
 
 _results = group(

@@ -18,7 +18,7 @@ import signal
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
@@ -138,11 +138,29 @@ def _usage_message(error: click.UsageError) -> str:
         if isinstance(each, click.Option) and not each.hidden
         for name in (*each.opts, *each.secondary_opts)
     ]
+    former = _former_option(error.option_name, options)
+    if former:
+        return f"no option {shown(error.option_name)}; {former}"
     # Without dashes, which all options share.
     near = nearest(error.option_name.lstrip("-"), [each.lstrip("-") for each in options])
     found = [name for name in options if f"'{name.lstrip('-')}'" in near] if "?" in near else []
     clause = f"; did you mean {' or '.join(found)}?" if found else ""
     return f"no option {shown(error.option_name)}{clause}"
+
+
+def _former_option(name: str, options: Collection[str]) -> str:
+    """Return what an option of a former name is now, if that is among `options`; empty for any other."""
+    from dynx.sim.scenario.options import FORMER_NAMES
+
+    flags = {
+        f"--{former}".replace("_", "-"): f"--{present}".replace("_", "-")
+        for former, present in FORMER_NAMES.items()
+    }
+    if flags.get(name) in options:
+        return f"it is now {flags[name]}"
+    if name == "--joint-dynamics" and "--no-joint-dynamics" in options:
+        return "joints have those of the description by default"
+    return ""
 
 
 def _discard_output() -> None:

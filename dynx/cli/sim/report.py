@@ -256,7 +256,7 @@ def _is_passive(request: SimulationRequest, rollout: Rollout) -> bool:
     """Check whether nothing does work on the robot, so that its energy is conserved."""
     joints = rollout.settings["joints"]
     disturbed = any(joints["damping"]) or any(joints["friction"]) or request.scenario.pushes
-    return request.controller is None and not disturbed and not request.scenario.position_limits
+    return request.controller is None and not disturbed and not request.scenario.joint_limits
 
 
 def _status(ended: EarlyEnd) -> str:
@@ -486,7 +486,7 @@ def _plant_deviations(report: Entry) -> list[str]:
     joints = {name: settings["joints"][name][base:] for name in ("damping", "friction", "armature")}
     parts += [f"{name} {value_range(each)}" for name, each in joints.items() if any(each)]
     parts += _listed([_push_text(each) for each in settings["pushes"]], "pushes")
-    if settings["position_limits"]:
+    if settings["joint_limits"]:
         parts.append("stops at the position limits")
     if settings["substeps"] > 1:
         parts.append(f"{settings['substeps']} substeps")

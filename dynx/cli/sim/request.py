@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from dynx import trajectory
+from dynx.backends.joint_friction import JointFriction
 from dynx.backends.registry import backend_class
 from dynx.cli.shell.inputs import Numbers, chosen_frame, configuration, load_robot, target_pose, velocity
 from dynx.cli.shell.kinds import Coefficients, command_flag, is_command_option
@@ -23,7 +24,7 @@ from dynx.sim.named_controllers import CONTROLLERS, ControllerRequest, Gains, na
 from dynx.sim.plants.registry import require_plant
 from dynx.sim.scenario import options as declared
 from dynx.sim.scenario.options import OPTIONS, Kind, Option, SimulationOptions
-from dynx.sim.setup import step_bytes
+from dynx.sim.setup import in_effect, step_bytes
 from dynx.simd.machine import require_memory
 from dynx.spatial.scalar import Floats
 from dynx.steppers.clock import Clock
@@ -58,7 +59,7 @@ def prepare(given: dict[str, Any]) -> SimulationRequest:
     if isinstance(chosen.plant, str):
         require_plant(chosen.plant)
     backend_class(given["backend"]).require_engine()
-    _refuse_ineffective_options(given, settings)
+    _refuse_ineffective_options(model, given, settings)
     motion = plan_motion(model, MotionInput.of(given))
     clock = Clock.of(chosen.dt, motion.duration, chosen.control_dt, chosen.delay)
     require_memory(f"{clock.n_steps} steps", clock.n_steps * (STEP_BYTES + step_bytes(model)))
@@ -112,15 +113,16 @@ def _controller(
         raise UnsupportedFeatureError(
             f"{given['controller']} is a motor inside PyBullet; no torque can be added"
         )
-    if chosen.damping is False and chosen.friction is False:
+    if not JointFriction.of_options(model, chosen.joint_damping, chosen.joint_friction).present:
         raise ArgumentError(
-            "--friction-compensation needs joint dynamics: --damping, --friction or --joint-dynamics"
+            "--friction-compensation needs damping or friction of a joint: in the description, by "
+            "--joint-damping or by --joint-friction"
         )
     slip = chosen.friction_slip
     return FrictionCompensation(
         controller,
-        damping=chosen.damping,
-        friction=chosen.friction,
+        damping=chosen.joint_damping,
+        friction=chosen.joint_friction,
         slip=slip,
         # A joint that sticks has no measured speed.
         speed="measured" if slip else "setpoint",
@@ -146,11 +148,11 @@ def _limits_of_motors(
 def _settings(model: Model, given: dict[str, Any]) -> dict[str, Any]:
     """Return the options of the scenario that were given, in the form of its fields.
 
-    Damping, friction and armature override ``--joint-dynamics``.
+    Damping, friction and armature override ``--no-joint-dynamics``.
     """
     settings: dict[str, Any] = {}
-    if given["joint_dynamics"]:
-        settings |= dict.fromkeys(("damping", "friction", "armature"), True)
+    if given["no_joint_dynamics"]:
+        settings |= dict.fromkeys(("joint_damping", "joint_friction", "joint_armature"), False)
     for name, each in OPTIONS.items():
         value = given.get(name)
         if is_command_option(each) and value not in (None, ()):
@@ -160,13 +162,15 @@ def _settings(model: Model, given: dict[str, Any]) -> dict[str, Any]:
     return settings
 
 
-def _refuse_ineffective_options(given: dict[str, Any], settings: dict[str, Any]) -> None:
+def _refuse_ineffective_options(model: Model, given: dict[str, Any], settings: dict[str, Any]) -> None:
     """Raise ArgumentError for an option that has no effect without another that is missing."""
     needed = {
         command_flag(each): f"{command_flag(OPTIONS[other])} {wanted}".rstrip()
         for name, each in OPTIONS.items()
         for other, wanted in [each.needs]
-        if name in settings and other and not _in_effect(settings.get(other, False), wanted)
+        if name in settings
+        and other
+        and not in_effect(model, other, settings.get(other, OPTIONS[other].default), wanted)
     }
     if given["seed"] is not None and "noise" not in settings:
         needed["--seed"] = "--noise-q or --noise-v"
@@ -174,10 +178,6 @@ def _refuse_ineffective_options(given: dict[str, Any], settings: dict[str, Any])
         needed["--resume-step"] = "--resume"
     for flag, other in needed.items():
         raise ArgumentError(f"{flag} needs {other}")
-
-
-def _in_effect(value: Any, wanted: str) -> bool:
-    return bool(value == wanted) if wanted else value is not False
 
 
 def _unchanged(model: Model, option: Option, value: Any) -> Any:

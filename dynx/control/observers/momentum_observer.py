@@ -29,15 +29,18 @@ from dynx.backends import Backend
 from dynx.backends.dynamics import Dynamics, EngineDynamics
 from dynx.backends.joint_friction import Coefficients, JointFriction, armature_matrix, checked_slip
 from dynx.control.base import ModelEvaluation, engine_of, parameter, substitute
+from dynx.control.friction import kept_coefficients
 from dynx.control.observers.wrench_estimate import MIN_RATIO, WrenchEstimate, estimate_wrenches
 from dynx.errors import ArgumentError, GainError, ShapeError, shown
 from dynx.model import Model
 from dynx.model.numbers import checked_array, checked_entries, checked_gain, real_array
+from dynx.option_names import checks_field_names
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Array, Floats
 
 
+@checks_field_names(damping="joint_damping", friction="joint_friction", armature="joint_armature")
 @checks_types
 @dataclass(frozen=True, eq=False, repr=False)
 class MomentumObserver(ModelEvaluation):
@@ -55,7 +58,11 @@ class MomentumObserver(ModelEvaluation):
     model: Model
     gain: Floats = parameter("1/s")
     """Gain of each coordinate (nv,), the inverse of its time constant."""
-    joint_friction: JointFriction = field(init=False)
+    joint_damping: bool | Floats = parameter("N m s/rad or N s/m")
+    joint_friction: bool | Floats = parameter("N m or N")
+    friction_slip: float = parameter("rad/s or m/s")
+    joint_armature: bool | Floats = parameter("kg m^2 or kg")
+    losses: JointFriction = field(init=False)
     """Damping and dry friction that are subtracted from the torque of the motors."""
     armature: Floats = field(init=False)
     """Armature (nv, nv), which is added to the mass matrix."""
@@ -67,17 +74,17 @@ class MomentumObserver(ModelEvaluation):
         *,
         time_constant: ArrayLike | None = None,
         gain: ArrayLike | None = None,
-        damping: Coefficients = False,
-        friction: Coefficients = False,
+        joint_damping: Coefficients = True,
+        joint_friction: Coefficients = True,
         friction_slip: float = 0.0,
-        armature: Coefficients = False,
+        joint_armature: Coefficients = True,
         backend: str | Backend = DEFAULT_ENGINE,
     ) -> None:
         """`time_constant` [s] or `gain` [1/s], one number or one for each coordinate (nv,).
 
-        `damping`, `friction`, `friction_slip` and `armature` are those of the joints, with the meaning and
-        the defaults of `dynx.simulate`; True takes those of the description. What is left out counts as an
-        external torque, as does the friction of a joint at rest, which no observer can tell from a force.
+        `joint_damping`, `joint_friction`, `friction_slip` and `joint_armature` have the meaning and the
+        defaults of `dynx.simulate`, those of the description. What is left out counts as an external torque,
+        as does the friction of a joint at rest, which no observer can tell from a force.
 
         Raises GainError for coefficients, ArgumentError for a backend of another robot.
         """
@@ -93,10 +100,12 @@ class MomentumObserver(ModelEvaluation):
         values: dict[str, Any] = {
             "model": model,
             "gain": checked_gain("gain", gain, model.nv),
-            "joint_friction": JointFriction(
-                model, damping, friction, checked_slip("friction_slip", friction_slip)
-            ),
-            "armature": armature_matrix(model, armature),
+            "joint_damping": kept_coefficients(model, "joint_damping", joint_damping),
+            "joint_friction": kept_coefficients(model, "joint_friction", joint_friction),
+            "friction_slip": checked_slip("friction_slip", friction_slip),
+            "joint_armature": kept_coefficients(model, "joint_armature", joint_armature),
+            "losses": JointFriction.of_options(model, joint_damping, joint_friction, friction_slip),
+            "armature": armature_matrix(model, joint_armature, "joint_armature"),
             "dynamics": EngineDynamics(engine_of(model, backend)),
         }
         for name, value in values.items():
@@ -194,7 +203,7 @@ class MomentumObserver(ModelEvaluation):
         """Return the momentum (..., nv) and, besides the torques, its rate (..., nv)."""
         p = ((M + self.armature) @ v[..., None])[..., 0]
         rate = (C.swapaxes(-1, -2) @ v[..., None])[..., 0] - g
-        return p, rate - self.joint_friction(v) if self.joint_friction.present else rate
+        return p, rate - self.losses(v) if self.losses.present else rate
 
     def __repr__(self) -> str:
         low, high = (f"{x:.3g}" for x in (self.gain.min(initial=np.inf), self.gain.max(initial=0.0)))

@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dynx.backends import Backend, backend
-from dynx.backends.joint_friction import Coefficients, JointFriction, armature_matrix, checked_slip
+from dynx.backends.joint_friction import Coefficients, JointFriction, armature_matrix
 from dynx.errors import ArgumentError
 from dynx.model import Model
 from dynx.model.elements import JointCoefficients
+from dynx.option_names import checks_field_names
 from dynx.rbd.joint_friction import FrictionLaw
 from dynx.sim.step import with_disturbances
 from dynx.spatial.scalar import Floats
@@ -29,6 +30,7 @@ STABLE = {"rk4": 2.78, "adaptive": np.inf}
 """Largest h f / (M s) by integrator; 2 for all others."""
 
 
+@checks_field_names(damping="joint_damping", friction="joint_friction", armature="joint_armature")
 class Disturbances:
     """Friction, armature and pushes that act on a plant, from the arguments of `dynx.simulate`.
 
@@ -38,18 +40,18 @@ class Disturbances:
     def __init__(
         self,
         model: Model,
-        damping: Coefficients = False,
-        friction: Coefficients = False,
+        joint_damping: Coefficients = True,
+        joint_friction: Coefficients = True,
         slip: float = 0.0,
-        armature: Coefficients = False,
+        joint_armature: Coefficients = True,
         pushes: Sequence[ExternalForce] = (),
         step: float = 0.0,
     ) -> None:
         """Raises GainError and ArgumentError for coefficients and pushes that `model` cannot have."""
         self.model = model
-        self.friction = JointFriction(model, damping, friction, checked_slip("friction_slip", slip))
+        self.friction = JointFriction.of_options(model, joint_damping, joint_friction, slip)
         self.pushes = tuple(push.checked(model) for push in pushes)
-        self.armature = armature_matrix(model, armature)
+        self.armature = armature_matrix(model, joint_armature, "joint_armature")
         """Armature (nv, nv), added to the mass matrix."""
         self.has_armature = bool(self.armature.any())
         self._step = step

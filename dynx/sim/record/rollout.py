@@ -401,7 +401,7 @@ def settings_of(scenario: Scenario) -> dict[str, Any]:
         "delay": clock.delay_steps * clock.dt,
         "substeps": scenario.substeps,
         "effort_limits": None if limit is None else limit.tolist(),
-        "position_limits": scenario.position_limits,
+        "joint_limits": scenario.joint_limits,
         "joints": {
             "damping": friction.damping.tolist(),
             "friction": friction.friction.tolist(),

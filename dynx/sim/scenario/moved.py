@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TypeVar
-
-Field = TypeVar("Field")
+from typing import Any
 
 MODULES = {
     "dynx.control.dynamics": "dynx.backends.dynamics",
@@ -52,6 +50,15 @@ CLASSES = {
 FIELDS = {"dynx.sim.plants.disturbances:Push": {"frame": "on"}}
 """Fields that were renamed, by the earlier name of their class."""
 
+ABSENT: dict[str, dict[str, object]] = {
+    "dynx.control.observers.momentum_observer:MomentumObserver": {
+        "joint_damping": False,
+        "joint_friction": False,
+        "joint_armature": False,
+    }
+}
+"""Values of fields that earlier documents of a class do not have, where they are not the default."""
+
 
 def present_name(name: str) -> str:
     """Return the present ``module:Class`` of a class that a document names."""
@@ -60,7 +67,8 @@ def present_name(name: str) -> str:
     return CLASSES.get(name, name)
 
 
-def present_fields(name: str, given: Mapping[str, Field]) -> dict[str, Field]:
-    """Return the fields of a class that a document names, with their present names."""
-    renamed = FIELDS.get(name, {})
-    return {renamed.get(field, field): value for field, value in given.items()}
+def present_fields(name: str, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a class that a document names, with their present names, and those that it had
+    without saying so."""
+    renamed, absent = FIELDS.get(name, {}), ABSENT.get(name, {})
+    return {**absent, **{renamed.get(field, field): value for field, value in given.items()}}

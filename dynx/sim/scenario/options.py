@@ -424,23 +424,23 @@ class SimulationOptions:
         group=ERRORS,
         default_words="none",
     )
-    damping: Coefficients = option(
-        False,
+    joint_damping: Coefficients = option(
+        True,
         "Viscous damping of the joints",
         unit="N m s/rad or N s/m",
         kind=COEFFICIENTS,
         rows=True,
         group=JOINTS,
-        default_words="0",
+        default_words="the description's",
     )
-    friction: Coefficients = option(
-        False,
+    joint_friction: Coefficients = option(
+        True,
         "Coulomb friction of the joints, which holds them at rest up to its magnitude",
         unit="N m or N",
         kind=COEFFICIENTS,
         rows=True,
         group=JOINTS,
-        default_words="0",
+        default_words="the description's",
     )
     friction_slip: float = option(
         0.0,
@@ -448,16 +448,16 @@ class SimulationOptions:
         unit="rad/s or m/s",
         kind=SLIP,
         group=JOINTS,
-        needs=("friction", ""),
+        needs=("joint_friction", ""),
     )
-    armature: Coefficients = option(
-        False,
+    joint_armature: Coefficients = option(
+        True,
         "Rotor inertia of the joints",
         unit="kg m^2 or kg",
         kind=COEFFICIENTS,
         rows=True,
         group=JOINTS,
-        default_words="0",
+        default_words="the description's",
     )
     effort_limits: Coefficients = option(
         False,
@@ -467,7 +467,7 @@ class SimulationOptions:
         group=JOINTS,
         default_words="unlimited",
     )
-    position_limits: bool = option(
+    joint_limits: bool = option(
         False, "Inelastic stops at the position limits of the joints", kind=FLAG, group=JOINTS
     )
     payload: Payload | Sequence[Payload] | None = option(
@@ -497,6 +497,14 @@ class SimulationOptions:
         flag="-",
     )
 
+
+FORMER_NAMES = {
+    "damping": "joint_damping",
+    "friction": "joint_friction",
+    "armature": "joint_armature",
+    "position_limits": "joint_limits",
+}
+"""Present names of options that had another one, in programs and in documents."""
 
 OPTIONS = {each.name: each for each in options_of(SimulationOptions)}
 """Declarations of the options of a simulation by name."""

@@ -6,12 +6,13 @@ import json
 import os
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, fields, make_dataclass, replace
-from typing import Any, Literal, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.argument_types import checks_types
+from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.control.base import Controller, refuse_other_than_controller
 from dynx.errors import ArgumentError, shown
 from dynx.files.documents import check_document, parse_json
@@ -19,6 +20,7 @@ from dynx.model import Model
 from dynx.model.loading import load
 from dynx.model.model import refuse_other_than_model
 from dynx.model.package_search import StrPath
+from dynx.option_names import checks_field_names
 from dynx.rbd.parameters import Payload
 from dynx.sim.controller_checks import copy_for_record
 from dynx.sim.plants.registry import default_integrator
@@ -38,18 +40,21 @@ from dynx.sim.scenario.documents import (
     in_words,
 )
 from dynx.sim.scenario.documents import NUMBERS as CONTROLLER_NUMBERS
-from dynx.sim.scenario.options import OPTIONS, SimulationOptions, as_array
+from dynx.sim.scenario.options import COEFFICIENTS, FORMER_NAMES, OPTIONS, SimulationOptions, as_array
 from dynx.steppers.clock import TIME_ROUNDING, Clock
 from dynx.steppers.forces import ExternalForce
 from dynx.trajectory.base import Trajectory
 
-SCHEMA = "dynx.scenario/1"
+SCHEMA = "dynx.scenario/2"
 """Name and version of the layout of a scenario's document."""
+
+FIRST_SCHEMA = "dynx.scenario/1"
+"""Version in which options had their former names, and a document without joint dynamics had none."""
 
 ScenarioDocument = make_dataclass(
     "ScenarioDocument",
     [
-        ("schema", Literal["dynx.scenario/1"]),
+        ("schema", Literal["dynx.scenario/2"]),
         ("model", dict[str, Any]),
         ("controller", dict[str, Any] | None, None),
         ("reference", list[Any] | dict[str, Any] | None, None),
@@ -87,13 +92,15 @@ def innermost(difference: Difference) -> Difference:
     return innermost(document_differences(f"{name}[{k}]", ours[k], theirs[k])[0])
 
 
+@checks_field_names(**FORMER_NAMES)
 @dataclass(frozen=True, eq=False, repr=False)
 class Scenario(SimulationOptions):
     """Complete description of one simulation, which `dynx.simulate` and `dynx.simulate_batch` run and a
     record contains.
 
     The fields are the arguments of `dynx.simulate`, which documents them. Two scenarios are equal if all
-    fields are, element by element, with the defaults filled in. ``dataclasses.replace`` changes one field;
+    fields are, element by element, with the defaults filled in; joint dynamics that a description does not
+    have are those that are switched off. ``dataclasses.replace`` changes one field;
     `to_json` and `from_json` keep every bit. Types are checked here, values when a simulation is made of it.
     """
 
@@ -117,11 +124,18 @@ class Scenario(SimulationOptions):
         object.__setattr__(self, "reference", as_array("reference", self.reference))
         for name, each in OPTIONS.items():
             object.__setattr__(self, name, each.kind.checked(name, getattr(self, name), self.model))
-        if self.position_limits and isinstance(self.plant, ScenePlant):
+        if self.joint_limits and isinstance(self.plant, ScenePlant):
             raise ArgumentError(
-                "position_limits are the stops of dynx; a plant in a scene has those of its engine, by "
+                "joint_limits are the stops of dynx; a plant in a scene has those of its engine, by "
                 "ScenePlant(joint_limits=True)"
             )
+
+    if not TYPE_CHECKING:  # type checkers report an unknown attribute themselves
+
+        def __getattr__(self, name: str) -> Any:
+            if name in FORMER_NAMES:
+                raise AttributeError(f"Scenario.{name} is now {FORMER_NAMES[name]}")
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
     @property
     def payloads(self) -> tuple[Payload, ...]:
@@ -168,6 +182,11 @@ class Scenario(SimulationOptions):
                 if mine != its:
                     found.append(Difference(name, mine, its))
                 continue
+            if (
+                name in JOINT_TERMS
+                and (_acts(name, mine, self.model), _acts(name, its, other.model)) == NEITHER
+            ):
+                continue
             pair = encode(mine, self.model), encode(its, other.model)
             found += document_differences(name, *pair)
         return found
@@ -205,7 +224,10 @@ class Scenario(SimulationOptions):
     @classmethod
     @checks_types
     def from_dict(cls, document: Mapping[str, Document]) -> Scenario:
-        """Return the scenario of a document. Raises ArgumentError for a document of another layout."""
+        """Return the scenario of a document, of an earlier dynx too. Raises ArgumentError for a document of
+        another layout."""
+        if isinstance(document, Mapping) and document.get("schema") == FIRST_SCHEMA:
+            document = _of_present_schema(document)
         if not isinstance(document, Mapping) or document.get("schema") != SCHEMA:
             has = f"has the schema {shown(document['schema'])}" if "schema" in document else "lacks a schema"
             raise ArgumentError(f"the document {has}; wanted that of a scenario, {SCHEMA!r}")
@@ -296,6 +318,19 @@ class ScenarioArguments(SimulationOptions):
         return Scenario(load(self.model), **given)
 
 
+JOINT_TERMS = {"joint_damping": "damping", "joint_friction": "friction", "joint_armature": "rotors"}
+"""Attribute of `JointDynamicsTerms` with the coefficients of the description, by the name of the option."""
+
+NEITHER = (False, False)
+
+
+def _acts(option: str, value: object, model: Model) -> bool:
+    """Check whether an option of joint dynamics acts: True does not where the description has none."""
+    if value is True:
+        return bool(getattr(JointDynamicsTerms(model), JOINT_TERMS[option]).any())
+    return value is not False
+
+
 def _is_default(value: object, default: object) -> bool:
     plain = type(value) is type(default) and isinstance(value, str | float | int | tuple)
     return value is default or (plain and value == default)
@@ -304,6 +339,21 @@ def _is_default(value: object, default: object) -> bool:
 def field_names() -> tuple[str, ...]:
     """Return the names of all fields of a scenario, those that can be given by position first."""
     return ("model", "controller", "reference", *OPTIONS)
+
+
+def _of_present_schema(document: Mapping[str, Document]) -> dict[str, Document]:
+    """Return the document of a scenario of `FIRST_SCHEMA` in the present layout, with the same meaning."""
+    former = {present: name for name, present in FORMER_NAMES.items()}
+    wrong = [name for name in former if name in document]
+    if wrong:
+        raise ArgumentError(
+            f"the document of schema {FIRST_SCHEMA!r} has {wrong[0]}; there it is {former[wrong[0]]}"
+        )
+    found = {FORMER_NAMES.get(name, name): each for name, each in document.items()}
+    absent = {
+        name: False for name, each in OPTIONS.items() if each.kind is COEFFICIENTS and name not in found
+    }
+    return {**found, **absent, "schema": SCHEMA}
 
 
 def _is_number(document: Document) -> bool:

@@ -99,7 +99,16 @@ def test_the_document_has_every_option_and_result() -> None:
             "--settle",
             "0.01",
         ),
-        *("--noise-q", "1e-5", "--delay", "0.002", "--push", "tool0:1,0,0,0,0,0:0.01", "--damping", "0.5"),
+        *(
+            "--noise-q",
+            "1e-5",
+            "--delay",
+            "0.002",
+            "--push",
+            "tool0:1,0,0,0,0,0:0.01",
+            "--joint-damping",
+            "0.5",
+        ),
     )
     assert made["schema"] == 1
     assert set(made) == set(KEYS.split())
@@ -169,6 +178,9 @@ def test_every_controller_runs(name: str) -> None:
 @needs_bullet
 def test_motors_of_the_engine_are_saturated_at_limits() -> None:
     motor = ["pendulum", "--to", "1", "--controller", "position-motor", "--plant", "pybullet", "--dt", "0.01"]
+    refused = sim(*motor)
+    assert (refused.exit_code, "give joint_friction=False" in refused.stderr) == (2, True)
+    motor += ["--joint-friction", "0"]
     free, described, weak = (
         document(*motor, *limits) for limits in ([], ["--effort-limits", "urdf"], ["--effort-limits", "1"])
     )
@@ -223,7 +235,7 @@ def test_a_frame_moves_on_a_straight_line(tmp_path: Path) -> None:
 
 
 def test_friction_compensation_removes_the_error() -> None:
-    losses = ["--friction", "0.5", "--controller", "discrete-computed-torque"]
+    losses = ["--joint-friction", "0.5", "--controller", "discrete-computed-torque"]
     without = document("ur5", *SHORT, *losses)
     given = document("ur5", *SHORT, *losses, "--friction-compensation")
     # In the last step the setpoint is at rest, and the elbow is not.
@@ -235,12 +247,14 @@ def test_friction_compensation_removes_the_error() -> None:
 
 def test_a_passive_robot_keeps_its_energy() -> None:
     made = document(
-        "pendulum", "--q0", "1.5", "--controller", "none", "--integrator", "rk4", "--duration", "1"
+        *("pendulum", "--q0", "1.5", "--controller", "none", "--integrator", "rk4", "--duration", "1"),
+        "--no-joint-dynamics",
     )
     assert made["passive"]
     assert made["energy_drift"] < 1e-10
     assert made["max_error"] is made["joints"][0]["effort_limit"] is None
-    text = sim("pendulum", "--q0", "1.5", "--controller", "none", "--duration", "0.1").stdout
+    falling = ["pendulum", "--q0", "1.5", "--controller", "none", "--duration", "0.1"]
+    text = sim(*falling, "--no-joint-dynamics").stdout
     assert "energy drift " in text
     assert "no tracking error: there is no reference" in text
 
@@ -274,13 +288,13 @@ def test_one_factor_for_all_links_and_another_for_one() -> None:
 
 
 def test_coefficients_by_joint_are_those_of_a_list() -> None:
-    by_joint = ["--friction", "elbow_joint=0.5", "--effort-limits", "elbow_joint=20,wrist_1_joint=9"]
+    by_joint = ["--joint-friction", "elbow_joint=0.5", "--effort-limits", "elbow_joint=20,wrist_1_joint=9"]
     settings = document("ur5", *SHORT, *by_joint)["settings"]
     assert settings["joints"]["friction"] == [0.0, 0.0, 0.5, 0.0, 0.0, 0.0]
     assert settings["effort_limits"] == [None, None, 20.0, 9.0, None, None]
-    refused = sim("ur5", *SHORT, "--friction", "elbow=0.5")
+    refused = sim("ur5", *SHORT, "--joint-friction", "elbow=0.5")
     assert refused.exit_code == 2
-    assert "friction: " in refused.stderr
+    assert "joint_friction: " in refused.stderr
     assert "'elbow_joint'" in refused.stderr
 
 
@@ -334,9 +348,14 @@ ELBOW = ["ur5", "--to", "elbow_joint=0.1"]
         ([*ELBOW, "--controller", "none", "--kp", "1"], "takes no gains"),
         ([*ELBOW, "--controller", "impedance"], "impedance needs kp"),
         ([*ELBOW, "--controller", "position-motor"], "pybullet"),
-        ([*ELBOW, "--friction-compensation"], "needs joint dynamics: --damping"),
-        ([*ELBOW, "--damping=-1"], "damping is negative"),
-        ([*ELBOW, "--friction", "1", "--friction-slip=-1"], "slip"),
+        ([*ELBOW, "--friction-compensation"], "needs damping or friction of a joint"),
+        ([*ELBOW, "--damping", "1"], "no option '--damping'; it is now --joint-damping"),
+        ([*ELBOW, "--friction", "1"], "no option '--friction'; it is now --joint-friction"),
+        ([*ELBOW, "--armature", "1"], "no option '--armature'; it is now --joint-armature"),
+        ([*ELBOW, "--position-limits"], "no option '--position-limits'; it is now --joint-limits"),
+        ([*ELBOW, "--joint-dynamics"], "joints have those of the description by default"),
+        ([*ELBOW, "--joint-damping=-1"], "damping is negative"),
+        ([*ELBOW, "--joint-friction", "1", "--friction-slip=-1"], "slip"),
         ([*ELBOW, "--push", "tool0"], "--push"),
         ([*ELBOW, "--push", "tool0:1,2"], "--push"),
         ([*ELBOW, "--push", "tool:1,2,3"], "did you mean 'tool0'"),
@@ -369,7 +388,7 @@ ELBOW = ["ur5", "--to", "elbow_joint=0.1"]
         ([*ELBOW, "--resume-step", "3"], "--resume-step needs --resume"),
         ([*ELBOW, "--method", "Radau"], "--method needs --integrator adaptive"),
         ([*ELBOW, "--atol", "1e-6", "--integrator", "rk4"], "--atol needs --integrator adaptive"),
-        ([*ELBOW, "--friction-slip", "0.1"], "--friction-slip needs --friction"),
+        ([*ELBOW, "--friction-slip", "0.1"], "--friction-slip needs --joint-friction"),
         ([*ELBOW, "--seed", "1"], "--seed needs --noise-q or --noise-v"),
         ([*ELBOW, "--integrator", "adaptive", "--method", "DOP85"], "did you mean 'DOP853'"),
     ],

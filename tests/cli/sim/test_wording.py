@@ -28,16 +28,19 @@ FALLING = ["solo12", "--base", "floating", "--controller", "pd", "--duration", "
         (["--mass-scale", "1.1"], "plant: masses times 1.1"),
         (["--mass-scale", "forearm_link=1.1"], "plant: mass of forearm_link times 1.1"),
         (["--mass-scale", "1.1", "--mass-scale", "forearm_link=2"], "plant: masses times 1.1 to 2"),
-        (["--friction", "0.5", "--damping", "1,2,1,1,1,1"], "plant: damping 1 to 2, friction 0.5"),
-        (["--armature", "0.1"], "plant: armature 0.1"),
+        (
+            ["--joint-friction", "0.5", "--joint-damping", "1,2,1,1,1,1"],
+            "plant: damping 1 to 2, friction 0.5",
+        ),
+        (["--joint-armature", "0.1"], "plant: armature 0.1"),
         (["--push", "tool0:1,0,0"], "plant: push on tool0 from 0 s"),
         (["--push", "tool0:1,0,0:0.01:0.02"], "plant: push on tool0 from 0.01 s for 0.02 s"),
-        (["--position-limits"], "plant: stops at the position limits"),
+        (["--joint-limits"], "plant: stops at the position limits"),
         (["--substeps", "2"], "plant: 2 substeps"),
         (["--noise-q", "1e-4", "--noise-v", "0.01"], "controller: noise 0.0001 in q and 0.01 in v"),
         (["--delay", "0.002"], "controller: delay 0.002 s"),
         (["--control-dt", "0.002"], "controller: period 0.002 s"),
-        (["--friction", "0.5", "--delay", "0.002"], "plant: friction 0.5; controller: delay 0.002 s"),
+        (["--joint-friction", "0.5", "--delay", "0.002"], "plant: friction 0.5; controller: delay 0.002 s"),
     ],
 )
 def test_the_header_lists_the_deviations_from_the_nominal_run(arguments: list[str], expected: str) -> None:
@@ -45,12 +48,12 @@ def test_the_header_lists_the_deviations_from_the_nominal_run(arguments: list[st
 
 
 def test_losses_of_a_floating_robot_are_those_of_its_joints() -> None:
-    losses = ["--friction", "0.5", "--armature", "0.1"]
+    losses = ["--joint-friction", "0.5", "--joint-armature", "0.1"]
     assert "plant: friction 0.5, armature 0.1" in sim(*FALLING, *losses).stdout.splitlines()
 
 
 def test_the_header_of_a_nominal_run_has_no_deviations() -> None:
-    lines = sim("ur5", *SHORT, "--joint-dynamics").stdout.splitlines()
+    lines = sim("ur5", *SHORT).stdout.splitlines()
     assert lines[2] == "kp 400, kd 40"
     assert not any(line.startswith(("plant:", "controller:")) for line in lines)
 
@@ -70,8 +73,8 @@ SWING = ["pendulum", "--controller", "none", "--q0", "1", "--duration", "0.1"]
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        (SWING, "energy drift "),
-        ([*SWING, "--damping", "urdf", "--friction", "urdf"], "energy changed by up to "),
+        ([*SWING, "--no-joint-dynamics"], "energy drift "),
+        (SWING, "energy changed by up to "),
         (FALLING, "energy changed by up to "),
         (["pendulum", "--controller", "none", "--duration", "0.1"], "the robot stayed at rest"),
         # Motion by rounding alone has no kinetic energy with which to compare a change.
@@ -88,9 +91,9 @@ def test_energy_drift_is_reported_only_for_a_passive_robot(arguments: list[str],
 
 
 def test_the_change_of_energy_is_that_of_the_record() -> None:
-    made = document(*SWING, "--damping", "1")
+    made = document(*SWING, "--joint-damping", "1")
     pendulum = dynx.load("pendulum")
-    energy = simulate(pendulum, q0=[1.0], duration=0.1, damping=1.0).energy
+    energy = simulate(pendulum, q0=[1.0], duration=0.1, joint_damping=1.0).energy
     assert made["energy_change"] == np.abs(energy - energy[0]).max()
     assert not made["passive"]
 
@@ -112,7 +115,7 @@ def test_every_violated_limit_is_listed() -> None:
 
 
 def test_noise_and_pushes_are_objects_in_the_document() -> None:
-    noise = ["--noise-q", "1e-5", "--noise-v", "1e-3", "--seed", "7", "--armature", "0.1"]
+    noise = ["--noise-q", "1e-5", "--noise-v", "1e-3", "--seed", "7", "--joint-armature", "0.1"]
     pushes = ["--push", "tool0:1,2,3", "--push", "tool0:0,0,0,0,0,1:0.01:0.02"]
     settings = document("ur5", *SHORT, *noise, *pushes)["settings"]
     assert settings["noise"] == {"q": 1e-5, "v": 1e-3, "seed": 7}

@@ -100,7 +100,7 @@ def test_steps_are_those_of_simulate_bit_for_bit(base: str, integrator: str) -> 
     model = mixed_robot(base, mimic=True)
     rng = np.random.default_rng(5)
     q, v = model.random(rng), 0.3 * rng.standard_normal(model.nv)
-    joints: dict[str, Any] = {"damping": True, "friction": True, "armature": True}
+    joints: dict[str, Any] = {"joint_damping": True, "joint_friction": True, "joint_armature": True}
     rollout = dynx.simulate(
         model,
         plant="pinocchio",
@@ -124,7 +124,7 @@ def test_steps_are_those_of_simulate_bit_for_bit(base: str, integrator: str) -> 
 def test_joints_stop_at_their_limits_as_in_simulate() -> None:
     model = dynx.load(PENDULUM)
     q, v = np.array([1.0]), np.array([0.0])
-    rollout = dynx.simulate(model, plant="pinocchio", q0=q, v0=v, duration=1.0, dt=1e-3, position_limits=True)
+    rollout = dynx.simulate(model, plant="pinocchio", q0=q, v0=v, duration=1.0, dt=1e-3, joint_limits=True)
     with alone(model, q, v, 1e-3, backend="pinocchio") as world:
         world.step(1000)
         found = world.state.robots["robot"]

@@ -36,7 +36,7 @@ def test_blocks_stick_break_loose_and_stop(dt: float) -> None:
     v0 = np.array([[0.123], [-0.3], [0.05], [0.0], [0.7]])
     law = PD(robot, kp=0.0, kd=0.0)
     many = simulate_batch(
-        robot, law, robot.neutral(), v0=v0, friction=friction, dt=dt, duration=duration, record_every=1
+        robot, law, robot.neutral(), v0=v0, joint_friction=friction, dt=dt, duration=duration, record_every=1
     )
     deceleration = friction / MASS
     t = many.t[None]
@@ -72,7 +72,11 @@ def test_loaded_blocks_stick_creep_slide_and_stop(dt: float) -> None:
     np.testing.assert_allclose(wanted[1], 0.7 * load_ / MASS * dt * np.arange(1, steps + 1), rtol=1e-9)
     law = PD(robot, kp=0.0, kd=0.0)
     options: dict[str, Any] = {"dt": dt, "duration": steps * dt}
-    each: dict[str, Any] = {"friction": friction[:, None], "damping": damping[:, None], "v0": v0[:, None]}
+    each: dict[str, Any] = {
+        "joint_friction": friction[:, None],
+        "joint_damping": damping[:, None],
+        "v0": v0[:, None],
+    }
     many = simulate_batch(robot, law, robot.neutral(), record_every=1, **each, **options)
     for row in range(len(v0)):
         own = {name: rows[row] for name, rows in each.items()}
@@ -87,7 +91,7 @@ def test_smoothed_friction_creeps_at_its_speed(dt: float) -> None:
     load_, slip = 0.5 * F, 1.01 * dt * F / MASS
     robot = slider().with_gravity((load_ / MASS, 0.0, 0.0))
     law, creep = PD(robot, kp=0.0, kd=0.0), slip * np.arctanh(load_ / F)
-    options: dict[str, Any] = {"friction": F, "dt": dt, "duration": 100 * dt, "friction_slip": slip}
+    options: dict[str, Any] = {"joint_friction": F, "dt": dt, "duration": 100 * dt, "friction_slip": slip}
     assert abs(simulate(robot, plant="compiled", **options).v[-1, 0] / creep - 1.0) < 1e-9
     assert abs(simulate_batch(robot, law, robot.neutral(), **options).v[0, 0] / creep - 1.0) < 1e-9
 
@@ -98,21 +102,21 @@ def test_random_motions_are_those_of_one_rollout(arm: Model, dt: float) -> None:
     law = PD(arm, kp=5.0, kd=0.02)
     q0, v0 = 0.3 * rng.normal(size=(20, 6)), rng.normal(size=(20, 6))
     friction = np.abs(rng.normal(size=(20, 6))) * 10.0 ** rng.uniform(-3, 1, (20, 1))
-    options: dict[str, Any] = {"damping": True, "armature": 1e-3, "dt": dt, "duration": 50 * dt}
+    options: dict[str, Any] = {"joint_damping": True, "joint_armature": 1e-3, "dt": dt, "duration": 50 * dt}
     many = simulate_batch(
         arm,
         law,
         arm.neutral(),
         q0=q0,
         v0=v0,
-        friction=friction,
+        joint_friction=friction,
         record_every=1,
         check_reference=False,
         **options,
     )
     assert 0.05 < np.mean(many.v_record == 0.0) < 0.95
     for row in range(20):
-        start: dict[str, Any] = {"q0": q0[row], "v0": v0[row], "friction": friction[row]}
+        start: dict[str, Any] = {"q0": q0[row], "v0": v0[row], "joint_friction": friction[row]}
         one = simulate(arm, law, arm.neutral(), plant="compiled", check_reference=False, **start, **options)
         assert_same(many, row, one)
         np.testing.assert_array_equal(many.v_record[row] == 0.0, one.v[1:] == 0.0)
@@ -125,7 +129,7 @@ def test_mimic_joints_and_bases(base: str) -> None:
     start: dict[str, Any] = {"q0": robot.random(rng), "v0": 0.3 * rng.uniform(-1.0, 1.0, robot.nv)}
     law = PD(robot, kp=2.0, kd=0.2)
     options: dict[str, Any] = {"duration": 0.1, "check_reference": False, **start}
-    many, one = batch_and_one(robot, law, robot.neutral(), friction=10.0, **options)
+    many, one = batch_and_one(robot, law, robot.neutral(), joint_friction=10.0, **options)
     assert np.any(one.v == 0.0)
     np.testing.assert_array_equal(many.v_record[0] == 0.0, one.v[1:] == 0.0)
 
@@ -137,7 +141,7 @@ def test_bits_do_not_depend_on_the_neighbours(arm: Model, monkeypatch: pytest.Mo
     rng = np.random.default_rng(1)
     law = PD(arm, kp=5.0, kd=0.02)
     start: dict[str, Any] = {"q0": 0.3 * rng.normal(size=(37, 6)), "v0": rng.normal(size=(37, 6))}
-    options: dict[str, Any] = {"friction": 0.3, "duration": 0.1, "check_reference": False}
+    options: dict[str, Any] = {"joint_friction": 0.3, "duration": 0.1, "check_reference": False}
     whole = simulate_batch(arm, law, arm.neutral(), **start, **options)
     monkeypatch.setattr(batch, "PART", 5)
     parts = simulate_batch(arm, law, arm.neutral(), **start, **options)
@@ -168,9 +172,9 @@ def test_friction_as_a_parameter_is_the_same_friction(arm: Model) -> None:
             law,
             arm.neutral(),
             plant="compiled",
-            damping=damping,
-            friction=friction,
-            armature=armature,
+            joint_damping=damping,
+            joint_friction=friction,
+            joint_armature=armature,
             **options,
         )
         assert np.any(one.v == 0.0)
@@ -180,9 +184,9 @@ def test_friction_as_a_parameter_is_the_same_friction(arm: Model) -> None:
 def test_a_slip_speed_below_the_bound_of_any_rollout_is_refused(arm: Model) -> None:
     law = PD(arm, kp=1.0, kd=0.01)
     options: dict[str, Any] = {"friction_slip": 1.0, "duration": 0.01}
-    simulate_batch(arm, law, arm.neutral(), friction=np.full((3, 1), 1e-2), **options)
+    simulate_batch(arm, law, arm.neutral(), joint_friction=np.full((3, 1), 1e-2), **options)
     with pytest.raises(ArgumentError, match="oscillates from step to step"):
-        simulate_batch(arm, law, arm.neutral(), friction=np.array([[1e-2], [100.0], [0.0]]), **options)
+        simulate_batch(arm, law, arm.neutral(), joint_friction=np.array([[1e-2], [100.0], [0.0]]), **options)
 
 
 def test_the_bound_of_the_slip_speed_counts_what_differs_between_rollouts() -> None:
@@ -196,12 +200,12 @@ def test_the_bound_of_the_slip_speed_counts_what_differs_between_rollouts() -> N
     def batch(**given: Any) -> None:
         simulate_batch(robot, law, robot.neutral(), **{**options, **given})
 
-    batch(friction=np.array([[0.0], [0.99 * most]]))
+    batch(joint_friction=np.array([[0.0], [0.99 * most]]))
     with pytest.raises(ArgumentError, match=r"is 2\.02 at rail in rollout 1, and 2 is the largest"):
-        batch(friction=np.array([[0.0], [1.01 * most]]))
-    batch(friction=1.05 * most, armature=light + 0.1 * MASS)
+        batch(joint_friction=np.array([[0.0], [1.01 * most]]))
+    batch(joint_friction=1.05 * most, joint_armature=light + 0.1 * MASS)
     with pytest.raises(ArgumentError, match="rail in rollout 0"):
-        batch(friction=1.05 * most, armature=light)
+        batch(joint_friction=1.05 * most, joint_armature=light)
     plant = dynx.parametric(robot, links=["block"], joint_dynamics=True)
     values = np.tile(plant.parameters.defaults, (3, 1))
     values[:, plant.parameters.index("rail.friction")] = 0.99 * most

@@ -130,6 +130,6 @@ def test_impacts_at_position_limits_are_traced_once(monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr(step, "trace", trace_and_count)
     for _ in range(2):
-        simulate_batch(ARM, law(), tutorial_motion(), rollouts=2, duration=0.01, position_limits=True)
+        simulate_batch(ARM, law(), tutorial_motion(), rollouts=2, duration=0.01, joint_limits=True)
     # One kernel is that of the step.
     assert len(traced) == 2

@@ -25,6 +25,7 @@ from dynx.sim.loop_step import LoopStep
 from tests.backends.robots import mixed_robot
 from tests.sim.bars import apart
 from tests.sim.batch.batches import assert_same, batch_and_each, batch_and_one
+from tests.sim.rigid_bodies import RIGID_BODIES
 
 POSTURE = np.array([0.3, -1.2, 1.0, 0.2, 0.4, 0.1])
 TOOL = Payload("tool0", 2.0, (0.0, 0.0, 0.1), np.diag([0.01, 0.02, 0.015]))
@@ -37,12 +38,12 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "long delay": {"delay": 6e-3},
     "delay of controls": {"delay": 3e-3, "control_dt": 2e-3},
     "delay beyond the end": {"delay": 1.0},
-    "damping": {"damping": [1.0, 1.0, 1.0, 0.1, 0.1, 0.1]},
-    "friction": {"friction": 0.5},
-    "slip": {"friction": 0.5, "friction_slip": 0.2, "armature": 0.1},
-    "friction and armature": {"friction": 0.5, "damping": 1.0, "armature": 1.0},
-    "armature": {"armature": 0.1},
-    "of the description": {"damping": True, "friction": True, "armature": True},
+    "damping": {"joint_damping": [1.0, 1.0, 1.0, 0.1, 0.1, 0.1]},
+    "friction": {"joint_friction": 0.5},
+    "slip": {"joint_friction": 0.5, "friction_slip": 0.2, "joint_armature": 0.1},
+    "friction and armature": {"joint_friction": 0.5, "joint_damping": 1.0, "joint_armature": 1.0},
+    "armature": {"joint_armature": 0.1},
+    "of the description": {"joint_damping": True, "joint_friction": True, "joint_armature": True},
     "payload": {"payload": TOOL},
     "masses": {"mass_scale": {"forearm_link": 1.5}},
     "pushes": {"pushes": PUSHES},
@@ -50,9 +51,9 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "efforts": {"effort_limits": [150, 35, 18, 2.5, 2, 2]},
     "efforts between controls": {"effort_limits": [150, 35, 18, 2.5, 2, 2], "control_dt": 7e-3},
     "all": {
-        "damping": 0.3,
-        "friction": 0.2,
-        "armature": 0.05,
+        "joint_damping": 0.3,
+        "joint_friction": 0.2,
+        "joint_armature": 0.05,
         "payload": [TOOL, Payload("forearm_link", 1.0)],
         "mass_scale": 1.1,
         "pushes": PUSHES,
@@ -110,25 +111,28 @@ def test_mimic_joints_feel_what_they_feel_alone(base: str, through: bool) -> Non
     options: dict[str, Any] = {
         "q0": robot.random(rng),
         "v0": rng.uniform(-1.0, 1.0, robot.nv),
-        "friction": True if through else 0.3,
-        "armature": True,
+        "joint_friction": True if through else 0.3,
+        "joint_armature": True,
         "pushes": [ExternalForce("tip", np.ones(6))],
         "duration": 0.03,
         "check_reference": False,
     }
-    batch_and_one(robot, law, robot.neutral(), damping=True, **options)
+    batch_and_one(robot, law, robot.neutral(), joint_damping=True, **options)
     rows = rng.uniform(0.1, 0.5, (2, len(robot.joint_names)))
-    batch_and_each(robot, law, robot.neutral(), {"damping": rows}, **options)
+    batch_and_each(robot, law, robot.neutral(), {"joint_damping": rows}, **options)
 
 
 def test_each_rollout_has_coefficients_of_its_own(arm: Model) -> None:
     rng = np.random.default_rng(4)
-    each: dict[str, Any] = {"damping": rng.uniform(0.1, 0.5, 3), "friction": rng.uniform(0.1, 0.5, (3, 6))}
+    each: dict[str, Any] = {
+        "joint_damping": rng.uniform(0.1, 0.5, 3),
+        "joint_friction": rng.uniform(0.1, 0.5, (3, 6)),
+    }
     law = GravityCompensatedPD(arm, kp=60, kd=6)
     options: dict[str, Any] = {"q0": POSTURE + 0.05, "duration": 0.05, "friction_slip": 0.05}
-    many = batch_and_each(arm, law, POSTURE, {**each, "armature": rng.uniform(0.05, 0.1, 3)}, **options)
-    column = simulate_batch(arm, law, POSTURE, **each, armature=np.full((3, 1), 0.07), **options)
-    row = simulate_batch(arm, law, POSTURE, **each, armature=0.07, **options)
+    many = batch_and_each(arm, law, POSTURE, {**each, "joint_armature": rng.uniform(0.05, 0.1, 3)}, **options)
+    column = simulate_batch(arm, law, POSTURE, **each, joint_armature=np.full((3, 1), 0.07), **options)
+    row = simulate_batch(arm, law, POSTURE, **each, joint_armature=0.07, **options)
     np.testing.assert_array_equal(column.q, row.q)
     assert apart(many.q, row.q) > 1e-6
 
@@ -141,8 +145,8 @@ def test_parameters_of_a_plant_with_a_payload_scaled_masses_and_rotors(arm: Mode
         "q0": POSTURE + 0.05,
         "duration": 0.03,
         "mass_scale": 1.1,
-        "armature": 0.1,
-        "friction": 0.2,
+        "joint_armature": 0.1,
+        "joint_friction": 0.2,
     }
     many = simulate_batch(
         arm,
@@ -164,7 +168,9 @@ def test_parameters_of_a_plant_with_a_payload_scaled_masses_and_rotors(arm: Mode
 
 def test_friction_is_compensated(arm: Model) -> None:
     law = FrictionCompensation(ComputedTorque(arm, kp=400, kd=40), damping=0.3, friction=0.5)
-    many, _ = batch_and_one(arm, law, POSTURE, q0=POSTURE + 0.05, duration=0.05, damping=0.3, friction=0.5)
+    many, _ = batch_and_one(
+        arm, law, POSTURE, q0=POSTURE + 0.05, duration=0.05, joint_damping=0.3, joint_friction=0.5
+    )
     without, _ = batch_and_one(arm, law, POSTURE, q0=POSTURE + 0.05, duration=0.05)
     assert apart(many.q, without.q) > 1e-6
 
@@ -199,29 +205,37 @@ def test_what_no_option_can_be_is_refused(arm: Model) -> None:
     bad: list[tuple[type[Exception], str, dict[str, Any]]] = [
         (ArgumentError, "not a multiple", {"delay": 1.5e-3}),
         (ArgumentError, "delay", {"delay": -1.0}),
-        (GainError, "damping has shape", {"damping": np.zeros((3, 4))}),
-        (GainError, "friction has shape", {"friction": np.zeros((3, 6, 1))}),
-        (GainError, "negative", {"friction": -np.ones((3, 6))}),
-        (GainError, "not finite", {"armature": np.full((3, 1), np.nan)}),
-        (GainError, "negative", {"damping": -1.0}),
-        (ArgumentError, "6 joints and 6 rollouts", {"damping": six, "rollouts": 6}),
-        (ArgumentError, "6 joints and 6 rollouts", {"friction": six, "armature": np.ones((6, 6))}),
-        (ArgumentError, "3 rows, damping says 4", {"damping": np.ones(4), "friction": np.ones((3, 6))}),
-        (ArgumentError, "slip", {"friction": 0.1, "friction_slip": -1.0}),
-        (UnknownNameError, "^friction: .*'elbow_joint'", {"friction": {"elbow": 2.0}}),
-        (GainError, "negative", {"friction": {"elbow_joint": [2.0, -1.0]}}),
+        (GainError, "damping has shape", {"joint_damping": np.zeros((3, 4))}),
+        (GainError, "friction has shape", {"joint_friction": np.zeros((3, 6, 1))}),
+        (GainError, "negative", {"joint_friction": -np.ones((3, 6))}),
+        (GainError, "not finite", {"joint_armature": np.full((3, 1), np.nan)}),
+        (GainError, "negative", {"joint_damping": -1.0}),
+        (ArgumentError, "6 joints and 6 rollouts", {"joint_damping": six, "rollouts": 6}),
+        (
+            ArgumentError,
+            "6 joints and 6 rollouts",
+            {"joint_friction": six, "joint_armature": np.ones((6, 6))},
+        ),
+        (
+            ArgumentError,
+            "3 rows, joint_damping says 4",
+            {"joint_damping": np.ones(4), "joint_friction": np.ones((3, 6))},
+        ),
+        (ArgumentError, "slip", {"joint_friction": 0.1, "friction_slip": -1.0}),
+        (UnknownNameError, "^joint_friction: .*'elbow_joint'", {"joint_friction": {"elbow": 2.0}}),
+        (GainError, "negative", {"joint_friction": {"elbow_joint": [2.0, -1.0]}}),
         (
             GainError,
             "one for each rollout",
-            {"friction": {"elbow_joint": np.ones(2), "wrist_1_joint": np.ones(3)}},
+            {"joint_friction": {"elbow_joint": np.ones(2), "wrist_1_joint": np.ones(3)}},
         ),
-        (GainError, "or True for the values of the description", {"damping": "urdf"}),
+        (GainError, "or True for the values of the description", {"joint_damping": "urdf"}),
     ]
     for error, said, options in bad:
         with pytest.raises(error, match=said):
             simulate_batch(arm, law, POSTURE, **{"duration": 0.01, **options})
-    simulate_batch(arm, law, POSTURE, duration=0.002, damping=six[:, None])
-    simulate_batch(arm, law, POSTURE, duration=0.002, damping=six[None], rollouts=1)
+    simulate_batch(arm, law, POSTURE, duration=0.002, joint_damping=six[:, None])
+    simulate_batch(arm, law, POSTURE, duration=0.002, joint_damping=six[None], rollouts=1)
     with pytest.raises(UnsupportedFeatureError):
         simulate_batch(arm, BulletPositionMotor(arm), POSTURE, duration=0.01)
 
@@ -232,8 +246,8 @@ def test_a_robot_without_an_acceleration_is_refused() -> None:
     hollow = Model.build("hollow", links, robot.joints)
     law = dynx.control.PD(hollow, kp=1.0, kd=0.1)
     with pytest.raises(SingularMassMatrixError):
-        simulate_batch(hollow, law, hollow.neutral(), duration=0.01, check_reference=False)
-    batch_and_one(hollow, law, hollow.neutral(), duration=0.01, check_reference=False, armature=1.0)
+        simulate_batch(hollow, law, hollow.neutral(), duration=0.01, check_reference=False, **RIGID_BODIES)
+    batch_and_one(hollow, law, hollow.neutral(), duration=0.01, check_reference=False, joint_armature=1.0)
 
 
 def test_the_memory_that_a_batch_needs_is_compared_with_the_machine(

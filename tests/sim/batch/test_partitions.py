@@ -37,7 +37,7 @@ OPTIONS: dict[str, Any] = {
     "delay": 3e-3,
     "effort_limits": [150, 35, 18, 2.5, 2, 2],
     "pushes": [ExternalForce("tool0", [10, 5, 0, 1, 0, 0], 0.02, 0.02)],
-    "friction": 0.2,
+    "joint_friction": 0.2,
     "record_every": 40,
 }
 
@@ -53,7 +53,7 @@ def batch(rows: slice = slice(None), *, noise: Noise = NOISE, **options: Any) ->
         FrictionCompensation(pid, damping=0.1, friction=0.1),
         POSTURE,
         gains={"kp": gains[rows]},
-        damping=0.01 * damping[rows],
+        joint_damping=0.01 * damping[rows],
         q0=starts[rows],
         noise=noise,
         **{**OPTIONS, **options},

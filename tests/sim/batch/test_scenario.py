@@ -22,8 +22,8 @@ OPTIONS: dict[str, Any] = {
     "control_dt": 2e-3,
     "delay": 1e-3,
     "noise": Noise(1e-4, 1e-3, seed=4),
-    "damping": 0.2,
-    "armature": 0.05,
+    "joint_damping": 0.2,
+    "joint_armature": 0.05,
     "effort_limits": 30.0,
     "payload": Payload(ARM.frame_names[-1], 0.5),
     "mass_scale": 1.1,
@@ -42,19 +42,21 @@ def test_a_scenario_means_what_its_fields_mean_as_arguments() -> None:
 
 def test_what_differs_is_given_beside_the_scenario() -> None:
     starts = np.array([[0.0, 0.0], [0.1, -0.1], [0.2, 0.3]])
-    many = simulate_batch(SCENARIO, q0=starts, damping=[[0.1], [0.2], [0.3]])
-    again = simulate_batch(ARM, LAW, GOAL, **{**OPTIONS, "q0": starts, "damping": [[0.1], [0.2], [0.3]]})
+    many = simulate_batch(SCENARIO, q0=starts, joint_damping=[[0.1], [0.2], [0.3]])
+    again = simulate_batch(
+        ARM, LAW, GOAL, **{**OPTIONS, "q0": starts, "joint_damping": [[0.1], [0.2], [0.3]]}
+    )
     assert np.array_equal(many.q, again.q)
     assert many.scenario == SCENARIO
-    heavier = simulate_batch(SCENARIO, q0=starts, damping=0.3)
-    assert heavier.scenario == replace(SCENARIO, damping=0.3)
+    heavier = simulate_batch(SCENARIO, q0=starts, joint_damping=0.3)
+    assert heavier.scenario == replace(SCENARIO, joint_damping=0.3)
     assert not np.array_equal(heavier.q, many.q)
 
 
 def test_one_row_is_for_all_rollouts() -> None:
     of_joints = np.array([0.1, 0.2])
-    many = simulate_batch(SCENARIO, rollouts=2, damping=of_joints[None], q0=np.full((1, 2), 0.1))
-    other = simulate_batch(replace(SCENARIO, damping=of_joints, q0=np.full(2, 0.1)), rollouts=2)
+    many = simulate_batch(SCENARIO, rollouts=2, joint_damping=of_joints[None], q0=np.full((1, 2), 0.1))
+    other = simulate_batch(replace(SCENARIO, joint_damping=of_joints, q0=np.full(2, 0.1)), rollouts=2)
     assert np.array_equal(many.q, other.q)
 
 

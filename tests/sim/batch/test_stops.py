@@ -37,7 +37,7 @@ def starts(model: Model) -> tuple[Floats, Floats]:
 def both(model: Model, law: PD, goal: Floats, each: dict[str, Any], **options: Any) -> BatchRollouts:
     """Return a batch with stops, after checking its rollouts against `simulate`, one by one."""
     q0, v0 = starts(model)
-    options = {"duration": STEPS * 1e-3, "position_limits": True, "check_reference": False, **options}
+    options = {"duration": STEPS * 1e-3, "joint_limits": True, "check_reference": False, **options}
     batch = simulate_batch(model, law, goal, q0=q0, v0=v0, record_every=1, **each, **options)
     for k in range(ROLLOUTS):
         own = {name: values[k] for name, values in each.items()}
@@ -58,7 +58,7 @@ def both(model: Model, law: PD, goal: Floats, each: dict[str, Any], **options: A
 
 @pytest.mark.parametrize(
     "options",
-    [{}, {"control_dt": 4e-3, "delay": 3e-3}, {"effort_limits": 20.0}, {"armature": 0.3}],
+    [{}, {"control_dt": 4e-3, "delay": 3e-3}, {"effort_limits": 20.0}, {"joint_armature": 0.3}],
     ids=["plain", "delay", "effort", "armature"],
 )
 def test_each_rollout_is_that_of_simulate(options: dict[str, Any]) -> None:
@@ -67,7 +67,7 @@ def test_each_rollout_is_that_of_simulate(options: dict[str, Any]) -> None:
 
 def test_armature_of_each_rollout_counts_in_the_impact() -> None:
     armature = np.linspace(0.01, 1.0, ROLLOUTS * 6).reshape(ROLLOUTS, 6)
-    both(ARM, PD(ARM, kp=50, kd=2), ARM.upper + 0.3, {"armature": armature})
+    both(ARM, PD(ARM, kp=50, kd=2), ARM.upper + 0.3, {"joint_armature": armature})
 
 
 @pytest.mark.parametrize("robot", ["panda", "solo12"])
@@ -80,7 +80,7 @@ def test_parameters_of_the_plant_count_in_the_impact() -> None:
     plant = dynx.parametric(ARM, point_payload="tool0")
     q0, v0 = starts(ARM)
     law, goal = PD(ARM, kp=50, kd=2), ARM.upper + 0.3
-    options: dict[str, Any] = {"duration": 0.05, "position_limits": True, "check_reference": False}
+    options: dict[str, Any] = {"duration": 0.05, "joint_limits": True, "check_reference": False}
     masses = np.linspace(0.0, 3.0, ROLLOUTS)
     parameters = np.pad(masses[:, None], ((0, 0), (0, 3)))
     batch = simulate_batch(ARM, law, goal, q0=q0, v0=v0, parametric=plant, parameters=parameters, **options)
@@ -94,7 +94,7 @@ def test_parameters_of_the_plant_count_in_the_impact() -> None:
 def test_a_rollout_does_not_depend_on_its_neighbours() -> None:
     q0, v0 = starts(ARM)
     law, goal = PD(ARM, kp=50, kd=2), ARM.upper + 0.3
-    options: dict[str, Any] = {"duration": 0.05, "position_limits": True, "check_reference": False}
+    options: dict[str, Any] = {"duration": 0.05, "joint_limits": True, "check_reference": False}
     whole = simulate_batch(ARM, law, goal, q0=q0, v0=v0, **options)
     part = simulate_batch(ARM, law, goal, q0=q0[4:6], v0=v0[4:6], **options)
     np.testing.assert_array_equal(whole.q[4:6], part.q)
@@ -105,7 +105,7 @@ def test_a_rollout_does_not_depend_on_its_neighbours() -> None:
 def test_without_a_joint_at_its_limit_stops_change_nothing() -> None:
     law, goal = PD(ARM, kp=50, kd=5), 0.5 * (ARM.lower + ARM.upper)
     runs = [
-        simulate_batch(ARM, law, goal, rollouts=3, duration=0.05, position_limits=limited)
+        simulate_batch(ARM, law, goal, rollouts=3, duration=0.05, joint_limits=limited)
         for limited in (False, True)
     ]
     np.testing.assert_array_equal(runs[0].q, runs[1].q)

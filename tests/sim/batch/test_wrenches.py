@@ -38,7 +38,7 @@ def test_a_batch_is_its_rollouts(base: Literal["fixed", "floating"], options: di
         "duration": 0.02,
         "pushes": PUSHES,
         "payload": Payload("tool0", 1.0, (0.0, 0.1, 0.0)),
-        "damping": True,
+        "joint_damping": True,
     }
     many = simulate_batch(arm, law, arm.neutral(), q0=starts, record_every=1, **given)
     joints, bases = many.joint_wrenches(**options), many.base_wrench(**options)

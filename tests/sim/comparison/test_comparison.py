@@ -61,8 +61,8 @@ def test_one_cause_is_proved_and_another_difference_has_no_effect() -> None:
 
 
 def test_links_joints_gains_and_noise_are_differences_of_their_own() -> None:
-    ours = simulate(scenario(damping=True))
-    theirs = simulate(scenario(other_robot(), kp=50.0, noise=Noise(q=1e-4), damping=True))
+    ours = simulate(scenario(joint_damping=True))
+    theirs = simulate(scenario(other_robot(), kp=50.0, noise=Noise(q=1e-4), joint_damping=True))
     found = compare(ours, theirs)
     assert found.proved
     effects = {cause.factor.name: cause for cause in found.causes}
@@ -85,8 +85,8 @@ def test_links_joints_gains_and_noise_are_differences_of_their_own() -> None:
 
 
 def test_a_cause_that_is_mended_leaves_the_rollouts_alike() -> None:
-    ours = scenario(damping=True)
-    theirs = scenario(other_robot(), damping=True)
+    ours = scenario(joint_damping=True)
+    theirs = scenario(other_robot(), joint_damping=True)
     mended = replace(theirs, model=ARM, controller=control.ComputedTorque(ARM, kp=100.0, kd=20.0))
     found = compare(simulate(ours), simulate(mended))
     assert found.alike
@@ -131,7 +131,7 @@ class Own(control.Controller[None], pure=True):
 def test_what_cannot_be_simulated_again_is_said(tmp_path: Path) -> None:
     start: dict[str, Any] = {"q0": np.full(6, 0.1), "duration": 0.02, "plant": "compiled"}
     ours = simulate(ARM, Own(ARM), np.zeros(6), **start)
-    theirs = simulate(ARM, Own(ARM), np.zeros(6), damping=1.0, **start)
+    theirs = simulate(ARM, Own(ARM), np.zeros(6), joint_damping=1.0, **start)
     assert compare(ours, theirs).proved  # as the objects are here
     ours.save(tmp_path / "own.npz")
     found = compare(Rollout.load(tmp_path / "own.npz"), theirs)

@@ -198,7 +198,7 @@ def test_effects_swap_with_the_rollouts() -> None:
         model=heavier(ARM, "forearm_link"),
         controller=control.ComputedTorque(heavier(ARM, "forearm_link"), kp=90.0, kd=15.0),
         payload=Payload("tool0", 0.5),
-        damping=0.2,
+        joint_damping=0.2,
     )
     there, back = compared(START, theirs), compared(theirs, START)
     np.testing.assert_array_equal(there.separation.distances, back.separation.distances)
@@ -210,10 +210,10 @@ def test_effects_swap_with_the_rollouts() -> None:
 def test_differences_that_cancel_are_causes_both() -> None:
     # The damping of the joints and that of the controller add up, but for the order of a step.
     ours = replace(START, controller=control.PD(ARM, kp=0.0, kd=2.0), v0=np.full(6, 0.5))
-    theirs = replace(ours, controller=control.PD(ARM, kp=0.0, kd=1.5), damping=0.5)
+    theirs = replace(ours, controller=control.PD(ARM, kp=0.0, kd=1.5), joint_damping=0.5)
     found = compared(ours, theirs)
     assert found.proved
-    assert names(found) == {"controller.kd", "damping"}
+    assert names(found) == {"controller.kd", "joint_damping"}
     for cause in found.causes:
         for effect in (cause.alone, cause.without):
             assert effect is not None

@@ -17,7 +17,7 @@ from dynx.sim.comparison import rollout_separation
 
 ARM = dynx.load("double_pendulum_continuous")
 OURS = simulate(ARM, None, q0=[0.5, 0.2], plant="compiled", duration=0.2)
-THEIRS = simulate(ARM, None, q0=[0.5, 0.2], plant="compiled", duration=0.2, damping=0.01)
+THEIRS = simulate(ARM, None, q0=[0.5, 0.2], plant="compiled", duration=0.2, joint_damping=0.01)
 
 
 def log(path: Path, t: np.ndarray, q: np.ndarray) -> Rollout:
@@ -83,10 +83,10 @@ def test_anything_but_a_rollout_is_refused() -> None:
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_progress_ends_with_the_last_rerun(count: int) -> None:
     options: dict[str, Any] = dict(
-        list({"damping": 0.01, "armature": 0.1, "friction": 0.001}.items())[:count]
+        list({"joint_damping": 0.01, "joint_armature": 0.1, "joint_friction": 0.001}.items())[:count]
     )
     assert THEIRS.scenario is not None
-    plain: dict[str, Any] = {"damping": False}
+    plain: dict[str, Any] = {"joint_damping": False}
     theirs = simulate(replace(THEIRS.scenario, **(plain | options)))
     calls: list[tuple[int, int]] = []
     found = compare(OURS, theirs, progress=lambda *each: calls.append(each))

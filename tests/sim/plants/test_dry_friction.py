@@ -26,6 +26,7 @@ from dynx.steppers.implicit_joints import BLOCK_CORRECTIONS, ImplicitJoints
 from dynx.testing.strategies import models
 from tests.backends.robots import mixed_robot
 from tests.oracles.closed_form import MODELS
+from tests.sim.rigid_bodies import RIGID_BODIES
 
 MASS, F = 2.0, 3.0
 STEPS = [1e-4, 1e-3, 1e-2]
@@ -45,7 +46,7 @@ def pulled(force: float, plant: str = "compiled", **options: Any) -> Rollout:
     robot = slider()
     law = OpenLoop(robot, np.full((1, 1), force), control_dt=options["duration"])
     control_dt = {"control_dt": options["duration"]}
-    return simulate(robot, law, plant=plant, friction=F, **{**control_dt, **options})
+    return simulate(robot, law, plant=plant, joint_friction=F, **{**control_dt, **options})
 
 
 @pytest.mark.parametrize("start", [0.0, 4.0])
@@ -55,7 +56,7 @@ def test_a_block_slides_under_friction_and_damping_as_the_closed_form(
     plant: str, scheme: str, start: float
 ) -> None:
     force, damping, dt = 2.0 * F, 2.5, 1e-3
-    found = pulled(force, plant, v0=[start], damping=damping, integrator=scheme, dt=dt, duration=1.0)
+    found = pulled(force, plant, v0=[start], joint_damping=damping, integrator=scheme, dt=dt, duration=1.0)
     # m v' = (force - F) - d v
     end, rate = (force - F) / damping, damping / MASS
     decay = np.exp(-rate * found.t)
@@ -104,7 +105,8 @@ def test_a_sliding_block_stops_in_time_and_stays(plant: str, dt: float) -> None:
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_swinging_pendulum_stops_where_friction_holds_it(scheme: str, dt: float) -> None:
     robot = load(MODELS / "pendulum.urdf")
-    rollout = simulate(robot, q0=[1.0], friction=2.0, integrator=scheme, dt=dt, duration=4.0)
+    options = RIGID_BODIES | {"joint_friction": 2.0}
+    rollout = simulate(robot, q0=[1.0], integrator=scheme, dt=dt, duration=4.0, **options)
     with backend("reference", robot) as engine:
         weight = engine.gravity_torque(rollout.q)[:, 0]
     # The velocity may also be 0 after one step, where the pendulum turns.
@@ -217,7 +219,7 @@ def test_friction_that_oscillates_is_found(monkeypatch: pytest.MonkeyPatch) -> N
     robot, h = slider(), 1e-2
     monkeypatch.setattr("dynx.sim.simulation.refuse_small_slip", lambda *_: None)
     for slip, found in ((0.0, []), (h * F / MASS, []), (0.1 * h * F / MASS, ["rail"])):
-        rollout = simulate(robot, friction=F, friction_slip=slip, v0=[0.3], dt=h, duration=1.0)
+        rollout = simulate(robot, joint_friction=F, friction_slip=slip, v0=[0.3], dt=h, duration=1.0)
         record = rollout.q[None], rollout.v[None]
         assert friction_scan.rattling_joints(robot, *record, np.zeros(1)) == found
 
@@ -227,11 +229,15 @@ def test_coupled_coordinates_and_mimic_joints_stick() -> None:
         robot = mixed_robot(base, mimic=True)
         rng = np.random.default_rng(2)
         start: dict[str, Any] = {"q0": robot.random(rng), "v0": rng.uniform(-1.0, 1.0, robot.nv)}
-        held = simulate(robot, friction=1e4, damping=True, armature=True, duration=0.05, **start)
+        held = simulate(
+            robot, joint_friction=1e4, joint_damping=True, joint_armature=True, duration=0.05, **start
+        )
         joints = slice(6 if robot.floating else 0, None)
         assert np.all(held.v[2:, joints] == 0.0)
         many = robot.with_gravity(np.zeros(3))
-        free = simulate(many, friction=True, damping=True, armature=True, duration=0.05, **start)
+        free = simulate(
+            many, joint_friction=True, joint_damping=True, joint_armature=True, duration=0.05, **start
+        )
         assert np.any(free.v[-1] != 0.0)
 
 
@@ -242,7 +248,7 @@ def test_a_run_is_resumed_bit_for_bit(scheme: str) -> None:
     robot = load(MODELS / "six_axis_arm.urdf")
     plant = "pybullet" if scheme == "engine" else "pinocchio"
     law = PD(robot, kp=5.0, kd=0.02)
-    options: dict[str, Any] = {"plant": plant, "integrator": scheme, "friction": True, "duration": 0.3}
+    options: dict[str, Any] = {"plant": plant, "integrator": scheme, "joint_friction": True, "duration": 0.3}
     scenario = Scenario(robot, law, np.full(6, 0.3), q0=np.full(6, 0.1), **options)
     whole = simulate(scenario)
     assert np.any(whole.v == 0.0)
@@ -256,7 +262,7 @@ def test_a_run_is_resumed_bit_for_bit(scheme: str) -> None:
 
 def test_a_slip_speed_below_its_bound_is_refused_with_numbers() -> None:
     robot = slider()
-    options: dict[str, Any] = {"friction": F, "dt": 1e-3, "duration": 0.01, "v0": [0.01]}
+    options: dict[str, Any] = {"joint_friction": F, "dt": 1e-3, "duration": 0.01, "v0": [0.01]}
     # dt f / (M s) = 2 at this speed.
     bound = 1e-3 * F / (2.0 * MASS)
     with pytest.raises(ArgumentError, match=r"friction_slip is .* 2\.\d* at rail, and 2 is the largest"):
@@ -270,7 +276,7 @@ def test_a_slip_speed_below_its_bound_is_refused_with_numbers() -> None:
 @pytest.mark.skipif("pybullet" not in installed_backends(), reason="PyBullet is not installed")
 def test_a_motor_of_the_engine_has_no_joints_that_stick() -> None:
     robot = load(MODELS / "six_axis_arm.urdf")
-    options: dict[str, Any] = {"plant": "pybullet", "friction": 0.1, "duration": 0.01}
+    options: dict[str, Any] = {"plant": "pybullet", "joint_friction": 0.1, "duration": 0.01}
     with pytest.raises(UnsupportedFeatureError, match="friction_slip above 0"):
         simulate(robot, BulletPositionMotor(robot), robot.neutral(), **options)
     simulate(robot, BulletPositionMotor(robot), robot.neutral(), friction_slip=50.0, **options)

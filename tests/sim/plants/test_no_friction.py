@@ -17,7 +17,11 @@ ROBOT = chain(3)
 """A robot whose description has no friction."""
 
 PLANTS = [name for name in ("pinocchio", "compiled", "pybullet") if name in installed_backends()]
-WITHOUT: list[dict[str, Any]] = [{}, {"friction": 0.0, "damping": 0.0}, {"friction": np.zeros(3)}]
+WITHOUT: list[dict[str, Any]] = [
+    {},
+    {"joint_friction": 0.0, "joint_damping": 0.0},
+    {"joint_friction": np.zeros(3)},
+]
 
 
 @pytest.fixture(autouse=True)
@@ -37,7 +41,7 @@ def test_steps_without_friction_solve_for_none(plant: str) -> None:
         assert record.executor == records[0].executor
         np.testing.assert_array_equal(record.v, records[0].v)
     with pytest.raises((AssertionError, DivergedError), match="friction is computed"):
-        simulate(ROBOT, PD(ROBOT, kp=5.0, kd=0.1), ROBOT.neutral(), friction=0.1, **start)
+        simulate(ROBOT, PD(ROBOT, kp=5.0, kd=0.1), ROBOT.neutral(), joint_friction=0.1, **start)
 
 
 def test_batches_without_friction_solve_for_none() -> None:
@@ -50,4 +54,4 @@ def test_batches_without_friction_solve_for_none() -> None:
     for no in WITHOUT[1:]:
         np.testing.assert_array_equal(final(**no), final())
     with pytest.raises(AssertionError, match="friction is computed"):
-        final(friction=0.1)
+        final(joint_friction=0.1)

@@ -13,6 +13,7 @@ from dynx.sim import simulate
 from tests.oracles.closed_form import MODELS, G
 from tests.oracles.pendulums import Pendulum
 from tests.sim.bars import ENERGY, MOMENTUM, tutorial_robot
+from tests.sim.rigid_bodies import RIGID_BODIES
 
 START = 1.0
 """Angle [rad] from which the pendulum falls."""
@@ -33,6 +34,7 @@ def quarter_off(integrator: str, steps: int, tolerance: float = 1e-10) -> float:
         integrator=integrator,
         rtol=tolerance,
         atol=tolerance / 100,
+        **RIGID_BODIES,
     )
     return float(np.abs(rollout.q[-1, 0]))
 
@@ -88,7 +90,8 @@ def test_damping_takes_the_energy_it_should() -> None:
     """What the damper takes is d v^2 over time; the rest of the balance is exact to the integrator."""
     robot = load(MODELS / "pendulum.urdf")
     d = 0.3
-    rollout = simulate(robot, q0=[START], damping=d, integrator="adaptive", duration=2.0)
+    options = RIGID_BODIES | {"joint_damping": d}
+    rollout = simulate(robot, q0=[START], integrator="adaptive", duration=2.0, **options)
     power = d * rollout.v[:, 0] ** 2
     lost = float(np.sum(0.5 * (power[1:] + power[:-1])) * 1e-3)
     assert rollout.energy[0] - rollout.energy[-1] == pytest.approx(lost, rel=1e-5)
@@ -97,8 +100,8 @@ def test_damping_takes_the_energy_it_should() -> None:
 def test_dry_friction_holds_a_joint_that_is_pushed_less() -> None:
     robot = load(MODELS / "pendulum.urdf")
     weight = Pendulum.m * G * Pendulum.c * np.sin(0.1)
-    held = simulate(robot, q0=[0.1], friction=2.0 * weight, friction_slip=0.01, duration=1.0)
-    slips = simulate(robot, q0=[0.1], friction=0.5 * weight, friction_slip=0.01, duration=1.0)
+    options = RIGID_BODIES | {"q0": [0.1], "friction_slip": 0.01, "duration": 1.0}
+    held, slips = (simulate(robot, **options | {"joint_friction": share * weight}) for share in (2.0, 0.5))
     # It creeps at the speed at which the regularised friction balances the weight.
     assert np.abs(held.v).max() <= 0.01 * np.arctanh(0.5) * 1.001
     assert np.abs(slips.v).max() > 0.05

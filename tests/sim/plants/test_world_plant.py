@@ -127,7 +127,13 @@ def test_joint_friction_and_pushes_act_as_in_other_plants(engine: str) -> None:
     slider = dynx.load(SLIDER)
     plant = ScenePlant(Scene("free", robots=(SceneRobot("slider", slider),)), engine=engine)
     push = dynx.ExternalForce("pusher", [4.0, 0, 0, 0, 0, 0], duration=0.25)
-    given = {"duration": 0.5, "damping": True, "friction": True, "armature": 0.5, "pushes": push}
+    given = {
+        "duration": 0.5,
+        "joint_damping": True,
+        "joint_friction": True,
+        "joint_armature": 0.5,
+        "pushes": push,
+    }
     inside, alone = (dynx.simulate(slider, plant=each, **given) for each in (plant, "reference"))  # type: ignore[arg-type]
     np.testing.assert_allclose(inside.q, alone.q, atol=2e-3)
     assert 0.0 < inside.v[-1, 0] < inside.v.max()
@@ -190,7 +196,9 @@ def test_the_notes_of_the_world_are_in_the_record_and_its_files(engine: str, tmp
     fast = replace(CUBE, twist=(90.0, 0.0, 0.0, 0.0, 0.0, 0.0), pose=dynx.Pose((1.0, 0.0, 0.1)))
     scene = Scene("noted", robots=(SceneRobot("slider", slider),), bodies=(ground(), fast))
     plant = ScenePlant(scene, engine=engine)
-    rollout = dynx.simulate(slider, plant=plant, dt=2e-3, duration=0.01, damping=True, friction=True)
+    rollout = dynx.simulate(
+        slider, plant=plant, dt=2e-3, duration=0.01, joint_damping=True, joint_friction=True
+    )
     with World(scene, engine, 2e-3) as world:
         expected = world.notes
     assert any("moves by" in note for note in expected)
@@ -231,7 +239,7 @@ def test_a_scene_refuses_what_it_cannot_do(engine: str) -> None:
     with pytest.raises(ArgumentError, match="is not the model"):
         replace(scenario, model=dynx.load(BRICK), controller=None, reference=None)
     with pytest.raises(ArgumentError, match="joint_limits"):
-        replace(scenario, position_limits=True)
+        replace(scenario, joint_limits=True)
     with pytest.raises(ArgumentError, match="own stepper"):
         dynx.simulate(replace(scenario, integrator="rk4"))
     with pytest.raises(ArgumentError, match="cannot be resumed"):
@@ -248,9 +256,9 @@ def test_a_step_of_the_engine_is_that_of_dynx(engine: str, mimic: bool) -> None:
         "v0": 0.3 * rng.standard_normal(model.nv),
         "duration": 0.1,
         "substeps": 2,
-        "damping": True,
-        "friction": True,
-        "armature": True,
+        "joint_damping": True,
+        "joint_friction": True,
+        "joint_armature": True,
         "pushes": dynx.ExternalForce("tip", [1.0, 2.0, 3.0, 0.1, 0.2, 0.3], start=0.02, duration=0.033),
     }
     own = dynx.simulate(model, plant=engine, integrator="engine", **given)

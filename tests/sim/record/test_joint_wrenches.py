@@ -72,8 +72,8 @@ def test_friction_and_armature_act_on_the_side_of_the_motor() -> None:
         q0 + 0.1,
         duration=0.05,
         q0=q0,
-        armature=0.2,
-        damping=3.0,
+        joint_armature=0.2,
+        joint_damping=3.0,
     )
     # Damping is that of the velocity at the end of the step.
     taken = 0.2 * rollout.a + 3.0 * rollout.v[1:]

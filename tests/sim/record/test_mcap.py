@@ -111,7 +111,7 @@ def arm() -> Rollout:
         tutorial_motion(0.05),
         payload=Payload("tool0", 1.0),
         noise=Noise(q=1e-5, v=1e-3, seed=3),
-        armature=0.1,
+        joint_armature=0.1,
         check_reference=False,
         effort_limits=20.0,
     )

@@ -28,7 +28,7 @@ def rollout() -> Rollout:
         ComputedTorque(robot, kp=400, kd=40),
         tutorial_motion(0.5),
         payload=Payload("tool0", 1.0),
-        armature=0.1,
+        joint_armature=0.1,
         check_reference=False,
         effort_limits=True,
     )

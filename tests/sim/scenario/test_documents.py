@@ -64,7 +64,7 @@ def scenarios(draw: st.DrawFn) -> Scenario:
         plant=draw(st.sampled_from(["pinocchio", "pybullet", "compiled"])),
         duration=draw(st.none() | numbers),
         noise=draw(st.none() | st.builds(Noise, numbers, numbers, st.integers(0, 9))),
-        damping=draw(st.booleans() | numbers),
+        joint_damping=draw(st.booleans() | numbers),
         effort_limits=draw(st.sampled_from(LIMITS)),
         payload=draw(st.none() | st.builds(Payload, st.just("tool0"), numbers)),
         mass_scale=draw(numbers | st.dictionaries(st.sampled_from(LINKS), numbers)),
@@ -142,7 +142,7 @@ def test_a_declared_trajectory_of_ones_own_is_rebuilt() -> None:
     ("change", "hint"),
     [
         ({"schema": "dynx.scenario/0"}, "schema"),
-        ({"damqing": 1.0}, "did you mean 'damping'"),
+        ({"joint_damqing": 1.0}, "did you mean 'joint_damping'"),
         ({"model": {"model": {"urdf": "<robot/>"}}}, "cannot be read"),
         ({"reference": {"class": "dynx.no_such:Thing", "fields": {}}}, "cannot be read"),
         ({"reference": {"class": "dynx.trajectory.base:Setpoint", "fields": {"x": 1}}}, "cannot be read"),

@@ -102,10 +102,10 @@ def test_a_list_an_array_and_another_order_are_equal() -> None:
 
 
 def test_a_zero_beside_a_scenario_is_no_default() -> None:
-    damped = Scenario(ARM, damping=0.5, duration=0.01)
-    with pytest.raises(ArgumentError, match="damping is given in addition to a scenario"):
-        simulate(damped, damping=0)
-    assert "damping=0" in repr(replace(damped, damping=0))
+    damped = Scenario(ARM, joint_damping=0.5, duration=0.01)
+    with pytest.raises(ArgumentError, match="joint_damping is given in addition to a scenario"):
+        simulate(damped, joint_damping=0)
+    assert "damping=0" in repr(replace(damped, joint_damping=0))
 
 
 def test_payloads_and_pushes_of_another_type_are_refused() -> None:

@@ -19,6 +19,7 @@ from dynx.rbd.parameters import Payload
 from dynx.sim import Scenario, Simulation, simulate, simulate_batch
 from dynx.sim.scenario.options import OPTIONS, SimulationOptions, option, options_of
 from dynx.world import Imu
+from tests.sim.rigid_bodies import RIGID_BODIES
 
 ARM = dynx.load("pendulum")
 
@@ -46,8 +47,10 @@ def test_type_checkers_refuse_what_the_functions_refuse() -> None:
     """Each comment below is an error of mypy if the call has none."""
     with pytest.raises(TypeError, match="simulate: missing a required argument: 'model'"):
         simulate()  # type: ignore[call-arg]
-    with pytest.raises(UnknownNameError, match="simulate has no option 'damqing'; did you mean 'damping'"):
-        simulate(ARM, damqing=1.0)  # type: ignore[call-arg]
+    with pytest.raises(
+        UnknownNameError, match="simulate has no option 'joint_damqing'; did you mean 'joint_damping'"
+    ):
+        simulate(ARM, joint_damqing=1.0)  # type: ignore[call-arg]
     with pytest.raises(ArgumentError, match=r"dt is '0\.001'"):
         simulate(ARM, duration=0.01, dt="0.001")  # type: ignore[arg-type]
     with pytest.raises(UnknownNameError, match="simulate_batch has no option 'rolouts'"):
@@ -69,17 +72,17 @@ def test_an_option_beside_a_scenario_is_refused_by_name() -> None:
 
 def test_a_scenario_keeps_values_in_one_form() -> None:
     scenario = Scenario(
-        ARM, dt=np.float64(2e-3), atol=1, damping=[1], payload=None, mass_scale={"b": 2.0, "a": 1.0}
+        ARM, dt=np.float64(2e-3), atol=1, joint_damping=[1], payload=None, mass_scale={"b": 2.0, "a": 1.0}
     )
     assert (type(scenario.dt), type(scenario.atol)) == (float, float)
-    assert isinstance(scenario.damping, np.ndarray)
-    assert not scenario.damping.flags.writeable
+    assert isinstance(scenario.joint_damping, np.ndarray)
+    assert not scenario.joint_damping.flags.writeable
     assert scenario.payload == ()
     assert list(scenario.mass_scale) == ["a", "b"]  # type: ignore[arg-type]
-    with pytest.raises(ArgumentError, match="position_limits is '1'; wanted True or False"):
-        Scenario(ARM, position_limits=1)  # type: ignore[arg-type]
-    with pytest.raises(ArgumentError, match="friction is None"):
-        Scenario(ARM, friction=None)  # type: ignore[arg-type]
+    with pytest.raises(ArgumentError, match="joint_limits is '1'; wanted True or False"):
+        Scenario(ARM, joint_limits=1)  # type: ignore[arg-type]
+    with pytest.raises(ArgumentError, match="joint_friction is None"):
+        Scenario(ARM, joint_friction=None)  # type: ignore[arg-type]
 
 
 def test_takes_gives_a_function_the_signature_of_a_dataclass() -> None:
@@ -102,7 +105,7 @@ def test_takes_gives_a_function_the_signature_of_a_dataclass() -> None:
 @pytest.mark.parametrize("slip", ["much", None, [1.0], -1.0, 1e-30, math.inf, 10**5000, True], ids=type)
 def test_an_invalid_slip_speed_says_what_is_wanted(slip: Any) -> None:
     with pytest.raises(ArgumentError, match=r"friction_slip is .*wanted a speed: 0, or 1e-09 or more"):
-        simulate(ARM, friction=0.1, friction_slip=slip, duration=0.01)
+        simulate(ARM, joint_friction=0.1, friction_slip=slip, duration=0.01)
 
 
 @pytest.mark.parametrize("name", [name for name, each in OPTIONS.items() if each.needs[0]])
@@ -110,7 +113,7 @@ def test_an_option_without_effect_is_refused_by_name_where_it_would_be_simulated
     other, wanted = OPTIONS[name].needs
     given = {"method": "RK45"}.get(name, 1e-3)
     law = control.PD(ARM, kp=1.0, kd=1.0)
-    options: dict[str, Any] = {name: given}
+    options: dict[str, Any] = RIGID_BODIES | {name: given}
     scenario = Scenario(ARM, law, ARM.neutral(), duration=0.01, plant="compiled", **options)
     # A file of an earlier version may have it.
     assert getattr(Scenario.from_json(scenario.to_json()), name) == given
@@ -126,7 +129,7 @@ def test_an_option_without_effect_is_refused_by_name_where_it_would_be_simulated
 def test_a_friction_of_each_rollout_makes_its_slip_effective() -> None:
     law = control.PD(ARM, kp=1.0, kd=1.0)
     scenario = Scenario(ARM, law, ARM.neutral(), duration=0.01, plant="compiled", friction_slip=0.1)
-    assert simulate_batch(scenario, friction=np.full((2, ARM.nv), 1e-3)).done.all()
+    assert simulate_batch(scenario, joint_friction=np.full((2, ARM.nv), 1e-3)).done.all()
 
 
 TWO_LINKS = dynx.load("planar_2r")
@@ -145,12 +148,12 @@ OTHERS: dict[str, Any] = {
     "q0": [0.1, 0.2],
     "v0": [1.0, 0.0],
     "noise": dynx.Noise(q=0.1),
-    "damping": 0.3,
-    "friction": 0.3,
+    "joint_damping": 0.3,
+    "joint_friction": 0.3,
     "friction_slip": 0.1,
-    "armature": 0.3,
+    "joint_armature": 0.3,
     "effort_limits": 0.1,
-    "position_limits": True,
+    "joint_limits": True,
     "payload": Payload(TIP, 1.0),
     "mass_scale": 2.0,
     "pushes": dynx.ExternalForce(TIP, [5.0, 0.0, 5.0, 0.0, 0.0, 0.0]),

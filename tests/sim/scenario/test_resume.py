@@ -33,9 +33,9 @@ SCENARIO = Scenario(
     q0=START,
     v0=START,
     noise=Noise(1e-4, 1e-3, seed=5),
-    damping=0.1,
-    friction=0.2,
-    armature=0.01,
+    joint_damping=0.1,
+    joint_friction=0.2,
+    joint_armature=0.01,
     effort_limits=np.full(6, 80.0),
     payload=Payload("tool0", 1.0),
     mass_scale={"forearm_link": 1.1},
@@ -60,12 +60,12 @@ CHANGES: dict[str, Any] = {
     "q0": START + 1e-15,
     "v0": START + 1e-15,
     "noise": Noise(1e-4, 1e-3, seed=6),
-    "damping": True,
-    "friction": 0.3,
+    "joint_damping": True,
+    "joint_friction": 0.3,
     "friction_slip": 2e-2,
-    "armature": np.full(6, 0.01),
+    "joint_armature": np.full(6, 0.01),
     "effort_limits": True,
-    "position_limits": True,
+    "joint_limits": True,
     "payload": Payload("tool0", 1.0, center=(0.0, 0.0, 0.01)),
     "mass_scale": {"forearm_link": 1.2},
     "pushes": [ExternalForce("tool0", [1.0, 0, 0, 0, 0, 1e-9], start=0.002, duration=0.01)],
@@ -162,11 +162,11 @@ def test_another_controller_or_another_engine_of_it_is_refused(other: Any) -> No
 def test_the_pendulum_with_another_armature_is_refused() -> None:
     pendulum = load("pendulum")
     free = simulate(pendulum, q0=[1.0], duration=0.1)
-    with pytest.raises(ArgumentError, match=r"had armature False; now it is 5\.0"):
-        simulate(pendulum, q0=[1.0], duration=0.1, armature=5.0, resume=free, step=50)
+    with pytest.raises(ArgumentError, match=r"had joint_armature True; now it is 5\.0"):
+        simulate(pendulum, q0=[1.0], duration=0.1, joint_armature=5.0, resume=free, step=50)
 
 
-@given(value=st.floats(1e-3, 1e3), change=st.sampled_from(["damping", "friction", "rtol"]))
+@given(value=st.floats(1e-3, 1e3), change=st.sampled_from(["joint_damping", "joint_friction", "rtol"]))
 def test_the_smallest_change_of_a_number_is_refused(value: float, change: str) -> None:
     before: dict[str, Any] = {change: value}
     after: dict[str, Any] = {change: float(np.nextafter(value, np.inf))}
