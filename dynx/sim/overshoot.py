@@ -134,16 +134,18 @@ def _overshoots(
 def overcompensated_friction(controller: Controller[Any] | None, plant: JointFriction) -> str | None:
     """Return a sentence on the joint whose friction a compensation by the measured speed exceeds most.
 
-    Such a joint is driven away in the direction of its motion. None where no coefficient is above that of
-    the `plant`, and for coefficients that are not those of coordinates (mimic joints of a description).
+    Such a joint is driven away in the direction of its motion. None where no coefficient of a coordinate is
+    above that of the `plant`; mimic joints count in the coordinate that they follow.
     """
     if not isinstance(controller, control.FrictionCompensation) or controller.speed != "measured":
         return None
-    own = controller.losses
-    for name, unit in (("damping", "N m s/rad or N s/m"), ("friction", "N m or N")):
-        ours, theirs = getattr(own, name), getattr(plant, name)
-        if ours.shape != theirs.shape or len(ours) != len(own.model.joint_names):
-            continue
+    own, joints = controller.losses, slice(6 if controller.model.floating else 0, None)
+    for name, unit, ours, theirs in (
+        ("damping", "N m s/rad or N s/m", own.viscous[joints], plant.viscous[joints]),
+        ("friction", "N m or N", own.dry[joints], plant.dry[joints]),
+    ):
+        if not len(ours):
+            return None
         worst = int(np.argmax(ours - theirs))
         if ours[worst] > theirs[worst]:
             joint = own.model.joint_names[worst]

@@ -14,7 +14,8 @@ from dynx import control
 from dynx.errors import DivergedError, SingularMassMatrixError
 from dynx.model import Model
 from dynx.sim import Noise, ScenePlant, simulate
-from dynx.sim.overshoot import largest_overshoot
+from dynx.sim.overshoot import largest_overshoot, overcompensated_friction
+from dynx.sim.plants.disturbances import Disturbances
 from dynx.steppers.registry import installed_worlds
 from dynx.world import Scene, SceneRobot
 
@@ -101,6 +102,20 @@ def test_friction_that_is_compensated_beyond_that_of_the_plant_is_named() -> Non
         simulate(model, law, np.full(6, 0.1), joint_damping=2.0, **options)
     damped = simulate(model, law, np.full(6, 0.1), joint_damping=9.0, **options)
     assert np.abs(damped.v).max() < 100.0
+
+
+@pytest.mark.parametrize(("name", "base"), [("panda", "fixed"), ("solo12", "floating")])
+def test_friction_is_overcompensated_with_joints_that_follow_others_and_on_a_floating_base(
+    name: str, base: Any
+) -> None:
+    """Against the plant with the joint dynamics of the description, the default."""
+    model = dynx.load(name, base=base)
+    law = control.FrictionCompensation(control.PD(model, kp=1.0, kd=0.1), damping={model.joint_names[1]: 5.0})
+    found = overcompensated_friction(law, Disturbances(model).friction)
+    assert found is not None
+    assert f"damping of 5 N m s/rad or N s/m at {model.joint_names[1]}" in found
+    same = control.FrictionCompensation(law.inner)
+    assert overcompensated_friction(same, Disturbances(model).friction) is None
 
 
 def test_one_coefficient_of_a_compensation_leaves_the_other_out() -> None:
