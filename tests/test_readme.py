@@ -128,3 +128,14 @@ def test_set_up_is_one_line(heading: str) -> None:
     found = re.findall(r"^```sh\n(.*?)^```$", section(heading), flags=re.MULTILINE | re.DOTALL)
     assert len(found) == 1
     assert len(found[0].splitlines()) == 1
+
+
+def test_the_checks_name_tests_that_exist() -> None:
+    """`.ci/run` ends with an error at a test that it names and that has another name."""
+    named = re.findall(
+        r"(tests/[\w/]+\.py)::(\w+)\[([\w.]+)\]", (ROOT / ".ci/run").read_text(encoding="utf-8")
+    )
+    assert named
+    for path, function, page in named:
+        assert f"\ndef {function}(" in (ROOT / path).read_text(encoding="utf-8")
+        assert page in PAGES
