@@ -83,7 +83,7 @@ TOOL = 1.3
 """Mass of the tool [kg]."""
 
 DIFFERENT = "documents of damped and of mimic joints, which say so"
-"""What the documents say that MuJoCo reads in another way: no bar."""
+"""Title of the readings of which the documents say that MuJoCo has others. Printed, not judged."""
 
 Worst = dict[str, tuple[float, str]]
 """Largest figure of each comparison, and where it was found."""

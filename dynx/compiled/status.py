@@ -1,4 +1,4 @@
-"""What ends the steps of a closed loop, in compiled steps as on floats, which need no compiler."""
+"""Reasons why the steps of a closed loop end, compiled or on floats. This module needs no compiler."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import IntFlag
 
 
 class Status(IntFlag):
-    """What ended the steps of a lane; `DONE` is none of it."""
+    """Reasons why the steps of a lane ended; `DONE`: all were made."""
 
     DONE = 0
     TORQUE = 1

@@ -1,4 +1,4 @@
-"""Numbers by which a step says how its iteration goes on; they need no compiler."""
+"""Numbers by which a step tells how its iteration goes on. This module needs no compiler."""
 
 RUNNING, GIVEN_UP, REACHED = 0.0, 1.0, 2.0
 """Values of ``status``."""
