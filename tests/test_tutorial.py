@@ -1,0 +1,84 @@
+"""Tests of the tutorial's programs and notebooks, which its pages are the source of."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from docs.tutorial.pages import STEPS, notebook, parts, program, reduced, write
+
+PAGE = """# 1. Fall
+
+Text of the step.
+
+```python
+steps = 1_000  # small: 10
+print(steps)
+```
+
+```text
+1000
+```
+
+<details>
+<summary>Answer</summary>
+
+```python
+answer = 2 * steps
+```
+
+Twice as many.
+
+</details>
+"""
+
+
+def test_parts_are_in_order_and_answers_are_folded() -> None:
+    assert [(part.language, part.folded) for part in parts(PAGE)] == [
+        ("", False),
+        ("python", False),
+        ("text", False),
+        ("", False),
+        ("python", True),
+        ("", True),
+    ]
+
+
+def test_a_program_runs_alone_and_has_the_text_as_comments() -> None:
+    for small, answer in ((False, 2000), (True, 20)):
+        variables: dict[str, object] = {}
+        exec(program(PAGE, small=small), variables)
+        assert variables["answer"] == answer
+    assert "# Text of the step." in program(PAGE)
+    assert "<" not in program(PAGE)
+
+
+def test_small_values_are_those_of_the_comments() -> None:
+    assert reduced("  n = f(3)  # small: 5\nm = 4  # more\n") == "  n = 5  # small: 5\nm = 4  # more\n"
+
+
+def test_notebooks_are_valid_and_hide_answers() -> None:
+    nbformat = pytest.importorskip("nbformat")
+    for path in STEPS:
+        nbformat.validate(notebook(path.read_text(encoding="utf-8")))
+    hidden = [cell["metadata"] for cell in notebook(PAGE)["cells"] if "answer" in cell["source"]]
+    assert hidden == [{"jupyter": {"source_hidden": True}}]
+
+
+def test_each_step_becomes_a_program_and_a_notebook(tmp_path: Path) -> None:
+    written = write(tmp_path)
+    assert len(written) == 2 * len(STEPS)
+    for path in written:
+        if path.suffix == ".py":
+            ast.parse(path.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("path", STEPS, ids=lambda path: path.stem)
+def test_each_step_is_short_and_has_a_picture_a_comparison_and_an_answer(path: Path) -> None:
+    page = path.read_text(encoding="utf-8")
+    assert len(page.splitlines()) <= 200
+    assert page.startswith(f"# {path.stem[0]}. ")
+    for wanted in ("](" + path.stem[0] + "_", "\n## What dynx adds", "\n## Exercise", "\n<details>"):
+        assert wanted in page, wanted
