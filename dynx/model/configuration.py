@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable
+from functools import cache
+from importlib import import_module
 from operator import add, sub
 
 import numpy as np
@@ -11,7 +13,6 @@ from numpy.typing import ArrayLike
 from dynx.errors import ArgumentError
 from dynx.model.numbers import (
     MAX_MAGNITUDE,
-    UNIT_NORM_TOLERANCE,
     checked_array,
     checked_generator,
     checked_quaternion,
@@ -21,6 +22,17 @@ from dynx.model.tree import Tree
 from dynx.spatial import branchless
 from dynx.spatial.branchless import FLOATS
 from dynx.spatial.scalar import Floats
+from dynx.time_limit import not_counted
+
+Step = Callable[[object, object, object], int]
+"""Function of two arrays and of the one that it fills, which returns whether both were valid."""
+
+_CODE = "dynx.compiled.configurations"
+"""Module above this one with `integrate` and `difference` in machine code."""
+
+_ACCEPTED = 0
+"""What the machine code returns for valid arrays, whatever it returns for others
+(`dynx.simd.arrays.ACCEPTED`, which takes a tenth of a second to import)."""
 
 
 def checked_q(tree: Tree, q: ArrayLike, name: str = "q") -> Floats:
@@ -73,29 +85,31 @@ def integrate(tree: Tree, q: ArrayLike, v: ArrayLike) -> Floats:
 
     A floating base moves along the exponential of its body twist.
     """
-    lists = _valid_lists(tree.nq, q, tree.nv, v) if tree.floating else None
-    if lists is None:
-        q, v = checked_q(tree, q), checked_array("v", v, tree.nv)
-        if not tree.floating:
-            return q + v
-        if not q.ndim == v.ndim == 1:
-            return branchless.integrate(*_broadcast(q, v))
-        lists = q.tolist(), v.tolist()
-    start, step = lists
+    if tree.floating and type(q) is type(v) is np.ndarray:
+        moved = np.empty(tree.nq)
+        if _integration()(q, v, moved) == _ACCEPTED:
+            return moved
+    q, v = checked_q(tree, q), checked_array("v", v, tree.nv)
+    if not tree.floating:
+        return q + v
+    if not q.ndim == v.ndim == 1:
+        return branchless.integrate(*_broadcast(q, v))
+    start, step = q.tolist(), v.tolist()
     return np.array(branchless.moved(start[:7], step[:6], FLOATS) + list(map(add, start[7:], step[6:])))
 
 
 def difference(tree: Tree, q0: ArrayLike, q1: ArrayLike) -> Floats:
     """Return the velocity v (..., nv) with integrate(q0, v) = q1, whose rotation angle is at most pi."""
-    lists = _valid_lists(tree.nq, q0, tree.nq, q1) if tree.floating else None
-    if lists is None or not _has_unit_norm(lists[1]):
-        q0, q1 = checked_q(tree, q0, "q0"), checked_q(tree, q1, "q1")
-        if not tree.floating:
-            return q1 - q0
-        if not q0.ndim == q1.ndim == 1:
-            return branchless.difference(*_broadcast(q0, q1))
-        lists = q0.tolist(), q1.tolist()
-    start, end = lists
+    if tree.floating and type(q0) is type(q1) is np.ndarray:
+        velocity = np.empty(tree.nv)
+        if _subtraction()(q0, q1, velocity) == _ACCEPTED:
+            return velocity
+    q0, q1 = checked_q(tree, q0, "q0"), checked_q(tree, q1, "q1")
+    if not tree.floating:
+        return q1 - q0
+    if not q0.ndim == q1.ndim == 1:
+        return branchless.difference(*_broadcast(q0, q1))
+    start, end = q0.tolist(), q1.tolist()
     return np.array(branchless.twist_between(start[:7], end[:7], FLOATS) + list(map(sub, end[7:], start[7:])))
 
 
@@ -121,30 +135,18 @@ def sampling_range(low: float, high: float, default_range: float) -> tuple[float
     return (low, low + 2.0 * default_range) if bounded_below else (high - 2.0 * default_range, high)
 
 
-def _valid_lists(nq: int, q: object, size: int, other: object) -> tuple[list[float], list[float]] | None:
-    """Return the entries of a configuration (nq,) of a floating base and of another array (size,), or None
-    where they are not arrays of valid numbers: one check of all of them, and no copy of an array.
-
-    The norm of all entries is below a bound only if every entry is, and no entry is NaN.
-    """
-    if not (
-        type(q) is type(other) is np.ndarray
-        and q.dtype is other.dtype is _FLOAT64
-        and q.shape == (nq,)
-        and other.shape == (size,)
-    ):
-        return None
-    start, entries = q.tolist(), other.tolist()
-    valid = math.hypot(*start, *entries) < MAX_MAGNITUDE and _has_unit_norm(start)
-    return (start, entries) if valid else None
+@cache
+def _integration() -> Step:
+    with not_counted():
+        step: Step = import_module(_CODE).integration()
+        return step
 
 
-def _has_unit_norm(q: list[float]) -> bool:
-    """Check whether the quaternion of a configuration has unit norm, to rounding."""
-    return abs(math.hypot(*q[3:7]) - 1.0) <= UNIT_NORM_TOLERANCE
-
-
-_FLOAT64 = np.dtype(np.float64)
+@cache
+def _subtraction() -> Step:
+    with not_counted():
+        step: Step = import_module(_CODE).subtraction()
+        return step
 
 
 def _broadcast(a: Floats, b: Floats) -> tuple[Floats, Floats]:

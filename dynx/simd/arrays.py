@@ -18,6 +18,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.errors import ArgumentError, DTypeError, ShapeError
+from dynx.simd.c_interface import (
+    DIMENSIONS,
+    DOUBLE,
+    FLAGS,
+    FORMAT,
+    LENGTH,
+    OBJECT,
+    SHAPE,
+    STRIDES,
+    VIEW_BYTES,
+    address_in_python,
+    load,
+    require,
+    store,
+)
 from dynx.simd.emit import ENTRY
 from dynx.simd.image import Code, Image, compile_text
 from dynx.simd.program import Port
@@ -31,18 +46,6 @@ _first_byte: Any = c_char.from_buffer
 ACCEPTED, REFUSED, DESCRIBED, UNSUITABLE = range(4)
 """Outcomes of a call: evaluated, with a sum below the bound, or not below it; only described in the words of
 the workspace, because there are too many samples; arrays that the code cannot use, or that share memory."""
-
-_VIEW_BYTES = 80
-"""Size of C's structure ``Py_buffer``."""
-
-_OBJECT, _LENGTH, _DIMENSIONS, _FORMAT, _SHAPE, _STRIDES = 8, 16, 36, 40, 48, 56
-"""Offsets of its fields; the address of the data is the first."""
-
-_FLAGS = 0x1C
-"""Flags of ``PyObject_GetBuffer``: shape, strides and format."""
-
-_DOUBLE = ord("d")
-"""Format of float64 in the machine's byte order: this character and the end of the string."""
 
 _ARGUMENTS, _KERNEL, _MOST, _ADDENDS, _RESULT, _BOUND, _SIZES = range(7)
 """Positions in the plan, an array of 64-bit words: addresses of the kernel's arguments and of its code, most
@@ -92,35 +95,35 @@ def _text(n_inputs: int, lanes: int) -> str:
     lines = [f"define i64 @{ENTRY}(ptr %plan, {objects}) {{", "entry:"]
     lines += ["  %outcome = alloca i64", f"  store i64 {UNSUITABLE}, ptr %outcome"]
     for k in views:
-        lines += [f"  %view{k} = alloca [{_VIEW_BYTES} x i8], align 16"]
+        lines += [f"  %view{k} = alloca [{VIEW_BYTES} x i8], align 16"]
         # A view without an object may be released.
-        lines += _store("ptr null", f"held{k}", f"view{k}", _OBJECT)
-    lines += _load("arguments", "plan", 8 * _ARGUMENTS, "ptr") + _load("result", "plan", 8 * _RESULT)
+        lines += store("ptr null", f"held{k}", f"view{k}", OBJECT)
+    lines += load("arguments", "plan", 8 * _ARGUMENTS, "ptr") + load("result", "plan", 8 * _RESULT)
     for k in views:
-        get = f"call i32 {_address('PyObject_GetBuffer')}(ptr %object{k}, ptr %view{k}, i32 {_FLAGS})"
+        get = f"call i32 {address_in_python('PyObject_GetBuffer')}(ptr %object{k}, ptr %view{k}, i32 {FLAGS})"
         lines += [
             f"  %failed{k} = {get}",
             f"  %got{k} = icmp eq i32 %failed{k}, 0",
             f"  br i1 %got{k}, label %got_{k}, label %clear",
             f"got_{k}:",
-            *_load(f"data{k}", f"view{k}", 0),
+            *load(f"data{k}", f"view{k}", 0),
         ]
         lines += _describe_input(k) if k < n_inputs else _describe_output(n_inputs)
     lines += [
         f"  store i64 {DESCRIBED}, ptr %outcome",
-        *_load("most", "plan", 8 * _MOST),
+        *load("most", "plan", 8 * _MOST),
         "  %few = icmp sle i64 %n, %most",
         "  br i1 %few, label %evaluate, label %leave",
         "evaluate:",
         *_evaluate(lanes),
         "  br label %leave",
         "clear:",
-        f"  call void {_address('PyErr_Clear')}()",
+        f"  call void {address_in_python('PyErr_Clear')}()",
         "  br label %leave",
         "leave:",
     ]
     # The references of the caller keep the memory alive for the evaluation in Python of what is described.
-    lines += [f"  call void {_address('PyBuffer_Release')}(ptr %view{k})" for k in views]
+    lines += [f"  call void {address_in_python('PyBuffer_Release')}(ptr %view{k})" for k in views]
     lines += ["  %found = load i64, ptr %outcome", "  ret i64 %found", "}"]
     reduced = f"declare double @llvm.vector.reduce.fadd.v{lanes}f64(double, <{lanes} x double>)"
     return "\n".join([*lines, reduced]) + "\n"
@@ -130,29 +133,29 @@ def _describe_input(k: int) -> list[str]:
     """Return the code that checks input number k and writes its address and its stride to the arguments."""
     view = f"view{k}"
     lines = [
-        *_load(f"dimensions{k}", view, _DIMENSIONS, "i32"),
-        *_require(f"dimensions{k}_", f"icmp eq i32 %dimensions{k}, 2"),
-        *_load(f"format{k}", view, _FORMAT, "ptr"),
+        *load(f"dimensions{k}", view, DIMENSIONS, "i32"),
+        *require(f"dimensions{k}_", f"icmp eq i32 %dimensions{k}, 2"),
+        *load(f"format{k}", view, FORMAT, "ptr"),
         f"  %characters{k} = load i16, ptr %format{k}, align 1",
-        *_require(f"format{k}_", f"icmp eq i16 %characters{k}, {_DOUBLE}"),
-        *_load(f"shape{k}", view, _SHAPE, "ptr"),
-        *_load(f"strides{k}", view, _STRIDES, "ptr"),
-        *_load(f"rows{k}", f"shape{k}", 0),
-        *_load(f"columns{k}", f"shape{k}", 8),
-        *_load(f"stride{k}", f"strides{k}", 0),
-        *_load(f"step{k}", f"strides{k}", 8),
-        *_load(f"size{k}", "plan", 8 * (_SIZES + k)),
-        *_require(f"columns{k}_", f"icmp eq i64 %columns{k}, %size{k}"),
+        *require(f"format{k}_", f"icmp eq i16 %characters{k}, {DOUBLE}"),
+        *load(f"shape{k}", view, SHAPE, "ptr"),
+        *load(f"strides{k}", view, STRIDES, "ptr"),
+        *load(f"rows{k}", f"shape{k}", 0),
+        *load(f"columns{k}", f"shape{k}", 8),
+        *load(f"stride{k}", f"strides{k}", 0),
+        *load(f"step{k}", f"strides{k}", 8),
+        *load(f"size{k}", "plan", 8 * (_SIZES + k)),
+        *require(f"columns{k}_", f"icmp eq i64 %columns{k}, %size{k}"),
     ]
-    lines += _require(f"rows{k}_", f"icmp eq i64 %rows{k}, %rows0")
+    lines += require(f"rows{k}_", f"icmp eq i64 %rows{k}, %rows0")
     # The stride of a single column is any number.
     lines += [f"  %near{k} = icmp eq i64 %step{k}, 8", f"  %narrow{k} = icmp sle i64 %columns{k}, 1"]
-    lines += _require(f"step{k}_", f"or i1 %near{k}, %narrow{k}")
-    lines += _require(f"upward{k}_", f"icmp sge i64 %stride{k}, 0")
+    lines += require(f"step{k}_", f"or i1 %near{k}, %narrow{k}")
+    lines += require(f"upward{k}_", f"icmp sge i64 %stride{k}, 0")
     lines += [f"  %offset{k} = or i64 %data{k}, %stride{k}", f"  %odd{k} = and i64 %offset{k}, 7"]
-    lines += _require(f"aligned{k}_", f"icmp eq i64 %odd{k}, 0")
-    lines += _store(f"i64 %data{k}", f"address{k}", "arguments", 8 * (1 + 2 * k))
-    lines += _store(f"i64 %stride{k}", f"distance{k}", "arguments", 8 * (2 + 2 * k))
+    lines += require(f"aligned{k}_", f"icmp eq i64 %odd{k}, 0")
+    lines += store(f"i64 %data{k}", f"address{k}", "arguments", 8 * (1 + 2 * k))
+    lines += store(f"i64 %stride{k}", f"distance{k}", "arguments", 8 * (2 + 2 * k))
     return [
         *lines,
         f"  %below{k} = sub i64 %rows{k}, 1",
@@ -167,14 +170,14 @@ def _describe_output(number: int) -> list[str]:
     """Return the code that writes the address of the output, if it shares no memory with an input."""
     lines = [
         "  %n = add i64 %rows0, 0",
-        *_load("bytes", f"view{number}", _LENGTH),
+        *load("bytes", f"view{number}", LENGTH),
         f"  %end{number} = add i64 %data{number}, %bytes",
     ]
     for k in range(number):
         lines += [
             f"  %before{k} = icmp ule i64 %end{k}, %data{number}",
             f"  %after{k} = icmp uge i64 %data{k}, %end{number}",
-            *_require(f"apart{k}_", f"or i1 %before{k}, %after{k}"),
+            *require(f"apart{k}_", f"or i1 %before{k}, %after{k}"),
         ]
     return [
         *lines,
@@ -187,9 +190,9 @@ def _evaluate(lanes: int) -> list[str]:
     """Return the code that runs the kernel on n samples and compares the sum of the addends."""
     vector = f"<{lanes} x double>"
     return [
-        *_load("kernel", "plan", 8 * _KERNEL, "ptr"),
-        *_load("addends", "plan", 8 * _ADDENDS, "ptr"),
-        *_load("bound", "plan", 8 * _BOUND, "double"),
+        *load("kernel", "plan", 8 * _KERNEL, "ptr"),
+        *load("addends", "plan", 8 * _ADDENDS, "ptr"),
+        *load("bound", "plan", 8 * _BOUND, "double"),
         "  store i64 %n, ptr %arguments",
         "  %addends_word = getelementptr i64, ptr %result_word, i64 2",
         "  store ptr %addends, ptr %addends_word",
@@ -215,29 +218,6 @@ def _evaluate(lanes: int) -> list[str]:
         f"  %judged = select i1 %good, i64 {ACCEPTED}, i64 {REFUSED}",
         "  store i64 %judged, ptr %outcome",
     ]
-
-
-def _address(function: str) -> str:
-    """Return the address of a function of Python's C interface as an operand."""
-    address = ctypes.cast(getattr(ctypes.pythonapi, function), ctypes.c_void_p).value
-    return f"inttoptr (i64 {address} to ptr)"
-
-
-def _at(name: str, base: str, offset: int) -> str:
-    return f"  %{name} = getelementptr i8, ptr %{base}, i64 {offset}"
-
-
-def _load(name: str, base: str, offset: int, kind: str = "i64") -> list[str]:
-    return [_at(f"{name}_at", base, offset), f"  %{name} = load {kind}, ptr %{name}_at"]
-
-
-def _store(value: str, name: str, base: str, offset: int) -> list[str]:
-    return [_at(f"{name}_at", base, offset), f"  store {value}, ptr %{name}_at"]
-
-
-def _require(name: str, condition: str) -> list[str]:
-    """Return the code that leaves, with the outcome stored so far, unless a condition holds."""
-    return [f"  %{name} = {condition}", f"  br i1 %{name}, label %{name}yes, label %leave", f"{name}yes:"]
 
 
 # -- in Python ------------------------------------------------------------
