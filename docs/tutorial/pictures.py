@@ -52,6 +52,74 @@ def _arm(v: Variables) -> None:
     _with_frames(picture, camera, engine.forward_kinematics(q, ["base_link", *links]), "1_arm.png")
 
 
+def _planar_frames(v: Variables) -> None:
+    q, lengths = np.array([0.5, 0.8]), (v["l1"], v["l2"])
+    elbow = lengths[0] * np.array([np.cos(q[0]), np.sin(q[0])])
+    tip = elbow + lengths[1] * np.array([np.cos(q.sum()), np.sin(q.sum())])
+    figure, axes = plt.subplots(figsize=(6.4, 5.2))
+    _links(axes, [np.zeros(2), elbow, tip])
+    axes.plot([0, 0.36], [0, 0], [elbow[0], 1.6 * elbow[0]], [elbow[1], 1.6 * elbow[1]], ls=":", color=GREY)
+    _angle(axes, np.zeros(2), 0.0, q[0], 0.3, "$q_1$")
+    _angle(axes, elbow, q[0], q.sum(), 0.2, "$q_2$")
+    _frame(axes, np.zeros(2), 0.0, "0", side=-0.75 * np.pi, length=0.12, dashed=True)
+    _frame(axes, np.zeros(2), q[0], "1", side=0.75 * np.pi, length=0.17)
+    _frame(axes, elbow, q.sum(), "2", side=-0.25 * np.pi)
+    _frame(axes, tip, q.sum(), "T", side=-0.3 * np.pi)
+    for start, end, name in ((np.zeros(2), elbow, "$l_1$"), (elbow, tip, "$l_2$")):
+        along = (end - start) / np.linalg.norm(end - start)
+        axes.text(*(0.5 * (start + end) + 0.05 * np.array([-along[1], along[0]])), name)
+    _plain(axes)
+    _save(figure, "2_frames.svg")
+
+
+def _workspace(v: Variables) -> None:
+    points = v["points"]
+    figure, panels = plt.subplots(1, 2, figsize=(9, 4.4))
+    radius = np.hypot(points[:, 0], points[:, 1])
+    panels[0].plot(radius, points[:, 2], ".", ms=1.5, color=BLUE)
+    panels[0].set(title="height over the distance from the axis of the base", xlabel="distance [m]")
+    panels[0].set(ylabel="z [m]", xlim=(0, 1))
+    middle = points[radius < 0.25]
+    panels[1].plot(middle[:, 0], middle[:, 1], ".", ms=1.5, color=BLUE)
+    panels[1].set(title="the middle, from above", xlabel="x [m]", ylabel="y [m]")
+    for axes in panels:
+        axes.set_aspect("equal")
+        axes.title.set_fontsize(9)
+    figure.tight_layout()
+    _save(figure, "2_workspace.png")
+
+
+def _two_solutions(v: Variables) -> None:
+    figure, axes = plt.subplots(figsize=(5.6, 4.2))
+    target = np.array([v["x"], v["y"]])
+    for (q1, q2), colour, name in zip(v["both"], (BLUE, VERMILION), ("elbow down", "elbow up"), strict=True):
+        elbow = v["l1"] * np.array([np.cos(q1), np.sin(q1)])
+        _links(axes, [np.zeros(2), elbow, target], colour)
+        side = np.array([0.0, -0.07 if q2 > 0 else 0.05])
+        axes.text(*(elbow + side), name, color=colour, ha="center")
+    axes.plot([0, target[0]], [0, target[1]], "--", color=GREY, lw=1)
+    axes.text(0.5 * target[0] + 0.02, 0.5 * target[1] - 0.03, "$r$")
+    axes.plot(*target, "*", ms=16, color=GREEN)
+    axes.text(target[0] + 0.03, target[1], "target $(x, y)$", va="center")
+    _plain(axes)
+    _save(figure, "3_two_solutions.svg")
+
+
+def _solutions(v: Variables) -> None:
+    arm, solutions = v["arm"], v["every"].q
+    chosen = [int(np.abs(solutions[:, 0] - solutions[0, 0]).argsort()[i]) for i in range(2)]
+    chosen += [int(np.abs(solutions[:, 0] - solutions[0, 0]).argsort()[-1 - i]) for i in (0, 3)]
+    camera = Camera.look_at((1.5, -1.1, 1.0), (0.2, 0.05, 0.3), field_of_view=0.46, size=(420, 420))
+    figure, panels = plt.subplots(1, 4, figsize=(12.6, 3.2))
+    for axes, index in zip(panels, chosen, strict=True):
+        robot = SceneRobot("ur5", arm, q=solutions[index])
+        with World(Scene("arm", robots=(robot,), bodies=(ground(),)), collisions=False) as world:
+            axes.imshow(world.camera(camera).rgb)
+        axes.axis("off")
+    figure.subplots_adjust(0, 0, 1, 1, 0.02, 0)
+    _save(figure, "3_solutions.png")
+
+
 def _with_frames(picture: Any, camera: Any, frames: Any, name: str, length: float = 0.12) -> None:
     """Write a picture of a camera with frames (4, 4) drawn over it."""
     height, width = picture.rgb.shape[:2]
@@ -78,16 +146,34 @@ def _save(figure: Any, name: str) -> None:
     plt.close(figure)
 
 
-def _frame(axes: Axes, origin: Any, angle: float, name: str, length: float = 0.14) -> None:
-    """Draw a frame in the plane: x vermilion, y green."""
+def _frame(
+    axes: Axes,
+    origin: Any,
+    angle: float,
+    name: str,
+    *,
+    side: float,
+    length: float = 0.14,
+    dashed: bool = False,
+) -> None:
+    """Draw a frame in the plane, x vermilion and y green, with its name in the direction `side` from x."""
     for turn, colour, letter in ((0.0, VERMILION, "x"), (np.pi / 2, GREEN, "y")):
         tip = origin + length * np.array([np.cos(angle + turn), np.sin(angle + turn)])
-        axes.annotate(
-            "", tip, origin, arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 2, "shrinkA": 0}
-        )
-        axes.text(*(origin + 1.18 * (tip - origin)), letter, color=colour, ha="center", va="center")
-    corner = origin - 0.62 * length * np.array([np.cos(angle + np.pi / 4), np.sin(angle + np.pi / 4)])
+        arrow = {"arrowstyle": "-|>", "color": colour, "lw": 2, "shrinkA": 0, "shrinkB": 0}
+        style = {"ls": "--", "lw": 1.4} if dashed else {}
+        axes.annotate("", tip, origin, arrowprops=arrow | style, annotation_clip=False)
+        axes.plot(*(origin + 1.2 * (tip - origin)), alpha=0)  # the picture contains the letter
+        axes.text(*(origin + 1.16 * (tip - origin)), letter, color=colour, ha="center", va="center")
+    corner = origin + 0.055 * np.array([np.cos(angle + side), np.sin(angle + side)])
     axes.text(*corner, name, ha="center", va="center", fontweight="bold")
+
+
+def _angle(axes: Axes, centre: Any, start: float, end: float, radius: float, name: str) -> None:
+    """Draw an arc from one direction to another, with the name of the angle."""
+    turns = np.linspace(start, end, 40)
+    axes.plot(centre[0] + radius * np.cos(turns), centre[1] + radius * np.sin(turns), color="black", lw=1)
+    middle = 0.5 * (start + end)
+    axes.text(*(centre + 1.14 * radius * np.array([np.cos(middle), np.sin(middle)])), name, va="center")
 
 
 def _links(axes: Axes, points: Any, colour: str = GREY, alpha: float = 1.0) -> None:
@@ -102,4 +188,8 @@ def _plain(axes: Axes) -> None:
     axes.axis("off")
 
 
-PICTURES: dict[str, tuple[Callable[[Variables], None], ...]] = {"1_load_an_arm": (_arm,)}
+PICTURES: dict[str, tuple[Callable[[Variables], None], ...]] = {
+    "1_load_an_arm": (_arm,),
+    "2_forward_kinematics": (_planar_frames, _workspace),
+    "3_inverse_kinematics": (_two_solutions, _solutions),
+}
