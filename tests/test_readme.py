@@ -22,8 +22,7 @@ from dynx.sim.plants import registry as plants
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 PAGES = {"README.md": (ROOT / "README.md").read_text(encoding="utf-8")} | {
-    path.relative_to(DOCS).as_posix(): path.read_text(encoding="utf-8")
-    for path in sorted((*DOCS.glob("*.md"), *DOCS.glob("tutorial/*.md")))
+    path.relative_to(DOCS).as_posix(): path.read_text(encoding="utf-8") for path in sorted(DOCS.rglob("*.md"))
 }
 """Text of the README, and of each page by its path in `docs`."""
 

@@ -1,0 +1,106 @@
+"""The site: each page has its place, each link and anchor its target, each public name its entry."""
+
+from __future__ import annotations
+
+import ast
+import re
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from docs.heading_anchors import anchor
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+PAGES = sorted(DOCS.rglob("*.md"))
+ENTRIES = re.findall(
+    r"^\.\. auto(class|function|data|exception):: ([\w.]+)$",
+    "\n".join(path.read_text(encoding="utf-8") for path in sorted((DOCS / "reference/api").glob("*.md"))),
+    flags=re.MULTILINE,
+)
+
+
+def public_names() -> dict[str, list[str]]:
+    """Return what each module of dynx declares as public, and the classes of `dynx.errors`."""
+    found = {}
+    for path in sorted((ROOT / "dynx").rglob("*.py")):
+        if path.name == "library.py":  # what a foreign library gives to dynx itself
+            continue
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        module = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        if module == "dynx.errors":
+            found[module] = [each.name for each in tree.body if isinstance(each, ast.ClassDef)]
+        for node in tree.body:
+            if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
+                found[module] = ast.literal_eval(node.value)
+    return found
+
+
+PUBLIC = public_names()
+
+
+@cache
+def value(name: str) -> object:
+    module, _, attribute = name.rpartition(".")
+    return getattr(import_module(module), attribute)
+
+
+@pytest.mark.parametrize("module", PUBLIC)
+def test_every_public_name_has_an_entry(module: str) -> None:
+    """Under its own name, or as the same object under a shorter one."""
+    entries = {name for _, name in ENTRIES}
+    missing = [name for name in PUBLIC[module] if f"{module}.{name}" not in entries]
+    if missing:
+        documented = [value(name) for name in entries if not name.startswith("dynx.training.")]
+        missing = [
+            name
+            for name in missing
+            if not (name.islower() and f"{module}.{name}" in PUBLIC)  # a module, whose names have entries
+            and not any(value(f"{module}.{name}") is each for each in documented)
+        ]
+    assert missing == []
+
+
+def test_every_entry_is_public_and_stands_once() -> None:
+    names = [name for _, name in ENTRIES]
+    assert len(names) == len(set(names))
+    public = {f"{module}.{name}" for module, declared in PUBLIC.items() for name in declared}
+    assert set(names) - public == set()
+
+
+def targets(path: Path) -> list[str]:
+    """Return what the table of contents of a page lists, as paths below docs without the suffix."""
+    text = path.read_text(encoding="utf-8")
+    found = []
+    for block in re.findall(r"^```\{toctree\}\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL):
+        for line in block.splitlines():
+            if line and not line.startswith(":"):
+                base = DOCS if line.startswith("/") else path.parent
+                matches = base.glob(f"{line.lstrip('/')}.md")
+                found += [each.relative_to(DOCS).as_posix() for each in matches if each != path]
+    return found
+
+
+def test_every_page_has_one_place() -> None:
+    listed = [target for path in PAGES for target in targets(path)]
+    assert sorted([*listed, "index.md"]) == [path.relative_to(DOCS).as_posix() for path in PAGES]
+
+
+@cache
+def anchors(path: Path) -> set[str]:
+    text = re.sub(r"^```.*?^```$", "", path.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    headings = (
+        re.sub(r"`|\[|\]\([^)]*\)", "", line) for line in re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    )
+    return {anchor(line) for line in headings}
+
+
+@pytest.mark.parametrize(
+    "path", [*PAGES, ROOT / "README.md"], ids=lambda path: path.relative_to(ROOT).as_posix()
+)
+def test_links_to_sections_have_their_heading(path: Path) -> None:
+    for target, name in re.findall(r"\]\(([^)#:]*)#([^)]+)\)", path.read_text(encoding="utf-8")):
+        assert name in anchors((path.parent / target).resolve() if target else path), f"{target}#{name}"
