@@ -53,9 +53,8 @@ def _arm(v: Variables) -> None:
 
 
 def _planar_frames(v: Variables) -> None:
-    q, lengths = np.array([0.5, 0.8]), (v["l1"], v["l2"])
-    elbow = lengths[0] * np.array([np.cos(q[0]), np.sin(q[0])])
-    tip = elbow + lengths[1] * np.array([np.cos(q.sum()), np.sin(q.sum())])
+    q = np.array([0.5, 0.8])
+    _, elbow, tip = _planar(q)
     figure, axes = plt.subplots(figsize=(6.4, 5.2))
     _links(axes, [np.zeros(2), elbow, tip])
     axes.plot([0, 0.36], [0, 0], [elbow[0], 1.6 * elbow[0]], [elbow[1], 1.6 * elbow[1]], ls=":", color=GREY)
@@ -93,10 +92,10 @@ def _two_solutions(v: Variables) -> None:
     figure, axes = plt.subplots(figsize=(5.6, 4.2))
     target = np.array([v["x"], v["y"]])
     for (q1, q2), colour, name in zip(v["both"], (BLUE, VERMILION), ("elbow down", "elbow up"), strict=True):
-        elbow = v["l1"] * np.array([np.cos(q1), np.sin(q1)])
-        _links(axes, [np.zeros(2), elbow, target], colour)
+        points = _planar((q1, q2))
+        _links(axes, points, colour)
         side = np.array([0.0, -0.07 if q2 > 0 else 0.05])
-        axes.text(*(elbow + side), name, color=colour, ha="center")
+        axes.text(*(points[1] + side), name, color=colour, ha="center")
     axes.plot([0, target[0]], [0, target[1]], "--", color=GREY, lw=1)
     axes.text(0.5 * target[0] + 0.02, 0.5 * target[1] - 0.03, "$r$")
     axes.plot(*target, "*", ms=16, color=GREEN)
@@ -118,6 +117,127 @@ def _solutions(v: Variables) -> None:
         axes.axis("off")
     figure.subplots_adjust(0, 0, 1, 1, 0.02, 0)
     _save(figure, "3_solutions.png")
+
+
+def _planar(q: Any, lengths: tuple[float, float] = (0.5, 0.4)) -> Any:
+    """Return base, elbow and tip (3, 2) of the planar arm."""
+    elbow = lengths[0] * np.array([np.cos(q[0]), np.sin(q[0])])
+    tip = elbow + lengths[1] * np.array([np.cos(q[0] + q[1]), np.sin(q[0] + q[1])])
+    return np.array([np.zeros(2), elbow, tip])
+
+
+def _arrow(axes: Axes, start: Any, end: Any, colour: str, name: str = "", **style: Any) -> None:
+    """Draw an arrow with its name at the head."""
+    arrow = {"arrowstyle": "-|>", "color": colour, "lw": 2.2, "shrinkA": 0, "shrinkB": 0} | style
+    axes.annotate("", end, start, arrowprops=arrow, annotation_clip=False)
+    along = (np.asarray(end) - start) / np.linalg.norm(np.asarray(end) - start)
+    head = end + 0.04 * along
+    across = "center" if abs(along[0]) < 0.6 else "right" if along[0] < 0 else "left"
+    axes.text(*head, name, color=colour, ha=across, va="top" if along[1] < -0.6 else "center")
+    axes.plot(*head, alpha=0)  # the picture contains the name
+
+
+def _columns(v: Variables) -> None:
+    points = _planar([0.4, 1.0])
+    figure, axes = plt.subplots(figsize=(5.4, 4.4))
+    _links(axes, points)
+    J = v["by_hand"]
+    for joint, colour in ((0, BLUE), (1, VERMILION)):
+        axes.plot(*points[[joint, 2]].T, ":", color=colour, lw=1.4)
+        _arrow(axes, points[2], points[2] + 0.6 * J[:, joint], colour, f"column {joint + 1}")
+    axes.text(points[0, 0], points[0, 1] - 0.06, "shoulder", color=BLUE, ha="center")
+    axes.text(points[1, 0] + 0.09, points[1, 1] - 0.03, "elbow", color=VERMILION, ha="center")
+    _plain(axes)
+    _save(figure, "4_columns.svg")
+
+
+def _ellipses(v: Variables) -> None:
+    figure, axes = plt.subplots(figsize=(8.4, 3.2))
+    engine = dynx.backend("reference", v["planar"])
+    circle = np.array([[np.cos(t), np.sin(t)] for t in np.linspace(0, 2 * np.pi, 200)])
+    for place, (elbow, colour) in enumerate(((1.8, GREEN), (0.9, BLUE), (0.15, VERMILION))):
+        q = np.array([0.9 - elbow / 2, elbow])
+        J = engine.jacobian(q, "tip")[:2]
+        points = _planar(q) + np.array([1.1 * place, 0.0])
+        _links(axes, points)
+        ellipse = points[2] + 0.25 * circle @ J.T
+        axes.fill(*ellipse.T, color=colour, alpha=0.35)
+        axes.text(1.1 * place + 0.1, -0.16, f"elbow {elbow} rad", color=colour)
+    _plain(axes)
+    _save(figure, "4_ellipses.svg")
+
+
+def _rod(v: Variables) -> None:
+    figure, axes = plt.subplots(figsize=(4.6, 4.4))
+    q, length = 0.7, 0.5
+    end = length * np.array([np.sin(q), -np.cos(q)])
+    _links(axes, [np.zeros(2), end])
+    axes.plot([0, 0], [0, -0.55], ":", color=GREY)
+    _angle(axes, np.zeros(2), -np.pi / 2, -np.pi / 2 + q, 0.17, "$q$")
+    centre = 0.5 * end
+    axes.plot(*centre, "o", color="black")
+    _arrow(axes, centre, (centre[0], centre[1] - 0.22), VERMILION, "$m g$")
+    axes.plot([0, centre[0]], [0.06, 0.06], color=BLUE, lw=1.5, marker="|")
+    axes.plot([centre[0]] * 2, [0.06, centre[1]], ":", color=BLUE)
+    axes.text(centre[0] / 2, 0.085, "lever arm $c\\,\\sin q$", color=BLUE, ha="center")
+    axes.text(0.6 * centre[0] + 0.045, 0.6 * centre[1] + 0.02, "$c$", ha="center")
+    turn = np.linspace(0.75 * np.pi, 1.4 * np.pi, 40)
+    axes.plot(0.09 * np.cos(turn), 0.09 * np.sin(turn), color=GREEN, lw=2)
+    _arrow(axes, 0.09 * np.array([np.cos(turn[-2]), np.sin(turn[-2])]), [-0.026, -0.09], GREEN)
+    axes.text(-0.13, 0.0, r"$\tau$", color=GREEN, fontsize=13)
+    _plain(axes)
+    _save(figure, "5_rod.svg")
+
+
+def _swings(v: Variables) -> None:
+    figure, axes = plt.subplots(figsize=(8.4, 3.0))
+    t = v["h"] * np.arange(1, 10_001)
+    for (name, angles), colour in zip(v["swings"].items(), (GREY, VERMILION, None, BLUE), strict=True):
+        if colour:
+            axes.plot(t[::10], angles[::10], color=colour, label=name)
+    axes.set(xlabel="time [s]", ylabel="angle [rad]", xlim=(0, 10), ylim=(-1.15, 1.75))
+    axes.legend(frameon=False, ncols=3, loc="upper center")
+    axes.spines[["top", "right"]].set_visible(False)
+    _save(figure, "5_swings.svg")
+
+
+def _cycloid(v: Variables) -> None:
+    t = np.linspace(0.0, 2.0, 401)
+    figure, panels = plt.subplots(3, 1, figsize=(7.2, 5.0), sharex=True)
+    setpoint = v["motion"](t)
+    rows = zip(panels, setpoint, ("position [rad]", "speed [rad/s]", "acceleration [rad/s²]"), strict=True)
+    for axes, values, name in rows:
+        axes.plot(t, values[:, 2], color=BLUE, label="cycloid")
+        axes.set_ylabel(name, fontsize=9)
+        axes.spines[["top", "right"]].set_visible(False)
+    jump = [0.0, 0.0, 1.0, 1.0]
+    panels[0].plot([-0.2, 0.0, 0.0, 2.0], jump, "--", color=VERMILION, label="jump")
+    for axes, low, high in ((panels[1], 0.0, 1.0), (panels[2], -1.6, 1.6)):
+        _arrow(axes, (0.0, 0.0), (0.0, high), VERMILION, lw=1.5, ls="--")
+        if low:
+            _arrow(axes, (0.0, 0.0), (0.0, low), VERMILION, lw=1.5, ls="--")
+        axes.text(0.03, 0.88 * (low or high), "without bound", color=VERMILION, fontsize=8)
+    panels[0].legend(frameon=False, loc="lower right")
+    panels[2].set(xlabel="time [s]", xlim=(-0.2, 2.0))
+    figure.align_ylabels()
+    _save(figure, "6_cycloid.svg")
+
+
+def _paths(v: Variables) -> None:
+    figure, panels = plt.subplots(1, 2, figsize=(8.4, 3.6))
+    views = ((0, 1, "from above"), (1, 2, "from the side"))
+    for axes, (across, up, name) in zip(panels, views, strict=True):
+        for path, colour in (("line", BLUE), ("joints", VERMILION)):
+            points = v["paths"][path]
+            axes.plot(points[:, across], points[:, up], color=colour, label=path)
+        axes.plot(*v["ends"][:, [across, up]].T, "o", color="black", ms=4)
+        axes.set(xlabel=f"{'xyz'[across]} [m]", ylabel=f"{'xyz'[up]} [m]", title=name)
+        axes.title.set_fontsize(10)
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.spines[["top", "right"]].set_visible(False)
+    panels[0].legend(frameon=False)
+    figure.tight_layout()
+    _save(figure, "6_paths.svg")
 
 
 def _with_frames(picture: Any, camera: Any, frames: Any, name: str, length: float = 0.12) -> None:
@@ -192,4 +312,7 @@ PICTURES: dict[str, tuple[Callable[[Variables], None], ...]] = {
     "1_load_an_arm": (_arm,),
     "2_forward_kinematics": (_planar_frames, _workspace),
     "3_inverse_kinematics": (_two_solutions, _solutions),
+    "4_jacobian": (_columns, _ellipses),
+    "5_dynamics": (_rod, _swings),
+    "6_trajectory": (_cycloid, _paths),
 }
