@@ -14,7 +14,6 @@ from types import ModuleType
 
 import pytest
 
-from docs.tutorial.pages import reduced
 from dynx import backends
 from dynx.control import registry as controllers
 from dynx.sim.plants import registry as plants
@@ -70,11 +69,15 @@ def check_output(printed: str, shown: str) -> None:
             assert shape(line) in lines, f"not printed any more: {line}\n{printed}"
 
 
-@pytest.mark.parametrize("page", [page for page, text in PAGES.items() if blocks("python", text)])
+@pytest.mark.parametrize(
+    "page",
+    # Those of the tutorial run in processes of their own: tests/test_tutorial.py.
+    [page for page, text in PAGES.items() if blocks("python", text) and not page.startswith("tutorial/")],
+)
 def test_python_blocks_run_in_order_and_print_what_is_shown(
     page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    if page in ("reinforcement_learning.md", "tutorial/9_learning.md"):
+    if page == "reinforcement_learning.md":
         pytest.importorskip("stable_baselines3", reason="needs the extra train")
     monkeypatch.chdir(tmp_path)
     registries = (
@@ -89,7 +92,7 @@ def test_python_blocks_run_in_order_and_print_what_is_shown(
     try:
         for program, shown in programs(PAGES[page]):
             with redirect_stdout(io.StringIO()) as printed:
-                exec(compile(reduced(program), page, "exec", dont_inherit=True), module.__dict__)
+                exec(compile(program, page, "exec", dont_inherit=True), module.__dict__)
             check_output(printed.getvalue(), shown)
     finally:
         for (names, unregister), known in zip(registries, before, strict=True):

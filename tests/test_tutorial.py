@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from docs.tutorial.pages import STEPS, notebook, parts, program, reduced, write
+from tests.test_readme import check_output, programs
 
 PAGE = """# 1. Fall
 
@@ -82,3 +85,22 @@ def test_each_step_is_short_and_has_a_picture_a_comparison_and_an_answer(path: P
     assert page.startswith(f"# {path.stem[0]}. ")
     for wanted in ("](" + path.stem[0] + "_", "\n## What dynx adds", "\n## Exercise", "\n<details>"):
         assert wanted in page, wanted
+
+
+@pytest.mark.parametrize("path", STEPS, ids=lambda path: path.stem)
+def test_each_step_runs_alone_and_prints_what_it_shows(path: Path, tmp_path: Path) -> None:
+    """Raw calls of PyBullet act on its first client, so that a program needs a process of its own."""
+    if path.stem == "9_learning":
+        pytest.importorskip("stable_baselines3", reason="needs the extra train")
+    shown = programs(path.read_text(encoding="utf-8"))
+    end = "--- end of a block ---"
+    lines = [f"{reduced(code)}\nprint({end!r})\n" for code, _ in shown]
+    (tmp_path / "step.py").write_text("".join(lines), encoding="utf-8")
+    result = subprocess.run(
+        [sys.executable, "step.py"], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 0, result.stderr
+    printed = result.stdout.split(end)
+    assert len(printed) == len(shown) + 1
+    for output, (_, wanted) in zip(printed, shown, strict=False):
+        check_output(output, wanted)
