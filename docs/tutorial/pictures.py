@@ -18,6 +18,7 @@ from matplotlib.axes import Axes
 
 import dynx
 from docs.tutorial.pages import HOME, program
+from dynx.viewer import Viewer
 from dynx.world import Camera, Scene, SceneRobot, World, ground
 
 BLUE, VERMILION, GREEN, GREY = "#0072b2", "#d55e00", "#009e73", "#8c8c8c"
@@ -240,6 +241,39 @@ def _paths(v: Variables) -> None:
     _save(figure, "6_paths.svg")
 
 
+def _loop(v: Variables) -> None:
+    figure, axes = plt.subplots(figsize=(8.2, 2.4))
+    boxes = {"trajectory": (0.0, BLUE), "controller": (3.2, VERMILION), "arm": (6.4, GREEN)}
+    for name, (x, colour) in boxes.items():
+        axes.add_patch(plt.Rectangle((x, 0), 1.7, 0.9, fc="none", ec=colour, lw=2))
+        axes.text(x + 0.85, 0.45, name, ha="center", va="center", color=colour, fontsize=12)
+    for x, name in ((1.7, r"$q^*, \dot q^*, \ddot q^*$"), (4.9, r"torques $\tau$")):
+        _arrow(axes, (x, 0.45), (x + 1.5, 0.45), "black", lw=1.5)
+        axes.text(x + 0.72, 0.58, name, ha="center")
+    axes.plot([7.25, 7.25, 4.05], [0, -0.75, -0.75], color="black", lw=1.5)
+    _arrow(axes, (4.05, -0.75), (4.05, 0.0), "black", lw=1.5)
+    axes.text(5.65, -0.62, r"measured $q, \dot q$", ha="center")
+    axes.set(xlim=(-0.1, 8.2), ylim=(-0.9, 1.0))
+    _plain(axes)
+    _save(figure, "7_loop.svg")
+
+
+def _errors(v: Variables) -> None:
+    figure, axes = plt.subplots(figsize=(8.0, 3.4))
+    for (name, rollout), colour in zip(v["rollouts"].items(), (VERMILION, GREEN, BLUE), strict=True):
+        error = np.abs(rollout.error).max(axis=1)
+        axes.semilogy(rollout.t[10 : len(error) : 5], error[10::5], color=colour)
+        axes.text(2.02, error[-1], name, color=colour, va="center")
+    axes.set(xlabel="time [s]", ylabel="largest error of a joint [rad]", xlim=(0, 2), ylim=(1e-6, 0.2))
+    axes.spines[["top", "right"]].set_visible(False)
+    _save(figure, "7_errors.svg")
+
+
+def _motion(v: Variables) -> None:
+    with Viewer((v["rollouts"]["computed torque"], v["heavy"]["PD"])) as viewer:
+        viewer.export(HOME / "7_motion.gif")
+
+
 def _with_frames(picture: Any, camera: Any, frames: Any, name: str, length: float = 0.12) -> None:
     """Write a picture of a camera with frames (4, 4) drawn over it."""
     height, width = picture.rgb.shape[:2]
@@ -315,4 +349,5 @@ PICTURES: dict[str, tuple[Callable[[Variables], None], ...]] = {
     "4_jacobian": (_columns, _ellipses),
     "5_dynamics": (_rod, _swings),
     "6_trajectory": (_cycloid, _paths),
+    "7_control": (_loop, _errors, _motion),
 }
