@@ -19,7 +19,7 @@ author = "the developers of dynx"
 copyright = "the developers of dynx"
 release = version = _package["Version"]
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton", "math_markup"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton", "command_help", "math_markup"]
 exclude_patterns = ["schemas"]
 default_role = "py:obj"
 html_math_renderer = "mathml"

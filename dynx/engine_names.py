@@ -1,15 +1,16 @@
-"""Names of PyBullet, Pinocchio, MuJoCo and Drake, and the calls of dynx that do the same.
+"""Names of engines, roboticstoolbox and Gymnasium, and the calls of dynx that do the same.
 
 Who knows an engine types its names first: `World.stepSimulation`, `dynx.rnea`, `model.getNumJoints`. The
 AttributeError of dynx's classes and packages then names dynx's own call, or else the nearest name
-(`explained`). Names of quantities are those of the table of quantities; the others stand here.
+(`explained`), and the page for those who come from that library. Names of quantities are those of the table
+of quantities; the others stand here. docs/write_coming_from.py writes the tables of the pages from both.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from dynx.backends.quantities import QUANTITIES
+from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.errors import nearest, shown
 
 _JOINT_LIMITS = "Model.joint(name), with limits, axis and dynamics"
@@ -178,8 +179,55 @@ DRAKE = {
 }
 """Methods and classes of Drake, besides those of quantities."""
 
-TABLES = {"PyBullet": PYBULLET, "Pinocchio": PINOCCHIO, "MuJoCo": MUJOCO, "Drake": DRAKE}
+ROBOTICSTOOLBOX = {
+    "DHRobot": f"{_LOADED}; a table of Denavit and Hartenberg is not read",
+    "ERobot": _LOADED,
+    "accel": "Backend.forward_dynamics(q, v, tau)",
+    "coriolis": "Backend.coriolis_matrix(q, v)",
+    "ctraj": "dynx.trajectory.line(...), a straight line of a frame",
+    "fdyn": "dynx.simulate(model, controller, reference)",
+    "fkine": "Backend.forward_kinematics(q, frame)",
+    "fkine_all": "Backend.forward_kinematics(q)",
+    "gravload": "Backend.gravity_torque(q)",
+    "ikine_GN": "Backend.inverse_kinematics(pose, frame)",
+    "ikine_LM": "Backend.inverse_kinematics(pose, frame)",
+    "ikine_NR": "Backend.inverse_kinematics(pose, frame)",
+    "inertia": "Backend.mass_matrix(q); Model.inertial(link) is that of a link",
+    "jacob0": "Backend.jacobian(q, frame)",
+    "jacob0_dot": "Backend.jacobian_derivative(q, v, frame)",
+    "jacobe": "Backend.jacobian(q, frame, reference='local')",
+    "jtraj": "dynx.trajectory.quintic(q0, q1, duration)",
+    "mstraj": "dynx.trajectory.spline(...) or dynx.trajectory.time_optimal_path(...)",
+    "mtraj": "dynx.trajectory.quintic(q0, q1, duration) or dynx.trajectory.trapezoidal(q0, q1, duration)",
+    "qlim": "Model.lower and Model.upper",
+    "rne": "Backend.inverse_dynamics(q, v, a)",
+    "teach": "Model.view(), a page with a slider for each joint",
+}
+"""Functions and methods of roboticstoolbox."""
+
+GYMNASIUM = {
+    "VectorEnv": "gymnasium.make_vec('dynx/CartPole-v0', num_envs=1024), one compiled kernel",
+    "action_space": "gymnasium.make('dynx/CartPole-v0') after `import dynx.envs`",
+    "make": "gymnasium.make('dynx/CartPole-v0', engine='mujoco') after `import dynx.envs`",
+    "make_vec": "gymnasium.make_vec('dynx/CartPole-v0', num_envs=1024) after `import dynx.envs`",
+    "observation_space": "gymnasium.make('dynx/CartPole-v0') after `import dynx.envs`",
+}
+"""Functions, classes and attributes of Gymnasium."""
+
+TABLES = {
+    "PyBullet": PYBULLET,
+    "Pinocchio": PINOCCHIO,
+    "MuJoCo": MUJOCO,
+    "Drake": DRAKE,
+    "roboticstoolbox": ROBOTICSTOOLBOX,
+    "Gymnasium": GYMNASIUM,
+}
 """What does the same in dynx, by library and name."""
+
+
+def page_of(library: str) -> str:
+    """Return the page of the documentation for those who come from a library."""
+    return f"docs/coming-from/{library.lower()}.md"
 
 
 def call_of_dynx(name: str) -> str | None:
@@ -188,13 +236,22 @@ def call_of_dynx(name: str) -> str | None:
     for library, table in TABLES.items():
         for known, call in table.items():
             if _spelling(known) == spelling:
-                return f"; for {known} of {library} dynx has {call}"
+                return _clause(known, library, call)
     for quantity in QUANTITIES.values():
         for library, other in quantity.other_names.items():
             if _spelling(other) == spelling:
-                call = f"Backend.{quantity.name}({', '.join(quantity.arguments)})"
-                return f"; for {other} of {library} dynx has {call}"
+                return _clause(other, library, method_call(quantity))
     return None
+
+
+def method_call(quantity: Quantity) -> str:
+    """Return the call of the method of `Backend` that computes a quantity."""
+    frame = ("frame",) if "point" in quantity.options else ()
+    return f"Backend.{quantity.name}({', '.join((*quantity.arguments, *frame))})"
+
+
+def _clause(name: str, library: str, call: str) -> str:
+    return f"; for {name} of {library} dynx has {call} (see {page_of(library)})"
 
 
 def _spelling(name: str) -> str:

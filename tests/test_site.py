@@ -78,8 +78,9 @@ def targets(path: Path) -> list[str]:
     for block in re.findall(r"^```\{toctree\}\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL):
         for line in block.splitlines():
             if line and not line.startswith(":"):
-                base = DOCS if line.startswith("/") else path.parent
-                matches = base.glob(f"{line.lstrip('/')}.md")
+                target = re.sub(r".*<(.*)>", r"\1", line)  # a title stands in front
+                base = DOCS if target.startswith("/") else path.parent
+                matches = base.glob(f"{target.lstrip('/')}.md")
                 found += [each.relative_to(DOCS).as_posix() for each in matches if each != path]
     return found
 
@@ -104,3 +105,10 @@ def anchors(path: Path) -> set[str]:
 def test_links_to_sections_have_their_heading(path: Path) -> None:
     for target, name in re.findall(r"\]\(([^)#:]*)#([^)]+)\)", path.read_text(encoding="utf-8")):
         assert name in anchors((path.parent / target).resolve() if target else path), f"{target}#{name}"
+
+
+def test_every_schema_is_listed() -> None:
+    listed = re.findall(
+        r"\]\(\.\./schemas/(.*)\)", (DOCS / "reference/schemas.md").read_text(encoding="utf-8")
+    )
+    assert listed == sorted(path.name for path in (DOCS / "schemas").glob("*.json"))
