@@ -44,7 +44,7 @@ from dynx.world.scene import Scene, SceneRobot
 from dynx.world.scenery import DARK, LIGHT, Scenery
 from tests.viewer.conftest import BROWSERS, PATIENCE, SOFTWARE
 
-UNLIT = LIGHT._replace(key=0.0, fill=0.0, sky_light=1.0, ground_light=1.0)
+UNLIT = LIGHT._replace(key=0.0, fill=0.0, sky_light=1.0, ground_light=1.0, polish=0.0)
 """Light by which every surface has its own colour."""
 
 CLOSE = 3

@@ -64,7 +64,7 @@ def view(
         "--play": play or None,
     }
     check_options(kind, given)
-    moves = {"play": play and export_path is None}
+    moves = {"play": play and export_path is None, "collisions": collisions}
     opened: object
     hints: tuple[str, ...] = ()
     options: dict[str, Any]
@@ -122,9 +122,9 @@ _TABLE = ".csv"
 
 _OPTIONS = {
     "robot": ("--engine", "--base", "--q", "--collisions"),
-    "rollout": ("--shapes", "--play"),
-    "comparison of rollouts": ("--shapes", "--play"),
-    "scene": ("--engine", "--duration", "--dt", "--play"),
+    "rollout": ("--shapes", "--play", "--collisions"),
+    "comparison of rollouts": ("--shapes", "--play", "--collisions"),
+    "scene": ("--engine", "--duration", "--dt", "--play", "--collisions"),
 }
 """Options that have an effect on each kind of target."""
 

@@ -1,5 +1,5 @@
-"""Films: pictures one after the other, as files by their suffix. Imports Pillow (GIF) and imageio-ffmpeg
-(MP4)."""
+"""Films: pictures one after the other, as files by their suffix. Imports Pillow (GIF, WebP) and
+imageio-ffmpeg (MP4)."""
 
 from __future__ import annotations
 
@@ -24,6 +24,9 @@ COLOURS = 128
 SHORTEST = 20
 """Shortest time between two pictures of a GIF file that browsers keep to [ms]."""
 
+WEBP_QUALITY = 80
+"""Quality of a WebP file, from 0 to 100."""
+
 QUALITY = 8
 """Quality of an MP4 file, from 0 to 10: edges of flat colours stay sharp."""
 
@@ -34,19 +37,21 @@ def film_suffix(path: str | os.PathLike[str]) -> str:
     suffix = os.path.splitext(checked_path(path))[1].lower()
     if suffix not in WRITERS:
         name = os.path.basename(os.fspath(path))
-        raise ArgumentError(f"{shown(name)} has no suffix of a film; a film is written as .gif or .mp4")
-    if suffix == ".gif":
-        _pillow()
-    else:
+        wanted = "a film is written as .gif, .webp or .mp4"
+        raise ArgumentError(f"{shown(name)} has no suffix of a film; {wanted}")
+    if suffix == ".mp4":
         _ffmpeg()
+    else:
+        _pillow()
     return suffix
 
 
 def write_pictures(
     path: str | os.PathLike[str], pictures: Iterable[NDArray[np.uint8]], period: float
 ) -> None:
-    """Write pictures (height, width, 3) as a film that shows one every `period` [s]: ``.gif``, which begins
-    again at its end, or ``.mp4`` (H.264).
+    """Write pictures (height, width, 3) as a film that shows one every `period` [s]: ``.gif`` or ``.webp``,
+    which begin again at their end, or ``.mp4`` (H.264). A WebP file has all colours, and about a fifth of the
+    size of a GIF file.
 
     All pictures have one size; an odd number of rows or columns of an MP4 file gets one more. The first
     picture is asked for when the suffix is known to be that of a film. Raises ArgumentError for another
@@ -82,6 +87,24 @@ def _delays(count: int, period: float) -> list[int]:
     ends = np.rint(100.0 * period * np.arange(count + 1))
     delays: list[int] = np.maximum(SHORTEST, 10 * np.diff(ends)).astype(int).tolist()
     return delays
+
+
+def _webp(pictures: Iterable[NDArray[np.uint8]], period: float) -> bytes | None:
+    drawn = [_pillow().fromarray(each) for each in pictures]
+    if not drawn:
+        return None
+    stream = io.BytesIO()
+    drawn[0].save(
+        stream,
+        format="WEBP",
+        save_all=True,
+        append_images=drawn[1:],
+        duration=_delays(len(drawn), period),
+        loop=0,
+        quality=WEBP_QUALITY,
+        method=4,
+    )
+    return stream.getvalue()
 
 
 def _mp4(pictures: Iterable[NDArray[np.uint8]], period: float) -> bytes | None:
@@ -128,13 +151,14 @@ def _encoding() -> Iterator[None]:
 
 WRITERS: dict[str, Callable[[Iterable[NDArray[np.uint8]], float], bytes | None]] = {
     ".gif": _gif,
+    ".webp": _webp,
     ".mp4": _mp4,
 }
 """Functions that return the content of a file, by its suffix; None without a picture."""
 
 
 def _pillow() -> Any:
-    with importing("a film as .gif needs Pillow: pip install 'dynx[film]'"):
+    with importing("a film as .gif or .webp needs Pillow: pip install 'dynx[film]'"):
         from PIL import Image
     return Image
 

@@ -108,11 +108,20 @@ class Camera:
         return np.asarray(columns, np.float64), np.asarray(rows, np.float64)
 
 
+class DrawnTriangles(NamedTuple):
+    """A surface that is only drawn, such as an arrow: it casts no shadow."""
+
+    vertices: Floats
+    """Corners (n, 3) [m]."""
+    faces: NDArray[np.intp]
+    """Numbers of the corners of each triangle (m, 3)."""
+
+
 class DrawnShape(NamedTuple):
     """A shape, its colour, its pose in the world (4, 4), and the number of its part."""
 
     part: int
-    shape: Shape
+    shape: Shape | DrawnTriangles
     rgba: tuple[float, float, float, float]
     T: Floats
     painted: bool = True

@@ -80,8 +80,13 @@ class PartVisibility:
                 if name in self._opacity
                 for node in nodes
             }
-            self._element.content = opacities_element(paths)
+            self._element.content = self._page.elements["opacities"] = opacities_element(paths)
             self._show_values()
+
+    @property
+    def opacities(self) -> dict[str, float]:
+        """Factor of the opacity of each part that is changed: 0 for one that is hidden."""
+        return self._opacity | dict.fromkeys(self._drawn.hidden, 0.0)
 
     def _named(self, part: str | None) -> list[str]:
         if part is not None and part not in self._drawn.parts:

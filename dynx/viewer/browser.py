@@ -28,6 +28,7 @@ from typing import Any, Literal, NamedTuple, Union, get_args, get_origin, get_ty
 
 from dynx.files.temporary import temporary_folder, writing_in
 from dynx.viewer.library import CLIENT
+from dynx.world.scenery import ROUGHNESS
 
 LOOPBACK_NAMES = ("localhost", "127.0.0.1", "::1")
 
@@ -329,15 +330,27 @@ _PRESSES = """
 """Lets viser prevent the default of a press on a part that is dragged: react-three-fiber listens passively,
 and a browser then reports an error."""
 
-_OWN_COLOURS = """
+_OWN_COLOURS = (
+    f"const ROUGHNESS = {ROUGHNESS};"
+    + """
   setInterval(() => {
     const page = window.__viserMutable, renderer = page?.scene?.__r3f?.root?.getState?.()?.gl;
-    if (!renderer || renderer.toneMapping === 0) return;
+    if (!renderer) return;
+    let changed = renderer.toneMapping !== 0;
     renderer.toneMapping = 0;
-    page.requestRender?.();
-  }, 50);
+    page.scene.traverse((each) => {
+      for (const material of each.isMesh ? [each.material].flat() : []) {
+        if (!material.isMeshStandardMaterial || material.roughness === ROUGHNESS) continue;
+        material.roughness = ROUGHNESS;
+        changed = true;
+      }
+    });
+    if (changed) page.requestRender?.();
+  }, 100);
 """
-"""Shows colours as they are: react-three-fiber makes them greyer, as films of analogue cameras do."""
+)
+"""Shows colours as they are, where react-three-fiber makes them greyer, as films of analogue cameras do, and
+the gloss of pictures."""
 
 # A program is not told what the pointer is over. Where a version of viser keeps its scene elsewhere, no name
 # is shown.
@@ -629,21 +642,27 @@ def names_element(names: Mapping[str, str]) -> str:
 
 
 def standalone(
-    page: str, title: str, names: Mapping[str, str], *, legend: str = "", software: bool = False
+    page: str,
+    title: str,
+    names: Mapping[str, str],
+    *,
+    legend: str = "",
+    software: bool = False,
+    elements: str = "",
 ) -> str:
     """Return a page of viser's that needs no server, with a title, the names of parts by the paths of their
-    nodes, and HTML that is laid over the corner of the picture.
+    nodes, HTML that is laid over the corner of the picture, and the elements of coloured text and of opacity.
 
     With `software` the page does not say that software draws it: its meshes were reduced for that.
     """
     policy = ContentPolicy("data: blob:")
-    page = _guarded(page, _OWN_COLOURS + _NAMES_ON_HOVER, policy)
+    page = _guarded(page, _OWN_COLOURS + _NAMES_ON_HOVER + _BEFORE_PICTURES, policy)
     meta = f'<meta http-equiv="Content-Security-Policy" content="{escape(policy.text(), quote=True)}">'
     page = page.replace("<head>", f"<head>{meta}", 1)
     body = page.rfind("</body>")
     if body < 0:
         return page
-    added = names_element(names)
+    added = names_element(names) + elements
     if legend:
         added += f'<div style="{_LEGEND_STYLE}">{legend}</div>'
     if software:

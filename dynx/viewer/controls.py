@@ -310,7 +310,7 @@ class Controls:
     ) -> Mark:
         """Write text at a position (3,) [m] in the world, with a colour and a size of the letters [pixels].
 
-        `colour` is that of `line`; with one, exported pages leave the text out.
+        `colour` is that of `line`.
         """
         label = _checked_label("text", text)
         point = checked_vector("position", position)
@@ -331,6 +331,7 @@ class Controls:
             self._texts = self._page.gui.add_html(texts_element(self._written), order=math.inf)
         else:
             self._texts.content = texts_element(self._written)
+        self._page.elements["texts"] = texts_element(self._written)
 
     def line(
         self,

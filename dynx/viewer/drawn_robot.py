@@ -531,6 +531,11 @@ class DrawnScene(DrawnParts):
             if link != name and link in drawn.links:
                 drawn.set_visible(link, visible)
 
+    @property
+    def seen_models(self) -> dict[str, Model]:
+        """The robots as pictures show them: with their collision shapes where these are shown."""
+        return {name: robot.seen_model for name, robot in self.robots.items()}
+
     def show(self, *, visuals: bool, collisions: bool) -> None:
         """Show or hide the visual shapes and the collision shapes of the robots."""
         for robot in self.robots.values():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from html import escape
 from typing import NamedTuple
@@ -26,17 +26,21 @@ from dynx.spatial.so3 import rotation_from_rpy
 from dynx.steppers.camera import Camera, DrawnShape
 from dynx.viewer.browser import standalone
 from dynx.viewer.colours import GREY, SKY_BLUE
-from dynx.viewer.drawn_robot import size_of
+from dynx.viewer.drawn_robot import GHOST_OPACITY, size_of
 from dynx.viewer.framing import (
     SHARE,
+    VIEW_DIRECTION,
     box_around,
     fitted_view,
     ground_height,
     has_ground,
+    has_plane,
     points_around,
     tile_for,
 )
+from dynx.viewer.lettering import length_text, write_caption, write_words
 from dynx.viewer.motion import MotionFrames
+from dynx.viewer.node_shapes import NodeShapes
 from dynx.viewer.page import Page
 from dynx.world.camera import cast_rays_smoothly, png_bytes
 from dynx.world.scenery import DARK, LIGHT, TILE, Scenery
@@ -58,7 +62,14 @@ _STICK_RADIUS = 0.015
 Progress = Callable[[int], object]
 """Called with the number of pictures that are drawn."""
 
-_OPAQUE_SKY_BLUE: Colour = (SKY_BLUE[0] / 255.0, SKY_BLUE[1] / 255.0, SKY_BLUE[2] / 255.0, 1.0)
+_CLEAR_SKY_BLUE: Colour = (SKY_BLUE[0] / 255.0, SKY_BLUE[1] / 255.0, SKY_BLUE[2] / 255.0, GHOST_OPACITY)
+
+NodesAt = Callable[[float, Camera], NodeShapes]
+"""What is seen beside the parts at a time [s] after the start, by a camera."""
+
+
+def _no_nodes(time: float, camera: Camera) -> NodeShapes:
+    return NodeShapes()
 
 
 class Stage(NamedTuple):
@@ -70,46 +81,62 @@ class Stage(NamedTuple):
     """Edge of the tiles of the ground [m]."""
     floor: float | None = None
     """Height [m] of a ground that is added; None for motions with a ground of their own."""
+    caption: str = ""
+    """Text in the corner."""
+    opacities: Mapping[str, float] = {}
+    """Factors of the opacity of the parts of the first motion; 0 for one that is hidden."""
 
 
-def stage_for(motion: MotionFrames, size: tuple[int, int] = SIZE, *, dark: bool = False) -> Stage:
-    """Return a stage whose camera sees a motion from the direction in which the page begins."""
+def stage_for(
+    motion: MotionFrames,
+    size: tuple[int, int] = SIZE,
+    *,
+    dark: bool = False,
+    camera: Camera | None = None,
+    direction: Floats = VIEW_DIRECTION,
+) -> Stage:
+    """Return a stage whose camera sees a motion from a direction (3,), by default that in which the page
+    begins, or a stage for the `camera` given."""
     low, high = box_around(motion.poses, motion.bodies, motion.robots)
-    points = points_around(motion.poses, motion.bodies, motion.robots)
-    upward = SHARE * math.tan(0.5 * Camera.field_of_view)
-    camera = Camera.look_at(*fitted_view(points, upward * size[0] / size[1], upward), size=size)
+    if camera is None:
+        points = points_around(motion.poses, motion.bodies, motion.robots)
+        upward = SHARE * math.tan(0.5 * Camera.field_of_view)
+        eye, target = fitted_view(points, upward * size[0] / size[1], upward, direction)
+        camera = Camera.look_at(eye, target, size=size)
     floor = None if has_ground(motion.bodies) else ground_height(low, motion.robots)
-    return Stage(camera, DARK if dark else LIGHT, tile_for(low, high), floor)
+    tile = tile_for(low, high)
+    # The ground of a height field has no tiles.
+    tiled = floor is not None or any(has_plane(body) for body in motion.bodies)
+    caption = f"large tile: {length_text(tile)}" if tiled else ""
+    return Stage(camera, DARK if dark else LIGHT, tile, floor, caption)
 
 
-def picture_of(motions: tuple[MotionFrames, ...], time: float, stage: Stage) -> NDArray[np.uint8]:
-    """Return colours (height, width, 3) of motions at a time [s]; all but the first are sky blue, and without
-    a shadow."""
-    groups: list[list[DrawnShape]] = []
+def picture_of(
+    motions: tuple[MotionFrames, ...], time: float, stage: Stage, beside: NodeShapes | None = None
+) -> NDArray[np.uint8]:
+    """Return colours (height, width, 3) of motions at a time [s], with what is seen `beside` their parts; all
+    but the first motion are see-through, sky blue, and without a shadow."""
+    solid: list[DrawnShape] = []
+    clear: list[DrawnShape] = []
     for number, motion in enumerate(motions):
         poses = motion.at(motion.frame_at(time))
-        groups.append(
-            [
-                DrawnShape(
-                    0,
-                    shape,
-                    rgba if number == 0 else _OPAQUE_SKY_BLUE,
-                    poses.get(part, np.eye(4)) @ T,
-                    painted=number == 0,
-                )
-                for part, shape, rgba, T in _shapes(motion)
-                if rgba[3] > 0.0 and (part in poses or number == 0)
-            ]
-        )
+        for part, shape, rgba, T in _shapes(motion):
+            if number > 0 and part not in poses:
+                continue
+            opacity = rgba[3] * stage.opacities.get(part, 1.0)
+            seen = (rgba[0], rgba[1], rgba[2], opacity) if number == 0 else _CLEAR_SKY_BLUE
+            if opacity > 0.0:
+                drawn = DrawnShape(0, shape, seen, poses.get(part, np.eye(4)) @ T, painted=number == 0)
+                (solid if seen[3] >= 1.0 else clear).append(drawn)
     if stage.floor is not None:
         T_floor = homogeneous(np.eye(3), np.array([0.0, 0.0, stage.floor]))
-        groups[0].append(DrawnShape(0, Plane(), (*stage.scenery.ground, 1.0), np.asarray(T_floor)))
-    camera = stage.camera
-    ghosts = [shape for group in groups[1:] for shape in group]
-    drawing = cast_rays_smoothly(
-        groups[0], camera.pose.matrix, camera, stage.scenery, stage.tile, ghosts=ghosts
-    )
-    return drawing.rgb.reshape(camera.size[1], camera.size[0], 3)
+        solid.append(DrawnShape(0, Plane(), (*stage.scenery.ground, 1.0), np.asarray(T_floor)))
+    camera, beside = stage.camera, beside or NodeShapes()
+    ghosts = [*clear, *beside.shapes]
+    drawing = cast_rays_smoothly(solid, camera.pose.matrix, camera, stage.scenery, stage.tile, ghosts=ghosts)
+    rgb = drawing.rgb.reshape(camera.size[1], camera.size[0], 3)
+    rgb = write_words(rgb, beside.words, camera)
+    return write_caption(rgb, stage.caption) if stage.caption else rgb
 
 
 def write_picture(path: str | os.PathLike[str], rgb: NDArray[np.uint8]) -> None:
@@ -129,6 +156,7 @@ def write_film(
     *,
     dark: bool = False,
     stage: Stage | None = None,
+    nodes_at: NodesAt = _no_nodes,
 ) -> None:
     """Write motions as a film that lasts as long as the longest, by the suffix of the file (`.gif`, which
     begins again, or `.mp4`). Raises the errors of `write_pictures`."""
@@ -139,7 +167,9 @@ def write_film(
 
     def pictures() -> Iterator[NDArray[np.uint8]]:
         for k in range(count):
-            yield picture_of(motions, float(first.t[0]) + k * period, stage)
+            yield picture_of(
+                motions, float(first.t[0]) + k * period, stage, nodes_at(k * period, stage.camera)
+            )
             progress(k + 1)
 
     write_pictures(path, pictures(), period)
@@ -211,7 +241,8 @@ def recording_html(
         # The last picture stays for a moment before the recording begins again.
         recorder.insert_sleep(1.0 if count else 0.0)
         text = recorder.as_html(page.dark)
-    return standalone(text, title, page.part_names, legend=legend, software=page.plain)
+    added = "".join(page.elements.values())
+    return standalone(text, title, page.part_names, legend=legend, software=page.plain, elements=added)
 
 
 def write_recording(
@@ -227,7 +258,7 @@ def write_recording(
 
     Raises ArgumentError for a file that cannot be written."""
     if not checked_path(path).lower().endswith((".html", ".htm")):
-        wanted = "wanted .html (a page), .gif or .mp4 (a film) or .png (a picture)"
+        wanted = "wanted .html (a page), .gif, .webp or .mp4 (a film) or .png (a picture)"
         raise ArgumentError(f"{shown(os.path.basename(path))} has no suffix of a page; {wanted}")
     write_bytes(path, recording_html(page, show, duration, title=title, legend=legend).encode())
 

@@ -145,12 +145,16 @@ def corners_of(low: Floats, high: Floats) -> Floats:
     return np.asarray(0.5 * (low + high) + 0.5 * (high - low) * _SIGNS)
 
 
-def fitted_view(points: Floats, across: float, upward: float) -> tuple[Floats, Floats]:
-    """Return eye and target (3,) [m] of the nearest camera in the `VIEW_DIRECTION` that sees all points
-    (n, 3) [m] in the middle of its picture; `across` and `upward` are the tangents of half the angles that
-    they may take. They reach the bounds of one of these angles, and of the other one alike on both sides."""
-    right = np.array([-VIEW_DIRECTION[1], VIEW_DIRECTION[0], 0.0]) / math.hypot(*VIEW_DIRECTION[:2])
-    axes = np.stack([right, np.cross(VIEW_DIRECTION, right), VIEW_DIRECTION])
+def fitted_view(
+    points: Floats, across: float, upward: float, towards: Floats = VIEW_DIRECTION
+) -> tuple[Floats, Floats]:
+    """Return eye and target (3,) [m] of the nearest camera in a direction `towards` (3,) that sees all points
+    (n, 3) [m] in the middle of its picture.
+
+    `across` and `upward` are the tangents of half the angles that they may take. They reach the bounds of one
+    of these angles, and of the other one alike on both sides."""
+    right = np.array([-towards[1], towards[0], 0.0]) / math.hypot(*towards[:2])
+    axes = np.stack([right, np.cross(towards, right), towards])
     x, y, z = axes @ points.T
     centre, distance = [], []
     for along, tangent in ((x, across), (y, upward)):

@@ -1,5 +1,5 @@
-"""Imports of viser (the page), rich (its prints) and fast-simplification (meshes), and the start of viser's
-server."""
+"""Imports of viser (the page), rich (its prints), fast-simplification (meshes) and Pillow (words), and the
+start of viser's server."""
 
 from __future__ import annotations
 
@@ -19,12 +19,17 @@ with importing("the viewer needs viser: pip install 'dynx[viewer]' ({error})"):
     import viser
     from fast_simplification import __version__ as SIMPLIFY_VERSION
     from fast_simplification import simplify
+    from PIL import Image, ImageDraw, ImageFont
     from viser import uplot
 
 __all__ = [
     "CLIENT",
     "HOTKEYS",
     "SIMPLIFY_VERSION",
+    "Image",
+    "ImageDraw",
+    "ImageFont",
+    "nodes_by_path",
     "serve",
     "silent",
     "simplify",
@@ -67,6 +72,11 @@ def _is_not_of_a_stranger(record: logging.LogRecord) -> bool:
     error = record.exc_info[0] if record.exc_info else None
     is_text = record.getMessage() == "connection handler failed" and error is AssertionError
     return not is_text and record.getMessage() != "opening handshake failed"
+
+
+def nodes_by_path(server: Any) -> dict[str, Any]:
+    """Return the nodes of the scene of a server by their paths, those above before those below."""
+    return dict(sorted(server.scene._handle_from_node_name.items()))
 
 
 def serve(

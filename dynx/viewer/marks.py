@@ -295,11 +295,13 @@ class SceneMarks:
         self._page, self._shown = page, dict.fromkeys(self.kinds, False)
         self._marks = [Marks(page, robot) for robot in drawn.robots.values()]
 
-    def add_switches(self) -> None:
-        """Add a box for each kind, where there is a robot."""
+    def add_switches(self) -> dict[str, Any]:
+        """Add a box for each kind, where there is a robot, and return them by kind."""
+        boxes = {}
         for kind in self.kinds if self._marks else ():
-            box = self._page.gui.add_checkbox(kind, initial_value=False)
+            box = boxes[kind] = self._page.gui.add_checkbox(kind, initial_value=False)
             box.on_update(lambda _, kind=kind, box=box: self.show(kind, box.value))
+        return boxes
 
     def show(self, kind: str, shown: bool) -> None:
         """Show or hide the marks of one kind."""

@@ -6,6 +6,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from html import escape
 from typing import Any, NamedTuple
 
@@ -312,11 +313,13 @@ class MotionView:
         look: Look = AS_DESCRIBED,
         compare: bool = False,
         play: bool = False,
+        collisions: bool = False,
         title: str = "",
         notes: Sequence[str] = (),
     ) -> None:
         """With `compare` the distance between the two motions is drawn below, and a button jumps to where
-        they part; otherwise the second is a reference, which can be hidden."""
+        they part; otherwise the second is a reference, which can be hidden. `collisions` are shown at
+        once."""
         self._page, self.motion, self.ghost = page, motion, ghost
         self.title = title or motion.name
         """Name of what is shown."""
@@ -340,7 +343,7 @@ class MotionView:
         """HTML that says which of two motions is solid; empty without `compare`."""
         self._trace: Any = None
         self._curves: list[Curves] = []
-        self._add_switches(compare=compare)
+        self._add_switches(compare=compare, collisions_first=collisions)
         step = float(np.median(np.diff(motion.t))) if len(motion.t) > 1 else 1e-3
         self.timeline = Timeline(page, self.duration, step, self._show, play=play)
         self._add_curves(curves, step, compare=compare)
@@ -350,11 +353,15 @@ class MotionView:
         """The names of the part under the pointer and of that which was clicked."""
         page.look_at(points_around(motion.poses, motion.bodies, motion.robots), SHARE)
 
+    shows_both = False
+    """Collision shapes are shown instead of visual ones."""
+
     @property
     def motions(self) -> tuple[MotionFrames, ...]:
         """The motions that are shown at present."""
         seen = self.ghost is not None and self._ghost_drawn is not None and self._ghost_drawn.visible
-        return (self.motion, self.ghost) if seen and self.ghost is not None else (self.motion,)
+        first = replace(self.motion, robots=self.drawn.seen_models)
+        return (first, self.ghost) if seen and self.ghost is not None else (first,)
 
     @property
     def visuals(self) -> Mapping[str, Sequence[Any]]:
@@ -396,12 +403,12 @@ class MotionView:
 
     # -- controls -----------------------------------------------------------------------------
 
-    def _add_switches(self, *, compare: bool) -> None:
+    def _add_switches(self, *, compare: bool, collisions_first: bool) -> None:
         gui = self._page.gui
         with gui.add_folder("show"):
             if self.legend:
                 gui.add_html(self.legend)
-            collisions = gui.add_checkbox("collision shapes", initial_value=False)
+            collisions = gui.add_checkbox("collision shapes", initial_value=collisions_first)
             ghost = None
             if self.ghost is not None:
                 ghost = gui.add_checkbox("second motion" if compare else "reference", initial_value=compare)
@@ -412,7 +419,7 @@ class MotionView:
             )
             points = None if forces is None else gui.add_checkbox("contact points", initial_value=False)
             self._marks = SceneMarks(self._page, self.drawn)
-            self._marks.add_switches()
+            marks = self._marks.add_switches()
             trace = gui.add_dropdown("trace of", (_NO_PART, *self.motion.poses), initial_value=_NO_PART)
 
         def show(_: Any = None) -> None:
@@ -432,12 +439,20 @@ class MotionView:
                 if trace.value != _NO_PART:
                     self._trace = self._line(self.motion.poses[trace.value][:, :3, 3])
 
-        for box in (collisions, ghost, forces, points):
-            if box is not None:
-                box.on_update(show)
+        boxes = {
+            "collision shapes": collisions,
+            "second motion" if compare else "reference": ghost,
+            "contact forces": forces,
+            "contact points": points,
+        }
+        self.switches = {name: box for name, box in boxes.items() if box is not None}
+        for box in self.switches.values():
+            box.on_update(show)
+        self.switches |= marks
         trace.on_update(draw_trace)
         if self._ghost_drawn is not None:
             self._ghost_drawn.visible = compare
+        self.drawn.show(visuals=not collisions.value, collisions=collisions.value)
 
     def _line(self, points: Floats) -> Any:
         return self._page.scene.add_line_segments(
@@ -483,6 +498,8 @@ class MotionView:
         # There is one torque fewer than there are states; the axes of all curves are alike.
         span = (self._start, self._start + self.duration)
         for each in curves:
+            if not each.names:
+                continue
             with gui.add_folder(each.title, expand_by_default=False):
                 self._curves.append(Curves(self._page, each.title, each.t, each.values, each.names, span))
 

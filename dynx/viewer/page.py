@@ -114,6 +114,8 @@ class Page:
         """The names of parts by the paths of their nodes."""
         self.reserved_keys: dict[str, str] = {}
         """Actions of the keys that the page itself uses, by key."""
+        self.elements: dict[str, str] = {}
+        """HTML elements that exported pages have as well, by what they tell the page."""
         self._server.on_client_connect(self._watch_narrow)
         self.lock = threading.RLock()
         """Held by whoever changes what the page shows."""
@@ -273,7 +275,7 @@ class Page:
             self.check_open()
             self._end_shown()
             self.ended = threading.Event()
-            self.part_names, self.reserved_keys = {}, {}
+            self.part_names, self.reserved_keys, self.elements = {}, {}, {}
             self._client.entitle(title)
             with self.together():
                 self.scene.reset()

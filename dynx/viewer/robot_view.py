@@ -459,6 +459,11 @@ class RobotView:
         return self.model.name
 
     @property
+    def shows_both(self) -> bool:
+        """True where collision shapes are shown together with visual ones."""
+        return all(self.switches[name].value for name in ("visual shapes", "collision shapes"))
+
+    @property
     def drawn(self) -> DrawnRobot:
         """The nodes of the links."""
         return self.robot
@@ -543,14 +548,14 @@ class RobotView:
 
     def _add_switches(self, *, collisions: bool) -> None:
         gui = self._page.gui
+        names = ("visual shapes", "collision shapes", *Marks.kinds, "gravity torques", "manipulability")
+        begin = {"visual shapes": not collisions, "collision shapes": collisions}
         with gui.add_folder("show"):
-            visual = gui.add_checkbox("visual shapes", initial_value=not collisions)
-            colliding = gui.add_checkbox("collision shapes", initial_value=collisions)
-            for kind in Marks.kinds:
-                box = gui.add_checkbox(kind, initial_value=False)
-                box.on_update(lambda _, kind=kind, box=box: self._mark(kind, box))
-            torques = gui.add_checkbox("gravity torques", initial_value=False)
-            ellipsoid = gui.add_checkbox("manipulability", initial_value=False)
+            self.switches = {name: gui.add_checkbox(name, begin.get(name, False)) for name in names}
+            """The boxes that show and hide something, by what they show."""
+        visual, colliding, *marks, torques, ellipsoid = self.switches.values()
+        for kind, box in zip(Marks.kinds, marks, strict=True):
+            box.on_update(lambda _, kind=kind, box=box: self._mark(kind, box))
 
         def shapes(_: Any = None) -> None:
             with self._page.lock, self._page.together():

@@ -10,7 +10,7 @@ from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, nearest, shown
@@ -18,7 +18,7 @@ from dynx.files.films import WRITERS
 from dynx.files.reading import checked_path
 from dynx.model import Model
 from dynx.model.loading import load
-from dynx.model.numbers import whole_number
+from dynx.model.numbers import checked_vector, whole_number
 from dynx.spatial.scalar import Floats
 from dynx.steppers.camera import Camera
 from dynx.viewer.appearance import PartVisibility, SavedViews, camera_of, look_from
@@ -31,16 +31,17 @@ from dynx.viewer.triangles import TRIANGLE_BUDGET, has_graphics_processor
 if TYPE_CHECKING:
     from dynx.sim import Rollout
     from dynx.viewer.camera_pane import CameraPane
-    from dynx.viewer.export import EmbeddedPage
+    from dynx.viewer.export import EmbeddedPage, Stage
     from dynx.viewer.motion import MotionFrames
     from dynx.viewer.motion_view import Series
+    from dynx.viewer.node_shapes import NodeShapes
 
 
 _OPTIONS = {
     "a robot": ("q", "engine", "collisions"),
-    "a motion": ("play",),
-    "two rollouts": ("play", "names"),
-    "a world": ("loads", "play", "steps"),
+    "a motion": ("play", "collisions"),
+    "two rollouts": ("play", "names", "collisions"),
+    "a world": ("loads", "play", "steps", "collisions"),
 }
 """Options of the view of each kind of subject."""
 
@@ -65,6 +66,14 @@ class View(Protocol):
     @property
     def drawn(self) -> DrawnParts:
         """The nodes of the parts."""
+
+    @property
+    def switches(self) -> Mapping[str, Any]:
+        """The boxes of the panel that show and hide something, by what they show."""
+
+    @property
+    def shows_both(self) -> bool:
+        """True where collision shapes are shown together with visual ones."""
 
     @property
     def visuals(self) -> Mapping[str, Sequence[Any]]:
@@ -229,8 +238,18 @@ def _checked_camera(camera: object) -> Camera:
     return camera
 
 
+def _checked_size(size: object) -> tuple[int, int]:
+    if not isinstance(size, tuple | list) or len(size) != 2:
+        raise ArgumentError(f"size is {shown(size)}; wanted width and height")
+    width, height = (whole_number(f"size[{k}]", side, 1) for k, side in enumerate(size))
+    return width, height
+
+
 PICTURE_SIZE = (960, 720)
 """Width and height of an exported picture [pixels]."""
+
+FILM_SIZE = (480, 360)
+"""Width and height of an exported film [pixels]."""
 
 
 class Viewer(Controls):
@@ -352,17 +371,16 @@ class Viewer(Controls):
     def set_visible(self, part: str | None, visible: bool = True) -> None:
         """Show or hide a part, as those of `follow`; None for all. Raises ArgumentError for an unknown part.
 
-        Exported pages show what is shown; pictures and films show all parts.
+        Exported pages, pictures and films show what is shown.
         """
         self.page.check_open()
         self._appearance.set_visible(part, visible)
 
     @checks_types
     def set_opacity(self, opacity: float, part: str | None = None) -> None:
-        """Let a part, or all, be seen through in the page: 1 is as described, 0 is not seen.
+        """Let a part, or all, be seen through: 1 is as described, 0 is not seen.
 
-        Exported pages, pictures and films have the opacity of the description. Raises ArgumentError for an
-        unknown part and for an opacity that is not from 0 to 1.
+        Raises ArgumentError for an unknown part and for an opacity that is not from 0 to 1.
         """
         self.page.check_open()
         self._appearance.set_opacity(part, opacity)
@@ -442,9 +460,7 @@ class Viewer(Controls):
         Raises ArgumentError where no page is open: `World.camera` draws without a browser.
         """
         client = self._first_page()
-        if not isinstance(size, tuple | list) or len(size) != 2:
-            raise ArgumentError(f"size is {shown(size)}; wanted width and height")
-        width, height = (whole_number(f"size[{k}]", side, 1) for k, side in enumerate(size))
+        width, height = _checked_size(size)
         try:
             picture = client.camera.get_render(
                 height=height, width=width, transport_format="png", timeout=timeout
@@ -456,34 +472,114 @@ class Viewer(Controls):
         return np.asarray(np.rint(picture[..., :3] * opacity + 255.0 * (1.0 - opacity)), dtype=np.uint8)
 
     def export(
-        self, path: str | os.PathLike[str], progress: Callable[[int], object] = lambda _: None
+        self,
+        path: str | os.PathLike[str],
+        progress: Callable[[int], object] = lambda _: None,
+        *,
+        size: tuple[int, int] | None = None,
+        camera: Camera | None = None,
+        direction: ArrayLike | None = None,
     ) -> None:
         """Write what is shown to a file, by its suffix.
 
         ``.html`` shows the robot, or plays the motion, without a server and without a network; ``.gif`` and
         ``.mp4`` (extra ``film``) are films of a motion, and ``.png`` a picture, drawn without a browser
-        (`progress` is called with the number of pictures drawn). Raises ArgumentError for a live world, whose
-        motion is not known before it has happened, for another suffix, and for a file that cannot be written;
+        (`progress` is called with the number of pictures drawn). These have the `size` given, width and
+        height [pixels], and are seen from a `direction` (3,) in the world, or by a `camera`, whose size they
+        have then. They show the marks, lines and text of the page, hide the parts that it hides, and say how
+        large the tiles of the ground are.
+
+        Raises ArgumentError for a live world, whose motion is not known before it has happened, for another
+        suffix, for a file that cannot be written, and for a page whose size, camera or direction is given;
         NotInstalledError without the package that writes the film.
         """
-        from dynx.viewer.export import picture_of, stage_for, write_film, write_picture, write_recording
+        from dynx.viewer.export import write_film, write_picture, write_recording
 
         self.page.check_open()
         view = self.view
         suffix = os.path.splitext(checked_path(path))[1].lower()
         if suffix == ".png":
-            motions = view.motions
-            stage = stage_for(motions[0], PICTURE_SIZE, dark=self.page.dark)
-            write_picture(path, picture_of(motions, view.time, stage))
+            write_picture(path, self._picture(size, camera, direction))
         elif suffix in WRITERS:
             if not view.duration:
                 raise ArgumentError("a film is made of a rollout, or of two motions; write a picture as .png")
-            write_film(path, view.motions, progress, dark=self.page.dark)
+            before = view.time - float(view.motions[0].t[0])
+            stage = self._stage(size, camera, direction, FILM_SIZE)
+            write_film(path, view.motions, progress, stage=stage, nodes_at=self._nodes_at)
+            view.go_to(before)
+        elif any(given is not None for given in (size, camera, direction)):
+            raise ArgumentError("size, camera and direction are those of a picture or a film, not of a page")
         elif view.duration is None:
             raise ArgumentError("a live world cannot be exported; simulate it, and export the rollout")
         else:
             title = f"dynx: {view.title}"
             write_recording(path, self.page, view.go_to, view.duration, title=title, legend=view.legend)
+
+    def _stage(
+        self,
+        size: tuple[int, int] | None,
+        camera: Camera | None,
+        direction: ArrayLike | None,
+        usual: tuple[int, int],
+    ) -> Stage:
+        from dynx.viewer.export import stage_for
+
+        given: dict[str, Any] = {}
+        if camera is not None:
+            if size is not None or direction is not None:
+                raise ArgumentError("a camera has a size and a direction of its own: give it alone")
+            given["camera"] = _checked_camera(camera)
+        if direction is not None:
+            towards = checked_vector("direction", direction)
+            length = float(np.linalg.norm(towards))
+            if not np.hypot(*towards[:2]) > 1e-6 * length:
+                raise ArgumentError(
+                    f"direction is {towards.tolist()}; wanted one that is not along the z axis of the world"
+                )
+            given["direction"] = towards / length
+        wide, high = _checked_size(usual if size is None else size)
+        stage = stage_for(self.view.motions[0], (wide, high), dark=self.page.dark, **given)
+        # A robot's parts are its links, those of a motion have its name before them.
+        opacities = {
+            part if part in self.view.motions[0].poses else f"{self.view.title}/{part}": value
+            for part, value in self._appearance.opacities.items()
+        }
+        return stage._replace(opacities=opacities)
+
+    def _picture(
+        self, size: tuple[int, int] | None, camera: Camera | None, direction: ArrayLike | None
+    ) -> NDArray[np.uint8]:
+        """Return what is shown, drawn without a browser, as colours (height, width, 3)."""
+        from dynx.viewer.export import picture_of
+
+        stage = self._stage(size, camera, direction, PICTURE_SIZE)
+        return picture_of(self.view.motions, self.view.time, stage, self._nodes(stage.camera))
+
+    def _nodes_at(self, time: float, camera: Camera) -> NodeShapes:
+        """Return what is seen beside the parts at a time of the motion [s]."""
+        self.view.go_to(time)
+        return self._nodes(camera)
+
+    def _nodes(self, camera: Camera) -> NodeShapes:
+        from dynx.viewer.node_shapes import Words, node_shapes
+
+        with self.page.lock:
+            found = node_shapes(self.page, camera, collisions=self.view.shows_both)
+            written = tuple(
+                Words(each.text, np.array(each.point), each.colour, each.size) for each in self._written
+            )
+        return found._replace(words=(*found.words, *written))
+
+    def set_shown(self, what: str, visible: bool = True) -> None:
+        """Show or hide what the panel calls `what` below "show", such as ``"frames"``, ``"contact forces"``,
+        ``"inertia ellipsoids"`` or ``"collision shapes"``. Raises ArgumentError for what the view does not
+        have."""
+        self.page.check_open()
+        check_switches({"visible": visible})
+        switches = self.view.switches
+        if not isinstance(what, str) or what not in switches:
+            raise ArgumentError(f"the panel shows no {shown(what)}{nearest(str(what), switches)}")
+        switches[what].value = visible
 
     def embed(self, height: int = 500) -> EmbeddedPage:
         """Return the robot or the motion as a page without a server, which a notebook shows and stores.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import threading
 import time
@@ -157,8 +158,10 @@ class WorldView:
         look: Look = AS_DESCRIBED,
         play: bool = False,
         steps: bool = True,
+        collisions: bool = False,
     ) -> None:
-        """`loads(world)` returns the arguments of `World.step` that act in the next step."""
+        """`loads(world)` returns the arguments of `World.step` that act in the next step; `collisions` are
+        shown at once."""
         self._page, self.world, self._loads = page, world, loads
         self._ended = page.ended
         scene = world.scene
@@ -182,7 +185,8 @@ class WorldView:
         self._running = threading.Event()
         if not has_ground(scene.bodies):
             page.add_ground(self._size)
-        self._add_controls(moving, steps=steps)
+        self._add_controls(moving, steps=steps, collisions_first=collisions)
+        self.drawn.show(visuals=not collisions, collisions=collisions)
         self.camera = FollowingCamera(page, self.drawn)
         """The camera of the page."""
         self.names = NamedParts(page, self.drawn.parts, self.drawn.visuals)
@@ -218,6 +222,8 @@ class WorldView:
             self.names.remove()
             self.drawn.remove()
             self.drawn = self._draw_scene()
+            colliding = self.switches["collision shapes"].value
+            self.drawn.show(visuals=not colliding, collisions=colliding)
             self.camera.watch(self.drawn)
             self._marks.watch(self.drawn)
             self.names = NamedParts(self._page, self.drawn.parts, self.drawn.visuals)
@@ -237,10 +243,14 @@ class WorldView:
         """The nodes of the shapes of each part."""
         return self.drawn.visuals
 
+    shows_both = False
+    """Collision shapes are shown instead of visual ones."""
+
     @property
     def motions(self) -> tuple[MotionFrames, ...]:
         """The world in its present state."""
-        return (motion_of_state(self.world.scene, self.world.state),)
+        shown = motion_of_state(self.world.scene, self.world.state)
+        return (dataclasses.replace(shown, robots=self.drawn.seen_models),)
 
     time = 0.0
     """Time of the only frame of `motions`."""
@@ -350,7 +360,7 @@ class WorldView:
 
     # -- controls -----------------------------------------------------------------------------
 
-    def _add_controls(self, moving: list[str], *, steps: bool) -> None:
+    def _add_controls(self, moving: list[str], *, steps: bool, collisions_first: bool) -> None:
         gui = self._page.gui
         with gui.add_folder("world"):
             # Versions of some engines begin with the name of the engine.
@@ -364,11 +374,11 @@ class WorldView:
             self._factor = gui.add_slider("speed", 0.05, 2.0, step=0.05, initial_value=1.0, visible=steps)
             self._message = gui.add_text("error", "", multiline=True, disabled=True, visible=False)
         with gui.add_folder("show"):
-            collisions = gui.add_checkbox("collision shapes", initial_value=False)
+            collisions = gui.add_checkbox("collision shapes", initial_value=collisions_first)
             forces = gui.add_checkbox("contact forces", initial_value=True)
             points = gui.add_checkbox("contact points", initial_value=False)
             self._marks = SceneMarks(self._page, self.drawn)
-            self._marks.add_switches()
+            marks = self._marks.add_switches()
         with gui.add_folder("pull and push", visible=steps):
             self._part = gui.add_dropdown("part", (_NO_PART, *moving), initial_value=_NO_PART)
             self._pull = gui.add_checkbox("pull by a spring", initial_value=False)
@@ -402,9 +412,10 @@ class WorldView:
                 self._report("")
                 self.push(self._part.value, impulse.value)
 
-        collisions.on_update(show)
-        forces.on_update(show)
-        points.on_update(show)
+        self.switches = {"collision shapes": collisions, "contact forces": forces, "contact points": points}
+        for box in self.switches.values():
+            box.on_update(show)
+        self.switches |= marks
         self._part.on_update(hold)
         self._pull.on_update(hold)
         push.on_click(pushed)

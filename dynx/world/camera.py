@@ -27,7 +27,7 @@ from dynx.model.geometry.ray_casting import cast_on_shape
 from dynx.rbd.kinematics import link_poses
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import inverse
-from dynx.steppers.camera import Camera, Draw, Drawing, DrawnShape
+from dynx.steppers.camera import Camera, Draw, Drawing, DrawnShape, DrawnTriangles
 from dynx.steppers.state import WorldState
 from dynx.world.boxes import shape_box
 from dynx.world.scene import Scene
@@ -149,7 +149,7 @@ class DepthBuffer:
         self.factors: Floats | None = None
         """Factors (n, 3) of the colours of shapes, from images and corners; None where all are 1."""
 
-    def draw(self, number: int, shape: Shape, T: Floats, *, painted: bool = False) -> None:
+    def draw(self, number: int, shape: Shape | DrawnTriangles, T: Floats, *, painted: bool = False) -> None:
         """Draw a shape at the pose T (4, 4) in the frame of the camera, scale excluded; a mesh that is
         `painted` with its normals, its image, and the colours of its corners."""
         if painted and isinstance(shape, Mesh):
@@ -157,8 +157,11 @@ class DepthBuffer:
             vertices = surface.vertices @ T[:3, :3].T + T[:3, 3]
             self._draw_triangles(number, vertices, surface.faces, _Paint(surface, T[:3, :3]))
             return
-        if isinstance(shape, Mesh | HeightField):
-            vertices, faces = shape.triangles if isinstance(shape, Mesh) else shape.triangles()
+        if isinstance(shape, Mesh | HeightField | DrawnTriangles):
+            if isinstance(shape, DrawnTriangles):
+                vertices, faces = shape
+            else:
+                vertices, faces = shape.triangles if isinstance(shape, Mesh) else shape.triangles()
             self._draw_triangles(number, vertices @ T[:3, :3].T + T[:3, 3], faces)
             return
         if isinstance(shape, Plane):
@@ -388,7 +391,7 @@ class _Paint(NamedTuple):
         return self.surface.texture.colours(np.einsum("ij,ijk->ik", weights, self.surface.uv[number]), extent)
 
 
-SHADOW_SIDES = (160, 512)
+SHADOW_SIDES = (160, 1024)
 """Least and largest width and height of the picture from the key light, in which shadows are looked up
 [pixels]: half of those of the picture, because edges of shadows are soft."""
 
@@ -396,11 +399,30 @@ _LIGHT_DISTANCE = 12.0
 """Distance of the eye of that picture, in radii of the ball around what casts shadows; the key light itself
 is infinitely far away."""
 
-_SOFTNESS = 0.006
+_SOFTNESS = 0.009
 """Radius of the light around an edge of a shadow, in radii of that ball."""
 
-_SOFT_STEPS = np.array([[x, y] for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)])
-"""Places (9, 2) around a point at which its shadow is looked up, in units of the softness."""
+_COARSE_STEPS = np.array([[x, y] for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)])
+"""Places (9, 2) around a point at which its shadow is looked up first, in units of the softness."""
+
+_FINE_STEPS = np.array([[x, y] for x in np.linspace(-1.0, 1.0, 7) for y in np.linspace(-1.0, 1.0, 7)])
+_FINE_STEPS = _FINE_STEPS[np.hypot(*_FINE_STEPS.T) <= 1.1]
+"""Places (n, 2) at which it is looked up where not all of the coarse ones agree."""
+
+_OPEN_REACH = 0.12
+"""Distance within which surfaces hide the sky from each other, in radii of the ball around the shapes."""
+
+_OPEN_STEPS = 14
+"""Number of places around a pixel at which surfaces are looked for that hide the sky."""
+
+_OPEN_TURNS = 4
+"""Number of pixels along each side of the squares in which every pixel looks at other places."""
+
+_DARKEST = 0.3
+"""Least share of the sky's light that is left where surfaces hide it."""
+
+_RIM = 0.4
+"""Share by which a see-through surface becomes opaque where it is seen along itself: its outline shows."""
 
 
 def cast_rays(
@@ -428,32 +450,129 @@ def cast_rays_smoothly(
     """Draw shapes as `cast_rays` does, with the mean colour of four rays in pixels at edges, which are not
     jagged then, and in those of images on meshes.
 
-    `ghosts` cast no shadow, and are seen only where they are clearly nearer than the shapes; their numbers
-    follow those of the shapes. Depth and number are those of the first of the four rays, a quarter of a pixel
-    from the centre.
+    Surfaces near others get less light of the sky. `ghosts` cast no shadow and are seen only where they are
+    clearly nearer than the shapes; those whose opacity is below 1 are seen through, the nearest of them
+    alone. Their numbers follow those of the shapes, the opaque ones first. Depth and number, of what is
+    opaque, are those of the first of the four rays, a quarter of a pixel from the centre.
     """
     width, height = camera.size
     fine = replace(camera, size=(2 * width, 2 * height))
+    opaque = [each for each in ghosts if each.rgba[3] >= 1.0]
+    clear = [each for each in ghosts if each.rgba[3] < 1.0]
     buffer = _buffer_of(shapes, T_world_camera, fine)
-    if ghosts:
-        buffer.lay_over(_buffer_of(ghosts, T_world_camera, fine), len(shapes))
+    if opaque:
+        buffer.lay_over(_buffer_of(opaque, T_world_camera, fine), len(shapes))
     every = np.arange(4 * width * height).reshape(height, 2, width, 2).swapaxes(1, 2).reshape(-1, 4)
     first = every[:, 0]
+    seen = [*shapes, *opaque]
     edge = (buffer.number[every] != buffer.number[first, None]).any(axis=1)
-    flat = np.array([*(isinstance(each.shape, Plane) for each in (*shapes, *ghosts)), True])
+    flat = np.array([*(isinstance(each.shape, Plane) for each in seen), True])
     curved = np.flatnonzero(~edge & ~flat[buffer.number[first]])
     normals = buffer.normal[every[curved]]
     size = np.linalg.norm(normals, axis=2)
     bend = np.einsum("ij,ikj->ik", normals[:, 0], normals[:, 1:])
     edge[curved] = (bend < _SMOOTH * size[:, :1] * size[:, 1:]).any(axis=1)
     # An image changes within a pixel.
-    varied = np.array([*(_is_varied(each) for each in (*shapes, *ghosts)), False])
+    varied = np.array([*(_is_varied(each) for each in seen), False])
     edge |= varied[buffer.number[first]]
-    shading = _Shading([*shapes, *ghosts], shapes, T_world_camera, fine, scenery, tile)
+    openness = _openness(buffer, first, camera, _OPEN_REACH * _ball(_casting(shapes))[1])
+    shading = _Shading(seen, shapes, T_world_camera, fine, scenery, tile)
     colours = np.empty((len(every), 3))
-    colours[~edge] = shading.colours(buffer, first[~edge])
-    colours[edge] = shading.colours(buffer, every[edge].ravel()).reshape(-1, 4, 3).mean(axis=1)
+    colours[~edge] = shading.colours(buffer, first[~edge], openness[~edge])
+    colours[edge] = (
+        shading.colours(buffer, every[edge].ravel(), np.repeat(openness[edge], 4))
+        .reshape(-1, 4, 3)
+        .mean(axis=1)
+    )
+    if clear:
+        veil = _buffer_of(clear, T_world_camera, fine)
+        _lay_veil(colours, veil, buffer, every, shading._replace(shapes=clear))
     return Drawing(_bytes(colours), buffer.depth[first], buffer.number[first])
+
+
+def _lay_veil(
+    colours: Floats, veil: DepthBuffer, behind: DepthBuffer, every: Whole, shading: _Shading
+) -> None:
+    """Mix into the colours (n, 3) of pixels, with the numbers of their four rays in `every` (n, 4), what a
+    buffer of see-through shapes sees clearly nearer than another."""
+    over = (veil.depth < (1.0 - _COINCIDENT) * behind.depth) & (veil.number >= 0)
+    pixels = np.flatnonzero(over[every].any(axis=1))
+    fine = every[pixels].ravel()
+    hit = np.flatnonzero(over[fine])
+    rays, normal = veil.rays(fine[hit]), veil.normal[fine[hit]]
+    length = np.linalg.norm(normal, axis=1) * np.linalg.norm(rays, axis=1)
+    slope = np.abs(np.einsum("ij,ij->i", normal, rays)) / np.where(length > 0.0, length, 1.0)
+    opacity = np.array([each.rgba[3] for each in shading.shapes])[veil.number[fine[hit]]]
+    opacity += _RIM * (1.0 - opacity) * (1.0 - np.minimum(slope, 1.0)) ** 3
+    share = np.zeros(len(fine))
+    share[hit] = opacity
+    mixed = np.zeros((len(fine), 3))
+    mixed[hit] = opacity[:, None] * shading.colours(veil, fine[hit])
+    share, mixed = share.reshape(-1, 4).mean(axis=1), mixed.reshape(-1, 4, 3).mean(axis=1)
+    colours[pixels] = (1.0 - share[:, None]) * colours[pixels] + mixed
+
+
+def _openness(buffer: DepthBuffer, pixels: Whole, camera: Camera, reach: float) -> Floats:
+    """Return the share (n,) of the sky's light that reaches what is seen in pixels of a buffer (n,), which
+    are the pixels of a camera by rows: surfaces within `reach` [m] hide a part of it.
+
+    Only surfaces that the camera sees count (ambient occlusion in the space of the picture)."""
+    width, height = camera.size
+    lit = np.ones(width * height)
+    if not 0.0 < reach < np.inf:
+        return lit
+    depth, normal = buffer.depth[pixels], buffer.normal[pixels]
+    x, y = camera.rays()
+    rays = np.stack([np.tile(x, height), np.repeat(y, width), np.ones(width * height)], axis=1)
+    radius = reach * camera.focal_length / depth
+    # Where all that is near is within a pixel there is nothing to see.
+    seen = np.flatnonzero((buffer.number[pixels] >= 0) & (radius > 1.5))
+    points = rays[seen] * depth[seen, None]
+    unit = normal[seen]
+    length = np.linalg.norm(unit, axis=1)
+    unit = (
+        unit
+        * (
+            np.where(np.einsum("ij,ij->i", unit, points) > 0.0, -1.0, 1.0)
+            / np.where(length > 0.0, length, 1.0)
+        )[:, None]
+    )
+    column, row = seen % width, seen // width
+    turn = (column % _OPEN_TURNS + _OPEN_TURNS * (row % _OPEN_TURNS)) / _OPEN_TURNS**2
+    radius = np.minimum(radius[seen], 0.25 * height)
+    hidden = np.zeros(len(seen))
+    for k in range(_OPEN_STEPS):
+        angle = 2.0 * math.pi * (turn + 0.381966 * k)
+        away = radius * ((k + turn + 0.1) / _OPEN_STEPS)
+        other_column = np.clip(np.rint(column + away * np.cos(angle)).astype(np.intp), 0, width - 1)
+        other_row = np.clip(np.rint(row + away * np.sin(angle)).astype(np.intp), 0, height - 1)
+        other = other_row * width + other_column
+        far = depth[other]
+        with np.errstate(invalid="ignore"):
+            between = rays[other] * far[:, None] - points
+            square = np.einsum("ij,ij->i", between, between)
+            height_above = np.einsum("ij,ij->i", between, unit) / np.sqrt(np.maximum(square, 1e-18))
+            near = np.maximum(1.0 - square / reach**2, 0.0)
+            hidden += np.where(np.isfinite(far), np.maximum(height_above - 0.12, 0.0) * near, 0.0)
+    lit[seen] = np.maximum(1.0 - 2.2 * hidden / _OPEN_STEPS, _DARKEST)
+    return _blurred(lit.reshape(height, width), depth.reshape(height, width), reach).ravel()
+
+
+def _blurred(values: Floats, depth: Floats, reach: float) -> Floats:
+    """Return means (h, w) of values over the squares in which pixels look at different places, of surfaces
+    at depths that differ by less than half the `reach` [m]."""
+    total, count = values.copy(), np.ones_like(values)
+    half = _OPEN_TURNS // 2
+    for down in range(-half, half):
+        for right in range(-half, half):
+            if down == 0 and right == 0:
+                continue
+            other = np.roll(depth, (down, right), (0, 1))
+            with np.errstate(invalid="ignore"):
+                near = np.abs(other - depth) < 0.5 * reach
+            total += np.where(near, np.roll(values, (down, right), (0, 1)), 0.0)
+            count += near
+    return np.asarray(total / count)
 
 
 def _is_varied(drawn: DrawnShape) -> bool:
@@ -487,8 +606,9 @@ class _Shading(NamedTuple):
     scenery: Scenery
     tile: float
 
-    def colours(self, buffer: DepthBuffer, pixels: Whole) -> Floats:
-        """Return the colours (n, 3) of pixels (n,), from 0 to 1."""
+    def colours(self, buffer: DepthBuffer, pixels: Whole, openness: Floats | None = None) -> Floats:
+        """Return the colours (n, 3) of pixels (n,), from 0 to 1; `openness` (n,) is the share of the light of
+        the sky that reaches them."""
         if not len(pixels):
             return np.zeros((0, 3))
         rays = buffer.rays(pixels)
@@ -508,15 +628,23 @@ class _Shading(NamedTuple):
             own = np.array([each.rgba[:3] for each in self.shapes])[buffer.number[pixels]]
             if buffer.factors is not None:
                 own *= buffer.factors[pixels]
-            colours[seen] = self._surfaces(buffer.number[pixels], own, points, normal, unit, pixel)
+            free = np.ones(len(seen)) if openness is None else openness[seen]
+            colours[seen] = self._surfaces(buffer.number[pixels], own, points, normal, unit, pixel, free)
         return colours
 
     def _surfaces(
-        self, number: Whole, colours: Floats, points: Floats, normal: Floats, rays: Floats, pixel: Floats
+        self,
+        number: Whole,
+        colours: Floats,
+        points: Floats,
+        normal: Floats,
+        rays: Floats,
+        pixel: Floats,
+        openness: Floats,
     ) -> Floats:
         """Return the colours (n, 3) of points (n, 3) of shapes by their `number` (n,), with their own
         `colours` (n, 3), the unit normals and the unit rays (n, 3) by which they are seen, and the extent of
-        a pixel there (n,) [m]."""
+        a pixel there (n,) [m]; `openness` (n,) is the share of the light of the sky that is not hidden."""
         planes = [k for k, each in enumerate(self.shapes) if isinstance(each.shape, Plane)]
         slopes = {}
         for k in planes:
@@ -527,11 +655,13 @@ class _Shading(NamedTuple):
             local = (points[on] - T[:3, 3]) @ T[:3, :2]
             colours[on] *= tiles(local, self.tile, pixel[on] / np.maximum(slope, 1e-6))[:, None]
         colours = np.minimum(colours, 1.0)
-        casters = [each for each in self.casters if not isinstance(each.shape, Plane)]
         side = int(np.clip(max(self.camera.size) // 2, *SHADOW_SIDES))
-        colours *= self.scenery.light(normal, _unshadowed(casters, points, normal, side))[:, None] ** (
-            1.0 / GAMMA
-        )
+        lit = _unshadowed(_casting(self.casters), points, normal, side)
+        light = self.scenery.light(normal, lit, openness)
+        gloss = self.scenery.gloss(normal, rays, lit, openness)
+        for on, _ in slopes.values():
+            gloss[on] = 0.0
+        colours = (colours**GAMMA * light[:, None] + gloss[:, None]) ** (1.0 / GAMMA)
         for on, slope in slopes.values():
             colours[on] = self.scenery.haze(colours[on], slope)
         return np.asarray(np.clip(colours, 0.0, 1.0))
@@ -541,11 +671,7 @@ def _unshadowed(shapes: Sequence[DrawnShape], points: Floats, normal: Floats, si
     """Return the share (n,) of the key light that reaches points (n, 3) of surfaces past the shapes: 1 in the
     light, 0 in the shadow, between them at its edge."""
     lit = np.ones(len(points))
-    if not shapes:
-        return lit
-    corners = np.array([shape_box(each.shape, each.T) for each in shapes])
-    low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
-    middle, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
+    middle, radius = _ball(shapes)
     if not 0.0 < radius < np.inf:
         return lit
     angle = 2.0 * math.asin(1.0 / _LIGHT_DISTANCE)
@@ -569,15 +695,37 @@ def _unshadowed(shapes: Sequence[DrawnShape], points: Floats, normal: Floats, si
         T_light_world[:3, :3] @ (points[facing] + 2.0 * texel * normal[facing]).T + T_light_world[:3, 3:]
     )
     soft = max(1.0, _SOFTNESS * radius / texel)
-    share = np.zeros(len(facing))
-    for across, upward in soft * _SOFT_STEPS:
-        column = np.floor(light.focal_length * x / z + 0.5 * side + across).astype(np.intp)
-        row = np.floor(light.focal_length * y / z + 0.5 * side + upward).astype(np.intp)
-        inside = (column >= 0) & (column < side) & (row >= 0) & (row < side)
-        pixels = np.where(inside, row * side + column, 0)
-        share += ~inside | (z <= buffer.depth[pixels] + 2.0 * texel * soft)
-    lit[facing] = share / len(_SOFT_STEPS)
+
+    def share(chosen: Whole | slice, steps: Floats) -> Floats:
+        total = np.zeros(len(x[chosen]))
+        for across, upward in soft * steps:
+            column = np.floor(light.focal_length * x[chosen] / z[chosen] + 0.5 * side + across)
+            row = np.floor(light.focal_length * y[chosen] / z[chosen] + 0.5 * side + upward)
+            inside = (column >= 0) & (column < side) & (row >= 0) & (row < side)
+            pixels = np.where(inside, row * side + column, 0.0).astype(np.intp)
+            total += ~inside | (z[chosen] <= buffer.depth[pixels] + 2.0 * texel * soft)
+        return total / len(steps)
+
+    found = share(slice(None), _COARSE_STEPS)
+    border = np.flatnonzero((found > 0.0) & (found < 1.0))
+    found[border] = share(border, _FINE_STEPS)
+    lit[facing] = found
     return lit
+
+
+def _casting(shapes: Sequence[DrawnShape]) -> list[DrawnShape]:
+    """Return the shapes that cast shadows: planes do not."""
+    return [each for each in shapes if not isinstance(each.shape, Plane)]
+
+
+def _ball(shapes: Sequence[DrawnShape]) -> tuple[Floats, float]:
+    """Return the middle (3,) and the radius [m] of a ball around shapes; the radius is 0 without shapes."""
+    boxes = [shape_box(each.shape, each.T) for each in shapes if not isinstance(each.shape, DrawnTriangles)]
+    if not boxes:
+        return np.zeros(3), 0.0
+    corners = np.array(boxes)
+    low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
+    return 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
 
 
 def draw_picture(scene: Scene, state: WorldState, camera: Camera, draw: Draw = cast_rays) -> Picture:

@@ -35,6 +35,18 @@ TILE_CONTRAST, SUBTILE_CONTRAST = 0.075, 0.025
 _HAZE = 0.12
 """Sine of the angle between a ray and a plane below which the plane vanishes in the colour of the horizon."""
 
+_GRAZING = 0.3
+"""Share of the light around that a surface mirrors where a ray grazes it."""
+
+ROUGHNESS = 0.5
+"""Roughness of the surfaces of pages, as glTF has it, whose highlight is that of pictures."""
+
+_SHARPNESS = 2.0 / ROUGHNESS**4 - 2.0
+"""Exponent by which the highlight fades, for the roughness (Walter et al. 2007)."""
+
+_SHINE = 0.01 / ROUGHNESS**4
+"""Share of the key light in the middle of its highlight, of a surface that mirrors 0.04 of what meets it."""
+
 Colour = tuple[float, float, float]
 
 
@@ -52,21 +64,45 @@ class Scenery(NamedTuple):
     """Light on a surface that faces upwards, also in the shadow."""
     ground_light: float
     """Light on a surface that faces downwards."""
+    polish: float = 1.0
+    """Share of the light that surfaces mirror, and by which surfaces hide the sky from each other; 0 for
+    matte ones that hide nothing."""
 
-    def light(self, normal: Floats, lit: Floats) -> Floats:
+    def light(self, normal: Floats, lit: Floats, openness: Floats | float = 1.0) -> Floats:
         """Return the light (n,) on surfaces with unit normals (n, 3), whose share `lit` (n,) from 0 to 1 is
-        not in the shadow of the key light."""
+        not in the shadow of the key light, and from which `openness` of the sky and the ground is seen."""
         upward = 0.5 + 0.5 * normal[:, 2]
         ambient = self.ground_light + (self.sky_light - self.ground_light) * upward
         key, fill = (np.maximum(normal @ towards, 0.0) for towards in (KEY_DIRECTION, FILL_DIRECTION))
-        return np.asarray(ambient + self.key * key * lit + self.fill * fill, dtype=np.float64)
+        near = (ambient + self.fill * fill) * (1.0 - self.polish * (1.0 - openness))
+        return np.asarray(near + self.key * key * lit, dtype=np.float64)
+
+    def gloss(self, normal: Floats, rays: Floats, lit: Floats, openness: Floats | float = 1.0) -> Floats:
+        """Return the light (n,) that surfaces mirror to the eye, of the key light and of the sky, by their
+        unit normals and the unit rays (n, 3) that meet them; the others are those of `light`.
+
+        It is the same for all colours, strongest where a ray grazes a surface (Schlick 1994), and a wide
+        highlight where the key light is mirrored (Blinn 1977).
+        """
+        facing = -np.einsum("ij,ij->i", normal, rays)
+        mirrored = rays + 2.0 * facing[:, None] * normal
+        grazing = _GRAZING * (1.0 - np.clip(facing, 0.0, 1.0)) ** 5
+        around = self.ground_light + (self.sky_light - self.ground_light) * np.clip(
+            0.5 + mirrored[:, 2], 0.0, 1.0
+        )
+        half = KEY_DIRECTION - rays
+        half /= np.maximum(np.linalg.norm(half, axis=1), 1e-9)[:, None]
+        shine = np.maximum(np.einsum("ij,ij->i", normal, half), 0.0) ** _SHARPNESS
+        shine *= np.maximum(normal @ KEY_DIRECTION, 0.0)
+        light = grazing * around * openness + _SHINE * self.key * shine * lit
+        return np.asarray(self.polish * light, dtype=np.float64)
 
     def sky(self, rays: Floats) -> Floats:
         """Return the colours (n, 3) in the directions of unit vectors (n, 3): of the sky above the horizon,
         of haze below it."""
         height = rays[:, 2:]
         horizon, zenith, ground = (np.array(each) for each in (self.horizon, self.zenith, self.ground))
-        above = horizon + (zenith - horizon) * np.clip(height / 0.6, 0.0, 1.0)
+        above = horizon + (zenith - horizon) * np.clip(height / 0.45, 0.0, 1.0)
         below = horizon + 0.6 * (ground - horizon) * np.clip(-height / 0.6, 0.0, 1.0)
         return np.asarray(np.where(height >= 0.0, above, below), dtype=np.float64)
 

@@ -67,13 +67,26 @@ def test_pictures_of_a_gif_file_begin_at_their_times(count: int, period: float, 
     assert np.abs(np.array(ends) - period * np.arange(1, count + 1)).max() <= 0.005 + 1e-9
 
 
+def test_a_webp_file_has_the_colours_of_its_pictures_at_their_rate(tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image")
+    pictures = flat(3, 16, 16)
+    write_pictures(tmp_path / "a.webp", iter(pictures), 0.05)
+    with image.open(tmp_path / "a.webp") as film:
+        assert (film.n_frames, film.size) == (3, (16, 16))
+        for k, given in enumerate(pictures):
+            film.seek(k)
+            seen = np.asarray(film.convert("RGB")).astype(float)
+            assert film.info["duration"] == 50
+            assert np.abs(seen[8, 8] - given[0, 0]).max() < COLOUR_ERROR
+
+
 @pytest.mark.parametrize("name", ["a.avi", "a", "mp4"])
 def test_other_suffixes_are_refused_before_a_picture_is_drawn(name: str, tmp_path: Path) -> None:
     def drawn() -> Iterator[NDArray[np.uint8]]:
         raise AssertionError("a picture was drawn")
         yield
 
-    with pytest.raises(ArgumentError, match=r"\.gif or \.mp4"):
+    with pytest.raises(ArgumentError, match=r"\.gif, \.webp or \.mp4"):
         write_pictures(tmp_path / name, drawn(), 0.1)
 
 

@@ -119,7 +119,7 @@ def test_a_film_lasts_as_long_as_its_motion_and_shows_each_time_at_that_time(
     def written(path: object, pictures: Iterable[object], period: float) -> None:
         films.append((len(list(pictures)), period))
 
-    def drawn(motions: object, time: float, stage: object) -> None:
+    def drawn(motions: object, time: float, *_: object) -> None:
         times.append(time)
 
     monkeypatch.setattr(export, "write_pictures", written)

@@ -303,7 +303,10 @@ def train() -> None:
         help="Page in the browser with the episodes, their numbers and controls; on one engine or two.",
     ),
     click.option(
-        "--export", "export_path", metavar="FILE", help="Film of an episode, as .gif or .mp4 (extra film)."
+        "--export",
+        "export_path",
+        metavar="FILE",
+        help="Film of an episode, as .gif, .webp or .mp4 (extra film).",
     ),
     json_option,
     quiet_option,

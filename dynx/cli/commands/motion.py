@@ -260,7 +260,7 @@ def compare() -> None:
         help="Robot whose shapes a rollout is drawn with; a file of a rollout has none (default: the robot "
         "of `dynx robots` with that name and those joints).",
     ),
-    click.option("--collisions", is_flag=True, help="Begin with the collision shapes of a robot."),
+    click.option("--collisions", is_flag=True, help="Begin with the collision shapes of robots."),
     click.option(
         "--whole-meshes",
         is_flag=True,

@@ -319,7 +319,7 @@ def test_a_policy_of_an_engine_is_judged_on_the_task_of_gymnasium(tmp_path: Path
 def test_other_films_are_refused(folder: Path, tmp_path: Path) -> None:
     result = run("play", str(folder / "final.zip"), "--export", str(tmp_path / "film.avi"))
     assert result.exit_code == 2
-    assert "a film is written as .gif or .mp4" in result.stderr
+    assert "a film is written as .gif, .webp or .mp4" in result.stderr
 
 
 def test_documents_keep_their_schemas(tmp_path: Path) -> None:
