@@ -1,4 +1,5 @@
-"""Words in pictures: names and numbers at their points, and how large the tiles of the ground are."""
+"""Words in pictures: names and numbers at their points, and how large the tiles of the ground are. Imports
+Pillow."""
 
 from __future__ import annotations
 
@@ -8,10 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dynx.errors import importing
 from dynx.spatial.scalar import Floats
 from dynx.steppers.camera import Camera
-from dynx.viewer.library import Image, ImageDraw, ImageFont
 from dynx.viewer.node_shapes import Words
+
+with importing("words on pictures need Pillow: pip install 'dynx[viewer]'"):
+    from PIL import Image, ImageDraw, ImageFont
 
 _LETTERS = 0.021
 """Size of the letters, as a share of the height of the picture."""

@@ -1,5 +1,5 @@
-"""Imports of viser (the page), rich (its prints), fast-simplification (meshes) and Pillow (words), and the
-start of viser's server."""
+"""Imports of viser (the page), rich (its prints) and fast-simplification (meshes), and the start of viser's
+server."""
 
 from __future__ import annotations
 
@@ -19,16 +19,12 @@ with importing("the viewer needs viser: pip install 'dynx[viewer]' ({error})"):
     import viser
     from fast_simplification import __version__ as SIMPLIFY_VERSION
     from fast_simplification import simplify
-    from PIL import Image, ImageDraw, ImageFont
     from viser import uplot
 
 __all__ = [
     "CLIENT",
     "HOTKEYS",
     "SIMPLIFY_VERSION",
-    "Image",
-    "ImageDraw",
-    "ImageFont",
     "nodes_by_path",
     "serve",
     "silent",
