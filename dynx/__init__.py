@@ -169,7 +169,9 @@ if not TYPE_CHECKING:
             from dynx.registry import unknown_name
 
             raise AttributeError(unknown_name("module 'dynx'", name, __all__))
-        return getattr(import_module(_HOME[name]), name)
+        from dynx.option_names import explained
+
+        return explained(getattr(import_module(_HOME[name]), name))
 
 
 def __dir__() -> list[str]:

@@ -24,6 +24,7 @@ from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, cast
 
 from dynx.errors import DTypeError, shown
+from dynx.option_names import ANSWERS, answer
 
 T = TypeVar("T", bound=Callable[..., Any])
 
@@ -32,7 +33,8 @@ Test = Callable[[object], bool]
 
 
 def checks_types(target: T) -> T:
-    """Decorate a function, or a class for the sake of its constructor, so that its arguments are checked."""
+    """Decorate a function, or a class for the sake of its constructor, so that its arguments are checked, and
+    keywords that it does not have are answered with the right name."""
     if isinstance(target, type):
         target.__init__ = _checked(target.__init__)  # type: ignore[misc]
         return target
@@ -44,6 +46,7 @@ def _checked(function: Callable[..., Any]) -> Callable[..., Any]:
     by_name: dict[str, Test] = {}
     by_place: list[Test | None] = []
     unread = True
+    called = function.__qualname__.removesuffix(".__init__").rpartition(".")[2]
 
     def read() -> None:
         nonlocal unread
@@ -64,9 +67,14 @@ def _checked(function: Callable[..., Any]) -> Callable[..., Any]:
         for name in options:
             if name in by_name and not by_name[name](options[name]):
                 raise _wrong_type(function, name, options[name])
-        return function(*given, **options)
+        try:
+            return function(*given, **options)
+        except TypeError:
+            answer(called, function, given, options)
+            raise
 
     checked.__checks_types__ = True  # type: ignore[attr-defined]
+    setattr(checked, ANSWERS, True)
     return checked
 
 

@@ -2,8 +2,9 @@
 
 Who knows an engine types its names first: `World.stepSimulation`, `dynx.rnea`, `model.getNumJoints`. The
 AttributeError of dynx's classes and packages then names dynx's own call, or else the nearest name
-(`explained`), and the page for those who come from that library. Names of quantities are those of the table
-of quantities; the others stand here. docs/write_coming_from.py writes the tables of the pages from both.
+(`explained`), and the page for those who come from that library. So it is with arguments such as
+`timestep`, `qpos` and `mu` (`keyword_of_dynx`). Names of quantities are those of the table of quantities; the
+others stand here. docs/write_coming_from.py writes the tables of the pages from both.
 """
 
 from __future__ import annotations
@@ -228,6 +229,125 @@ TABLES = {
 def page_of(library: str) -> str:
     """Return the page of the documentation for those who come from a library."""
     return f"docs/coming-from/{library.lower()}.md"
+
+
+KEYWORDS = {
+    "T_a_b": "pose transform offset relative_pose relpose",
+    "a": "qacc accelerations qdd ddq acceleration",
+    "accelerometer": "noise errors acceleration accel acc",
+    "backends": "engine engines backend simulators",
+    "base": "fixed_base use_fixed_base floating floating_base free_flyer root_joint",
+    "bodies": "objects obstacles parts shapes",
+    "control_dt": "control_timestep control_period control_frequency",
+    "direction": "directions ray_direction ray_to to",
+    "directions": "direction ray_directions ray_to to",
+    "dt": "timestep time_step step_size delta_t h",
+    "duration": "time t t_end end_time final_time stop_time tf",
+    "engine": "backend simulator physics physics_engine plant",
+    "engines": "engine backend backends simulator simulators",
+    "field_of_view": "fov fovy",
+    "frame": "link body end_effector ee tool tip",
+    "frames": "links bodies",
+    "friction": "mu mu1 mu_static lateral_friction friction_coefficient static_friction",
+    "integrator": "method solver",
+    "joint_armature": "armature rotor_inertia",
+    "joint_damping": "damping",
+    "joint_friction": "dry_friction frictionloss coulomb",
+    "kd": "kv derivative_gain damping d velocity_gain d_gain",
+    "ki": "integral_gain i i_gain",
+    "kp": "stiffness proportional_gain p position_gain p_gain",
+    "length": "height range max_range max_distance",
+    "material": "friction mu restitution lateral_friction color colour rgba",
+    "max_force": "force max_torque effort effort_limit force_limit forcerange",
+    "mass": "density m weight",
+    "model": "robot urdf",
+    "n": "steps num_steps n_steps count",
+    "noise": "std sigma stddev standard_deviation",
+    "on": "frame link body parent part site",
+    "origins": "origin ray_from from",
+    "part": "body link name object a",
+    "payload": "load tool",
+    "plant": "engine backend simulator physics physics_engine",
+    "pose": "position pos xyz orientation quaternion quat rpy euler transform base_pose base_position origin",
+    "point_a": "pivot anchor point",
+    "position_tolerance": "tol tolerance eps ftol",
+    "pushes": "forces external_force disturbances wrenches perturbations",
+    "q": "qpos joint_positions joint_angles positions position q0 joints std sigma",
+    "q0": "qpos qpos0 q_init init_q initial_q seed initial_guess q_start start x0 q",
+    "q1": "q_end q_goal goal end qf q_target target",
+    "quat_xyzw": "quaternion quat wxyz xyzw orientation",
+    "radius": "r",
+    "rate": "frequency hz update_rate fps",
+    "reference": "trajectory path desired setpoint target",
+    "restitution": "bounce bounciness e coefficient_of_restitution",
+    "robots": "robot models model",
+    "rolling_friction": "mu_rolling",
+    "rpy": "roll pitch yaw euler angles rotation",
+    "rollouts": "n count samples batch batch_size num_samples n_rollouts num_rollouts",
+    "samples": "n count batch batch_size num_samples",
+    "seed": "random_state rng",
+    "size": "half_extents extents dimensions dims lengths width height resolution",
+    "step": "dt timestep time_step step_size",
+    "target": "position setpoint q_desired q_target velocity goal",
+    "tau": "torque torques effort efforts ctrl u qfrc_applied",
+    "torques": "torque ctrl control controls effort efforts tau action u",
+    "torsional_friction": "spinning_friction mu_spin mu2",
+    "v": "qvel velocities joint_velocities qd dq v0 velocity",
+    "v0": "qvel qvel0 qd0 dq0 v v_init initial_velocity",
+    "wrench": "force torque forces",
+    "xyz": "position pos translation p t origin",
+}
+"""Words for arguments, by the name that dynx has for them: what other libraries and textbooks call them."""
+
+MEANINGS = {
+    "accelerometer": "dynx.world.SensorErrors; so is that of the gyroscope",
+    "base": "'fixed' or 'floating'",
+    "direction": "(3,)",
+    "mass": "in kg",
+    "material": "a dynx.world.Material, such as Material(friction=0.5)",
+    "pose": "a dynx.Pose((x, y, z), (roll, pitch, yaw)) or a matrix (4, 4)",
+    "quat_xyzw": "x, y, z, w",
+    "rpy": "roll, pitch, yaw [rad]",
+    "size": "all of it, (x, y, z) [m] of a box, (width, height) of a picture",
+    "wrench": "force, then moment: (6,)",
+}
+"""What arguments are whose words mean another quantity, or one in another form."""
+
+_OF_BASE_POSE = (
+    "dynx.load(..., base_pose=...) sets that of a fixed base, the first seven of q that of a floating one"
+)
+_GRAVITY = "dynx.load(..., gravity=...) sets that of a robot, dynx.world.Scene(gravity=...) that of a scene"
+
+ELSEWHERE = {
+    "gravity g": _GRAVITY,
+    "fixed_base use_fixed_base floating floating_base": "dynx.load(..., base='fixed') or 'floating' decides",
+    "position pos pose base_pose base_position": _OF_BASE_POSE,
+    "quaternion quat": "dynx.Pose.from_matrix(((x, y, z), (qx, qy, qz, qw))) makes a pose of one",
+    "qpos qvel": "robots={name: (q, v)} has them by robot",
+    "timestep time_step dt": "dynx.World(scene, dt=...) sets it",
+}
+"""What stands for arguments that belong to another call."""
+
+
+def parameter_of(word: str, known: Iterable[str]) -> str | None:
+    """Return the one of the `known` arguments that a library or a textbook calls `word`; None without one."""
+    spelling = _spelling(word)
+    for name in known:
+        if spelling in map(_spelling, KEYWORDS.get(name, "").split()):
+            return name
+    return None
+
+
+def keyword_of_dynx(word: str, known: Iterable[str]) -> str | None:
+    """Return a clause with the one of the `known` arguments that others call `word`, or the call that has it;
+    None for another word."""
+    name = parameter_of(word, known)
+    if name is not None:
+        return f"; did you mean {shown(name)}{f', {MEANINGS[name]}' if name in MEANINGS else ''}?"
+    for words, call in ELSEWHERE.items():
+        if _spelling(word) in map(_spelling, words.split()):
+            return f"; {call}"
+    return None
 
 
 def call_of_dynx(name: str) -> str | None:

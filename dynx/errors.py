@@ -342,11 +342,17 @@ def nonblank_lines(text: object) -> list[str]:
 
 
 def nearest(wanted: object, known: Iterable[str]) -> str:
-    """Make a clause such as ``; did you mean 'tool0'?`` or, without a near name, the known names."""
+    """Make a clause such as ``; did you mean 'tool0'?`` with near names, or else those that have the wanted
+    one as a part or are a part of it; without such, the known names."""
     names, name = list(known), _written(wanted)
     if len(name) <= 200:
         lowered = {known_name.lower(): known_name for known_name in reversed(names)}
         close = difflib.get_close_matches(name.lower(), lowered, n=3, cutoff=0.55)
+        if not close and len(name) > 2:
+            parts = [
+                each for each in lowered if name.lower() in each or (len(each) > 2 and each in name.lower())
+            ]
+            close = sorted(parts, key=lambda each: abs(len(each) - len(name)))[:3]
         if close:
             return "; did you mean " + " or ".join(shown(lowered[match]) for match in close) + "?"
     if not names:

@@ -21,6 +21,7 @@ from importlib.util import find_spec
 from typing import Any, Generic, TypeVar, cast
 
 from dynx.errors import ArgumentError, DynxError, nearest, shown
+from dynx.option_names import explained
 
 Kind = TypeVar("Kind")
 Owner = TypeVar("Owner", bound=type)
@@ -65,19 +66,24 @@ class _Door:
 def moved_names(
     package: str, moved: Mapping[str, str], home: Mapping[str, str] | None = None
 ) -> Callable[[str], Any]:
-    """Return the ``__getattr__`` of a package whose public names have moved, or are imported on use.
+    """Return the ``__getattr__`` of a public package: its names may have moved, or are imported on use.
 
+    Its functions and classes, also those that it has by now, answer mistaken keywords (`explained`).
     `home` has the module of each name, as ``"package.module"`` or ``"package.module:other_name"``: the first
     look-up imports it, or a module of the package with that name. For a name of `moved` ImportError is
     raised, whose text also reaches the user of ``from package import name``, and AttributeError for any other
     name.
     """
     homes = home or {}
+    eager = vars(sys.modules[package])
+    for each in eager.get("__all__", ()):
+        if each in eager:
+            eager[each] = explained(eager[each])
 
     def getattr_of_package(name: str) -> Any:
         if name in homes:
             module, _, other = homes[name].partition(":")
-            found = getattr(import_module(module), other or name)
+            found = explained(getattr(import_module(module), other or name))
             setattr(sys.modules[package], name, found)
             return found
         if name in moved:
@@ -110,8 +116,8 @@ def unknown_name(subject: str, name: str, known: Iterable[str]) -> str:
     libraries ask every object for, are not explained."""
     if name.startswith("_"):
         return f"{subject} has no attribute {name!r}"
-    explained: str = import_module("dynx.engine_names").explained(subject, name, known)
-    return explained
+    message: str = import_module("dynx.engine_names").explained(subject, name, known)
+    return message
 
 
 class ClassRegistry(Generic[Kind]):

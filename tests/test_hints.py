@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import dynx
-from dynx.errors import ArgumentError, DTypeError
+from dynx.errors import ArgumentError, DTypeError, DynxError
 from dynx.world import Scene, World, box
 
 untyped: Any = dynx
@@ -47,6 +48,49 @@ def test_other_numbers_of_steps_are_refused(movers: list[Any], wrong: Any) -> No
 
 
 HINTS: dict[str, tuple[Callable[[], object], str]] = {
+    "a time step by the name of MuJoCo": (
+        lambda: untyped.World(Scene("s"), timestep=0.01),
+        "no setting 'timestep'; did you mean 'dt'",
+    ),
+    "gravity of a world": (lambda: untyped.World(Scene("s"), gravity=(0, 0, -1)), r"Scene\(gravity=...\)"),
+    "gravity of a simulation": (
+        lambda: untyped.simulate(ARM, gravity=(0, 0, -1), duration=0.1),
+        r"dynx.load\(..., gravity=...\)",
+    ),
+    "positions by the name of MuJoCo": (
+        lambda: untyped.simulate(ARM, qpos=ARM.neutral(), duration=0.1),
+        "did you mean 'q0'",
+    ),
+    "a coefficient of friction": (lambda: untyped.world.Material(mu=0.5), "did you mean 'friction'"),
+    "a position of a box": (
+        lambda: untyped.world.box("b", (1.0, 1.0, 1.0), position=(0, 0, 1)),
+        "SceneBody has no option 'position'; did you mean 'pose', a dynx.Pose",
+    ),
+    "half of a box": (
+        lambda: untyped.world.box("b", half_extents=(1, 1, 1)),
+        "did you mean 'size', all of it",
+    ),
+    "noise of an IMU": (lambda: untyped.world.Imu("i", "tool0", noise=0.1), "'accelerometer', dynx.world.Se"),
+    "a robot by its maker": (lambda: dynx.load("franka"), "did you mean 'panda'"),
+    "a robot by its maker and name": (lambda: dynx.load("unitree_go1"), "did you mean 'go1'"),
+    "a quaternion for a position": (
+        lambda: untyped.Pose((0.0, 0.0, 0.0, 1.0)),
+        r"shape \(4,\); wanted 3 numbers, x, y, z \[m\]; Pose.from_matrix\(\(\(x, y, z\), \(qx, qy, qz, qw",
+    ),
+    "a quaternion for angles": (
+        lambda: untyped.Pose((0.0, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0]),
+        r"wanted 3 numbers, roll, pitch, yaw \[rad\]; Pose.from_matrix",
+    ),
+    "a number for a position": (lambda: untyped.Pose(3.0), r"of shape \(\); wanted 3 numbers"),
+    "a quaternion of a pose": (lambda: untyped.Pose(quaternion=(0, 0, 0, 1)), "Pose.from_matrix"),
+    "a setting of the search": (
+        lambda: dynx.backend("reference", ARM).inverse_kinematics(
+            np.eye(4),
+            "tool0",
+            q_init=ARM.neutral(),  # type: ignore[call-overload]
+        ),
+        "inverse_kinematics has no option 'q_init'; did you mean 'q0'",
+    ),
     "a scene by its name": (
         lambda: untyped.World("stack"),
         r"wanted a Scene, such as dynx.world.read_scene\('stack'\)",
@@ -105,7 +149,7 @@ HINTS: dict[str, tuple[Callable[[], object], str]] = {
 @pytest.mark.parametrize("name", HINTS)
 def test_a_mistake_is_answered_with_the_call(name: str) -> None:
     call, message = HINTS[name]
-    with pytest.raises(ArgumentError, match=message):
+    with pytest.raises(DynxError, match=message):
         call()
 
 
@@ -135,3 +179,30 @@ def test_a_list_of_wrong_objects_is_not_said_to_be_too_many() -> None:
         untyped.diagnose([3])
     assert "one at a time" not in str(error.value)
     assert os.linesep not in str(error.value)
+
+
+OTHER_FILES = {
+    "a.sdf": ("<sdf version='1.6'><world name='w'/></sdf>", "this file is SDF, Gazebo's format"),
+    "a.world": ("<?xml version='1.0'?><sdf><model name='m'/></sdf>", "this file is SDF, Gazebo's format"),
+    "a.xml": ("<mujoco><worldbody/></mujoco>", "this file is MJCF, MuJoCo's format"),
+    "a.dae": ("<COLLADA/>", "this file is a mesh; dynx.world.mesh"),
+    "a.stl": ("solid a", "not XML.*a file .stl is a mesh; dynx.world.mesh"),
+    "a.usda": ("#usda 1.0", "not XML.*a file .usda is USD, which dynx does not read"),
+    "a.toml": ("name = 's'", r"not XML.*dynx.world.read_scene\(file\)"),
+    "a.json": ("{}", r"not XML.*dynx.world.read_scene\(file\)"),
+}
+"""Files of other formats, and what each is said to be where a URDF is wanted."""
+
+
+@pytest.mark.parametrize("name", OTHER_FILES)
+def test_a_file_of_another_format_is_said_to_be_one(name: str, tmp_path: Path) -> None:
+    text, message = OTHER_FILES[name]
+    (tmp_path / name).write_text(text)
+    with pytest.raises(DynxError, match=message):
+        dynx.load(tmp_path / name)
+
+
+@pytest.mark.parametrize("name", ["no.sdf", "no.stl", "no.usd"])
+def test_a_scene_of_another_format_is_said_to_be_one(name: str) -> None:
+    with pytest.raises(DynxError, match=f"a file of a scene ends in .toml.*a file {name[2:]} is "):
+        dynx.world.read_scene(name)

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+import pickle
+from abc import ABCMeta
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, is_dataclass, replace
+from functools import partial
 from typing import Any
 
 import pytest
 
 import dynx
+from dynx.engine_names import KEYWORDS, keyword_of_dynx, parameter_of
 from dynx.errors import ArgumentError, UnknownNameError
 from dynx.option_names import checks_option_names, takes
 from dynx.sim.scenario.options import option
 from dynx.steppers.forces import ExternalForce
-from dynx.world import Scene, World, box
+from dynx.world import Material, Scene, World, box
+from tests.random_calls.calls import public_modules
 
 
 @pytest.fixture(scope="module")
@@ -126,3 +131,87 @@ def test_a_field_that_is_missing_or_unknown_names_the_class() -> None:
         ExternalForce(on="tip", wrench=[0.0] * 6, at_time=1.0)  # type: ignore[call-arg]
     with pytest.raises(UnknownNameError, match="'self'"):
         act(self=1, duration=1.0)  # type: ignore[call-arg]
+
+
+def public() -> Iterator[tuple[str, Callable[..., Any], bool]]:
+    """Yield the name of each public function, class and method, itself, and whether it must answer a
+    mistaken keyword, by the rule of `dynx.option_names.explained`. Objects of methods are not initialised."""
+    for module in public_modules():
+        for name in getattr(module, "__all__", ()):
+            value = getattr(module, name)
+            full = f"{module.__name__}.{name}"
+            if inspect.isfunction(value):
+                yield full, value, True
+            if not isinstance(value, type) or issubclass(value, BaseException) or inspect.isabstract(value):
+                continue
+            result = is_dataclass(value) and not has_options(value.__init__)
+            yield full, value, inspect.isfunction(value.__init__) and not result
+            for holder in value.__mro__:
+                for own, member in vars(holder).items():
+                    function = inspect.unwrap(getattr(member, "__func__", member))
+                    if own.startswith("_") or not inspect.isfunction(function):
+                        continue
+                    explained = holder.__module__.startswith("dynx") and not isinstance(holder, ABCMeta)
+                    method = getattr(value, own)
+                    explained &= has_options(function) and not issubclass(holder, tuple)
+                    if inspect.isfunction(method) and explained:
+                        method = partial(method, object.__new__(value))
+                    yield f"{full}.{own}", method, explained
+
+
+def has_options(function: Any) -> bool:
+    return bool(function.__defaults__ or function.__kwdefaults__)
+
+
+def parameters_of(function: Any) -> Mapping[str, inspect.Parameter]:
+    """Return the parameters of a function or class; none of a class that nobody knows those of."""
+    try:
+        return inspect.signature(function).parameters
+    except ValueError:
+        return {}
+
+
+def test_everything_public_answers_a_misspelt_keyword_with_the_right_one() -> None:
+    silent: dict[str, str] = {}
+    answered = set()
+    for full, function, explained in public():
+        names = [
+            name
+            for name, each in parameters_of(function).items()
+            if each.kind in (each.POSITIONAL_OR_KEYWORD, each.KEYWORD_ONLY) and len(name) > 3
+        ]
+        if not explained or not names:
+            continue
+        wrong = names[0][:2] + names[0][1:]
+        try:
+            function(**{wrong: None})
+        except UnknownNameError as error:
+            answered.add(full)
+            if f"did you mean {names[0]!r}" not in str(error):
+                silent[full] = str(error)
+        except Exception as error:
+            silent[full] = f"{type(error).__name__}: {error}"
+        else:
+            silent[full] = "returns"
+    assert silent == {}
+    assert len(answered) > 150
+
+
+def test_words_of_other_libraries_name_the_argument() -> None:
+    """Each argument of the table is one of something public."""
+    names = {name for _, function, _ in public() for name in parameters_of(function)}
+    assert set(KEYWORDS) - names == set()
+    for name, words in KEYWORDS.items():
+        for word in words.split():
+            assert parameter_of(word, [name]) == name
+            assert f"did you mean {name!r}" in str(keyword_of_dynx(word, ["nothing", name]))
+
+
+def test_a_public_class_keeps_its_signature_its_pickle_and_its_copy() -> None:
+    for made in (dynx.Pose((1.0, 2.0, 3.0)), Material(friction=0.3), dynx.Noise(q=0.1)):
+        assert pickle.loads(pickle.dumps(made)) == made
+        assert replace(made) == made
+    assert list(inspect.signature(dynx.Pose).parameters) == ["xyz", "rpy"]
+    assert pickle.loads(pickle.dumps(dynx.world.box)) is dynx.world.box
+    with pytest.raises(UnknownNameError, match="Pose has no option 'rotation'; did you mean 'rpy'"):
+        replace(dynx.Pose(), rotation=(0.0, 0.0, 0.0))  # type: ignore[call-arg]

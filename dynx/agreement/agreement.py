@@ -42,7 +42,6 @@ from dynx.model import Model, Pose
 from dynx.model.loading import load
 from dynx.model.numbers import checked_seed, whole_number
 from dynx.model.tree import Base
-from dynx.option_names import checks_option_names
 
 DEFAULT_SAMPLES = 16
 DEFAULT_REFEREE_SAMPLES = 2
@@ -57,7 +56,6 @@ IDENTITY_SAMPLES = 4
 Progress = Callable[[str], None]
 
 
-@checks_option_names
 @checks_types
 def agree(
     model: Model | str | Path,

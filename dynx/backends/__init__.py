@@ -6,6 +6,8 @@ backend of that name is first used.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from dynx.backends.base import Backend
 from dynx.backends.derived import DerivedBackend, native_quantities
 from dynx.backends.registry import (
@@ -16,6 +18,7 @@ from dynx.backends.registry import (
     register,
     unregister,
 )
+from dynx.registry import moved_names
 
 __all__ = [
     "Backend",
@@ -28,3 +31,7 @@ __all__ = [
     "register",
     "unregister",
 ]
+
+# Hidden from type checkers, which would take any name for an attribute.
+if not TYPE_CHECKING:
+    __getattr__ = moved_names(__name__, {})

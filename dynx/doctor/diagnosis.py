@@ -70,7 +70,6 @@ from dynx.model.loading import read_description
 from dynx.model.numbers import is_real
 from dynx.model.tree import Base, checked_base
 from dynx.model.xml.source import XmlSource
-from dynx.option_names import checks_option_names
 from dynx.rules import LEVELS, CallingRule, Case, Detection, Level, Rule, all_rules
 from dynx.rules.case import end_of
 from dynx.rules.geometry import is_found, is_found_above, named_meshes, parts_with_meshes, reason_unread
@@ -392,7 +391,6 @@ Robot = str | os.PathLike[str] | bytes | Model
 
 
 @checks_types
-@checks_option_names
 def diagnose(
     robot: Robot,
     *,

@@ -9,10 +9,13 @@ A task says what is observed, done and rewarded; the engine moves the robot. doc
 of your own. Needs the extra ``envs``.
 """
 
+from typing import TYPE_CHECKING
+
 from dynx.envs.environment import TaskEnvironment
 from dynx.envs.randomization import Randomization
 from dynx.envs.registration import make_environment, register_task, register_tasks
 from dynx.envs.task import Episode, Episodes, Outcome, RobotTask, State, Task, WorldTask
+from dynx.registry import moved_names
 
 __all__ = [
     "Episode",
@@ -29,3 +32,7 @@ __all__ = [
 ]
 
 register_tasks()
+
+# Hidden from type checkers, which would take any name for an attribute.
+if not TYPE_CHECKING:
+    __getattr__ = moved_names(__name__, {})

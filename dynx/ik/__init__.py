@@ -7,13 +7,12 @@ imported when they are first used.
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dynx.ik.options import FrameTarget, IKOptions, Options
 from dynx.ik.result import IKResult
 from dynx.ik.solver import inverse_kinematics
-from dynx.registry import unknown_name
+from dynx.registry import moved_names
 
 if TYPE_CHECKING:
     from dynx.ik.closed_forms.solutions import IKSolutions
@@ -30,20 +29,11 @@ __all__ = [
     "inverse_kinematics",
 ]
 
-_CLOSED_FORMS = {"ClosedForm": "solver", "IKSolutions": "solutions", "closed_form": "solver"}
-
-# Hidden from type checkers, which would take any name for an attribute: they know the imports above.
-if not TYPE_CHECKING:
-
-    def __getattr__(name: str) -> Any:
-        if name in _MOVED:
-            # The text of an ImportError reaches the user of ``from dynx.ik import name`` too.
-            raise ImportError(f"dynx.ik.{name} is now {_MOVED[name]}", name="dynx.ik")
-        if name not in _CLOSED_FORMS:
-            raise AttributeError(unknown_name("module 'dynx.ik'", name, __all__))
-        return getattr(import_module(f"dynx.ik.closed_forms.{_CLOSED_FORMS[name]}"), name)
-
-
+_HOME = {
+    "ClosedForm": "dynx.ik.closed_forms.solver",
+    "IKSolutions": "dynx.ik.closed_forms.solutions",
+    "closed_form": "dynx.ik.closed_forms.solver",
+}
 _MOVED = {
     "Kinematics": "dynx.Backend",
     "Problem": "dynx.ik.problem.Problem",
@@ -55,3 +45,7 @@ _MOVED = {
     "is_rigid": "dynx.model.targets.is_rigid",
     "spells_options": "dynx.ik.options.spells_options",
 }
+
+# Hidden from type checkers, which would take any name for an attribute: they know the imports above.
+if not TYPE_CHECKING:
+    __getattr__ = moved_names(__name__, _MOVED, _HOME)

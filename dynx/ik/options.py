@@ -19,7 +19,7 @@ from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, ShapeError, UnknownNameError, nearest, shown
 from dynx.model.numbers import real_array, whole_number
 from dynx.model.targets import FREE, Targets
-from dynx.option_names import checks_field_names
+from dynx.option_names import right_name
 from dynx.time_limit import UNLIMITED, TimeLimit
 
 if TYPE_CHECKING:
@@ -254,7 +254,7 @@ class Options:
         for name in options:
             if name not in _NAMES:
                 raise UnknownNameError(
-                    f"inverse_kinematics has no option {shown(name)}{nearest(name, _NAMES)}"
+                    f"inverse_kinematics has no option {shown(name)}{right_name(name, ('q0', *_NAMES))}"
                 )
         return cls(**options)
 
@@ -306,7 +306,6 @@ def spells_options(function: F) -> F:
     return function
 
 
-@checks_field_names()
 @dataclass(frozen=True, eq=False)
 class FrameTarget:
     """Target of one frame among several that are to be reached at once.

@@ -5,6 +5,8 @@ reads the file itself, so that differences in reading show. Results are still in
 robots are compared, not conventions.
 """
 
+from typing import TYPE_CHECKING
+
 from dynx.loaded.registry import (
     COMMON_VARIANTS,
     ENGINES,
@@ -15,6 +17,7 @@ from dynx.loaded.registry import (
     loader_class,
 )
 from dynx.loaded.robot import LoadedInertial, LoadedJoint, LoadedModel, LoadedRobot
+from dynx.registry import moved_names
 
 __all__ = [
     "COMMON_VARIANTS",
@@ -29,3 +32,7 @@ __all__ = [
     "load_as",
     "loader_class",
 ]
+
+# Hidden from type checkers, which would take any name for an attribute.
+if not TYPE_CHECKING:
+    __getattr__ = moved_names(__name__, {})

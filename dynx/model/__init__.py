@@ -1,5 +1,7 @@
 """Robot description: immutable model, URDF reader and writer, library of robots, configuration arithmetic."""
 
+from typing import TYPE_CHECKING
+
 from dynx.model.elements import (
     Frame,
     Inertial,
@@ -13,6 +15,7 @@ from dynx.model.elements import (
 )
 from dynx.model.mechanism import Mechanism, build_mechanism
 from dynx.model.model import Model
+from dynx.registry import moved_names
 
 __all__ = [
     "Frame",
@@ -28,3 +31,7 @@ __all__ = [
     "Pose",
     "build_mechanism",
 ]
+
+# Hidden from type checkers, which would take any name for an attribute.
+if not TYPE_CHECKING:
+    __getattr__ = moved_names(__name__, {})

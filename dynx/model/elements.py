@@ -116,10 +116,18 @@ def rigid_matrix(T: ArrayLike, name: str) -> Floats:
 
 @dataclass(frozen=True)
 class Pose:
-    """URDF's ``<origin>``: translation `xyz` [m], then roll-pitch-yaw `rpy` [rad]."""
+    """URDF's ``<origin>``: translation `xyz` [m], then roll-pitch-yaw `rpy` [rad].
+
+    Raises ShapeError unless each has three entries.
+    """
 
     xyz: Vector = ZERO
     rpy: Vector = ZERO
+
+    def __post_init__(self) -> None:
+        for name, part in (("xyz", self.xyz), ("rpy", self.rpy)):
+            if type(part) is not tuple or len(part) != 3:
+                _refuse_part(name, part)
 
     @classmethod
     def from_matrix(cls, T: ArrayLike, name: str = "T") -> Pose:
@@ -142,6 +150,18 @@ class Pose:
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Floats:
         """Return a copy of `matrix`, so that NumPy takes a pose wherever a matrix (4, 4) is taken."""
         return np.array(self.matrix, dtype=dtype)
+
+
+def _refuse_part(name: str, part: object) -> None:
+    """Raise ShapeError for xyz or rpy of a pose that has not three entries."""
+    shape = np.shape(np.array(part, dtype=object))
+    if shape == (3,):
+        return
+    hint = "; Pose.from_matrix(((x, y, z), (qx, qy, qz, qw))) makes a pose of a quaternion"
+    raise ShapeError(
+        f"{name} of a pose is {shown(part)}, of shape {shape}; wanted 3 numbers, "
+        f"{'x, y, z [m]' if name == 'xyz' else 'roll, pitch, yaw [rad]'}{hint if shape == (4,) else ''}"
+    )
 
 
 IDENTITY = Pose()

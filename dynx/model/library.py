@@ -150,9 +150,28 @@ def find(name: str) -> Path:
             return found
         hint = nearest(name, by_name) or "; the library is empty: is example-robot-data installed?"
         of_data = hint_of_data_package(name) if re.fullmatch(r"[\w-]+", name) else ""
-        if of_data and (".urdf" in of_data or "?" not in hint):
+        made = [each for each in _OF_MAKER.get(re.split(r"[\W_]", name.lower())[0], ()) if each in by_name]
+        if made:
+            hint = f"; did you mean {' or '.join(map(shown, made))}?"
+        elif of_data and (".urdf" in of_data or "?" not in hint):
             hint = of_data
         raise RobotNotFoundError(f"no robot {shown(name)} in the library, and no such file{hint}") from None
+
+
+_OF_MAKER = {
+    "anybotics": ("anymal", "anymal_c"),
+    "emika": ("panda",),
+    "fr3": ("panda",),
+    "franka": ("panda",),
+    "gen3": ("kinova",),
+    "jaco": ("kinova",),
+    "pal": ("talos", "tiago"),
+    "rethink": ("baxter",),
+    "spot": ("anymal", "a1"),
+    "ufactory": ("xarm7",),
+    "universal": ("ur5", "ur10"),
+}
+"""Robots of the library by the first word of what they are called besides, or by their maker."""
 
 
 def _free_name(stem: str, inside: str, source: str, taken: dict[str, int]) -> str:

@@ -20,7 +20,6 @@ from dynx.model.package_search import StrPath, data_folders, environment_folders
 from dynx.model.tree import STANDARD_GRAVITY, Base
 from dynx.model.urdf.geometry import urdf_geometry
 from dynx.model.urdf.reader import read_urdf
-from dynx.option_names import checks_option_names
 
 _SUFFIXES = (".urdf", ".xacro", ".xml")
 
@@ -30,7 +29,6 @@ _WITH_ARGUMENTS = re.compile(r"(?P<path>.*\.xacro)\s+(?P<arguments>\w+:?=.*)", r
 _ARGUMENT = re.compile(r"(\w+):=(.*)", re.DOTALL)
 
 
-@checks_option_names
 def load(
     x: StrPath | bytes | bytearray | Model,
     *,

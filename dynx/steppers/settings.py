@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
+from dynx.errors import ArgumentError, UnknownNameError, shown
 from dynx.model.numbers import checked_array, is_real
+from dynx.option_names import right_name
 
 
 @dataclass(frozen=True)
@@ -62,9 +63,10 @@ class Setting:
 
 
 def checked_settings(
-    engine: str, known: Mapping[str, Setting], given: Mapping[str, object]
+    engine: str, known: Mapping[str, Setting], given: Mapping[str, object], options: Iterable[str] = ()
 ) -> dict[str, Any]:
-    """Return a value for every setting of an engine: the given one, or the default.
+    """Return a value for every setting of an engine: the given one, or the default. `options` are the other
+    arguments of the call, one of which may be meant.
 
     Raises UnknownNameError for a setting that the engine does not have, ArgumentError for an invalid value.
     """
@@ -75,9 +77,8 @@ def checked_settings(
                     "settings of an engine are given by their names, such as "
                     f"{next(iter(known), 'name')}=..., or as **settings"
                 )
-            raise UnknownNameError(
-                f"the engine {shown(engine)} has no setting {shown(name)}{nearest(name, known)}"
-            )
+            near = right_name(name, [*options, *known])
+            raise UnknownNameError(f"the engine {shown(engine)} has no setting {shown(name)}{near}")
     return {
         name: setting.checked(name, given[name]) if name in given else setting.default
         for name, setting in known.items()

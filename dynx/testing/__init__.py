@@ -9,17 +9,15 @@ Importing this package imports neither Hypothesis nor an engine: pytest imports 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from dynx.registry import moved_names
 
 if TYPE_CHECKING:
     from dynx.testing.agreement_class import agreement_tests
 
 __all__ = ["agreement_tests"]
 
-
-def __getattr__(name: str) -> Any:
-    if name == "agreement_tests":
-        from dynx.testing.agreement_class import agreement_tests
-
-        return agreement_tests
-    raise AttributeError(f"module 'dynx.testing' has no attribute {name!r}")
+# Hidden from type checkers, which would take any name for an attribute: they know the import above.
+if not TYPE_CHECKING:
+    __getattr__ = moved_names(__name__, {}, {"agreement_tests": "dynx.testing.agreement_class"})

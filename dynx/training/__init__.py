@@ -9,6 +9,9 @@ the end of the process; `load_policy` reads a policy, and `evaluate` judges it.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from dynx.registry import moved_names
 from dynx.training.environments import make
 from dynx.training.evaluation import Evaluation, evaluate
 from dynx.training.hyperparameters import recipe_of
@@ -35,3 +38,7 @@ __all__ = [
     "recipe_of",
     "train",
 ]
+
+# Hidden from type checkers, which would take any name for an attribute.
+if not TYPE_CHECKING:
+    __getattr__ = moved_names(__name__, {})

@@ -200,7 +200,10 @@ class World:
         """Options of the world other than the engine's settings."""
         self.dt: float = self.options["dt"]
         self.substeps: int = self.options["substeps"]
-        self.settings: Mapping[str, Any] = checked_settings(engine, self._kind.settings, settings)
+        known = self._kind.settings
+        self.settings: Mapping[str, Any] = checked_settings(
+            engine, known, settings, ("engine", "substeps", *self.options)
+        )
         """The engine's settings in use, by name."""
         self._layout = prepare(scene, **switches)
         self._scene_motors = {robot.name: robot.motors for robot in scene.robots if robot.motors}
@@ -643,7 +646,6 @@ class World:
 
         return Queries(self.scene, self._layout)
 
-    @checks_option_names
     @checks_types
     def avoidance(
         self, robot: str | None = None, *, margin: float = MARGIN, self_margin: float | None = None

@@ -58,15 +58,15 @@ FLOWS = {
             "viewer",
         ),
         (),
-        71,
-        11850,
+        72,
+        12200,
     ),
     "inverse kinematics": Flow(
         ENGINE + "engine.inverse_kinematics(engine.forward_kinematics(q, 'tool0'), 'tool0', q)",
         ("world", "sim", "ik.closed_forms"),
         (),
-        105,
-        18850,
+        106,
+        19000,
     ),
     "simulate": Flow(
         ROBOT + "from dynx import control\n"
@@ -88,16 +88,16 @@ FLOWS = {
             "envs",
         ),
         (),
-        152,
-        24300,
+        153,
+        24650,
     ),
     "step of a box": Flow(
         "from dynx.world import Scene, World, box\n"
         "World(Scene('box', bodies=(box('box', (0.1, 0.1, 0.1), mass=1.0),)), 'mujoco').step()",
         ("ik", "sim", "envs", "doctor"),
         (),
-        112,
-        20150,
+        113,
+        20450,
     ),
     "step of the cart-pole": Flow(
         "import gymnasium, dynx.envs\n"
@@ -106,8 +106,8 @@ FLOWS = {
         "environment.step(environment.action_space.sample())",
         ("distance", "ik", "world.camera", "steppers.camera"),
         (),
-        153,
-        26250,
+        154,
+        26450,
     ),
 }
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, TypeVar
 
 import click
@@ -127,9 +129,12 @@ def finite_number(word: str) -> float:
     try:
         number = float(word)
     except ValueError:
-        raise click.BadParameter(
-            f"{shown(word)} is not a number (write 0.5,-1.2 with decimal points)"
-        ) from None
+        hint = "write 0.5,-1.2 with decimal points"
+        degrees = re.fullmatch(r"\s*(?P<number>\S*\d\.?)\s*(deg|degree|degrees|\u00b0)\s*", word)
+        with suppress(ValueError):
+            if degrees:
+                hint = f"angles are in rad: {word.strip()} are {math.radians(float(degrees['number'])):.6g}"
+        raise click.BadParameter(f"{shown(word)} is not a number ({hint})") from None
     if not math.isfinite(number):
         raise click.BadParameter(f"{shown(word)} is not finite")
     bound = import_object("dynx.model.numbers:MAX_MAGNITUDE")

@@ -40,8 +40,8 @@ from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Array, Floats
 
 
-@checks_field_names(damping="joint_damping", friction="joint_friction", armature="joint_armature")
 @checks_types
+@checks_field_names(damping="joint_damping", friction="joint_friction", armature="joint_armature")
 @dataclass(frozen=True, eq=False, repr=False)
 class MomentumObserver(ModelEvaluation):
     """Estimates the external torque (nv,) of a robot from q, v and the torque of its motors (see the module).

@@ -396,7 +396,10 @@ def read_urdf(data: str | bytes, source: str) -> UrdfContent:
 
 def _require_robot(root: Element, reading: Reading) -> None:
     if root.tag != "robot":
-        other = {"sdf": " (SDF is not read)", "mujoco": " (MJCF is not read)"}.get(root.tag, "")
+        from dynx.model.other_formats import BY_ROOT
+
+        kind = BY_ROOT.get(root.tag)
+        other = "" if kind is None else f"; this file is {kind}"
         raise reading.error(root, f"the root element is <{escaped(root.tag)}>; wanted <robot>{other}")
     tags = {child.tag for child in root.children}
     if tags & _SRDF and "link" not in tags:

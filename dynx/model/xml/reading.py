@@ -365,7 +365,11 @@ class _TreeBuilder:
     def explained(self, error: expat.ExpatError) -> DescriptionError:
         """Return the error of dynx for one that expat raised."""
         line = self._lines_before + error.lineno
-        return self._error(_explain(error.code, self._root is not None), line)
+        begun = self._root is not None
+        from dynx.model.other_formats import format_hint
+
+        hint = "" if begun else format_hint(self._source)
+        return self._error(_explain(error.code, begun) + hint, line)
 
     def _error(self, message: str, line: int) -> DescriptionError:
         return DescriptionError(message, source=self._source, line=line)

@@ -25,6 +25,7 @@ from dynx.files.documents import parse_json
 from dynx.files.reading import checked_path, printable, read_file
 from dynx.files.writing import write_bytes
 from dynx.model.library import SCENES, own_roots, robots, scene_names
+from dynx.model.other_formats import format_hint
 from dynx.model.package_search import StrPath
 from dynx.world.scene.documents import scene_document, scene_from_document
 from dynx.world.scene.paths import ScenePaths
@@ -99,7 +100,8 @@ def _named(name: str) -> Path:
     known = scene_names()
     hint = ", and names its robots" if name in _robot_names() else ""
     raise RobotNotFoundError(
-        f"no scene {shown(name)} (a file of a scene ends in .toml or .json{hint}){nearest(name, known)}"
+        f"no scene {shown(name)} (a file of a scene ends in .toml or .json{hint}){format_hint(name)}"
+        f"{nearest(name, known)}"
     )
 
 

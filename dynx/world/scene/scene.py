@@ -16,7 +16,6 @@ from dynx.model import Model
 from dynx.model.elements import Vector
 from dynx.model.numbers import checked_gravity, is_real
 from dynx.model.tree import STANDARD_GRAVITY
-from dynx.option_names import checks_option_names
 from dynx.registry import explains_names
 from dynx.steppers.material import Material
 from dynx.world.scene.bodies import Constraint, PointToPoint, SceneBody, Weld
@@ -160,7 +159,6 @@ class Scene:
         """Which parts may collide, by names that are not checked again."""
         return CollisionFilter(self.robots, self.bodies, [tuple(map(self._members, p)) for p in self.ignored])
 
-    @checks_option_names
     @checks_types
     def avoidance(
         self, robot: str | None = None, *, margin: float = MARGIN, self_margin: float | None = None
@@ -189,7 +187,6 @@ class Scene:
             robot = self.robots[0].name
         return self._avoidance(self.robot(robot), margin, self_margin)
 
-    @checks_option_names
     @checks_types
     def avoidance_for(
         self, model: Model, *, margin: float = MARGIN, self_margin: float | None = None

@@ -311,6 +311,7 @@ ELBOW = ["ur5", "--to", "elbow_joint=0.1"]
         (["ur5", "--to", "0,nan,0,0,0,0"], "'--to': 'nan' is not finite"),
         (["ur5", "--to", "0,inf,0,0,0,0"], "'--to': 'inf' is not finite"),
         (["ur5", "--to", "0,1;5"], "'1;5' is not a number"),
+        (["ur5", "--to", "90deg"], r"angles are in rad: 90deg are 1.5708"),
         (["ur5", "--to", "0,0,0"], "--to has 3 numbers; ur5 needs 6"),
         (["ur5", "--to", "elbow=1"], "did you mean 'elbow_joint'"),
         (["ur5", "--to", "elbow_joint=4"], "position of 'elbow_joint' is 4"),

@@ -352,7 +352,7 @@ BAD: dict[str, tuple[str, int | None, str]] = {
         1,
         "this is an SRDF file, which has groups of joints and no robot; wanted a URDF file",
     ),
-    "no robot": ("\n<sdf/>", 2, "the root element is <sdf>; wanted <robot> (SDF is not read)"),
+    "no robot": ("\n<sdf/>", 2, "the root element is <sdf>; wanted <robot>; this file is SDF"),
     "two robots": (robot('<link name="a"/>') + "<robot", 4, "wanted one root element"),
     "no link": (robot(""), None, "the robot has no link"),
     "link in capitals": (robot("<Link name='a'/>"), 2, "did you mean 'link'?"),

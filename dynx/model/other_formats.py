@@ -1,0 +1,30 @@
+"""Files of robots, scenes and meshes that are given where a robot in URDF is wanted: what each is."""
+
+from __future__ import annotations
+
+from pathlib import PurePath
+
+_SDF = "SDF, Gazebo's format of models and worlds, which dynx does not read"
+_MJCF = "MJCF, MuJoCo's format, which dynx writes (World.to_mjcf) and does not read"
+_MESH = "a mesh; dynx.world.mesh(name, file) makes a body of one, and the <geometry> of a URDF may name it"
+_USD = "USD, which dynx does not read"
+
+BY_ROOT = {"sdf": _SDF, "world": _SDF, "mujoco": _MJCF, "COLLADA": _MESH}
+"""What a file is, by its root element."""
+
+_BY_SUFFIX = {
+    ".sdf": _SDF,
+    ".world": "a saved world (dynx.World.write), or SDF; dynx.World.read opens the first",
+    ".mjcf": _MJCF,
+    ".toml": "a scene, or settings; dynx.world.read_scene(file) reads a scene",
+    ".json": "a scene, or another document; dynx.world.read_scene(file) reads a scene",
+    ".srdf": "SRDF, which has groups of joints and no robot",
+    **dict.fromkeys((".stl", ".obj", ".dae", ".ply", ".gltf", ".glb"), _MESH),
+    **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), _USD),
+}
+
+
+def format_hint(path: str) -> str:
+    """Make the clause of an error for a file that is no URDF: what a file of its suffix is; may be empty."""
+    kind = _BY_SUFFIX.get(PurePath(path).suffix.lower())
+    return "" if kind is None else f" (a file {PurePath(path).suffix} is {kind})"
