@@ -28,8 +28,7 @@ from dynx.model.geometry import Mesh
 from dynx.model.geometry.drawn_shapes import link_shapes
 from dynx.model.library import robots
 from dynx.spatial.scalar import Floats
-from dynx.viewer.drawn_robot import is_painted
-from dynx.viewer.triangles import MAX_WHOLE, budgets, reduced
+from dynx.viewer.triangles import budgets, reduced
 
 SURFACE, BOX, DISTANCE, VOLUME, WHOLE = 0.95, 0.01, 0.01, 0.02, 0.2
 """Least share of the surface, largest changes of box, distance and volume, largest share of whole meshes."""
@@ -154,16 +153,14 @@ def comparisons(model: Model) -> Iterator[Comparison]:
     for link in model.links:
         shapes = [shape for shape, _, _ in link_shapes(model.geometry, link.name)]
         count.update(shape for shape in shapes if isinstance(shape, Mesh))
-    # What has an image stays whole, though it may be as heavy as others.
-    shares = budgets({mesh: number for mesh, number in count.items() if not is_painted(mesh)})
-    shares |= {mesh: MAX_WHOLE for mesh in count if mesh not in shares}
+    shares = budgets(count)
     of_file: dict[tuple[str, tuple[float, ...]], list[Mesh]] = {}
     for mesh in count:
         of_file.setdefault((mesh.file, mesh.scale), []).append(mesh)
     # A file is divided by its materials.
     for parts in of_file.values():
         whole = [mesh.triangles[0][mesh.triangles[1]] for mesh in parts]
-        drawn = [reduced(mesh, None if is_painted(mesh) else shares[mesh]) for mesh in parts]
+        drawn = [reduced(mesh, shares[mesh]) for mesh in parts]
         found = [each.vertices.astype(np.float64)[each.faces] for each in drawn]
         asked = sum(shares[mesh] for mesh in parts)
         yield compare(parts[0].name, np.concatenate(whole), np.concatenate(found), asked)

@@ -27,6 +27,7 @@ from dynx.viewer.triangles import (
     budgets,
     hull_of,
     reduced,
+    reduced_surface,
     resized,
     turned_outwards,
     with_edges,
@@ -326,7 +327,7 @@ class DrawnRobot(DrawnParts):
             self._faults.setdefault(link, []).append(str(error))
 
     def _shares(self, shapes: Any) -> dict[Mesh, int]:
-        count = Counter(shape for shape in shapes if isinstance(shape, Mesh) and not is_painted(shape))
+        count = Counter(shape for shape in shapes if isinstance(shape, Mesh))
         if self._look.triangles is None:
             return {}
         parts = budgets(count, self._look.triangles)
@@ -411,12 +412,12 @@ def is_painted(shape: Shape) -> bool:
 def _add_shape(
     scene: Any, path: str, shape: Shape, rgba: Colour, T: Floats, look: Look, budget: int | None
 ) -> Any:
-    """Add a node with a shape at the pose T (4, 4) in its parent, of at most `budget` triangles unless it is
-    painted, and return it."""
+    """Add a node with a shape at the pose T (4, 4) in its parent, reduced to a `budget` of triangles, and
+    return it."""
     opacity = look.opacity or rgba[3]
     if is_painted(shape) and look.colour is None:
         assert isinstance(shape, Mesh)
-        content, triangles = glb(shape.surface, (*rgba[:3], opacity))
+        content, triangles = glb(reduced_surface(shape, budget), (*rgba[:3], opacity))
         placed = {"wxyz": wxyz(T[:3, :3]), "position": T[:3, 3]}
         node = scene.add_glb(path, content, cast_shadow=False, receive_shadow=False, **placed)
         return PaintedNode(node, triangles)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Mapping
-from functools import cache, cached_property, lru_cache
+from functools import cache, lru_cache
 from glob import glob
 from hashlib import sha256
 from pathlib import Path
@@ -19,7 +19,8 @@ from dynx.files.cache import keep, read_cached, source_hash
 from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
 from dynx.model.geometry.mesh_reading import Surface
 from dynx.spatial.scalar import Floats
-from dynx.viewer.library import SIMPLIFY_VERSION, simplify
+from dynx.viewer.library import SIMPLIFY_VERSION
+from dynx.viewer.reduction import distinct_rows, is_closed, simplified
 
 
 def turned_outwards(triangles: Triangles) -> Triangles | None:
@@ -35,7 +36,7 @@ def turned_outwards(triangles: Triangles) -> Triangles | None:
     places = [np.unique(column, return_inverse=True)[1].reshape(-1) for column in triangles.vertices.T]
     _, number = distinct_rows(np.stack(places, axis=1))
     faces = number[triangles.faces]
-    if not _is_closed(faces):
+    if not is_closed(faces):
         return None
     count = int(faces.max()) + 1
     first, second = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
@@ -63,29 +64,6 @@ TRIANGLE_BUDGET = 15_000
 MAX_WHOLE = 1_000
 """Largest number of triangles of a mesh that always stays whole."""
 
-_JOINED = 1e-3
-"""Distance within which vertices of a reduced mesh are joined, as a share of its size."""
-
-_GENTLE = 3
-"""Aggressiveness of fast-simplification; by its default of 7 thin parts of a mesh collapse."""
-
-_GROWTH = 1.5
-"""Ratio of the numbers of triangles in two attempts to reduce a mesh."""
-
-_LEAST_SAVED = 0.2
-"""Share of its triangles that a reduced mesh saves at least; otherwise the mesh stays whole."""
-
-_SURFACE_CHANGED, _VOLUME_CHANGED, _MOVED = 0.05, 0.02, 0.01
-"""Largest effects of a reduction: on the surface and on the enclosed volume as shares of them, and the
-distance by which the box or any point moves as a share of the diagonal of the box."""
-
-_TRIED = 20_000
-"""Number of random points on a surface whose distance from another one is measured."""
-
-_SAMPLES = 100_000
-"""Number of random points that stand for a surface where distances to it are measured. They lie so densely
-that the nearest of them is farther away than the surface by less than half of the distance allowed."""
-
 
 def budgets(meshes: Mapping[Mesh, int], total: int = TRIANGLE_BUDGET) -> dict[Mesh, int]:
     """Divide `total` triangles between meshes that occur so many times each, in proportion to what each has.
@@ -108,13 +86,23 @@ def has_graphics_processor() -> bool:
 
 def reduced(shape: Shape, budget: int | None) -> Triangles:
     """Return a shape as triangles: a mesh with at most `budget`, unless that is None, or with as many as its
-    surface, its box and, if it is closed, its volume need.
+    surface, its box, its colours and, if it is closed, its volume need.
 
     Raises DescriptionError for a mesh that cannot be read.
     """
     if not isinstance(shape, Mesh) or budget is None or len(shape.triangles[1]) <= budget:
         return triangles_of(shape)
-    return _reduced(shape, budget)
+    found = _reduced(shape, budget)
+    return triangles_of(shape) if found is None else Triangles.of(found.vertices, found.faces)
+
+
+def reduced_surface(mesh: Mesh, budget: int | None) -> Surface:
+    """Return the surface of a mesh with the triangles of `reduced`, and what they look like.
+
+    Raises DescriptionError for a mesh that cannot be read.
+    """
+    found = None if budget is None or len(mesh.triangles[1]) <= budget else _reduced(mesh, budget)
+    return mesh.surface if found is None else found
 
 
 def with_edges(shape: Shape, budget: int | None) -> tuple[Triangles, bool]:
@@ -125,24 +113,15 @@ def with_edges(shape: Shape, budget: int | None) -> tuple[Triangles, bool]:
     """
     if not isinstance(shape, Mesh):
         return triangles_of(shape), False
-    return _with_edges(shape, budget)
+    surface = reduced_surface(shape, budget)
+    if surface.normals is None:
+        return reduced(shape, budget), True
+    return _with_edges(shape, budget), False
 
 
 @lru_cache(maxsize=256)
-def _with_edges(mesh: Mesh, budget: int | None) -> tuple[Triangles, bool]:
-    surface, found = mesh.surface, reduced(mesh, budget)
-    if surface.normals is None:
-        return found, True
-    if len(found.faces) == len(surface.faces):
-        return split_at_edges(surface)[0], False
-    name = _hash(found.vertices, found.faces, surface.vertices, surface.faces, surface.normals)
-    split = _unpacked(read_cached(name))
-    if split is None:
-        normals = _nearest_normals(found, surface)
-        vertices, faces = found.vertices.astype(np.float64), found.faces.astype(np.intp)
-        split, _ = split_at_edges(Surface(vertices, faces, normals))
-        keep(name, _packed(split))
-    return split, False
+def _with_edges(mesh: Mesh, budget: int | None) -> Triangles:
+    return split_at_edges(reduced_surface(mesh, budget))[0]
 
 
 _NORMALS_TRIED = 8
@@ -152,7 +131,7 @@ _NORMAL_STEPS = 64
 """Number of steps between 0 and 1 by which normals are told apart."""
 
 
-def _nearest_normals(found: Triangles, whole: Surface) -> Floats:
+def _nearest_normals(found: Surface, whole: Surface) -> Floats:
     """Return normals (m, 3, 3) for the corners of a reduced mesh: of the normals at the nearest corners of
     the whole one, that which is the nearest to the normal of the triangle."""
     assert whole.normals is not None
@@ -163,7 +142,7 @@ def _nearest_normals(found: Triangles, whole: Surface) -> Floats:
     )
     _, near = cKDTree(points[chosen]).query(found.vertices, k=min(_NORMALS_TRIED, len(chosen)))
     near = chosen[near.reshape(len(found.vertices), -1)]
-    a, b, c = np.moveaxis(found.vertices[found.faces].astype(np.float64), 1, 0)
+    a, b, c = np.moveaxis(found.vertices[found.faces], 1, 0)
     tried = normals[near[found.faces]]
     best = np.argmax(np.einsum("ijkl,il->ijk", tried, np.cross(b - a, c - a)), axis=2)
     return np.asarray(np.take_along_axis(tried, best[:, :, None, None], axis=2)[:, :, 0])
@@ -196,93 +175,21 @@ def split_at_edges(surface: Surface, *corners: Floats) -> tuple[Triangles, list[
 
 
 @lru_cache(maxsize=256)
-def _reduced(mesh: Mesh, budget: int) -> Triangles:
-    vertices, faces = mesh.triangles
-    name = _hash(vertices, faces, np.array(budget))
-    found = _unpacked(read_cached(name))
-    if found is None:
-        found = _simplified(vertices, faces, budget)
-        keep(name, _packed(found))
-    return found
-
-
-def _simplified(vertices: Floats, faces: NDArray[np.intp], budget: int) -> Triangles:
-    # Files repeat vertices, not always to the last digit, and only edges that are shared can be collapsed.
-    grid = _JOINED * float(np.ptp(vertices, axis=0).max()) or 1.0
-    cells = np.rint(vertices / grid).astype(np.int64)
-    first, number = distinct_rows(cells - cells.min(axis=0))
-    points = vertices[first]
-    joined = number[faces]
-    distinct = (
-        (joined[:, 0] != joined[:, 1]) & (joined[:, 1] != joined[:, 2]) & (joined[:, 0] != joined[:, 2])
-    )
-    remaining = joined[distinct]
-    if len(remaining) <= budget:
-        return Triangles.of(points, remaining)
-    points, remaining = points.astype(np.float32), remaining.astype(np.int32)
-    whole = _Measures(points, remaining)
-    target = max(budget, 4)
-    while whole.surface > 0.0 and target <= (1.0 - _LEAST_SAVED) * len(faces):
-        found, kept = simplify(points, remaining, target_count=target, agg=_GENTLE)
-        if len(kept) and whole.is_near(_Measures(found, kept)):
-            return Triangles.of(found, kept)
-        target = math.ceil(_GROWTH * target)
-    return Triangles.of(vertices, faces)
-
-
-class _Measures:
-    """What a reduction keeps of a mesh: surface, box, place and, if it is closed, volume."""
-
-    def __init__(self, vertices: NDArray[np.floating[Any]], faces: NDArray[np.integer[Any]]) -> None:
-        self.corners: Floats = vertices.astype(np.float64)[faces]
-        self._faces = faces
-        self._box = np.stack([self.corners.min(axis=(0, 1)), self.corners.max(axis=(0, 1))])
-        self.a, b, c = np.moveaxis(self.corners, 1, 0)
-        self._normals = np.cross(b - self.a, c - self.a)
-        self._areas = 0.5 * np.linalg.norm(self._normals, axis=1)
-        self.surface = float(self._areas.sum())
-
-    def is_near(self, found: _Measures) -> bool:
-        """Check whether a reduced mesh is near this one."""
-        volume = self._volume
-        largest = _MOVED * float(np.linalg.norm(np.ptp(self._box, axis=0)))
-        return bool(
-            abs(found.surface - self.surface) <= _SURFACE_CHANGED * self.surface
-            and np.abs(found._box - self._box).max() <= largest
-            and (volume is None or abs(found._enclosed() - volume) <= _VOLUME_CHANGED * abs(volume))
-            and found.distance(self) <= largest
-            and self.distance(found) <= largest
-        )
-
-    def distance(self, other: _Measures) -> float:
-        """Return the largest distance of a corner, or of a point on the surface, from the other surface, or a
-        little more."""
-        # A triangle that closes a hole has its corners on the other surface.
-        corners = np.unique(self.corners.reshape(-1, 3), axis=0)
-        return float(np.max(other._points.query(np.concatenate([corners, self._points.data[:_TRIED]]))[0]))
-
-    def _enclosed(self) -> float:
-        from_middle = self.a - self._box.mean(axis=0)
-        return float(np.einsum("ij,ij->", from_middle, self._normals)) / 6.0
-
-    @cached_property
-    def _volume(self) -> float | None:
-        return self._enclosed() if _is_closed(self._faces) else None
-
-    @cached_property
-    def _points(self) -> cKDTree:
-        """Points on the surface."""
-        random = np.random.default_rng(0)
-        of = random.choice(len(self._areas), _SAMPLES, p=self._areas / self.surface)
-        weights = random.dirichlet((1.0, 1.0, 1.0), _SAMPLES)
-        return cKDTree(np.einsum("ij,ijk->ik", weights, self.corners[of]))
-
-
-def _is_closed(faces: NDArray[np.integer[Any]]) -> bool:
-    """Check whether each edge is passed as often in one direction as in the other."""
-    count = int(faces.max(initial=0)) + 1
-    first, second = faces.reshape(-1).astype(np.int64), np.roll(faces, -1, axis=1).reshape(-1)
-    return np.array_equal(np.sort(first * count + second), np.sort(second * count + first))
+def _reduced(mesh: Mesh, budget: int) -> Surface | None:
+    """Return a reduced mesh; None for one that stays whole."""
+    whole = mesh.surface
+    pixels = () if whole.texture is None else (whole.texture.pixels,)
+    given = [each for each in (whole.normals, whole.uv, whole.colours) if each is not None]
+    name = _hash(whole.vertices, whole.faces, *given, *pixels, np.array(budget))
+    content = read_cached(name)
+    if content is not None:
+        return _unpacked(content, whole)
+    found = simplified(whole, budget)
+    if found is not None and whole.normals is not None:
+        found = found._replace(normals=_nearest_normals(found, whole))
+    keep(name, _packed(found))
+    # What is read from the cache is the same.
+    return _unpacked(_packed(found), whole)
 
 
 def _hash(*arrays: NDArray[Any]) -> str:
@@ -299,20 +206,37 @@ def _version() -> str:
     return f"{np.__version__} {SIMPLIFY_VERSION} {source_hash(Path(__file__).parent)}"
 
 
-def _packed(triangles: Triangles) -> bytes:
-    vertices, faces = triangles
-    return (
-        len(vertices).to_bytes(8, "little") + vertices.astype("<f4").tobytes() + faces.astype("<u4").tobytes()
-    )
+def _packed(surface: Surface | None) -> bytes:
+    """Return a surface without its image as bytes; none for None."""
+    if surface is None:
+        return b""
+    counts = np.array([len(surface.vertices), len(surface.faces)], "<u8")
+    parts = (surface.vertices, surface.normals, surface.uv, surface.colours)
+    numbers = [each.astype("<f4").tobytes() for each in parts if each is not None]
+    return b"".join([counts.tobytes(), surface.faces.astype("<u4").tobytes(), *numbers])
 
 
-def _unpacked(content: bytes | None) -> Triangles | None:
-    """Return the triangles in a content of the cache, whose checksum was right; None for None."""
-    if content is None:
+def _unpacked(content: bytes, whole: Surface) -> Surface | None:
+    """Return the reduced surface of a whole one in a content of the cache, whose checksum was right."""
+    if not content:
         return None
-    count = int.from_bytes(content[:8], "little")
-    vertices = np.frombuffer(content, "<f4", 3 * count, 8).reshape(-1, 3)
-    return Triangles.of(vertices, np.frombuffer(content, "<u4", offset=8 + vertices.nbytes).reshape(-1, 3))
+    vertices, faces = np.frombuffer(content, "<u8", 2).tolist()
+    place = 16
+
+    def read(kind: str, *shape: int) -> NDArray[Any]:
+        nonlocal place
+        found = np.frombuffer(content, kind, math.prod(shape), place).reshape(shape)
+        place += found.nbytes
+        return found
+
+    triangles = read("<u4", faces, 3).astype(np.intp)
+    points = read("<f4", vertices, 3).astype(np.float64)
+    normals = None if whole.normals is None else read("<f4", faces, 3, 3).astype(np.float64)
+    textured = whole.texture is not None
+    uv = read("<f4", faces, 3, 2).astype(np.float64) if textured else None
+    coloured = not textured and whole.colours is not None
+    colours = read("<f4", faces, 3, 3).astype(np.float64) if coloured else None
+    return Surface(points, triangles, normals, uv, whole.texture, colours)
 
 
 _SEGMENTS = 32
@@ -361,21 +285,6 @@ def resized(triangles: Triangles, factor: float) -> Triangles:
     vertices = triangles.vertices
     middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     return Triangles.of(middle + factor * (vertices - middle), triangles.faces)
-
-
-def distinct_rows(rows: NDArray[np.integer[Any]]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return where each distinct row of non-negative integers (n, 3) occurs first, and the number of each row
-    among these.
-
-    The three numbers are joined to one where it can hold them: numbers are sorted ten times faster than rows.
-    """
-    sizes = [int(column.max(initial=0)) + 1 for column in rows.T]
-    if math.prod(sizes) < 2**63:
-        joined = (rows[:, 0].astype(np.int64) * sizes[1] + rows[:, 1]) * sizes[2] + rows[:, 2]
-        _, first, number = np.unique(joined, return_index=True, return_inverse=True)
-    else:
-        _, first, number = np.unique(rows, axis=0, return_index=True, return_inverse=True)
-    return first, number.reshape(-1)
 
 
 @lru_cache(maxsize=256)

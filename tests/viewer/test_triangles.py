@@ -14,15 +14,18 @@ from scipy.spatial import cKDTree
 
 import dynx
 from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Shape, Sphere, solid_properties
+from dynx.model.geometry.images import Texture
+from dynx.model.geometry.mesh_reading import Surface
 from dynx.spatial.scalar import Floats
+from dynx.viewer import reduction
 from dynx.viewer import triangles as meshes_module
 from dynx.viewer.library import simplify
+from dynx.viewer.reduction import distinct_rows, simplified
 from dynx.viewer.triangles import (
     MAX_WHOLE,
     TRIANGLE_BUDGET,
     Triangles,
     budgets,
-    distinct_rows,
     hull_of,
     reduced,
     triangles_of,
@@ -110,7 +113,7 @@ def test_reduced_meshes_keep_surface_box_place_and_volume(robot: str, links: tup
     for mesh in meshes:
         assert isinstance(mesh, Mesh)
         whole, found = triangles_of(mesh), reduced(mesh, MAX_WHOLE)
-        assert len(found.faces) <= 0.8 * len(whole.faces) or len(found.faces) == len(whole.faces)
+        assert len(found.faces) <= 0.95 * len(whole.faces) or len(found.faces) == len(whole.faces)
         assert 0.95 <= surface(found) / surface(whole) <= 1.05
         diagonal = np.linalg.norm(np.ptp(whole.vertices, axis=0))
         for corner in (np.min, np.max):
@@ -153,11 +156,11 @@ def test_reduced_meshes_are_kept_on_disk(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.delenv("DYNX_CACHE", raising=False)
     counts = list[int]()
 
-    def counted(*given: Any, target_count: int, agg: int) -> Any:
+    def counted(*given: Any, target_count: int, **options: Any) -> Any:
         counts.append(target_count)
-        return simplify(*given, target_count=target_count, agg=agg)
+        return simplify(*given, target_count=target_count, **options)
 
-    monkeypatch.setattr(meshes_module, "simplify", counted)
+    monkeypatch.setattr(reduction, "simplify", counted)
     mesh = ball(tmp_path)
 
     def again(mesh: Mesh, budget: int) -> Triangles:
@@ -187,6 +190,50 @@ def test_reduced_meshes_are_kept_on_disk(tmp_path: Path, monkeypatch: pytest.Mon
     assert all(map(np.array_equal, again(mesh, 200), first))
     assert counts == 2 * attempts
     meshes_module._reduced.cache_clear()
+
+
+def wavy_square() -> tuple[Surface, Floats]:
+    """Return a slightly curved square of two triangles a cell, and the places (m, 3, 2) of its corners."""
+    x, y = np.meshgrid(np.linspace(0.0, 1.0, 41), np.linspace(0.0, 1.0, 41), indexing="ij")
+    vertices = np.stack([x, y, 0.02 * np.sin(3.0 * x)], axis=-1).reshape(-1, 3)
+    first = (np.arange(40)[:, None] * 41 + np.arange(40)).reshape(-1, 1)
+    faces = np.concatenate([first + np.array([0, 41, 42]), first + np.array([0, 42, 1])])
+    return Surface(vertices, faces), vertices[faces][..., :2]
+
+
+def test_an_image_stays_in_its_place_where_triangles_are_fewer() -> None:
+    bare, places = wavy_square()
+    levels = np.rint(np.linspace(0, 255, 64)).astype(np.uint8)
+    pixels = np.stack(np.broadcast_arrays(levels[:, None], levels, np.uint8(0)), axis=-1)
+    # Each half of the square shows the whole image: places jump in the middle.
+    halves = places.copy()
+    half = np.floor(2.0 * places[..., 0].mean(axis=1))
+    halves[..., 0] = 2.0 * places[..., 0] - half[:, None]
+    for uv, least in ((places, 500), (halves, 600)):
+        whole = bare._replace(uv=uv, texture=Texture(np.ascontiguousarray(pixels), (False, False)))
+        found = simplified(whole, 300)
+        assert found is not None
+        assert found.uv is not None
+        assert found.texture is whole.texture
+        assert len(found.faces) < least
+        corners = found.vertices[found.faces]
+        side = np.floor(2.0 * corners[..., 0].mean(axis=1))[:, None]
+        wanted = corners[..., 0] if uv is places else 2.0 * corners[..., 0] - side
+        assert np.abs(found.uv[..., 0] - wanted).max() < 0.01
+        assert np.abs(found.uv[..., 1] - corners[..., 1]).max() < 0.01
+
+
+def test_an_edge_between_colours_stays_sharp() -> None:
+    bare, places = wavy_square()
+    right = places[..., 0].mean(axis=1) > 0.5
+    colours = np.where(right[:, None, None], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]) * np.ones((1, 3, 1))
+    found = simplified(bare._replace(colours=colours), 300)
+    assert found is not None
+    assert found.colours is not None
+    assert len(found.faces) < 600
+    middle = found.vertices[found.faces][..., 0].mean(axis=1)
+    assert np.allclose(found.colours[middle > 0.5], [1.0, 0.0, 0.0])
+    assert np.allclose(found.colours[middle < 0.5], [0.0, 0.0, 1.0])
 
 
 @needs_examples
