@@ -15,6 +15,7 @@ from typing import Any
 from dynx.backends.base import Backend
 from dynx.backends.hooks import untranslated
 from dynx.model import Model
+from dynx.model.elements import JointCoefficients
 from dynx.spatial.scalar import Floats
 
 Evaluation = Callable[..., Any]
@@ -49,6 +50,9 @@ class Dynamics(ABC):
     """dJ/dt (6, nv) of q, v, frame."""
     frame_acceleration: Evaluation
     """J a + dJ/dt v (6,) of q, v, a, frame."""
+    joints: JointCoefficients | None = None
+    """Damping, dry friction and armature (nv,) with which the robot moves, where it has any. The quantities
+    are those of rigid bodies all the same."""
 
     def __init__(self, model: Model) -> None:
         self.model = model

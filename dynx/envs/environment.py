@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from dynx.argument_types import checks_types
 from dynx.envs.library import Env, Space, spaces
 from dynx.envs.randomization import Randomization, Variation, first_seed
-from dynx.envs.task import Episodes, Outcome, Task, checked_engine
+from dynx.envs.task import Episodes, JointOptions, Outcome, Task, checked_engine
 from dynx.errors import (
     ArgumentError,
     ClosedError,
@@ -59,12 +59,17 @@ class TaskEnvironment(Env[Any, Any]):
         randomize: Randomization | Mapping[str, Any] | None = None,
         width: int = 480,
         height: int = 360,
+        joint_damping: bool = True,
+        joint_friction: bool = True,
+        joint_armature: bool = True,
     ) -> None:
         """`engine` is by default the first of ``task.engines()``; pictures have `width` x `height` pixels.
 
         Each episode draws the parameters that `randomize` names; ``info["parameters"]`` of `reset` has their
-        values. Raises ArgumentError for an engine or a render mode that does not exist, NotInstalledError for
-        an engine that is not installed, and the errors of `Randomization` and of its parameters.
+        values. Joints have the damping, dry friction and armature of their description, unless
+        `joint_damping`, `joint_friction` or `joint_armature` is False. Raises ArgumentError for an option
+        that is not valid, NotInstalledError for an engine that is not installed, and the errors of
+        `Randomization` and of its parameters.
         """
         if not isinstance(task, Task):
             raise ArgumentError(f"task is of type {type(task).__name__}; wanted a dynx.envs.Task")
@@ -86,7 +91,8 @@ class TaskEnvironment(Env[Any, Any]):
         self._phase = "before reset"
         self._shown_at = -np.inf
         drawn = None if randomize is None else Randomization.read(randomize)
-        self._episodes: Episodes | None = task.open(self.engine)
+        joints = JointOptions(joint_damping, joint_friction, joint_armature)
+        self._episodes: Episodes | None = task.open(self.engine, joints)
         self._variation: Variation | None = None
         if drawn is not None:
             try:

@@ -78,6 +78,9 @@ def make_environment(
     randomize: Randomization | Mapping[str, Any] | None = None,
     width: int = 480,
     height: int = 360,
+    joint_damping: bool = True,
+    joint_friction: bool = True,
+    joint_armature: bool = True,
     **options: Any,
 ) -> TaskEnvironment:
     """Return the environment of a task with these `options` on an engine; `gymnasium.make` calls this, and
@@ -87,7 +90,17 @@ def make_environment(
     ``dynx/Pendulum-v0``.
     """
     made = task_class(task).with_options(options)
-    return TaskEnvironment(made, engine, render_mode, randomize=randomize, width=width, height=height)
+    return TaskEnvironment(
+        made,
+        engine,
+        render_mode,
+        randomize=randomize,
+        width=width,
+        height=height,
+        joint_damping=joint_damping,
+        joint_friction=joint_friction,
+        joint_armature=joint_armature,
+    )
 
 
 def make_vector_environment(
@@ -102,6 +115,9 @@ def make_vector_environment(
     randomize: Randomization | Mapping[str, Any] | None = None,
     width: int = 480,
     height: int = 360,
+    joint_damping: bool = True,
+    joint_friction: bool = True,
+    joint_armature: bool = True,
     **options: Any,
 ) -> RobotVectorEnvironment:
     """Return environments of a task that step in one compiled kernel; `gymnasium.make_vec` calls this.
@@ -129,6 +145,9 @@ def make_vector_environment(
         render_mode=render_mode,
         width=width,
         height=height,
+        joint_damping=joint_damping,
+        joint_friction=joint_friction,
+        joint_armature=joint_armature,
     )
 
 

@@ -22,8 +22,10 @@ from dynx.backends.registry import backend
 from dynx.envs.library import spaces
 from dynx.envs.randomization import Parameter, Randomization
 from dynx.envs.task import (
+    DESCRIBED,
     Episode,
     Episodes,
+    JointOptions,
     Move,
     Outcome,
     RobotTask,
@@ -53,26 +55,31 @@ ROBOT = "robot"
 """Name of the robot in the scene that is drawn."""
 
 
-def robot_episodes(task: RobotTask, engine: str) -> RobotEpisodes:
+def robot_episodes(task: RobotTask, engine: str, joints: JointOptions = DESCRIBED) -> RobotEpisodes:
     """Return the episodes of a task of one robot: on `compiled` in a lane of its kernel, otherwise, and for a
     task that cannot be compiled, on floats."""
     if engine == COMPILED:
         try:
-            return CompiledEpisodes(task, engine)
+            return CompiledEpisodes(task, engine, joints)
         except UnsupportedFeatureError:
             pass
-    return RobotEpisodes(task, engine)
+    return RobotEpisodes(task, engine, joints)
 
 
 class RobotEpisodes(Episodes):
     """Episodes of a task of one robot on floats, whose dynamics a backend evaluates."""
 
-    def __init__(self, task: RobotTask, engine: str) -> None:
-        self._task = task
+    def __init__(self, task: RobotTask, engine: str, joints: JointOptions = DESCRIBED) -> None:
+        self._task, self._joints = task, joints
         self._backend = backend(engine, task.model, validate=False)
         self._robot = EngineDynamics(self._backend)
         self._move: Move = partial(free_move, task, self._robot.forward_dynamics)
         self._variation: RobotVariation | None = None
+        varied = VariedRobot(task, None, joints)
+        self._robot.joints = varied.nominal_joints
+        if varied.parameters.names:
+            self._variation = RobotVariation(task, varied, self._backend)
+            self._move = self._variation.move(np.zeros(0))
         self._discrete = isinstance(task.action_space, spaces.Discrete)
         self._dtype, self._shape = task.observation_space.dtype, task.observation_space.shape
         self._viewer: Any = None
@@ -82,7 +89,8 @@ class RobotEpisodes(Episodes):
 
     def vary(self, randomization: Randomization) -> tuple[Parameter, ...]:
         """Return the parameters of this robot that episodes draw."""
-        varied = VariedRobot(self._task, randomization)
+        varied = VariedRobot(self._task, randomization, self._joints)
+        self._robot.joints = varied.nominal_joints
         self._variation = RobotVariation(self._task, varied, self._backend)
         return varied.drawn_parameters
 
@@ -183,11 +191,10 @@ class RobotEpisodes(Episodes):
 class CompiledEpisodes(RobotEpisodes):
     """Episodes of a task of one robot in one lane of the kernel of `dynx.envs.vector`, with its bits."""
 
-    def __init__(self, task: RobotTask, engine: str) -> None:
+    def __init__(self, task: RobotTask, engine: str, joints: JointOptions = DESCRIBED) -> None:
         """Raises UnsupportedFeatureError for a task that cannot be compiled."""
-        super().__init__(task, engine)
-        self._varied: VariedRobot | None = None
-        self._drawn: Floats = np.zeros(0)
+        super().__init__(task, engine, joints)
+        self._varied = VariedRobot(task, None, joints)
         self._open_lane()
 
     def _open_lane(self) -> None:
@@ -204,7 +211,7 @@ class CompiledEpisodes(RobotEpisodes):
 
     def vary(self, randomization: Randomization) -> tuple[Parameter, ...]:
         """Return the parameters of this robot that episodes draw."""
-        self._varied = VariedRobot(self._task, randomization)
+        self._varied = VariedRobot(self._task, randomization, self._joints)
         self._open_lane()
         return self._varied.drawn_parameters
 
@@ -244,7 +251,7 @@ class CompiledEpisodes(RobotEpisodes):
 
 
 class RobotVariation:
-    """Steps of a robot with drawn parameters, and the actions that act after a delay.
+    """Steps of a robot with joint dynamics and drawn parameters, and the actions that act after a delay.
 
     The engine loads the robot anew for each episode in which masses differ.
     """
@@ -287,7 +294,7 @@ class RobotVariation:
 
 
 class EngineFriction(StepFriction):
-    """Joint friction on floats, with the mass matrix and the bias of an engine."""
+    """Joint dynamics on floats, with the mass matrix and the bias of an engine."""
 
     def __init__(self, task: RobotTask, dynamics: EngineDynamics, joints: JointCoefficients) -> None:
         # Imported here, because its kernel needs the compiler.
@@ -297,7 +304,9 @@ class EngineFriction(StepFriction):
         super().__init__(task, law.joints)
         self._dynamics, self._damping = dynamics, joints.damping
         damping = joints.damping if self.damps_implicitly else None
-        self._solver = ImplicitJoints(law, joints.friction, task.step_dt, damping=damping)
+        self._solver = ImplicitJoints(
+            law, joints.friction, task.step_dt, damping=damping, armature=joints.armature
+        )
 
     def solve(self, q: Floats, v: Floats, tau: Floats) -> tuple[Floats, Floats]:
         M, bias = self._dynamics.mass_matrix_and_bias(q, v)
@@ -316,9 +325,14 @@ class EngineFriction(StepFriction):
 class WorldEpisodes(Episodes):
     """Episodes of a task in a world, which is opened once, or anew for an episode with a scene of its own."""
 
-    def __init__(self, task: WorldTask, engine: str) -> None:
+    def __init__(self, task: WorldTask, engine: str, joints: JointOptions = DESCRIBED) -> None:
         self._task, self._engine = task, engine
-        self._options = {"dt": task.control_dt, "substeps": task.substeps, **task.settings.get(engine, {})}
+        self._options = {
+            "dt": task.control_dt,
+            "substeps": task.substeps,
+            **task.settings.get(engine, {}),
+            **joints.switched_off,
+        }
         self._varied: VariedScene | None = None
         self._values: NDArray[np.float64] = np.zeros(0)
         self._waiting: deque[Any] = deque()

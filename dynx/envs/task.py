@@ -30,6 +30,7 @@ from dynx.rbd.integration import Accelerate, ExplicitEuler, RungeKutta4, SemiImp
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Array
 from dynx.steppers.registry import WITHOUT_CONTACTS, world_names
+from dynx.steppers.settings import checked_switches
 
 if TYPE_CHECKING:
     from dynx.steppers.camera import Camera
@@ -45,8 +46,48 @@ DEFAULT_WORLD_ENGINE = "pybullet"
 XYZ = ("x", "y", "z")
 """Names of the components of a vector."""
 
-ENVIRONMENT_OPTIONS = ("engine", "render_mode", "randomize", "width", "height")
+ENVIRONMENT_OPTIONS = (
+    "engine",
+    "render_mode",
+    "randomize",
+    "width",
+    "height",
+    "joint_damping",
+    "joint_friction",
+    "joint_armature",
+)
 """Options of every environment, beside those of its task."""
+
+
+@dataclass(frozen=True)
+class JointOptions:
+    """Joint dynamics of the description that the joints of an environment have, as in a `dynx.World`.
+
+    Raises ArgumentError for an option that is neither True nor False.
+    """
+
+    joint_damping: bool = True
+    """Viscous damping."""
+    joint_friction: bool = True
+    """Dry friction."""
+    joint_armature: bool = True
+    """Rotor inertia."""
+
+    def __post_init__(self) -> None:
+        checked_switches(**vars(self))
+
+    def has(self, coefficient: str) -> bool:
+        """Check whether joints have a coefficient of the description: damping, friction or armature."""
+        return bool(getattr(self, f"joint_{coefficient}"))
+
+    @property
+    def switched_off(self) -> dict[str, bool]:
+        """The options that are False, as arguments of `dynx.World`."""
+        return {name: False for name, value in vars(self).items() if not value}
+
+
+DESCRIBED = JointOptions()
+"""All joint dynamics of the description."""
 
 
 class Outcome(NamedTuple):
@@ -95,8 +136,8 @@ class Task(ABC):
         """Return the names of the engines on which tasks of this kind run, the default first."""
 
     @abstractmethod
-    def open(self, engine: str) -> Episodes:
-        """Return the episodes of this task on an engine, which is one of `engines`."""
+    def open(self, engine: str, joints: JointOptions = DESCRIBED) -> Episodes:
+        """Return the episodes of this task on an engine, which is one of `engines`, with joint dynamics."""
 
     @classmethod
     def with_options(cls: type[Kind], options: Mapping[str, Any]) -> Kind:
@@ -196,6 +237,10 @@ SCHEMES: dict[str, Callable[[Model, float], Any]] = {
 class RobotTask(Task):
     """A task of one robot without contacts, whose dynamics a backend of dynx evaluates.
 
+    The robot that moves has the damping, dry friction and armature of its description, unless options of the
+    environment switch them off; what the methods evaluate is that of rigid bodies, and ``robot.joints`` has
+    the coefficients.
+
     All methods are array code for one environment: they compute with NumPy's functions on arrays of floats,
     and in a vector environment on symbols, from which one kernel is compiled. So they must not branch on a
     value (write ``np.where``) and must return the same for the same arguments. `robot` evaluates quantities
@@ -288,9 +333,9 @@ class RobotTask(Task):
         """Return the names of all backends, the default first."""
         return tuple(dict.fromkeys((DEFAULT_ENGINE, *backend_names())))
 
-    def open(self, engine: str) -> Episodes:
+    def open(self, engine: str, joints: JointOptions = DESCRIBED) -> Episodes:
         """Return the episodes of this task on a backend."""
-        return _opened("robot_episodes", self, engine)
+        return _opened("robot_episodes", self, engine, joints)
 
 
 Move = Callable[..., tuple[Array, Array]]
@@ -435,9 +480,9 @@ class WorldTask(Task):
         names = (name for name in world_names() if name not in WITHOUT_CONTACTS)
         return tuple(dict.fromkeys((DEFAULT_WORLD_ENGINE, *names)))
 
-    def open(self, engine: str) -> Episodes:
+    def open(self, engine: str, joints: JointOptions = DESCRIBED) -> Episodes:
         """Return the episodes of this task in a world of an engine."""
-        return _opened("WorldEpisodes", self, engine)
+        return _opened("WorldEpisodes", self, engine, joints)
 
 
 def checked_engine(kind: type[Task], engine: str | None) -> str:
@@ -473,9 +518,9 @@ def refuse_unphysical(name: str, value: object, unit: str, *, zero: bool = False
         raise ArgumentError(f"{name} is {shown(value)}; wanted a number {wanted} [{unit}]")
 
 
-def _opened(make: str, task: Task, engine: str) -> Episodes:
+def _opened(make: str, task: Task, engine: str, joints: JointOptions) -> Episodes:
     """Return the episodes of a task, made by `dynx.envs.runner`, which imports this module."""
-    episodes: Episodes = getattr(import_module("dynx.envs.runner"), make)(task, engine)
+    episodes: Episodes = getattr(import_module("dynx.envs.runner"), make)(task, engine, joints)
     return episodes
 
 

@@ -77,16 +77,18 @@ class TaskStep:
     """Flag of an environment that diverged: its step was not taken, and its episode is truncated."""
 
     def __init__(self, task: RobotTask, varied: VariedRobot | None = None) -> None:
-        """`varied` are the parameters of the motion that each environment has for itself."""
+        """`varied` are the parameters of the motion, of which each environment may have drawn ones for
+        itself; by default the joint dynamics of the description."""
         space = task.action_space
         if not isinstance(space, spaces.Discrete | spaces.Box):
             raise UnsupportedFeatureError(
                 f"a vector environment takes actions of a Discrete or a Box space, not of {space}"
             )
-        self._task, self._varied = task, varied
+        self._task = task
+        self._varied = varied = VariedRobot(task, None) if varied is None else varied
         self._friction: JointFrictionText | None = None
         self._parametric: ParametricDynamics | None = None
-        if varied is not None and varied.parameters.names:
+        if varied.parameters.names:
             self._parametric = ParametricDynamics(varied.parameters)
             if varied.parameters.joint_dynamics:
                 law = FrictionLaw.of(task.model, varied.dry_joints)
@@ -94,6 +96,7 @@ class TaskStep:
         self._starters: dict[int, TaskLanes] = {}
         self.layout = RowLayout.of(task)
         self._robot = ArrayDynamics(task.model)
+        self._robot.joints = varied.nominal_joints
         shape = task.observation_space.shape
         if shape is None or len(shape) != 1:
             raise UnsupportedFeatureError(
@@ -150,7 +153,7 @@ class TaskStep:
         evaluate: Callable[..., dict[str, Any]] = self._step if start is None else self._start
         if start is None:
             sizes = {"state": self.layout.size, "steps": 1, "limit": 1, "action": self.actions, **sizes}
-            if self._varied is not None and self._varied.drawn_parameters:
+            if self._varied.drawn_parameters:
                 sizes["parameters"] = len(self._varied.drawn_parameters)
                 if self._varied.delayed_actions:
                     sizes["earlier"] = self._varied.delayed_actions * self.actions
@@ -177,12 +180,10 @@ class TaskStep:
         results: dict[str, Any] = {}
         actions: list[Array] = [action] * task.substeps
         move: Move = partial(free_move, task, robot.forward_dynamics)
-        if self._varied is not None and "parameters" in inputs:
-            drawn = inputs["parameters"]
-            move = self._move(self._varied, drawn, inputs, move)
-            if "earlier" in inputs:
-                earlier = inputs["earlier"]
-                actions, results["earlier"] = self._delayed(self._varied, drawn, count, action, earlier)
+        drawn: Array = inputs.get("parameters", np.zeros(0))
+        move = self._move(drawn, inputs, move)
+        if "earlier" in inputs:
+            actions, results["earlier"] = self._delayed(drawn, count, action, inputs["earlier"])
         moved = control_step(task, robot, move, before, [self._shaped(each) for each in actions])
         given = self._shaped(action)
         after = task.settle(moved)
@@ -216,11 +217,11 @@ class TaskStep:
         space = self._task.action_space
         return action[0] if isinstance(space, spaces.Discrete) else action.reshape(space.shape)
 
-    def _move(self, varied: VariedRobot, drawn: Array, inputs: Mapping[str, Array], free: Move) -> Move:
-        """Return the steps of the integrator of a robot with drawn parameters."""
+    def _move(self, drawn: Array, inputs: Mapping[str, Array], free: Move) -> Move:
+        """Return the steps of the integrator of a robot with parameters; those `free` for one without."""
         if self._parametric is None:
             return free
-        dynamics, values = self._parametric, varied.values(symbol_array(drawn))
+        dynamics, values = self._parametric, self._varied.values(symbol_array(drawn))
         if self._friction is not None:
             return self._friction.moves(values, inputs)
 
@@ -229,10 +230,9 @@ class TaskStep:
 
         return partial(free_move, self._task, forward_dynamics)
 
-    def _delayed(
-        self, varied: VariedRobot, drawn: Array, count: Any, action: Array, earlier: Array
-    ) -> tuple[list[Array], Array]:
+    def _delayed(self, drawn: Array, count: Any, action: Array, earlier: Array) -> tuple[list[Array], Array]:
         """Return the action that acts in each step of the integrator, and the actions before the next."""
+        varied = self._varied
         # Before the first action of an episode there was none; it acts from the beginning.
         rows = [
             np.where(count == 0.0, action, row)

@@ -1,6 +1,6 @@
 """Drawn parameters of a robot or a scene, and what they change.
 
-`VariedRobot`: masses, payload and friction of the joints of a task of one robot, and the delay of actions.
+`VariedRobot`: masses, payload and joint dynamics of a task of one robot, and the delay of actions.
 `VariedScene`: masses, payload, friction of joints and of contacts in a world.
 """
 
@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dynx.envs.randomization import AXES, Parameter, Randomization, parameters_of, require_name
-from dynx.envs.task import RobotTask
+from dynx.envs.task import DESCRIBED, JointOptions, RobotTask
 from dynx.errors import UnknownNameError, UnsupportedFeatureError, nearest, shown
 from dynx.model import Model
-from dynx.rbd.parameters import POINT, Parameters
+from dynx.model.elements import JointCoefficients
+from dynx.rbd.parameters import JOINT, POINT, Parameters
 from dynx.spatial.scalar import Array, Floats
 
 if TYPE_CHECKING:
@@ -32,21 +33,29 @@ SCENE_FIELDS = ("mass_scale", "payload", *JOINT_FIELDS, "friction_scale")
 class VariedRobot:
     """The parameters of one task that episodes draw, and what they change; on floats or on symbols.
 
-    `drawn` (k,) has the values of `drawn_parameters`, in order.
+    Joint dynamics that episodes do not draw are those of the description. `drawn` (k,) has the values of
+    `drawn_parameters`, in order.
     """
 
-    def __init__(self, task: RobotTask, randomization: Randomization) -> None:
-        """Raises UnknownNameError for a link, frame or joint that the robot does not have,
-        UnsupportedFeatureError for a parameter of contacts."""
-        if randomization.friction_scale is not None:
+    def __init__(
+        self, task: RobotTask, randomization: Randomization | None, joints: JointOptions = DESCRIBED
+    ) -> None:
+        """`randomization` is None where nothing is drawn.
+
+        Raises UnknownNameError for a link, frame or joint that the robot does not have,
+        UnsupportedFeatureError for a parameter of contacts.
+        """
+        if randomization is not None and randomization.friction_scale is not None:
             raise UnsupportedFeatureError(
                 f"{type(task).__name__} has no contacts, so friction_scale changes nothing; the friction of "
                 "its joints is joint_friction"
             )
         self._task, model = task, task.model
         self._model = model
-        self.drawn_parameters: tuple[Parameter, ...] = parameters_of(
-            randomization, ROBOT_FIELDS, self._required, task.step_dt
+        self.drawn_parameters: tuple[Parameter, ...] = (
+            ()
+            if randomization is None
+            else parameters_of(randomization, ROBOT_FIELDS, self._required, task.step_dt)
         )
         """Parameters that change the motion."""
         scales = self._columns("mass_scale")
@@ -57,44 +66,59 @@ class VariedRobot:
             dict.fromkeys(massive, scales[None]) if None in scales else {str(k): c for k, c in scales.items()}
         )
         bounds = {each.field: each.distribution.bounds for each in self.drawn_parameters}
+        described = any(
+            joints.has(name) and getattr(joint.dynamics, name) != 0.0
+            for joint in model.joints
+            for name in JOINT
+            if joint.moves
+        )
         self.parameters = Parameters(
             model,
             scaled=tuple(links),
-            point_payload=randomization.payload_frame,
-            joint_dynamics="joint_damping" in bounds or "joint_friction" in bounds,
+            point_payload=None if randomization is None else randomization.payload_frame,
+            joint_dynamics=described or "joint_damping" in bounds or "joint_friction" in bounds,
         )
         """The parameters of the robot, of which some are drawn."""
-        self._sources = [*links.values(), *self._columns("payload").values(), *self._sources_of_joints()]
+        self._sources = [
+            *links.values(),
+            *self._columns("payload").values(),
+            *(self._sources_of_joints(joints) if self.parameters.joint_dynamics else ()),
+        ]
+        """For each parameter the column of the drawn values, or the value of one that is not drawn."""
         self.delayed_actions = math.ceil(
             np.round(bounds.get("delay", (0.0, 0.0))[1] / task.step_dt) / task.substeps
         )
         """Number of actions before the present one that may still act."""
 
-    def _sources_of_joints(self) -> list[int | None]:
-        """Return the column of each coefficient of the joints; None for those that are 0."""
-        if not self.parameters.joint_dynamics:
-            return []
-        columns, names = [self._columns(field) for field in JOINT_FIELDS], self._model.joint_names
-        return [
-            column
-            for joint in self._model.joints
-            if joint.moves
-            for column in (
+    def _sources_of_joints(self, joints: JointOptions) -> list[int | float]:
+        """Return the source of each coefficient of the joints, in the order of the parameters."""
+        columns, names = {name: self._columns(f"joint_{name}") for name in JOINT}, self._model.joint_names
+        found: list[int | float] = []
+        for joint in self._model.joints:
+            for name in JOINT if joint.moves else ():
                 # One value for all joints is that of the joints with a coordinate, not of those that mimic.
-                *(each.get(joint.name, each.get(None) if joint.name in names else None) for each in columns),
-                None,
-            )
-        ]
+                whole = columns[name].get(None) if joint.name in names else None
+                column = columns[name].get(joint.name, whole)
+                own = float(getattr(joint.dynamics, name)) if joints.has(name) else 0.0
+                found.append(own if column is None else column)
+        return found
+
+    @property
+    def nominal_joints(self) -> JointCoefficients | None:
+        """Coefficients (nv,) of the coordinates with what is drawn left out; None if all are 0."""
+        joints = self.parameters.joints(self.values(np.zeros(len(self.drawn_parameters))))
+        return joints if joints is not None and any(each.any() for each in joints) else None
 
     @property
     def dry_joints(self) -> Floats:
-        """1 for coordinates (nv,) with dry friction that is drawn, otherwise 0."""
-        joints = self.parameters.joints(np.array([float(each is not None) for each in self._sources]))
+        """1 for coordinates (nv,) with dry friction that is drawn or of the description, otherwise 0."""
+        ones = np.ones(len(self.drawn_parameters))
+        joints = self.parameters.joints(np.asarray(self.values(ones)))
         return np.zeros(self._model.nv) if joints is None else np.sign(joints.friction)
 
     def values(self, drawn: Array) -> Array:
         """Return the values (n,) of `parameters`."""
-        return np.array([0.0 if column is None else drawn[column] for column in self._sources])
+        return np.array([drawn[each] if isinstance(each, int) else each for each in self._sources])
 
     def acting_actions(self, drawn: Array, action: Array, earlier: Sequence[Array]) -> list[Array]:
         """Return the action that acts in each step of the integrator, from the present one and from those

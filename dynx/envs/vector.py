@@ -13,7 +13,7 @@ from dynx.envs.environment import checked_action
 from dynx.envs.library import AutoresetMode, Space, VectorEnv, batch_space, spaces
 from dynx.envs.randomization import Randomization, Variation, first_seed
 from dynx.envs.runner import draw_robot
-from dynx.envs.task import RobotTask
+from dynx.envs.task import JointOptions, RobotTask
 from dynx.envs.task_step import DIVERGED, INVALID, TaskLanes, TaskStep
 from dynx.envs.variation import VariedRobot
 from dynx.errors import (
@@ -80,9 +80,12 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         render_mode: str | None = None,
         width: int = 480,
         height: int = 360,
+        joint_damping: bool = True,
+        joint_friction: bool = True,
+        joint_armature: bool = True,
     ) -> None:
-        """Raises ArgumentError for an option that cannot be used, UnsupportedFeatureError for a task that
-        cannot be compiled."""
+        """Options are those of `TaskEnvironment`. Raises ArgumentError for an option that cannot be used,
+        UnsupportedFeatureError for a task that cannot be compiled."""
         if render_mode is not None and render_mode not in RENDER_MODES:
             raise ArgumentError(
                 f"render_mode is {shown(render_mode)}{nearest(str(render_mode), RENDER_MODES)}"
@@ -105,10 +108,10 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         self._discrete = isinstance(task.action_space, spaces.Discrete)
         self._kinds = "iu" if self._discrete else "fiu"
         self._variation: Variation | None = None
-        varied = None
-        if randomize is not None:
-            drawn = Randomization.read(randomize)
-            varied = VariedRobot(task, drawn)
+        drawn = None if randomize is None else Randomization.read(randomize)
+        joints = JointOptions(joint_damping, joint_friction, joint_armature)
+        varied = VariedRobot(task, drawn, joints)
+        if drawn is not None:
             spaces_of_one = task.observation_space, task.action_space
             self._variation = Variation(drawn, varied.drawn_parameters, *spaces_of_one, count=n)
         self._task_step = TaskStep(task, varied)

@@ -14,10 +14,11 @@ from dataclasses import replace
 from typing import Any
 
 from dynx.envs.library import registry
-from dynx.envs.registration import is_of_dynx
+from dynx.envs.registration import is_of_dynx, specification
+from dynx.envs.task import JointOptions
 from dynx.errors import ArgumentError, RobotNotFoundError, shown
 from dynx.model.library import find
-from dynx.training.specification import TaskSpec
+from dynx.training.specification import TaskSpec, TrainingSpec
 
 NO_OPTIONS: Mapping[str, Any] = {}
 
@@ -32,6 +33,16 @@ _ROBOT = "robot"
 
 _TASK = "task"
 """Argument by which the environments of dynx get the class of their task."""
+
+
+def of_rigid_bodies(spec: TrainingSpec) -> TrainingSpec:
+    """Return the present meaning of what was trained when the robot of a `RobotTask` was one of rigid bodies:
+    its joint dynamics are switched off. Worlds had joint dynamics already."""
+    known = specification(spec.task.id)
+    if not is_of_dynx(spec.task.id) or known.vector_entry_point is None:
+        return spec
+    options = {**dict.fromkeys(vars(JointOptions()), False), **spec.task.options}
+    return replace(spec, task=replace(spec.task, options=options))
 
 
 def task_of_file(
@@ -65,9 +76,11 @@ def task_of_file(
             _check_robot(value, where)
         else:
             _check_words(f"option {name}", value, where)
-    # The caller's own choice may be an environment that has no engines.
+    # The caller's own choice may be an environment that has neither engines nor joint dynamics.
     engine = task.engine if env_id is None or of_dynx else None
-    return replace(task, id=chosen, engine=engine, options={**task.options, **given})
+    elsewhere = () if of_dynx else vars(JointOptions())
+    options = {name: value for name, value in task.options.items() if name not in elsewhere}
+    return replace(task, id=chosen, engine=engine, options={**options, **given})
 
 
 def _check_words(what: str, value: object, where: str) -> None:

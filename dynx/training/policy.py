@@ -21,7 +21,7 @@ from dynx.files.reading import irregularity, named_file
 from dynx.files.writing import atomic_file
 from dynx.model.numbers import real_array, whole_number
 from dynx.training.environments import make
-from dynx.training.file_tasks import task_of_file
+from dynx.training.file_tasks import of_rigid_bodies, task_of_file
 from dynx.training.library import (
     CLIPPED_AT,
     EPSILON,
@@ -34,7 +34,7 @@ from dynx.training.library import (
     weights_of_file,
     write_weights,
 )
-from dynx.training.specification import PolicyDocument, TaskSpec, TrainingSpec
+from dynx.training.specification import FIRST_POLICY, POLICY, PolicyDocument, TaskSpec, TrainingSpec
 
 DOCUMENT = "dynx.json"
 """Member of the file of a policy that says what it was trained on; stable-baselines3 ignores it."""
@@ -103,7 +103,7 @@ class Policy:
         added."""
         scaling = self.scaling
         document = PolicyDocument(
-            "dynx.policy/1",
+            POLICY,
             __version__,
             self.spec,
             self.steps_done,
@@ -123,7 +123,8 @@ class Policy:
 def read_policy_document(path: str | os.PathLike[str]) -> PolicyDocument:
     """Read what a file of a policy says about itself, which may be anything: `task_of_file` checks its task.
 
-    Raises ArgumentError for a file that is no policy of dynx.
+    A policy of an earlier dynx has the options with which its task means the same today. Raises ArgumentError
+    for a file that is no policy of dynx.
     """
     where = shown(os.fspath(path), 300)
     if not os.path.isfile(path):
@@ -148,7 +149,7 @@ def read_policy_document(path: str | os.PathLike[str]) -> PolicyDocument:
     try:
         found = convert_document(document, PolicyDocument)
         whole_number("steps_done", found.steps_done, 0)
-        return found
+        return found if found.schema != FIRST_POLICY else replace(found, spec=of_rigid_bodies(found.spec))
     except ArgumentError as error:
         raise ArgumentError(f"{where}: {error}") from error
 

@@ -17,12 +17,19 @@ from dynx.files.writing import write_text
 from dynx.training.checkpoints import Checkpoints
 from dynx.training.environments import make, make_vector
 from dynx.training.evaluation import AT_ONCE, Evaluation
+from dynx.training.file_tasks import of_rigid_bodies
 from dynx.training.learning import Learning, Progress, Schedule
 from dynx.training.library import new_algorithm, set_threads
 from dynx.training.policy import Policy
 from dynx.training.specification import TrainingSpec, read_spec, spec_document
 
 RUN = "run.json"
+
+SCHEMA = "dynx.training/2"
+"""Name and version of the layout of `RUN`."""
+
+FIRST_SCHEMA = "dynx.training/1"
+"""Version of a run whose `RobotTask` moves rigid bodies."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +58,8 @@ def train(
     The folder gets `RUN`, checkpoints, `EVALUATIONS` and `CURVE` (a JSON document in each line), `BEST` (the
     policy of the best evaluation) and `FINAL`. A run that was ended, even by a power failure, goes on with
     `resume` from its last checkpoint: weights, state of the optimizer, schedules, scaling and replay buffer
-    are those of the checkpoint; the environments begin new episodes. A finished run is only judged, unless
+    are those of the checkpoint; the environments begin new episodes. A run of an earlier dynx goes on with
+    the joint dynamics that its environments had (`of_rigid_bodies`). A finished run is only judged, unless
     the number of steps is greater now: then it goes on, with schedules that end at the new one.
 
     Raises ArgumentError for a folder that has another run, or one that is not to be resumed, and the errors
@@ -59,7 +67,9 @@ def train(
     """
     schedule = schedule or Schedule()
     place = Path(folder)
-    _check_folder(place, spec, resume)
+    schema, given = _checked_schema(place, spec, resume), spec
+    if schema == FIRST_SCHEMA:
+        spec = of_rigid_bodies(spec)
     with ExitStack() as stack:
         stack.callback(set_threads(schedule.threads))
         vector = make_vector(spec)
@@ -75,7 +85,7 @@ def train(
         algorithm = new_algorithm(spec.algorithm, vector, spec.hyperparameters, spec.seed + done)
         if found is not None:
             found.restore(algorithm, vector)
-        _write_run(place, spec)
+        _write_run(place, given, schema)
         learning = Learning(spec, place, schedule, algorithm, vector, judged, checkpoints, progress)
         if done < spec.steps:
             learning.learn(spec.steps - done)
@@ -88,23 +98,32 @@ def read_run(folder: str | os.PathLike[str]) -> TrainingSpec:
 
     Raises ArgumentError for a folder without a run.
     """
-    path = Path(folder) / RUN
+    return _read_run(Path(folder))[0]
+
+
+def _read_run(folder: Path) -> tuple[TrainingSpec, str]:
+    """Read what a folder was trained with, and the schema of its `RUN`."""
+    path = folder / RUN
     try:
         document = parse_json(read_file(str(path)))
         spec: object = document["spec"]
+        schema = FIRST_SCHEMA if document.get("schema") == FIRST_SCHEMA else SCHEMA
     except RobotNotFoundError:
         raise ArgumentError(f"{shown(folder, 300)} has no training run: there is no {RUN} in it") from None
     except (DescriptionError, ValueError, KeyError, TypeError) as error:
         raise ArgumentError(f"{shown(path, 300)} cannot be read: {error}") from error
-    return read_spec(spec, str(path))
+    return read_spec(spec, str(path)), schema
 
 
-def _check_folder(place: Path, spec: TrainingSpec, resume: bool) -> None:
-    """Check that the folder is free for a run, or has this one where it is to be resumed."""
+def _checked_schema(place: Path, spec: TrainingSpec, resume: bool) -> str:
+    """Return the schema of the run that a folder has, where it is to be resumed, otherwise that of a new one.
+
+    Raises ArgumentError for a folder that is not free for a run, or has another one.
+    """
     if not os.path.exists(place / RUN):
         if resume:
             raise ArgumentError(f"{shown(place, 300)} has no training run that could be resumed")
-        return
+        return SCHEMA
     if not resume:
         raise ArgumentError(
             f"{shown(place, 300)} has a training run already; resume it (--resume) or name another folder"
@@ -114,16 +133,18 @@ def _check_folder(place: Path, spec: TrainingSpec, resume: bool) -> None:
     )
     if linked is not None:
         raise ArgumentError(f"{shown(linked, 300)} is a link, through which the run would write; remove it")
-    difference = spec.obstacle_to_continuing(read_run(place))
+    known, schema = _read_run(place)
+    difference = spec.obstacle_to_continuing(known)
     if difference is not None:
         raise ArgumentError(f"{shown(place, 300)} has another run: {difference}")
+    return schema
 
 
-def _write_run(place: Path, spec: TrainingSpec) -> None:
+def _write_run(place: Path, spec: TrainingSpec, schema: str) -> None:
     """Make the folder of a run that can begin, or go on, perhaps with more steps."""
     try:
         place.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ArgumentError(f"{shown(place, 300)} cannot be made: {error.strerror}") from error
-    document = {"schema": "dynx.training/1", "dynx": __version__, "spec": spec_document(spec)}
+    document = {"schema": schema, "dynx": __version__, "spec": spec_document(spec)}
     write_text(place / RUN, json_text(document))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, shown
@@ -79,11 +79,18 @@ class TrainingSpec:
         return self.first_difference(replace(other, steps=self.steps))
 
 
+FIRST_POLICY: Final = "dynx.policy/1"
+"""Version of a policy's document in which the robot of a `RobotTask` was one of rigid bodies."""
+
+POLICY: Final = "dynx.policy/2"
+"""Version of a policy's document in which it has the joint dynamics of its description."""
+
+
 @dataclass(frozen=True)
 class PolicyDocument:
     """What a file of a policy says about itself (member ``dynx.json``)."""
 
-    schema: Literal["dynx.policy/1"]
+    schema: Literal["dynx.policy/1", "dynx.policy/2"]
     dynx: str
     spec: TrainingSpec
     steps_done: int

@@ -19,7 +19,7 @@ from dynx.errors import ArgumentError
 from dynx.training import Schedule, TaskSpec, load_policy, make, train
 from dynx.training.library import ALGORITHMS
 from dynx.training.policy import DOCUMENT, read_policy_document
-from tests.training.runs import small_run
+from tests.training.runs import members, small_run, written
 
 ONCE = Schedule(checkpoint_every=1000, evaluate_every=1000)
 
@@ -30,18 +30,6 @@ def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("run")
     train(small_run(64, normalize=True), folder, schedule=ONCE, final_episodes=1)
     return folder / "final.zip"
-
-
-def members(path: Any) -> dict[str, bytes]:
-    with zipfile.ZipFile(path) as archive:
-        return {name: archive.read(name) for name in archive.namelist()}
-
-
-def written(path: Path, parts: dict[str, bytes]) -> Path:
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, content in parts.items():
-            archive.writestr(name, content)
-    return path
 
 
 def test_a_loaded_policy_acts_as_stable_baselines_does(trained: Path) -> None:
@@ -246,3 +234,23 @@ def test_an_observation_of_another_kind_is_refused(trained: Path) -> None:
 def test_a_name_longer_than_a_system_allows_is_an_error_of_dynx(name: str, tmp_path: Path) -> None:
     with pytest.raises(ArgumentError, match=r"\.{3}"):
         load_policy(tmp_path / name)
+
+
+def test_policies_of_earlier_versions_move_rigid_bodies(trained: Path, tmp_path: Path) -> None:
+    """As they were trained: their robots had no joint dynamics, which those of worlds had."""
+    parts = members(trained)
+    document = json.loads(parts[DOCUMENT])
+    assert document["schema"] == "dynx.policy/2"
+
+    def task(schema: str, env_id: str, **options: Any) -> Any:
+        told = {**document["spec"]["task"], "id": env_id, "options": options}
+        changed = {**document, "schema": schema, "spec": {**document["spec"], "task": told}}
+        path = written(tmp_path / "told.zip", {**parts, DOCUMENT: json.dumps(changed).encode()})
+        return read_policy_document(path).spec.task
+
+    off = {"joint_damping": False, "joint_friction": False, "joint_armature": False}
+    assert task("dynx.policy/1", "dynx/Reach-v0", robot="panda").options == {**off, "robot": "panda"}
+    assert task("dynx.policy/1", "dynx/Reach-v0", **off, robot="panda").options == {**off, "robot": "panda"}
+    assert task("dynx.policy/2", "dynx/Reach-v0", robot="panda").options == {"robot": "panda"}
+    for env_id in ("dynx/Push-v0", "CartPole-v1", "own/Unknown-v0"):
+        assert task("dynx.policy/1", env_id).options == {}

@@ -18,9 +18,9 @@ import pytest
 
 from dynx.errors import ArgumentError, UnknownNameError
 from dynx.training import Schedule, TaskSpec, TrainingSpec, load_policy, train
-from dynx.training.policy import read_policy_document
+from dynx.training.policy import DOCUMENT, read_policy_document
 from dynx.training.records import read_lines
-from tests.training.runs import SMALL, small_run
+from tests.training.runs import SMALL, members, small_run, written
 
 OFTEN = Schedule(checkpoint_every=64, evaluate_every=128, episodes=2)
 
@@ -229,3 +229,23 @@ def test_a_checkpoint_that_was_cut_off_is_passed_over(tmp_path: Path) -> None:
         each.write_bytes(b"PK")
     with pytest.raises(ArgumentError, match="no checkpoint can be used"):
         train(small_run(), tmp_path, resume=True)
+
+
+def test_a_run_of_an_earlier_version_goes_on_with_rigid_bodies(tmp_path: Path) -> None:
+    """Twice: the folder keeps its version, and the caller names the task as before."""
+    task = TaskSpec("dynx/Pendulum-v0", "compiled")
+    spec = small_run(128, task=task)
+    train(spec, tmp_path, schedule=OFTEN, final_episodes=1)
+    document = json.loads((tmp_path / "run.json").read_text())
+    assert document["schema"] == "dynx.training/2"
+    (tmp_path / "run.json").write_text(json.dumps({**document, "schema": "dynx.training/1"}))
+    for path in (tmp_path / "checkpoints").glob("*.zip"):
+        parts = members(path)
+        told = {**json.loads(parts[DOCUMENT]), "schema": "dynx.policy/1"}
+        written(path, {**parts, DOCUMENT: json.dumps(told).encode()})
+    for steps in (192, 256):
+        found = train(replace(spec, steps=steps), tmp_path, resume=True, schedule=OFTEN, final_episodes=1)
+        assert found.resumed_at > 0
+        assert found.policy.spec.task.options["joint_friction"] is False
+        document = json.loads((tmp_path / "run.json").read_text())
+        assert (document["schema"], document["spec"]["task"]["options"]) == ("dynx.training/1", {})

@@ -96,9 +96,11 @@ def play(
 
 def _task_of(policy: str, options: Sequence[tuple[str, str]], own_task: str | None) -> TaskSpec:
     """Return the task of a policy with the options and the name that the command gives."""
+    # First, because it registers the task that the file may name.
+    env_id = None if own_task is None else task_id(own_task)
     task = read_policy_document(policy).spec.task
     given = {name: json_value(word) for name, word in options}
-    return task_of_file(task, policy, given, None if own_task is None else task_id(own_task))
+    return task_of_file(task, policy, given, env_id)
 
 
 def _given_task(options: Sequence[tuple[str, str]], own_task: str | None) -> TaskSpec:

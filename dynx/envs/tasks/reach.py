@@ -60,9 +60,10 @@ class Reach(RobotTask):
     """Bring a frame of an arm to a random pose and hold it there.
 
     Action (nv,) from -1 to 1. With ``actions="torque"``: the torque beyond that of gravity, 1 being the one
-    that accelerates the joint alone by 20 rad/s^2 at the neutral configuration; joints are damped by 2 /s.
-    With ``actions="velocity"``: the velocity, 1 being 1 rad/s or m/s, which the torque of the inverse
-    dynamics approaches at a rate of 20 /s.
+    that accelerates the joint alone by 20 rad/s^2 at the neutral configuration, with its armature and against
+    its dry friction; joints are damped by 2 /s beside their own damping. With ``actions="velocity"``: the
+    velocity, 1 being 1 rad/s or m/s, which the torque of the inverse dynamics approaches at a rate of 20 /s;
+    it includes armature, damping and the friction of a joint that moves at that velocity.
 
     Observation (2 nv + 9,): q, v, position of the frame [m], the vector from it to the goal [m], and the
     rotation vector from it to the goal [rad], in world axes. Reward: -(distance [m] + 0.2 angle [rad] + 0.001
@@ -158,12 +159,21 @@ class Reach(RobotTask):
 
     def torque(self, robot: Dynamics, state: State, action: Array) -> Array:
         """Return the torque of an action."""
-        q, v, _ = state
+        (q, v, _), joints = state, robot.joints
         if self.actions == "torque":
-            push = self.inertia * (MAX_ACCELERATION * action - DAMPING_RATE * v)
+            inertia = self.inertia if joints is None else self.inertia + joints.armature
+            push = inertia * (MAX_ACCELERATION * action - DAMPING_RATE * v)
+            if joints is not None:
+                push = push + joints.friction * action
             tau: Array = robot.gravity_torque(q) + push
         else:
-            tau = robot.inverse_dynamics(q, v, SERVO_RATE * (MAX_SPEED * action - v))
+            wanted = MAX_SPEED * action
+            a = SERVO_RATE * (wanted - v)
+            tau = robot.inverse_dynamics(q, v, a)
+            if joints is not None:
+                # Damping acts on the velocity at the end of the step.
+                damping = joints.damping * (v + self.step_dt * a)
+                tau = tau + joints.armature * a + damping + joints.friction * np.sign(wanted)
         return tau
 
     def errors(self, robot: Dynamics, state: State) -> tuple[Array, Array, Array]:
