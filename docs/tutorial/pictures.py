@@ -19,7 +19,7 @@ from matplotlib.axes import Axes
 import dynx
 from docs.tutorial.pages import HOME, program
 from dynx.viewer import Viewer
-from dynx.world import Camera, Scene, SceneRobot, World, ground
+from dynx.world import Camera, ExternalForce, Scene, SceneRobot, World, ground
 
 BLUE, VERMILION, GREEN, GREY = "#0072b2", "#d55e00", "#009e73", "#8c8c8c"
 
@@ -274,6 +274,45 @@ def _motion(v: Variables) -> None:
         viewer.export(HOME / "7_motion.gif")
 
 
+def _box(v: Variables) -> None:
+    figure, axes = plt.subplots(figsize=(5.6, 3.0))
+    axes.plot([-0.5, 0.7], [0, 0], color=GREY, lw=3)
+    axes.add_patch(plt.Rectangle((-0.2, 0), 0.4, 0.2, fc="#dddddd", ec=GREY, lw=1.5))
+    _arrow(axes, (0.0, 0.1), (0.0, -0.2), VERMILION, "weight $m g$")
+    _arrow(axes, (0.0, 0.0), (0.0, 0.32), BLUE, "normal force $N$")
+    _arrow(axes, (-0.02, 0.0), (-0.32, 0.0), GREEN)
+    axes.text(-0.36, 0.05, r"friction $\mu N$", color=GREEN, ha="center")
+    _arrow(axes, (0.25, 0.1), (0.45, 0.1), "black", "speed $v$")
+    _plain(axes)
+    _save(figure, "8_box.svg")
+
+
+def _camera(v: Variables) -> None:
+    picture = v["picture"]
+    figure, panels = plt.subplots(1, 3, figsize=(10.8, 3.0))
+    panels[0].imshow(picture.rgb)
+    near = np.where(np.isfinite(picture.depth), picture.depth, np.nan)
+    panels[1].imshow(near, cmap="viridis_r", vmin=2.5, vmax=8.0)
+    parts = np.array(picture.segmentation, dtype=float)
+    parts[~picture.mask("r2d2")] = np.nan
+    panels[2].imshow(np.full((*parts.shape, 3), 0.93))
+    panels[2].imshow(parts, cmap="tab20", interpolation="nearest")
+    for axes in panels:
+        axes.axis("off")
+    figure.subplots_adjust(0, 0, 1, 1, 0.02, 0)
+    _save(figure, "8_camera.png")
+
+
+def _push(v: Variables) -> None:
+    with World(v["rolling"], "pybullet", dt=2e-3) as world, world.view(steps=False) as viewer:
+        world.run(2.5)
+        with viewer.record(HOME / "8_push.gif"):
+            for step in range(22):
+                push = ExternalForce("r2d2/head", (0, 300.0, 0, 0, 0, 0))
+                world.run(0.1, forces=[push] if step in (5, 6) else [])
+                viewer.update()
+
+
 def _with_frames(picture: Any, camera: Any, frames: Any, name: str, length: float = 0.12) -> None:
     """Write a picture of a camera with frames (4, 4) drawn over it."""
     height, width = picture.rgb.shape[:2]
@@ -350,4 +389,5 @@ PICTURES: dict[str, tuple[Callable[[Variables], None], ...]] = {
     "5_dynamics": (_rod, _swings),
     "6_trajectory": (_cycloid, _paths),
     "7_control": (_loop, _errors, _motion),
+    "8_worlds": (_box, _camera, _push),
 }
