@@ -36,7 +36,9 @@ Invalid input raises one of these. Any other exception is a defect of dynx.
 from __future__ import annotations
 
 import difflib
+import json
 import os
+import re
 import signal
 import threading
 from collections.abc import Iterable, Iterator
@@ -140,7 +142,32 @@ class UnknownBackendError(BackendError, LookupError):
 
 
 class NotInstalledError(BackendError, ImportError):
-    """A package is missing; the message names the extra of dynx that installs it."""
+    """A package is missing; the message names the extra of dynx that installs it.
+
+    In the message extra ``EXTRA`` becomes `install_command`.
+    """
+
+    def __init__(self, message: str) -> None:
+        command = _OF_INDEX.sub(lambda found: install_command(found["extra"]), message)
+        super().__init__(command)
+
+
+_OF_INDEX = re.compile(r"""pip install (['"])dynx\[(?P<extra>[\w,-]+)\]\1""")
+
+
+def install_command(extra: str) -> str:
+    """Return the words that say how to install an extra, by how dynx itself was installed: from a folder, a
+    repository or an index of packages."""
+    from importlib.metadata import PackageNotFoundError, distribution
+
+    try:
+        origin = json.loads(distribution("dynx").read_text("direct_url.json") or "{}")
+    except (PackageNotFoundError, ValueError):
+        origin = {"dir_info": {}}
+    if "vcs_info" in origin:
+        source = f"{origin['vcs_info'].get('vcs', 'git')}+{origin.get('url', '')}"
+        return f"pip install 'dynx[{extra}] @ {source}'"
+    return f"pip install '.[{extra}]' in the clone" if origin else f"pip install 'dynx[{extra}]'"
 
 
 @contextmanager

@@ -73,8 +73,10 @@ def explained(public: Any) -> Any:
     if not isinstance(public, FunctionType) or hasattr(public, ANSWERS):
         return public
     name: str = public.__name__
-    answering = _checked(public, name, {})
     home = vars(sys.modules[public.__module__])
+    if getattr(home.get(name), "__wrapped__", None) is public:
+        return home[name]  # another package has it, too
+    answering = _checked(public, name, {})
     if home.get(name) is public:
         home[name] = answering
     return answering

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import importlib.metadata
+import json
 import pickle
 import re
 from typing import Any
@@ -19,6 +21,7 @@ from dynx.errors import (
     LimitError,
     LimitViolation,
     NoClosedFormError,
+    NotInstalledError,
     SimulationError,
     TrajectoryError,
     escaped,
@@ -157,3 +160,41 @@ def test_the_environment_turns_tracebacks_on(
     if value is not None:
         monkeypatch.setenv("DYNX_TRACEBACK", value)
     assert traceback_wanted() == wanted
+
+
+ORIGINS = {
+    "a clone": (
+        {"url": "file:///home/me/dynx", "dir_info": {"editable": True}},
+        "pip install '.[plot]' in the clone",
+    ),
+    "a repository": (
+        {"url": "https://example.org/dynx", "vcs_info": {"vcs": "git"}},
+        "pip install 'dynx[plot] @ git+https://example.org/dynx'",
+    ),
+    "an index": (None, "pip install 'dynx[plot]'"),
+}
+"""What an installer notes on the origin of dynx, and the words that install an extra."""
+
+
+@pytest.mark.parametrize("origin", ORIGINS)
+def test_an_extra_is_installed_as_dynx_was(origin: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    noted, words = ORIGINS[origin]
+
+    class Installed:
+        def read_text(self, name: str) -> str | None:
+            assert name == "direct_url.json"
+            return None if noted is None else json.dumps(noted)
+
+    monkeypatch.setattr(importlib.metadata, "distribution", lambda name: Installed())
+    for quote in ("'", '"'):
+        error = NotInstalledError(f"a plot needs matplotlib: pip install {quote}dynx[plot]{quote} (or not)")
+        assert str(error) == f"a plot needs matplotlib: {words} (or not)"
+        assert str(pickle.loads(pickle.dumps(error))) == str(error)
+
+
+def test_without_an_installation_an_extra_is_installed_in_the_clone(monkeypatch: pytest.MonkeyPatch) -> None:
+    def absent(name: str) -> None:
+        raise importlib.metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(importlib.metadata, "distribution", absent)
+    assert errors.install_command("plot") == "pip install '.[plot]' in the clone"

@@ -159,7 +159,7 @@ class BatchRollouts:
         """Plot the share of rollouts below each error, and the errors of each joint; return the `matplotlib`
         figure.
 
-        Raises NotInstalledError without matplotlib (``pip install 'dynx[plot]'``).
+        Raises NotInstalledError without matplotlib (extra ``plot``).
         """
         figure = new_figure(7.0, 6.0)
         upper, lower = figure.subplots(2, 1)

@@ -178,7 +178,7 @@ def plot_rows(rows: Sequence[Row], tutorial: Tutorial, path: str | os.PathLike[s
     """Plot the errors in a panel for each plant, save the figure at `path` and return it.
 
     The curves show the largest error of all joints at each time. Raises NotInstalledError without matplotlib
-    (``pip install 'dynx[plot]'``), ArgumentError where the file cannot be written.
+    (extra ``plot``), ArgumentError where the file cannot be written.
     """
     figure = new_figure(7.0, 2.0 + 3.2 * len(tutorial.plants))
     panels = figure.subplots(len(tutorial.plants), 1, sharex=True, sharey=True, squeeze=False)[:, 0]

@@ -86,7 +86,7 @@ def test_a_film_is_exported_by_its_suffix(
         patch.setitem(sys.modules, "imageio_ffmpeg", None)
         code, output = run(saved, "--export", str(film))
         assert (code, film.exists()) == (2, False)
-        assert "pip install 'dynx[film]'" in output
+        assert "pip install '.[film]'" in output
     pytest.importorskip("imageio_ffmpeg", reason="needs the extra film")
     code, output = run(saved, "--export", str(film))
     assert code == 0, output

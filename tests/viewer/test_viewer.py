@@ -53,7 +53,7 @@ def test_the_line_that_installs_the_viewer_is_told() -> None:
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert ended.returncode == 1
     assert ended.stderr.splitlines()[-1].startswith(
-        "dynx.errors.NotInstalledError: the viewer needs viser: pip install 'dynx[viewer]'"
+        "dynx.errors.NotInstalledError: the viewer needs viser: pip install '.[viewer]'"
     )
 
 

@@ -6,7 +6,14 @@ prismatic ones), `candidates` (one branch, polished by Newton's method on the ch
 `branch_kernel` (all branches), `solver`.
 """
 
+from typing import TYPE_CHECKING
+
 from dynx.ik.closed_forms.solutions import IKSolutions
 from dynx.ik.closed_forms.solver import ClosedForm, closed_form, redundant_joints
+from dynx.registry import moved_names
 
 __all__ = ["ClosedForm", "IKSolutions", "closed_form", "redundant_joints"]
+
+# Hidden from type checkers, which would take any name for an attribute.
+if not TYPE_CHECKING:
+    __getattr__ = moved_names(__name__, {})

@@ -42,7 +42,7 @@ def save(rollout: Rollout, path: str | os.PathLike[str]) -> None:
       describes the topics
 
     All three keep every bit of the numbers. Raises ArgumentError for another format or a file that
-    cannot be written, NotInstalledError for ``.mcap`` without mcap (``pip install 'dynx[mcap]'``).
+    cannot be written, NotInstalledError for ``.mcap`` without mcap (extra ``mcap``).
     """
     path = checked_path(path)
     write = WRITERS.get(Path(path).suffix.lower())

@@ -45,7 +45,7 @@ ABOUT_CHANNEL = {"offered_qos_profiles": ""}
 
 
 def write_mcap(rollout: Rollout, file: BinaryIO) -> None:
-    """Write `rollout` as a recording. Raises NotInstalledError without mcap (``dynx[mcap]``)."""
+    """Write `rollout` as a recording. Raises NotInstalledError without mcap (extra ``mcap``)."""
     with importing("a .mcap file needs mcap: pip install 'dynx[mcap]'"):
         from mcap.writer import Writer
     writer = Writer(file)

@@ -56,7 +56,7 @@ def plot(rollout: Rollout, path: str | os.PathLike[str] | None = None) -> Any:
     that frame. A limit is drawn where a torque comes near it.
     A floating base has its own column: its position in the world, and its error, velocity and force in the
     axes of the base. The figure belongs to no window. Raises NotInstalledError without matplotlib
-    (``pip install 'dynx[plot]'``), ArgumentError for a file that cannot be written.
+    (extra ``plot``), ArgumentError for a file that cannot be written.
     """
     columns, forces = _columns(rollout.model), _contact_forces(rollout)
     rows = 4 if forces else 3

@@ -76,8 +76,7 @@ def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
 
     Robots are written as URDF text with the full paths of their meshes; those that lie neither with the file
     nor with a library need `package_dirs` when it is read. Raises ArgumentError for another suffix
-    or a file that cannot be written, NotInstalledError for ``.toml`` without tomli-w (``pip install
-    'dynx[world]'``).
+    or a file that cannot be written, NotInstalledError for ``.toml`` without tomli-w (extra ``world``).
     """
     file = checked_path(path)
     suffix = Path(file).suffix.lower()

@@ -15,7 +15,7 @@ def plot(readings: Readings, path: str | os.PathLike[str] | None = None) -> Any:
     """Plot the samples over the time at which they were taken; return the `matplotlib.figure.Figure`, and
     save it at `path` if that is given.
 
-    Raises NotInstalledError without matplotlib (``pip install 'dynx[plot]'``), ArgumentError for a file that
+    Raises NotInstalledError without matplotlib (extra ``plot``), ArgumentError for a file that
     cannot be written.
     """
     channels = readings.sensor.channels

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, ShapeError, UnknownNameError, nearest, shown
@@ -87,7 +88,7 @@ class Readings:
         return np.concatenate(list(self.channels.values()), axis=1)
 
     @checks_types
-    def held(self, times: Floats) -> Floats:
+    def held(self, times: ArrayLike) -> Floats:
         """Return the values (n, size) that can be read at some times (n,) [s]: those of the last sample that
         is available then, NaN before the first."""
         times = real_array("times", times)

@@ -187,4 +187,4 @@ def test_a_page_without_matplotlib_names_the_extra_before_the_run(
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     result = run("--engine", ENGINES[0], "--html", str(tmp_path / "c.html"))
     assert result.exit_code == 2
-    assert "pip install 'dynx[plot]'" in result.output
+    assert "pip install '.[plot]'" in result.output

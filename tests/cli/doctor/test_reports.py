@@ -241,7 +241,7 @@ def test_a_missing_engine_is_a_line_with_the_package_to_install(
     assert [line.split("'")[1] for line in missing_engines([differing(), alike()])] == ["drake"]
     assert missing_engines([refused()]) == []
     conclude([differing()], tmp_path, engines=None)
-    assert "note: the engine 'drake' needs a package: pip install 'dynx[drake]'" in capsys.readouterr().out
+    assert "note: the engine 'drake' needs a package: pip install '.[drake]'" in capsys.readouterr().out
     conclude([differing()], tmp_path, engines=("pinocchio", "pybullet", "mujoco"))
     assert "drake" not in capsys.readouterr().out
 

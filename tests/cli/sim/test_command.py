@@ -521,7 +521,7 @@ def test_a_plot_without_matplotlib_names_the_extra(tmp_path: Path, monkeypatch: 
     for arguments in (["ur5", *SHORT], ["--tutorial"]):
         result = sim(*arguments, "--plot", str(tmp_path / "out.png"))
         assert result.exit_code == 2
-        assert "pip install 'dynx[plot]'" in result.stderr
+        assert "pip install '.[plot]'" in result.stderr
         assert result.stdout == ""
 
 

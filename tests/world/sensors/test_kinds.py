@@ -251,6 +251,7 @@ def test_samples_have_their_rate_and_are_held_until_the_next(arm: Model) -> None
     rows = np.rint(samples.t * 1000).astype(int)
     np.testing.assert_array_equal(samples.values, found["fast"].values[rows])
     held = samples.held(rollout.t)
+    np.testing.assert_array_equal(samples.held(rollout.t.tolist()), held)
     assert np.isnan(held[:13]).all()
     for k in range(13, 101):
         taken = np.flatnonzero(samples.t + 0.0125 <= k * 1e-3 + 1e-9)[-1]
