@@ -24,7 +24,7 @@ from dynx.world.last_step import LastStep
 from dynx.world.queries import first_hits
 from dynx.world.sensors.errors import SampleNumbers
 from dynx.world.sensors.kinds import ContactSensor, RaySensor
-from dynx.world.sensors.motion import RobotMotion, SensedMotion
+from dynx.world.sensors.motion import RobotMotion, SensedBody, SensedFrame, SensedMotion
 from dynx.world.sensors.places import SensedParts, SensorPlace
 from dynx.world.sensors.readings import SAME_SAMPLE, SensorReading, read_sensor, sample_numbers
 from dynx.world.sensors.sensor import Sensor
@@ -41,6 +41,8 @@ class SceneInstants:
     """Poses (n, 4, 4) of the bodies that move."""
     force_on: Callable[[str], Floats]
     """Sum (n, 3) of the contact forces on a part, in world axes [N]."""
+    body_motion: Callable[[str], SensedBody | None] = lambda _: None
+    """Velocity and acceleration of a body; None where they are not recorded."""
 
 
 class SceneMotion(SensedMotion):
@@ -65,6 +67,12 @@ class SceneMotion(SensedMotion):
                 with backend("reference", robot.model) as engine:
                     return engine.forward_kinematics(around.configurations[robot.name], place.name)
         return np.broadcast_to(self._bodies[place.name], (n, 4, 4))
+
+    def frame_motion(self, place: SensorPlace) -> SensedFrame:
+        moved = None if place.robot is not None else self._around.body_motion(place.name)
+        if moved is None:
+            return super().frame_motion(place)
+        return SensedFrame(self.pose(place), moved.velocity, moved.acceleration, self._around.layout.gravity)
 
     def contact_force(self, place: SensorPlace) -> Floats:
         require_shapes(place, self._around.layout, own=True)
@@ -129,7 +137,8 @@ class _Pending(NamedTuple):
     t: float
     sensors: Sequence[Sensor]
     robots: Mapping[str, RobotState]
-    bodies: Mapping[str, Floats]
+    bodies: Mapping[str, BodyState]
+    """States of the bodies that move."""
 
 
 @dataclass(eq=False)
@@ -249,9 +258,7 @@ class WorldSensors:
             return
         robots = {robot.name: engine.robot_state(k) for k, robot in enumerate(self._layout.robots)}
         bodies = {
-            body.name: engine.body_state(k).T_world_body[None]
-            for k, body in enumerate(self._layout.bodies)
-            if not body.fixed
+            body.name: engine.body_state(k) for k, body in enumerate(self._layout.bodies) if not body.fixed
         }
         self._pending = _Pending(t, due, robots, bodies)
 
@@ -271,8 +278,9 @@ class WorldSensors:
         around = SceneInstants(
             self._layout,
             {name: state.q[None] for name, state in before.items()},
-            bodies,
+            {name: state.T_world_body[None] for name, state in bodies.items()},
             lambda part: _force_on(part, contacts or ()),
+            lambda name: self._motion_of(name, bodies, after),
         )
         motion = SceneMotion(np.array([t]), self._h, robots, around, None)
         for sensor in due:
@@ -281,6 +289,13 @@ class WorldSensors:
             # Of those that can be read at the end of the step, the last is enough.
             while len(kept) > 1 and self._is_available(sensor, kept[1], t + self._h):
                 kept.popleft()
+
+    def _motion_of(self, name: str, before: Mapping[str, BodyState], after: WorldState) -> SensedBody:
+        """Return the motion of a body in a step, of one that is fixed at rest."""
+        if name not in before:
+            return SensedBody(np.zeros((1, 6)), np.zeros((1, 6)))
+        body = next(each for each in self._layout.bodies if each.name == name)
+        return SensedBody.of_step(body, before[name], after.bodies[name], self._h)
 
     def readings(self, time: float) -> dict[str, SensorReading]:
         """Return the last reading of each sensor that is available at `time` [s]."""

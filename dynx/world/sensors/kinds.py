@@ -114,9 +114,10 @@ class ForceTorqueSensor(PlacedSensor):
 class Imu(PlacedSensor):
     """An inertial measurement unit: specific force ``acceleration`` [m/s^2] and ``angular_velocity`` [rad/s].
 
-    Both are those of the sensor's frame, at `pose` in a frame of a robot, in its axes. The specific force is
-    the acceleration of the frame's origin minus gravity: at rest it is 9.81 m/s^2 upwards (Groves, Principles
-    of GNSS, inertial and multisensor integrated navigation systems, 2013, eq. 2.76).
+    Both are those of the sensor's frame, at `pose` in a frame of a robot or in that of a body, in its axes.
+    The specific force is the acceleration of the frame's origin minus gravity: at rest it is 9.81 m/s^2
+    upwards, in free fall 0 (Groves, Principles of GNSS, inertial and multisensor integrated navigation
+    systems, 2013, eq. 2.76).
     """
 
     accelerometer: SensorErrors = NO_ERRORS
@@ -129,19 +130,21 @@ class Imu(PlacedSensor):
     )
 
     def require(self, parts: SensedParts) -> None:
-        model, name = _robot_part(self, parts)
-        _frame(self, model, name, "frame")
+        _, robot, name = self.place(parts)
+        if robot is not None:
+            _frame(self, parts.robots[robot], name, "frame")
 
     def layout(self, parts: SensedParts) -> SensorLayout:
-        robot, model, name = _robot_and_part(self, parts)
-        return self._on_frame(robot, model, name)
+        _, robot, name = self.place(parts)
+        if robot is None:
+            return self._on_part(parts)
+        return self._on_frame(robot, parts.robots[robot], name)
 
     def measure(self, motion: SensedMotion) -> tuple[Floats, ...]:
-        robot, frame = motion.robot(self.place(motion.parts))
-        T, velocity, acceleration = robot.pose(frame), robot.velocity(frame), robot.acceleration(frame)
+        T, velocity, acceleration, gravity = motion.frame_motion(self.place(motion.parts))
         R, p = self.frame(T)
         omega, alpha, lever = velocity[:, 3:], acceleration[:, 3:], p - T[:, :3, 3]
-        proper = acceleration[:, :3] - np.array(robot.model.gravity)
+        proper = acceleration[:, :3] - gravity
         proper = proper + cross(alpha, lever) + cross(omega, cross(omega, lever))
         return rotate_back(R, proper), rotate_back(R, omega)
 
@@ -271,7 +274,10 @@ def _robot_and_part(sensor: Sensor, parts: SensedParts) -> tuple[str, Model, str
     on a body."""
     _, robot, name = sensor.place(parts)
     if robot is None:
-        raise ArgumentError(f"{sensor} is on the body {shown(name)}; wanted a part of a robot")
+        raise ArgumentError(
+            f"{sensor} is on the body {shown(name)}, which no joint carries; wanted a part of a robot (an "
+            "Imu, a ContactSensor or a RaySensor can be on a body)"
+        )
     return robot, parts.robots[robot], name
 
 

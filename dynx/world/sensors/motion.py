@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from dynx.errors import UnsupportedFeatureError, shown
 from dynx.model import Model
 from dynx.model.elements import Joint
 from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import cross
+from dynx.steppers.layout import BodyLayout
+from dynx.steppers.state import BodyState
 from dynx.world.sensors.places import SensedParts, SensorPlace
 
 
@@ -103,6 +107,42 @@ class RobotMotion:
         return self._bodies.base_wrench(self.q, rest, rest)
 
 
+@dataclass(frozen=True, eq=False)
+class SensedBody:
+    """A body that no joint carries, at n instants: velocity and acceleration (n, 6) of the origin of its
+    frame, linear, then angular, in world axes."""
+
+    velocity: Floats
+    acceleration: Floats
+
+    @classmethod
+    def of_step(cls, body: BodyLayout, before: BodyState, after: BodyState, h: float) -> SensedBody:
+        """Return the motion at the beginning of a step of `h` [s], from the states before and after it.
+
+        The acceleration is that at the beginning of a step of semi-implicit Euler, in which the velocity of
+        the centre of mass and the angular velocity change as `MeanAcceleration` has it for robots.
+        """
+        at, at_next = (state.T_world_body[:3, :3] @ body.center for state in (before, after))
+        omega, omega_next = before.twist[3:], after.twist[3:]
+        rising = after.twist[:3] + cross(omega_next, at_next) - before.twist[:3] - cross(omega, at)
+        alpha = (omega_next - omega) / h
+        linear = rising / h - cross(alpha, at) - cross(omega, cross(omega, at))
+        return cls(before.twist[None], np.concatenate([linear, alpha])[None])
+
+
+class SensedFrame(NamedTuple):
+    """A frame of a robot or a body at n instants."""
+
+    T: Floats
+    """Poses (n, 4, 4) in the world."""
+    velocity: Floats
+    """Velocities (n, 6) of its origin, linear, then angular, in world axes."""
+    acceleration: Floats
+    """Classical accelerations (n, 6), likewise."""
+    gravity: Floats
+    """Gravity (3,) in world axes [m/s^2]."""
+
+
 class SensedMotion:
     """Robots at the instants `t` (n,) [s], the beginnings of steps of `h` [s]."""
 
@@ -123,6 +163,13 @@ class SensedMotion:
         """Return the poses (n, 4, 4) of a link or body in the world."""
         robot, name = self.robot(place)
         return robot.pose(name)
+
+    def frame_motion(self, place: SensorPlace) -> SensedFrame:
+        """Return the motion of a frame of a robot, or of a body; UnsupportedFeatureError where it is not
+        recorded."""
+        robot, frame = self.robot(place)
+        gravity = np.array(robot.model.gravity)
+        return SensedFrame(robot.pose(frame), robot.velocity(frame), robot.acceleration(frame), gravity)
 
     def contact_force(self, place: SensorPlace) -> Floats:
         """Return the sum (n, 3) of the contact forces on a link or body, in world axes [N]."""
