@@ -17,7 +17,9 @@ import numpy as np
 
 from dynx.backends.solvability import main_joints, singular_direction
 from dynx.errors import DynxError, shown
+from dynx.model.elements import Vector
 from dynx.model.mechanism import ROOT, Mechanism
+from dynx.model.tree import STANDARD_GRAVITY
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation, quat_log
 from dynx.steppers.layout import Collider, ConstraintLayout, Layout, Owner
@@ -26,6 +28,7 @@ from dynx.steppers.state import WorldState
 from dynx.steppers.stepper import Stepper
 from dynx.world.boxes import owner_pose, shape_box
 from dynx.world.motors import JointLaw
+from dynx.world.scene.scene import Scene
 
 MIN_DEPTH = 1e-3
 """Depth [m] from which two parts count as overlapping: at rest, parts sink into one another by less."""
@@ -136,6 +139,21 @@ def _fast_parts(engine: Stepper, state: WorldState) -> Iterator[str]:
         from dynx.world.fast_parts import fast_parts
 
         yield from fast_parts(engine, state)
+
+
+def notes_on_gravity(scene: Scene) -> Iterator[str]:
+    """Yield one sentence for each robot that was given another gravity than its scene, whose gravity acts."""
+    for robot in scene.robots:
+        own = robot.model.gravity
+        if own not in (scene.gravity, STANDARD_GRAVITY):
+            yield (
+                f"gravity is {_vector(scene.gravity)} m/s^2, that of the scene, and not the {_vector(own)} "
+                f"of the model of {shown(robot.name)}"
+            )
+
+
+def _vector(values: Vector) -> str:
+    return f"({', '.join(f'{each:g}' for each in values)})"
 
 
 def notes_on_engine(engine: Stepper) -> Iterator[str]:

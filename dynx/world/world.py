@@ -35,7 +35,7 @@ from dynx.steppers.stepper import Stepper
 from dynx.world.commands import Commands, MotorsOf, RobotLoads, with_scene_motors
 from dynx.world.contacts import MAX_RAY_LENGTH, ClosestPoints, Contact, MeanContact, RayHits
 from dynx.world.motion import Motion, apply_state, checked_state
-from dynx.world.notes import Overlap, notes_on_engine, notes_on_start, overlaps_of
+from dynx.world.notes import Overlap, notes_on_engine, notes_on_gravity, notes_on_start, overlaps_of
 from dynx.world.preparation import checked_options, layout_for, prepare
 from dynx.world.scene.documents import scene_document, scene_from_document
 from dynx.world.scene.paths import ScenePaths
@@ -714,6 +714,7 @@ class World:
 
     def _lasting_notes(self, given: Mapping[str, object]) -> Iterator[str]:
         """Yield the notes that hold at every state, with those on the settings `given`."""
+        yield from notes_on_gravity(self.scene)
         yield from notes_on_engine(self._motion.engine)
         if self.scene.gravity[2] > 0.0:
             # Imported here, because gravity hardly ever points up.

@@ -48,6 +48,20 @@ def test_parts_that_overlap_at_the_start_are_noted_with_their_depth(engine: str)
 
 
 @pytest.mark.parametrize("engine", WORLDS)
+def test_a_gravity_of_a_model_that_the_scene_replaces_is_noted(engine: str) -> None:
+    def notes(own: tuple[float, float, float], of_scene: tuple[float, float, float]) -> tuple[str, ...]:
+        robot = SceneRobot("arm", dynx.load("ur5").with_gravity(own))
+        with World(Scene("s", robots=(robot,), gravity=of_scene), engine) as world:
+            return tuple(each for each in world.notes if "gravity" in each)
+
+    moon, standard = (0.0, 0.0, -1.62), (0.0, 0.0, -9.81)
+    assert notes(moon, standard) == (
+        "gravity is (0, 0, -9.81) m/s^2, that of the scene, and not the (0, 0, -1.62) of the model of 'arm'",
+    )
+    assert notes(moon, moon) == notes(standard, moon) == ()
+
+
+@pytest.mark.parametrize("engine", WORLDS)
 def test_parts_at_rest_on_one_another_are_not_noted(engine: str) -> None:
     bodies = (
         ground(),

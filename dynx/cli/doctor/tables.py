@@ -258,6 +258,8 @@ def _show_next(out: Console, report: DoctorReport, mended: str | None, command: 
     out.print()
     if mended is not None:
         out.print(f"{_action(report)} {one_line(mended)}", style="bold green")
+        if by_hand := _by_hand(report):
+            sentence(out, f"not mended, because the file does not say what is right: {by_hand}", 0, "yellow")
     elif report.mended is not None:
         out.print(f"to mend it: {command} --fix OUT.urdf", style="bold")
     if not report.alike:
@@ -283,6 +285,16 @@ def _action(report: DoctorReport) -> str:
     if report.kinematics_only:
         return "no inertial data, which --fix does not invent; copied unchanged to"
     return f"nothing to change in the text{level_clause(report)}; copied unchanged to"
+
+
+def _by_hand(report: DoctorReport) -> str:
+    """Write the rules of bad practice that the written file keeps, such as a unit that it does not state."""
+    changed = {change.rule for change in report.changes}
+    kept = dict.fromkeys(
+        each.rule for each in report.findings if each.kind == "practice" and each.rule not in changed
+    )
+    entries = ((rule, catalogue_entry(rule)) for rule in kept)
+    return ", ".join(wording.name(rule) + (f" {entry.name}" if entry else "") for rule, entry in entries)
 
 
 def _conditions(report: DoctorReport) -> str:

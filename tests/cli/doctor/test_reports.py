@@ -194,6 +194,20 @@ def test_names_cannot_write_on_the_terminal(report: DoctorReport) -> None:
         assert "x" * 1000 not in text
 
 
+def test_a_written_file_names_the_bad_practice_that_it_keeps() -> None:
+    """Such as lengths in millimetres: the file does not say what else is, so that nothing is converted."""
+    report = differing()
+    practice = replace(report.findings[0], rule="DX520", kind="practice", effect=None, effects={})
+    report = replace(report, findings=(*report.findings, practice))
+    out = StringIO()
+    show_one(Console(file=out, width=200, markup=False), report, {}, "out.urdf", "dynx doctor in.urdf")
+    assert (
+        "not mended, because the file does not say what is right: DX903, DX520 robot-in-millimetres"
+        in out.getvalue()
+    )
+    assert "not mended" not in shown(report)
+
+
 @pytest.mark.parametrize("key", ["not_used", "refused"])
 def test_an_engine_that_is_not_used_on_the_mended_file_does_not_refuse_it(key: str) -> None:
     out, word = StringIO(), key.replace("_", " ")
