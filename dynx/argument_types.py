@@ -17,11 +17,11 @@ import inspect
 import re
 import sys
 import typing
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import wraps
 from importlib import import_module
 from types import NoneType, UnionType
-from typing import Any, Literal, TypeVar, Union, cast
+from typing import Any, Literal, TypeGuard, TypeVar, Union, cast
 
 from dynx.errors import DTypeError, shown
 from dynx.option_names import ANSWERS, answer
@@ -41,9 +41,24 @@ def checks_types(target: T) -> T:
     return cast(T, _checked(target))
 
 
+def is_listed(value: object) -> TypeGuard[Iterable[Any]]:
+    """Check whether a value has elements: what can be iterated, but no text, no bytes and no array without an
+    axis, which has no elements though it looks iterable."""
+    return (
+        isinstance(value, Iterable)
+        and not isinstance(value, str | bytes | bytearray)
+        and getattr(value, "ndim", 1) > 0
+    )
+
+
 def _checked(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return the function with a check of its arguments before each call."""
+    """Return the function with a check of its arguments before each call.
+
+    An iterator is read once, by the function; its elements are checked as they are read.
+    """
     by_name: dict[str, Test] = {}
+    of_iterators: dict[str, Test] = {}
+    parameters: list[str] = []
     by_place: list[Test | None] = []
     unread = True
     called = function.__qualname__.removesuffix(".__init__").rpartition(".")[2]
@@ -51,11 +66,20 @@ def _checked(function: Callable[..., Any]) -> Callable[..., Any]:
     def read() -> None:
         nonlocal unread
         by_name.update(_tests_of(function))
+        of_iterators.update(
+            {name: test.of_elements for name, test in by_name.items() if isinstance(test, _IterableTest)}
+        )
+        parameters.extend(inspect.signature(function).parameters)
         for each in inspect.signature(function).parameters.values():
             if each.kind not in (each.POSITIONAL_ONLY, each.POSITIONAL_OR_KEYWORD):
                 break
             by_place.append(by_name.get(each.name))
         unread = False
+
+    def watched(name: str, value: Any) -> Any:
+        if name not in of_iterators or not isinstance(value, Iterator):
+            return value
+        return _elements(function, name, value, of_iterators[name])
 
     @wraps(function)
     def checked(*given: Any, **options: Any) -> Any:
@@ -67,6 +91,9 @@ def _checked(function: Callable[..., Any]) -> Callable[..., Any]:
         for name in options:
             if name in by_name and not by_name[name](options[name]):
                 raise _wrong_type(function, name, options[name])
+        if of_iterators:
+            given = tuple(map(watched, parameters, given)) + given[len(parameters) :]
+            options = {name: watched(name, value) for name, value in options.items()}
         try:
             return function(*given, **options)
         except TypeError:
@@ -76,6 +103,18 @@ def _checked(function: Callable[..., Any]) -> Callable[..., Any]:
     checked.__checks_types__ = True  # type: ignore[attr-defined]
     setattr(checked, ANSWERS, True)
     return checked
+
+
+def _elements(function: Callable[..., Any], name: str, values: Iterator[Any], test: Test) -> Iterator[Any]:
+    """Yield the elements of an iterator that is an argument; raise DTypeError at one of another type."""
+    wanted = _written(inspect.signature(function).parameters[name].annotation)
+    for index, each in enumerate(values):
+        if not test(each):
+            raise DTypeError(
+                f"{name} yields {shown(each)} at place {index}, of type {type(each).__name__}; wanted "
+                f"{wanted}"
+            )
+        yield each
 
 
 def _wrong_type(function: Callable[..., Any], argument: str | int, value: object) -> DTypeError:
@@ -231,13 +270,22 @@ def _container_test(origin: type, arguments: tuple[Any, ...], names: _Names) -> 
     of_elements = _test(arguments[0], names)
     if of_elements is None:
         return None
-    wanted = Sequence if issubclass(origin, Sequence) else origin
-    return lambda value: (
-        isinstance(value, wanted)
-        # An iterator is left for the function, which can read it once.
-        and getattr(value, "ndim", 1) > 0
-        and (not isinstance(value, Collection) or all(of_elements(each) for each in value))
-    )
+    return _IterableTest(Sequence if issubclass(origin, Sequence) else origin, of_elements)
+
+
+class _IterableTest:
+    """The test of an iterable and its elements."""
+
+    def __init__(self, wanted: type, of_elements: Test) -> None:
+        self.wanted, self.of_elements = wanted, of_elements
+
+    def __call__(self, value: object) -> bool:
+        return (
+            isinstance(value, self.wanted)
+            and getattr(value, "ndim", 1) > 0
+            # An iterator is left for the function, which can read it once.
+            and (not isinstance(value, Collection) or all(map(self.of_elements, value)))
+        )
 
 
 def _class_test(annotation: Any) -> Test | None:

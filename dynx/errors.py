@@ -361,6 +361,8 @@ def _written(value: object) -> str:
         return str(value)
     except ValueError:  # an integer of more digits than Python writes, alone or inside `value`
         return f"{type(value).__name__} with too many digits"
+    except Exception as error:  # of a class of the user's, whose text is asked for in an error of dynx
+        return f"{type(value).__name__}, whose text raises {type(error).__name__}"
 
 
 def nonblank_lines(text: object) -> list[str]:

@@ -183,7 +183,9 @@ class ClassRegistry(Generic[Kind]):
                 f"the loader of {shown(name)} is of type {type(loader).__name__}, not callable"
             )
         if name in self.names():
-            raise ArgumentError(f"the name {shown(name)} is taken; a {self._word} is never replaced")
+            raise ArgumentError(
+                f"the name {shown(name)} is taken; wanted another, for a {self._word} is never replaced"
+            )
         self._registered[name] = loader
 
     def unregister(self, name: str) -> None:

@@ -14,6 +14,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from numbers import Real
 
+import numpy as np
+
 from dynx.errors import ArgumentError, shown
 
 clock = time.monotonic
@@ -53,7 +55,11 @@ class TimeLimit:
         if timeout is None:
             self.timeout = timeout
             return
-        if isinstance(timeout, bool) or not isinstance(timeout, Real) or not 0.0 < timeout < _MOST:
+        if (
+            isinstance(timeout, bool | np.timedelta64)
+            or not isinstance(timeout, Real)
+            or not 0.0 < timeout < _MOST
+        ):
             raise ArgumentError(f"timeout is {shown(timeout)}; wanted a positive number of seconds, or None")
         self.timeout = float(timeout)
         self._end = self._now() + self.timeout

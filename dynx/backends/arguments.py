@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from math import hypot, isfinite
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import is_listed
 from dynx.backends.solvability import singular_matrix
 from dynx.errors import (
     ArgumentError,
@@ -79,7 +80,7 @@ class Arguments:
 
     def frames(self, frames: object) -> list[str]:
         """Return the names in a sequence of frames."""
-        if isinstance(frames, Iterable) and getattr(frames, "ndim", 1) > 0:
+        if is_listed(frames):
             return list(frames)
         raise ArgumentError(
             f"frame is of type {type(frames).__name__}; wanted a name, a sequence of names, or None for all"

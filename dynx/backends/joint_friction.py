@@ -16,6 +16,7 @@ from dynx.argument_types import checks_types
 from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.errors import ArgumentError, DTypeError, GainError, UnknownNameError, shown
 from dynx.model import Model
+from dynx.model.model import refuse_other_than_model
 from dynx.model.numbers import checked_gain, is_real, read_only, real_array
 from dynx.spatial.scalar import Array, Floats, sign, tanh
 
@@ -70,6 +71,7 @@ class JointFriction:
         friction_slip: float = 0.0,
     ) -> JointFriction:
         """Return the friction of the options of a simulation, which errors name."""
+        refuse_other_than_model(model)
         made = cls.__new__(cls)
         slip = checked_slip("friction_slip", friction_slip)
         made._set(model, ("joint_damping", joint_damping), ("joint_friction", joint_friction), slip)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property, partial
 
-from dynx.argument_types import checks_types
+from dynx.argument_types import checks_types, is_listed
 from dynx.backends.registry import installed_backends
 from dynx.bench.cases import BENCHMARK_QUANTITIES, Batch, BenchmarkCase, draw_batch, require_memory
 from dynx.bench.implementations import Implementation, PreparedCall, Role, backend_implementation
@@ -78,7 +78,7 @@ def benchmark_cases(
 
 
 def _counts(name: str, counts: Iterable[int]) -> set[int]:
-    if not isinstance(counts, Iterable) or getattr(counts, "ndim", 1) == 0:
+    if not is_listed(counts):
         raise ArgumentError(f"{name} is {shown(counts)}; wanted whole numbers")
     return {whole_number(name, count, 1) for count in counts}
 

@@ -252,7 +252,7 @@ def checked_given(
     for name, given in settings.items():
         if name not in engines:
             raise UnknownNameError(
-                f"settings are given for {shown(name)}, which does not run{nearest(str(name), engines)}"
+                f"settings are given for {shown(name)}, which does not run{nearest(name, engines)}"
             )
         if not isinstance(given, Mapping):
             raise ArgumentError(f"settings of {name} is of type {type(given).__name__}; wanted a dict")

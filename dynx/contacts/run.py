@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import sys
 import traceback
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from dynx.argument_types import is_listed
 from dynx.contacts.case import ContactCase, Figure
 from dynx.errors import (
     ArgumentError,
@@ -84,7 +85,7 @@ def carry_out(run: CaseRun) -> Measured | Unmeasured:
 
 def checked_figures(figures: object) -> tuple[Figure, ...]:
     """Return what a case measured; ArgumentError where it is not at least one figure, each with its name."""
-    found = tuple(figures) if isinstance(figures, Iterable) else ()
+    found = tuple(figures) if is_listed(figures) else ()
     if not found or not all(isinstance(each, Figure) for each in found):
         raise ArgumentError("measure returned no figures; wanted at least one Figure")
     names = [each.name for each in found]

@@ -18,7 +18,7 @@ from dynx.argument_types import checks_types
 from dynx.backends import Backend, backend
 from dynx.backends.dynamics import Dynamics, EngineDynamics
 from dynx.control.content import attributes_of, content_of, fields_of
-from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
+from dynx.errors import ArgumentError, DTypeError, ShapeError, UnsupportedFeatureError, shown
 from dynx.files.pages import html_grid
 from dynx.model import Model
 from dynx.registry import DEFAULT_ENGINE
@@ -332,3 +332,12 @@ def _in_words(value: Any) -> str:
             return f"{value.flat[0]:g}"
         return str(value.shape) if value.ndim > 1 else f"[{', '.join(f'{x:g}' for x in value)}]"
     return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def require_state(state: Floats, least: int, most: int | None = None) -> None:
+    """Raise DTypeError or ShapeError for a state that has not the numbers of `initial_state`: at least
+    `least`, and at most `most` unless that is None."""
+    if state.dtype == object and any(each is None for each in state.flat):
+        raise DTypeError("state has an entry that is None; wanted numbers")
+    if state.ndim != 1 or len(state) < least or (most is not None and len(state) > most):
+        raise ShapeError(f"state has shape {state.shape}; wanted one that initial_state or torque returned")

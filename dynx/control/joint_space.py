@@ -18,7 +18,15 @@ from numpy.typing import ArrayLike
 
 from dynx.argument_types import checks_types
 from dynx.backends import Backend
-from dynx.control.base import Controller, ControllerState, Measurement, ModelBased, gain, parameter
+from dynx.control.base import (
+    Controller,
+    ControllerState,
+    Measurement,
+    ModelBased,
+    gain,
+    parameter,
+    require_state,
+)
 from dynx.control.saturation import checked_limit
 from dynx.model import Model
 from dynx.model.numbers import checked_gain, positive_seconds
@@ -156,6 +164,7 @@ class PID(JointSpace[Floats], pure=True):
     @checks_types
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: Floats) -> tuple[Floats, Floats]:
         """Return the torque (nv,) within the limits, and the next integral part."""
+        require_state(state, self.n_joints, self.n_joints)
         q, v, q_wanted, v_wanted = self.joint_states(measurement, setpoint)
         error = q_wanted - q
         wanted = state + pd_torque(q, v, q_wanted, v_wanted, self.kp, self.kd)

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.argument_types import checks_types
-from dynx.control.base import Controller, Measurement, Wrapper, parameter
-from dynx.errors import ArgumentError, DTypeError, ShapeError, UnsupportedFeatureError, shown
+from dynx.control.base import Controller, Measurement, Wrapper, parameter, require_state
+from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
 from dynx.model.numbers import checked_gain, is_real, positive_seconds, real_array
 from dynx.spatial.scalar import Array, Floats, arctan2
 from dynx.trajectory.base import Setpoint
@@ -108,7 +108,7 @@ class MotorLag(_StatefulWrapper, pure=True):
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: Floats) -> tuple[Floats, Floats]:
         """Return the mean torque (nv,) of the motor in this step."""
         nv, k = self.model.nv, self._steps
-        _check_state(state, (k + 1) * nv)
+        require_state(state, (k + 1) * nv)
         way, motor = state[: k * nv], state[k * nv : (k + 1) * nv]
         tau, after = self._inner_torque(measurement, setpoint, state[(k + 1) * nv :])
         way = np.concatenate([way, tau])
@@ -163,7 +163,7 @@ class Encoders(_StatefulWrapper, pure=True):
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: Floats) -> tuple[Floats, Floats]:
         """Return the torque (nv,) of the inner controller for the positions that the encoders show."""
         n = len(self.resolution)
-        _check_state(state, n + 1)
+        require_state(state, n + 1)
         t, q, v = measurement
         base_q, base_v = len(q) - n, len(v) - n
         counts = _rounded(q[base_q:] / self.resolution)
@@ -186,11 +186,3 @@ def _rounded(x: Array) -> Any:
     """Round to whole numbers, with an error of some 1e-16 |x|: kernels have no operation for it."""
     sine, cosine = np.sin(math.tau * x), np.cos(math.tau * x)
     return x - arctan2(sine, cosine) / math.tau
-
-
-def _check_state(state: Floats, least: int) -> None:
-    """Raise ShapeError for a state that has not the numbers of `initial_state`."""
-    if state.dtype == object and any(each is None for each in state.flat):
-        raise DTypeError("state has an entry that is None; wanted numbers")
-    if state.ndim != 1 or len(state) < least:
-        raise ShapeError(f"state has shape {state.shape}; wanted one that initial_state or torque returned")

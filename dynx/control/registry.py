@@ -83,8 +83,10 @@ def to_document(controller: Controller[Any]) -> dict[str, Any]:
 @checks_types
 def from_document(model: Model, document: Mapping[str, Any]) -> Controller[Any]:
     """Return the controller of `model` that `to_document` wrote. Raises ArgumentError for other documents."""
+    if "controller" not in document:
+        raise ArgumentError(f"document is {shown(document)}, which lacks the name of its controller")
     arguments = {name: _read(model, value) for name, value in document.items() if name != "controller"}
-    name = document.get("controller", "")
+    name = document["controller"]
     kind = controller_class(FORMER_NAMES.get(name, name) if isinstance(name, str) else name)
     known = getattr(kind, "__dataclass_fields__", {})
     if "model" in known and known["model"].init:

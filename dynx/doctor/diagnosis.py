@@ -67,7 +67,7 @@ from dynx.loaded import COMMON_VARIANTS, ENGINES, VARIANTS, engine_of, installed
 from dynx.loaded.difference import model_difference
 from dynx.model import Model
 from dynx.model.loading import read_description
-from dynx.model.numbers import is_real
+from dynx.model.numbers import checked_seed, is_real, whole_number
 from dynx.model.tree import Base, checked_base
 from dynx.model.xml.source import XmlSource
 from dynx.rules import LEVELS, CallingRule, Case, Detection, Level, Rule, all_rules
@@ -429,7 +429,9 @@ def diagnose(
     choices = checked_choices((choose or {}).items())
     checked_base(base)
     if fix_tolerance is not None and not (is_real(fix_tolerance) and 0.0 < fix_tolerance < 1.0):
-        raise ArgumentError(f"fix_tolerance is {fix_tolerance!r}; wanted a relative error between 0 and 1")
+        raise ArgumentError(
+            f"fix_tolerance is {shown(fix_tolerance)}; wanted a relative error between 0 and 1"
+        )
     if level not in LEVELS:
         raise UnknownNameError(f"no level {shown(level)}{nearest(level, LEVELS)}")
     progress = progress or _ignore_progress
@@ -688,14 +690,15 @@ def _examiners(
     engines: Sequence[str] | None, samples: int, seed: int, tolerance: float
 ) -> tuple[Examiner, Examiner]:
     """Return the examiner of the engines, and that of the variants to examine beside them."""
-    for name, value, least in (("samples", samples, 1), ("seed", seed, 0)):
-        if isinstance(value, bool) or not isinstance(value, int) or value < least:
-            raise ArgumentError(f"{name} is {value!r}; wanted a whole number, at least {least}")
+    whole_number("samples", samples, 1)
+    checked_seed("seed", seed)
     if not (is_real(tolerance) and 0.0 < tolerance < 1.0):
-        raise ArgumentError(f"tolerance is {tolerance!r}; wanted a relative error between 0 and 1")
+        raise ArgumentError(f"tolerance is {shown(tolerance)}; wanted a relative error between 0 and 1")
     chosen = installed_engines() if engines is None else tuple(dict.fromkeys(engines))
     if isinstance(engines, str) or not chosen:
-        raise ArgumentError(f"engines is {engines!r}; wanted names out of {', '.join([*ENGINES, *VARIANTS])}")
+        raise ArgumentError(
+            f"engines is {shown(engines)}; wanted names out of {', '.join([*ENGINES, *VARIANTS])}"
+        )
     beside = [name for name in COMMON_VARIANTS if engines is None and engine_of(name) in chosen]
     return Examiner(chosen, samples, seed), Examiner(beside, samples, seed)
 

@@ -74,9 +74,7 @@ class TaskEnvironment(Env[Any, Any]):
         if not isinstance(task, Task):
             raise ArgumentError(f"task is of type {type(task).__name__}; wanted a dynx.envs.Task")
         if render_mode is not None and render_mode not in RENDER_MODES:
-            raise ArgumentError(
-                f"render_mode is {shown(render_mode)}{nearest(str(render_mode), RENDER_MODES)}"
-            )
+            raise ArgumentError(f"render_mode is {shown(render_mode)}{nearest(render_mode, RENDER_MODES)}")
         self.task = task
         """The task."""
         self.engine = checked_engine(type(task), engine)
@@ -237,7 +235,7 @@ def _array_of(action: object) -> Any:
     try:
         return np.asarray(action)
     except ValueError as error:
-        raise ShapeError(f"action is ragged; wanted rows of one length: {error}") from None
+        raise ShapeError(f"action is ragged, {shown(action)}; wanted rows of one length: {error}") from None
 
 
 def _checked_choice(space: spaces.Discrete, action: Any) -> int:

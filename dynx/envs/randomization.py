@@ -77,7 +77,7 @@ def read_distribution(name: str, given: Any, valid: str = NOT_NEGATIVE) -> Distr
             )
         ((kind, pair),) = given.items()
         if kind not in KINDS:
-            raise UnknownNameError(f"{name} has no distribution {shown(kind)}{nearest(str(kind), KINDS)}")
+            raise UnknownNameError(f"{name} has no distribution {shown(kind)}{nearest(kind, KINDS)}")
     if (
         not isinstance(pair, Sequence | np.ndarray)
         or isinstance(pair, str)
@@ -162,7 +162,7 @@ class Randomization:
         known = [each.name for each in fields(cls)]
         for name in randomize:
             if name not in known:
-                raise UnknownNameError(f"randomize has no parameter {shown(name)}{nearest(str(name), known)}")
+                raise UnknownNameError(f"randomize has no parameter {shown(name)}{nearest(name, known)}")
         return cls(**randomize)
 
     @checks_types
@@ -198,7 +198,7 @@ def _payload(given: Any) -> dict[str | None, Distribution]:
         raise ArgumentError(f"payload is {shown(given)}; wanted {{'frame': name, 'mass': (low, high)}}")
     for name in given:
         if name not in PAYLOAD_FIELDS:
-            raise UnknownNameError(f"payload has no {shown(name)}{nearest(str(name), PAYLOAD_FIELDS)}")
+            raise UnknownNameError(f"payload has no {shown(name)}{nearest(name, PAYLOAD_FIELDS)}")
     for name in PAYLOAD_FIELDS[:2]:
         if name not in given:
             raise ArgumentError(f"payload has no {name}: {shown(given)}")

@@ -157,7 +157,7 @@ class Task(ABC):
         for name in options:
             if name not in known:
                 raise UnknownNameError(
-                    f"{type(self).__name__} has no option {shown(name)} of reset{nearest(str(name), known)}"
+                    f"{type(self).__name__} has no option {shown(name)} of reset{nearest(name, known)}"
                 )
 
 
@@ -494,9 +494,7 @@ def checked_engine(kind: type[Task], engine: str | None) -> str:
     if engine is None:
         return known[0]
     if engine not in known:
-        raise ArgumentError(
-            f"{kind.__name__} does not run on engine {shown(engine)}{nearest(str(engine), known)}"
-        )
+        raise ArgumentError(f"{kind.__name__} does not run on engine {shown(engine)}{nearest(engine, known)}")
     return engine
 
 
@@ -508,7 +506,7 @@ def component_names(vector: str, components: Sequence[str] = XYZ) -> tuple[str, 
 def refuse_unknown_choice(name: str, value: object, known: Sequence[str]) -> None:
     """Raise ArgumentError for an option that is not one of the `known` words."""
     if value not in known:
-        raise ArgumentError(f"{name} is {shown(value)}{nearest(str(value), known)}")
+        raise ArgumentError(f"{name} is {shown(value)}{nearest(value, known)}")
 
 
 def refuse_unphysical(name: str, value: object, unit: str, *, zero: bool = False) -> None:

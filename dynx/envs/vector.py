@@ -87,9 +87,7 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         """Options are those of `TaskEnvironment`. Raises ArgumentError for an option that cannot be used,
         UnsupportedFeatureError for a task that cannot be compiled."""
         if render_mode is not None and render_mode not in RENDER_MODES:
-            raise ArgumentError(
-                f"render_mode is {shown(render_mode)}{nearest(str(render_mode), RENDER_MODES)}"
-            )
+            raise ArgumentError(f"render_mode is {shown(render_mode)}{nearest(render_mode, RENDER_MODES)}")
         n = self.num_envs = whole_number("num_envs", num_envs, 1)
         self.task = task
         """The task."""
@@ -346,7 +344,7 @@ def checked_mode(mode: AutoresetMode | str) -> AutoresetMode:
         if mode is each or mode in (each.name, each.value):
             return each
     names = [each.value for each in AutoresetMode]
-    raise ArgumentError(f"autoreset_mode is {shown(mode)}{nearest(str(mode), names)}")
+    raise ArgumentError(f"autoreset_mode is {shown(mode)}{nearest(mode, names)}")
 
 
 def checked_reset_mask(mask: Any, n: int, *, started: bool) -> NDArray[np.bool_]:

@@ -74,7 +74,7 @@ def _check_table(part: object, kind: Any, place: str) -> None:
     for key, each in part.items():
         if key not in known:
             where = f"{place.removesuffix(':')} has" if place else "there is"
-            raise ArgumentError(f"{where} no key {shown(key)}{nearest(str(key), known)}")
+            raise ArgumentError(f"{where} no key {shown(key)}{nearest(key, known)}")
         check_document(each, known[key], _inside(place, key))
     for each in fields(kind):
         if each.default is MISSING and each.default_factory is MISSING and each.name not in part:

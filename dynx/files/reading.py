@@ -99,16 +99,24 @@ def irregularity(path: str | os.PathLike[str]) -> str:
 
 
 def checked_path(path: object) -> str:
-    """Return a path as a str. Raises ArgumentError for anything but a str, bytes or an `os.PathLike`."""
+    """Return a path as a str. Raises ArgumentError for anything but a str, bytes or an `os.PathLike`,
+    and for characters that no name of a file has: NUL and surrogates."""
     try:
-        return os.fsdecode(path)  # type: ignore[arg-type]  # anything is tried
+        found = os.fsdecode(path)  # type: ignore[arg-type]  # anything is tried
     except TypeError:
         raise ArgumentError(f"a path is {shown(path)}; wanted a str or an os.PathLike") from None
+    try:
+        os.fsencode(found)
+    except UnicodeEncodeError:
+        raise ArgumentError(f"a path is {shown(found)}; wanted characters of a file's name") from None
+    if "\0" in found:
+        raise ArgumentError(f"a path is {shown(found)}; wanted one without the character of the number 0")
+    return found
 
 
 def printable(path: str) -> str:
-    """Return `path` for use in a message, quoted where it is long or holds control characters."""
-    return path if path.isprintable() and len(path) <= 300 else shown(path, 300)
+    """Return `path` for use in a message, quoted where it is empty or long or holds control characters."""
+    return path if path and path.isprintable() and len(path) <= 300 else shown(path, 300)
 
 
 def _require_regular(status: os.stat_result) -> None:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from dynx.errors import ArgumentError, shown
+from dynx.files.reading import checked_path
 
 if sys.platform != "win32":
     import fcntl
@@ -42,7 +43,7 @@ def atomic_file(path: str | os.PathLike[str], mode: int = 0o666, *, sync: bool =
     permissions; a new one gets `mode` minus the umask of the process. A named pipe or a device is written
     directly. Raises ArgumentError if the file cannot be written.
     """
-    target = Path(os.path.realpath(path))
+    target = Path(os.path.realpath(checked_path(path)))
     partial: Path | None = None
     try:
         if os.path.isdir(target):

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, ShapeError, UnknownNameError, nearest, shown
-from dynx.model.numbers import real_array, whole_number
+from dynx.model.numbers import is_whole, real_array, whole_number
 from dynx.model.targets import FREE, Targets
 from dynx.option_names import right_name
 from dynx.time_limit import UNLIMITED, TimeLimit
@@ -100,7 +100,7 @@ def checked_axes(
     Raises ArgumentError, ShapeError or DTypeError for options that cannot be used, with the nearest name.
     """
     if not isinstance(axes, str) or axes not in AXES:
-        raise ArgumentError(f"axes is {shown(axes)}{nearest(str(axes), AXES)}")
+        raise ArgumentError(f"axes is {shown(axes)}{nearest(axes, AXES)}")
     names = _free_names(free)
     along = [
         checked_tolerance("position_tolerance", position_tolerance),
@@ -143,7 +143,7 @@ def _free_names(free: Any) -> tuple[str, ...]:
         )
     for name in names:
         if not isinstance(name, str) or name not in FREE + AXIS_NAMES:
-            raise ArgumentError(f"free is {shown(name)}{nearest(str(name), FREE + AXIS_NAMES)}")
+            raise ArgumentError(f"free is {shown(name)}{nearest(name, FREE + AXIS_NAMES)}")
     return names
 
 
@@ -283,7 +283,7 @@ def checked_rng(rng: object) -> np.random.Generator | int:
     """Return a seed or generator. Raises ArgumentError."""
     if isinstance(rng, np.random.Generator):
         return rng
-    if isinstance(rng, int | np.integer) and not isinstance(rng, bool) and rng >= 0:
+    if is_whole(rng) and rng >= 0:
         return int(rng)
     raise ArgumentError(f"rng is {shown(rng)}; wanted a generator or a seed (at least 0)")
 

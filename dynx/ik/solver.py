@@ -153,7 +153,7 @@ def _inverse_kinematics(
 def _solved(backend: Backend, problem: Problem, method: str) -> IKResult:
     """Return the result of a checked problem. Raises ArgumentError for an unknown method."""
     if not isinstance(method, str) or method not in METHODS:
-        raise ArgumentError(f"method is {shown(method)}{nearest(str(method), METHODS)}")
+        raise ArgumentError(f"method is {shown(method)}{nearest(method, METHODS)}")
     if method == "dynx":
         found = None
         if backend.compiles:
@@ -236,8 +236,8 @@ def _all_solutions(
     names = ("free", "point", "weights", "axes", "limit_margin", "nearest", "maximize", "avoid", "method")
     if frame is None or any(getattr(options, name) is not getattr(plain, name) for name in names):
         raise ArgumentError(
-            f"all_solutions takes poses (..., 4, 4) of a frame, without {', '.join(names[:-1])} or "
-            f"{names[-1]}"
+            f"all_solutions is True; it takes poses (..., 4, 4) of a frame, without "
+            f"{', '.join(names[:-1])} or {names[-1]}"
         )
     backend.model.frame_index(frame)
     limits = options.search_limits()

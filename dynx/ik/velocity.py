@@ -16,13 +16,14 @@ programs, J. SIAM 8(4), 1960).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dynx.argument_types import is_listed
 from dynx.backends.base import Backend
 from dynx.errors import ArgumentError, ShapeError, importing, shown
 from dynx.ik.descent import ErrorCall, KernelTarget
@@ -526,7 +527,7 @@ def velocity_ik(
 def _checked_tasks(tasks: VelocityTask | Sequence[VelocityTask]) -> list[VelocityTask]:
     if isinstance(tasks, VelocityTask):
         return [tasks]
-    if isinstance(tasks, str) or not isinstance(tasks, Iterable):
+    if not is_listed(tasks):
         raise ArgumentError(
             f"tasks is {shown(tasks)}; wanted dynx.ik.velocity.VelocityTask, or a list of them"
         )

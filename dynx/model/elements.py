@@ -18,11 +18,11 @@ from numpy.typing import ArrayLike
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, DTypeError, NotFiniteError, ShapeError, shown
 from dynx.model.numbers import (
+    array_of,
     checked_entries,
     checked_quaternion,
     checked_vector,
     real_array,
-    refuse_mask,
 )
 from dynx.spatial.scalar import Array, Floats
 from dynx.spatial.se3 import homogeneous
@@ -82,9 +82,8 @@ def rigid_matrix(T: ArrayLike, name: str) -> Floats:
     A pair of a position (3,) and a unit quaternion (x, y, z, w) (4,) is one, too. `name` is how errors call
     it. Raises ArgumentError unless T is a rigid transform to 1e-6.
     """
-    refuse_mask(name, T)
     try:
-        entries = np.asarray(matrix_of_pair(T, name))
+        entries = array_of(name, matrix_of_pair(T, name))
         if entries.dtype.kind == "c":
             raise DTypeError(f"{name} has dtype {entries.dtype}; wanted real numbers (float64)")
         array = np.asarray(entries, dtype=np.float64)

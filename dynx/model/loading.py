@@ -11,6 +11,7 @@ from pathlib import PurePath
 
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import is_listed
 from dynx.errors import ArgumentError, DescriptionError, RobotNotFoundError, nearest, shown
 from dynx.files.reading import printable, read_file
 from dynx.model.elements import IDENTITY, Pose
@@ -71,7 +72,7 @@ def load(
         )
     if isinstance(x, Model):
         return _with_options(x, base, lock, gravity, base_pose)
-    if not isinstance(package_dirs, str | os.PathLike | Iterable):
+    if not isinstance(package_dirs, str | os.PathLike) and not is_listed(package_dirs):
         raise ArgumentError(f"package_dirs is {shown(package_dirs)}; wanted folders")
     folders = [package_dirs] if isinstance(package_dirs, str | os.PathLike) else list(package_dirs)
     data, source, name = read_description(x, folders)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import is_listed
 from dynx.errors import ArgumentError, DTypeError, GainError, NotFiniteError, ShapeError, shown
-from dynx.spatial.scalar import Floats
+from dynx.spatial.scalar import Array, Floats
 
 _FLOAT64 = np.dtype(np.float64)
 _MAX_FLOAT = float(np.finfo(np.float64).max)
@@ -20,9 +22,6 @@ MAX_MAGNITUDE = 1e60
 A moment is a product of two lengths, two speeds and a mass. The bound prevents its overflow, with which an
 engine would silently return infinity or NaN.
 """
-
-MAX_SAMPLES = 10**9
-"""Largest number of samples that are drawn at once."""
 
 DIVERGENCE_SPEED = 1e8
 """Norm of the velocity [rad/s or m/s] above which a simulation or a world counts as diverged."""
@@ -58,18 +57,28 @@ def checked_vector(name: str, value: ArrayLike) -> Floats:
     return array
 
 
-MAX_COUNT = 2**53
-"""Largest whole number up to which a float holds all."""
+MAX_COUNT = 10**9
+"""Largest number of samples, steps or anything else that one call is asked for: more is a mistake, which
+would fill the memory or take days."""
+
+MAX_INDEX = 2**53
+"""Largest number of a rollout or a step: up to it a float holds all whole numbers."""
 
 
 def whole_number(name: str, value: object, least: int, most: float = MAX_COUNT) -> int:
     """Return a whole number from `least` to `most`; raise ArgumentError for anything else."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or not least <= value <= most:
+    if not is_whole(value) or not least <= value <= most:
         # Nobody asks for so many; only who did is told that there is an end.
         too_many = most < MAX_COUNT or (isinstance(value, int) and value > most)
         end = f" and at most {most}" if too_many else ""
         raise ArgumentError(f"{name} is {shown(value)}; wanted a whole number, at least {least}{end}")
     return int(value)
+
+
+def is_whole(value: object) -> TypeGuard[int]:
+    """Check whether a value is one whole number, of Python or NumPy; no truth value, and no span of time,
+    which NumPy derives from its integers."""
+    return isinstance(value, int | np.integer) and not isinstance(value, bool | np.timedelta64)
 
 
 def checked_seed(name: str, value: object) -> int:
@@ -79,7 +88,7 @@ def checked_seed(name: str, value: object) -> int:
 
 def is_real(value: object) -> TypeGuard[float]:
     """Check whether a value is one real number, of Python or NumPy, that a float can hold; no truth value."""
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+    if not is_whole(value) and not isinstance(value, float | np.floating):
         return False
     return not isinstance(value, int) or abs(value) <= _MAX_FLOAT
 
@@ -98,17 +107,32 @@ def positive_seconds(name: str, seconds: object) -> float:
     raise ArgumentError(f"{name} is {shown(seconds)}; wanted a positive number of seconds")
 
 
+_NO_ARRAY = (TypeError, RuntimeError, AttributeError, LookupError, ArithmeticError)
+"""What classes with ``__array__`` raise that have no numbers, as a tensor of PyTorch with a gradient."""
+
+
+def array_of(name: str, value: object) -> Array:
+    """Return an array of any dtype. Raises ShapeError if it is ragged, DTypeError if it has a mask, which
+    would be lost, or if its class has no numbers."""
+    if type(value) is not np.ndarray:
+        refuse_mask(name, value)
+    try:
+        return np.asarray(value)
+    except ValueError as error:
+        raise ShapeError(f"{name} is ragged, {shown(value)}; wanted rows of one length: {error}") from None
+    except _NO_ARRAY as error:
+        raise DTypeError(
+            f"{name} is {shown(value)}, of type {type(value).__name__}, which is no array: {error}; wanted "
+            "real numbers (float64)"
+        ) from error
+
+
 def real_array(name: str, value: ArrayLike) -> Floats:
     """Return `value` as a float64 array of any shape.
 
     Raises ShapeError if it is ragged, DTypeError if it is not real or has a mask, which would be lost.
     """
-    if type(value) is not np.ndarray:
-        refuse_mask(name, value)
-    try:
-        array = np.asarray(value)
-    except ValueError as error:
-        raise ShapeError(f"{name} is ragged, {shown(value)}; wanted rows of one length: {error}") from None
+    array = array_of(name, value)
     if array.dtype.kind not in "fiu":
         origin = "" if array is value else f" (it is {shown(value)}, of type {type(value).__name__})"
         raise DTypeError(f"{name} has dtype {array.dtype}; wanted real numbers (float64){origin}")
@@ -159,19 +183,22 @@ def read_only(array: Floats) -> Floats:
 
 def checked_generator(rng: np.random.Generator | int | None) -> np.random.Generator:
     """Return the generator, or that of a seed. Raises ArgumentError for anything else."""
-    try:
-        return np.random.default_rng(rng)
-    except (TypeError, ValueError):
-        raise ArgumentError(f"rng is {shown(rng)}; wanted a NumPy generator, or a seed: 0 or more") from None
+    # NumPy's own reading of a list that holds itself ends the process.
+    numbers = is_listed(rng) and isinstance(rng, list | tuple | np.ndarray) and all(map(is_whole, rng))
+    sources = np.random.Generator | np.random.BitGenerator | np.random.SeedSequence
+    if rng is None or is_whole(rng) or numbers or isinstance(rng, sources):
+        with suppress(ValueError):
+            return np.random.default_rng(rng)
+    raise ArgumentError(f"rng is {shown(rng)}; wanted a NumPy generator, or a seed: 0 or more")
 
 
 def checked_size(size: tuple[int, ...] | int) -> tuple[int, ...]:
     """Return the shape of an array of samples. Raises ArgumentError for anything else."""
     shape = tuple(size) if isinstance(size, tuple | list) else (size,)
-    if not all(isinstance(n, int | np.integer) and not isinstance(n, bool) and n >= 0 for n in shape):
+    if not all(is_whole(n) and n >= 0 for n in shape):
         raise ArgumentError(f"size is {shown(size)}; wanted a number of samples, or a tuple of them")
-    if math.prod(shape) > MAX_SAMPLES:
-        raise ArgumentError(f"size is {shown(size)}; wanted at most {MAX_SAMPLES:g} samples")
+    if math.prod(shape) > MAX_COUNT:
+        raise ArgumentError(f"size is {shown(size)}; wanted at most {MAX_COUNT:g} samples")
     return tuple(int(n) for n in shape)
 
 
@@ -201,12 +228,19 @@ def checked_gravity(gravity: ArrayLike) -> tuple[float, float, float]:
     return (x, y, z)
 
 
-def refuse_mask(name: str, value: object) -> None:
-    """Raise DTypeError for a masked array, or a list or tuple with one inside."""
+MAX_AXES = 64
+"""Largest number of axes of an array, as of NumPy."""
+
+
+def refuse_mask(name: str, value: object, axes: int = 0) -> None:
+    """Raise DTypeError for a masked array, or a list or tuple with one inside; ShapeError for lists nested
+    deeper than an array can be, such as one that holds itself."""
     if isinstance(value, list | tuple):
+        if axes == MAX_AXES:
+            raise ShapeError(f"{name} is nested more than {MAX_AXES} times; wanted an array of numbers")
         for each in value:
             if not isinstance(each, float | int):
-                refuse_mask(name, each)
+                refuse_mask(name, each, axes + 1)
     elif isinstance(value, np.ma.MaskedArray):
         raise DTypeError(
             f"{name} is a masked array; wanted an array without a mask, such as its method filled returns"

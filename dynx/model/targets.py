@@ -83,7 +83,7 @@ def checked_targets(target: ArrayLike, free: str | None = None) -> Targets:
     target = matrix_of_pair(target, "target")
     if free is not None:
         if not isinstance(free, str) or free not in FREE:
-            raise ArgumentError(f"free is {shown(free)}{nearest(str(free), FREE)}")
+            raise ArgumentError(f"free is {shown(free)}{nearest(free, FREE)}")
         return _checked_parts(checked_entries("target", real_array("target", target)), free)
     if (
         type(target) is np.ndarray

@@ -80,7 +80,7 @@ def lock_joints(joints: list[Joint], lock: Mapping[str, float]) -> list[Joint]:
     by_name = {joint.name: joint for joint in joints}
     for name, value in lock.items():
         if name not in by_name:
-            raise UnknownNameError(f"cannot lock {shown(name)}: no such joint{nearest(str(name), by_name)}")
+            raise UnknownNameError(f"cannot lock {shown(name)}: no such joint{nearest(name, by_name)}")
         if not by_name[name].moves:
             raise UnknownNameError(f"cannot lock {shown(name)}: it is a fixed joint already")
         if isinstance(value, bool | str) or not isinstance(value, SupportsFloat):

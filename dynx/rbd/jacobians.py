@@ -32,9 +32,7 @@ def checked_reference(reference: object) -> Reference:
     try:
         return REFERENCES[reference]  # type: ignore[index]
     except (KeyError, TypeError):
-        raise UnknownNameError(
-            f"reference is {shown(reference)}{nearest(str(reference), REFERENCES)}"
-        ) from None
+        raise UnknownNameError(f"reference is {shown(reference)}{nearest(reference, REFERENCES)}") from None
 
 
 def frame_jacobian(mechanism: Mechanism, poses: Poses, frame: int, reference: Reference) -> Array:

@@ -104,7 +104,7 @@ class Parameters:
         try:
             return self.names.index(name)
         except ValueError:
-            raise UnknownNameError(f"no parameter {shown(name)}{nearest(str(name), self.names)}") from None
+            raise UnknownNameError(f"no parameter {shown(name)}{nearest(name, self.names)}") from None
 
     @property
     def _moving(self) -> tuple[Joint, ...]:
@@ -255,7 +255,9 @@ class Payload:
         if self.inertia is not None:
             tensor = checked_array("inertia", self.inertia, 3)
             if tensor.shape != (3, 3) or not np.array_equal(tensor, tensor.T):
-                raise ArgumentError("the inertia of a payload is not a symmetric matrix (3, 3)")
+                raise ArgumentError(
+                    f"the inertia of a payload is {shown(self.inertia)}; wanted a symmetric matrix (3, 3)"
+                )
 
     @property
     def inertial(self) -> Inertial:

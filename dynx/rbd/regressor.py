@@ -21,6 +21,7 @@ from functools import cached_property
 import numpy as np
 
 from dynx.argument_types import checks_types
+from dynx.errors import ArgumentError, shown
 from dynx.model import Model
 from dynx.model.mechanism import Body, BodyFrame, Mechanism, ScalarConverter, float64, pose_arrays
 from dynx.rbd.kinematics import BodyPose, Poses, pose_pairs
@@ -187,7 +188,14 @@ def _times(row: Array, A: Array) -> Array:
 
 @checks_types
 def inertial_parameters(model: Model, convert: ScalarConverter = float64) -> Array:
-    """Return pi (10 n_links,): the ten parameters of each of `model.links`, zeros without an inertial."""
+    """Return pi (10 n_links,): the ten parameters of each of `model.links`, zeros without an inertial.
+
+    `convert` makes arrays of scalars of a file's numbers; ArgumentError for one that changes their shape.
+    """
+    if np.shape(made := convert(np.zeros(3))) != (3,):
+        raise ArgumentError(
+            f"convert returns {shown(made)} for 3 numbers; wanted an array of their shape (3,)"
+        )
     return np.concatenate(
         [parameters_from_inertia(link_inertia(model, link.name, convert)) for link in model.links]
     )

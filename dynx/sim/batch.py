@@ -29,13 +29,13 @@ from dynx.backends.solvability import Solvability
 from dynx.compiled.parametric import ParametricDynamics
 from dynx.compiled.status import Status
 from dynx.compiled.step import BoundSteps, CompiledStep, Stop
-from dynx.errors import ArgumentError, GainError, shown
+from dynx.errors import ArgumentError, GainError, ShapeError, shown
 from dynx.files.arrays import read_arrays, write_arrays
 from dynx.files.reading import checked_path
 from dynx.files.writing import clear_unfinished
 from dynx.model import Model
 from dynx.model.configuration import checked_q
-from dynx.model.numbers import checked_array, real_array, whole_number
+from dynx.model.numbers import MAX_INDEX, array_of, checked_array, real_array, whole_number
 from dynx.option_names import takes
 from dynx.sim.batch_rollouts import BatchRollouts
 from dynx.sim.loop_step import PLACEHOLDER, ArrayDisturbances, LoopStep, gain_shapes, innermost
@@ -366,8 +366,8 @@ def joints_of(model: Model) -> int:
 
 def _has_rows(name: str, value: Any, joints: int) -> bool:
     try:
-        shape = np.shape(value)
-    except ValueError:
+        shape = array_of(name, value).shape
+    except ShapeError:
         # Lists of different lengths are refused with the scenario.
         return False
     return len(shape) > 1 or (name in COEFFICIENTS and len(shape) == 1 and shape != (joints,))
@@ -613,7 +613,7 @@ def simulate_batch(given: BatchArguments) -> BatchRollouts:
         raise ArgumentError(
             f"gains is {shown(gains)}; wanted a mapping from names, as in {{'kp': [100, 200]}}"
         )
-    whole_number("record_every", record_every, 0)
+    whole_number("record_every", record_every, 0, MAX_INDEX)
     if executor is not None and not isinstance(executor, Executor) and not hasattr(executor, "submit"):
         raise ArgumentError(
             f"executor is {shown(executor)}; wanted one of concurrent.futures, such as ThreadPoolExecutor(4)"

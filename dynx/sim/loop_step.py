@@ -28,6 +28,7 @@ from dynx.control.base import Controller, chain_of, gains_of, rebind
 from dynx.control.content import attributes_of, content_of, fields_of, is_foreign
 from dynx.errors import ArgumentError, TraceError, UnsupportedFeatureError, shown
 from dynx.model import Mechanism, Model
+from dynx.model.numbers import is_real
 from dynx.rbd.elimination import factorize_mass_matrix, solve_with_factors
 from dynx.rbd.integration import SemiImplicitEuler
 from dynx.rbd.joint_friction import FrictionLaw, FrictionStep, damped_equation
@@ -633,7 +634,7 @@ def gain_shapes(controller: Controller[Any]) -> dict[str, tuple[int, ...]]:
         return shapes
     declared = {name for name, each in fields_of(controller).items() if each.metadata}
     for name, value in attributes_of(controller).items():
-        real = isinstance(value, float | int | np.floating | np.integer) and not isinstance(value, bool)
+        real = is_real(value)
         numbers = isinstance(value, np.ndarray) and value.dtype.kind in "fi"
         if name not in declared and not name.startswith("_") and (real or numbers):
             shapes[name] = np.shape(value)

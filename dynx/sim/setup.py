@@ -147,7 +147,9 @@ def require_duration(scenario: Scenario) -> None:
     """Raise ArgumentError where neither the scenario nor its reference has a duration."""
     known_controller(scenario)
     if scenario.duration is None and not isinstance(scenario.reference, Trajectory):
-        raise ArgumentError("duration is not given, and the reference is not a trajectory with a duration")
+        raise ArgumentError(
+            "duration is None, and reference is no trajectory, which has one; wanted a time in seconds"
+        )
 
 
 def disturbances_of(scenario: Scenario, moved: Model) -> Disturbances:

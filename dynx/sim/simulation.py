@@ -18,7 +18,7 @@ from dynx.backends.registry import backend_class
 from dynx.control.base import Controller
 from dynx.errors import ArgumentError, ClosedError, SimulationError, shown
 from dynx.model import Model
-from dynx.model.numbers import checked_array
+from dynx.model.numbers import checked_array, is_real
 from dynx.option_names import takes
 from dynx.registry import explains_names
 from dynx.sim.closed_loop import ClosedLoop, LoopState, Sensors, StateBuffers, stops_of
@@ -186,7 +186,7 @@ class Simulation:
         """
         end = self.n_steps
         if until is not None:
-            if not isinstance(until, int | float) or not math.isfinite(until):
+            if not is_real(until) or not math.isfinite(until):
                 raise ArgumentError(f"until is {shown(until)}; wanted a time in seconds")
             refuse_too_many_steps("until", until, self._dt)
             if round(until / self._dt) < self._record.steps:
@@ -675,7 +675,9 @@ def simulate(given: SimulateArguments) -> Rollout:
     scenario = given.scenario_on_backend()
     require_duration(scenario)
     if given.step is not None and given.resume is None:
-        raise ArgumentError("step is that of a rollout to resume, which is not given")
+        raise ArgumentError(
+            f"step is {shown(given.step)}, and resume is None; wanted the rollout to go on from that step"
+        )
     with Simulation(scenario, progress=given.progress) as simulation:
         if given.resume is not None:
             simulation.take_over(given.resume, given.step)

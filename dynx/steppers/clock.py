@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dynx.errors import ArgumentError, shown
-from dynx.model.numbers import is_real, positive_seconds
+from dynx.model.numbers import is_real, is_whole, positive_seconds
 from dynx.spatial.scalar import Floats
 
 TIME_ROUNDING = 1e-9
@@ -102,8 +102,8 @@ def refuse_too_many_steps(name: str, seconds: float, dt: float) -> None:
 def step_count(n: object, by_time: str) -> int:
     """Return a number of steps, from 1 to `MAX_STEPS`. Raises ArgumentError for anything else, which states
     `by_time`, the call that takes seconds, for a number that is not whole."""
-    if isinstance(n, bool) or not isinstance(n, int | np.integer) or not 1 <= n <= MAX_STEPS:
-        clause = f"; {by_time} [s]" if is_real(n) and not isinstance(n, int | np.integer) else ""
+    if not is_whole(n) or not 1 <= n <= MAX_STEPS:
+        clause = f"; {by_time} [s]" if is_real(n) and not is_whole(n) else ""
         raise ArgumentError(f"n is {shown(n)}; wanted a number of steps, from 1 to {MAX_STEPS:g}{clause}")
     return int(n)
 

@@ -57,7 +57,7 @@ class Adaptive:
         self._flow = Flow(model)
         self._h = h
         if method not in METHODS:
-            raise ArgumentError(f"method is {shown(method)}{nearest(str(method), METHODS)}")
+            raise ArgumentError(f"method is {shown(method)}{nearest(method, METHODS)}")
         for name, tolerance in (("rtol", rtol), ("atol", atol)):
             if not isinstance(tolerance, int | float) or not 0.0 < tolerance < np.inf:
                 raise ArgumentError(f"{name} is {shown(tolerance)}; wanted a positive number")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dynx.errors import ArgumentError, UnknownNameError, shown
-from dynx.model.numbers import checked_array, is_real
+from dynx.model.numbers import checked_array, is_real, is_whole
 from dynx.option_names import right_name
 
 
@@ -48,7 +48,7 @@ class Setting:
                 self._bounded(name, number)
             return tuple(numbers.tolist())
         if isinstance(self.default, int):
-            if isinstance(value, bool) or not isinstance(value, int | np.integer):
+            if not is_whole(value):
                 raise ArgumentError(f"setting {name} is {shown(value)}; wanted a whole number")
             return int(self._bounded(name, int(value)))
         if not is_real(value):

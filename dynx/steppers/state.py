@@ -59,7 +59,7 @@ class PartStates(dict[str, Part]):
     """States by name; a name that does not exist is answered with the nearest."""
 
     def __missing__(self, name: object) -> Part:
-        raise UnknownNameError(f"the world has no state of {shown(name)}{nearest(str(name), self)}")
+        raise UnknownNameError(f"the world has no state of {shown(name)}{nearest(name, self)}")
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ def agreement_tests(
     Raises ArgumentError for another base; other invalid arguments fail the tests.
     """
     if base not in _BASES:
-        raise ArgumentError(f"base is {shown(base)}{nearest(str(base), _BASES)}")
+        raise ArgumentError(f"base is {shown(base)}{nearest(base, _BASES)}")
     chosen = None if backends is None else tuple(backends)
 
     class AgreementTests:

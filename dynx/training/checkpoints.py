@@ -55,7 +55,10 @@ class Checkpoints:
 
     def add(self, policy: Policy) -> None:
         """Write a checkpoint; it counts only when all of it is on the disk."""
-        self._folder.mkdir(exist_ok=True)
+        try:
+            self._folder.mkdir(exist_ok=True)
+        except OSError as error:
+            raise ArgumentError(f"{shown(self._folder, 300)} cannot be made: {error.strerror}") from error
         path = self._folder / f"{policy.steps_done:012d}.zip"
         arrays = replay_arrays(policy.algorithm)
         if arrays is not None:

@@ -73,7 +73,7 @@ def evaluate(
     short. `progress` is called with the number of episodes that have ended.
     """
     whole_number("episodes", episodes, 1, MAX_EPISODES)
-    checked_seed("seed", seed)
+    seed = checked_seed("seed", seed)
     if not envs:
         raise ArgumentError("envs is empty; wanted at least one environment to judge the policy in")
     returns, lengths = np.zeros(episodes), np.zeros(episodes, dtype=np.int64)

@@ -19,7 +19,7 @@ from dynx.errors import ArgumentError, shown
 from dynx.files.documents import convert_document, json_text, parse_json, to_json_values
 from dynx.files.reading import irregularity, named_file
 from dynx.files.writing import atomic_file
-from dynx.model.numbers import real_array, whole_number
+from dynx.model.numbers import MAX_INDEX, real_array, whole_number
 from dynx.training.environments import make
 from dynx.training.file_tasks import of_rigid_bodies, task_of_file
 from dynx.training.library import (
@@ -148,7 +148,7 @@ def read_policy_document(path: str | os.PathLike[str]) -> PolicyDocument:
         raise ArgumentError(f"{where} is damaged, or no policy: {' '.join(str(error).split())}") from error
     try:
         found = convert_document(document, PolicyDocument)
-        whole_number("steps_done", found.steps_done, 0)
+        whole_number("steps_done", found.steps_done, 0, MAX_INDEX)
         return found if found.schema != FIRST_POLICY else replace(found, spec=of_rigid_bodies(found.spec))
     except ArgumentError as error:
         raise ArgumentError(f"{where}: {error}") from error

@@ -12,7 +12,7 @@ from dynx._version import __version__
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, DescriptionError, RobotNotFoundError, shown
 from dynx.files.documents import json_text, parse_json
-from dynx.files.reading import read_file
+from dynx.files.reading import checked_path, read_file
 from dynx.files.writing import write_text
 from dynx.training.checkpoints import Checkpoints
 from dynx.training.environments import make, make_vector
@@ -66,7 +66,7 @@ def train(
     of the task and the algorithm.
     """
     schedule = schedule or Schedule()
-    place = Path(folder)
+    place = Path(checked_path(folder))
     schema, given = _checked_schema(place, spec, resume), spec
     if schema == FIRST_SCHEMA:
         spec = of_rigid_bodies(spec)
@@ -98,7 +98,7 @@ def read_run(folder: str | os.PathLike[str]) -> TrainingSpec:
 
     Raises ArgumentError for a folder without a run.
     """
-    return _read_run(Path(folder))[0]
+    return _read_run(Path(checked_path(folder)))[0]
 
 
 def _read_run(folder: Path) -> tuple[TrainingSpec, str]:
@@ -128,9 +128,9 @@ def _checked_schema(place: Path, spec: TrainingSpec, resume: bool) -> str:
         raise ArgumentError(
             f"{shown(place, 300)} has a training run already; resume it (--resume) or name another folder"
         )
-    linked = next(
-        (each for each in (*place.glob("*"), *place.glob("checkpoints/*")) if each.is_symlink()), None
-    )
+    # One after the other: a link is found before what is behind it is read.
+    entries = (each for pattern in ("*", "checkpoints/*") for each in place.glob(pattern))
+    linked = next((each for each in entries if each.is_symlink()), None)
     if linked is not None:
         raise ArgumentError(f"{shown(linked, 300)} is a link, through which the run would write; remove it")
     known, schema = _read_run(place)

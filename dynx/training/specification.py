@@ -57,7 +57,7 @@ class TrainingSpec:
     def __post_init__(self) -> None:
         for name in ("steps", "envs"):
             whole_number(name, getattr(self, name), 1)
-        checked_seed("seed", self.seed)
+        object.__setattr__(self, "seed", checked_seed("seed", self.seed))
 
     @checks_types
     def first_difference(self, other: TrainingSpec) -> str | None:

@@ -95,6 +95,12 @@ def _stack_samples(Y: Floats) -> Floats:
     return Y.reshape(-1, Y.shape[-1])
 
 
+MAX_HARMONICS = 10_000
+"""Largest number of harmonics of an excitation: its points fill the memory."""
+
+MAX_CANDIDATES = 1_000_000
+"""Largest number of candidates of an excitation, which are held at once."""
+
 POINTS_PER_HARMONIC = 128
 """Points per harmonic at which the series is evaluated: its extremes are then known to 0.03 %."""
 
@@ -143,20 +149,22 @@ def excitation(
 ) -> Trajectory:
     """Return one period of a random Fourier series around `q0` (nq,), from rest to rest, in `duration` [s].
 
-    `harmonics` (at least 3) is the number of multiples of 1 / duration [Hz] in the series. The motion of
-    every joint is scaled until it reaches a limit: the model's limits of position and velocity (`velocity`
-    replaces the latter), and `acceleration`, if given; one number or (nv,). `q0` is by default the middle of
-    the position limits, or 0 for a joint without limits, which moves at most pi [rad] or 1 m from there.
+    `harmonics` (3 to `MAX_HARMONICS`) is the number of multiples of 1 / duration [Hz] in the series. The
+    motion of every joint is scaled until it reaches a limit: the model's limits of position and velocity
+    (`velocity` replaces the latter), and `acceleration`, if given; one number or (nv,). `q0` is by default
+    the middle of the position limits, or 0 for a joint without limits, which moves at most pi [rad] or 1 m
+    from there.
 
-    Of `candidates` series drawn with `rng`, a seed or a generator, the one with the smallest condition number
-    of the inertial regressor is returned, since its samples determine the inertial parameters best
-    (`dynx.trajectory.Identifiability`, evaluated by `backend`). Only for a fixed base.
+    Of `candidates` (1 to `MAX_CANDIDATES`) series drawn with `rng`, a seed or a generator, the one with the
+    smallest condition number of the inertial regressor is returned, since its samples determine the inertial
+    parameters best (`dynx.trajectory.Identifiability`, evaluated by `backend`). Only for a fixed base.
 
     Raises ArgumentError for invalid arguments, TrajectoryError for a limit of 0 or a q0 outside the limits.
     """
     ends = _ends_around(model, q0)
     T = checked_duration(duration)
-    harmonics, candidates = whole_number("harmonics", harmonics, 3), whole_number("candidates", candidates, 1)
+    harmonics = whole_number("harmonics", harmonics, 3, MAX_HARMONICS)
+    candidates = whole_number("candidates", candidates, 1, MAX_CANDIDATES)
     generator = checked_generator(rng)
     bounds = _MotionLimits(ends, velocity, acceleration)
     drawn = [

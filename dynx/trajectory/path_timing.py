@@ -221,7 +221,7 @@ def time_optimal_path(
         raise ArgumentError(f"{ends.floating.name} has a floating base; a path needs a fixed one")
     limited = effort is not False
     if acceleration is None and not limited:
-        raise ArgumentError("neither acceleration nor effort is limited; wanted one of them")
+        raise ArgumentError("acceleration is None and effort False; wanted a limit of one of them")
     V = velocity_limits(velocity, ends)
     require_positive_finite("velocity", V, ends)
     if acceleration is None:

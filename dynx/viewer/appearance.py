@@ -90,7 +90,7 @@ class PartVisibility:
 
     def _named(self, part: str | None) -> list[str]:
         if part is not None and part not in self._drawn.parts:
-            raise ArgumentError(f"no part {shown(part)}{nearest(str(part), self._drawn.parts)}")
+            raise ArgumentError(f"no part {shown(part)}{nearest(part, self._drawn.parts)}")
         return list(self._drawn.parts) if part is None else [part]
 
     def _show_values(self) -> None:

@@ -82,7 +82,7 @@ class CameraPane:
         if not isinstance(camera, Camera):
             raise ArgumentError(f"camera is of type {type(camera).__name__}; wanted a Camera")
         if shows not in KINDS:
-            raise ArgumentError(f"shows is {shown(shows)}{nearest(str(shows), KINDS)}")
+            raise ArgumentError(f"shows is {shown(shows)}{nearest(shows, KINDS)}")
         self._page, self._motion_now, self._camera = page, motion_now, camera
         self._ended = threading.Event()
         self._changed = threading.Event()
@@ -106,7 +106,7 @@ class CameraPane:
     @shows.setter
     def shows(self, kind: str) -> None:
         if kind not in KINDS:
-            raise ArgumentError(f"shows is {shown(kind)}{nearest(str(kind), KINDS)}")
+            raise ArgumentError(f"shows is {shown(kind)}{nearest(kind, KINDS)}")
         self._shows.value = kind
 
     @property

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from dynx.argument_types import is_listed
 from dynx.errors import ArgumentError, nearest, shown
 from dynx.model.numbers import checked_array, checked_vector, is_real, positive_number
 from dynx.spatial.scalar import Floats
@@ -30,7 +31,7 @@ LABEL_SIZE = 12.0
 def slider_step(lower: float, upper: float) -> float:
     """Return a power of ten that is at most a thousandth of the range: the page shows as many digits of the
     value as the step has."""
-    return float(10.0 ** math.floor(math.log10((upper - lower) / 1000.0)))
+    return float(10.0 ** math.floor(math.log10(max(upper - lower, 1e-300) / 1000.0)))
 
 
 class Control:
@@ -241,8 +242,7 @@ class Controls:
         """Add a choice of one of the `options`, at first of `value` or the first one; `changed(value)` is
         called when another is chosen in the page."""
         _checked_label("name of a dropdown", name)
-        listed = isinstance(options, Iterable) and getattr(options, "ndim", 1) > 0
-        texts = tuple(options) if listed and not isinstance(options, str) else ()
+        texts = tuple(options) if is_listed(options) else ()
         if not texts or not all(isinstance(each, str) and each for each in texts):
             raise ArgumentError(f"options of dropdown {shown(name)} are {shown(options)}; wanted texts")
         start = texts[0] if value is None else value
@@ -373,6 +373,10 @@ class Controls:
 
         `parts` are the nodes of shapes by the name of their part.
         """
+        if not isinstance(parts, Mapping):
+            raise ArgumentError(
+                f"parts is {shown(parts)}; wanted the nodes of shapes by the name of their part"
+            )
         call = _checked_function("clicked", clicked)
         for name, nodes in parts.items():
             for node in nodes:
@@ -416,7 +420,7 @@ def _checked_switch(what: str, value: object) -> bool:
 
 def _checked_choice(what: str, value: object, options: Sequence[str]) -> str:
     if not isinstance(value, str) or value not in options:
-        raise ArgumentError(f"{what} is {shown(value)}{nearest(str(value), options)}")
+        raise ArgumentError(f"{what} is {shown(value)}{nearest(value, options)}")
     return value
 
 

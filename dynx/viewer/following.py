@@ -61,7 +61,7 @@ class FollowingCamera:
         if part is not None:
             known = self._drawn.roots | {name: name for name in self._drawn.parts}
             if part not in known:
-                raise ArgumentError(f"no part {shown(part)}{nearest(str(part), known)}")
+                raise ArgumentError(f"no part {shown(part)}{nearest(part, known)}")
             self._part.value = known[part]
         self._mode.value = _FREE if part is None else _FIRST_PERSON if first_person else _FOLLOWS
         self._start()

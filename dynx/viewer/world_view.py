@@ -334,7 +334,7 @@ class WorldView:
         Raises ArgumentError for an unknown part and for an impulse that is no three finite numbers.
         """
         if part not in self.drawn.parts:
-            raise ArgumentError(f"no part {shown(part)}{nearest(str(part), self.drawn.parts)}")
+            raise ArgumentError(f"no part {shown(part)}{nearest(part, self.drawn.parts)}")
         given = checked_array("impulse", impulse, 3)
         if given.ndim != 1:
             raise ArgumentError(f"impulse has shape {given.shape}; wanted (3,)")

@@ -63,7 +63,7 @@ class Picture:
         """
         numbers = [k for k, each in enumerate(self.names) if each == name or each.startswith(f"{name}/")]
         if not isinstance(name, str) or not numbers:
-            raise UnknownNameError(f"no part {shown(name)} in the picture{nearest(str(name), self.names)}")
+            raise UnknownNameError(f"no part {shown(name)} in the picture{nearest(name, self.names)}")
         return np.isin(self.segmentation, numbers)
 
     @checks_types

@@ -292,7 +292,7 @@ def found_robot(name: str, robots: Mapping[str, _T]) -> _T:
     try:
         return robots[name]
     except (KeyError, TypeError):
-        raise UnknownNameError(f"no robot {shown(name)}{nearest(str(name), robots)}") from None
+        raise UnknownNameError(f"no robot {shown(name)}{nearest(name, robots)}") from None
 
 
 OnFrames = Sequence[tuple[str, ExternalForce, float]]

@@ -104,7 +104,7 @@ class LastStep:
         try:
             return self._robots[robot]
         except (KeyError, TypeError):
-            raise UnknownNameError(f"no robot {shown(robot)}{nearest(str(robot), self._robots)}") from None
+            raise UnknownNameError(f"no robot {shown(robot)}{nearest(robot, self._robots)}") from None
 
     def require(self) -> None:
         """Raise ArgumentError if no step was taken since the state was set."""

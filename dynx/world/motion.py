@@ -50,7 +50,7 @@ def checked_state(layout: Layout, state: WorldState | None, robots: Parts, bodie
     for kind, given, known in (("robot", robots, known_robots), ("body", bodies, known_bodies)):
         for name in given:
             if name not in known:
-                raise UnknownNameError(f"no {kind} {shown(name)}{nearest(str(name), known)}")
+                raise UnknownNameError(f"no {kind} {shown(name)}{nearest(name, known)}")
     return WorldState(
         time,
         {name: _robot_state(known_robots[name], pair) for name, pair in robots.items()},

@@ -180,7 +180,7 @@ def _joint_numbers(kind: str, model: Model, joints: Sequence[str] | None) -> tup
     for name in joints:
         if name not in names:
             raise UnknownNameError(
-                f"{model.name} has no joint {shown(name)} with a coordinate{nearest(str(name), names)}"
+                f"{model.name} has no joint {shown(name)} with a coordinate{nearest(name, names)}"
             )
     return tuple(names.index(name) for name in joints)
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynx.argument_types import checks_types
-from dynx.errors import DTypeError, UnknownNameError, nearest, shown
+from dynx.errors import DTypeError, ShapeError, UnknownNameError, nearest, shown
 from dynx.model import Model
-from dynx.model.numbers import is_real
+from dynx.model.numbers import checked_entries, is_real, real_array
 from dynx.spatial.scalar import Floats
 
 SAME_TIME = 1e-6
@@ -61,6 +61,14 @@ class ConfigurationChannel(Channel):
     def distances(self, ours: Floats, theirs: Floats) -> Floats:
         """Return the magnitude (n, nv) of the difference of two configurations [rad or m]."""
         return np.asarray(np.abs(self.model.difference(ours, theirs)))
+
+
+def checked_times(times: Floats) -> Floats:
+    """Return times (n,) [s]; raise the errors of `checked_entries` and ShapeError for anything else."""
+    checked = checked_entries("times", real_array("times", times))
+    if checked.ndim != 1:
+        raise ShapeError(f"times has shape {checked.shape}; wanted (n,)")
+    return checked
 
 
 def position_channel(name: str, rows: Floats) -> PositionChannel:
@@ -117,6 +125,7 @@ class Record:
         """
         if channel not in self.channels:
             raise UnknownNameError(f"no channel {shown(channel)}{nearest(channel, self.channels)}")
+        times = checked_times(times)
         found, last = self.channels[channel], len(self.times) - 1
         before = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, max(last - 1, 0))
         after = np.minimum(before + 1, last)

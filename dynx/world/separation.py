@@ -10,7 +10,7 @@ from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.model.numbers import is_real
 from dynx.spatial.scalar import Floats
-from dynx.world.record import Record
+from dynx.world.record import Record, checked_times
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,8 @@ def separation(ours: Record, theirs: Record, times: Floats | None = None) -> Sep
     end = min(float(ours.times[-1]), float(theirs.times[-1]))
     fine, coarse = sorted((theirs, ours), key=lambda record: record.step)
     if times is not None:
-        if times.ndim != 1 or not times.size:
+        times = checked_times(times)
+        if not times.size:
             raise ShapeError(f"times has shape {times.shape}; wanted (n,), at least one time")
         coarse = fine = Record("", times, {})
     compared = coarse.times_within(begin, end)
@@ -88,9 +89,11 @@ def separation(ours: Record, theirs: Record, times: Floats | None = None) -> Sep
         # One state tells nothing of a motion: a log in ms would be like any simulation from the same start.
         compared = max(compared, fine.times_within(begin, end), key=len)
     if not compared.size:
+        chosen = "" if times is None else f"times is {shown(times)}; "
         raise ArgumentError(
-            f"{ours.name} and {theirs.name} have no common time: one is from {ours.times[0]:.12g} to "
-            f"{ours.times[-1]:.12g} s, the other from {theirs.times[0]:.12g} to {theirs.times[-1]:.12g} s"
+            f"{chosen}{ours.name} and {theirs.name} have no common time at which to be compared: one "
+            f"is from {ours.times[0]:.12g} to {ours.times[-1]:.12g} s, the other from {theirs.times[0]:.12g} "
+            f"to {theirs.times[-1]:.12g} s"
         )
     channels = [ours.channels[name] for name in common]
     with np.errstate(invalid="ignore", over="ignore"):

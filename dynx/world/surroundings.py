@@ -111,7 +111,7 @@ class ContactTable:
         own = np.array([name == part or name.startswith(f"{part}/") for name in self.names])
         if not own.any():
             known = dict.fromkeys([*self.names, *(name.partition("/")[0] for name in self.names)])
-            raise UnknownNameError(f"no part {shown(part)}{nearest(str(part), known)}")
+            raise UnknownNameError(f"no part {shown(part)}{nearest(part, known)}")
         total = np.zeros((self.n_steps, 6))
         force = self.normal_force[:, None] * self.normal + self.friction_force
         wrench = np.concatenate([force, cross(0.5 * (self.point_a + self.point_b), force)], axis=1)

@@ -18,7 +18,7 @@ from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, UnknownNameError, shown
 from dynx.model import Model, Pose
 from dynx.model.geometry import Mesh
-from dynx.model.numbers import checked_bool, positive_seconds, whole_number
+from dynx.model.numbers import MAX_INDEX, checked_bool, positive_seconds, whole_number
 from dynx.model.package_search import StrPath
 from dynx.option_names import as_object, checks_option_names, refuse_options, right_name
 from dynx.rbd.jacobians import LOCAL, checked_reference
@@ -236,7 +236,7 @@ class World:
                 lambda engine: self._queries.contacts(engine),
             )
         kept = {"keep_last_step": keep_last_step, "contact_interval": contact_interval}
-        self._kept = {name: value for name, value in kept.items() if value}
+        self._kept = {name: value for name, value in kept.items() if value is not None and value is not False}
         """Options on which no later step depends, as far as they are given."""
         self._contact_interval: ContactInterval | None = None
         if contact_interval is not None:
@@ -415,7 +415,7 @@ class World:
 
     @rollout.setter
     def rollout(self, number: int) -> None:
-        self._rollout = whole_number("rollout", number, 0)
+        self._rollout = whole_number("rollout", number, 0, MAX_INDEX)
         if self._sensors is not None:
             self._sensors.rollout = self._rollout
 

@@ -124,7 +124,7 @@ def test_what_has_no_document() -> None:
     documents: list[tuple[dict[str, Any], str]] = [
         ({"controller": "PD", "kp": 1.0}, "the document of a PD is invalid: .*'kd'"),
         ({"controller": "pd", "kp": 1.0}, "no controller 'pd'; did you mean"),
-        ({"kp": 1.0}, "no controller ''"),
+        ({"kp": 1.0}, "lacks the name of its controller"),
     ]
     for document, says in documents:
         with pytest.raises(ArgumentError, match=says):

@@ -11,10 +11,13 @@ import inspect
 import pkgutil
 import signal
 import traceback
+from collections import UserDict, deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from datetime import datetime, timedelta
 from decimal import Decimal
+from enum import Enum
 from fractions import Fraction
 from functools import cache, partial
 from importlib import import_module
@@ -71,6 +74,43 @@ class Foreign:
 
     def __repr__(self) -> str:
         return "<foreign object>"
+
+
+class Unwritable:
+    """Object whose text cannot be asked for."""
+
+    def __repr__(self) -> str:
+        raise RuntimeError("no text")
+
+
+class NoNumbers:
+    """Object that looks like an array and has no numbers, as a tensor of PyTorch with a gradient."""
+
+    def __array__(self, *_: Any, **__: Any) -> Any:
+        raise RuntimeError("call detach first")
+
+    def __len__(self) -> int:
+        return 3
+
+
+class Text(str):
+    """Text of a class of its own."""
+
+    def __new__(cls) -> Text:
+        """Make a text that is in no list of names."""
+        return super().__new__(cls, "no such text")
+
+
+class Colour(Enum):
+    """A choice that is no text."""
+
+    RED = "red"
+
+
+def _list_of_itself() -> list[Any]:
+    found: list[Any] = []
+    found.append(found)
+    return found
 
 
 BAD: Mapping[str, tuple[Callable[[], Any], ...]] = {
@@ -162,6 +202,48 @@ BAD: Mapping[str, tuple[Callable[[], Any], ...]] = {
         lambda: [Foreign()],
         lambda: np.array(Foreign()),
     ),
+    "hostile": (
+        Unwritable,
+        lambda: [Unwritable()],
+        NoNumbers,
+        lambda: [NoNumbers()],
+        Text,
+        lambda: Colour,
+        lambda: Colour.RED,
+        _list_of_itself,
+        lambda: "a\0b",
+        lambda: "\ud800",
+        lambda: "two\nlines\x1b[31m",
+        lambda: "{name} %s %n",
+        lambda: Path("a\0b"),
+        lambda: memoryview(b"bytes"),
+        lambda: bytearray(b"bytes"),
+        lambda: frozenset({"a"}),
+        lambda: np.str_("box"),
+        lambda: np.array("box"),
+        lambda: np.bytes_(b"box"),
+        lambda: np.array([[1.0], [2.0, 3.0]], object),
+        lambda: np.array([10**400], object),
+        lambda: [10**400, 1.0, 1.0],
+        lambda: np.void(b"abc"),
+        lambda: np.timedelta64(3, "s"),
+        lambda: np.zeros(3, ">f8"),
+        lambda: np.broadcast_to(np.float64(1.0), (3,)),
+        lambda: np.zeros((3, 0, 3)),
+        lambda: datetime(2020, 1, 1),
+        lambda: timedelta(seconds=1),
+        lambda: slice(3),
+        lambda: Ellipsis,
+        lambda: NotImplemented,
+        lambda: {None: None},
+        lambda: {(1, 2): [3]},
+        lambda: UserDict(box=1.0),
+        lambda: deque([1.0, 2.0, 3.0]),
+        lambda: iter(["a", 3]),
+        lambda: map(str, range(3)),
+        lambda: -0.0,
+        lambda: 5e-324,
+    ),
 }
 """Kinds of wrong arguments."""
 
@@ -245,7 +327,12 @@ class Call:
 
 
 def _short(value: object) -> str:
-    text = repr(value) if not isinstance(value, int) or abs(value) < 10**20 else "<huge int>"
+    if isinstance(value, int) and abs(value) > 10**20:
+        return "<huge int>"
+    try:
+        text = repr(value)
+    except (RuntimeError, ValueError):
+        return f"<{type(value).__name__} without a text>"
     return text if len(text) < 60 else text[:57] + "..."
 
 
@@ -262,6 +349,11 @@ def valid_argument(parameter: inspect.Parameter) -> Any:
         if word in annotation:
             return make()
     return BY_NAME.get(parameter.name, lambda: np.zeros(3))()
+
+
+def _fitting(parameter: inspect.Parameter, value: Any) -> Any:
+    """Return a wrong argument; a number for a class where a callable is wanted: its own errors are right."""
+    return 3 if isinstance(value, type) and "Callable" in str(parameter.annotation) else value
 
 
 def random_call(seed: int, number: int, among: tuple[Door, ...] | None = None) -> Call | None:
@@ -282,7 +374,7 @@ def random_call(seed: int, number: int, among: tuple[Door, ...] | None = None) -
     for each in usable:
         if each.name in chosen:
             kind = list(BAD)[rng.integers(len(BAD))]
-            given[each.name] = BAD[kind][rng.integers(len(BAD[kind]))]()
+            given[each.name] = _fitting(each, BAD[kind][rng.integers(len(BAD[kind]))]())
             kinds[each.name] = kind
         elif each.default is each.empty or rng.random() < 0.2:
             given[each.name] = valid_argument(each)

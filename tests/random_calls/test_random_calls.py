@@ -17,7 +17,17 @@ import dynx
 from dynx import trajectory
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, DTypeError
-from tests.random_calls.calls import Call, Door, Foreign, doors, outcome, public_modules, random_call
+from tests.random_calls.calls import (
+    Call,
+    Door,
+    Foreign,
+    NoNumbers,
+    Unwritable,
+    doors,
+    outcome,
+    public_modules,
+    random_call,
+)
 from tests.random_calls.messages import omissions
 from tests.random_calls.objects import OBJECTS, arm, motion, scene
 
@@ -202,7 +212,7 @@ def test_errors_name_the_argument_what_was_given_and_what_is_valid() -> None:
 
 def test_a_number_that_no_float_holds_is_refused_and_a_seed_may_be_one() -> None:
     engine = dynx.backend("reference", arm())
-    with pytest.raises(ArgumentError, match=r"max_iterations is .* at most 9007199254740992"):
+    with pytest.raises(ArgumentError, match=r"max_iterations is .* at most 1000000000"):
         engine.inverse_kinematics(np.eye(4), "tip", max_iterations=10**400)
     assert dynx.Noise(0.1, 0.1, seed=2**128).seed == 2**128
 
@@ -230,3 +240,67 @@ def test_an_array_in_the_place_of_an_objective_is_named() -> None:
     solve: Any = dynx.backend("reference", arm()).inverse_kinematics
     with pytest.raises(ArgumentError, match="maximize"):
         solve(np.eye(4), "tip", maximize=np.zeros((2, 3)))
+
+
+def test_elements_of_an_iterator_are_checked_as_they_are_read() -> None:
+    @checks_types
+    def joined(names: Iterable[str], *more: int) -> str:
+        return ",".join(names)
+
+    assert joined(name for name in "ab") == joined(names=iter("ab")) == "a,b"
+    with pytest.raises(DTypeError, match=r"names yields '3' at place 1, of type int; wanted Iterable\[str\]"):
+        joined(iter(["a", 3]), 1)  # type: ignore[arg-type]  # the mistake that is tested
+    with pytest.raises(DTypeError, match="reports yields '0' at place 0, of type int"):
+        untyped.doctor.results_document(each for each in range(3))
+
+
+def _list_of_itself() -> list[Any]:
+    found: list[Any] = []
+    found.append(found)
+    return found
+
+
+HARD: dict[str, tuple[Callable[[], Any], str]] = {
+    "span of time as a number": (
+        lambda: untyped.Payload("tip", np.timedelta64(3, "s")),
+        "mass of a payload is '3 seconds'",
+    ),
+    "span of time as a count": (lambda: untyped.agree(arm(), samples=np.timedelta64(3, "s")), "samples"),
+    "list that holds itself": (lambda: untyped.quat_from_rpy(_list_of_itself()), "nested more than 64 times"),
+    "list that holds itself as a seed": (
+        lambda: arm().random(rng=_untyped_list()),
+        "rng is .*wanted a NumPy generator",
+    ),
+    "class without numbers": (
+        lambda: untyped.rotation_from_rpy(NoNumbers()),
+        "rpy is .*no array: call detach",
+    ),
+    "array without an axis as parts": (lambda: untyped.Scene(robots=np.array(1.0)), "robots of a scene is"),
+    "array without an axis as pushes": (
+        lambda: untyped.Scenario(arm(), pushes=np.array(1.0)),
+        "pushes is '1.0'",
+    ),
+    "more of anything than a call can make": (
+        lambda: dynx.trajectory.excitation(arm(), 1.0, harmonics=10**15),
+        "at most 10000",
+    ),
+    "more samples than a call can make": (lambda: dynx.agree(arm(), samples=10**15), "at most 1000000000"),
+    "name of a file with NUL": (lambda: dynx.world.write_scene(scene(), "a\0b.toml"), "a path is 'a"),
+    "name of a file that cannot be encoded": (lambda: OBJECTS["world"]().write("\ud800"), "a path is '"),
+    "object whose text cannot be asked for": (
+        lambda: untyped.Noise(0.1, 0.1, seed=Unwritable()).deviations(3),
+        "seed is 'Unwritable, whose text raises RuntimeError'",
+    ),
+}
+
+
+def _untyped_list() -> Any:
+    """Return a list that holds itself, without a type."""
+    return _list_of_itself()
+
+
+@pytest.mark.parametrize("case", HARD)
+def test_what_looks_right_to_python_and_is_not_is_named(case: str) -> None:
+    call, message = HARD[case]
+    with pytest.raises(ArgumentError, match=message):
+        call()

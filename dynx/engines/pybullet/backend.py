@@ -32,6 +32,7 @@ from dynx.engines.pybullet.client import CanonicalClient, refuse_many_joints
 from dynx.engines.pybullet.library import bullet, bullet_version
 from dynx.errors import ArgumentError, ClosedError, EngineError
 from dynx.model import Model
+from dynx.model.configuration import checked_q
 from dynx.model.mechanism import ROOT, BodyFrame, Mechanism, float64
 from dynx.model.numbers import checked_array, positive_number, whole_number
 from dynx.rbd.jacobians import LOCAL_WORLD_ALIGNED, Reference
@@ -396,7 +397,7 @@ class PyBulletBackend(Backend):
         `inverse_kinematics` does. Mimic joints are treated as independent, and the solution is projected to
         the nearest configuration (least squares).
         """
-        q0 = self._arguments.q(q0)
+        q0 = checked_q(self.model, q0, "q0")
         index = self._index(frame)
         count = whole_number("iterations", iterations, 1, MAX_ITERATIONS)
         residual = positive_number("residual", residual)

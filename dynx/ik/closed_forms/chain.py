@@ -128,7 +128,7 @@ def checked_given(model: Model, given: Mapping[str, float]) -> dict[str, float]:
             if isinstance(name, str):
                 model.coordinate_index(name)  # explains joints without a coordinate
             raise UnknownNameError(
-                f"no joint {shown(name)} in {model.name}{nearest(str(name), model.joint_names)}"
+                f"no joint {shown(name)} in {model.name}{nearest(name, model.joint_names)}"
             )
         if not is_real(value) or not abs(value) < MAX_MAGNITUDE:
             raise ArgumentError(f"given[{name!r}] is {shown(value)}; wanted a finite number")

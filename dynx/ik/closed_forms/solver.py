@@ -266,7 +266,9 @@ def _checked_poses(target: ArrayLike) -> Floats:
     """Return poses (..., 4, 4) as contiguous arrays; the errors of `checked_targets`, or ShapeError."""
     targets = checked_targets(target)
     if targets.positions is None or targets.rotations is None:
-        raise ShapeError("target is a position; the closed form needs poses (..., 4, 4)")
+        raise ShapeError(
+            f"target has shape {np.shape(target)}, a position; the closed form needs poses (..., 4, 4)"
+        )
     return np.asarray(homogeneous(targets.rotations, targets.positions))
 
 

@@ -139,7 +139,7 @@ class Geometry:
         try:
             return self.links[link]
         except (KeyError, TypeError):
-            raise UnknownNameError(f"no link {shown(link)}{nearest(str(link), self.links)}") from None
+            raise UnknownNameError(f"no link {shown(link)}{nearest(link, self.links)}") from None
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Geometry) and self.links == other.links

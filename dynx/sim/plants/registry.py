@@ -67,7 +67,9 @@ def register(name: str, loader: Callable[[], type[Plant]]) -> None:
     Raises ArgumentError for a name that is taken by another plant or by a backend of dynx.
     """
     if name in BACKENDS:
-        raise ArgumentError(f"the name {shown(name)} is taken by a backend; a plant is never replaced")
+        raise ArgumentError(
+            f"the name {shown(name)} is taken by a backend; wanted another, for a plant is never replaced"
+        )
     _steppers.register(name, loader)
 
 

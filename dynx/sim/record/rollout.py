@@ -93,6 +93,7 @@ class Summary(NamedTuple):
     def _repr_html_(self) -> str:
         return self.to_html("summary")
 
+    @checks_types
     def to_html(self, title: str) -> str:
         """Return a table with a row for each coordinate under `title`; without a reference it has no
         errors."""

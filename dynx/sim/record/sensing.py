@@ -68,9 +68,7 @@ class OwnReadings(Mapping[str, Readings]):
         if name in self._reasons:
             raise self._reasons[name]
         if name not in self._found:
-            raise UnknownNameError(
-                f"the rollout has no sensor {shown(name)}{nearest(str(name), self._found)}"
-            )
+            raise UnknownNameError(f"the rollout has no sensor {shown(name)}{nearest(name, self._found)}")
         return self._found[name]
 
     def __contains__(self, name: object) -> bool:

@@ -12,11 +12,12 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, fields, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from dynx.argument_types import is_listed
 from dynx.errors import ArgumentError, shown
 from dynx.option_names import as_object
 from dynx.registry import DEFAULT_ENGINE
@@ -185,7 +186,7 @@ class Parts(Kind):
         if value is None and not self.optional:
             raise ArgumentError(f"{name} is None; wanted {self.values}")
         given = () if value is None else value
-        parts = tuple(given) if isinstance(given, Iterable) else (given,)
+        parts = tuple(given) if is_listed(given) else (given,)
         if isinstance(given, Mapping) or not all(isinstance(each, known) for each in parts):
             part = self.part_class
             clause = as_object(given, part.__name__, inspect.signature(part).parameters)
@@ -198,7 +199,7 @@ class SensorParts(Parts):
 
     def checked(self, name: str, value: Any, model: Model) -> Any:
         """Return the sensors as a tuple."""
-        return value if value == () else super().checked(name, value, model)
+        return value if isinstance(value, tuple) and not value else super().checked(name, value, model)
 
 
 class Factors(Kind):
@@ -216,14 +217,15 @@ def as_array(name: str, value: Any) -> Any:
     masked array."""
     import numpy as np
 
-    from dynx.model.numbers import refuse_mask
+    from dynx.errors import ShapeError
+    from dynx.model.numbers import array_of, refuse_mask
 
     refuse_mask(name, value)
     if not isinstance(value, list | tuple | np.ndarray):
         return value
     try:
-        array = np.array(value)
-    except ValueError:
+        array = np.array(array_of(name, value))
+    except ShapeError:  # of rows of several lengths, which the caller may take
         return value
     if array.dtype.kind in "iuf":
         array = array.astype(np.float64)

@@ -38,7 +38,7 @@ def inertials(kind: Kind = "physical") -> Strategy[Inertial | None]:
     physical by construction, up to rounding.
     """
     if kind not in KINDS:
-        raise UnknownNameError(f"kind is {shown(kind)}{nearest(str(kind), KINDS)}")
+        raise UnknownNameError(f"kind is {shown(kind)}{nearest(kind, KINDS)}")
     return _inertials(kind)
 
 
@@ -176,12 +176,12 @@ def models(
     if min_links > max_links:
         raise ArgumentError(f"min_links is {min_links}, more than max_links, which is {max_links}")
     if base not in get_args(BaseChoice):
-        raise UnknownNameError(f"base is {shown(base)}{nearest(str(base), get_args(BaseChoice))}")
+        raise UnknownNameError(f"base is {shown(base)}{nearest(base, get_args(BaseChoice))}")
     if isinstance(joint_types, str) or not joint_types:
         raise ArgumentError(f"joint_types is {shown(joint_types)}; wanted one or more of {JOINT_TYPES}")
     for kind in joint_types:
         if kind not in JOINT_TYPES:
-            raise UnknownNameError(f"no joint type {shown(kind)}{nearest(str(kind), JOINT_TYPES)}")
+            raise UnknownNameError(f"no joint type {shown(kind)}{nearest(kind, JOINT_TYPES)}")
     flags = {
         "mimics": mimics,
         "locks": locks,

@@ -211,7 +211,7 @@ def scenes(
         if not least <= value <= MAX_PARTS:
             raise ArgumentError(f"{name} is {value}; wanted {least} to {MAX_PARTS}")
     if ground not in get_args(GroundChoice):
-        raise UnknownNameError(f"ground is {shown(ground)}{nearest(str(ground), get_args(GroundChoice))}")
+        raise UnknownNameError(f"ground is {shown(ground)}{nearest(ground, get_args(GroundChoice))}")
     flags = {
         "moving": moving,
         "constraints": constraints,

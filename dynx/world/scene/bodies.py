@@ -203,7 +203,7 @@ def mesh(
 
 
 def _placed_shapes(what: str, shapes: object) -> tuple[Collision, ...]:
-    if isinstance(shapes, str):
+    if isinstance(shapes, str | bytes):
         raise ArgumentError(f"shapes of {what} is {shown(shapes)}; wanted a shape, such as Box((1, 1, 1))")
     listed: list[Any] = list(shapes) if isinstance(shapes, Sequence) else [shapes]
     if not listed:

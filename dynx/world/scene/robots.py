@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.argument_types import checks_types
+from dynx.argument_types import checks_types, is_listed
 from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.model import Model, Pose
 from dynx.model.configuration import checked_q, neutral
@@ -34,7 +34,7 @@ def checked_pairs(what: str, given: object, second: type, wanted: str) -> tuple[
     Raises ArgumentError for anything else; `wanted` describes a pair.
     """
     pairs = given.items() if isinstance(given, Mapping) else given
-    if isinstance(pairs, str) or not isinstance(pairs, Collection) or isinstance(pairs, np.ndarray):
+    if not is_listed(pairs) or not isinstance(pairs, Collection) or isinstance(pairs, np.ndarray):
         raise ArgumentError(f"{what} is {shown(given)}; wanted a sequence of pairs of {wanted}")
     found = []
     for k, pair in enumerate(pairs):
@@ -138,7 +138,7 @@ class SceneRobot:
         if not isinstance(self.self_collision, bool):
             raise ArgumentError(f"self_collision of {what} is {shown(self.self_collision)}; wanted a bool")
         motors = (self.motors,) if isinstance(self.motors, Motor) else self.motors
-        if not isinstance(motors, Iterable) or isinstance(motors, np.ndarray):
+        if not is_listed(motors):
             raise ArgumentError(f"motors of {what} is {shown(motors)}; wanted motors")
         motors = tuple(motors)
         for motor in motors:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from numpy.typing import ArrayLike
 
-from dynx.argument_types import checks_types
+from dynx.argument_types import checks_types, is_listed
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model import Model
 from dynx.model.elements import Vector
@@ -108,14 +108,14 @@ class Scene:
     def robot(self, name: str) -> SceneRobot:
         """Return the robot of that name; UnknownNameError if there is none."""
         if name not in self._robots:
-            raise UnknownNameError(f"no robot {shown(name)} in {self.name}{nearest(str(name), self._robots)}")
+            raise UnknownNameError(f"no robot {shown(name)} in {self.name}{nearest(name, self._robots)}")
         return self._robots[name]
 
     @checks_types
     def body(self, name: str) -> SceneBody:
         """Return the body of that name; UnknownNameError if there is none."""
         if name not in self._bodies:
-            raise UnknownNameError(f"no body {shown(name)} in {self.name}{nearest(str(name), self._bodies)}")
+            raise UnknownNameError(f"no body {shown(name)} in {self.name}{nearest(name, self._bodies)}")
         return self._bodies[name]
 
     @checks_types
@@ -262,7 +262,7 @@ class Scene:
 
 
 def _instances(name: str, parts: object, kinds: type | UnionType) -> tuple[object, ...]:
-    if isinstance(parts, str) or not isinstance(parts, Iterable):
+    if not is_listed(parts):
         single = not isinstance(parts, str) and isinstance(parts, kinds)
         hint = f", such as [{type(parts).__name__}(...)]" if single else ""
         raise ArgumentError(f"{name} of a scene is {shown(parts)}; wanted a sequence{hint}")
@@ -278,7 +278,7 @@ def _spelled(kinds: object) -> str:
 
 
 def _names(what: str, names: object) -> tuple[str, ...]:
-    if isinstance(names, str) or not isinstance(names, Iterable):
+    if not is_listed(names):
         raise ArgumentError(f"{what} is {shown(names)}; wanted a sequence of names")
     return tuple(names)
 

@@ -111,7 +111,7 @@ class Readings:
 def _of_channel(sensor: Sensor, channels: Mapping[str, Floats], name: str) -> Floats:
     """Return the values (..., size) of a channel, (...,) of one that is a number."""
     if name not in channels:
-        raise UnknownNameError(f"{sensor} has no channel {shown(name)}{nearest(str(name), channels)}")
+        raise UnknownNameError(f"{sensor} has no channel {shown(name)}{nearest(name, channels)}")
     number = next(each for each in sensor.channels if each.name == name).components == ("",)
     return channels[name][..., 0] if number else channels[name]
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
 from dataclasses import KW_ONLY, dataclass
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
+from dynx.argument_types import is_listed
 from dynx.errors import ArgumentError, shown
 from dynx.model.numbers import checked_seed, is_real
 from dynx.model.urdf.values import name_fault
@@ -145,7 +145,7 @@ def checked_sensors(sensors: object, parts: SensedParts) -> tuple[Sensor, ...]:
     Raises ArgumentError for anything else and for two of one name, and the errors of `Sensor.require`.
     """
     given = (sensors,) if isinstance(sensors, Sensor) else sensors
-    if isinstance(given, str) or not isinstance(given, Iterable):
+    if not is_listed(given):
         raise ArgumentError(f"sensors is {shown(sensors)}; wanted a sequence of sensors")
     found = tuple(given)
     if len(found) > MAX_SENSORS:
