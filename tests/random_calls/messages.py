@@ -44,7 +44,7 @@ VALID = re.compile(
     r"\b(wanted|known|did you mean|at most|at least|between|only|must|needs?|has no|there (is|are) (no|none)"
     r"|no such|give|such as|of this|not finite|cannot|one of|takes|beyond|above|below|positive|greater|less"
     r"|exceeds|allowed|differs?|use|choose|change|accepted|supported|expected|not callable|are not|without"
-    r"|instead|belongs|larger|smaller|more than|fewer|is a str|(saved|written) as)\b"
+    r"|instead|with it|belongs|larger|smaller|more than|fewer|is a str|(saved|written) as)\b"
 )
 """Words by which a message says what is valid."""
 
@@ -57,7 +57,7 @@ def omissions(call: Call, error: DynxError) -> list[str]:
     parameters = inspect.signature(call.function).parameters
     found = []
     # A function of names of others takes the name by which an error calls its argument.
-    label = str(call.given["name"]) if "name" in call.given else ""
+    label = _text(str, call.given.get("name", ""))
     # What is looked up or opened is known by its own name.
     quoted = any(
         _quotes(value, text)
@@ -90,7 +90,8 @@ def _quotes(value: Any, text: str) -> bool:
         return False
     if isinstance(value, bytes):
         return repr(value)[:25] in text
-    written = str(value)
+    # Control characters are escaped.
+    written = repr(str(value))[1:-1]
     return (written[:25] if written else "''") in text or (Path(written).name[:25] or "''") in text
 
 
@@ -144,7 +145,7 @@ def _traces(value: Any) -> Iterator[str]:
             # Long ones are shortened, and line breaks are escaped.
             yield written[:25].replace("\n", "\\n").rstrip()
     if not isinstance(value, np.ndarray):
-        with suppress(ValueError, TypeError, OverflowError):
+        with suppress(ValueError, TypeError, OverflowError, RuntimeError):
             yield f"shape {np.asarray(value).shape}"
     if isinstance(value, np.ndarray):
         for each in (*value.ravel()[:9], *(value[:2] if value.ndim else ())):

@@ -226,6 +226,38 @@ def test_several_robots_and_bases(arm: Path, tmp_path: Path) -> None:
     assert [each["base"] for each in json.loads(both.stdout)["results"]] == ["fixed", "floating"]
 
 
+def test_mended_files_of_equal_names_and_of_both_bases_are_apart_and_indented_as_theirs(
+    arm: Path, tmp_path: Path
+) -> None:
+    """Two robots of one name on two bases are four files; what is inserted has the blanks of its place."""
+    deep = ARM.replace("  ", "\t")
+    for folder, text in (("left", ARM), ("right", deep)):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "arm.urdf").write_bytes(text.encode("latin-1"))
+    doctor("left/arm.urdf", "right/arm.urdf", "--base", "both", "--fix", "mended")
+    written = {
+        path.relative_to(tmp_path / "mended").as_posix() for path in (tmp_path / "mended").rglob("*.*")
+    }
+    assert written == {
+        f"{side}/arm-{base}.urdf" for side in ("left", "right") for base in ("fixed", "floating")
+    }
+    for name in written:
+        original = set((deep if name.startswith("right") else ARM).splitlines())
+        blanks = "\t" if name.startswith("right") else "  "
+        lines = (tmp_path / "mended" / name).read_text(encoding="latin-1").splitlines()
+        inserted = [line for line in lines if line not in original]
+        assert any(line.strip() == '<mass value="0"/>' for line in inserted), name
+        depth = 0
+        for line in lines:
+            element = line.strip()
+            depth -= element.startswith("</")
+            if line in inserted:
+                assert line == blanks * depth + element, (name, line)
+            depth += (
+                element.startswith("<") and not element.startswith(("</", "<!", "<?")) and "/" not in element
+            )
+
+
 @pytest.mark.parametrize(
     ("arguments", "clue"),
     [
