@@ -59,14 +59,14 @@ FLOWS = {
         ),
         (),
         72,
-        12200,
+        12250,
     ),
     "inverse kinematics": Flow(
         ENGINE + "engine.inverse_kinematics(engine.forward_kinematics(q, 'tool0'), 'tool0', q)",
         ("world", "sim", "ik.closed_forms"),
         (),
         106,
-        19000,
+        19050,
     ),
     "simulate": Flow(
         ROBOT + "from dynx import control\n"
@@ -89,7 +89,7 @@ FLOWS = {
         ),
         (),
         153,
-        24650,
+        24700,
     ),
     "step of a box": Flow(
         "from dynx.world import Scene, World, box\n"
@@ -97,7 +97,7 @@ FLOWS = {
         ("ik", "sim", "envs", "doctor"),
         (),
         113,
-        20450,
+        20500,
     ),
     "step of the cart-pole": Flow(
         "import gymnasium, dynx.envs\n"
@@ -107,7 +107,7 @@ FLOWS = {
         ("distance", "ik", "world.camera", "steppers.camera"),
         (),
         154,
-        26450,
+        26500,
     ),
 }
 
