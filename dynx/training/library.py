@@ -148,7 +148,7 @@ def new_algorithm(
     for each in _FRACTIONS:
         value = hyperparameters.get(each, 1.0)
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= 1.0:
-            raise ArgumentError(f"{each} is {shown(value)}; wanted a number between 0 and 1")
+            raise ArgumentError(f"{each} is {value!r}; wanted a number between 0 and 1")
     values = {each: schedule_of(each, value) for each, value in hyperparameters.items()}
     if "policy_kwargs" in values:
         values["policy_kwargs"] = _policy_options(values["policy_kwargs"])
