@@ -6,6 +6,7 @@ import ast
 import re
 from functools import cache
 from importlib import import_module
+from inspect import unwrap
 from pathlib import Path
 
 import pytest
@@ -44,8 +45,10 @@ PUBLIC = public_names()
 
 @cache
 def value(name: str) -> object:
+    """Return the object of a name, without what answers mistaken keywords around it."""
     module, _, attribute = name.rpartition(".")
-    return getattr(import_module(module), attribute)
+    found = getattr(import_module(module), attribute)
+    return unwrap(found) if callable(found) else found
 
 
 @pytest.mark.parametrize("module", PUBLIC)
