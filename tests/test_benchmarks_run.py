@@ -18,6 +18,13 @@ def test_every_benchmark_runs() -> None:
     assert finished.returncode == 0, finished.stdout + finished.stderr
 
 
+def test_many_joints_are_opened_or_refused_by_every_backend() -> None:
+    finished = run("benchmarks.many_joints", "248")
+    assert finished.returncode == 0, finished.stdout + finished.stderr
+    for name in installed_backends():
+        assert name in finished.stdout
+
+
 def test_the_table_of_peers_has_dynx_first() -> None:
     # Without the two peers for which something is compiled for seconds.
     quick = ["--without", "adam, JAX", "--without", "CasADi map, C code"]
