@@ -46,3 +46,14 @@ def gravity_notes(gravity: Sequence[float]) -> Iterator[str]:
             f"gravity ({numbers}) points up, along z of the world; it is the acceleration of a body that "
             "falls, (0, 0, -9.81) by default"
         )
+
+
+def rotation_notes(rpy: Sequence[float], name: str) -> Iterator[str]:
+    """Yield a sentence if roll, pitch or yaw [rad] of what is called `name` is beyond a full turn, as angles
+    in degrees are."""
+    largest = max(rpy, key=abs)
+    if abs(largest) > 2.0 * math.pi:
+        yield (
+            f"rpy of {name} holds {largest:g} rad, more than a full turn; {largest:g} degrees are "
+            f"{math.radians(largest):.5g} rad"
+        )

@@ -11,13 +11,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import islice
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from dynx.backends.solvability import main_joints, singular_direction
 from dynx.errors import DynxError, shown
-from dynx.model.elements import Vector
+from dynx.model.elements import IDENTITY, Vector
 from dynx.model.mechanism import ROOT, Mechanism
 from dynx.model.tree import STANDARD_GRAVITY
 from dynx.spatial.scalar import Floats
@@ -27,8 +27,12 @@ from dynx.steppers.materials import inexact_materials
 from dynx.steppers.state import WorldState
 from dynx.steppers.stepper import Stepper
 from dynx.world.boxes import owner_pose, shape_box
-from dynx.world.motors import JointLaw
+from dynx.world.motors import JointLaw, combine
 from dynx.world.scene.scene import Scene
+
+if TYPE_CHECKING:
+    from dynx.world.scene.bodies import SceneBody
+    from dynx.world.sensors.sensor import Sensor
 
 MIN_DEPTH = 1e-3
 """Depth [m] from which two parts count as overlapping: at rest, parts sink into one another by less."""
@@ -238,6 +242,32 @@ class RobotLoad(NamedTuple):
     law: JointLaw | None
     implicit: Floats | None
     """1 for joints whose law holds at the end of the step, 0 for the others (n,)."""
+
+
+def notes_on_angles(scene: Scene) -> Iterator[str]:
+    """Yield a sentence for each rotation of the scene and each target of its motors that is far beyond a full
+    turn or the limits of the joint, as angles in degrees are."""
+    placed: list[SceneBody | Sensor] = [*scene.bodies, *scene.sensors]
+    # Some sensors have no pose of their own.
+    poses = [(f"the pose of {shown(each.name)}", getattr(each, "pose", IDENTITY)) for each in placed]
+    targets = []
+    for robot in scene.robots:
+        law, _ = combine(robot.model, robot.motors)
+        if law.kp.any():
+            targets.append((robot, law))
+    turned = [(name, pose) for name, pose in poses if max(map(abs, pose.rpy)) > 2.0 * np.pi]
+    if not turned and not targets:
+        return
+    # Imported here, because angles hardly ever are in degrees.
+    from dynx.model.unlikely_inputs import position_notes, rotation_notes
+
+    for name, pose in turned:
+        yield from rotation_notes(pose.rpy, name)
+    for robot, law in targets:
+        q = robot.model.neutral()
+        driven = np.flatnonzero(law.kp)
+        q[len(q) - len(law.target) + driven] = law.target[driven]
+        yield from position_notes(robot.model, q, f"the target of the motors of {shown(robot.name)}")
 
 
 class LastLoads(NamedTuple):

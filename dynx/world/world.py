@@ -35,7 +35,14 @@ from dynx.steppers.stepper import Stepper
 from dynx.world.commands import Commands, MotorsOf, RobotLoads, with_scene_motors
 from dynx.world.contacts import MAX_RAY_LENGTH, ClosestPoints, Contact, MeanContact, RayHits
 from dynx.world.motion import Motion, apply_state, checked_state
-from dynx.world.notes import Overlap, notes_on_engine, notes_on_gravity, notes_on_start, overlaps_of
+from dynx.world.notes import (
+    Overlap,
+    notes_on_angles,
+    notes_on_engine,
+    notes_on_gravity,
+    notes_on_start,
+    overlaps_of,
+)
 from dynx.world.preparation import checked_options, layout_for, prepare
 from dynx.world.scene.documents import scene_document, scene_from_document
 from dynx.world.scene.paths import ScenePaths
@@ -255,8 +262,8 @@ class World:
         self.notes: tuple[str, ...] = self.notes_on_present_state()
         """Parts that overlap at the start, constraints that it violates, joints beyond their limits, robots
         whose accelerations have no bound, parts that are too fast for the step, coefficients of contact that
-        the engine does not have, joint dynamics that are not exact, a step that is long, and settings given
-        that the engine changes, one sentence each."""
+        the engine does not have, joint dynamics that are not exact, a step that is long, angles of the scene
+        that look like degrees, and settings given that the engine changes, one sentence each."""
 
     @property
     def version(self) -> str:
@@ -721,6 +728,7 @@ class World:
             from dynx.model.unlikely_inputs import gravity_notes
 
             yield from gravity_notes(self.scene.gravity)
+        yield from notes_on_angles(self.scene)
         yield from self._commands.notes()
         in_effect = self._kind.settings_in_effect(self.settings, self.dt / self.substeps)
         yield from changed_settings(given, self.settings, in_effect)

@@ -66,7 +66,7 @@ FLOWS = {
         ("world", "sim", "ik.closed_forms"),
         (),
         106,
-        19050,
+        19100,
     ),
     "simulate": Flow(
         ROBOT + "from dynx import control\n"
@@ -89,7 +89,7 @@ FLOWS = {
         ),
         (),
         153,
-        24700,
+        24750,
     ),
     "step of a box": Flow(
         "from dynx.world import Scene, World, box\n"
@@ -97,7 +97,7 @@ FLOWS = {
         ("ik", "sim", "envs", "doctor"),
         (),
         113,
-        20500,
+        20600,
     ),
     "step of the cart-pole": Flow(
         "import gymnasium, dynx.envs\n"
@@ -107,7 +107,7 @@ FLOWS = {
         ("distance", "ik", "world.camera", "steppers.camera"),
         (),
         154,
-        26500,
+        26650,
     ),
 }
 

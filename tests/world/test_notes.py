@@ -13,7 +13,11 @@ from dynx import Pose
 from dynx.model import Inertial, Joint, Link, Model
 from dynx.model.elements import JointType
 from dynx.world import (
+    Encoder,
+    Imu,
+    PDMotor,
     PointToPoint,
+    PositionMotor,
     Scene,
     SceneBody,
     SceneRobot,
@@ -185,3 +189,33 @@ def test_a_robot_without_collision_shapes_is_noted_where_there_is_something_to_p
         assert world.notes == ()
     with World(Scene("s", robots=(robot,)), "pybullet") as world:
         assert world.notes == ()
+
+
+def test_angles_of_a_scene_that_look_like_degrees_are_noted() -> None:
+    """Rotations of bodies and sensors beyond a full turn, and targets of motors far beyond limits; not those
+    of motors without stiffness, nor of angles that are in radians."""
+    arm = dynx.load("ur5").with_base_pose(Pose((0.0, 0.0, 2.0)))
+    turned, level = Pose((2.0, 0.0, 0.0), (0.0, 0.0, 90.0)), Pose((4.0, 0.0, 0.0), (0.0, 0.0, 6.2))
+    target = np.array([0.0, -90.0, 90.0, 0.0, 0.0, 0.0])
+    bodies = (
+        box("turned", (0.1, 0.1, 0.1), mass=1.0, pose=turned),
+        box("level", (0.1, 0.1, 0.1), mass=1.0, pose=level),
+    )
+    sensors = (Imu("imu", "arm/tool0", pose=Pose(rpy=(0.0, -180.0, 0.0))), Encoder("e", "arm/elbow_joint"))
+    for motor, noted in (
+        (PDMotor(target, 100.0, 10.0), True),
+        (PositionMotor(target, 100.0, 10.0), True),
+        (PDMotor(target, 0.0, 10.0), False),
+        (PDMotor(np.radians(target), 100.0, 10.0), False),
+    ):
+        robot = SceneRobot("arm", arm, motors=motor)
+        with World(Scene("s", robots=(robot,), bodies=bodies, sensors=sensors), "mujoco") as world:
+            assert [each.partition(", more than a full turn; ")[::2] for each in world.notes[:2]] == [
+                ("rpy of the pose of 'turned' holds 90 rad", "90 degrees are 1.5708 rad"),
+                ("rpy of the pose of 'imu' holds -180 rad", "-180 degrees are -3.1416 rad"),
+            ]
+            of_motors = [each for each in world.notes if "the target of the motors of 'arm'" in each]
+            assert len(of_motors) == (2 if noted else 0)
+            if noted:
+                assert "'elbow_joint' is at 90 rad, far beyond its limits" in of_motors[1]
+                assert "90 degrees are 1.5708 rad" in of_motors[1]
