@@ -237,7 +237,8 @@ def refuse_mask(name: str, value: object, axes: int = 0) -> None:
     deeper than an array can be, such as one that holds itself."""
     if isinstance(value, list | tuple):
         if axes == MAX_AXES:
-            raise ShapeError(f"{name} is nested more than {MAX_AXES} times; wanted an array of numbers")
+            kind = type(value).__name__
+            raise ShapeError(f"{name} is a {kind} nested more than {MAX_AXES} times; wanted an array")
         for each in value:
             if not isinstance(each, float | int):
                 refuse_mask(name, each, axes + 1)

@@ -578,7 +578,9 @@ class Viewer(Controls):
         check_switches({"visible": visible})
         switches = self.view.switches
         if not isinstance(what, str) or what not in switches:
-            raise ArgumentError(f"the panel shows no {shown(what)}{nearest(str(what), switches)}")
+            raise ArgumentError(
+                f"what is {shown(what)}, which the panel does not show{nearest(what, switches)}"
+            )
         switches[what].value = visible
 
     def embed(self, height: int = 500) -> EmbeddedPage:

@@ -142,8 +142,9 @@ def _traces(value: Any) -> Iterator[str]:
         yield "lacks"
     for written in (_text(str, value), _text(repr, value)):
         if written:
-            # Long ones are shortened, and line breaks are escaped.
+            # Long ones are shortened, and control characters are escaped.
             yield written[:25].replace("\n", "\\n").rstrip()
+            yield repr(written)[1:25]
     if not isinstance(value, np.ndarray):
         with suppress(ValueError, TypeError, OverflowError, RuntimeError):
             yield f"shape {np.asarray(value).shape}"

@@ -4,6 +4,7 @@ from tests.security.attack import ATTACKS, TRAINING
 from tests.security.surfaces import (
     arrays,
     description,
+    further_files,
     mesh,
     page,
     published_files,
@@ -20,6 +21,7 @@ __all__ = [
     "TRAINING",
     "arrays",
     "description",
+    "further_files",
     "mesh",
     "page",
     "published_files",
