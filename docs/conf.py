@@ -19,7 +19,14 @@ author = "the developers of dynx"
 copyright = "the developers of dynx"
 release = version = _package["Version"]
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton", "command_help", "math_markup"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx_copybutton",
+    "command_help",
+    "math_markup",
+    "tutorial_downloads",
+]
 exclude_patterns = ["schemas"]
 default_role = "py:obj"
 html_math_renderer = "mathml"

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import ast
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -88,19 +86,17 @@ def test_each_step_is_short_and_has_a_picture_a_comparison_and_an_answer(path: P
 
 
 @pytest.mark.parametrize("path", STEPS, ids=lambda path: path.stem)
-def test_each_step_runs_alone_and_prints_what_it_shows(path: Path, tmp_path: Path) -> None:
-    """Raw calls of PyBullet act on its first client, so that a program needs a process of its own."""
+def test_each_step_runs_alone_as_a_notebook_and_prints_what_it_shows(path: Path, tmp_path: Path) -> None:
+    """Each in a process of its own: raw calls of PyBullet act on the first client of their process."""
     if path.stem == "9_learning":
         pytest.importorskip("stable_baselines3", reason="needs the extra train")
-    shown = programs(path.read_text(encoding="utf-8"))
-    end = "--- end of a block ---"
-    lines = [f"{reduced(code)}\nprint({end!r})\n" for code, _ in shown]
-    (tmp_path / "step.py").write_text("".join(lines), encoding="utf-8")
-    result = subprocess.run(
-        [sys.executable, "step.py"], cwd=tmp_path, capture_output=True, text=True, check=False
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    page = path.read_text(encoding="utf-8")
+    document = nbformat.from_dict(notebook(page, small=True))
+    client = nbclient.NotebookClient(
+        document, timeout=300, kernel_name="python3", resources={"metadata": {"path": str(tmp_path)}}
     )
-    assert result.returncode == 0, result.stderr
-    printed = result.stdout.split(end)
-    assert len(printed) == len(shown) + 1
-    for output, (_, wanted) in zip(printed, shown, strict=False):
-        check_output(output, wanted)
+    client.execute()
+    cells = [cell for cell in document.cells if cell.cell_type == "code"]
+    for cell, (_, shown) in zip(cells, programs(page), strict=True):
+        check_output("".join(output.get("text", "") for output in cell.outputs), shown)

@@ -5,6 +5,7 @@ python -m docs.tutorial pictures [STEP]
 
 from __future__ import annotations
 
+import json
 import os
 import tempfile
 from collections.abc import Callable, Mapping
@@ -313,6 +314,38 @@ def _push(v: Variables) -> None:
                 viewer.update()
 
 
+def _cart_pole(v: Variables) -> None:
+    figure, axes = plt.subplots(figsize=(6.0, 3.4))
+    axes.plot([-1.1, 1.3], [0, 0], color=GREY, lw=2)
+    axes.add_patch(plt.Rectangle((0.1, 0.02), 0.5, 0.24, fc="#dddddd", ec=GREY, lw=1.5))
+    hinge = np.array([0.35, 0.14])
+    tip = hinge + 0.75 * np.array([np.sin(0.3), np.cos(0.3)])
+    axes.plot(*np.array([hinge, tip]).T, lw=8, color=BLUE, alpha=0.5, solid_capstyle="round")
+    axes.plot(*hinge, "o", ms=8, mfc="white", mec=BLUE, mew=2)
+    axes.plot([hinge[0]] * 2, [hinge[1], 0.95], ":", color=GREY)
+    _angle(axes, hinge, np.pi / 2 - 0.3, np.pi / 2, 0.5, "")
+    axes.text(hinge[0] + 0.07, 0.7, r"$\theta$")
+    _frame(axes, np.array([-0.7, 0.0]), 0.0, "0", side=-0.7 * np.pi, length=0.25)
+    _arrow(axes, (-0.7, -0.12), (hinge[0], -0.12), "black", lw=1.3)
+    axes.text(-0.15, -0.21, "$x$", ha="center")
+    _arrow(axes, (0.6, 0.14), (0.95, 0.14), VERMILION, "right", lw=2.2)
+    _arrow(axes, (0.1, 0.14), (-0.22, 0.14), VERMILION, "left", lw=2.2)
+    _plain(axes)
+    _save(figure, "9_cart_pole.svg")
+
+
+def _curve(v: Variables) -> None:
+    lines = Path("cart_pole/curve.jsonl").read_text(encoding="utf-8").splitlines()
+    points = [json.loads(line) for line in lines]
+    figure, axes = plt.subplots(figsize=(7.2, 3.0))
+    axes.plot([each["steps"] for each in points], [each["mean_return"] for each in points], color=BLUE)
+    axes.axhline(500, ls=":", color=GREY)
+    axes.set(xlabel="steps", ylabel="mean return of the last 100 episodes", ylim=(0, 520))
+    axes.yaxis.label.set_fontsize(8)
+    axes.spines[["top", "right"]].set_visible(False)
+    _save(figure, "9_curve.svg")
+
+
 def _with_frames(picture: Any, camera: Any, frames: Any, name: str, length: float = 0.12) -> None:
     """Write a picture of a camera with frames (4, 4) drawn over it."""
     height, width = picture.rgb.shape[:2]
@@ -390,4 +423,5 @@ PICTURES: dict[str, tuple[Callable[[Variables], None], ...]] = {
     "6_trajectory": (_cycloid, _paths),
     "7_control": (_loop, _errors, _motion),
     "8_worlds": (_box, _camera, _push),
+    "9_learning": (_cart_pole, _curve),
 }
