@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import dynx
 from dynx.errors import ArgumentError, DTypeError, DynxError
-from dynx.world import Scene, World, box
+from dynx.world import Scene, SceneRobot, World, box
 
 untyped: Any = dynx
 """dynx without types: the mistakes are tested."""
@@ -83,6 +83,16 @@ HINTS: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "a number for a position": (lambda: untyped.Pose(3.0), r"of shape \(\); wanted 3 numbers"),
     "a quaternion of a pose": (lambda: untyped.Pose(quaternion=(0, 0, 0, 1)), "Pose.from_matrix"),
+    "torques without the robot": (
+        lambda: untyped.World(Scene("s", robots=(SceneRobot("arm", ARM),))).step(torques=ARM.neutral()),
+        r"torques is of type ndarray; wanted a dict by robot, such as \{'arm': ...\}",
+    ),
+    "a motor without the robot": (
+        lambda: untyped.World(Scene("s", robots=(SceneRobot("arm", ARM),))).step(
+            motors=untyped.PDMotor(0.0, 1.0, 1.0)
+        ),
+        r"motors is of type PDMotor; wanted a dict by robot, such as \{'arm': ...\}",
+    ),
     "a setting of the search": (
         lambda: dynx.backend("reference", ARM).inverse_kinematics(
             np.eye(4),
@@ -206,3 +216,10 @@ def test_a_file_of_another_format_is_said_to_be_one(name: str, tmp_path: Path) -
 def test_a_scene_of_another_format_is_said_to_be_one(name: str) -> None:
     with pytest.raises(DynxError, match=f"a file of a scene ends in .toml.*a file {name[2:]} is "):
         dynx.world.read_scene(name)
+
+
+def test_one_pose_of_a_sensor_at_rest_is_one_of_many() -> None:
+    T = dynx.Pose((0.0, 0.0, 1.0), (0.1, 0.2, 0.3)).matrix
+    one, many = (dynx.control.SensorMotion.at_rest(each) for each in (T, T[None]))
+    np.testing.assert_array_equal(one.acceleration, many.acceleration)
+    assert one.acceleration.shape == (1, 3)

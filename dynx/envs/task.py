@@ -26,6 +26,7 @@ from dynx.envs.randomization import Parameter, Randomization
 from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError, nearest, shown
 from dynx.model import Model
 from dynx.model.numbers import MAX_MAGNITUDE, is_real
+from dynx.option_names import right_name
 from dynx.rbd.integration import Accelerate, ExplicitEuler, RungeKutta4, SemiImplicitEuler
 from dynx.registry import DEFAULT_ENGINE
 from dynx.spatial.scalar import Array
@@ -147,7 +148,7 @@ class Task(ABC):
         for name in options:
             if name not in known:
                 names = [*known, *ENVIRONMENT_OPTIONS]
-                raise UnknownNameError(f"{cls.__name__} has no option {shown(name)}{nearest(name, names)}")
+                raise UnknownNameError(f"{cls.__name__} has no option {shown(name)}{right_name(name, names)}")
         return cls(**options)
 
     def require_start_options(self, options: Mapping[str, Any]) -> None:

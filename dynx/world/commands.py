@@ -4,7 +4,7 @@ evaluated before each step of the engine, or torques that it holds."""
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from math import hypot, isfinite
 from typing import TYPE_CHECKING, TypeVar
@@ -266,7 +266,7 @@ def checked_torques(
     Raises UnknownNameError, ShapeError, DTypeError or NotFiniteError, naming the robot.
     """
     if type(torques) is not dict and not isinstance(torques, Mapping):
-        raise ArgumentError(f"torques is of type {type(torques).__name__}; wanted a dict by robot")
+        raise _not_by_robot("torques", torques, robots)
     checked: list[tuple[int, Floats]] = []
     for name, tau in torques.items():
         try:
@@ -285,6 +285,13 @@ def checked_torques(
 
 
 _T = TypeVar("_T")
+
+
+def _not_by_robot(name: str, given: object, robots: Iterable[str]) -> ArgumentError:
+    """Return the error for an argument that is no dict, with the dict that is perhaps meant."""
+    one = next(iter(robots), None)
+    such = "" if one is None else f", such as {{{one!r}: ...}}"
+    return ArgumentError(f"{name} is of type {type(given).__name__}; wanted a dict by robot{such}")
 
 
 def found_robot(name: str, robots: Mapping[str, _T]) -> _T:
@@ -465,7 +472,7 @@ class Commands:
     def _set_motors(self, motors: MotorsOf) -> Mapping[int, EngineCommand]:
         """Give the motors to their robots; return the commands to the engine's own motors."""
         if not isinstance(motors, Mapping):
-            raise ArgumentError(f"motors is of type {type(motors).__name__}; wanted a dict by robot")
+            raise _not_by_robot("motors", motors, self._robots)
         commands: dict[int, EngineCommand] = {}
         given: dict[int, list[Motor]] = {}
         for name, listed in motors.items():

@@ -55,10 +55,12 @@ class SensorMotion:
     def at_rest(
         cls, T_world_sensor: ArrayLike, gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     ) -> SensorMotion:
-        """Return the motion of a sensor that rests at poses (n, 4, 4), of which only the rotations count."""
+        """Return the motion of a sensor that rests at poses (n, 4, 4), or at one (4, 4), which is n = 1; only
+        their rotations count."""
         T = checked_entries("T_world_sensor", real_array("T_world_sensor", T_world_sensor))
+        T = T[None] if T.ndim == 2 else T
         if T.ndim != 3 or T.shape[1:] != (4, 4):
-            raise ShapeError(f"T_world_sensor has shape {T.shape}; wanted (n, 4, 4)")
+            raise ShapeError(f"T_world_sensor has shape {T.shape}; wanted (n, 4, 4), or (4, 4) for n = 1")
         nothing = np.zeros((len(T), 3))
         return cls(-rotate_back(T[:, :3, :3], checked_vector("gravity", gravity)), nothing, nothing)
 
