@@ -507,8 +507,12 @@ class Viewer(Controls):
             stage = self._stage(size, camera, direction, FILM_SIZE)
             write_film(path, view.motions, progress, stage=stage, nodes_at=self._nodes_at)
             view.go_to(before)
-        elif any(given is not None for given in (size, camera, direction)):
-            raise ArgumentError("size, camera and direction are those of a picture or a film, not of a page")
+        elif size is not None or camera is not None or direction is not None:
+            options = {"size": size, "camera": camera, "direction": direction}
+            name = next(each for each, value in options.items() if value is not None)
+            raise ArgumentError(
+                f"{name} is {shown(options[name])}; wanted None: it is of a picture or a film, not of a page"
+            )
         elif view.duration is None:
             raise ArgumentError("a live world cannot be exported; simulate it, and export the rollout")
         else:

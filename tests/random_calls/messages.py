@@ -44,7 +44,7 @@ VALID = re.compile(
     r"\b(wanted|known|did you mean|at most|at least|between|only|must|needs?|has no|there (is|are) (no|none)"
     r"|no such|give|such as|of this|not finite|cannot|one of|takes|beyond|above|below|positive|greater|less"
     r"|exceeds|allowed|differs?|use|choose|change|accepted|supported|expected|not callable|are not|without"
-    r"|instead|with it|belongs|larger|smaller|more than|fewer|is a str|(saved|written) as)\b"
+    r"|instead|with it|nearest|belongs|larger|smaller|more than|fewer|is a str|(saved|written) as)\b"
 )
 """Words by which a message says what is valid."""
 
