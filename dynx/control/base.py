@@ -21,8 +21,10 @@ from dynx.control.content import attributes_of, content_of, fields_of
 from dynx.errors import ArgumentError, DTypeError, ShapeError, UnsupportedFeatureError, shown
 from dynx.files.pages import html_grid
 from dynx.model import Model
+from dynx.model.elements import JointCoefficients
+from dynx.rbd.parameters import Parameters
 from dynx.registry import DEFAULT_ENGINE
-from dynx.spatial.scalar import Floats
+from dynx.spatial.scalar import Array, Floats, sign
 from dynx.trajectory.base import Setpoint
 
 ControllerState = TypeVar("ControllerState")
@@ -187,15 +189,23 @@ class Controller(ABC, Generic[ControllerState]):
 class ModelBased(Controller[ControllerState]):
     """A controller that evaluates the dynamics of its model with a backend.
 
+    With `joint_dynamics` it knows the damping, dry friction and armature of the description, as quantities of
+    backends do with the option of that name; by default it computes with rigid bodies. Dry friction is
+    overcome along the velocity of the setpoint, which moves joints that stick and cannot make them unstable.
     It commands every coordinate, so a floating base, which has no motor, is refused.
     """
 
     model: Model
     backend: str | Backend = field(compare=False)
     dynamics: Dynamics = field(init=False, repr=False)
+    joint_dynamics: bool = field(default=False, kw_only=True, repr=False)
+    joints: JointCoefficients | None = field(init=False, repr=False, compare=False, default=None)
+    """Coefficients (nv,) of the coordinates that the controller knows, if any is not 0."""
 
     @checks_types
-    def __init__(self, model: Model, backend: str | Backend = DEFAULT_ENGINE) -> None:
+    def __init__(
+        self, model: Model, backend: str | Backend = DEFAULT_ENGINE, joint_dynamics: bool = False
+    ) -> None:
         """`backend` is a name, or a backend of an equal model.
 
         Raises UnsupportedFeatureError for a floating base, ArgumentError for a backend of another robot.
@@ -206,6 +216,23 @@ class ModelBased(Controller[ControllerState]):
                 "which has no motor; joint-space controllers (PD, PID, Velocity) leave the base alone"
             )
         self._set(model=model, backend=backend, dynamics=EngineDynamics(engine_of(model, backend)))
+        self._set(joint_dynamics=joint_dynamics, joints=known_joints(model) if joint_dynamics else None)
+
+    @property
+    def name(self) -> str:
+        """Name of the class, followed by words for the joint dynamics that the controller knows."""
+        return super().name + (", joint dynamics known" if self.joint_dynamics else "")
+
+    def with_joint_dynamics(
+        self, tau: Array, v: Array, a: Array, v_wanted: Array, h: Array | float = 0.0
+    ) -> Array:
+        """Return a torque (nv,) plus that of armature and damping at velocity `v` and acceleration `a`, and
+        of dry friction along `v_wanted`. Damping is that after a step of `h` [s]."""
+        joints = self.joints
+        if joints is None:
+            return tau
+        dry = joints.friction * sign(v_wanted)
+        return np.asarray(tau + joints.armature * a + joints.damping * (v + h * a) + dry)
 
     @checks_types
     def on(self: Self, engine: str | Backend) -> Self:
@@ -303,6 +330,13 @@ def _with_dynamics(controller: Controller[Any], change: Callable[[Dynamics], Dyn
         elif isinstance(value, ModelEvaluation):
             changes[name] = value.with_dynamics(change)
     return changes
+
+
+def known_joints(model: Model) -> JointCoefficients | None:
+    """Return the coefficients (nv,) of a description for the coordinates of the model; None if all are 0."""
+    parameters = Parameters(model, joint_dynamics=True)
+    found = parameters.joints(np.array(parameters.defaults))
+    return found if found is not None and any(each.any() for each in found) else None
 
 
 def engine_of(model: Model, engine: str | Backend) -> Backend:

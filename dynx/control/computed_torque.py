@@ -25,7 +25,8 @@ class ComputedTorque(ModelBased[None], pure=True):
 
     With an exact model the error of each coordinate obeys e'' + kd e' + kp e = 0, independent of the others
     (Spong, Hutchinson and Vidyasagar, Robot Modeling and Control, section 8.3). In discrete time an error of
-    about dt a* kd / (2 kp) remains, which `DiscreteComputedTorque` removes.
+    about dt a* kd / (2 kp) remains, which `DiscreteComputedTorque` removes. With `joint_dynamics` ID includes
+    those of the description.
     """
 
     kp: Floats = gain("1/s^2")
@@ -39,13 +40,14 @@ class ComputedTorque(ModelBased[None], pure=True):
         kd: ArrayLike | None = None,
         natural_frequency: ArrayLike | None = None,
         damping_ratio: ArrayLike = 1.0,
+        joint_dynamics: bool = False,
         backend: str | Backend = DEFAULT_ENGINE,
     ) -> None:
         """Gains `kp` [1/s^2] and `kd` [1/s], or `natural_frequency` [rad/s] and `damping_ratio`.
 
         One number, or one for each coordinate. Raises GainError.
         """
-        super().__init__(model, backend)
+        super().__init__(model, backend, joint_dynamics)
         kp, kd = feedback_gains(model.nv, kp, kd, natural_frequency, damping_ratio)
         self._set(kp=kp, kd=kd)
 
@@ -53,7 +55,7 @@ class ComputedTorque(ModelBased[None], pure=True):
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         _, q, v = measurement
         a = commanded_acceleration(q, v, *setpoint, self.kp, self.kd)
-        return self.dynamics.inverse_dynamics(q, v, a), None
+        return self.with_joint_dynamics(self.dynamics.inverse_dynamics(q, v, a), v, a, setpoint.v), None
 
 
 def commanded_acceleration(
@@ -74,25 +76,34 @@ class DiscreteComputedTorque(ModelBased[None], pure=True):
     An initial error is removed in one step, however large the torque, and velocities are the difference
     quotients of the reference.
 
-    It is exact if the control step equals the physics step and there is no friction; with friction wrap it in
-    `FrictionCompensation`. With another plant (RK4, sub-steps) an error of the order of dt remains.
+    It is exact if the control step equals the physics step and the plant has no joint dynamics, or those that
+    it knows with `joint_dynamics`: they act at the end of the step. With another plant (RK4, sub-steps) an
+    error of the order of dt remains.
     """
 
     control_dt: float = parameter("s")
 
     lead = 1
 
-    def __init__(self, model: Model, *, control_dt: float, backend: str | Backend = DEFAULT_ENGINE) -> None:
+    def __init__(
+        self,
+        model: Model,
+        *,
+        control_dt: float,
+        joint_dynamics: bool = False,
+        backend: str | Backend = DEFAULT_ENGINE,
+    ) -> None:
         """`control_dt` [s] is the plant's step. Raises ArgumentError if it is not positive."""
-        super().__init__(model, backend)
+        super().__init__(model, backend, joint_dynamics)
         self._set(control_dt=positive_seconds("control_dt", control_dt))
 
     @checks_types
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         """Return the torque (nv,); the setpoint is that of the end of the step."""
         _, q, v = measurement
-        a = one_step_acceleration(q, v, setpoint.q, self.control_dt)
-        return self.dynamics.inverse_dynamics(q, v, a), None
+        dt = self.control_dt
+        a, tau_of = one_step_acceleration(q, v, setpoint.q, dt), self.dynamics.inverse_dynamics
+        return self.with_joint_dynamics(tau_of(q, v, a), v, a, (setpoint.q - q) / dt, dt), None
 
 
 def one_step_acceleration(q: Array, v: Array, q_next: Array, dt: Array | float) -> Array:

@@ -181,22 +181,30 @@ class GravityCompensatedPD(ModelBased[None], pure=True):
     """PD control with gravity compensation, so that there is no error at rest.
 
     Globally asymptotically stable for a constant setpoint (Takegaki and Arimoto 1981; Siciliano et al.,
-    Robotics, section 8.5.1).
+    Robotics, section 8.5.1). With `joint_dynamics` it overcomes damping and friction at the setpoint's
+    velocity.
     """
 
     kp: Floats = gain("N m/rad or N/m")
     kd: Floats = gain("N m s/rad or N s/m")
 
     def __init__(
-        self, model: Model, *, kp: ArrayLike, kd: ArrayLike, backend: str | Backend = DEFAULT_ENGINE
+        self,
+        model: Model,
+        *,
+        kp: ArrayLike,
+        kd: ArrayLike,
+        joint_dynamics: bool = False,
+        backend: str | Backend = DEFAULT_ENGINE,
     ) -> None:
         """Gains are those of `PD`."""
-        super().__init__(model, backend)
+        super().__init__(model, backend, joint_dynamics)
         self._set(kp=checked_gain("kp", kp, model.nv), kd=checked_gain("kd", kd, model.nv))
 
     @checks_types
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         weight = self.dynamics.gravity_torque(measurement.q)
+        weight = self.with_joint_dynamics(weight, setpoint.v, 0.0 * setpoint.a, setpoint.v)
         return weight + pd_torque(
             measurement.q, measurement.v, setpoint.q, setpoint.v, self.kp, self.kd
         ), None
@@ -219,13 +227,15 @@ class FeedForward(ModelBased[None], pure=True):
         *,
         kp: ArrayLike = 0.0,
         kd: ArrayLike = 0.0,
+        joint_dynamics: bool = False,
         backend: str | Backend = DEFAULT_ENGINE,
     ) -> None:
         """Gains `kp` and `kd` are those of `PD`; by default there are none."""
-        super().__init__(model, backend)
+        super().__init__(model, backend, joint_dynamics)
         self._set(kp=checked_gain("kp", kp, model.nv), kd=checked_gain("kd", kd, model.nv))
 
     @checks_types
     def torque(self, measurement: Measurement, setpoint: Setpoint, state: None) -> tuple[Floats, None]:
         tau = self.dynamics.inverse_dynamics(*setpoint)
+        tau = self.with_joint_dynamics(tau, setpoint.v, setpoint.a, setpoint.v)
         return tau + pd_torque(measurement.q, measurement.v, setpoint.q, setpoint.v, self.kp, self.kd), None

@@ -46,8 +46,8 @@ class TaskSpace(ModelBased[ControllerState]):
 
     frame: str
 
-    def __init__(self, model: Model, frame: str, backend: str | Backend) -> None:
-        super().__init__(model, backend)
+    def __init__(self, model: Model, frame: str, backend: str | Backend, joint_dynamics: bool) -> None:
+        super().__init__(model, backend, joint_dynamics)
         model.frame_index(frame)
         self._set(frame=frame)
 
@@ -66,7 +66,8 @@ class Impedance(TaskSpace[None], pure=True):
     """tau = J' (K e + D e') + g(q) - B v, without shaping the inertia.
 
     It is passive for a reference at rest: it supplies no energy to its environment (Hogan 1985; Siciliano et
-    al., Robotics, section 9.2). A steady force F displaces the frame by F / K.
+    al., Robotics, section 9.2). A steady force F displaces the frame by F / K. With `joint_dynamics` damping
+    and friction are overcome at the setpoint's velocity.
     """
 
     stiffness: Floats = gain("N/m, N m/rad")
@@ -81,6 +82,7 @@ class Impedance(TaskSpace[None], pure=True):
         stiffness: ArrayLike,
         damping: ArrayLike,
         joint_damping: ArrayLike = 0.0,
+        joint_dynamics: bool = False,
         backend: str | Backend = DEFAULT_ENGINE,
     ) -> None:
         """`stiffness` K [N/m, N m/rad] and `damping` D [N s/m, N m s/rad] along the world's axes.
@@ -88,7 +90,7 @@ class Impedance(TaskSpace[None], pure=True):
         (6,), linear then angular, or one number; `joint_damping` B (nv,) damps motions that do not move the
         frame. Raises GainError, UnknownNameError for the frame.
         """
-        super().__init__(model, frame, backend)
+        super().__init__(model, frame, backend, joint_dynamics)
         per = "linear then angular"
         self._set(
             stiffness=checked_gain("stiffness", stiffness, 6, per=per),
@@ -101,6 +103,7 @@ class Impedance(TaskSpace[None], pure=True):
         error = self._error(measurement, setpoint)
         wrench = self.stiffness * error.pose + self.damping * error.twist
         weight = self.dynamics.gravity_torque(measurement.q)
+        weight = self.with_joint_dynamics(weight, setpoint.v, 0.0 * setpoint.a, setpoint.v)
         return weight + error.jacobian.T @ wrench - self.joint_damping * measurement.v, None
 
 
@@ -132,13 +135,14 @@ class OperationalSpace(TaskSpace[None], pure=True):
         posture_kp: ArrayLike = 0.0,
         posture_kd: ArrayLike = 1.0,
         damping: float = 1e-3,
+        joint_dynamics: bool = False,
         backend: str | Backend = DEFAULT_ENGINE,
     ) -> None:
         """Gains of the frame (6,), linear then angular, or one number; of the posture (nv,).
 
         Units as those of `ComputedTorque`. Raises GainError, UnknownNameError for the frame.
         """
-        super().__init__(model, frame, backend)
+        super().__init__(model, frame, backend, joint_dynamics)
         kp, kd = feedback_gains(6, kp, kd, natural_frequency, damping_ratio)
         self._set(
             kp=kp,
@@ -157,10 +161,13 @@ class OperationalSpace(TaskSpace[None], pure=True):
         left = wanted - dynamics.jacobian_derivative(q, v, frame) @ v
         posture = commanded_acceleration(q, v, *setpoint, self.posture_kp, self.posture_kd)
         J = error.jacobian
-        inverse = solve_mass_matrix(self.model.mechanism, dynamics.mass_matrix(q), J.T)
+        M = dynamics.mass_matrix(q)
+        if self.joints is not None:
+            M = M + np.diag(self.joints.armature)
+        inverse = solve_mass_matrix(self.model.mechanism, M, J.T)
         a = (
             posture
             + inverse
             @ solve_columns(J @ inverse + self.damping**2 * np.eye(6), (left - J @ posture)[:, None])[:, 0]
         )
-        return dynamics.inverse_dynamics(q, v, a), None
+        return self.with_joint_dynamics(dynamics.inverse_dynamics(q, v, a), v, a, setpoint.v), None

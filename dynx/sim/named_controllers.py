@@ -75,11 +75,11 @@ class ControllerRequest:
         """Number of coordinates with motors."""
         return self.model.nv - (6 if self.model.floating else 0)
 
-    def rates(self, n: int | None = None) -> dict[str, Floats]:
+    def rates(self, n: int | None = None) -> dict[str, Any]:
         """Return kp [1/s^2] and kd [1/s] of an error (n,), by default one for each coordinate."""
         return self._feedback(np.ones(self.model.nv if n is None else n))
 
-    def torques(self) -> dict[str, Floats]:
+    def torques(self) -> dict[str, Any]:
         """Return kp [N m/rad or N/m] and kd [N m s/rad or N s/m] of the joints."""
         return self._feedback(joint_inertia(self.model, self.start))
 

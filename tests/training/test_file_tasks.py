@@ -21,8 +21,8 @@ from click.testing import CliRunner
 from dynx.cli.shell.main import cli
 from dynx.errors import ArgumentError, DynxError, UnknownNameError
 from dynx.training import Schedule, TaskSpec, judge, load_policy, train
-from tests.training.runs import small_run
-from tests.training.test_policy import ONCE, members, written
+from tests.training.runs import members, small_run, written
+from tests.training.test_policy import ONCE
 
 URDF = '<robot name="r"><link name="base"/></robot>'
 MESH = (
