@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 import runpy
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -74,6 +76,30 @@ def test_tables_of_contacts_have_every_verdict() -> None:
     )
     assert "| three | `sliding` | a \\| b |" in parts["lacking"]
     assert "falls (order 1.0), 4.0e-02 .. 1.0e-02" in parts["figures"]
+
+
+def test_the_gallery_shows_the_code_of_each_picture(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    pytest.importorskip("viser", reason="needs the extra viewer")
+    gallery = importlib.import_module("docs.gallery")
+    current = (DOCS / "gallery.md").read_text(encoding="utf-8")
+    assert current == gallery.page(), "run: python -m docs.gallery"
+    files = [DOCS / "gallery" / f"{Path(name).stem}.webp" for name in gallery.PICTURES]
+    assert len(files) >= 20
+    assert sorted(files) == sorted((DOCS / "gallery").iterdir())
+    assert sum(file.stat().st_size for file in files) <= 6e6
+    monkeypatch.setattr(gallery, "FOLDER", tmp_path)
+    monkeypatch.setattr(gallery, "SIZE", (80, 60))
+    gallery.write("stack.png")
+    sizes = []
+    for file in (DOCS / "gallery" / "stack.webp", tmp_path / "stack.webp"):
+        with gallery.Image.open(file) as picture:
+            sizes.append(picture.size)
+            small = np.asarray(picture.convert("RGB").resize((16, 12)), dtype=np.float64)
+        if file.parent != tmp_path:
+            committed = small
+    assert sizes[1] == (80, 60)
+    # The caption is larger in a small picture.
+    assert np.median(np.abs(small - committed)) < 10.0
 
 
 @pytest.mark.parametrize("name", ["README.md", "docs/doctor.md"])

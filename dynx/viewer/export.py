@@ -34,7 +34,6 @@ from dynx.viewer.framing import (
     fitted_view,
     ground_height,
     has_ground,
-    has_plane,
     points_around,
     tile_for,
 )
@@ -105,9 +104,7 @@ def stage_for(
         camera = Camera.look_at(eye, target, size=size)
     floor = None if has_ground(motion.bodies) else ground_height(low, motion.robots)
     tile = tile_for(low, high)
-    # The ground of a height field has no tiles.
-    tiled = floor is not None or any(has_plane(body) for body in motion.bodies)
-    caption = f"large tile: {length_text(tile)}" if tiled else ""
+    caption = f"large tile: {length_text(tile)}"
     return Stage(camera, DARK if dark else LIGHT, tile, floor, caption)
 
 

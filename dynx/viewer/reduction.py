@@ -5,17 +5,17 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from dynx.model.geometry.mesh_reading import Surface
 from dynx.spatial.scalar import Floats
 from dynx.viewer.library import simplify
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 Whole = NDArray[np.intp]
 
@@ -170,6 +170,10 @@ def _cut(whole: _Measures) -> tuple[Floats, Whole]:
 
 def _connected(first: Whole, second: Whole, count: int) -> Whole:
     """Return the number of the group of each of `count` things of which pairs belong together."""
+    # Imported here, because SciPy takes long to load, and meshes that were reduced before are read from files.
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
     pairs = coo_matrix((np.ones(len(first), dtype=bool), (first, second)), shape=(count, count))
     return np.asarray(connected_components(pairs, directed=False)[1], dtype=np.intp)
 
@@ -262,6 +266,8 @@ class _Measures:
         of[votes[0][0][rising]] = votes[0][1][rising]
         # Points of other pieces are as far away as nothing of the mesh is.
         apart = 4.0 * self._diagonal
+        from scipy.spatial import cKDTree
+
         tree = cKDTree(np.column_stack([self._samples.points, apart * own]))
         used = np.unique(faces)
         _, tried = tree.query(np.column_stack([vertices[used], apart * of[pieces[used]]]), k=_NEAREST)
@@ -341,6 +347,8 @@ class _Measures:
 
     @cached_property
     def _tree(self) -> cKDTree:
+        from scipy.spatial import cKDTree
+
         return cKDTree(self._samples.points)
 
 

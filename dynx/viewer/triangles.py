@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from dynx.files.cache import keep, read_cached, source_hash
 from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
@@ -140,6 +139,9 @@ def _nearest_normals(found: Surface, whole: Surface) -> Floats:
     _, chosen = np.unique(
         np.concatenate([points, np.rint(4.0 * normals)], axis=1).astype(np.float32), axis=0, return_index=True
     )
+    # Imported here, because SciPy takes long to load.
+    from scipy.spatial import cKDTree
+
     _, near = cKDTree(points[chosen]).query(found.vertices, k=min(_NORMALS_TRIED, len(chosen)))
     near = chosen[near.reshape(len(found.vertices), -1)]
     a, b, c = np.moveaxis(found.vertices[found.faces], 1, 0)

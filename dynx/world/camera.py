@@ -645,9 +645,9 @@ class _Shading(NamedTuple):
         """Return the colours (n, 3) of points (n, 3) of shapes by their `number` (n,), with their own
         `colours` (n, 3), the unit normals and the unit rays (n, 3) by which they are seen, and the extent of
         a pixel there (n,) [m]; `openness` (n,) is the share of the light of the sky that is not hidden."""
-        planes = [k for k, each in enumerate(self.shapes) if isinstance(each.shape, Plane)]
+        grounds = [k for k, each in enumerate(self.shapes) if isinstance(each.shape, Plane | HeightField)]
         slopes = {}
-        for k in planes:
+        for k in grounds:
             on = np.flatnonzero(number == k)
             slope = np.abs(np.einsum("ij,ij->i", normal[on], rays[on]))
             slopes[k] = on, slope
@@ -662,8 +662,10 @@ class _Shading(NamedTuple):
         for on, _ in slopes.values():
             gloss[on] = 0.0
         colours = (colours**GAMMA * light[:, None] + gloss[:, None]) ** (1.0 / GAMMA)
-        for on, slope in slopes.values():
-            colours[on] = self.scenery.haze(colours[on], slope)
+        for k, (on, slope) in slopes.items():
+            # A height field has an end.
+            if isinstance(self.shapes[k].shape, Plane):
+                colours[on] = self.scenery.haze(colours[on], slope)
         return np.asarray(np.clip(colours, 0.0, 1.0))
 
 
