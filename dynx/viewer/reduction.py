@@ -170,7 +170,7 @@ def _cut(whole: _Measures) -> tuple[Floats, Whole]:
 
 def _connected(first: Whole, second: Whole, count: int) -> Whole:
     """Return the number of the group of each of `count` things of which pairs belong together."""
-    # Imported here, because SciPy takes long to load, and meshes that were reduced before are read from files.
+    # Imported here, because SciPy takes long to load, and a mesh that was reduced before is read from a file.
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
