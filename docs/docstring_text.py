@@ -16,8 +16,7 @@ def restructured(lines: list[str]) -> list[str]:
     result: list[str] = []
     in_code = False
     in_list = False
-    for text in lines:
-        line = text.replace("(*", "(\\*")
+    for line in lines:
         indent = len(line) - len(line.lstrip())
         after_blank = not result or not result[-1].strip()
         if line.strip():
@@ -29,8 +28,16 @@ def restructured(lines: list[str]) -> list[str]:
                 language = "python" if PYTHON.search(line) else "text"
                 result += [f".. code-block:: {language}", ""]
                 in_code = True
-        result.append(line)
+        result.append(line if in_code else escaped(line))
     return result
+
+
+def escaped(line: str) -> str:
+    """Return a line of text whose stars and bars are themselves and no markup, as in (*size, nq) and |v|."""
+    parts = re.split(r"(``.*?``|`[^`]*`)", line)
+    return "".join(
+        part if k % 2 else part.replace("(*", r"(\*").replace("|", r"\|") for k, part in enumerate(parts)
+    )
 
 
 def is_item(line: str) -> bool:

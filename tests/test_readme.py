@@ -14,6 +14,7 @@ from types import ModuleType
 
 import pytest
 
+from docs.tutorial.pages import reduced
 from dynx import backends
 from dynx.control import registry as controllers
 from dynx.sim.plants import registry as plants
@@ -92,7 +93,7 @@ def test_python_blocks_run_in_order_and_print_what_is_shown(
     try:
         for program, shown in programs(PAGES[page]):
             with redirect_stdout(io.StringIO()) as printed:
-                exec(compile(program, page, "exec", dont_inherit=True), module.__dict__)
+                exec(compile(reduced(program), page, "exec", dont_inherit=True), module.__dict__)
             check_output(printed.getvalue(), shown)
     finally:
         for (names, unregister), known in zip(registries, before, strict=True):
