@@ -68,6 +68,8 @@ def benchmark_cases(
     Batches smaller than `least` are not combined with several threads.
     """
     whole_number("least", least, 0)
+    if isinstance(quantities, str):
+        raise ArgumentError(f"quantities is {shown(quantities)}; wanted a list of names")
     return tuple(
         BenchmarkCase(quantity, batch, count)
         for batch in sorted(_counts("batches", batches), reverse=True)

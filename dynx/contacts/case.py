@@ -145,5 +145,7 @@ def find_case(name: str) -> ContactCase:
 
 @checks_types
 def find_cases(names: Sequence[str] | None = None) -> tuple[ContactCase, ...]:
-    """Return the cases of these names, or all."""
+    """Return the cases of these names, or all. ArgumentError for one name, which is no sequence of them."""
+    if isinstance(names, str):
+        raise ArgumentError(f"names is {shown(names)}; wanted a list of names")
     return tuple(find_case(name) for name in (case_names() if names is None else names))

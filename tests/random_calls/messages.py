@@ -156,7 +156,9 @@ def _traces(value: Any) -> Iterator[str]:
         yield from (str(value[0]), "length 0", "the same") if value.ndim and len(value) else ()
         yield from (str(value.shape), str(value.dtype), f"{value.size} ", "NaN", "nan", "inf")
         yield from (f"{value.ndim} axes", "infinit", "not finite", "empty", "masked")
-    if isinstance(value, int | float | np.number) and not isinstance(value, np.complexfloating):
+    if isinstance(value, int | float | np.number) and not isinstance(
+        value, np.complexfloating | np.timedelta64
+    ):
         yield from (f"{float(value):.12g}", str(float(value)))
     if isinstance(value, (float, np.floating)) and not np.isfinite(value):
         yield from ("NaN", "nan", "inf", "not finite")
