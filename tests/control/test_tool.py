@@ -137,6 +137,6 @@ def test_readings_that_do_not_determine_a_tool() -> None:
     with pytest.raises(ShapeError, match=r"\(5, 6\)"):
         identify_tool(weight[:4], SensorMotion.at_rest(T))
     with pytest.raises(ShapeError, match=r"\(n, 4, 4\)"):
-        SensorMotion.at_rest(T[0])
+        SensorMotion.at_rest(T[0, 0])
     with pytest.raises(UnknownNameError, match="tool0"):
         SensorMotion.of_robot(dynx.load("ur5"), "tool", np.zeros((3, 6)))
