@@ -18,7 +18,7 @@ def setup(app: Sphinx) -> dict[str, object]:
 
 def write_inline(writer: HTML5Translator, node: nodes.math) -> None:
     """Write a formula within a line."""
-    writer.body.append(tex2mathml(node.astext()))
+    writer.body.append(_mathml(node.astext()))
     raise nodes.SkipNode
 
 
@@ -26,6 +26,11 @@ def write_block(writer: HTML5Translator, node: nodes.math_block) -> None:
     """Write a formula on lines of its own, with an anchor if it has a label."""
     names = node["ids"]
     anchor = f' id="{names[0]}"' if names else ""
-    formula = tex2mathml(node.astext(), as_block=True)
+    formula = _mathml(node.astext(), as_block=True)
     writer.body.append(f'<div class="math"{anchor}>{formula}</div>\n')
     raise nodes.SkipNode
+
+
+def _mathml(formula: str, *, as_block: bool = False) -> str:
+    """Return a formula as MathML. Browsers draw dots that are marked as accents into letters such as q."""
+    return str(tex2mathml(formula, as_block=as_block)).replace(' accent="true"', "")
