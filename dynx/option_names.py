@@ -100,8 +100,6 @@ def _explain_class(cls: type) -> None:
                 wanted = not is_dataclass(each) or _has_options(function)
             else:
                 wanted = not name.startswith("_") and not in_loops and _has_options(function)
-                # One that takes all keywords answers them itself.
-                wanted = wanted and not function.__code__.co_flags & inspect.CO_VARKEYWORDS
             if wanted:
                 answering = _checked(function, each.__name__ if name == "__init__" else name, {})
                 kind = type(member)

@@ -20,7 +20,7 @@ from dynx.model import Model, Pose
 from dynx.model.geometry import Mesh
 from dynx.model.numbers import MAX_INDEX, checked_bool, positive_seconds, whole_number
 from dynx.model.package_search import StrPath
-from dynx.option_names import as_object, checks_option_names, refuse_options, right_name
+from dynx.option_names import ANSWERS, as_object, checks_option_names, refuse_options, right_name
 from dynx.rbd.jacobians import LOCAL, checked_reference
 from dynx.registry import door, explains_names
 from dynx.spatial.scalar import Floats
@@ -324,6 +324,9 @@ class World:
         except BaseException:
             self._forget_steps()
             raise
+
+    # It answers mistaken keywords itself.
+    setattr(step, ANSWERS, True)
 
     @checks_option_names(wrenches="forces")
     def run(
