@@ -13,7 +13,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from docstring_text import constant_text, restructured
 
-_package = metadata("dynx")
+from dynx._version import DISTRIBUTION
+
+_package = metadata(DISTRIBUTION)
 project = "dynx"
 author = "the developers of dynx"
 copyright = "the developers of dynx"

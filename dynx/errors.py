@@ -46,6 +46,8 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any, Literal, NamedTuple
 
+from dynx._version import DISTRIBUTION
+
 
 class DynxError(Exception):
     """Root of all errors that dynx raises on purpose."""
@@ -161,13 +163,13 @@ def install_command(extra: str) -> str:
     from importlib.metadata import PackageNotFoundError, distribution
 
     try:
-        origin = json.loads(distribution("dynx").read_text("direct_url.json") or "{}")
+        origin = json.loads(distribution(DISTRIBUTION).read_text("direct_url.json") or "{}")
     except (PackageNotFoundError, ValueError):
         origin = {"dir_info": {}}
     if "vcs_info" in origin:
         source = f"{origin['vcs_info'].get('vcs', 'git')}+{origin.get('url', '')}"
-        return f"pip install 'dynx[{extra}] @ {source}'"
-    return f"pip install '.[{extra}]' in the clone" if origin else f"pip install 'dynx[{extra}]'"
+        return f"pip install '{DISTRIBUTION}[{extra}] @ {source}'"
+    return f"pip install '.[{extra}]' in the clone" if origin else f"pip install '{DISTRIBUTION}[{extra}]'"
 
 
 @contextmanager

@@ -169,9 +169,9 @@ ORIGINS = {
     ),
     "a repository": (
         {"url": "https://example.org/dynx", "vcs_info": {"vcs": "git"}},
-        "pip install 'dynx[plot] @ git+https://example.org/dynx'",
+        "pip install 'dynx-robotics[plot] @ git+https://example.org/dynx'",
     ),
-    "an index": (None, "pip install 'dynx[plot]'"),
+    "an index": (None, "pip install 'dynx-robotics[plot]'"),
 }
 """What an installer notes on the origin of dynx, and the words that install an extra."""
 
