@@ -1,7 +1,8 @@
 """`integrate` and `difference` of one configuration with a floating base, in machine code.
 
 Both are the text of `dynx.spatial.branchless`, with the same results bit for bit as on floats. They are
-compiled when a process first needs them, in about a tenth of a second, for robots of any size.
+compiled for robots of any size once a process has computed thousands of them on floats
+(`dynx.model.configuration.ConfigurationStep`).
 """
 
 from __future__ import annotations

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
 from importlib import import_module
 from operator import add, sub
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError
+from dynx.errors import ArgumentError, CompileError
 from dynx.model.numbers import (
     MAX_MAGNITUDE,
     checked_array,
@@ -29,6 +28,9 @@ Step = Callable[[object, object, object], int]
 
 _CODE = "dynx.compiled.configurations"
 """Module above this one with `integrate` and `difference` in machine code."""
+
+MIN_CALLS_TO_COMPILE = 20_000
+"""Steps on floats that take about as long as to import the compiler and to compile one."""
 
 _ACCEPTED = 0
 """What the machine code returns for valid arrays, whatever it returns for others
@@ -87,7 +89,7 @@ def integrate(tree: Tree, q: ArrayLike, v: ArrayLike) -> Floats:
     """
     if tree.floating and type(q) is type(v) is np.ndarray:
         moved = np.empty(tree.nq)
-        if _integration()(q, v, moved) == _ACCEPTED:
+        if _integration.function(q, v, moved) == _ACCEPTED:
             return moved
     q, v = checked_q(tree, q), checked_array("v", v, tree.nv)
     if not tree.floating:
@@ -102,7 +104,7 @@ def difference(tree: Tree, q0: ArrayLike, q1: ArrayLike) -> Floats:
     """Return the velocity v (..., nv) with integrate(q0, v) = q1, whose rotation angle is at most pi."""
     if tree.floating and type(q0) is type(q1) is np.ndarray:
         velocity = np.empty(tree.nv)
-        if _subtraction()(q0, q1, velocity) == _ACCEPTED:
+        if _subtraction.function(q0, q1, velocity) == _ACCEPTED:
             return velocity
     q0, q1 = checked_q(tree, q0, "q0"), checked_q(tree, q1, "q1")
     if not tree.floating:
@@ -135,18 +137,37 @@ def sampling_range(low: float, high: float, default_range: float) -> tuple[float
     return (low, low + 2.0 * default_range) if bounded_below else (high - 2.0 * default_range, high)
 
 
-@cache
-def _integration() -> Step:
-    with not_counted():
-        step: Step = import_module(_CODE).integration()
-        return step
+class ConfigurationStep:
+    """A step in machine code, from its call number `MIN_CALLS_TO_COMPILE` on and where it can be compiled.
+
+    Until then its `function` accepts nothing, so that the caller computes on floats, with the same bits.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._left = MIN_CALLS_TO_COMPILE
+        self.function: Step = self._count
+
+    def compile(self) -> None:
+        """Replace `function` by machine code."""
+        with not_counted():
+            self.function = getattr(import_module(_CODE), self._name)()
+
+    def _count(self, first: object, second: object, result: object) -> int:
+        self._left -= 1
+        if self._left <= 0:
+            try:
+                self.compile()
+            except CompileError:
+                self.function = _refuse
+        return ~_ACCEPTED
 
 
-@cache
-def _subtraction() -> Step:
-    with not_counted():
-        step: Step = import_module(_CODE).subtraction()
-        return step
+def _refuse(first: object, second: object, result: object) -> int:
+    return ~_ACCEPTED
+
+
+_integration, _subtraction = ConfigurationStep("integration"), ConfigurationStep("subtraction")
 
 
 def _broadcast(a: Floats, b: Floats) -> tuple[Floats, Floats]:

@@ -12,15 +12,23 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.errors import ArgumentError, NotFiniteError
-from dynx.model import Model
+from dynx.errors import ArgumentError, CompileError, NotFiniteError
+from dynx.model import Model, configuration
 from dynx.model.loading import load
 from dynx.model.numbers import MAX_MAGNITUDE, UNIT_NORM_TOLERANCE
 from dynx.spatial import branchless
 from dynx.spatial.branchless import FLOATS
 from dynx.spatial.scalar import Floats
 
+STEPS = {"integration": configuration._integration, "subtraction": configuration._subtraction}
 ROBOTS = {robot: load(robot, base="floating") for robot in ("free_body", "ur5", "talos")}
+
+
+@pytest.fixture(autouse=True, scope="module")
+def compiled() -> None:
+    """Compile both steps, which a process does after thousands of them."""
+    for step in STEPS.values():
+        step.compile()
 
 
 @st.composite
@@ -106,3 +114,31 @@ def test_a_step_is_one_call_of_machine_code_for_any_number_of_joints(robot: str)
     # The method, the properties of sizes, `np.empty` and the function itself.
     assert calls(model.integrate, q, v) <= 4
     assert calls(model.difference, q, end) <= 4
+
+
+def test_a_step_is_compiled_once_it_has_been_computed_often(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(configuration, "MIN_CALLS_TO_COMPILE", 3)
+    step = configuration.ConfigurationStep("integration")
+    monkeypatch.setattr(configuration, "_integration", step)
+    model = ROBOTS["ur5"]
+    q, v = model.random(0), np.full(model.nv, 0.1)
+    on_floats = [model.integrate(q, v) for _ in range(3)]
+    result = np.empty(model.nq)
+    assert step.function(q, v, result) == 0
+    for each in (*on_floats, model.integrate(q, v)):
+        assert np.array_equal(each, result)
+
+
+def test_steps_remain_on_floats_where_they_cannot_be_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails() -> None:
+        raise CompileError("no linker")
+
+    monkeypatch.setattr(configuration, "MIN_CALLS_TO_COMPILE", 1)
+    monkeypatch.setattr("dynx.compiled.configurations.integration", fails)
+    step = configuration.ConfigurationStep("integration")
+    monkeypatch.setattr(configuration, "_integration", step)
+    model = ROBOTS["talos"]
+    q, v = model.random(0), np.full(model.nv, 0.1)
+    expected = model.integrate(q.tolist(), v.tolist())
+    for _ in range(3):
+        assert np.array_equal(model.integrate(q, v), expected)
