@@ -33,4 +33,5 @@ def write_block(writer: HTML5Translator, node: nodes.math_block) -> None:
 
 def _mathml(formula: str, *, as_block: bool = False) -> str:
     """Return a formula as MathML. Browsers draw dots that are marked as accents into letters such as q."""
+    formula = formula.replace(r"\dots", r"\ldots")  # docutils knows the second only
     return str(tex2mathml(formula, as_block=as_block)).replace(' accent="true"', "")
