@@ -1,5 +1,5 @@
 """Options of functions: a misspelt name, a former one or that of another library raises an error with the
-right one, and a dataclass can declare the arguments of a function.
+right one.
 
 Public names of a package answer by themselves (`explained`, which `dynx.registry.moved_names` calls); a
 decorator is for former names, and for methods that are doors to a function.
@@ -11,20 +11,17 @@ import inspect
 import sys
 from abc import ABCMeta
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import is_dataclass
 from difflib import get_close_matches
 from functools import wraps
 from importlib import import_module
 from types import FunctionType, MappingProxyType
-from typing import Any, ParamSpec, TypeVar, cast, overload
+from typing import Any, TypeVar, cast, overload
 
 from dynx.errors import ArgumentError, UnknownNameError, escaped, nearest, shown
 
 F = TypeVar("F", bound=Callable[..., Any])
 C = TypeVar("C", bound=type)
-P = ParamSpec("P")
-A = TypeVar("A")
-R = TypeVar("R")
 
 
 @overload
@@ -155,67 +152,6 @@ def refuse_options(
     for each in options:
         if each not in known:
             raise UnknownNameError(f"{name} has no option {shown(each)}{right_name(each, known, renamed)}")
-
-
-def check_arguments(
-    name: str,
-    signature: inspect.Signature,
-    given: Iterable[Any],
-    options: Mapping[str, Any],
-    elsewhere: Mapping[str, str] = MappingProxyType({}),
-    renamed: Mapping[str, str] = MappingProxyType({}),
-) -> None:
-    """Raise UnknownNameError for a keyword of `options` that the signature of the function `name` does not
-    have, TypeError for other arguments that do not fit it.
-
-    `elsewhere` has the option for each name under which other functions have it, `renamed` the present names
-    of former keywords.
-    """
-    for each in options:
-        if each not in signature.parameters:
-            near = right_name(each, signature.parameters, renamed)
-            clause = f"; here it is {elsewhere[each]}" if each in elsewhere else near
-            raise UnknownNameError(f"{name} has no option {shown(each)}{clause}")
-    try:
-        signature.bind(*given, **options)
-    except TypeError as error:
-        raise TypeError(f"{name}: {error}") from None
-
-
-def takes(
-    arguments: Callable[P, A], renamed: Mapping[str, str] = MappingProxyType({}), **elsewhere: str
-) -> Callable[[Callable[[A], R]], Callable[P, R]]:
-    """Decorate a function of one object, so that it has the signature of the dataclass `arguments`.
-
-    `renamed` has the present names of former keywords, `elsewhere` the option for each name under which other
-    functions have it.
-
-    Type checkers and `help` see the fields as arguments. A keyword that is no field raises UnknownNameError,
-    other arguments that do not fit TypeError. The docstring gets a line for each field that `option`
-    declares (`dynx.sim.scenario.options`).
-    """
-
-    def decorate(function: Callable[[A], R]) -> Callable[P, R]:
-        name = function.__name__
-        signature = inspect.signature(arguments)
-
-        @wraps(function)
-        def called(*given: P.args, **options: P.kwargs) -> R:
-            check_arguments(name, signature, given, options, elsewhere, renamed)
-            return function(arguments(*given, **options))
-
-        lines = [
-            f"        {each.name}: {each.metadata['option'].line}"
-            for each in fields(cast(Any, arguments))
-            if "option" in each.metadata
-        ]
-        if function.__doc__ and lines:
-            called.__doc__ = "\n".join([function.__doc__.rstrip(), "", "    Options:", *lines, "    "])
-        returned = inspect.signature(function).return_annotation
-        called.__signature__ = signature.replace(return_annotation=returned)  # type: ignore[attr-defined]
-        return called
-
-    return decorate
 
 
 def _checked(function: F, name: str, renamed: Mapping[str, str]) -> F:

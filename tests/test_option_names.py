@@ -15,8 +15,8 @@ import pytest
 import dynx
 from dynx.engine_names import KEYWORDS, keyword_of_dynx, parameter_of
 from dynx.errors import ArgumentError, UnknownNameError
-from dynx.option_names import checks_option_names, takes
-from dynx.sim.scenario.options import option
+from dynx.option_names import checks_option_names
+from dynx.sim.scenario.options import option, takes
 from dynx.steppers.forces import ExternalForce
 from dynx.world import Material, Scene, World, box
 from tests.random_calls.calls import public_modules

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from typing import Any, Literal
 
 import numpy as np
 
 from dynx.model import Mechanism, Model
-from dynx.rbd import aba, centroidal, coriolis, crba, jacobians, joint_wrenches, kinematics, regressor, rnea
+from dynx.rbd import aba, centroidal, crba, jacobians, joint_wrenches, kinematics, regressor, rnea
 from dynx.spatial.scalar import Array
 
 Algorithm = Callable[..., Array]
@@ -123,6 +124,16 @@ class Quantity:
         """Evaluate the algorithm at the tree's configuration q (..., nq), other arguments and details."""
         first = kinematics.body_poses(mechanism, q) if self.takes_poses else q
         return np.asarray(self.algorithm(mechanism, first, *rest))
+
+
+def _imported_late(module: str, name: str) -> Algorithm:
+    """Return a function that stands for an algorithm whose long text few programs need."""
+
+    def algorithm(*arguments: Any) -> Any:
+        return getattr(import_module(module), name)(*arguments)
+
+    algorithm.__module__, algorithm.__name__ = module, name
+    return algorithm
 
 
 LIBRARIES = ("Pinocchio", "Drake", "MuJoCo", "PyBullet")
@@ -269,7 +280,7 @@ _TABLE = (
         ("q", "v"),
         ("nv", "nv"),
         "N m s/rad",
-        coriolis.coriolis_matrix,
+        _imported_late("dynx.rbd.coriolis", "coriolis_matrix"),
         "coriolis",
         "Echeandia and Wensing 2021, eq. 24",
         _elsewhere("computeCoriolisMatrix"),

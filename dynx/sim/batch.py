@@ -36,14 +36,13 @@ from dynx.files.writing import clear_unfinished
 from dynx.model import Model
 from dynx.model.configuration import checked_q
 from dynx.model.numbers import MAX_INDEX, array_of, checked_array, real_array, whole_number
-from dynx.option_names import takes
 from dynx.sim.batch_rollouts import BatchRollouts
 from dynx.sim.loop_step import PLACEHOLDER, ArrayDisturbances, LoopStep, gain_shapes, innermost
 from dynx.sim.noise import Noise
 from dynx.sim.plants.disturbances import refuse_unstable
 from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.scenario.options import COEFFICIENTS as COEFFICIENTS_KIND
-from dynx.sim.scenario.options import FORMER_NAMES, OPTIONS, option
+from dynx.sim.scenario.options import FORMER_NAMES, OPTIONS, option, takes
 from dynx.sim.scenario.scenario import Scenario, ScenarioArguments
 from dynx.sim.setup import Setup, require_duration
 from dynx.sim.step_completion import LaneStops, Settling

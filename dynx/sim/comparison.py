@@ -20,7 +20,6 @@ from dynx.model import Model
 from dynx.model.elements import Inertial
 from dynx.model.geometry.links import Collision
 from dynx.model.numbers import is_real
-from dynx.option_names import check_arguments
 from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.record.rollout import Rollout
 from dynx.sim.scenario.documents import (
@@ -35,6 +34,7 @@ from dynx.sim.scenario.documents import (
     encode,
     in_words,
 )
+from dynx.sim.scenario.options import check_arguments
 from dynx.sim.scenario.scenario import Difference, Scenario, document_differences, field_names
 from dynx.sim.simulation import simulate
 from dynx.steppers.clock import Clock

@@ -19,7 +19,6 @@ from dynx.control.base import Controller
 from dynx.errors import ArgumentError, ClosedError, SimulationError, shown
 from dynx.model import Model
 from dynx.model.numbers import checked_array, is_real
-from dynx.option_names import takes
 from dynx.registry import explains_names
 from dynx.sim.closed_loop import ClosedLoop, LoopState, Sensors, StateBuffers, stops_of
 from dynx.sim.controller_checks import ControllerWatch, refuse_self_changed
@@ -29,7 +28,7 @@ from dynx.sim.plants.registry import make_plant
 from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.record.rollout import Rollout
 from dynx.sim.scenario.documents import in_words
-from dynx.sim.scenario.options import FORMER_NAMES
+from dynx.sim.scenario.options import FORMER_NAMES, takes
 from dynx.sim.scenario.scenario import RecordedScenario, Scenario, ScenarioArguments, innermost
 from dynx.sim.setup import Setup, require_duration, setpoints_of, step_bytes
 from dynx.sim.step import at_limit

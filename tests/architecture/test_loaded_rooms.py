@@ -58,15 +58,15 @@ FLOWS = {
             "viewer",
         ),
         (),
-        72,
-        12250,
+        71,
+        11960,
     ),
     "inverse kinematics": Flow(
         ENGINE + "engine.inverse_kinematics(engine.forward_kinematics(q, 'tool0'), 'tool0', q)",
         ("world", "sim", "ik.closed_forms"),
         (),
-        106,
-        19100,
+        105,
+        18800,
     ),
     "simulate": Flow(
         ROBOT + "from dynx import control\n"
@@ -88,16 +88,16 @@ FLOWS = {
             "envs",
         ),
         (),
-        153,
-        24750,
+        152,
+        24600,
     ),
     "step of a box": Flow(
         "from dynx.world import Scene, World, box\n"
         "World(Scene('box', bodies=(box('box', (0.1, 0.1, 0.1), mass=1.0),)), 'mujoco').step()",
         ("ik", "sim", "envs", "doctor"),
         (),
-        113,
-        20600,
+        112,
+        20300,
     ),
     "step of the cart-pole": Flow(
         "import gymnasium, dynx.envs\n"
@@ -107,7 +107,7 @@ FLOWS = {
         ("distance", "ik", "world.camera", "steppers.camera"),
         (),
         154,
-        26650,
+        26600,
     ),
 }
 

@@ -1,7 +1,7 @@
 """Options of a simulation, each declared once: a field with its default, meaning, unit and kind.
 
 From the fields of `SimulationOptions` follow the signatures of `dynx.simulate` and `dynx.simulate_batch`
-(`dynx.option_names.takes`), the fields of `Scenario` and their checks, a scenario's document and its JSON
+(`takes`), the fields of `Scenario` and their checks, a scenario's document and its JSON
 Schema, the options of ``dynx sim`` (`dynx.cli.shell.kinds`), and the table in docs/simulation.md. A new
 option is a field here, and the code in which it acts.
 
@@ -12,14 +12,16 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field, fields, replace
+from functools import wraps
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, TypeVar
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, cast
 
 from dynx.argument_types import is_listed
-from dynx.errors import ArgumentError, shown
-from dynx.option_names import as_object
+from dynx.errors import ArgumentError, UnknownNameError, shown
+from dynx.option_names import as_object, right_name
 from dynx.registry import DEFAULT_ENGINE
 
 if TYPE_CHECKING:
@@ -34,6 +36,9 @@ if TYPE_CHECKING:
     from dynx.world.sensors.sensor import Sensor
 
 T = TypeVar("T")
+P = ParamSpec("P")
+A = TypeVar("A")
+R = TypeVar("R")
 
 NumberOrArray = bool | float | list[Any] | dict[str, Any] | None
 """JSON type of one number, an array, or true for the values of the robot description."""
@@ -510,3 +515,67 @@ FORMER_NAMES = {
 
 OPTIONS = {each.name: each for each in options_of(SimulationOptions)}
 """Declarations of the options of a simulation by name."""
+
+
+# -- functions whose arguments a dataclass declares ----------------------------------------------------
+
+
+def check_arguments(
+    name: str,
+    signature: inspect.Signature,
+    given: Iterable[Any],
+    options: Mapping[str, Any],
+    elsewhere: Mapping[str, str] = MappingProxyType({}),
+    renamed: Mapping[str, str] = MappingProxyType({}),
+) -> None:
+    """Raise UnknownNameError for a keyword of `options` that the signature of the function `name` does not
+    have, TypeError for other arguments that do not fit it.
+
+    `elsewhere` has the option for each name under which other functions have it, `renamed` the present names
+    of former keywords.
+    """
+    for each in options:
+        if each not in signature.parameters:
+            near = right_name(each, signature.parameters, renamed)
+            clause = f"; here it is {elsewhere[each]}" if each in elsewhere else near
+            raise UnknownNameError(f"{name} has no option {shown(each)}{clause}")
+    try:
+        signature.bind(*given, **options)
+    except TypeError as error:
+        raise TypeError(f"{name}: {error}") from None
+
+
+def takes(
+    arguments: Callable[P, A], renamed: Mapping[str, str] = MappingProxyType({}), **elsewhere: str
+) -> Callable[[Callable[[A], R]], Callable[P, R]]:
+    """Decorate a function of one object, so that it has the signature of the dataclass `arguments`.
+
+    `renamed` has the present names of former keywords, `elsewhere` the option for each name under which other
+    functions have it.
+
+    Type checkers and `help` see the fields as arguments. A keyword that is no field raises UnknownNameError,
+    other arguments that do not fit TypeError. The docstring gets a line for each field that `option`
+    declares.
+    """
+
+    def decorate(function: Callable[[A], R]) -> Callable[P, R]:
+        name = function.__name__
+        signature = inspect.signature(arguments)
+
+        @wraps(function)
+        def called(*given: P.args, **options: P.kwargs) -> R:
+            check_arguments(name, signature, given, options, elsewhere, renamed)
+            return function(arguments(*given, **options))
+
+        lines = [
+            f"        {each.name}: {each.metadata['option'].line}"
+            for each in fields(cast(Any, arguments))
+            if "option" in each.metadata
+        ]
+        if function.__doc__ and lines:
+            called.__doc__ = "\n".join([function.__doc__.rstrip(), "", "    Options:", *lines, "    "])
+        returned = inspect.signature(function).return_annotation
+        called.__signature__ = signature.replace(return_annotation=returned)  # type: ignore[attr-defined]
+        return called
+
+    return decorate

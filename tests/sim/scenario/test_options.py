@@ -14,10 +14,9 @@ import pytest
 import dynx
 from dynx import control
 from dynx.errors import ArgumentError, LimitError, UnknownNameError
-from dynx.option_names import takes
 from dynx.rbd.parameters import Payload
 from dynx.sim import Scenario, Simulation, simulate, simulate_batch
-from dynx.sim.scenario.options import OPTIONS, SimulationOptions, option, options_of
+from dynx.sim.scenario.options import OPTIONS, SimulationOptions, option, options_of, takes
 from dynx.world import Imu
 from tests.sim.rigid_bodies import RIGID_BODIES
 
