@@ -268,8 +268,12 @@ def by_export(subject: Subject) -> NDArray[np.uint8]:
     return picture_of((motion,), 0.0, Stage(subject.camera, UNLIT))
 
 
+MATTE = "window.__dynxRoughness = 1"
+"""Program of the page that takes the gloss from its surfaces."""
+
+
 def unlit_page(viewer: Viewer) -> None:
-    """Light a page from everywhere alike, so that every surface has its own colour."""
+    """Light a page from everywhere alike, so that every surface has its own colour; run `MATTE` in it."""
     scene = viewer.page.scene
     for name in ("/ground", "/sky", "/sun", "/fill"):
         scene.remove_by_name(name)
@@ -383,6 +387,7 @@ def main() -> None:
                 unlit_page(viewer)
                 page = browser.new_page(viewport={"width": 900, "height": 600})
                 page.goto(viewer.url)
+                page.evaluate(MATTE)
                 page.wait_for_selector("canvas[data-engine]", timeout=1e3 * PATIENCE)
                 page.wait_for_timeout(3000)
                 label = "page" if whole else "page, meshes reduced"

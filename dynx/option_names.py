@@ -88,19 +88,25 @@ def _explain_class(cls: type) -> None:
         if not each.__module__.startswith("dynx") or vars(each).get("_explains_options"):
             continue
         each._explains_options = True  # type: ignore[attr-defined]
-        in_loops = isinstance(each, ABCMeta)
         for name, member in list(vars(each).items()):
             function = getattr(member, "__func__", member)
-            if not isinstance(function, FunctionType) or hasattr(function, ANSWERS):
+            if not isinstance(function, FunctionType):
                 continue
-            if name == "__init__":
-                wanted = not is_dataclass(each) or _has_options(function)
-            else:
-                wanted = not name.startswith("_") and not in_loops and _has_options(function)
-            if wanted:
-                answering = _checked(function, each.__name__ if name == "__init__" else name, {})
+            answering = method_of(each, name, function)
+            if answering is not function:
                 kind = type(member)
                 setattr(each, name, answering if kind is FunctionType else kind(answering))
+
+
+def method_of(cls: type, name: str, function: F) -> F:
+    """Return the method `name` of a public class, so that it answers mistaken keywords if it has to."""
+    if not isinstance(function, FunctionType) or hasattr(function, ANSWERS):
+        return function
+    if name == "__init__":
+        wanted = not is_dataclass(cls) or _has_options(function)
+    else:
+        wanted = not name.startswith("_") and not isinstance(cls, ABCMeta) and _has_options(function)
+    return _checked(function, cls.__name__ if name == "__init__" else name, {}) if wanted else function
 
 
 def _has_options(function: FunctionType) -> bool:

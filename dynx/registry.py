@@ -21,7 +21,7 @@ from importlib.util import find_spec
 from typing import Any, Generic, TypeVar, cast
 
 from dynx.errors import ArgumentError, DynxError, nearest, shown
-from dynx.option_names import explained
+from dynx.option_names import explained, method_of
 
 Kind = TypeVar("Kind")
 Owner = TypeVar("Owner", bound=type)
@@ -56,7 +56,7 @@ class _Door:
 
     def __get__(self, instance: object, owner: type) -> Any:
         module, _, name = self.target.partition(":")
-        body = getattr(import_module(module), name)
+        body = method_of(self._owner, self._name, getattr(import_module(module), name))
         if isinstance(self.stub, classmethod):
             body = classmethod(body)
         setattr(self._owner, self._name, body)

@@ -98,19 +98,22 @@ def irregularity(path: str | os.PathLike[str]) -> str:
     return ""
 
 
-def checked_path(path: object) -> str:
-    """Return a path as a str. Raises ArgumentError for anything but a str, bytes or an `os.PathLike`,
-    and for characters that no name of a file has: NUL and surrogates."""
+def checked_path(path: object, name: str = "a path") -> str:
+    """Return the path that is given for the argument `name` as a str.
+
+    Raises ArgumentError for anything but a str, bytes or an `os.PathLike`, and for characters that no
+    name of a file has: NUL and surrogates.
+    """
     try:
         found = os.fsdecode(path)  # type: ignore[arg-type]  # anything is tried
     except TypeError:
-        raise ArgumentError(f"a path is {shown(path)}; wanted a str or an os.PathLike") from None
+        raise ArgumentError(f"{name} is {shown(path)}; wanted a str or an os.PathLike") from None
     try:
         os.fsencode(found)
     except UnicodeEncodeError:
-        raise ArgumentError(f"a path is {shown(found)}; wanted characters of a file's name") from None
+        raise ArgumentError(f"{name} is {shown(found)}; wanted characters of a file's name") from None
     if "\0" in found:
-        raise ArgumentError(f"a path is {shown(found)}; wanted one without the character of the number 0")
+        raise ArgumentError(f"{name} is {shown(found)}; wanted one without the character of the number 0")
     return found
 
 

@@ -284,7 +284,7 @@ class OutcomeStore:
 
     def __init__(self, folder: str | os.PathLike[str], scenario: Scenario) -> None:
         """Raises ArgumentError if the folder cannot be made or written."""
-        self._folder = Path(checked_path(folder))
+        self._folder = Path(checked_path(folder, "keep"))
         self._scenario = scenario.with_defaults().to_json()
         self._failures: list[ArgumentError] = []
         try:

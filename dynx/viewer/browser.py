@@ -340,8 +340,9 @@ _OWN_COLOURS = (
     renderer.toneMapping = 0;
     page.scene.traverse((each) => {
       for (const material of each.isMesh ? [each.material].flat() : []) {
-        if (!material.isMeshStandardMaterial || material.roughness === ROUGHNESS) continue;
-        material.roughness = ROUGHNESS;
+        const roughness = window.__dynxRoughness ?? ROUGHNESS;
+        if (!material.isMeshStandardMaterial || material.roughness === roughness) continue;
+        material.roughness = roughness;
         changed = true;
       }
     });

@@ -31,7 +31,7 @@ from dynx.steppers.camera import Camera, Draw, Drawing, DrawnShape, DrawnTriangl
 from dynx.steppers.state import WorldState
 from dynx.world.boxes import shape_box
 from dynx.world.scene import Scene
-from dynx.world.scenery import GAMMA, KEY_DIRECTION, LIGHT, TILE, Scenery, tiles
+from dynx.world.scenery import GAMMA, KEY_DIRECTION, LIGHT, MATTE, TILE, Scenery, tiles
 
 if TYPE_CHECKING:
     from dynx.model.geometry.mesh_reading import Surface
@@ -429,7 +429,7 @@ def cast_rays(
     shapes: Sequence[DrawnShape],
     T_world_camera: Floats,
     camera: Camera,
-    scenery: Scenery = LIGHT,
+    scenery: Scenery = MATTE,
     tile: float = TILE,
 ) -> Drawing:
     """Draw shapes by the rays through the centres of pixels; planes have tiles with edges of `tile` [m]."""

@@ -114,6 +114,8 @@ class Scenery(NamedTuple):
 
 
 LIGHT = Scenery((0.50, 0.67, 0.86), (0.90, 0.93, 0.96), (0.66, 0.69, 0.72), 0.60, 0.10, 0.36, 0.15)
+MATTE = LIGHT._replace(polish=0.0)
+"""Light of what a camera measures: surfaces have the hue of their own colour."""
 DARK = Scenery((0.06, 0.08, 0.11), (0.17, 0.19, 0.22), (0.26, 0.28, 0.31), 0.60, 0.10, 0.34, 0.15)
 
 

@@ -122,7 +122,7 @@ def test_what_has_no_document() -> None:
     with pytest.raises(ArgumentError, match="Damper cannot be written: wanted a frozen dataclass"):
         controller_to_document(Damper(ARM, np.ones(6)))
     documents: list[tuple[dict[str, Any], str]] = [
-        ({"controller": "PD", "kp": 1.0}, "the document of a PD is invalid: .*'kd'"),
+        ({"controller": "PD", "kp": 1.0}, "PD needs kd="),
         ({"controller": "pd", "kp": 1.0}, "no controller 'pd'; did you mean"),
         ({"kp": 1.0}, "lacks the name of its controller"),
     ]

@@ -96,7 +96,7 @@ def test_an_unknown_engine_is_named_with_the_nearest() -> None:
 
 def test_a_missing_engine_is_refused_with_its_installation(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pybullet", None)
-    with pytest.raises(NotInstalledError, match=r"pip install 'dynx\[pybullet\]'"):
+    with pytest.raises(NotInstalledError, match=r"pip install '\S*\[pybullet\]'"):
         loader_class("pybullet")
     assert "pybullet" not in installed_engines()
     assert "pinocchio" in installed_engines()

@@ -189,7 +189,7 @@ def test_a_simulation_without_a_duration_goes_on() -> None:
         simulation.run(until=3.0)
         assert simulation.time == 3.0
         the_same(simulation.rollout, simulate(replace(free, duration=3.0)))
-    with pytest.raises(ArgumentError, match="duration is not given"):
+    with pytest.raises(ArgumentError, match="duration is None, and reference is no trajectory"):
         simulate(free)
 
 

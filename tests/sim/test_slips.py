@@ -134,7 +134,7 @@ def test_a_simulation_states_what_is_wanted(function: Callable[..., Any], slip: 
         ),
         (lambda: simulate_batch(ARM, None, REST, duration=0.01), ArgumentError, "controller is None"),
         (
-            lambda: simulate_batch(ARM, PD, REST, duration=0.01, rollouts=10**12),
+            lambda: simulate_batch(ARM, PD, REST, duration=0.01, rollouts=10**9),
             ArgumentError,
             "need about",
         ),
@@ -145,7 +145,7 @@ def test_a_simulation_states_what_is_wanted(function: Callable[..., Any], slip: 
             "^threads is .* wanted a positive integer",
         ),
         (lambda: laws.Saturated(PD, limit="much"), GainError, "^limit is 'much'.* or None for the values"),
-        (lambda: simulate_batch(ARM, PD, REST, duration=0.01, keep=3), ArgumentError, "a path is '3'"),
+        (lambda: simulate_batch(ARM, PD, REST, duration=0.01, keep=3), ArgumentError, "keep is '3'"),
         (
             lambda: simulate_batch(ARM, PD, REST, duration=0.01, executor="x"),
             ArgumentError,

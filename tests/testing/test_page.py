@@ -38,7 +38,10 @@ class Options:
 def workflow_commands() -> Iterator[str]:
     """Yield the commands of the workflow, of the step that stands for one of its steps, and of the hook."""
     yaml = import_module("yaml")
-    workflow, step, hooks = map(yaml.safe_load, blocks("yaml", PAGE))
+    action, workflow, step, hooks = map(yaml.safe_load, blocks("yaml", PAGE))
+    (used,) = [each for each in action if each["uses"].startswith("OWNER/dynx@")]
+    own_action = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))
+    assert used["with"].keys() <= own_action["inputs"].keys()
     assert workflow["permissions"]["security-events"] == "write"
     for each in [*(step for job in workflow["jobs"].values() for step in job["steps"]), *step]:
         assert ("run" in each) != ("uses" in each)

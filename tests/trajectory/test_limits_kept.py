@@ -246,7 +246,7 @@ def test_effort_that_does_not_hold_the_robot_is_refused() -> None:
         time_optimal_path(points, effort=0.0, model=model)
     with pytest.raises(ArgumentError, match="effort is limited for a robot; wanted its model="):
         time_optimal_path(points, effort=20.0, velocity=1.0)
-    with pytest.raises(ArgumentError, match="neither acceleration nor effort is limited"):
+    with pytest.raises(ArgumentError, match="acceleration is None and effort False; wanted a limit"):
         time_optimal_path(points, model=model)
 
 

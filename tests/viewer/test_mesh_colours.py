@@ -10,6 +10,7 @@ import pytest
 
 from benchmarks.mesh_colours import (
     BALLS,
+    MATTE,
     SHARE,
     SUBJECTS,
     by_camera,
@@ -62,6 +63,7 @@ def test_the_page_without_light_has_the_colours_of_the_files(open_page: OpenPage
     with subject.model.view() as viewer:
         unlit_page(viewer)
         page = open_page(viewer.url)
+        page.page.evaluate(MATTE)
         connected(viewer)
         shown = lambda: share_close(by_page(viewer, subject.camera), pixels, expected) >= SHARE  # noqa: E731
         until(shown, "the colours of the files")

@@ -119,5 +119,5 @@ def test_importing_the_engine_prints_nothing() -> None:
 
 def test_a_missing_engine_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pybullet", None)
-    with pytest.raises(NotInstalledError, match=r"pip install 'dynx\[pybullet\]'.*3\.11"):
+    with pytest.raises(NotInstalledError, match=r"pip install '\S*\[pybullet\]'.*3\.11"):
         PyBulletBackend(chain(2))

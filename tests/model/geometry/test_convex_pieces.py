@@ -137,7 +137,7 @@ def test_a_concave_solid_is_divided_into_convex_ones(tmp_path: Path) -> None:
 def test_a_missing_coacd_is_named_with_its_extra(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setitem(sys.modules, "coacd", None)
     whole = channel(tmp_path)
-    with pytest.raises(NotInstalledError, match=r"pip install 'dynx\[decomposition\]'"):
+    with pytest.raises(NotInstalledError, match=r"pip install '\S*\[decomposition\]'"):
         convex_decomposition(whole, tmp_path)
     for concavity in (0.0, -1.0, 2.0, float("nan")):
         with pytest.raises(ArgumentError, match="concavity"):

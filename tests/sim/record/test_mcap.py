@@ -281,7 +281,7 @@ def test_without_mcap_the_extra_is_named(
     arm: Rollout, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "mcap.writer", None)
-    with pytest.raises(NotInstalledError, match=r"dynx\[mcap\]"):
+    with pytest.raises(NotInstalledError, match=r"pip install '\S*\[mcap\]'"):
         arm.save(tmp_path / "run.mcap")
     assert not list(tmp_path.iterdir())
 
