@@ -13,7 +13,7 @@ from dynx.errors import EngineError, EngineLimitError
 from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
 from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import quat_from_rotation
-from dynx.steppers.camera import Camera, Drawing, DrawnShape
+from dynx.steppers.camera import Camera, Drawing, DrawnShape, DrawnTriangles
 
 _MOST_GEOMS = 100
 """Number of geoms in a scene beside the shapes: lights and the sky."""
@@ -96,7 +96,7 @@ def _model(shapes: Sequence[DrawnShape], camera: Camera) -> Any:
         ) from error
 
 
-def _geom(shape: Shape) -> tuple[Any, list[float]]:
+def _geom(shape: Shape | DrawnTriangles) -> tuple[Any, list[float]]:
     kinds = mujoco.mjtGeom
     if isinstance(shape, Box):
         return kinds.mjGEOM_BOX, [0.5 * edge for edge in shape.size]
@@ -110,9 +110,12 @@ def _geom(shape: Shape) -> tuple[Any, list[float]]:
     return kinds.mjGEOM_MESH, []
 
 
-def _add_mesh(spec: Any, number: int, shape: Shape) -> str:
-    assert isinstance(shape, Mesh | HeightField)
-    vertices, faces = shape.triangles if isinstance(shape, Mesh) else shape.triangles()
+def _add_mesh(spec: Any, number: int, shape: Shape | DrawnTriangles) -> str:
+    if isinstance(shape, DrawnTriangles):
+        vertices, faces = shape
+    else:
+        assert isinstance(shape, Mesh | HeightField)
+        vertices, faces = shape.triangles if isinstance(shape, Mesh) else shape.triangles()
     # A mesh that is open has no volume, and is drawn from both sides.
     # Each side has vertices of its own, or their normals would cancel out.
     both = np.concatenate([faces, faces[:, ::-1] + len(vertices)])
