@@ -90,8 +90,6 @@ def _explain_class(cls: type) -> None:
         each._explains_options = True  # type: ignore[attr-defined]
         for name, member in list(vars(each).items()):
             function = getattr(member, "__func__", member)
-            if not isinstance(function, FunctionType):
-                continue
             answering = method_of(each, name, function)
             if answering is not function:
                 kind = type(member)

@@ -99,11 +99,8 @@ def irregularity(path: str | os.PathLike[str]) -> str:
 
 
 def checked_path(path: object, name: str = "a path") -> str:
-    """Return the path that is given for the argument `name` as a str.
-
-    Raises ArgumentError for anything but a str, bytes or an `os.PathLike`, and for characters that no
-    name of a file has: NUL and surrogates.
-    """
+    """Return the path given for the argument `name` as a str. Raises ArgumentError for anything but a str,
+    bytes or an `os.PathLike`, and for characters that no name of a file has: NUL and surrogates."""
     try:
         found = os.fsdecode(path)  # type: ignore[arg-type]  # anything is tried
     except TypeError:
