@@ -46,7 +46,7 @@ def is_item(line: str) -> bool:
 
 
 PYTHON = re.compile(r"^\s*(import|from|with|for|class|def|@|#)\b|\w\(.*|^\s*\w+ = ")
-"""What lines of Python have and trees of names or drawings lack."""
+"""Marks of a line of Python, which trees of names and drawings do not have."""
 
 
 def constant_text(name: str, value: object) -> list[str]:

@@ -311,7 +311,7 @@ MEANINGS = {
     "size": "all of it, (x, y, z) [m] of a box, (width, height) of a picture",
     "wrench": "force, then moment: (6,)",
 }
-"""What arguments are whose words mean another quantity, or one in another form."""
+"""Meaning of arguments whose names elsewhere stand for another quantity or another form."""
 
 _OF_BASE_POSE = (
     "dynx.load(..., base_pose=...) sets that of a fixed base, the first seven of q that of a floating one"
@@ -326,7 +326,7 @@ ELSEWHERE = {
     "qpos qvel": "robots={name: (q, v)} has them by robot",
     "timestep time_step dt": "dynx.World(scene, dt=...) sets it",
 }
-"""What stands for arguments that belong to another call."""
+"""Calls that take the arguments which a function does not take."""
 
 
 def parameter_of(word: str, known: Iterable[str]) -> str | None:

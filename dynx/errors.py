@@ -169,7 +169,9 @@ def install_command(extra: str) -> str:
     if "vcs_info" in origin:
         source = f"{origin['vcs_info'].get('vcs', 'git')}+{origin.get('url', '')}"
         return f"pip install '{DISTRIBUTION}[{extra}] @ {source}'"
-    return f"pip install '.[{extra}]' in the clone" if origin else f"pip install '{DISTRIBUTION}[{extra}]'"
+    if "dir_info" in origin:
+        return f"pip install '.[{extra}]' in the clone"
+    return f"pip install '{DISTRIBUTION}[{extra}]'"
 
 
 @contextmanager

@@ -171,9 +171,10 @@ ORIGINS = {
         {"url": "https://example.org/dynx", "vcs_info": {"vcs": "git"}},
         "pip install 'dynx-robotics[plot] @ git+https://example.org/dynx'",
     ),
+    "a wheel": ({"url": "file:///tmp/dynx.whl", "archive_info": {}}, "pip install 'dynx-robotics[plot]'"),
     "an index": (None, "pip install 'dynx-robotics[plot]'"),
 }
-"""What an installer notes on the origin of dynx, and the words that install an extra."""
+"""Note of an installer on the origin of dynx, and the words that install an extra."""
 
 
 @pytest.mark.parametrize("origin", ORIGINS)

@@ -1,4 +1,4 @@
-"""What a release needs agrees with itself, and the action for robot descriptions does what it says."""
+"""The files of a release agree with each other, and the action for robot descriptions does what it says."""
 
 from __future__ import annotations
 

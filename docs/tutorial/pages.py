@@ -28,7 +28,7 @@ class Part(NamedTuple):
     """``python``, another language of a block, or ``""`` for text."""
     text: str
     folded: bool = False
-    """Whether the part belongs to an answer, which the page shows on request."""
+    """True for a part of an answer, which the page shows on request."""
 
 
 def parts(page: str) -> list[Part]:

@@ -33,8 +33,8 @@ MIN_CALLS_TO_COMPILE = 20_000
 """Steps on floats that take about as long as to import the compiler and to compile one."""
 
 _ACCEPTED = 0
-"""What the machine code returns for valid arrays, whatever it returns for others
-(`dynx.simd.arrays.ACCEPTED`, which takes a tenth of a second to import)."""
+"""Result of the machine code for valid arrays: `dynx.simd.arrays.ACCEPTED`, which takes a tenth of a second
+to import."""
 
 
 def checked_q(tree: Tree, q: ArrayLike, name: str = "q") -> Floats:

@@ -167,7 +167,6 @@ _OF_MAKER = {
     "jaco": ("kinova",),
     "pal": ("talos", "tiago"),
     "rethink": ("baxter",),
-    "spot": ("anymal", "a1"),
     "ufactory": ("xarm7",),
     "universal": ("ur5", "ur10"),
 }

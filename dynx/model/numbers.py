@@ -108,7 +108,7 @@ def positive_seconds(name: str, seconds: object) -> float:
 
 
 _NO_ARRAY = (TypeError, RuntimeError, AttributeError, LookupError, ArithmeticError)
-"""What classes with ``__array__`` raise that have no numbers, as a tensor of PyTorch with a gradient."""
+"""Errors of classes with ``__array__`` that have no numbers, such as a tensor of PyTorch with a gradient."""
 
 
 def array_of(name: str, value: object) -> Array:

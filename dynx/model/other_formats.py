@@ -10,7 +10,7 @@ _MESH = "a mesh; dynx.world.mesh(name, file) makes a body of one, and the <geome
 _USD = "USD, which dynx does not read"
 
 BY_ROOT = {"sdf": _SDF, "world": _SDF, "mujoco": _MJCF, "COLLADA": _MESH}
-"""What a file is, by its root element."""
+"""Format of a file by its root element."""
 
 _BY_SUFFIX = {
     ".sdf": _SDF,

@@ -64,7 +64,7 @@ Progress = Callable[[int], object]
 _CLEAR_SKY_BLUE: Colour = (SKY_BLUE[0] / 255.0, SKY_BLUE[1] / 255.0, SKY_BLUE[2] / 255.0, GHOST_OPACITY)
 
 NodesAt = Callable[[float, Camera], NodeShapes]
-"""What is seen beside the parts at a time [s] after the start, by a camera."""
+"""Function of a time [s] after the start and a camera, which returns the marks and texts that it sees."""
 
 
 def _no_nodes(time: float, camera: Camera) -> NodeShapes:

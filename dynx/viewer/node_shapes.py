@@ -43,7 +43,7 @@ class Words(NamedTuple):
 
 
 class NodeShapes(NamedTuple):
-    """What the nodes of a page are in a picture."""
+    """Shapes and texts in a picture for the nodes of a page."""
 
     shapes: tuple[DrawnShape, ...] = ()
     words: tuple[Words, ...] = ()

@@ -36,7 +36,7 @@ _RATIO = 1.25
 """Ratio of the numbers of triangles of two attempts, of which one is near enough, below which the search
 ends."""
 
-_LEAST_SAVED = 0.05
+_LEAST_SAVED = 0.2
 """Share of its triangles that a reduced mesh saves at least; otherwise the mesh stays whole."""
 
 _AREA_CHANGED, _VOLUME_CHANGED, _MOVED = 0.045, 0.018, 0.009
@@ -190,7 +190,7 @@ class _SurfacePoints(NamedTuple):
 
 
 class _Measures:
-    """What a reduction keeps of a mesh: area, box, place, colours and, if it is closed, volume."""
+    """Quantities of a mesh that a reduction keeps: area, box, place, colours and, if it is closed, volume."""
 
     def __init__(self, vertices: Floats, faces: Whole, values: Floats | None, surface: Surface) -> None:
         """`values` (m, 3, k) are those of corners, of the given `surface`."""
@@ -205,7 +205,7 @@ class _Measures:
 
     @property
     def is_thick(self) -> NDArray[np.bool_]:
-        """Whether the height of each triangle can be told from zero (m,)."""
+        """Mask (m,) of the triangles whose height differs from zero by more than rounding."""
         sides = np.linalg.norm(self.corners - np.roll(self.corners, -1, axis=1), axis=2).max(axis=1)
         return np.asarray(2.0 * self._areas > _THIN * float(np.ptp(self._box, axis=0).max()) * sides)
 

@@ -195,7 +195,7 @@ def test_names_cannot_write_on_the_terminal(report: DoctorReport) -> None:
 
 
 def test_a_written_file_names_the_bad_practice_that_it_keeps() -> None:
-    """Such as lengths in millimetres: the file does not say what else is, so that nothing is converted."""
+    """Lengths in millimetres are one: the file does not say what else is, so nothing is converted."""
     report = differing()
     practice = replace(report.findings[0], rule="DX520", kind="practice", effect=None, effects={})
     report = replace(report, findings=(*report.findings, practice))
