@@ -28,11 +28,11 @@ TUTORIAL = "tutorial's loop, PyBullet alone"
 TUTORIAL_SUBSTEPS = "the same, 10 sub-steps"
 TUTORIAL_NUMPY = "tutorial's loop, with NumPy"
 BARE = "NumPy and pin, by hand"
-DYNX = "dynx, law and plant pinocchio"
+DYNX = "dynx, controller and plant pinocchio"
 LOOPS = (
     DYNX,
-    "dynx, law and plant compiled",
-    "dynx, law pinocchio, plant pybullet",
+    "dynx, controller and plant compiled",
+    "dynx, controller pinocchio, plant pybullet",
     TUTORIAL,
     TUTORIAL_SUBSTEPS,
     TUTORIAL_NUMPY,

@@ -6,7 +6,7 @@ processor time per sample of `compiled` and of the fastest other engine in nanos
 time of `compiled` that engine takes. A ratio below 1 ends the command with 1.
 
 ``--record FILE`` adds each row to a file when it is measured. Rows that the file has are not measured again,
-so an interrupted run continues where it stopped. ``--markdown`` prints the table of docs/bench.md.
+so an interrupted run continues where it stopped. ``--markdown`` prints the table of docs/results.md.
 """
 
 from __future__ import annotations

@@ -75,7 +75,7 @@ COUNTERS = """
         counts.connected ??= Date.now() / 1e3;
         if (event.data.messages.some((each) => each.type === "MeshMessage")) counts.shapes = Date.now() / 1e3;
         for (const each of event.data.messages) {
-          if (each.type !== "SetOrientationMessage") continue;
+          if (!(each.updates?.dynx_poses || each.type === "SetOrientationMessage")) continue;
           turns[each.name] = (turns[each.name] || 0) + 1;
           counts.updates = Math.max(counts.updates, turns[each.name]);
         }
@@ -84,8 +84,8 @@ COUNTERS = """
   };
 })();
 """
-"""Counters in the page: triangles of the latest picture, pictures drawn, and rotations that arrive for the
-link that is turned most often (a pose of the robot may come in several batches)."""
+"""Counters in the page: triangles of the latest picture, pictures drawn, and poses that arrive of what moves
+most often."""
 
 
 class Start(NamedTuple):

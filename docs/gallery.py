@@ -8,9 +8,10 @@ a browser and without a graphics processor.
 
 from __future__ import annotations
 
-import dataclasses
+import ast
 import inspect
 import os
+import re
 import sys
 import tempfile
 import textwrap
@@ -21,15 +22,7 @@ import numpy as np
 from PIL import Image
 
 import dynx
-from dynx.model.geometry import (
-    Appearance,
-    Box,
-    Cylinder,
-    Geometry,
-    HeightField,
-    LinkGeometry,
-    Visual,
-)
+from dynx.model.geometry import HeightField
 from dynx.viewer import Viewer
 from dynx.world import Material, Scene, SceneBody, SceneRobot, TorqueMotor, World, ground, read_scene
 from dynx.world.comparison import compare_engines
@@ -79,13 +72,14 @@ def humanoid(path: str) -> None:
         viewer.export(path, size=SIZE, direction=(1.0, -0.55, 0.25))
 
 
-@picture("Quadruped on a height field", "Motors hold a Unitree A1 in its stance on hills of 10 cm.")
+@picture("Quadruped on a height field", "Motors hold a Unitree A1 in its stance on hills.")
 def quadruped(path: str) -> None:
-    x, y = np.meshgrid(np.linspace(-1.5, 1.5, 61), np.linspace(-1.5, 1.5, 61))
-    heights = 0.05 * np.sin(3.2 * x) * np.cos(2.6 * y)
+    x, y = np.meshgrid(np.linspace(-2.0, 2.0, 81), np.linspace(-2.0, 2.0, 81))
+    steep = 0.035 + 0.1 * np.clip(np.hypot(x, y) - 0.35, 0.0, 1.0)
+    heights = steep * np.sin(4.0 * x + 0.5) * np.cos(3.6 * y)
     hills = SceneBody(
         "hills",
-        HeightField(tuple(map(tuple, heights.tolist())), (3.0, 3.0)),
+        HeightField(tuple(map(tuple, heights.tolist())), (4.0, 4.0)),
         material=Material(friction=0.9, rgba=(0.47, 0.56, 0.36, 1.0)),
     )
     a1 = read_scene("standing").robots[0]
@@ -105,18 +99,16 @@ def stack(path: str) -> None:
             viewer.export(path, size=SIZE)
 
 
+@picture("Lander", "A lander comes down on its pad between two flags, on the Moon.")
+def lander(path: str) -> None:
+    with World(read_scene("landing"), "mujoco") as world, world.view(steps=False) as viewer:
+        viewer.set_shown("contact forces", False)
+        viewer.export(path, size=SIZE, direction=(0.5, -1.0, 0.3))
+
+
 @picture("Cart-pole", "State feedback catches a pole that begins at 23 degrees.", ".webp")
 def cart_pole(path: str) -> None:
-    blue, orange, grey = (0.1, 0.4, 0.7, 1.0), (0.9, 0.55, 0.1, 1.0), (0.35, 0.38, 0.42, 1.0)
-    shapes = {
-        "rail": Visual(Box((3.3, 0.04, 0.03)), dynx.Pose((0.0, 0.0, -0.08)), Appearance("grey", grey)),
-        "cart": Visual(Box((0.3, 0.2, 0.12)), material=Appearance("blue", blue)),
-        "pole": Visual(Cylinder(0.02, 0.8), dynx.Pose((0.0, 0.0, 0.4)), Appearance("orange", orange)),
-    }
-    drawn = {link: LinkGeometry((shape,)) for link, shape in shapes.items()}
-    geometry = Geometry({"tip": LinkGeometry(), **drawn})
-    model = dataclasses.replace(dynx.load("cart_pole"), geometry=geometry)
-    robot = SceneRobot("cart_pole", model, q=[0.0, 0.4])
+    robot = SceneRobot("cart_pole", dynx.load("cart_pole"), q=[0.0, 0.4])
     world = World(Scene("cart-pole", robots=[robot]), "mujoco")
     with world, world.view(steps=False) as viewer, viewer.record(path):
         for _ in range(60):
@@ -147,7 +139,7 @@ def contacts(path: str) -> None:
     with World(read_scene("standing"), "mujoco") as world:
         world.step(1500)
         with world.view(steps=False, whole_meshes=True) as viewer:
-            viewer.set_opacity(0.35)
+            viewer.set_shown("force numbers")
             viewer.export(path, size=SIZE)
 
 
@@ -164,18 +156,21 @@ def inertia_ellipsoids(path: str) -> None:
 def frames(path: str) -> None:
     with dynx.load("panda").view(q=[0, -0.5, 0, -2.1, 0, 1.6, 0.8, 0.02], whole_meshes=True) as viewer:
         viewer.set_shown("frames")
-        viewer.set_opacity(0.35)
+        viewer.set_opacity(0.5)
         viewer.export(path, size=SIZE)
 
 
-@picture("Two engines", "One shot in PyBullet, solid, and in MuJoCo, see-through and blue.", ".webp")
+@picture("Two engines", "A ball hits pins: in PyBullet solid, in MuJoCo see-through and blue.", ".webp")
 def two_engines(path: str) -> None:
     run = compare_engines(read_scene("bowling"), ["pybullet", "mujoco"], duration=1.2, samples=60)
     with Viewer(run, port=0) as viewer:
-        viewer.export(path, size=FILM)
+        viewer.export(path, size=FILM, direction=(-0.7, -1.0, 0.7))
 
 
-@picture("Gravity torques", "An arrow along each joint axis, relative to the limit, and the torque.")
+@picture(
+    "Gravity torques",
+    "Arrows along the joint axes: their length is the torque over its limit, the number the torque.",
+)
 def gravity_torques(path: str) -> None:
     with dynx.load("panda").view(q=[0, 0.5, 0, -1.6, 0, 2.1, 0.8, 0.02], whole_meshes=True) as viewer:
         viewer.set_shown("gravity torques")
@@ -203,7 +198,7 @@ def names(path: str) -> None:
         viewer.export(path, size=SIZE, direction=(1.0, 0.4, 0.4))
 
 
-@picture("A path", "The path of the tip of a double pendulum, as a line of a program.", ".webp")
+@picture("A path", "The path of the tip of a double pendulum: a program draws the line.", ".webp")
 def path_of_a_tip(path: str) -> None:
     rollout = dynx.simulate(
         dynx.load("dynx_double_pendulum", base_pose=dynx.Pose((0.0, 0.0, 2.2))),
@@ -241,7 +236,7 @@ def many_robots(path: str) -> None:
         viewer.export(path, size=SIZE)
 
 
-@picture("A duck", "A mesh that collides as its hull, with its image.")
+@picture("A duck", "A mesh with its image. For contacts its convex hull counts.")
 def duck(path: str) -> None:
     with World(read_scene("duck"), "mujoco") as world:
         world.step(300)
@@ -250,7 +245,7 @@ def duck(path: str) -> None:
             viewer.export(path, size=SIZE)
 
 
-@picture("Mobile robot", "TIAGo, with text of a program.")
+@picture("Mobile robot", "TIAGo, beside a text that the program writes.")
 def mobile_robot(path: str) -> None:
     with dynx.load("tiago").view(whole_meshes=True) as viewer:
         viewer.text("TIAGo", (0.35, 0.4, 0.9), colour="blue", size=26)
@@ -259,33 +254,41 @@ def mobile_robot(path: str) -> None:
 
 HEAD = """# Gallery
 
-Pictures and films that `python -m docs.gallery` draws, each with the code that draws it: by the viewer,
-without a browser and without a graphics processor. The code begins with these lines; `path` is the file, a
-film as `.webp` or a picture as `.png`.
+Each picture or film on this page stands above the program that draws it. The viewer of dynx draws them,
+without a browser and without a graphics processor. The programs need the extras `viewer`, `world`, `film`,
+`mujoco` and `drake`. A program takes up to two minutes; `python -m docs.gallery` runs them all.
 
-```python
-{imports}
-```
-
-A lander is not among them: the lander that dynx plays is Gymnasium's own, which draws itself (extra `box2d`).
+One environment that dynx plays is not here: Gymnasium's own lander (extra `box2d`) draws its own pictures.
 """
 
 
 def page() -> str:
     """Return docs/gallery.md."""
-    source = Path(__file__).read_text(encoding="utf-8")
-    first, last = source.index("import numpy as np"), source.index("\n\nFOLDER")
-    imports = source[first:last].replace("from PIL import Image\n", "")
-    imports = f"import dataclasses\nimport os\n\n{imports}"
-    names = f"{imports}\n\nSIZE, FILM = {SIZE}, {FILM}"
-    parts = [HEAD.format(imports=names)]
+    parts = [HEAD]
     for name, (title, sentence, draw) in PICTURES.items():
         lines = inspect.getsource(draw).splitlines()
         start = next(k for k, line in enumerate(lines) if line.startswith("def ")) + 1
         body = textwrap.dedent("\n".join(lines[start:]))
         file = f"gallery/{Path(name).stem}.webp"
-        parts.append(f"## {title}\n\n{sentence}\n\n![{title}: {sentence}]({file})\n\n```py\n{body}\n```\n")
+        shown = f"![{title}: {sentence}]({file})"
+        code = f"```python\n{first_lines(body, name)}\n{body}\n```"
+        parts.append(f"## {title}\n\n{sentence}\n\n{shown}\n\n{code}\n")
     return "\n".join(parts)
+
+
+def first_lines(code: str, file: str) -> str:
+    """Return the imports of this module that code needs, the sizes, and the path of its file."""
+    words = set(re.findall(r"\w+", code))
+    lines: dict[bool, list[str]] = {False: [], True: []}
+    for node in ast.parse(Path(__file__).read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            node.names = [each for each in node.names if (each.asname or each.name) in words]
+            if node.names:
+                line = ast.unparse(node)
+                lines["dynx" in line].append(line)
+    sizes = [f"{name} = {value}" for name, value in (("SIZE", SIZE), ("FILM", FILM)) if name in words]
+    settings = [*sizes, f'path = "{file}"']
+    return "\n\n".join("\n".join(part) for part in (lines[False], lines[True], settings) if part)
 
 
 def write(name: str) -> None:

@@ -73,13 +73,13 @@ def page(entries: Sequence[Entry]) -> str:
         "# Real robots: why engines differ on them",
         "",
         "Written by `python -m docs.survey`. Every file is loaded by each engine as its users load it, fixed "
-        "and floating, and compared with reference values; see [doctor.md](doctor.md). The effect of a cause "
+        "and floating, and compared with reference values; see [doctor](doctor.md). The effect of a cause "
         "is how much an engine's result changes when that cause alone is removed, relative to the "
         "largest reference value; `no answer` means that the engine refuses the file, or cannot compute the "
         "quantity, until it is removed; `present` means forces of contacts, which have no number. "
-        "Every cause listed is proved. Rules are explained in [rules.md](rules.md).",
+        "Every cause listed is proved. Rules are explained in [rules](rules.md).",
         "",
-        "Figures on public files that the doctor was not developed with: [public_files.md](public_files.md).",
+        "Figures on public files that the doctor was not developed with: [public files](public_files.md).",
         "",
     ]
     for group, title in GROUPS.items():

@@ -12,13 +12,18 @@ import re
 from pathlib import Path
 
 from dynx.backends.quantities import QUANTITIES
-from dynx.engine_names import TABLES, method_call, page_of
+from dynx.engine_names import TABLES, method_call
 
 ROOT = Path(__file__).parents[1]
 BEGIN = "<!-- written: calls -->\n"
 END = "<!-- end -->"
 NAME = r"\b(?:dynx|World|Backend|Model|Scene|SceneRobot|PDMotor|Weld|numpy|gymnasium)(?:\.\w+)*"
-CALL = re.compile(NAME + r"(?:\((?:[^()]|\([^()]*\))*\)|\b)")
+CALL = re.compile(NAME + r"(?:\((?:[^()]|\([^()]*\))*\)|\b)|<\w+>")
+
+
+def page_of(library: str) -> str:
+    """Return the file of the page ``Coming from ...`` for those who come from a library."""
+    return f"docs/coming-from/{library.lower()}.md"
 
 
 def calls(library: str) -> dict[str, str]:

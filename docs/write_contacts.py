@@ -1,23 +1,23 @@
 """Write the tables of docs/contacts.md: the cases, and how far each engine is from mechanics in them.
 
-    python docs/write_contacts.py                 # measures, which takes some minutes
-    python docs/write_contacts.py contacts.json   # takes the document that dynx contacts --json wrote
+    python -m docs.write_contacts                 # measures, which takes some minutes
+    python -m docs.write_contacts contacts.json   # takes the document that dynx contacts --json wrote
 
-Tables stand between ``<!-- written: NAME -->`` and ``<!-- end -->``; the other text of the page is kept.
+Tables stand between the marks of `docs.page_parts`; the other text of the page is kept.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import re
 import subprocess
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from docs.page_parts import replaced, table
 from dynx.cli.contacts import wording
 from dynx.cli.contacts.page import causes, cell_figure
 from dynx.contacts import find_cases
@@ -32,7 +32,7 @@ def main(arguments: Sequence[str]) -> None:
     report = json.loads(Path(arguments[0]).read_text(encoding="utf-8") if arguments else measured())
     text = PAGE.read_text(encoding="utf-8")
     for name, part in {"cases": cases(), **results(report)}.items():
-        text = replaced(text, name, part)
+        text = replaced(PAGE, text, name, part)
     PAGE.write_text(text, encoding="utf-8")
 
 
@@ -71,7 +71,7 @@ def conditions(report: Entry) -> str:
     counts = ", ".join(f"{found.count(each)} {each}" for each in wording.RANKS if each in found)
     verdict_counts = {each: found.count(each) for each in wording.RANKS}
     return (
-        f"Written by `python docs/write_contacts.py` for {engines}, at steps of "
+        f"Written by `python -m docs.write_contacts` for {engines}, at steps of "
         f"{wording.steps_text(report['steps'])}: {len(found)} figures of {len(report['cases'])} cases "
         f"({counts}), {report['runs']} runs. {wording.headline(verdict_counts)}\n"
     )
@@ -166,21 +166,6 @@ def figures(report: Entry) -> str:
                 )
             )
     return table(("case", "figure", "exact", "tolerance", *names), rows)
-
-
-def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table in Markdown."""
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |\n" for line in lines)
-
-
-def replaced(text: str, name: str, part: str) -> str:
-    """The text with what stands between the marks of `name` replaced."""
-    mark = f"<!-- written: {name} -->\n"
-    pattern = re.compile(re.escape(mark) + ".*?(?=<!-- end -->)", re.DOTALL)
-    if not pattern.search(text):
-        sys.exit(f"{PAGE.name} has no place for {name!r}")
-    return pattern.sub(lambda _: mark + part, text)
 
 
 if __name__ == "__main__":

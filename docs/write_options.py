@@ -1,4 +1,4 @@
-"""Write the table of options in docs/simulation.md from their declarations.
+"""Write the table of options in docs/reference/simulation.md from their declarations.
 
     python docs/write_options.py
 
@@ -11,7 +11,7 @@ from pathlib import Path
 
 from dynx.sim.scenario.options import OPTIONS
 
-PAGE = Path(__file__).with_name("simulation.md")
+PAGE = Path(__file__).parent / "reference/simulation.md"
 BEGIN, END = "<!-- written by docs/write_options.py -->\n", "<!-- end -->\n"
 
 

@@ -16,6 +16,7 @@ from dynx.agreement.report import AgreementDocument
 from dynx.bench.report import BenchDocument
 from dynx.cli.compare import CompareDocument
 from dynx.cli.contacts.run import ContactsDocument
+from dynx.cli.convert import ConvertDocument
 from dynx.cli.learning.documents import EnvDistanceDocument, PlayDocument, TasksDocument, TrainDocument
 from dynx.cli.sim.report import SimDocument
 from dynx.cli.sim.tutorial import TutorialDocument
@@ -23,6 +24,7 @@ from dynx.cli.world import WorldDocument
 from dynx.doctor.formats.baseline import BaselineDocument
 from dynx.doctor.report import DoctorDocument
 from dynx.files.documents import json_schema
+from dynx.same.report import SameDocument
 from dynx.sim.scenario.scenario import ScenarioDocument
 from dynx.world.scene.documents import SceneDocument
 
@@ -37,9 +39,11 @@ def schemas() -> dict[str, dict[str, Any]]:
         "bench": json_schema(BenchDocument, "dynx bench --json"),
         "compare": json_schema(CompareDocument, "dynx compare --json"),
         "contacts": json_schema(ContactsDocument, "dynx contacts --json"),
+        "convert": json_schema(ConvertDocument, "dynx convert --json"),
         "doctor": json_schema(DoctorDocument, "dynx doctor --json"),
         "env-distance": json_schema(EnvDistanceDocument, "dynx env distance --json"),
         "play": json_schema(PlayDocument, "dynx play --json"),
+        "same": json_schema(SameDocument, "dynx same --json"),
         "scenario": json_schema(ScenarioDocument, "dynx.Scenario.to_json"),
         "scene": json_schema(SceneDocument, "dynx.world.write_scene", omits_defaults=True),
         "sim": json_schema(SimDocument, "dynx sim --json"),

@@ -7,6 +7,7 @@
     tau = engine.inverse_dynamics(q, v, a)
     report = dynx.agree(model)                      # do all engines return the same numbers?
     report = dynx.diagnose("my.urdf")               # why do they differ when they load the file themselves?
+    report = dynx.same_robot("my.urdf", "my.xml")   # do two files describe the same robot?
     rollout = dynx.simulate(model, controller, reference, plant="pybullet")
 
 Importing dynx imports no engine; each name is imported when it is first used.
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
         rpy_from_rotation,
     )
     from dynx.rbd.regressor import inertial_parameters
+    from dynx.same import SameReport, same_robot
     from dynx.sim import (
         BatchRollouts,
         Noise,
@@ -70,6 +72,7 @@ __all__ = [
     "Pose",
     "PositionMotor",
     "Rollout",
+    "SameReport",
     "Scenario",
     "Scene",
     "ScenePlant",
@@ -99,6 +102,7 @@ __all__ = [
     "rotation_from_rpy",
     "rpy_from_quat",
     "rpy_from_rotation",
+    "same_robot",
     "sim",
     "simulate",
     "simulate_batch",
@@ -122,6 +126,7 @@ _HOME = {
     "Pose": "dynx.model",
     "PositionMotor": "dynx.world",
     "Rollout": "dynx.sim",
+    "SameReport": "dynx.same",
     "Scenario": "dynx.sim",
     "Scene": "dynx.world",
     "ScenePlant": "dynx.sim",
@@ -147,6 +152,7 @@ _HOME = {
     "rotation_from_rpy": "dynx.model.rotations",
     "rpy_from_quat": "dynx.model.rotations",
     "rpy_from_rotation": "dynx.model.rotations",
+    "same_robot": "dynx.same",
     "simulate": "dynx.sim",
     "simulate_batch": "dynx.sim",
 }

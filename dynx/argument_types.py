@@ -3,10 +3,9 @@
     @checks_types
     def closed_form(model: Model, frame: str, ...) -> ClosedForm: ...
 
-A wrong argument raises DTypeError, which names it, what was given and what the annotation allows. Numbers
-and what may be any array (`ArrayLike`) are left to `dynx.model.numbers`, which checks bounds, shape, dtype
-and entries. Annotations are read at the first call; a class that is imported for types alone is known by its
-name until a value has another.
+A wrong argument raises DTypeError. Numbers and what may be any array (`ArrayLike`) are left to
+`dynx.model.numbers`, which checks bounds, shape, dtype and entries. Annotations are read at the first call; a
+class that is imported for types alone is known by its name until a value has another.
 """
 
 from __future__ import annotations
@@ -97,7 +96,7 @@ def _checked(function: Callable[..., Any]) -> Callable[..., Any]:
         try:
             return function(*given, **options)
         except TypeError:
-            answer(called, function, given, options)
+            answer(getattr(checked, "__called__", called), function, given, options)
             raise
 
     checked.__checks_types__ = True  # type: ignore[attr-defined]
@@ -125,9 +124,17 @@ def _wrong_type(function: Callable[..., Any], argument: str | int, value: object
     for kind, maker in _MAKERS.items():
         if re.match(rf"{kind}\b", wanted):
             wanted = f"a {wanted}, such as {maker}({shown(value) if isinstance(value, str) else '...'})"
-    if isinstance(value, list | tuple) and value:
-        test = _tests_of(function)[name]
-        wanted += "; one at a time" if all(map(test, value)) else ""
+    if isinstance(value, list | tuple) and value and all(map(_tests_of(function)[name], value)):
+        wanted += "; one at a time"
+    annotation = _Names(inspect.unwrap(function)).value_of(parameters[name].annotation)
+    if typing.get_origin(annotation) is Literal:
+        *others, last = map(repr, typing.get_args(annotation))
+        wanted = " or ".join(filter(None, (", ".join(others), last)))
+    for each in (annotation, *typing.get_args(annotation)):
+        count = _count_of_arguments(each)
+        if count is not None and callable(value):
+            many = f"{count} argument{'s' * (count != 1)}"
+            return DTypeError(f"{name} is {described(value)}; wanted a function that is called with {many}")
     given = f"the class {value.__name__}" if isinstance(value, type) else shown(value)
     return DTypeError(f"{name} is {given}, of type {type(value).__name__}; wanted {wanted}")
 
@@ -140,6 +147,7 @@ def _written(annotation: object) -> str:
     """Return the text of an annotation, with arrays, robots and truth values as a reader knows them."""
     text = annotation if isinstance(annotation, str) else getattr(annotation, "__name__", str(annotation))
     text = re.sub(r"\b(Floats|Array|Integers)\b", "numpy.ndarray", text)
+    text = re.sub(r"^JointDynamics$", "True (as described) or False; dynx.simulate takes numbers", text)
     text = re.sub(r"^Robot$", "a name, a path, URDF text or a Model", text)
     return re.sub(r"\bbool\b", "True or False", text)
 
@@ -242,7 +250,8 @@ def _test(annotation: Any, names: _Names) -> Test | None:
     if origin.__module__.startswith("numpy"):
         return _is_array if origin.__name__ == "ndarray" else None
     if origin is collections.abc.Callable:  # type: ignore[comparison-overlap]  # a class at runtime
-        return callable
+        count = _count_of_arguments(annotation)
+        return callable if count is None else lambda value: takes(value, count)
     return _container_test(origin, arguments, names)
 
 
@@ -271,6 +280,31 @@ def _container_test(origin: type, arguments: tuple[Any, ...], names: _Names) -> 
     if of_elements is None:
         return None
     return _IterableTest(Sequence if issubclass(origin, Sequence) else origin, of_elements)
+
+
+def _count_of_arguments(annotation: object) -> int | None:
+    """Return the number of arguments of a ``Callable[[A, B], R]``; None for what does not state it."""
+    arguments = typing.get_args(annotation)
+    is_function = typing.get_origin(annotation) is collections.abc.Callable
+    return len(arguments[0]) if is_function and isinstance(arguments[0], list) else None
+
+
+def takes(value: Any, count: int) -> bool:
+    """Check whether a value can be called with `count` arguments by place."""
+    try:
+        inspect.signature(value).bind(*[None] * count)
+    except (TypeError, ValueError) as error:
+        # A ValueError is that of a function without a signature.
+        return callable(value) and isinstance(error, ValueError)
+    return True
+
+
+def described(value: Any) -> str:
+    """Write what is to be a function, with its parameters."""
+    if not callable(value):
+        return f"{shown(value)}, of type {type(value).__name__}"
+    called = getattr(value, "__name__", type(value).__name__)
+    return f"{'a lambda' if called == '<lambda>' else called}, which takes {inspect.signature(value)}"
 
 
 class _IterableTest:

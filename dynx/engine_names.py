@@ -4,7 +4,7 @@ Who knows an engine types its names first: `World.stepSimulation`, `dynx.rnea`, 
 AttributeError of dynx's classes and packages then names dynx's own call, or else the nearest name
 (`explained`), and the page for those who come from that library. So it is with arguments such as
 `timestep`, `qpos` and `mu` (`keyword_of_dynx`). Names of quantities are those of the table of quantities; the
-others stand here. docs/write_coming_from.py writes the tables of the pages from both.
+others stand here. The tables of the pages "Coming from" are written from both.
 """
 
 from __future__ import annotations
@@ -15,7 +15,11 @@ from dynx.backends.quantities import QUANTITIES, Quantity
 from dynx.errors import nearest, shown
 
 _JOINT_LIMITS = "Model.joint(name), with limits, axis and dynamics"
-_MOTORS = "a motor of the joint, such as dynx.PDMotor, in World.step(motors={robot: motor})"
+_MOTORS = (
+    "World.step(motors={robot: dynx.PDMotor(...)}), or TorqueMotor, PositionMotor, VelocityMotor; "
+    "World.step(torques={robot: tau}); a controller of dynx.control in dynx.simulate, such as "
+    "OpenLoop with a table of torques"
+)
 _STATE = "World.state, with robots[name].q and .v"
 _POSE_OF_BODY = "World.state, with bodies[name].T_world_body; the base of a robot is in robots[name].q"
 _SET_STATE = "World.set_state(...), or SceneRobot(q=..., v=...) at the start"
@@ -42,7 +46,8 @@ PYBULLET = {
     "calculateInverseKinematics": "Backend.inverse_kinematics(pose, frame)",
     "calculateInverseKinematics2": "Backend.inverse_kinematics({frame: pose, ...})",
     "changeConstraint": _CONSTRAINT,
-    "changeDynamics": f"{_MATERIAL}, or mass_scale and payload of dynx.simulate",
+    "changeDynamics": f"{_MATERIAL}; the element <dynamics> of a joint in the URDF, for a World; the "
+    "arguments joint_damping, mass_scale and payload of dynx.simulate; link_damping, a setting of World",
     "computeProjectionMatrixFOV": _CAMERA,
     "computeViewMatrix": _CAMERA,
     "computeViewMatrixFromYawPitchRoll": _CAMERA,
@@ -76,8 +81,8 @@ PYBULLET = {
     "getQuaternionFromEuler": f"dynx.quat_from_rpy(rpy): {_EULER}, result x, y, z, w",
     "getVisualShapeData": "Model.geometry",
     "invertTransform": "numpy.linalg.inv(T) of a pose (4, 4), or the transposed rotation",
-    "loadMJCF": f"{_FILES}; MJCF is written by World.to_mjcf, not read",
-    "loadSDF": f"{_FILES}; SDF is not read",
+    "loadMJCF": "dynx.load(path) for a robot; MJCF is written by Model.to_mjcf and World.to_mjcf",
+    "loadSDF": "dynx.load(path) for a robot",
     "loadURDF": f"{_LOADED}, and dynx.world.SceneRobot(name, model) in a Scene",
     "multiplyTransforms": "T_AB @ T_BC of poses (4, 4)",
     "rayTest": "World.cast_rays(origins, directions)",
@@ -152,7 +157,7 @@ MUJOCO = {
     "mj_ray": "World.cast_rays(origins, directions)",
     "mj_resetData": "World.reset()",
     "mj_rne": "Backend.inverse_dynamics(q, v, a)",
-    "mj_saveLastXML": "World.to_mjcf()",
+    "mj_saveLastXML": "World.to_mjcf() or Model.to_mjcf()",
     "mj_step": "World.step()",
     "mj_step1": "World.step()",
     "mj_step2": "World.step()",
@@ -215,6 +220,27 @@ GYMNASIUM = {
 }
 """Functions, classes and attributes of Gymnasium."""
 
+SHORT = {
+    "com": "Backend.center_of_mass(q)",
+    "cubic_spline": "dynx.trajectory.spline(times, waypoints)",
+    "dof": "Model.nv, the number of velocities; Model.nq is that of coordinates",
+    "fd": "Backend.forward_dynamics(q, v, tau)",
+    "fk": "Backend.forward_kinematics(q, frame)",
+    "id": "Backend.inverse_dynamics(q, v, a)",
+    "ik": "Backend.inverse_kinematics(pose, frame)",
+    "linear": "dynx.trajectory.cubic(q0, q1, duration, v0=v, v1=v) with v = (q1 - q0) / duration, at "
+    "constant speed; dynx.trajectory.line(...) for a frame on a straight line in space",
+    "lspb": "dynx.trajectory.trapezoidal(q0, q1, velocity=..., acceleration=...)",
+    "min_jerk": "dynx.trajectory.quintic(q0, q1, duration), the motion of least jerk from rest to rest",
+    "minimum_jerk": "dynx.trajectory.quintic(q0, q1, duration), the motion of least jerk from rest to rest",
+    "ndof": "Model.nv, the number of velocities; Model.nq is that of coordinates",
+    "plant_model": "dynx.sim.plant_model(model, payload)",
+    "quintic_spline": "dynx.trajectory.spline(times, waypoints, kind='quintic')",
+    "to_mjcf": "dynx.world.scene_to_mjcf(scene), of a dynx.world.Scene with the robot",
+    "with_payload": "dynx.sim.plant_model(model, payload)",
+}
+"""Short names that textbooks and the command line have, and names that are elsewhere in dynx."""
+
 TABLES = {
     "PyBullet": PYBULLET,
     "Pinocchio": PINOCCHIO,
@@ -224,11 +250,6 @@ TABLES = {
     "Gymnasium": GYMNASIUM,
 }
 """What does the same in dynx, by library and name."""
-
-
-def page_of(library: str) -> str:
-    """Return the page of the documentation for those who come from a library."""
-    return f"docs/coming-from/{library.lower()}.md"
 
 
 KEYWORDS = {
@@ -308,7 +329,7 @@ MEANINGS = {
     "pose": "a dynx.Pose((x, y, z), (roll, pitch, yaw)) or a matrix (4, 4)",
     "quat_xyzw": "x, y, z, w",
     "rpy": "roll, pitch, yaw [rad]",
-    "size": "all of it, (x, y, z) [m] of a box, (width, height) of a picture",
+    "size": "from side to side: (x, y, z) [m] of a box, (width, height) [pixels] of a picture",
     "wrench": "force, then moment: (6,)",
 }
 """Meaning of arguments whose names elsewhere stand for another quantity or another form."""
@@ -353,6 +374,9 @@ def keyword_of_dynx(word: str, known: Iterable[str]) -> str | None:
 def call_of_dynx(name: str) -> str | None:
     """Return a clause with the call of dynx for the name that an engine has; None for another name."""
     spelling = _spelling(name)
+    for known, call in SHORT.items():
+        if _spelling(known) == spelling:
+            return f"; dynx has {call}"
     for library, table in TABLES.items():
         for known, call in table.items():
             if _spelling(known) == spelling:
@@ -371,7 +395,7 @@ def method_call(quantity: Quantity) -> str:
 
 
 def _clause(name: str, library: str, call: str) -> str:
-    return f"; for {name} of {library} dynx has {call} (see {page_of(library)})"
+    return f"; for {name} of {library} dynx has {call} (see 'Coming from {library}' in the documentation)"
 
 
 def _spelling(name: str) -> str:

@@ -151,7 +151,7 @@ def refuse_options(
     known = [
         each.name
         for each in parameters
-        if each.name not in ("self", "cls") and each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD)
+        if each.name not in ("self", "cls") and each.kind in (each.POSITIONAL_OR_KEYWORD, each.KEYWORD_ONLY)
     ]
     for each in options:
         if each not in known:

@@ -57,6 +57,7 @@ class _Door:
     def __get__(self, instance: object, owner: type) -> Any:
         module, _, name = self.target.partition(":")
         body = method_of(self._owner, self._name, getattr(import_module(module), name))
+        body.__called__ = self._name  # in errors on keywords
         if isinstance(self.stub, classmethod):
             body = classmethod(body)
         setattr(self._owner, self._name, body)

@@ -1,9 +1,9 @@
 """Time limits of searches: what the option `timeout` [s] means.
 
 A search asks between two pieces of its work whether its time is over, and returns the best found so far: it
-takes longer by the pieces at its end, at most the distances of two configurations, and by no more than a
-tenth where those are shorter. Time in which modules are imported, kernels compiled or loaded, and shapes
-prepared does not count: it is spent once for a process, a robot or a scene, and is no search.
+takes longer by the piece at its end, such as a descent's step or the distance of a pair of bodies, and by no
+more than a tenth where those are shorter. Time in which modules are imported, kernels compiled or loaded, and
+shapes prepared does not count: it is spent once for a process, a robot or a scene, and is no search.
 """
 
 from __future__ import annotations

@@ -48,7 +48,7 @@ settings.register_profile("coverage", parent=settings.get_profile("mutation"), m
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
 
 LONGEST = (
-    "tests/test_readme.py::test_python_blocks",
+    "tests/test_readme.py::test_blocks_run_alone",
     "tests/properties/",
     "tests/surveys/test_raw_engines.py",
     "tests/test_benchmarks_run.py",

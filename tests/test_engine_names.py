@@ -154,3 +154,19 @@ def test_a_name_written_with_underscores_is_the_same(name: str) -> None:
     snake = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
     assert call_of_dynx(snake) is not None
     assert call_of_dynx(f"{name}x") is None
+
+
+@pytest.mark.parametrize(
+    ("owner", "name", "call"),
+    [
+        ("Model", "dof", "Model.nv"),
+        ("Model", "with_payload", "dynx.sim.plant_model(model, payload)"),
+        ("compiled", "com", "Backend.center_of_mass(q)"),
+        ("compiled", "fk", "Backend.forward_kinematics(q, frame)"),
+        ("compiled", "ik", "Backend.inverse_kinematics(pose, frame)"),
+        ("dynx", "plant_model", "dynx.sim.plant_model(model, payload)"),
+    ],
+)
+def test_short_names_name_the_call(doors: dict[str, Any], owner: str, name: str, call: str) -> None:
+    with pytest.raises(AttributeError, match=re.escape(f"; dynx has {call}")):
+        getattr(doors[owner], name)

@@ -68,7 +68,7 @@ HINTS: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "half of a box": (
         lambda: untyped.world.box("b", half_extents=(1, 1, 1)),
-        "did you mean 'size', all of it",
+        r"did you mean 'size', from side to side: \(x, y, z\) \[m\] of a box",
     ),
     "noise of an IMU": (lambda: untyped.world.Imu("i", "tool0", noise=0.1), "'accelerometer', dynx.world.Se"),
     "a robot by its maker": (lambda: dynx.load("franka"), "did you mean 'panda'"),
@@ -192,9 +192,10 @@ def test_a_list_of_wrong_objects_is_not_said_to_be_too_many() -> None:
 
 
 OTHER_FILES = {
-    "a.sdf": ("<sdf version='1.6'><world name='w'/></sdf>", "this file is SDF, Gazebo's format"),
-    "a.world": ("<?xml version='1.0'?><sdf><model name='m'/></sdf>", "this file is SDF, Gazebo's format"),
-    "a.xml": ("<mujoco><worldbody/></mujoco>", "this file is MJCF, MuJoCo's format"),
+    "a.sdf": ("<world name='w'/>", "this file is a part of SDF, whose root is <sdf>"),
+    "b.xml": ('<gazebo version="1.0"/>', "dynx reads versions 1.4 to 1.12"),
+    "empty.sdf": ("", "wanted <sdf version=...>"),
+    "a.xml": ("<model><link/></model>", "the root element is <model>; wanted <robot>"),
     "a.dae": ("<COLLADA/>", "this file is a mesh; dynx.world.mesh"),
     "a.stl": ("solid a", "not XML.*a file .stl is a mesh; dynx.world.mesh"),
     "a.usda": ("#usda 1.0", "not XML.*a file .usda is USD, which dynx does not read"),

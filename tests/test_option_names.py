@@ -66,6 +66,13 @@ def test_keywords_that_do_not_fit(options: dict[str, Any], error: type[Exception
         act(**options)
 
 
+@pytest.mark.parametrize(("method", "known"), [("to_mjcf", ""), ("to_urdf", "; known: geometry")])
+def test_a_method_with_its_body_elsewhere_names_itself(method: str, known: str) -> None:
+    call = getattr(dynx.load("pendulum"), method)
+    with pytest.raises(UnknownNameError, match=rf"^{method} has no option 'foo'{known}$"):
+        call(foo=1)
+
+
 def test_a_type_error_of_the_body_is_not_changed() -> None:
     with pytest.raises(TypeError, match="has no len"):
         act(forces=3, duration=1.0)
@@ -114,7 +121,7 @@ def test_a_function_that_takes_a_dataclass_has_its_signature_and_documents_its_o
     assert before.strip().endswith("At a target.")
     lines = [line for line in options.splitlines() if line.strip()]
     assert len(lines) == 1
-    assert lines[0].startswith("    speed: Speed of release")
+    assert lines[0].startswith("- `speed`: Speed of release")
     assert "m/s" in lines[0]
 
 

@@ -126,6 +126,14 @@ def test_the_action_fails_on_a_robot_that_engines_load_differently(
     for robot, status in (("robots/alike.urdf", 0), (f"\nrobots/alike.urdf\nrobots/{differs.name}\n", 1)):
         result = run(EXAMINE["run"], runner | variables(EXAMINE, robots=robot, engines=engines), tmp_path)
         assert result.returncode == status, result.stdout + result.stderr
+    chosen = {"robots": f"robots/{differs.name}", "engines": engines}
+    for options, status in (({"ignore": "DX301,DX101"}, 0), ({"only": "DX101"}, 0), ({"only": "DX301"}, 1)):
+        result = run(EXAMINE["run"], runner | variables(EXAMINE, **chosen, **options), tmp_path)
+        assert result.returncode == status, result.stdout + result.stderr
+        assert ("::notice title=1 finding ignored::DX301" in result.stdout) == (not status)
+    (tmp_path / "output").unlink()
+    robot = f"\nrobots/alike.urdf\nrobots/{differs.name}\n"
+    run(EXAMINE["run"], runner | variables(EXAMINE, robots=robot, engines=engines), tmp_path)
     assert not list(tmp_path.rglob("executed"))
     outputs = dict(
         line.split("=", 1) for line in (tmp_path / "output").read_text(encoding="utf-8").splitlines()

@@ -22,6 +22,7 @@ from dynx.doctor import results_document as doctor_document
 from dynx.doctor.formats.baseline import baseline_document
 from dynx.errors import DescriptionError
 from dynx.files.documents import json_text
+from dynx.same import same_robot
 from dynx.sim import Noise, Payload, compare, simulate
 from dynx.sim.scenario.scenario import Scenario
 from dynx.trajectory import cycloidal
@@ -76,6 +77,13 @@ def test_documents_of_the_doctor_keep_their_schema() -> None:
     assert found.findings
     document = doctor_document([found, alike(), differing(), hostile(), refused()], not_done=["later"])
     assert errors("doctor", document) == []
+
+
+def test_documents_of_same_keep_their_schema() -> None:
+    text = load("ur5").to_urdf()
+    other = text.replace('mass value="2.275"', 'mass value="2.3"')
+    for second in (text, other, "double_pendulum"):
+        assert errors("same", same_robot("ur5", second).to_dict()) == []
 
 
 def test_baselines_keep_their_schema() -> None:

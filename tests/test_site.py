@@ -42,6 +42,40 @@ def public_names() -> dict[str, list[str]]:
 
 PUBLIC = public_names()
 
+EXAMPLES = {
+    "dynx": (
+        "Backend BatchRollouts Derivatives ExternalForce IKResult Model Noise PDMotor Payload "
+        "Pose PositionMotor Rollout Scenario Scene ScenePlant Simulation TorqueMotor "
+        "VelocityMotor World agree backend compare compare_as_loaded diagnose inertial_parameters "
+        "installed_backends inverse_kinematics load parametric quat_from_rpy robots "
+        "rotation_from_quat rotation_from_rpy rpy_from_rotation same_robot simulate simulate_batch"
+    ),
+    "dynx.contacts": "conform",
+    "dynx.control": (
+        "BulletPositionMotor ComputedTorque Controller DiscreteComputedTorque Encoders "
+        "FeedForward FrictionCompensation GravityCompensatedPD Impedance MomentumObserver "
+        "MotorLag OpenLoop OperationalSpace PD PID Saturated model_dynamics"
+    ),
+    "dynx.distance": "Hull distance",
+    "dynx.envs": "Randomization make_environment",
+    "dynx.ik": "FrameTarget closed_form",
+    "dynx.ik.tracking": "track",
+    "dynx.model": "Joint Link",
+    "dynx.sim": "plant_model",
+    "dynx.testing": "agreement_tests assert_same_robot",
+    "dynx.trajectory": (
+        "Identifiability Setpoint Trajectory check concatenate cubic cycloidal excitation from_function "
+        "line quintic s_curve spline time_optimal time_optimal_path trapezoidal violations"
+    ),
+    "dynx.viewer": "Viewer view",
+    "dynx.world": (
+        "Camera ContactSensor Encoder ForceTorqueSensor Imu JointTorqueSensor Material Picture "
+        "RaySensor SceneRobot Weld box capsule cylinder ground read_scene scene_to_mjcf sphere "
+        "write_scene"
+    ),
+}
+"""Names, by their module, that most users meet: the entry of each has an example."""
+
 
 @cache
 def value(name: str) -> object:
@@ -72,6 +106,15 @@ def test_every_entry_is_public_and_stands_once() -> None:
     assert len(names) == len(set(names))
     public = {f"{module}.{name}" for module, declared in PUBLIC.items() for name in declared}
     assert set(names) - public == set()
+
+
+def test_what_users_meet_has_an_example() -> None:
+    """Below its entry; tests/test_readme.py runs a sample of the examples, tests/page_blocks.py all."""
+    pages = "\n".join(path.read_text(encoding="utf-8") for path in (DOCS / "reference/api").glob("*.md"))
+    shown = re.findall(r"^\.\. auto\w+:: ([\w.]+)\n\n {3}\.\. code-block:: python$", pages, re.MULTILINE)
+    wanted = [f"{module}.{name}" for module, names in EXAMPLES.items() for name in names.split()]
+    assert len(wanted) >= 80
+    assert sorted(shown) == sorted(wanted)
 
 
 def targets(path: Path) -> list[str]:

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dynx.cli.doctor.run import FIX_TOLERANCE
 from dynx.doctor import diagnose
 from dynx.doctor.examination import temporary_urdf, without_meshes
 from dynx.engines.silence import silence
@@ -271,12 +272,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("source", type=Path, help="folder, or text file with one path per line")
     parser.add_argument("--base", choices=["fixed", "floating", "both"], default="both")
-    parser.add_argument("--fix-tolerance", type=float, help="largest effect that a corrected file keeps")
+    parser.add_argument(
+        "--fix-tolerance",
+        type=float,
+        default=FIX_TOLERANCE,
+        help="largest effect that a corrected file keeps (default: that of `dynx doctor --fix`)",
+    )
     add_options(parser)
     options = parser.parse_args()
     bases: list[Base] = ["fixed", "floating"] if options.base == "both" else [options.base]
     paths = listed(options.source)
-    tasks = make_tasks(paths, bases, options.engines, options.mended, options.fix_tolerance)
+    tasks = make_tasks(
+        paths, bases, options.engines, options.mended, options.fix_tolerance if options.mended else None
+    )
     entries = survey(tasks, options.jobs, options.seconds, options.json)
     root = Path(os.path.commonpath(paths)) if len(paths) > 1 else Path(paths[0]).parent
     for line in summary(entries, root):

@@ -11,7 +11,10 @@ that ``docs/`` or ``tests/`` name. Of each it takes the first three files that e
 of the SHA-256 of repository and path, until there are 150. It leaves out sources of xacro, texts without a
 ``<robot>``, pointers to large files, and files whose text (up to white space) or names of links and joints
 are those of a file of example-robot-data, pybullet_data, dynx or the list. Malformed files stay. The first
-half is to develop on; a repository is in one half only.
+half is to develop on, the second to measure.
+
+The third part, ``unseen``, was added later: the next 50 files, by the same rule, from the repositories that
+follow. A repository is in one part only.
 
 ``extract`` writes the files of the list, checked against their SHA-256, with meshes, textures and packages of
 their repositories, and prints the paths.
@@ -34,10 +37,13 @@ from dynx.model.library import own_roots, robots
 HERE = Path(__file__).parent
 SEARCH, LIST = HERE / "public_search.txt", HERE / "public_files.tsv"
 
-FILES, PER_REPOSITORY = 150, 3
+PARTS = {"develop": 0, "bar": 75, "unseen": 150}
+"""Parts of the list, and the number of files in front of each; one repository is never divided."""
 
-PARTS = ("develop", "bar")
-"""The first half of the list, and the second."""
+ENDS = (150, 200)
+"""Numbers of files at which the list ended, at first and today; no repository reaches beyond them."""
+
+PER_REPOSITORY = 3
 
 _BESIDE = (".stl", ".dae", ".obj", ".mtl", ".glb", ".gltf", ".png", ".jpg", ".jpeg", ".tga", "/package.xml")
 """Endings of files, in lower case, that descriptions refer to."""
@@ -59,17 +65,21 @@ class PublicFile:
 def searched() -> list[str]:
     """Repositories that the search found, in the order of the hashes of their names."""
     found = {repository for line in _lines(SEARCH) for repository in line.partition(":")[2].split()}
-    return sorted(found, key=lambda repository: _digest(repository.lower()))
+    return sorted(found, key=lambda repository: sha256_of(repository.lower()))
 
 
 def files_of(snapshot: Path, repository: str) -> Iterator[tuple[str, str]]:
     """Yield path and text of the descriptions in a snapshot, in the order of their hashes."""
-    names = _git(snapshot, "ls-tree", "-r", "-z", "--name-only", "HEAD").decode(errors="replace").split("\0")
+    names = (
+        snapshot_output(snapshot, "ls-tree", "-r", "-z", "--name-only", "HEAD")
+        .decode(errors="replace")
+        .split("\0")
+    )
     for path in sorted(
-        (name for name in names if name.endswith(".urdf")), key=lambda name: _digest(f"{repository}/{name}")
+        (name for name in names if name.endswith(".urdf")), key=lambda name: sha256_of(f"{repository}/{name}")
     ):
         try:
-            text = _git(snapshot, "cat-file", "blob", f"HEAD:{path}").decode(errors="replace")
+            text = snapshot_output(snapshot, "cat-file", "blob", f"HEAD:{path}").decode(errors="replace")
         except subprocess.CalledProcessError:
             continue
         if "<robot" in text and "<xacro:" not in text and not text.startswith("version https://git-lfs"):
@@ -85,20 +95,20 @@ def public_files(snapshots: Path) -> Iterator[PublicFile]:
         snapshot = snapshots / repository.replace("/", "+")
         if repository.lower() in named or not snapshot.is_dir():
             continue
-        part = PARTS[0] if count < FILES // 2 else PARTS[1]
+        part = [name for name, before in PARTS.items() if count >= before][-1]
         taken = 0
         for path, text in files_of(snapshot, repository):
             keys = _keys(text)
             if not seen.isdisjoint(keys):
                 continue
             seen |= keys
-            commit = _git(snapshot, "rev-parse", "HEAD").decode().strip()
-            yield PublicFile(part, repository, commit, path, _digest(text))
+            commit = snapshot_output(snapshot, "rev-parse", "HEAD").decode().strip()
+            yield PublicFile(part, repository, commit, path, sha256_of(text))
             taken, count = taken + 1, count + 1
-            if count == FILES:
-                return
-            if taken == PER_REPOSITORY:
+            if taken == PER_REPOSITORY or count in ENDS:
                 break
+        if count == ENDS[-1]:
+            return
 
 
 def extract(snapshots: Path, folder: Path, part: str | None = None) -> Iterator[Path]:
@@ -107,7 +117,9 @@ def extract(snapshots: Path, folder: Path, part: str | None = None) -> Iterator[
         if part not in (None, each.part):
             continue
         snapshot = snapshots / each.repository.replace("/", "+")
-        names = _git(snapshot, "ls-tree", "-r", "-z", "--name-only", each.commit).decode(errors="replace")
+        names = snapshot_output(snapshot, "ls-tree", "-r", "-z", "--name-only", each.commit).decode(
+            errors="replace"
+        )
         beside = (name for name in names.split("\0") if f"/{name}".lower().endswith(_BESIDE))
         root = folder / each.repository.replace("/", "+")
         for name in (each.path, *beside):
@@ -115,12 +127,12 @@ def extract(snapshots: Path, folder: Path, part: str | None = None) -> Iterator[
             if target.exists() or not target.resolve().is_relative_to(root.resolve()):
                 continue
             try:
-                data = _git(snapshot, "cat-file", "blob", f"{each.commit}:{name}")
+                data = snapshot_output(snapshot, "cat-file", "blob", f"{each.commit}:{name}")
             except subprocess.CalledProcessError:
                 continue  # A file that is too large for the snapshot.
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(data)
-        if _digest(_text(root / each.path)) != each.digest:
+        if sha256_of(_text(root / each.path)) != each.digest:
             raise ValueError(f"{each.repository}/{each.path} is not the file of the list")
         yield root / each.path
 
@@ -142,10 +154,10 @@ def _known_files() -> Iterator[Path]:
 def _keys(text: str) -> set[str]:
     """Return what two copies of one description share: the text up to white space, the names."""
     names = sorted(f"{tag} {name}" for tag, name in _NAME.findall(text))
-    return {_digest("".join(text.split())), _digest("\n".join(names))}
+    return {sha256_of("".join(text.split())), sha256_of("\n".join(names))}
 
 
-def _digest(text: str) -> str:
+def sha256_of(text: str) -> str:
     return sha256(text.encode(errors="replace")).hexdigest()
 
 
@@ -165,7 +177,7 @@ def _tracked(folder: str) -> list[Path]:
     return [root / name for name in names.split("\0") if name and not name.endswith(".png")]
 
 
-def _git(snapshot: Path, *arguments: str) -> bytes:
+def snapshot_output(snapshot: Path, *arguments: str) -> bytes:
     command = ["git", f"--git-dir={snapshot}", *arguments]
     return subprocess.run(command, check=True, capture_output=True).stdout
 
@@ -176,7 +188,7 @@ def main(arguments: Iterable[str] | None = None) -> None:
     parser.add_argument("command", choices=["list", "extract"])
     parser.add_argument("snapshots", type=Path, help="folder of Git directories OWNER+NAME")
     parser.add_argument("folder", type=Path, nargs="?", help="folder for the extracted files")
-    parser.add_argument("--part", choices=PARTS)
+    parser.add_argument("--part", choices=tuple(PARTS))
     options = parser.parse_args(None if arguments is None else list(arguments))
     if options.command == "list":
         writer = csv.writer(sys.stdout, delimiter="\t", lineterminator="\n")

@@ -4,8 +4,8 @@
 
 Bodies of 1 kg slide on level ground, and their normal force is read after every step: that of the last step
 (`World.contacts`) and the mean over an interval (`World.mean_contacts`). By mechanics it is the weight. The
-table of docs/world.md has the standard deviation of what is read, relative to the weight: for each engine the
-least and the largest of the bodies.
+table of docs/results.md has the standard deviation of what is read, relative to the weight. For each engine
+it has the least and the largest of the bodies.
 """
 
 from __future__ import annotations

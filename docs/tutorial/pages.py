@@ -61,7 +61,8 @@ def notebook(page: str, *, small: bool = False) -> dict[str, Any]:
     for part in parts(page):
         if part.language == "python":
             text = reduced(part.text) if small else part.text
-            cell = {"cell_type": "code", "outputs": [], "execution_count": None, "source": text.rstrip("\n")}
+            cell: dict[str, Any] = {"cell_type": "code", "outputs": [], "execution_count": None}
+            cell["source"] = text.rstrip("\n")
             cell["metadata"] = {"jupyter": {"source_hidden": True}} if part.folded else {}
         elif part.language == "text":
             continue  # the notebook prints it

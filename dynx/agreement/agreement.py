@@ -250,10 +250,10 @@ def _label(model: object) -> str:
 
 @dataclass(frozen=True)
 class AgreementTask:
-    """A robot and the options of its comparison; None stands for the default of `dynx.agree`."""
+    """A robot and the options of its comparison; None stands for the default of `load` or `dynx.agree`."""
 
     robot: str
-    base: Base
+    base: Base | None
     lock: tuple[tuple[str, float], ...]
     backends: tuple[str, ...] | None
     samples: int | None

@@ -62,7 +62,7 @@ class Backend(QuantityCalls):
     A batch is a Python loop over the engine's calls unless the class is `vectorized`; NumPy evaluates a batch
     of the backend ``reference`` at once. The backend ``compiled`` gives the same numbers to rounding, and
     evaluates a batch for UR5 at least about 60 times as fast (``dynx bench ur5 --batch 65536 --threads 1``;
-    docs/bench.md recommends a backend for each use).
+    ``dynx bench`` measures each on your machine).
 
     Raises errors of `dynx.errors` only. With ``validate=False`` arguments are not checked: they must be
     float64 arrays of the right shape, and the result for any other is undefined.

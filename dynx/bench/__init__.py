@@ -1,7 +1,7 @@
 """Benchmarks of backends and other libraries on the user's machine and robot; results are checked first.
 
 A `Plan` lists what is timed, a `Session` times it, and `document` converts the measurements to JSON values.
-The command is `dynx bench`; docs/bench.md describes it.
+The command is `dynx bench`.
 """
 
 from typing import TYPE_CHECKING

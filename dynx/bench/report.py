@@ -1,4 +1,4 @@
-"""The results of a session as a JSON document, which docs/bench.md describes."""
+"""The results of a session as a JSON document."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ def agree(
     robots: tuple[str, ...],
     backends: tuple[str, ...] | None,
     as_loaded: bool,
-    base: Base,
+    base: Base | None,
     base_pose: list[float] | None,
     lock: Locks,
     samples: int | None,
@@ -50,7 +50,7 @@ def agree(
         compare: Callable[..., int] = import_object("dynx.cli.doctor.as_loaded:compare")
         return compare(
             robots,
-            base,
+            base or "fixed",
             backends,
             samples,
             seed,

@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,13 +22,13 @@ from dynx.model.geometry import Geometry
 from dynx.model.library import robots, scene_names
 from dynx.model.loading import load
 from dynx.model.tree import Base
-from dynx.sim import Rollout
-from dynx.steppers.registry import installed_worlds
 from dynx.viewer import Viewer
-from dynx.viewer.motion import FRAME_RATE, MAX_FRAMES
-from dynx.world import World
-from dynx.world.comparison import WorldComparison, compare_engines
-from dynx.world.scene import read_scene
+
+# A robot is on the page sooner without simulations and worlds, which others need alone.
+if TYPE_CHECKING:
+    from dynx.sim import Rollout
+    from dynx.world import World
+    from dynx.world.comparison import WorldComparison
 
 
 def view(
@@ -69,17 +69,13 @@ def view(
     hints: tuple[str, ...] = ()
     options: dict[str, Any]
     if kind == "robot":
-        opened = load_robot(targets[0], base or "fixed")
+        opened = load_robot(targets[0], base)
         start = None if q is None else configuration(opened, q)
         options = {"q": start, "engine": single_engine(engines), "collisions": collisions}
     elif kind == "scene":
-        from dynx.cli.view import open_scene
-
         opened = open_scene(targets[0], export_path, compare, engines, duration, dt)
         options = moves
     else:
-        from dynx.cli.view import has_shapes, read_rollout
-
         rollouts = tuple(read_rollout(target, shapes) for target in targets)
         if shapes is None and not all(map(has_shapes, rollouts)):
             hints = ("--shapes ROBOT, a name or a file, draws a rollout with the shapes of its robot",)
@@ -163,7 +159,7 @@ def _kind_of(target: str) -> str:
     return "scene" if suffix in _SCENES or target in scene_names() else "robot"
 
 
-def load_robot(target: str, base: Base) -> Model:
+def load_robot(target: str, base: Base | None) -> Model:
     """Load a robot; where there is none of that name, the error names a scene with a similar one."""
     try:
         return load(target, base=base)
@@ -191,6 +187,8 @@ def read_rollout(path: str, shapes: str | None) -> Rollout:
     Without one it has the shapes of the robot of the library that has its name and its joints, if there is
     one: the file came from anyone, so it does not choose which files are read.
     """
+    from dynx.sim import Rollout
+
     if not os.path.isfile(path):
         other = irregularity(path)
         raise RobotNotFoundError(f"no file {shown(path, 300)}{f': {other}' if other else ''}")
@@ -266,6 +264,12 @@ def open_scene(
     dt: float | None,
 ) -> World | WorldComparison:
     """Return the world of a scene, or its recorded motion for an export and for a comparison."""
+    from dynx.steppers.registry import installed_worlds
+    from dynx.viewer.motion import FRAME_RATE, MAX_FRAMES
+    from dynx.world import World
+    from dynx.world.comparison import compare_engines
+    from dynx.world.scene import read_scene
+
     scene, step = read_scene(target), DEFAULT_STEP if dt is None else dt
     if export_path is None and not compare:
         if duration is not None:

@@ -60,6 +60,7 @@ def world(
     dt: float,
     substeps: int,
     settings: Sequence[tuple[str, str]],
+    keyframe: str | None,
     contact_interval: float | None,
     within: float | None,
     json_path: str | None,
@@ -79,7 +80,8 @@ def world(
         for option, value in given_options.items():
             if value is not None:
                 raise ArgumentError(f"{option} is given with --export, which runs nothing")
-        return _export(scene, export_path, engines, dt, substeps, settings, quiet=quiet)
+        described = read_scene(scene, keyframe=keyframe)
+        return _export(described, export_path, engines, dt, substeps, settings, quiet=quiet)
     check_json(json_path)
     for path in (plot_path, save_path):
         if path is not None:
@@ -89,7 +91,7 @@ def world(
     if plot_path is not None:
         picture_format(plot_path)
     chosen = engines or installed_worlds()
-    described = read_scene(scene)
+    described = read_scene(scene, keyframe=keyframe)
     given = settings_by_engine(chosen, settings)
     errors: list[DynxError | None] = []
 
@@ -125,7 +127,7 @@ def world(
 
 
 def _export(
-    scene: str,
+    scene: Scene,
     path: str,
     engines: Sequence[str] | None,
     dt: float,
@@ -142,13 +144,13 @@ def _export(
         )
     engine = engines[0] if engines else "mujoco"
     given = settings_by_engine(tuple(dict.fromkeys((engine, "mujoco"))), settings)
-    files, notes = export(read_scene(scene), path, engine, dt, substeps, given)
+    files, notes = export(scene, path, engine, dt, substeps, given)
     if (engines or settings or substeps > 1) and not is_mjcf(path):
         notes = ["the engine, its steps and its settings are those of a world; MJCF alone has them"]
     if not quiet:
         for file in files:
             console().print(f"wrote {one_line(file)}")
-        for note in notes:
+        for note in (*map(str, scene.notes), *notes):
             console().print(f"note: {one_line(note)}", style="yellow")
     return DONE
 

@@ -14,6 +14,6 @@ class Status(IntFlag):
     DIVERGED = 2
     """The velocity after the step is not finite or too large to be meaningful."""
     AT_LIMIT = 4
-    """A joint is beyond a position limit, to which it is to be stopped before the next step."""
+    """A joint passed a position limit, to which it is to be stopped before the next step."""
     UNSETTLED = 8
     """It is not settled which joints stick: the step is to be repeated with corrected modes."""

@@ -9,15 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from math import isfinite
+from typing import Any, NamedTuple
 
 from dynx.compiled.status import Status
 from dynx.errors import TraceError, UnsupportedFeatureError
+from dynx.model import Model
 from dynx.simd.cache import load_kernel, program_recipe
 from dynx.simd.call_sequence import CallSequence, Integers, StridedRows
 from dynx.simd.kernel import Kernel
 from dynx.simd.trace import trace
+from dynx.simd.user_code.arrays import traced_array
+from dynx.simd.user_code.numbers import as_symbol
 from dynx.spatial.scalar import Array, Floats
+from dynx.steppers.joint_stops import bounds_of_step
+from dynx.steppers.layout import stop_positions
 
 MAX_CACHED_KERNELS = 32
 """Number of kernels that this process keeps for later steps with an equal key."""
@@ -131,3 +137,17 @@ class BoundSteps:
     def repeat_group(self, step: int, lane: int) -> None:
         """Repeat a step for one vector of lanes, from number `lane` on."""
         self._calls.repeat_group(step - self.first, lane)
+
+
+def position_excess(model: Model, start: Array, q: Array, found: Any = 0.0) -> Any:
+    """Return a number that is positive if a joint passed a position limit in a step from the configuration
+    `start` (nq,) to q (nq,), or if `found` is, for symbols."""
+    joints = slice(7 if model.floating else 0, None)
+    limits = stop_positions(model)
+    bounds = bounds_of_step(traced_array(start[joints]), *limits)
+    for x, lower, upper, low, high in zip(q[joints], *limits, *bounds, strict=True):
+        beyond = [low - x] if isfinite(lower) else []
+        beyond += [x - high] if isfinite(upper) else []
+        for each in beyond:
+            found = as_symbol(each).maximum(found)
+    return found

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from threading import Lock
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, overload, runtime_checkable
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from dynx.model.numbers import is_real
 from dynx.rbd.kinematics import body_poses
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous
+from dynx.time_limit import UNLIMITED, TimeLimit
 
 SAMPLES = 50
 """Random configurations that tell whether two links touch by the way that they are modelled."""
@@ -264,8 +265,19 @@ class Avoidance:
         """Return the names of the bodies of a pair."""
         return self.parts[pair.a].name, self.parts[pair.b].name
 
-    def near(self, backend: FrameKinematics, q: Floats, beyond: float = 0.0) -> list[NearPair]:
-        """Return the pairs at q (nq,) whose distance may be below the margin plus `beyond` [m]."""
+    @overload
+    def near(self, backend: FrameKinematics, q: Floats, beyond: float = 0.0) -> list[NearPair]: ...
+
+    @overload
+    def near(
+        self, backend: FrameKinematics, q: Floats, beyond: float = 0.0, *, time_limit: TimeLimit
+    ) -> list[NearPair] | None: ...
+
+    def near(
+        self, backend: FrameKinematics, q: Floats, beyond: float = 0.0, *, time_limit: TimeLimit = UNLIMITED
+    ) -> list[NearPair] | None:
+        """Return the pairs at q (nq,) whose distance may be below the margin plus `beyond` [m]; None if the
+        time was over before every pair was examined."""
         poses: dict[Any, Floats] = {
             frame: backend.forward_kinematics(q, frame) for frame in self._frames if frame is not None
         }
@@ -277,18 +289,32 @@ class Avoidance:
             ]
             found = []
             for pair in self.pairs:
+                if time_limit.is_over():
+                    return None
                 separation = separation_of(placed[pair.a], placed[pair.b], pair.margin + beyond)
                 if separation is not None:
                     found.append(NearPair(pair, separation))
         return found
 
-    def violated(self, backend: FrameKinematics, q: Floats) -> list[NearPair]:
-        """Return the pairs that are not proved to keep their margin at q (nq,)."""
-        return [each for each in self.near(backend, q) if not each.is_clear]
+    @overload
+    def violated(self, backend: FrameKinematics, q: Floats) -> list[NearPair]: ...
 
-    def is_clear(self, backend: FrameKinematics, q: Floats) -> bool:
-        """Return whether all pairs are proved to keep their margins at q (nq,)."""
-        return not self.violated(backend, q)
+    @overload
+    def violated(
+        self, backend: FrameKinematics, q: Floats, *, time_limit: TimeLimit
+    ) -> list[NearPair] | None: ...
+
+    def violated(
+        self, backend: FrameKinematics, q: Floats, *, time_limit: TimeLimit = UNLIMITED
+    ) -> list[NearPair] | None:
+        """Return the pairs that are not proved to keep their margin at q (nq,); None if the time was over
+        before every pair was examined."""
+        near = self.near(backend, q, time_limit=time_limit)
+        return None if near is None else [each for each in near if not each.is_clear]
+
+    def is_clear(self, backend: FrameKinematics, q: Floats, time_limit: TimeLimit = UNLIMITED) -> bool:
+        """Return whether all pairs are proved to keep their margins at q (nq,), before the time is over."""
+        return self.violated(backend, q, time_limit=time_limit) == []
 
     def gradients(self, backend: FrameKinematics, q: Floats, near: Sequence[NearPair]) -> Floats:
         """Return the derivatives (n, nv) of the distances of pairs at q."""

@@ -178,6 +178,10 @@ class CauseAttributor:
             for each in faults:
                 own = {name: effect for name, effect in shared.items() if name in unclear}
                 measured[each] = measured.get(each, {}) | own
+        # The remedy at one place can mend the others too, so that each seems to have no effect.
+        joint = {name for name in self._large(whole) if not any(name in each for each in measured.values())}
+        for each in found:
+            measured[each] |= {name: whole[name] for name in joint}
         return [self._attribution(rule, each, measured[each]) for each in found]
 
     def _effects_at(
@@ -458,7 +462,11 @@ def coarsest_mending(
             break
     kept = sorted({rule for rule, _, _ in left}) if chosen is not best else []
     sentence = f"left {', '.join(kept)} where the effect is at most {tolerance:g}" if kept else None
-    return _with_fewest_digits(case, chosen, examiner, bound), sentence
+    short = _with_fewest_digits(case, chosen, examiner, bound)
+    if short is not chosen:
+        digits = f"wrote new numbers with the fewest digits that keep every engine within {bound:g}"
+        sentence = digits if sentence is None else f"{sentence}; {digits}"
+    return short, sentence
 
 
 _LARGE_SHARES = (1.0, 0.1, 0.01)

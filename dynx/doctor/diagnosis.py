@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
@@ -48,6 +49,7 @@ from dynx.doctor.mending import (
     readable,
     reading_change,
     refusal,
+    refusing_rules,
     remedy_of,
 )
 from dynx.doctor.report import (
@@ -66,6 +68,7 @@ from dynx.errors import ArgumentError, DescriptionError, DynxError, UnknownNameE
 from dynx.loaded import COMMON_VARIANTS, ENGINES, VARIANTS, engine_of, installed_engines, loader_class
 from dynx.loaded.difference import model_difference
 from dynx.model import Model
+from dynx.model.documents import bare_urdf
 from dynx.model.loading import read_description
 from dynx.model.numbers import checked_seed, is_real, whole_number
 from dynx.model.tree import Base, checked_base
@@ -73,7 +76,7 @@ from dynx.model.xml.source import XmlSource
 from dynx.rules import LEVELS, CallingRule, Case, Detection, Level, Rule, all_rules
 from dynx.rules.case import end_of
 from dynx.rules.geometry import is_found, is_found_above, named_meshes, parts_with_meshes, reason_unread
-from dynx.rules.registry import checked_choices
+from dynx.rules.registry import checked_choices, ignored_rules
 
 REFERENCE_MARGIN = 10.0
 """Smallest error that counts as a difference, in errors of the reference values: engines round, too."""
@@ -103,9 +106,14 @@ def first_report(case: Case, before: Examination, tolerance: float) -> DoctorRep
         pairs=_pairs(before),
         referee=referee,
         model_difference=tuple(model_difference(model, descriptions)),
+        refusal=None if isinstance(case.reading, Model) else _failure(case.reading),
         text=case.source.text,
         form=case.source.form,
     )
+
+
+def _failure(error: DynxError) -> LoadFailure:
+    return LoadFailure(type(error).__name__, str(error))
 
 
 def with_meshes(report: DoctorReport, source: XmlSource) -> DoctorReport:
@@ -165,6 +173,7 @@ def _residual(examination: Examination) -> float:
 def _engine_result(case: Case, name: str, before: Examination) -> EngineResult:
     kind = loader_class(name)
     errors, output = before.errors(name), before.outputs[name]
+    moves = before.reference.model.nv and not before.reference.kinematics_only
     return EngineResult(
         engine=name,
         version=kind.engine_version(),
@@ -175,6 +184,7 @@ def _engine_result(case: Case, name: str, before: Examination) -> EngineResult:
         not_used_after=output.not_used,
         before=errors,
         after=errors,
+        step_defaults=kind.STEP_DEFAULTS if moves and output.no_results is None else {},
     )
 
 
@@ -198,9 +208,11 @@ def all_findings(
     proofs: Sequence[AttributedCause],
     mended: Mending,
     engines: Collection[str],
+    refusing: Collection[Rule] = (),
 ) -> tuple[Finding, ...]:
     """Report everything detected, with the effect where one was measured, or is known in all `engines`; texts
-    name these engines only."""
+    name these engines only. Where no engine is affected by a cause of the `refusing` rules, for which dynx
+    refuses the file, the effect is on dynx."""
     proved: dict[Place, list[AttributedCause]] = {}
     for each in proofs:
         proved.setdefault(place_of(each.rule, each.detection), []).append(each)
@@ -232,6 +244,16 @@ def all_findings(
                 effect=attribution.largest_effect,
                 effects=dict(attribution.effects),
                 proved=attribution.proved,
+                remedy=done.get(rule.id),
+            )
+        elif rule in refusing:
+            effect = Effect("loading", float("inf"))
+            finding = replace(
+                finding,
+                engines=("dynx",),
+                effect=effect,
+                effects={"dynx": effect},
+                proved=True,
                 remedy=done.get(rule.id),
             )
         findings.append(finding)
@@ -402,6 +424,8 @@ def diagnose(
     fix_tolerance: float | None = None,
     choose: Mapping[str, str] | None = None,
     level: Level = "physics",
+    ignore: Sequence[str] = (),
+    only: Sequence[str] = (),
     counterexamples: bool = True,
     progress: Progress | None = None,
 ) -> DoctorReport:
@@ -416,7 +440,9 @@ def diagnose(
     its new numbers have the fewest digits that keep every engine within a tenth of it (default: no effect
     above `tolerance`, and all digits). `choose` maps rule ids to one of the rule's `choices`. `level` is the
     largest change of the mended file: ``safe`` changes nothing that a reader notices, ``rounding`` the
-    equations of motion by rounding only, ``physics`` whatever the causes require. `counterexamples` selects
+    equations of motion by rounding only, ``physics`` whatever the causes require. `ignore` has ids or names
+    of rules whose findings make no check fail; with `only`, those of all other rules do not either. They stay
+    in `findings`, are counted in `DoctorReport.ignored`, and are mended. `counterexamples` selects
     the search for the smallest robot that shows a difference which no rule explains. `progress` is called
     with the name of each step.
 
@@ -427,6 +453,7 @@ def diagnose(
     started = time.perf_counter()
     examiner, variants = _examiners(engines, samples, seed, tolerance)
     choices = checked_choices((choose or {}).items())
+    not_counted = ignored_rules(ignore, only)
     checked_base(base)
     if fix_tolerance is not None and not (is_real(fix_tolerance) and 0.0 < fix_tolerance < 1.0):
         raise ArgumentError(
@@ -448,7 +475,15 @@ def diagnose(
             report = replace(report, findings=left)
     seconds = time.perf_counter() - started
     tolerance = max(report.tolerance, tolerance)
-    return replace(report, samples=samples, seed=seed, tolerance=tolerance, seconds=seconds)
+    ignored = Counter(each.rule for each in report.findings if each.rule in not_counted)
+    return replace(
+        report,
+        samples=samples,
+        seed=seed,
+        tolerance=tolerance,
+        ignored=dict(sorted(ignored.items())),
+        seconds=seconds,
+    )
 
 
 @checks_types
@@ -463,7 +498,7 @@ def compare_as_loaded(
 ) -> DoctorReport:
     """Compare engines that load the file themselves, without a search for causes.
 
-    The states are those of `diagnose`.
+    The states are those of `diagnose`. A report of engines that differ is never `explained`.
     """
     started = time.perf_counter()
     examiner, variants = _examiners(engines, samples, seed, tolerance)
@@ -471,7 +506,8 @@ def compare_as_loaded(
     try:
         case = open_case(robot, base, {})
         _, before, report = _loaded(case, examiner, tolerance)
-        report = replace(report, variants=variants_as_loaded(case, before.reference, variants))
+        beside = variants_as_loaded(case, before.reference, variants)
+        report = replace(report, variants=beside, causes_searched=False)
     except DynxError as error:
         report = refused_report(str(_label(robot)), error, base=base)
     seconds = time.perf_counter() - started
@@ -483,7 +519,7 @@ def open_case(robot: Robot, base: Base, choices: Mapping[str, str]) -> Case:
     """Read the document of a robot as a case; raises the errors of `dynx.load`, and DescriptionError for a
     document larger than is examined."""
     if isinstance(robot, Model):
-        document = XmlSource(robot.to_urdf(), robot.source)
+        document = XmlSource(bare_urdf(robot), robot.source)
     else:
         data, source, _ = read_description(robot)
         document = XmlSource(data, source)
@@ -493,7 +529,6 @@ def open_case(robot: Robot, base: Base, choices: Mapping[str, str]) -> Case:
 
 def refused_report(robot: str, error: DynxError, *, base: str | None = None) -> DoctorReport:
     """Make the report of a robot that could not be examined."""
-    failure = LoadFailure(type(error).__name__, str(error))
     place = error if isinstance(error, DescriptionError) else None
     source, line = (None, None) if place is None else (place.source, place.line)
     return DoctorReport(
@@ -502,7 +537,7 @@ def refused_report(robot: str, error: DynxError, *, base: str | None = None) -> 
         base=base,
         residual=math.inf,
         referee=math.inf,
-        error=failure,
+        error=_failure(error),
         error_line=line,
     )
 
@@ -545,7 +580,7 @@ def _diagnosis_of(
         tolerance,
         lambda rule: proofs.measure(rule, minor=True),
     )
-    found = _with_contacts(found, best, case.with_source(full.case.source), seed)
+    found = _with_contacts(found, best, case, case.with_source(full.case.source), seed)
     left = _engines_without_remedy(best.mending.case, rules, examiner.engines)
     unexplained = _unexplained(best.examination, tolerance, left)
     if unexplained and counterexamples:
@@ -562,7 +597,9 @@ def _diagnosis_of(
     withheld = reading_change(case, mended)
     return replace(
         with_after(report, last, best.examination),
-        findings=with_original_names(all_findings(found, best.proofs, mended, examiner.engines), case.source),
+        findings=with_original_names(
+            all_findings(found, best.proofs, mended, examiner.engines, refusing_rules(case)), case.source
+        ),
         unexplained=unexplained,
         choices=(*mended.choices, *filter(None, [sentence])),
         calls=run_time_calls(mended.case, examiner),
@@ -626,11 +663,13 @@ def _rules_for(examiner: Examiner) -> list[Rule]:
 
 
 def _with_contacts(
-    found: Sequence[tuple[Rule, Detection]], best: SelectedPlaces, mended: Case, seed: int
+    found: Sequence[tuple[Rule, Detection]], best: SelectedPlaces, case: Case, mended: Case, seed: int
 ) -> list[tuple[Rule, Detection]]:
-    """Name the links in contact where contacts have an effect."""
+    """Name the links in contact where contacts have an effect, as the file names them."""
     touching = {each.rule: engine for each in best.proofs if each.rule.present_as for engine in each.effects}
-    texts = {rule: describe_contacts(mended, engine, seed) for rule, engine in touching.items()}
+    gone, new = case.links.keys() - mended.links.keys(), mended.links.keys() - case.links.keys()
+    names = dict(zip(new, gone, strict=True)) if len(gone) == len(new) == 1 else {}
+    texts = {rule: describe_contacts(mended, engine, seed, names) for rule, engine in touching.items()}
     return [
         (rule, replace(each, message=f"{each.message}: {texts[rule]}") if texts.get(rule) else each)
         for rule, each in found

@@ -16,7 +16,7 @@ from dynx.agreement.tolerances import BAR
 from dynx.backends.solvability import singular_coordinates
 from dynx.doctor.lines import line_opcodes, lines_of
 from dynx.engines.silence import silence
-from dynx.errors import DescriptionError, DynxError, UnusableEngineError
+from dynx.errors import DescriptionError, DynxError, UnsupportedFeatureError, UnusableEngineError
 from dynx.files.temporary import temporary_folder
 from dynx.loaded import LoadedModel, LoadedRobot, loader_class
 from dynx.model import Model
@@ -153,7 +153,7 @@ def temporary_urdf(source: XmlSource, *, mesh_boxes: bool = False) -> Iterator[P
 STATES = 500
 """Number of states at which contacts are looked for, without dynamics: 5 to 15 ms of most robots."""
 
-_MAX_PAIRS = 4
+_MAX_PAIRS = 3
 """Number of pairs that are listed."""
 
 
@@ -167,8 +167,9 @@ class LinkContact:
     positions: Mapping[str, float] = field(default_factory=dict)
 
 
-def describe_contacts(case: Case, engine: str, seed: int) -> str:
-    """Write which links touch in an engine; empty where the engine cannot tell."""
+def describe_contacts(case: Case, engine: str, seed: int, names: Mapping[str, str] | None = None) -> str:
+    """Write which links touch in an engine; empty where the engine cannot tell. `names` has other names of
+    links, by those in the case."""
     try:
         found = links_in_contact(case, engine, seed)
     except DynxError:
@@ -177,11 +178,13 @@ def describe_contacts(case: Case, engine: str, seed: int) -> str:
         return f"none touch in {STATES} states within limits in which mimic joints follow; in others some do"
     deepest = sorted(found.items(), key=lambda item: -item[1].depth)
     listed = [
-        f"{one} and {other} touch in {each.states} of {STATES} states, up to {1e3 * each.depth:.3g} mm deep"
-        for (one, other), each in deepest[:_MAX_PAIRS]
+        f"{' and '.join((names or {}).get(name, name) for name in pair)} touch in {each.states} of {STATES} "
+        f"states, up to {1e3 * each.depth:.3g} mm deep"
+        for pair, each in deepest[:_MAX_PAIRS]
     ]
     more = len(deepest) - _MAX_PAIRS
-    return "; ".join([*listed, *([f"and {more} more pairs"] if more > 0 else [])])
+    pairs = "pair" if more == 1 else "pairs"
+    return "; ".join([*listed, *([f"and {more} more {pairs}"] if more > 0 else [])])
 
 
 def deepest_contact(case: Case, engines: Iterable[str], seed: int) -> Mapping[str, float] | None:
@@ -198,23 +201,42 @@ def deepest_contact(case: Case, engines: Iterable[str], seed: int) -> Mapping[st
 
 
 def links_in_contact(case: Case, engine: str, seed: int) -> Mapping[tuple[str, str], LinkContact]:
-    """Find the pairs of links that touch; raises EngineError where the engine refuses the file."""
+    """Find the pairs of links that touch; raises EngineError where the engine refuses the file.
+
+    Engines merge links on fixed joints, so each shape is given a name that tells its own link.
+    """
     model = model_without_mimics(case.source, case.base)
     base = 7 if model.floating else 0
+    source, owners = _with_named_shapes(without_meshes(case.source))
     found: dict[tuple[str, str], LinkContact] = {}
     with (
-        temporary_urdf(without_meshes(case.source)) as path,
+        temporary_urdf(source) as path,
         silence(),
         loader_class(engine)(path, model) as robot,
     ):
         for q in following_positions(case, STATES, seed):
-            for pair, depth in robot.contacts(q).items():
+            depths: dict[tuple[str, str], float] = {}
+            for shapes, depth in robot.contacts(q).items():
+                one, other = sorted(owners.get(shape, shape) for shape in shapes)
+                depths[one, other] = max(depth, depths.get((one, other), 0.0))
+            for pair, depth in depths.items():
                 contact = found.setdefault(pair, LinkContact())
                 contact.states += 1
                 if depth > contact.depth:
                     contact.depth = depth
                     contact.positions = dict(zip(model.joint_names, q[base:].tolist(), strict=True))
     return found
+
+
+def _with_named_shapes(source: XmlSource) -> tuple[XmlSource, dict[str, str]]:
+    """Name every collision shape; return the links to which the shapes belong, by these names."""
+    shapes = [(shape, link) for link in source.root.all("link") for shape in link.all("collision")]
+    names = [f"collision shape {number}" for number in range(len(shapes))]
+    edits = (
+        source.attribute_edit(shape, "name", name) for name, (shape, _) in zip(names, shapes, strict=True)
+    )
+    owners = {name: link.attributes.get("name", "") for name, (_, link) in zip(names, shapes, strict=True)}
+    return source.apply(*edits), owners
 
 
 def following_positions(case: Case, count: int, seed: int) -> Floats:
@@ -425,7 +447,14 @@ MAX_CHAIN = 500
 
 
 def require_bounded(source: XmlSource) -> None:
-    """Raise DescriptionError for a document larger than is examined."""
+    """Raise DescriptionError for a document larger than is examined, or of a format that is not."""
+    other = {"mujoco": "MJCF", "sdf": "SDF"}.get(source.root.tag)
+    if other is not None:
+        raise UnsupportedFeatureError(
+            f"the doctor examines URDF, and this is {other}; dynx agree compares the engines on it",
+            source=source.source,
+            line=source.root.line,
+        )
     if len(source.data) > MAX_BYTES:
         _refuse(source, None, f"has {len(source.data)} bytes; at most {MAX_BYTES} are examined")
     for number, element in enumerate(source.root.walk()):

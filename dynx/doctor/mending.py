@@ -246,11 +246,22 @@ def left_undone(case: Case) -> list[tuple[Rule, Detection]]:
     ]
 
 
-def _after_reading_rules(case: Case, level: Level) -> Mending:
+def refusing_rules(case: Case) -> list[Rule]:
+    """List the rules whose causes make dynx refuse the text: with all others mended it still does."""
+    return [
+        rule
+        for rule in dict.fromkeys(rule for rule, _ in readable(case).applied)
+        if not _after_reading_rules(case, "physics", without=rule).case.readable
+    ]
+
+
+def _after_reading_rules(case: Case, level: Level, without: Rule | None = None) -> Mending:
     mended = Mending(case)
     for rule in _rules("reading"):
         if mended.case.readable:
             break
+        if rule is without:
+            continue
         mended = _after_remedy(mended, rule, rule.detect(mended.case), level)
     return mended
 

@@ -6,6 +6,7 @@ whose results are not used (``result``) or that computes NaN has no error.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -24,14 +25,16 @@ from dynx.rules.rule import Kind, Level
 
 Status = Literal["alike", "explained", "massless", "unexplained", "refused"]
 """``explained``: engines differ and every difference has a proved cause. ``massless``: the file has no
-inertial data, and only the kinematics was compared. ``refused``: not examined."""
+inertial data, and only the kinematics was compared. ``unexplained``: a difference has no cause that was
+found, or no cause was searched for (`dynx.compare_as_loaded`). ``refused``: not examined."""
 
 
 @dataclass(frozen=True)
 class Effect:
     """Relative change of a quantity by a cause, infinite where an engine computes nothing because of it.
 
-    It is infinite also for ``contact_forces``, whose size means nothing where shapes overlap.
+    It is infinite also for ``contact_forces``, whose size means nothing where shapes overlap. An effect on
+    ``dynx`` is that dynx itself refuses the file.
     """
 
     quantity: str
@@ -44,7 +47,8 @@ class Finding:
 
     `proved` says that removing it alone changed a quantity of an engine, and that the engines agree once all
     causes are removed. A finding of kind ``difference`` without effect is present in the file but changes
-    nothing on this base.
+    nothing on this base. Not every such place is listed: an invalid number is, wherever it stands (DX103),
+    but a link without inertial that a fixed base holds still is not (DX101).
     """
 
     rule: str
@@ -69,7 +73,8 @@ class EngineResult:
     Errors are against the reference values that dynx computes from the file. `refused` is the message with
     which the engine refuses the file, `refused_after` that for the mended file. `not_used` and
     `not_used_after` are the reasons why dynx does not use an engine that refuses nothing: it would crash, its
-    results are undefined, or they are those of another robot.
+    results are undefined, or they are those of another robot. `step_defaults` are what a step of the engine
+    does by itself and no result includes, with the code that switches it off.
     """
 
     engine: str
@@ -81,6 +86,7 @@ class EngineResult:
     after: Mapping[str, float] = field(default_factory=dict)
     not_used: str | None = None
     not_used_after: str | None = None
+    step_defaults: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def no_results(self) -> str | None:
@@ -226,10 +232,16 @@ class DoctorReport:
     pairs: tuple[PairError, ...] = ()
     model_difference: tuple[Deviation, ...] = ()
     variants: tuple[VariantResult, ...] = ()
+    ignored: Mapping[str, int] = field(default_factory=dict)
+    """Number of `findings` of each rule that the user ignores: they are reported, and make no check fail."""
     meshes: int = 0
     """Number of mesh files that the description names."""
     unread_meshes: tuple[UnreadMesh, ...] = ()
     """Those of them that were not read."""
+    refusal: LoadFailure | None = None
+    """Error with which `dynx.load` refuses the file as it is, though it was examined; None where it loads."""
+    causes_searched: bool = field(default=True, compare=False)
+    """False for `dynx.compare_as_loaded`, which measures differences without a search for their causes."""
     error: LoadFailure | None = None
     error_line: int | None = field(default=None, compare=False)
     """Line of the text at which the `error` is, where it is known."""
@@ -250,14 +262,19 @@ class DoctorReport:
 
     @property
     def alike(self) -> bool:
-        """True if every engine loads the file, with no error above the tolerance, in dynamics too.
+        """True if dynx and every engine load the file, with no error above the tolerance, in dynamics too.
 
         `variants` do not count.
         """
         largest = max((e for each in self.engines for e in each.before.values()), default=0.0)
-        refused = any(each.no_results is not None for each in self.engines)
+        refused = self.refusal is not None or any(each.no_results is not None for each in self.engines)
         compared = self.error is None and not self.kinematics_only
         return compared and not refused and largest <= self.tolerance
+
+    @property
+    def _engines_alike(self) -> bool:
+        """Check whether the engines load the file alike, also where dynx refuses it."""
+        return replace(self, refusal=None).alike
 
     @property
     def variants_off(self) -> tuple[VariantResult, ...]:
@@ -274,8 +291,14 @@ class DoctorReport:
     @property
     def explained(self) -> bool:
         """True if no difference above `tolerance` remains, in what is compared, after the causes were
-        removed."""
-        return self.error is None and not self.unexplained and self.residual <= self.tolerance
+        removed; False where engines differ and no cause was searched for."""
+        loaded = self.refusal is None and all(each.no_results is None for each in self.engines)
+        return (
+            (self.causes_searched or loaded)
+            and self.error is None
+            and not self.unexplained
+            and self.residual <= self.tolerance
+        )
 
     @property
     def remaining(self) -> float:
@@ -322,8 +345,9 @@ class DoctorReport:
         """Verdict in one sentence."""
         if self.error is not None:
             return f"not examined ({self.error.type}: {self.error.message})"
+        refused = "" if self.refusal is None else f"dynx refuses it ({self.refusal.message}); "
         skipped = f"; every engine skips {' and '.join(self.skipped)}" if self.skipped else ""
-        return f"{self._verdict_on_engines}{skipped}"
+        return f"{refused}{self._verdict_on_engines}{skipped}"
 
     @property
     def skipped(self) -> tuple[str, ...]:
@@ -333,8 +357,11 @@ class DoctorReport:
 
     @property
     def _verdict_on_engines(self) -> str:
-        if self.alike:
-            off = [f"{each.engine} is {_off(each)}" for each in self.variants_off]
+        if self._engines_alike:
+            off = [
+                f"only another call, {each.engine}, is {_off(each.largest_error)}"
+                for each in self.variants_off
+            ]
             return "; ".join(["all engines load it alike", *off])
         if self.unexplained:
             count = len(self.unexplained)
@@ -345,12 +372,27 @@ class DoctorReport:
             many = f"{others} further cause{'s' * (others != 1)}"
             also = f", and engines differ for {many}" if others > 0 else ""
             return f"no inertial data: the dynamics cannot be compared{also}"
+        if not self.causes_searched:
+            return (
+                f"engines differ: {self._largest_error}; dynx.diagnose and dynx doctor search for the causes"
+            )
         if not causes:
             return "engines differ, for a cause that is known and cannot be mended"
         proved = causes - {finding.rule for finding in self.differences if not finding.proved}
         share = "all" if proved == causes else f"{len(proved)} of them"
         cause = f"{len(causes)} cause{'s' * (len(causes) != 1)}"
         return f"engines differ, for {cause}, {share} proved{self._left_at_level()}"
+
+    @property
+    def _largest_error(self) -> str:
+        """Write the largest error as loaded, with its engine; or the engines without results."""
+        without = [each.engine for each in self.engines if each.no_results is not None]
+        if without:
+            return f"no result from {' and '.join(without)}"
+        errors = [(each.engine, *item) for each in self.engines for item in each.before.items()]
+        # A NaN counts as the largest error.
+        engine, quantity, error = max(errors, key=lambda each: (math.isnan(each[2]), each[2]))
+        return f"{quantity.replace('_', ' ')} of {engine} is {_off(error)}"
 
     def _left_at_level(self) -> str:
         """Write what remains in a file that is mended at a lower level than `physics`."""
@@ -366,9 +408,11 @@ class DoctorReport:
         return document_of(DoctorEntry, replace(self, seconds=round(self.seconds, 4)))
 
 
-def _off(variant: VariantResult) -> str:
-    error = variant.largest_error
-    return f"off by {100.0 * error:.2g} %" if error < 1e4 else "off without bound"
+def _off(error: float) -> str:
+    percent = 100.0 * error
+    if not percent < 1e6:  # NaN, too
+        return "off without bound"
+    return f"off by {percent:.2g} %" if percent < 99.5 else f"off by {percent:.0f} %"
 
 
 @dataclass(frozen=True)
@@ -398,14 +442,16 @@ class DoctorEntry:
     pairs: tuple[PairError, ...]
     model_difference: tuple[Deviation, ...]
     variants: tuple[VariantResult, ...]
+    ignored: Mapping[str, int]
     meshes: int
     unread_meshes: tuple[UnreadMesh, ...]
+    refusal: LoadFailure | None
     error: LoadFailure | None
     withheld: str | None
     seconds: float
 
 
-# The JSON document of several reports (schema 1, docs/schemas/doctor.json).
+# The JSON document of several reports (schema 1).
 
 
 SCHEMA = 1

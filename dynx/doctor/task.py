@@ -29,6 +29,8 @@ class DoctorTask:
     tolerance: float | None = None
     choose: tuple[tuple[str, str], ...] = ()
     level: Level = "physics"
+    ignore: tuple[str, ...] = ()
+    only: tuple[str, ...] = ()
     causes: bool = True
     fix_tolerance: float | None = None
 
@@ -46,6 +48,8 @@ def examine(task: DoctorTask) -> DoctorReport:
                 task.robot,
                 choose=dict(task.choose),
                 level=task.level,
+                ignore=task.ignore,
+                only=task.only,
                 fix_tolerance=task.fix_tolerance,
                 **chosen,
             )

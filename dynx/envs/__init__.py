@@ -5,8 +5,8 @@
 
     env = gymnasium.make("dynx/CartPole-v0", engine="pinocchio")
 
-A task says what is observed, done and rewarded; the engine moves the robot. docs/environments.md shows a task
-of your own. Needs the extra ``envs``.
+A task says what is observed, done and rewarded; the engine moves the robot. The page "Environments" of the
+documentation shows a task of your own. Needs the extra ``envs``.
 """
 
 from typing import TYPE_CHECKING

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynx.argument_types import checks_types
+from dynx.envs.hooks import require_settings
 from dynx.envs.library import Env, Space, spaces
 from dynx.envs.randomization import Randomization, Variation, first_seed
 from dynx.envs.task import Episodes, JointOptions, Outcome, Task, checked_engine
@@ -62,19 +63,20 @@ class TaskEnvironment(Env[Any, Any]):
         joint_damping: bool = True,
         joint_friction: bool = True,
         joint_armature: bool = True,
+        joint_limits: bool = True,
     ) -> None:
         """`engine` is by default the first of ``task.engines()``; pictures have `width` x `height` pixels.
 
         Each episode draws the parameters that `randomize` names; ``info["parameters"]`` of `reset` has their
-        values. Joints have the damping, dry friction and armature of their description, unless
-        `joint_damping`, `joint_friction` or `joint_armature` is False. Raises ArgumentError for an option
-        that is not valid, NotInstalledError for an engine that is not installed, and the errors of
-        `Randomization` and of its parameters.
+        values. Joints have the damping, dry friction, armature and limits of their description, unless one of
+        these options is False. Raises ArgumentError for an option that is not valid, NotInstalledError for an
+        engine that is not installed, and the errors of `Randomization` and of its parameters.
         """
         if not isinstance(task, Task):
             raise ArgumentError(f"task is of type {type(task).__name__}; wanted a dynx.envs.Task")
         if render_mode is not None and render_mode not in RENDER_MODES:
             raise ArgumentError(f"render_mode is {shown(render_mode)}{nearest(render_mode, RENDER_MODES)}")
+        require_settings(task)
         self.task = task
         """The task."""
         self.engine = checked_engine(type(task), engine)
@@ -89,7 +91,7 @@ class TaskEnvironment(Env[Any, Any]):
         self._phase = "before reset"
         self._shown_at = -np.inf
         drawn = None if randomize is None else Randomization.read(randomize)
-        joints = JointOptions(joint_damping, joint_friction, joint_armature)
+        joints = JointOptions(joint_damping, joint_friction, joint_armature, joint_limits)
         self._episodes: Episodes | None = task.open(self.engine, joints)
         self._variation: Variation | None = None
         if drawn is not None:
@@ -108,6 +110,14 @@ class TaskEnvironment(Env[Any, Any]):
         if self._episodes is None:
             raise ClosedError("this environment was closed")
         return self._episodes
+
+    @property
+    def reward_terms(self) -> Mapping[str, float]:
+        """Terms of the reward of the last step by name; empty before it, and where the task names none.
+
+        Raises ClosedError after `close`.
+        """
+        return self.episodes.reward_terms()
 
     @checks_types
     def reset(
@@ -143,7 +153,8 @@ class TaskEnvironment(Env[Any, Any]):
         A step that diverges, or that the engine fails to take, truncates the episode: the observation is that
         before the step, the reward 0, and ``info["diverged"]`` says why. Raises EpisodeError before the first
         `reset` and after the end of an episode, and ArgumentError (and its kinds) for an action that is not
-        in the action space; the episode is unchanged then.
+        in the action space; the episode is unchanged then. What the methods of a `RobotTask` return raises
+        ShapeError, DTypeError or NotFiniteError, which name the task and the method.
         """
         episodes = self.episodes
         if self._phase != "running":

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 COMPILED = "compiled"
 """The engine of vector environments, whose kernels are compiled."""
 
+MIN_CHECKED_NAME = 8
+"""Length of the shortest hook whose misspelt names are refused."""
+
 NAMESPACE = "dynx"
 ENTRY_POINT = "dynx.envs.registration:make_environment"
 VECTOR_ENTRY_POINT = "dynx.envs.registration:make_vector_environment"
@@ -60,6 +63,7 @@ def task_class(task: str | type[Task]) -> type[Task]:
             return task_class(specification(env_id).kwargs["task"])
     if not (isinstance(found, type) and issubclass(found, Task)):
         raise ArgumentError(f"task is {shown(task)}; wanted a subclass of dynx.envs.Task")
+    _refuse_misspelt_hooks(found)
     for base in found.__mro__[1:]:
         for name, method in vars(base).items():
             if isinstance(method, FunctionType) and not callable(getattr(found, name)):
@@ -67,6 +71,31 @@ def task_class(task: str | type[Task]) -> type[Task]:
                     f"{name} of {found.__name__} is a {type(getattr(found, name)).__name__}; wanted a method"
                 )
     return found
+
+
+def _refuse_misspelt_hooks(kind: type[Task]) -> None:
+    """Raise UnknownNameError for a public name of a task class that is one edit from that of an optional hook
+    which the class leaves as it was.
+
+    Short names have neighbours that are words, and the fields of a dataclass are options.
+    """
+    bases = [each for each in kind.__mro__ if each.__module__ == Task.__module__]
+    own = {name for each in kind.__mro__ if each not in bases and each is not object for name in vars(each)}
+    hooks = {name for each in bases for name in (*vars(each), *vars(each).get("__annotations__", ()))} - own
+    for name in sorted(own - {*dir(Task), *getattr(kind, "__dataclass_fields__", ())}):
+        for hook in sorted(hooks):
+            if not name.startswith("_") and len(hook) >= MIN_CHECKED_NAME and is_one_edit(name, hook):
+                raise UnknownNameError(f"{kind.__name__} has {shown(name)}; did you mean {shown(hook)}?")
+
+
+def is_one_edit(name: str, other: str) -> bool:
+    """Check whether two names differ in one letter: another, an absent or an additional one."""
+    pairs = enumerate(zip(name, other, strict=False))
+    k = next((k for k, (a, b) in pairs if a != b), min(len(name), len(other)))
+    rests = name[k:], other[k:]
+    return name != other and (
+        rests[0][1:] == rests[1][1:] or rests[0][1:] == rests[1] or rests[0] == rests[1][1:]
+    )
 
 
 @checks_types
@@ -81,6 +110,7 @@ def make_environment(
     joint_damping: bool = True,
     joint_friction: bool = True,
     joint_armature: bool = True,
+    joint_limits: bool = True,
     **options: Any,
 ) -> TaskEnvironment:
     """Return the environment of a task with these `options` on an engine; `gymnasium.make` calls this, and
@@ -100,6 +130,7 @@ def make_environment(
         joint_damping=joint_damping,
         joint_friction=joint_friction,
         joint_armature=joint_armature,
+        joint_limits=joint_limits,
     )
 
 
@@ -118,6 +149,7 @@ def make_vector_environment(
     joint_damping: bool = True,
     joint_friction: bool = True,
     joint_armature: bool = True,
+    joint_limits: bool = True,
     **options: Any,
 ) -> RobotVectorEnvironment:
     """Return environments of a task that step in one compiled kernel; `gymnasium.make_vec` calls this.
@@ -148,6 +180,7 @@ def make_vector_environment(
         joint_damping=joint_damping,
         joint_friction=joint_friction,
         joint_armature=joint_armature,
+        joint_limits=joint_limits,
     )
 
 

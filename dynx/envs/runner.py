@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from dynx.backends.base import Backend
 from dynx.backends.dynamics import EngineDynamics
 from dynx.backends.registry import backend
+from dynx.envs import hooks
 from dynx.envs.library import spaces
 from dynx.envs.randomization import Parameter, Randomization
 from dynx.envs.task import (
@@ -32,11 +33,10 @@ from dynx.envs.task import (
     State,
     StepFriction,
     WorldTask,
-    control_step,
     free_move,
 )
 from dynx.envs.variation import VariedRobot, VariedScene
-from dynx.errors import DivergedError, ShapeError, UnsupportedFeatureError
+from dynx.errors import DivergedError, UnsupportedFeatureError
 from dynx.model.elements import JointCoefficients
 from dynx.model.numbers import DIVERGENCE_SPEED
 from dynx.rbd.joint_friction import FrictionLaw
@@ -73,10 +73,12 @@ class RobotEpisodes(Episodes):
         self._task, self._joints = task, joints
         self._backend = backend(engine, task.model, validate=False)
         self._robot = EngineDynamics(self._backend)
-        self._move: Move = partial(free_move, task, self._robot.forward_dynamics)
         self._variation: RobotVariation | None = None
         varied = VariedRobot(task, None, joints)
         self._robot.joints = varied.nominal_joints
+        self._move: Move = partial(free_move, task, self._robot.forward_dynamics)
+        if varied.stops:
+            self._move = _stopped(task, self._move, self._robot)
         if varied.parameters.names:
             self._variation = RobotVariation(task, varied, self._backend)
             self._move = self._variation.move(np.zeros(0))
@@ -110,7 +112,7 @@ class RobotEpisodes(Episodes):
 
     def start(self, rng: np.random.Generator, options: Mapping[str, Any]) -> tuple[Any, dict[str, Any]]:
         self._task.require_start_options(options)
-        self.state = self._task.start(rng.random(self._task.random_size), **options)
+        self.state = hooks.start(self._task, rng.random(self._task.random_size), options)
         self._steps = 0
         return self._observation(), self._task.info(self._robot, self._state)
 
@@ -121,23 +123,17 @@ class RobotEpisodes(Episodes):
             actions: Sequence[Array] = [given] * task.substeps
         else:
             actions = self._variation.acting_actions(given, first=self._steps == 0)
-        moved = control_step(task, robot, self._move, before, actions)
+        moved = hooks.control_step(task, robot, self._move, before, actions)
         self._steps += 1
         self._refuse_divergence(moved.q, moved.v)
-        after = self._state = task.settle(moved)
+        after = self._state = hooks.settle(task, moved)
         self._last = before, given
-        reward = float(task.reward(robot, before, given, after))
-        terminated = bool(task.terminated(robot, after))
+        reward = float(hooks.number(task, "reward", task.reward(robot, before, given, after)))
+        terminated = bool(hooks.number(task, "terminated", task.terminated(robot, after)))
         return Outcome(self._observation(), reward, terminated, task.info(robot, after))
 
     def _observation(self) -> Array:
-        observation = np.array(self._task.observation(self._robot, self._state), dtype=self._dtype)
-        if observation.shape != self._shape:
-            raise ShapeError(
-                f"the observation of {type(self._task).__name__} has shape {observation.shape}; "
-                f"its observation space has {self._shape}"
-            )
-        return observation
+        return hooks.observation(self._task, self._robot, self._state).astype(self._dtype)
 
     def _refuse_divergence(self, q: Floats, v: Floats) -> None:
         if not v @ v < DIVERGENCE_SPEED**2:
@@ -235,6 +231,8 @@ class CompiledEpisodes(RobotEpisodes):
         now["steps"][0] = self._steps
         self._action[...] = action if np.ndim(action) == 1 else np.ravel(action)
         lanes.evaluate()
+        if lanes.flags[0] >= self._step.invalid:
+            self._step.refuse_not_finite(lanes.flags)
         self._steps += 1
         row = lanes.end["state"][0].copy()
         after, flags = layout.state(row), int(lanes.flags[0])
@@ -273,9 +271,11 @@ class RobotVariation:
             self._own = backend(self._nominal.name, parameters.model_of(values), validate=False)
         dynamics = EngineDynamics(self._nominal if self._own is None else self._own)
         joints = parameters.joints(values)
-        if joints is None:
-            return partial(free_move, self._task, dynamics.forward_dynamics)
-        return EngineFriction(self._task, dynamics, joints).move
+        dynamics.joints = joints
+        move: Move = partial(free_move, self._task, dynamics.forward_dynamics)
+        if joints is not None:
+            move = EngineFriction(self._task, dynamics, joints).move
+        return _stopped(self._task, move, dynamics) if self.robot.stops else move
 
     def acting_actions(self, action: Array, *, first: bool) -> list[Array]:
         """Return the action that acts in each step of the integrator; the `first` of an episode acts until
@@ -291,6 +291,12 @@ class RobotVariation:
         if self._own is not None:
             self._own.close()
             self._own = None
+
+
+def _stopped(task: RobotTask, move: Move, dynamics: EngineDynamics) -> Move:
+    from dynx.envs.stops import stopped_move  # most robots of tasks have no limits
+
+    return stopped_move(task.model, move, dynamics)
 
 
 class EngineFriction(StepFriction):

@@ -47,22 +47,10 @@ DEFAULT_WORLD_ENGINE = "pybullet"
 XYZ = ("x", "y", "z")
 """Names of the components of a vector."""
 
-ENVIRONMENT_OPTIONS = (
-    "engine",
-    "render_mode",
-    "randomize",
-    "width",
-    "height",
-    "joint_damping",
-    "joint_friction",
-    "joint_armature",
-)
-"""Options of every environment, beside those of its task."""
-
 
 @dataclass(frozen=True)
 class JointOptions:
-    """Joint dynamics of the description that the joints of an environment have, as in a `dynx.World`.
+    """Joint dynamics and limits of the description that an environment's joints have, as in a `dynx.World`.
 
     Raises ArgumentError for an option that is neither True nor False.
     """
@@ -73,6 +61,8 @@ class JointOptions:
     """Dry friction."""
     joint_armature: bool = True
     """Rotor inertia."""
+    joint_limits: bool = True
+    """Stops at the position limits."""
 
     def __post_init__(self) -> None:
         checked_switches(**vars(self))
@@ -88,7 +78,10 @@ class JointOptions:
 
 
 DESCRIBED = JointOptions()
-"""All joint dynamics of the description."""
+"""All joint dynamics and limits of the description."""
+
+ENVIRONMENT_OPTIONS = ("engine", "render_mode", "randomize", "width", "height", *vars(DESCRIBED))
+"""Options of every environment, beside those of its task."""
 
 
 class Outcome(NamedTuple):
@@ -238,13 +231,14 @@ SCHEMES: dict[str, Callable[[Model, float], Any]] = {
 class RobotTask(Task):
     """A task of one robot without contacts, whose dynamics a backend of dynx evaluates.
 
-    The robot that moves has the damping, dry friction and armature of its description, unless options of the
-    environment switch them off; what the methods evaluate is that of rigid bodies, and ``robot.joints`` has
-    the coefficients.
+    The robot that moves has the damping, dry friction, armature and limits of its description, unless options
+    of the environment switch them off; what the methods evaluate is that of rigid bodies, and
+    ``robot.joints`` has the coefficients.
 
     All methods are array code for one environment: they compute with NumPy's functions on arrays of floats,
     and in a vector environment on symbols, from which one kernel is compiled. So they must not branch on a
-    value (write ``np.where``) and must return the same for the same arguments. `robot` evaluates quantities
+    value (write ``np.where``) and must return the same for the same arguments: random numbers are those that
+    `start` receives, and a kernel refuses others with an ArgumentError. `robot` evaluates quantities
     of the robot at a configuration: ``robot.forward_kinematics(q, frame)``, ``robot.bias_torque(q, v)`` and
     the others of `dynx.backends.dynamics.Dynamics`.
     """
@@ -284,8 +278,11 @@ class RobotTask(Task):
     def reward_terms(
         self, robot: Dynamics, before: State, action: Array, after: State
     ) -> Mapping[str, float]:
-        """Return the terms whose sum is the reward, by name; by default none. Only pages that show episodes
-        ask for them."""
+        """Return the terms whose sum is the reward, by name; by default none.
+
+        Only what shows an episode asks for them. They do not make the reward: `reward` does, and a task
+        computes the sum there.
+        """
         return {}
 
     def terminated(self, robot: Dynamics, state: State) -> Any:
@@ -320,14 +317,15 @@ class RobotTask(Task):
 
     @cached_property
     def _scheme(self) -> Any:
-        if self.integrator not in SCHEMES:
+        scheme = self.integrator.replace("-", "_")  # as the command line spells it
+        if scheme not in SCHEMES:
             raise ArgumentError(f"integrator is {shown(self.integrator)}{nearest(self.integrator, SCHEMES)}")
-        if self.integrator == "semi_implicit" and self.model.floating:
+        if scheme == "semi_implicit" and self.model.floating:
             # Its compiled step of a base on floats is imported only where there is one.
             from dynx.steppers.integrators import CompiledBaseEuler
 
             return CompiledBaseEuler(self.model, self.step_dt)
-        return SCHEMES[self.integrator](self.model, self.step_dt)
+        return SCHEMES[scheme](self.model, self.step_dt)
 
     @classmethod
     def engines(cls) -> tuple[str, ...]:
@@ -342,19 +340,6 @@ class RobotTask(Task):
 Move = Callable[..., tuple[Array, Array]]
 """Function of q (nq,), v (nv,) and tau (nv,) at the beginning of a step of the integrator that returns q and
 v at its end."""
-
-
-def control_step(
-    task: RobotTask, robot: Dynamics, move: Move, before: State, actions: Sequence[Array]
-) -> State:
-    """Return the state after ``task.control_dt``, before the task settles it.
-
-    `actions` has the one that acts in each step of the integrator.
-    """
-    q, v, memory = before
-    for action in actions:
-        q, v = move(q, v, task.torque(robot, State(q, v, memory), action))
-    return State(q, v, memory)
 
 
 def free_move(
@@ -458,8 +443,11 @@ class WorldTask(Task):
         """Return the reward of a control step."""
 
     def reward_terms(self, episode: Episode, action: Any) -> Mapping[str, float]:
-        """Return the terms whose sum is the reward, by name; by default none. Only pages that show episodes
-        ask for them."""
+        """Return the terms whose sum is the reward, by name; by default none.
+
+        Only what shows an episode asks for them. They do not make the reward: `reward` does, and a task
+        computes the sum there.
+        """
         return {}
 
     def terminated(self, episode: Episode) -> bool:

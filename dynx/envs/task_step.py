@@ -14,14 +14,18 @@ from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from dynx.compiled.array_dynamics import ArrayDynamics
 from dynx.compiled.parametric import ParametricDynamics
 from dynx.compiled.step import BoundSteps, StepText, compiled
+from dynx.envs import hooks
 from dynx.envs.library import spaces
-from dynx.envs.task import Move, RobotTask, State, StepFriction, control_step, free_move
+from dynx.envs.own_tasks import refuse_irreproducible
+from dynx.envs.stops import LimitWatch, StopsText
+from dynx.envs.task import Move, RobotTask, State, StepFriction, free_move
 from dynx.envs.variation import VariedRobot
-from dynx.errors import ArgumentError, ShapeError, UnsupportedFeatureError
+from dynx.errors import ArgumentError, NotFiniteError, UnsupportedFeatureError
 from dynx.model.numbers import DIVERGENCE_SPEED
 from dynx.rbd.joint_friction import FrictionLaw, damped_equation
 from dynx.simd.kernel import Kernel
@@ -31,9 +35,15 @@ from dynx.simd.user_code.numbers import select
 from dynx.spatial.scalar import Array, Floats, sign
 from dynx.steppers.implicit_joints import BLOCK_CORRECTIONS, MAX_SOLUTIONS
 
-TERMINATED, TRUNCATED, INVALID, DIVERGED, UNSETTLED = 1, 1 << 8, 1 << 16, 1 << 24, 1 << 32
+TERMINATED, TRUNCATED, INVALID, DIVERGED, UNSETTLED, AT_LIMIT = (1 << 8 * k for k in range(6))
 """Bits of the output ``flags``, an integer of 64 bits: one byte for each flag, so that the bytes are arrays
 of bool without any conversion. A kernel writes doubles; these have the bit patterns of the integers."""
+
+NOT_FINITE = {"torque": 2 * INVALID, "reward": 4 * INVALID, "observation": 8 * INVALID}
+"""Bits of hooks of the task that returned numbers that are not finite, in the byte of `INVALID`."""
+
+REPEATED = frozenset({"modes", "one_by_one", "released"})
+"""Inputs with which a step that is not settled is repeated; at first they are 0."""
 
 STARTED_AT_ONCE = 16
 """Number of episodes that start together; more are a power of it, so that few lanes are made."""
@@ -52,7 +62,7 @@ class RowLayout(NamedTuple):
     @classmethod
     def of(cls, task: RobotTask) -> RowLayout:
         """Return the layout for a task."""
-        state = task.start(np.zeros(task.random_size))
+        state = hooks.start(task, np.zeros(task.random_size), {})
         return cls(len(state.q), len(state.v), len(state.memory))
 
     @property
@@ -75,6 +85,9 @@ class TaskStep:
 
     diverged = DIVERGED
     """Flag of an environment that diverged: its step was not taken, and its episode is truncated."""
+
+    invalid = INVALID
+    """Smallest flag of a step that is refused, or that diverged."""
 
     def __init__(self, task: RobotTask, varied: VariedRobot | None = None) -> None:
         """`varied` are the parameters of the motion, of which each environment may have drawn ones for
@@ -107,14 +120,28 @@ class TaskStep:
         self.actions = 1 if isinstance(space, spaces.Discrete) else math.prod(space.shape)
 
     @property
+    def stops(self) -> bool:
+        """True if joints stop at limits."""
+        return self._varied.stops
+
+    @property
     def modes(self) -> int:
         """Number of modes of dry friction in all steps of the integrator."""
         return 0 if self._friction is None else self._friction.size * self._task.substeps
 
     @cached_property
     def kernel(self) -> Kernel:
-        """The kernel of a step. Raises UnsupportedFeatureError for a task that cannot be compiled."""
+        """The kernel of a step, which flags lanes in which a joint passed a limit.
+
+        Raises UnsupportedFeatureError for a task that cannot be compiled, ArgumentError for one with a hook
+        that depends on more than its arguments.
+        """
         return compiled(self.text())
+
+    @cached_property
+    def kernel_with_stops(self) -> Kernel:
+        """The kernel of a step of these lanes; compiled when a joint first passes a limit."""
+        return compiled(self.text(stops=True))
 
     def starts(self, random: Floats, options: Mapping[str, Any]) -> tuple[Floats, Floats]:
         """Return the states and the observations (n, size) at the start of episodes, from numbers
@@ -127,6 +154,7 @@ class TaskStep:
         if options:
             found = np.empty((n, self.layout.size)), np.empty((n, self.observations))
             compiled(self.text(options))([random], [*found])
+            hooks.refuse_not_finite(self._task, "observation", found[1])
             return found
         size = STARTED_AT_ONCE
         while size < n:
@@ -137,20 +165,36 @@ class TaskStep:
         lanes.arrays["random"][:n] = random
         lanes.now["steps"][...] = ENDED
         lanes.evaluate()
+        self.refuse_not_finite(lanes.flags[:n])
         return lanes.end["state"][:n], lanes.arrays["observation"][:n]
 
-    def text(self, start: Mapping[str, Any] | None = None) -> StepText:
-        """Return the text of a step, or of the start of episodes with the options `start`.
+    def refuse_not_finite(self, flags: NDArray[np.int64]) -> None:
+        """Raise NotFiniteError if flags say that a hook of the task returned numbers that are not finite."""
+        for hook, bit in NOT_FINITE.items():
+            rows = np.flatnonzero(flags & bit)
+            if len(rows):
+                where = f" in environment {rows[0]}" if len(flags) > 1 else ""
+                raise NotFiniteError(f"{hook} of {type(self._task).__name__} is not finite{where}")
+
+    def text(self, start: Mapping[str, Any] | None = None, *, stops: bool = False) -> StepText:
+        """Return the text of a step, without or with `stops`, or of the start of episodes with the options
+        `start`.
 
         Inputs of a step: ``state`` (layout), the number of ``steps`` and its ``limit``, ``action``, and
         ``random`` for the start of the next episode; where they are drawn, ``parameters`` of the motion,
-        ``earlier`` actions that may still act, and the ``modes`` of dry friction with which a step is
-        repeated. Outputs: ``state``, ``steps``, ``observation``, ``reward``, ``flags``, ``earlier`` if it is
-        an input, and ``next_modes``. A step that diverges is not taken: the episode ends in the state before
-        it, truncated, without a reward. A start has ``state`` and ``observation`` of ``random``.
+        ``earlier`` actions that may still act, and the ``modes`` of dry friction, and stops that are
+        ``released``, with which a step is repeated. Outputs: ``state``, ``steps``, ``observation``,
+        ``reward``, ``flags``, ``earlier`` if it is an input, ``next_modes`` and ``next_released``. A step
+        that diverges is not taken: the episode ends in the state before it, truncated, without a reward. A
+        start has ``state`` and ``observation`` of ``random``.
         """
         sizes = {"random": self._task.random_size}
-        evaluate: Callable[..., dict[str, Any]] = self._step if start is None else self._start
+        evaluate: Callable[..., dict[str, Any]] = self._start
+        limits: LimitWatch | StopsText | None = None
+        if start is None and self._varied.stops:
+            limits = (StopsText if stops else LimitWatch)(self._task.model)
+        if start is None:
+            evaluate = partial(self._step, limits=limits)
         if start is None:
             sizes = {"state": self.layout.size, "steps": 1, "limit": 1, "action": self.actions, **sizes}
             if self._varied.drawn_parameters:
@@ -159,10 +203,14 @@ class TaskStep:
                     sizes["earlier"] = self._varied.delayed_actions * self.actions
             if self.modes:
                 sizes |= {"modes": self.modes, "one_by_one": 1}
+            if isinstance(limits, StopsText):
+                sizes["released"] = limits.size * self._task.substeps
 
         def traced(**inputs: Array) -> dict[str, Array]:
             given = {name: traced_array(array) for name, array in inputs.items()}
             results = evaluate(given, **(start or {}))
+            if not stops:
+                refuse_irreproducible(self._task, self.layout, self._robot.joints, start)
             # Entries that do not depend on an input are numbers.
             return {name: symbol_array(entries) for name, entries in results.items()}
 
@@ -170,10 +218,12 @@ class TaskStep:
         return StepText(traced, sizes, f"the {purpose} of {type(self._task).__name__} cannot be compiled")
 
     def _start(self, inputs: Mapping[str, Array], **options: Any) -> dict[str, Any]:
-        state = self._task.start(inputs["random"], **options)
+        state = hooks.start(self._task, inputs["random"], options)
         return {"state": self.layout.row(state), "observation": self._observation(state)}
 
-    def _step(self, inputs: Mapping[str, Array]) -> dict[str, Any]:
+    def _step(
+        self, inputs: Mapping[str, Array], limits: LimitWatch | StopsText | None = None
+    ) -> dict[str, Any]:
         task, robot, layout = self._task, self._robot, self.layout
         action, random, (count,), (limit,) = (inputs[each] for each in ("action", "random", "steps", "limit"))
         before, space = layout.state(inputs["state"]), task.action_space
@@ -182,31 +232,55 @@ class TaskStep:
         move: Move = partial(free_move, task, robot.forward_dynamics)
         drawn: Array = inputs.get("parameters", np.zeros(0))
         move = self._move(drawn, inputs, move)
+        if limits is not None:
+            move = limits.moves(move, partial(self._mass_matrix, drawn), inputs)
         if "earlier" in inputs:
             actions, results["earlier"] = self._delayed(drawn, count, action, inputs["earlier"])
-        moved = control_step(task, robot, move, before, [self._shaped(each) for each in actions])
+        overflow: list[Any] = []
+        moved = hooks.control_step(
+            task, robot, partial(_watched, move, overflow), before, [self._shaped(each) for each in actions]
+        )
         given = self._shaped(action)
-        after = task.settle(moved)
-        reward = _number(task.reward(robot, before, given, after))
+        after = hooks.settle(task, moved)
+        reward = hooks.number(task, "reward", task.reward(robot, before, given, after))
         taken = count + 1.0
-        terminated, truncated = _mask(task.terminated(robot, after)), _mask(taken >= limit)
-        flags = _flags(terminated, truncated)
+        over = hooks.number(task, "terminated", task.terminated(robot, after))
+        terminated, truncated = _mask(over), _mask(_number(taken >= limit))
+        flags = select(_are_finite([reward]), _flags(terminated, truncated), _bits(NOT_FINITE["reward"]))
+        repeats: Any = 0.0
         if self._friction is not None and self.modes:
             results["next_modes"], changes = self._friction.results()
+            repeats = select(changes > 0.0, 1.0, repeats)
             flags = select(changes > 0.0, _bits(UNSETTLED), flags)
+        if isinstance(limits, StopsText):
+            results["next_released"] = limits.released
+            repeats = select(limits.changes > 0.0, 1.0, repeats)
+            flags = select(limits.changes > 0.0, _bits(UNSETTLED), flags)
         finite = np.sum(moved.v * moved.v) < DIVERGENCE_SPEED**2
+        unsettled = select(finite, flags == _bits(UNSETTLED), 0.0)
         flags = select(finite, flags, _bits(DIVERGED | TRUNCATED))
-        flags = select(_is_valid(space, action), flags, _bits(INVALID))
+        for each in overflow:
+            flags = select(each, _bits(NOT_FINITE["torque"]), flags)
+        if isinstance(limits, LimitWatch):
+            repeats = select(limits.excess > 0.0, 1.0, repeats)
+            # What follows without the stop is not what happens, be it a divergence.
+            flags = select(limits.excess > 0.0, select(unsettled, flags, _bits(AT_LIMIT)), flags)
+        valid = _is_valid(space, action)
+        flags, repeats = select(valid, flags, _bits(INVALID)), select(valid, repeats, 1.0)
         ends = select(finite, np.maximum(terminated, truncated), 1.0)
         after, reward = _selected(finite, after, before), select(finite, reward, 0.0)
         ended = count < 0.0
-        reward, flags = select(ended, 0.0, reward), select(ended, 0.0, flags)
+        reward, flags, repeats = (select(ended, 0.0, each) for each in (reward, flags, repeats))
         taken = select(ended, 0.0, select(ends, ENDED, taken))
-        after = _selected(ended, task.start(random), after)
+        after = _selected(ended, hooks.start(task, random, {}), after)
+        observation = self._observation(after)
+        shown = select(_are_finite(observation), flags, _bits(NOT_FINITE["observation"]))
+        # The observation of an invalid step, or of one that is repeated, is not returned.
+        flags = select(repeats > 0.0, flags, shown)
         return {
             "state": layout.row(after),
             "steps": [taken],
-            "observation": self._observation(after),
+            "observation": observation,
             "reward": [reward],
             "flags": [flags],
             **results,
@@ -230,6 +304,12 @@ class TaskStep:
 
         return partial(free_move, self._task, forward_dynamics)
 
+    def _mass_matrix(self, drawn: Array, q: Array) -> Array:
+        """Return the mass matrix of the robot that moves, with its armature, as symbols."""
+        if self._parametric is None:
+            return symbol_array(self._robot.mass_matrix(q))
+        return self._parametric.inertia(self._varied.values(symbol_array(drawn)), symbol_array(q))
+
     def _delayed(self, drawn: Array, count: Any, action: Array, earlier: Array) -> tuple[list[Array], Array]:
         """Return the action that acts in each step of the integrator, and the actions before the next."""
         varied = self._varied
@@ -242,13 +322,7 @@ class TaskStep:
         return acting, np.concatenate([action, *rows[:-1]])
 
     def _observation(self, state: State) -> Array:
-        found = np.asarray(self._task.observation(self._robot, state))
-        if found.shape != (self.observations,):
-            raise ShapeError(
-                f"the observation of {type(self._task).__name__} has shape {found.shape}; "
-                f"its observation space has {(self.observations,)}"
-            )
-        return found
+        return hooks.observation(self._task, self._robot, state)
 
 
 class JointFrictionText(StepFriction):
@@ -339,7 +413,7 @@ class TaskLanes:
         self.flags = self.arrays["flags"][:count, 0].view(np.int64)
         """Flags (count,) of the last step."""
         self._every_flag = self.arrays["flags"][:, 0].view(np.int64)
-        self._settles = bool(step.modes)
+        self._settles, self._stops, self._step = bool(step.modes), step.stops, step
 
     @property
     def now(self) -> dict[str, Floats]:
@@ -356,6 +430,8 @@ class TaskLanes:
         self._calls[self._turn]()
         if self._settles and self._every_flag.max() >= UNSETTLED:
             self._settle()
+        if self._stops and self.flags.max() >= AT_LIMIT:
+            self._stop(np.flatnonzero(self.flags >= AT_LIMIT))
 
     def accept(self) -> None:
         """Go on from the end of the step that was evaluated."""
@@ -365,14 +441,50 @@ class TaskLanes:
         """Repeat the step with corrected modes of dry friction until they are right."""
         arrays = self.arrays
         for count in range(1, MAX_SOLUTIONS):
-            unsettled = self._every_flag >= UNSETTLED
+            unsettled = self._every_flag == UNSETTLED
             if not unsettled.any():
                 break
             arrays["modes"][unsettled] = arrays["next_modes"][unsettled]
             arrays["one_by_one"][...] = float(count >= BLOCK_CORRECTIONS)
             self._calls[self._turn]()
         arrays["modes"][...], arrays["one_by_one"][...] = 0.0, 0.0
-        self._every_flag[self._every_flag >= UNSETTLED] = 0
+        self._every_flag[self._every_flag == UNSETTLED] = 0
+
+    def _stop(self, rows: NDArray[np.intp]) -> None:
+        """Evaluate the step again with stops, in lanes in which a joint passed a limit."""
+        kernel, n = self._step.kernel_with_stops, len(rows)
+        before, after = {**self.arrays, **self.now}, {**self.arrays, **self.end}
+        inputs = {
+            port.name: np.zeros((n, port.size)) if port.name in REPEATED else before[port.name][rows]
+            for port in kernel.inputs
+        }
+        outputs = {port.name: np.empty((n, port.size)) for port in kernel.outputs}
+        flags = outputs["flags"][:, 0].view(np.int64)
+        for count in range(1, MAX_SOLUTIONS + 1):
+            kernel([*inputs.values()], [*outputs.values()])
+            unsettled = flags == UNSETTLED
+            if not unsettled.any():
+                break
+            for name in inputs.keys() & {"modes", "released"}:
+                inputs[name][unsettled] = outputs[f"next_{name}"][unsettled]
+            if "one_by_one" in inputs:
+                inputs["one_by_one"][...] = float(count >= BLOCK_CORRECTIONS)
+        flags[flags == UNSETTLED] = 0
+        for name, found in outputs.items():
+            if name in after and not name.startswith("next_"):
+                after[name][rows] = found
+
+
+def _watched(move: Move, overflow: list[Any], q: Array, v: Array, tau: Array) -> tuple[Array, Array]:
+    """Return `move` of a torque; add the condition that it is not finite at a state that is."""
+    slow = np.sum(v * v) < DIVERGENCE_SPEED**2
+    overflow.append(select(slow, select(_are_finite(tau), 0.0, 1.0), 0.0) > 0.0)
+    return move(q, v, tau)
+
+
+def _are_finite(values: Any) -> Any:
+    """Return the condition that all of some numbers are finite."""
+    return np.sum(np.abs(traced_array(values))) < math.inf
 
 
 def _selected(condition: Any, yes: State, no: State) -> State:
@@ -408,7 +520,7 @@ def _number(value: Any) -> Any:
 
 def _mask(condition: Any) -> Any:
     """Return 1.0 where a condition holds, otherwise 0.0."""
-    return select(_number(condition), 1.0, 0.0)
+    return select(condition, 1.0, 0.0)
 
 
 def _is_valid(space: Any, action: Array) -> Any:

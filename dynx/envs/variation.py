@@ -20,6 +20,7 @@ from dynx.model import Model
 from dynx.model.elements import JointCoefficients
 from dynx.rbd.parameters import JOINT, POINT, Parameters
 from dynx.spatial.scalar import Array, Floats
+from dynx.steppers.layout import stop_positions
 
 if TYPE_CHECKING:
     from dynx.steppers.material import Material
@@ -51,6 +52,8 @@ class VariedRobot:
                 "its joints is joint_friction"
             )
         self._task, model = task, task.model
+        self.stops = joints.joint_limits and bool(np.isfinite(stop_positions(model)).any())
+        """True if joints stop at limits."""
         self._model = model
         self.drawn_parameters: tuple[Parameter, ...] = (
             ()

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from dynx.envs.environment import DIVERGED as DIVERGED_KEY
 from dynx.envs.environment import checked_action
+from dynx.envs.hooks import require_settings
 from dynx.envs.library import AutoresetMode, Space, VectorEnv, batch_space, spaces
 from dynx.envs.randomization import Randomization, Variation, first_seed
 from dynx.envs.runner import draw_robot
@@ -83,12 +84,17 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         joint_damping: bool = True,
         joint_friction: bool = True,
         joint_armature: bool = True,
+        joint_limits: bool = True,
     ) -> None:
-        """Options are those of `TaskEnvironment`. Raises ArgumentError for an option that cannot be used,
-        UnsupportedFeatureError for a task that cannot be compiled."""
+        """Options are those of `TaskEnvironment`.
+
+        Raises ArgumentError for an option that cannot be used, or a task with a hook that depends on more
+        than its arguments, UnsupportedFeatureError for one that cannot be compiled.
+        """
         if render_mode is not None and render_mode not in RENDER_MODES:
             raise ArgumentError(f"render_mode is {shown(render_mode)}{nearest(render_mode, RENDER_MODES)}")
         n = self.num_envs = whole_number("num_envs", num_envs, 1)
+        require_settings(task)
         self.task = task
         """The task."""
         mode = self._mode = checked_mode(autoreset_mode)
@@ -107,7 +113,7 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         self._kinds = "iu" if self._discrete else "fiu"
         self._variation: Variation | None = None
         drawn = None if randomize is None else Randomization.read(randomize)
-        joints = JointOptions(joint_damping, joint_friction, joint_armature)
+        joints = JointOptions(joint_damping, joint_friction, joint_armature, joint_limits)
         varied = VariedRobot(task, drawn, joints)
         if drawn is not None:
             spaces_of_one = task.observation_space, task.action_space
@@ -143,7 +149,12 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         return np.array(self._lanes.now["state"][: self.num_envs])
 
     def set_states(self, states: ArrayLike) -> None:
-        """Set q, v and memory of each environment (num_envs, nq + nv + k), at the start of an episode."""
+        """Begin an episode of every environment in a state (num_envs, nq + nv + k), as `states` has them.
+
+        A row is q [rad or m], v [rad/s or m/s] and the k numbers of memory of the task. The observation is
+        that of the next step. Raises EpisodeError before the first `reset`, ClosedError after `close`, and
+        ShapeError, DTypeError or NotFiniteError for an invalid array.
+        """
         self._refuse_closed()
         if not self._running:
             raise EpisodeError("set_states was called before the first reset")
@@ -199,7 +210,8 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         truncations and infos, arrays with one row for each.
 
         Raises EpisodeError before the first `reset`, and in mode DISABLED after the end of an episode;
-        ArgumentError and its kinds for an invalid action, all of which leave every environment as it was.
+        ArgumentError and its kinds for an invalid action, NotFiniteError for a torque, reward or observation
+        of the task that is not finite. All leave every environment as it was.
         """
         if not self._running:
             self._refuse_closed()
@@ -222,6 +234,8 @@ class RobotVectorEnvironment(VectorEnv[Any, Any, Any]):
         largest = flags.max()
         if largest >= INVALID and (flags & INVALID).any():
             raise_invalid_action(self.single_action_space, self._actions, flags & INVALID)
+        if largest >= INVALID:
+            self._task_step.refuse_not_finite(flags)
         self._lanes.accept()
         infos: dict[str, Any] = {}
         if self._variation is not None:

@@ -32,6 +32,7 @@ from dynx.viewer.page import DEFAULT_HOST, Page
 from dynx.viewer.triangles import TRIANGLE_BUDGET, has_graphics_processor
 from dynx.world.camera import part_poses
 from dynx.world.scene import Scene
+from dynx.world.scenery import DARK, LIGHT
 
 DEFAULT_RATE = 25.0
 """Steps a second of an environment that does not name its ``render_fps``."""
@@ -149,7 +150,7 @@ class EpisodePage:
         self._act, self._seed = act, checked_seed("seed", seed)
         self._runs = [_Run(env, name) for env, name in zip(envs, named, strict=True)]
         whole = has_graphics_processor()
-        self._look = Look(triangles=None if whole else TRIANGLE_BUDGET)
+        self._look = Look(triangles=None if whole else TRIANGLE_BUDGET, scenery=DARK if dark else LIGHT)
         for run in self._runs:
             run.begin(self._seed)
             if run.scene_and_state() is None and run.env.render_mode != "rgb_array":

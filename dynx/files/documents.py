@@ -6,6 +6,7 @@ because JSON cannot express it; so every number in a schema may be null. No othe
 
 from __future__ import annotations
 
+import inspect
 import json
 import math
 from collections.abc import Iterable, Mapping
@@ -247,12 +248,17 @@ def json_schema(document_class: type[Any], title: str, *, omits_defaults: bool =
 
 
 def _strict_schema(part: Any, omits_defaults: bool) -> Any:
-    """Allow null for every number, forbid keys that are not listed, and remove Python's default values."""
+    """Allow null for every number, forbid keys that are not listed, and remove Python's default values and
+    the indentation of docstrings."""
     if isinstance(part, list):
         return [_strict_schema(each, omits_defaults) for each in part]
     if not isinstance(part, dict):
         return part
-    part = {key: _strict_schema(each, omits_defaults) for key, each in part.items() if key != "default"}
+    # msgspec states the names of keys and dedents docstrings from 0.23 on; a schema is alike by all versions.
+    left_out = ("default", "propertyNames")
+    part = {key: _strict_schema(each, omits_defaults) for key, each in part.items() if key not in left_out}
+    if isinstance(part.get("description"), str):
+        part["description"] = inspect.cleandoc(part["description"])
     if part.get("type") == "number":
         part["type"] = ["number", "null"]
     if "properties" in part and part.get("type") == "object":

@@ -135,7 +135,11 @@ def _encoder(path: Path, width: int, height: int, rate: float) -> Any:
     encoder = _ffmpeg().write_frames(
         str(path), (width, height), fps=rate, quality=QUALITY, macro_block_size=2, ffmpeg_log_level="error"
     )
-    encoder.send(None)
+    try:
+        encoder.send(None)
+    except IndexError as error:
+        # It takes the list of codecs apart without a look at whether ffmpeg printed one.
+        raise RuntimeError("ffmpeg lists no codecs") from error
     return encoder
 
 

@@ -375,9 +375,16 @@ def start_within_limits(model: Model, q0: ArrayLike | None) -> Floats:
     return q
 
 
-def argument_note(model: Model, q0: ArrayLike | None, avoidance: Avoidance | None) -> str:
-    """Return sentences on a q0 that was moved into the limits and on what the avoidance leaves out."""
-    notes = ("" if q0 is None else start_note(model, q0), "" if avoidance is None else avoidance.note)
+def argument_note(
+    model: Model, q0: ArrayLike | None, avoidance: Avoidance | None, nearest: ArrayLike | None = None
+) -> str:
+    """Return sentences on a q0 that was moved into the limits, on what the avoidance leaves out, and on a
+    configuration `nearest` (nq,) that is far beyond the limits."""
+    notes = ["" if q0 is None else start_note(model, q0), "" if avoidance is None else avoidance.note]
+    if nearest is not None and np.ndim(nearest) == 1:
+        from dynx.model.unlikely_inputs import position_notes
+
+        notes += position_notes(model, np.asarray(nearest, dtype=np.float64), "nearest")
     return "; ".join(filter(None, notes))
 
 
@@ -393,10 +400,15 @@ def start_note(model: Model, q0: ArrayLike) -> str:
         joints = ", ".join(names[k - offset] for k in columns.tolist())
         count, size = int(outside.any(axis=-1).sum()), q[..., 0].size
         return f"{count} of {size} q0 were outside the limits and moved into them ({joints})"
-    moved = [
-        f"{names[k - offset]} from {q[k]:.6g} to {min(max(q[k], model.lower[k]), model.upper[k]):.6g}"
-        for k in np.flatnonzero(outside).tolist()
-    ]
+    from dynx.model.unlikely_inputs import in_other_unit
+
+    moved = []
+    for k in np.flatnonzero(outside).tolist():
+        x, lower, upper = (float(each[k]) for each in (q, model.lower, model.upper))
+        meant = in_other_unit(model.joint(names[k - offset]), x, lower, upper)
+        moved.append(
+            f"{names[k - offset]} from {x:.6g} to {min(max(x, lower), upper):.6g}{meant and f' ({meant})'}"
+        )
     return f"q0 was outside the limits and moved into them: {', '.join(moved)}"
 
 

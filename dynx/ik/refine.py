@@ -214,13 +214,14 @@ def _preferred(
         if best is not None:
             return best
 
+    time_limit = limits.time_limit
+
     def is_admissible(q: Floats) -> bool:
-        return avoidance is None or avoidance.is_clear(wanted.backend, q)
+        return avoidance is None or avoidance.is_clear(wanted.backend, q, time_limit)
 
     objective = secondary.objective(coordinates, wanted.task)
     solutions: list[tuple[float, Candidate]] = []
     iterations = 0
-    time_limit = limits.time_limit
     for start in begins:
         if time_limit.is_over():
             break
@@ -392,12 +393,16 @@ class AvoidingDescent:
         """Descend from q (nq,); return the configuration, the number of steps, and whether it reaches the
         target and keeps all margins."""
         best, factor, steps = self._state(q), DAMPING, 0
+        if best is None:
+            return q, steps, False
         recent = deque([best.squared])
         while not best.done and steps < MAX_STEPS and factor <= MAX_FACTOR:
             if self._time_limit.is_over():
                 break
             steps += 1
             trial = self._state(self._moved(best, factor * best.squared + MIN_DAMPING))
+            if trial is None:
+                break
             gain = best.squared - trial.squared
             if not (trial.done or gain > 0.0):
                 factor *= REJECTED_FACTOR
@@ -408,9 +413,12 @@ class AvoidingDescent:
                 break
         return best.q, steps, best.done
 
-    def _state(self, q: Floats) -> _ClearStep:
+    def _state(self, q: Floats) -> _ClearStep | None:
+        """Return the state at q (nq,); None if the time was over before it was known."""
         error = self._task.error(q)
-        every = self._avoidance.near(self._backend, q, REACH)
+        every = self._avoidance.near(self._backend, q, REACH, time_limit=self._time_limit)
+        if every is None:
+            return None
         near = [each for each in every if each.pair not in self._fixed]
         lacks = np.array([each.pair.margin + BUFFER - each.separation.distance for each in near])
         squared = 0.5 * sum([x * x for x in error.vector]) + 0.5 * float((np.maximum(lacks, 0.0) ** 2).sum())
@@ -521,7 +529,9 @@ class _ClearFinder:
                 if not candidate.success:
                     continue
                 candidate.restarts = restarts
-                violated = self._avoidance.violated(self._backend, candidate.q)
+                violated = self._avoidance.violated(self._backend, candidate.q, time_limit=time_limit)
+                if violated is None:
+                    break
                 if not violated:
                     return candidate, ""
                 lacking.append((tally.add(candidate, violated), candidate))
@@ -543,7 +553,8 @@ class _ClearFinder:
                 complete = False
                 break
         if tally.best is None:
-            # The time was over, and rounding decided against the solution at the edge of a tolerance.
+            # The time was over before the distances at a solution were known, or rounding decided against the
+            # solution at the edge of a tolerance.
             return replace(self._search.evaluate(solution, task), success=False, timed_out=True), ""
         tally.best.restarts, tally.best.timed_out = max(starts - 1, 0), time_limit.is_over()
         return tally.best, collision_sentence(
@@ -582,10 +593,13 @@ class _ClearFinder:
         found.iterations = steps
         if not found.success:
             return None
-        violated = self._avoidance.violated(self._backend, found.q)
-        if not violated:
+        violated = self._avoidance.violated(
+            self._backend, found.q, time_limit=self._problem.limits.time_limit
+        )
+        if violated == []:
             return found
-        tally.compare(found, violated)
+        if violated is not None:
+            tally.compare(found, violated)
         return None
 
     def _is_in_every_solution(self, near: NearPair) -> bool:

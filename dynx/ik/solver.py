@@ -146,7 +146,8 @@ def _inverse_kinematics(
         )
     problem = checked_problem(backend.model, target, frame, q0, chosen)
     found = _solved(backend, problem, chosen.method)
-    note = argument_note(backend.model, q0, problem.avoidance)
+    goal = None if problem.secondary is None else problem.secondary.nearest
+    note = argument_note(backend.model, q0, problem.avoidance, goal)
     return replace(found, note=note) if note else found
 
 

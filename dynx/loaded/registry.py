@@ -6,11 +6,12 @@ with that of its engine, ``ENGINE:VARIANT``.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection
 from pathlib import Path
 
 from dynx.argument_types import checks_types
-from dynx.errors import BackendError, UnknownBackendError
+from dynx.errors import BackendError, RobotNotFoundError, UnknownBackendError, shown
 from dynx.loaded.robot import LoadedRobot
 from dynx.model import Model
 from dynx.registry import ClassRegistry
@@ -62,9 +63,19 @@ def installed_engines() -> tuple[str, ...]:
 
 
 @checks_types
-def load_as(engine: str, path: Path, model: Model, calls: Collection[str] = ()) -> LoadedRobot:
-    """Return the robot as `engine` loads it from the file; see `LoadedRobot`."""
-    return loader_class(engine)(path, model, calls)
+def load_as(
+    engine: str, path: str | os.PathLike[str], model: Model, calls: Collection[str] = ()
+) -> LoadedRobot:
+    """Return the robot as `engine` loads it from the URDF file at `path`; see `LoadedRobot`.
+
+    Use it in a ``with`` statement, or close it. Raises RobotNotFoundError where there is no such file.
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise RobotNotFoundError(
+            f"no file {shown(path)}; wanted the path of a URDF file, which {shown(engine)} loads itself"
+        )
+    return loader_class(engine)(file, model, calls)
 
 
 def _is_installed(engine: str) -> bool:

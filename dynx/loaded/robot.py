@@ -95,6 +95,10 @@ class LoadedRobot(ABC):
     CALLS: ClassVar[Mapping[str, str]] = {}
     """Engine settings that are remedies at run time: id -> the line of code a user would write."""
 
+    STEP_DEFAULTS: ClassVar[Mapping[str, str]] = {}
+    """What a step of the engine does by itself, though no file states it: what it does -> the line of code
+    that switches it off. No result here includes it."""
+
     refuses_without: ClassVar[tuple[str, ...]] = ()
     """The parts of a link, ``visual`` or ``collision``, for whose missing mesh file the engine refuses the
     whole description."""
@@ -148,9 +152,11 @@ class LoadedRobot(ABC):
         """Return a (nv,)."""
 
     def contacts(self, q: Floats) -> Mapping[tuple[str, str], float]:
-        """Return the pairs of links whose contact adds forces, each with the depth [m] of the penetration.
+        """Return the pairs of shapes whose contact adds forces, each with the depth [m] of the penetration.
 
-        Empty in an engine whose equations of motion have no contacts.
+        A shape is known by its name in the document; one without a name by the link in which the engine has
+        it, which may be one that others are merged into. Empty in an engine whose equations of motion have no
+        contacts.
         """
         return {}
 

@@ -9,7 +9,7 @@ from operator import add, sub
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError, CompileError
+from dynx.errors import ArgumentError, CompileError, ShapeError, shown
 from dynx.model.numbers import (
     MAX_MAGNITUDE,
     checked_array,
@@ -43,7 +43,12 @@ def checked_q(tree: Tree, q: ArrayLike, name: str = "q") -> Floats:
     If its norm deviates by more than rounding, the quaternion is normalised in a copy, since engines treat
     such quaternions differently.
     """
-    array = checked_array(name, q, tree.nq)
+    try:
+        array = checked_array(name, q, tree.nq)
+    except ShapeError as error:
+        base = "position and quaternion (x, y, z, w) of the base, " if tree.floating else ""
+        listed = ", ".join(map(shown, tree.joint_names[:8])) + ", ..." * (len(tree.joint_names) > 8)
+        raise ShapeError(f"{error}: {base}{listed}") from None
     if not tree.floating:
         return array
     quat = array[..., 3:7]

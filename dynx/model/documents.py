@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from dynx.model.elements import IDENTITY, Pose
 from dynx.model.loading import read_model
 from dynx.model.model import Model
 from dynx.model.numbers import checked_array
+from dynx.model.tree import STANDARD_GRAVITY
+
+
+def bare_urdf(model: Model) -> str:
+    """Return the robot as URDF text that says nothing of its base, the pose of that, and gravity, for those
+    that state these apart."""
+    return replace(model, base="fixed", base_pose=IDENTITY, gravity=STANDARD_GRAVITY).to_urdf()
 
 
 def robot_document(model: Model) -> dict[str, Any]:
     """Return the entries ``urdf``, ``base``, ``gravity`` and, if the base is not at the world frame,
     ``base_pose``: x, y, z [m], roll, pitch, yaw [rad]."""
-    entries = {"urdf": model.to_urdf(), "base": model.base, "gravity": [float(x) for x in model.gravity]}
+    entries = {"urdf": bare_urdf(model), "base": model.base, "gravity": [float(x) for x in model.gravity]}
     return entries if model.base_pose == IDENTITY else {**entries, "base_pose": pose_numbers(model.base_pose)}
 
 

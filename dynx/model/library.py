@@ -12,14 +12,12 @@ import os
 import re
 import sys
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
 
-from dynx.errors import RobotNotFoundError, nearest, shown
-from dynx.model.package_search import data_folders
+from dynx.errors import RobotNotFoundError, shown
 
 EXAMPLE_ROBOT_DATA = "example-robot-data"
 DYNX_MODELS = "dynx"
@@ -99,40 +97,6 @@ def robots() -> tuple[LibraryRobot, ...]:
     return tuple(sorted(entries, key=lambda entry: (entry.source != EXAMPLE_ROBOT_DATA, entry.name)))
 
 
-def in_data_package(name: str) -> Path | None:
-    """Return the URDF file of a Python package of data (``pybullet_data``) that is called `name` there, as
-    ``plane.urdf``, ``kuka_iiwa/model.urdf`` or ``r2d2``; None if no package has it.
-
-    A path never leaves the package; one that begins with a dot is a file of the user's own.
-    """
-    if not name or os.path.isabs(name) or {".", ".."}.intersection(name.split("/")):
-        return None
-    file = name if name.endswith(".urdf") else f"{name}.urdf"
-    for folder in data_folders():
-        with suppress(OSError, ValueError):
-            found = (folder / file).resolve()
-            if found.is_file() and found.is_relative_to(folder):
-                return found
-    return None
-
-
-def hint_of_data_package(name: str) -> str:
-    """Return a clause with the URDF files of packages of data whose file or folder is called `name`, else
-    with the nearest names; empty without one."""
-    word = name.removesuffix(".urdf")
-    files = [
-        path.relative_to(folder).as_posix()
-        for folder in data_folders()
-        for depth in ("*", "*/*", "*/*/*")
-        for path in sorted(folder.glob(f"{depth}.urdf"))
-    ]
-    same = [each for each in files if word in (Path(each).stem, Path(each).parent.name)]
-    if same:
-        return f"; did you mean {' or '.join(map(shown, same[:3]))}?"
-    near = nearest(word, [each.removesuffix(".urdf") for each in files])
-    return near if "?" in near else ""
-
-
 def find(name: str) -> Path:
     """Return the path of the description of a robot, by its name or an alias, else by the name without suffix
     of a file in a package of data (`in_data_package`).
@@ -144,33 +108,16 @@ def find(name: str) -> Path:
     try:
         return by_name[name]
     except KeyError:
+        # Imported here, because most robots are found.
+        from dynx.model.missing_robot import hint_for_name, in_data_package
+
         # A file of a policy names robots by this function: a path is none.
         found = in_data_package(name) if re.fullmatch(r"[\w-]+", name) else None
         if found is not None:
             return found
-        hint = nearest(name, by_name) or "; the library is empty: is example-robot-data installed?"
-        of_data = hint_of_data_package(name) if re.fullmatch(r"[\w-]+", name) else ""
-        made = [each for each in _OF_MAKER.get(re.split(r"[\W_]", name.lower())[0], ()) if each in by_name]
-        if made:
-            hint = f"; did you mean {' or '.join(map(shown, made))}?"
-        elif of_data and (".urdf" in of_data or "?" not in hint):
-            hint = of_data
-        raise RobotNotFoundError(f"no robot {shown(name)} in the library, and no such file{hint}") from None
-
-
-_OF_MAKER = {
-    "anybotics": ("anymal", "anymal_c"),
-    "emika": ("panda",),
-    "fr3": ("panda",),
-    "franka": ("panda",),
-    "gen3": ("kinova",),
-    "jaco": ("kinova",),
-    "pal": ("talos", "tiago"),
-    "rethink": ("baxter",),
-    "ufactory": ("xarm7",),
-    "universal": ("ur5", "ur10"),
-}
-"""Robots of the library by the first word of what they are called besides, or by their maker."""
+        raise RobotNotFoundError(
+            f"no robot {shown(name)} in the library, and no such file{hint_for_name(name, by_name)}"
+        ) from None
 
 
 def _free_name(stem: str, inside: str, source: str, taken: dict[str, int]) -> str:

@@ -14,15 +14,15 @@ from numpy.typing import ArrayLike
 from dynx.argument_types import is_listed
 from dynx.errors import ArgumentError, DescriptionError, RobotNotFoundError, nearest, shown
 from dynx.files.reading import printable, read_file
-from dynx.model.elements import IDENTITY, Pose
-from dynx.model.library import find, hint_of_data_package, in_data_package, robots
+from dynx.model.elements import IDENTITY, Frame, Pose, checked_pose
+from dynx.model.library import find, robots
 from dynx.model.model import Model
 from dynx.model.package_search import StrPath, data_folders, environment_folders, resolve_package
-from dynx.model.tree import STANDARD_GRAVITY, Base
+from dynx.model.tree import Base, Description
 from dynx.model.urdf.geometry import urdf_geometry
 from dynx.model.urdf.reader import read_urdf
 
-_SUFFIXES = (".urdf", ".xacro", ".xml")
+_SUFFIXES = (".urdf", ".xacro", ".xml", ".mjcf", ".sdf", ".world")
 
 # Without the colon an argument is a mistake, which is named.
 _WITH_ARGUMENTS = re.compile(r"(?P<path>.*\.xacro)\s+(?P<arguments>\w+:?=.*)", re.DOTALL)
@@ -43,12 +43,14 @@ def load(
 
     `x` is one of
 
-    - URDF text: a `str` or `bytes` whose first character, after white space or a byte-order mark, is ``<``;
-    - a path: any `os.PathLike`, or a `str` with a separator or with the suffix .urdf, .xacro or .xml (.xacro
-      needs the extra ``xacro``, which evaluates expressions of a file as Python code: expand only files that
-      you trust). Such a string is never looked up as a name. Arguments of a xacro file follow its path in a
-      `str`, as ROS writes them: ``"ur.urdf.xacro name:=ur ur_type:=ur5e"``. Where a `str` is no file, it may
-      be one of ``pybullet_data``, as PyBullet finds it: ``plane.urdf``, ``kuka_iiwa/model.urdf``;
+    - text of URDF, MJCF or SDF: a `str` or `bytes` that begins with ``<`` after white space or a byte-order
+      mark;
+    - a path: any `os.PathLike`, or a `str` with a separator or with the suffix .urdf, .xacro, .xml, .mjcf,
+      .sdf or .world (.xacro needs the extra ``xacro``, which evaluates expressions of a file as Python
+      code: expand only files that you trust). Such a string is never looked up as a name. Arguments of a
+      xacro file follow its path in a `str`, as ROS writes them: ``"ur.urdf.xacro name:=ur ur_type:=ur5e"``.
+      Where a `str` is no file, it may be one of ``pybullet_data``, as PyBullet finds it, such as
+      ``plane.urdf``;
     - ``package://NAME/FILE``: a file of a package in `package_dirs`, in ROS_PACKAGE_PATH or
       AMENT_PREFIX_PATH, or of the Python package ``pybullet_data``; never one outside the package;
     - the name of a robot in the library, see ``dynx robots``. It takes precedence over a file of that name in
@@ -56,15 +58,15 @@ def load(
       of ``pybullet_data`` without its suffix, such as ``r2d2``, or any file;
     - a `Model`, whose base, its pose and gravity are kept unless they are given.
 
-    `base` is ``"fixed"`` (default) or ``"floating"``. `lock` fixes joints, by name, at positions [rad or m];
-    they are removed from q. `gravity` is (3,) [m/s^2] in world axes, by default (0, 0, -9.81). `base_pose`
-    is the pose of the root link of a fixed base in the world, a `Pose`, a matrix (4, 4) or a pair of position
-    and quaternion (x, y, z, w), by default the identity. `package_dirs` are the folders in which packages and
-    meshes are searched, besides those around the file.
+    `base` is ``"fixed"`` (default) or ``"floating"``; MJCF and SDF state their own, and the gravity. `lock`
+    fixes joints, by name, at positions [rad or m]; they are removed from q. `gravity` is (3,) [m/s^2] in
+    world axes, by default (0, 0, -9.81). `base_pose` is the pose of the root link of a fixed base in the
+    world, a `Pose`, a matrix (4, 4) or a pair of position and quaternion (x, y, z, w), by default the
+    identity. Packages and meshes are searched in the folders `package_dirs` and around the file.
 
     Raises RobotNotFoundError if no robot or file is found, DescriptionError if the description is malformed
     (with file and line), UnsupportedFeatureError if it uses a feature that dynx does not support,
-    UnknownNameError for an unknown joint in `lock`.
+    ArgumentError for a `base` that contradicts the file, UnknownNameError for an unknown joint in `lock`.
     """
     if lock is not None and not isinstance(lock, Mapping):
         raise ArgumentError(
@@ -101,7 +103,7 @@ def read_description(
     if isinstance(x, str) and x.lstrip("\ufeff \t\r\n").startswith("<"):
         return x, "<string>", None
     if not isinstance(x, str | os.PathLike):
-        raise ArgumentError(f"x is of type {type(x).__name__}; wanted a path, URDF text, a name or a Model")
+        raise ArgumentError(f"x is of type {type(x).__name__}; wanted a path, text, a name or a Model")
     named, arguments = split_arguments(x) if isinstance(x, str) else (x, {})
     path = _path_of(named, package_dirs)
     name = PurePath(path).name.split(".")[0]
@@ -149,13 +151,14 @@ def _path_of(x: StrPath, package_dirs: Iterable[StrPath]) -> str:
     if any(separator in x for separator in separators) or x.endswith(_SUFFIXES):
         path = os.path.expanduser(x)
         if not _exists(path):
+            # Imported here, because most files are there.
+            from dynx.model.missing_robot import hint_for_file, in_data_package
+
             elsewhere = in_data_package(x)
             if elsewhere is not None:
                 return str(elsewhere)
-            known = [entry.name for entry in robots()]
-            stem = PurePath(x).stem
-            hint = f"; the library has {shown(stem)}" if stem in known else hint_of_data_package(x)
-            raise RobotNotFoundError(f"no such file: {shown(x, 300)}{hint}")
+            library = {each.name: each.path for each in robots()}
+            raise RobotNotFoundError(f"no such file: {shown(x, 300)}{hint_for_file(x, library)}")
         return path
     try:
         return str(find(x))
@@ -184,23 +187,41 @@ def read_model(
     base_pose: Pose | ArrayLike | None = None,
     package_dirs: Iterable[StrPath] = (),
 ) -> Model:
-    """Create the model of URDF text; `source` names it in errors.
+    """Create the model of URDF, MJCF or SDF text; `source` names it in errors.
 
     A robot without a name in the text is called `name`. The other arguments and errors are those of `load`.
     """
-    content = read_urdf(data, source)
+    content = _read(data, source, package_dirs, base)
+    return build_described(content, source, name, base=base, lock=lock, gravity=gravity, base_pose=base_pose)
+
+
+def build_described(
+    content: Description,
+    source: str,
+    name: str | None = None,
+    *,
+    base: Base | None = None,
+    lock: Mapping[str, float] | None = None,
+    gravity: ArrayLike | None = None,
+    base_pose: Pose | ArrayLike | None = None,
+) -> Model:
+    """Create the model of what was read of a file; the arguments and errors are those of `read_model`."""
+    chosen = base or content.base or "fixed"
+    if base_pose is None:
+        # A floating base has its pose in q.
+        base_pose = content.base_pose if chosen == "fixed" else IDENTITY
     try:
         model = Model.build(
             content.name or name or "robot",
             content.links,
             content.joints,
-            base=base or "fixed",
-            gravity=STANDARD_GRAVITY if gravity is None else gravity,
-            base_pose=IDENTITY if base_pose is None else base_pose,
+            base=chosen,
+            gravity=content.gravity if gravity is None else gravity,
+            base_pose=base_pose,
             lock=lock,
             notes=content.notes,
             source=source,
-            geometry=urdf_geometry(data, source, package_dirs),
+            geometry=content.geometry,
         )
     except DescriptionError as error:
         if content.unread is None:
@@ -210,15 +231,52 @@ def read_model(
             source=source,
             line=content.unread.line,
         ) from None
-    for frame in content.frames:
-        if frame.link not in model.frame_names:
+    return _with_frames(model, content.frames, source) if content.frames else model
+
+
+def _with_frames(model: Model, frames: Iterable[Frame], source: str) -> Model:
+    """Add frames at once, as `Model.with_frame` adds each: a file may have thousands."""
+    names, placed = dict.fromkeys(model.frame_names), []
+    for frame in frames:
+        if frame.link not in names:
             raise DescriptionError(
                 f"frame {shown(frame.name)} is on {shown(frame.link)}, which is not a link"
                 + nearest(frame.link, model.frame_names),
                 source=source,
             )
-        model = model.with_frame(frame.name, frame.link, frame.placement)
-    return model
+        model.link(frame.link)
+        if frame.name in names:
+            raise ArgumentError(f"frame {shown(frame.name)} exists already in {model.name}")
+        names[frame.name] = None
+        placed.append(replace(frame, placement=checked_pose("placement", frame.placement)))
+    return replace(model, extra_frames=(*model.extra_frames, *placed))
+
+
+def _read(data: str | bytes, source: str, package_dirs: Iterable[StrPath], base: Base | None) -> Description:
+    content = None
+    # Imported here, because most robots are read from URDF. A URDF file may have an element <mujoco>, too.
+    if _contains(data, "<mujoco"):
+        from dynx.model.mjcf.reader import read_mjcf
+
+        content = read_mjcf(data, source, package_dirs)
+    if content is None and _contains(data, "<sdf"):
+        from dynx.model.sdf.reader import read_sdf
+
+        content = read_sdf(data, source, package_dirs)
+    if content is None:
+        content = read_urdf(data, source)
+        frames = [frame.name for frame in content.frames]
+        return replace(content, geometry=urdf_geometry(data, source, package_dirs, frames))
+    if base not in (None, content.base):
+        raise ArgumentError(
+            f"base is {shown(base)}, and the file says that the robot is {content.base}; "
+            f"load(...).with_base({base!r}) makes a robot with that base of it"
+        )
+    return content
+
+
+def _contains(data: str | bytes, text: str) -> bool:
+    return text.encode() in data if isinstance(data, bytes) else text in data
 
 
 def _with_options(

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, shown
-from dynx.files.pages import html_grid
 from dynx.model import configuration, topology
 from dynx.model.elements import IDENTITY, Frame, Joint, Link, Note, Pose, checked_pose
 from dynx.model.geometry.links import Geometry
@@ -19,7 +18,6 @@ from dynx.model.mechanism import Mechanism, build_mechanism
 from dynx.model.numbers import checked_gravity
 from dynx.model.topology import refuse_unbounded_numbers
 from dynx.model.tree import NO_GEOMETRY, STANDARD_GRAVITY, Base, Tree, checked_base
-from dynx.model.urdf.writer import write_urdf
 from dynx.registry import door, explains_names
 from dynx.spatial.scalar import longdouble
 
@@ -96,7 +94,26 @@ class Model(Tree):
         """The moving bodies in float64, on which the algorithms of `dynx.rbd` work."""
         return build_mechanism(self)
 
-    to_urdf = write_urdf
+    @door("dynx.model.urdf.writer:write_urdf")
+    def to_urdf(self, *, geometry: bool = False) -> str:
+        """Return the robot as URDF text in canonical form: one element a line, and nothing that has its
+        default.
+
+        `dynx.load` of the text returns an equal model; equality ignores shapes, which `geometry` adds.
+        Extensions that other readers ignore state what URDF cannot: gravity, the base, locked joints, frames.
+        Raises DescriptionError for a name, a number or a shape that URDF cannot express.
+        """
+        raise NotImplementedError
+
+    @door("dynx.model.mjcf.writer:write_mjcf")
+    def to_mjcf(self) -> str:
+        """Return the robot as MJCF text, MuJoCo's format, with comments on what that cannot say.
+
+        `dynx.load` of the text returns a model with the same links, joints, frames, inertias, limits and
+        coefficients, to rounding. Bodies, joints and sites have the names of links, joints and frames.
+        Raises DescriptionError and UnsupportedFeatureError for what MJCF cannot express.
+        """
+        raise NotImplementedError
 
     @cached_property
     def extended_mechanism(self) -> Mechanism:
@@ -166,6 +183,8 @@ class Model(Tree):
             for joint in self.coordinate_joints
         )
         head = ("joint", "type", "parent", "child", "lower", "upper", "velocity", "effort")
+        from dynx.files.pages import html_grid  # most models are shown on no page
+
         return html_grid(f"{repr(self)[1:-1]}, {self.total_mass:.6g} kg", head, rows)
 
     def __getstate__(self) -> dict[str, Any]:

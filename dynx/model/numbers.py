@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from contextlib import suppress
 from typing import TypeGuard
 
@@ -135,6 +136,8 @@ def real_array(name: str, value: ArrayLike) -> Floats:
     array = array_of(name, value)
     if array.dtype.kind not in "fiu":
         origin = "" if array is value else f" (it is {shown(value)}, of type {type(value).__name__})"
+        if isinstance(value, Mapping):
+            origin += "; numbers of joints by name: [values[name] for name in model.joint_names]"
         raise DTypeError(f"{name} has dtype {array.dtype}; wanted real numbers (float64){origin}")
     return np.asarray(array, dtype=np.float64)
 

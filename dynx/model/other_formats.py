@@ -4,12 +4,21 @@ from __future__ import annotations
 
 from pathlib import PurePath
 
-_SDF = "SDF, Gazebo's format of models and worlds, which dynx does not read"
-_MJCF = "MJCF, MuJoCo's format, which dynx writes (World.to_mjcf) and does not read"
+_SDF = "SDF, Gazebo's format of models and worlds, which dynx.load reads"
+_MJCF = "MJCF, MuJoCo's format, which dynx.load reads, or dynx.world.read_scene if it holds several robots"
 _MESH = "a mesh; dynx.world.mesh(name, file) makes a body of one, and the <geometry> of a URDF may name it"
 _USD = "USD, which dynx does not read"
 
-BY_ROOT = {"sdf": _SDF, "world": _SDF, "mujoco": _MJCF, "COLLADA": _MESH}
+_INCLUDED = "a part that a file of MJCF includes; dynx.load reads the file with <mujoco>"
+
+BY_ROOT = {
+    "mujocoinclude": _INCLUDED,
+    "sdf": _SDF,
+    "gazebo": "SDF of a version before 1.3; dynx reads versions 1.4 to 1.12, whose root is <sdf>",
+    "world": "a part of SDF, whose root is <sdf>",
+    "mujoco": _MJCF,
+    "COLLADA": _MESH,
+}
 """Format of a file by its root element."""
 
 _BY_SUFFIX = {
@@ -22,6 +31,14 @@ _BY_SUFFIX = {
     **dict.fromkeys((".stl", ".obj", ".dae", ".ply", ".gltf", ".glb"), _MESH),
     **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), _USD),
 }
+
+
+_ROOTS = {".sdf": "<sdf version=...>", ".world": "<sdf version=...>", ".mjcf": "<mujoco model=...>"}
+
+
+def wanted_root(path: str) -> str:
+    """Return the root element that a description in a file of its suffix has."""
+    return _ROOTS.get(PurePath(path).suffix.lower(), "<robot name=...>")
 
 
 def format_hint(path: str) -> str:

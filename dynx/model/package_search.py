@@ -21,7 +21,13 @@ StrPath = str | os.PathLike[str]
 DATA_PACKAGES = ("pybullet_data",)
 """Python packages of robots and meshes, found without being imported."""
 
-_SEARCH_PATHS = (("ROS_PACKAGE_PATH", ""), ("AMENT_PREFIX_PATH", "share"))
+_SEARCH_PATHS = (
+    ("ROS_PACKAGE_PATH", ""),
+    ("AMENT_PREFIX_PATH", "share"),
+    ("GZ_SIM_RESOURCE_PATH", ""),
+    ("SDF_PATH", ""),
+    ("GAZEBO_MODEL_PATH", ""),
+)
 """Environment variables that list folders, and where packages lie in each of these."""
 
 
@@ -32,7 +38,8 @@ def data_folders() -> list[Path]:
 
 
 def environment_folders() -> tuple[Path, ...]:
-    """Return the folders that hold packages by ROS_PACKAGE_PATH and AMENT_PREFIX_PATH."""
+    """Return the folders that hold packages, or models, by ROS_PACKAGE_PATH, AMENT_PREFIX_PATH,
+    GZ_SIM_RESOURCE_PATH, SDF_PATH and GAZEBO_MODEL_PATH."""
     listed = ((os.environ.get(variable, "").split(os.pathsep), below) for variable, below in _SEARCH_PATHS)
     return tuple(Path(entry, below) for entries, below in listed for entry in entries if entry)
 
@@ -74,8 +81,11 @@ def resolve_package(uri: str, roots: Iterable[StrPath]) -> Path:
     return found
 
 
-MANIFESTS = ("package.xml", "manifest.xml")
-"""Files that mark the root folder of a ROS package; the first states its name."""
+MODEL_MANIFEST = "model.config"
+"""File that marks the folder of a model of Gazebo, and names its SDF."""
+
+MANIFESTS = ("package.xml", "manifest.xml", MODEL_MANIFEST)
+"""Files that mark the root folder of a package; the first states the name of a ROS package."""
 
 MAX_FOLDERS = 5000
 """Largest number of folders of a repository that are searched for a package."""
@@ -98,9 +108,10 @@ _NAME = re.compile(rb"<name>\s*([^<\s]+)\s*</name>")
 # Cached, because a robot has dozens of meshes.
 @lru_cache(maxsize=256)
 def enclosing_folder(folder: Path) -> Path:
-    """Return the folder of all files that come with a description: the repository, else the package.
+    """Return the folder of all files that come with a description: the repository, else the package of ROS,
+    else the outermost Python package around it.
 
-    Without either it is the description's own folder, or the one above where the name of the folder shows
+    Without any it is the description's own folder, or the one above where the name of the folder shows
     that it holds descriptions only.
     """
     above = [each for each in (folder, *folder.parents) if _is_private(each)]
@@ -108,6 +119,9 @@ def enclosing_folder(folder: Path) -> Path:
         for each in above:
             if any((each / marker).exists() for marker in markers):
                 return each
+    python = [each for each in above if (each / "__init__.py").exists()]
+    if python:
+        return python[-1]
     beside = folder.name.lower() in _DESCRIPTION_FOLDERS or "urdf" in folder.name.lower()
     return folder.parent if beside and folder.parent in above else folder
 

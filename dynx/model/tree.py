@@ -206,6 +206,24 @@ class Tree:
         return message + nearest(name, known)
 
 
+@dataclass(frozen=True)
+class Description:
+    """Content of a file: parts in the order of the file, not yet checked to form a tree."""
+
+    name: str | None
+    links: list[Link]
+    joints: list[Joint]
+    frames: list[Frame]
+    notes: list[Note]
+    geometry: Geometry = NO_GEOMETRY
+    unread: Note | None = None
+    """The first ignored element that may hold links or joints; it explains why the parts form no tree."""
+    base: Base | None = None
+    """The base that the file states; None for a format that leaves it open."""
+    gravity: Vector = STANDARD_GRAVITY
+    base_pose: Pose = IDENTITY
+
+
 def checked_base(base: str) -> Literal["fixed", "floating"]:
     """Return `base`; raise ArgumentError unless it is ``"fixed"`` or ``"floating"``."""
     if base == "fixed":

@@ -6,7 +6,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from dynx.errors import shown
+from dynx.model.elements import Joint
+from dynx.model.model import Model
 from dynx.model.tree import Tree
 from dynx.spatial.scalar import Floats
 
@@ -27,15 +31,31 @@ def position_notes(model: Tree, q: Floats, name: str = "q") -> Iterator[str]:
     for k, joint in enumerate(model.coordinate_joints, start=base):
         x, lower, upper = float(q[k]), float(model.lower[k]), float(model.upper[k])
         if joint.type in FAR and not lower - FAR[joint.type] <= x <= upper + FAR[joint.type]:
-            unit, other, factor = _OTHER_UNITS[joint.type]
-            meant = f"; {x:g} {other} are {factor * x:.5g} {unit}" if lower <= factor * x <= upper else ""
+            meant = in_other_unit(joint, x, lower, upper)
             found.append(
-                f"{name}: {shown(joint.name)} is at {x:g} {unit}, far beyond its limits {lower:.4g} to "
-                f"{upper:.4g}{meant}"
+                f"{name}: {shown(joint.name)} is at {x:g} {joint.unit}, far beyond its limits {lower:.4g} to "
+                f"{upper:.4g}{meant and f'; {meant}'}"
             )
     yield from found[:MAX_JOINTS]
     if len(found) > MAX_JOINTS:
         yield f"{name}: {len(found) - MAX_JOINTS} more are far beyond their limits"
+
+
+def target_notes(model: Model, robot: str, kp: Floats, target: Floats) -> Iterator[str]:
+    """Yield a sentence for each target (n,) of the motors of a robot that is far beyond the limits of its
+    joint; `kp` (n,) is the stiffness of the motors, zero where a joint has no target."""
+    q, driven = model.neutral(), np.flatnonzero(kp)
+    q[len(q) - len(target) + driven] = target[driven]
+    yield from position_notes(model, q, f"the target of the motors of {shown(robot)}")
+
+
+def in_other_unit(joint: Joint, x: float, lower: float, upper: float) -> str:
+    """Return what a position far beyond the limits is in the unit that was perhaps meant; empty where that
+    is beyond them, too."""
+    if joint.type not in FAR or lower - FAR[joint.type] <= x <= upper + FAR[joint.type]:
+        return ""
+    unit, other, factor = _OTHER_UNITS[joint.type]
+    return f"{x:g} {other} are {factor * x:.5g} {unit}" if lower <= factor * x <= upper else ""
 
 
 def gravity_notes(gravity: Sequence[float]) -> Iterator[str]:

@@ -52,7 +52,7 @@ def align_frames(mechanism: Mechanism) -> Mechanism:
         R, p = Q_parent.T @ body.R, Q_parent.T @ (body.p - o_parent)
         if body.revolute:
             child_offsets = [np.sum(child.p * body.axis) for child in children.get(index, ())]
-            Q, o = _rotation_to_axis(R, body.axis), _origin_shift(R, p, body.axis, child_offsets)
+            Q, o = rotation_to_axis(R, body.axis), _origin_shift(R, p, body.axis, child_offsets)
             placed.append((body, R @ Q, p + R @ o, Z_AXIS + zero))
         else:
             Q, o = R.T, -R.T @ p
@@ -81,16 +81,19 @@ def regroup_inertias(mechanism: Mechanism) -> Mechanism:
     inertias = {ROOT: mechanism.root, **{k: body.inertia for k, body in enumerate(mechanism.bodies)}}
     for index in reversed(range(len(mechanism.bodies))):
         body = mechanism.bodies[index]
-        inertias[index], redundant = _split_inertia(inertias[index], body)
+        inertias[index], redundant = split_inertia(inertias[index], body.revolute)
         inertias[body.parent] = inertias[body.parent] + redundant.transform(body.R, body.p)
     bodies = tuple(replace(body, inertia=inertias[k]) for k, body in enumerate(mechanism.bodies))
     return replace(mechanism, root=inertias[ROOT], bodies=bodies)
 
 
-def _split_inertia(inertia: RigidInertia, body: Body) -> tuple[RigidInertia, RigidInertia]:
-    """Split an inertia into the part that stays with the body and the part that moves to its parent."""
+def split_inertia(inertia: RigidInertia, revolute: bool) -> tuple[RigidInertia, RigidInertia]:
+    """Split an inertia into the part that stays with the body and the part that moves to its parent.
+
+    The body rotates about the z axis of its frame if it is `revolute`, and slides otherwise.
+    """
     mass, h, tensor = inertia.mass, inertia.first_moment, inertia.rotational_inertia
-    if not body.revolute:
+    if not revolute:
         return RigidInertia(mass, h, 0 * tensor), RigidInertia(0 * mass, 0 * h, tensor)
     xx, yy, zz = (inertia.second_moment_matrix[k, k] for k in range(3))
     # With this tensor the second-moment matrix of the remaining part has the diagonal xx, yy and exactly 0.
@@ -123,7 +126,7 @@ def _inertias_in_frames(
         yield moved[k]
 
 
-def _rotation_to_axis(R: Array, axis: Array) -> Array:
+def rotation_to_axis(R: Array, axis: Array) -> Array:
     """Return a rotation Q (3, 3) that maps z to `axis`.
 
     If `axis` is a coordinate axis, Q permutes axes; else it is chosen so that R Q has a zero entry.

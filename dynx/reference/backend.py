@@ -22,8 +22,8 @@ class ReferenceBackend(Backend):
     """`dynx.rbd` evaluated on float64; see `Backend` for the interface.
 
     NumPy evaluates a batch at once. The backend ``compiled`` gives the same numbers to rounding, about 300
-    times as fast for the inverse dynamics of UR5 on one thread (``dynx bench ur5 --batch 65536 --threads 1``;
-    other quantities are in docs/bench.md).
+    times as fast for the inverse dynamics of UR5 on one thread (``dynx bench ur5 --batch 65536 --threads 1``,
+    which measures the other quantities too).
     """
 
     name: ClassVar[str] = "reference"

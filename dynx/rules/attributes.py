@@ -8,9 +8,9 @@ from collections.abc import Collection, Sequence
 from dynx.errors import escaped
 from dynx.model.elements import Pose, Vector
 from dynx.model.urdf.reader import QUATERNION, read_origin, reads_quaternions
-from dynx.model.urdf.values import Reading
 from dynx.model.xml.reading import Element
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
+from dynx.model.xml.values import Reading
 from dynx.rules.case import Case
 from dynx.rules.numbers_in_text import MOMENTS, decimal, is_number
 from dynx.rules.rule import Correction, found_at

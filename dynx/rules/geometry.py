@@ -27,6 +27,7 @@ from dynx.model.geometry.mesh_files import (
     found_by_bullet,
     reason_unknown,
 )
+from dynx.model.geometry.solids import polyhedron_properties
 from dynx.model.xml.source import Edit, SourceElement, XmlSource
 from dynx.rules.attributes import number_of, origin_of, vector_of
 from dynx.rules.case import Case
@@ -281,7 +282,8 @@ def _in_own_frame(element: SourceElement, source: str) -> Extent | None:
 
 def _cylinder(radius: float, length: float) -> Extent:
     outside = radius / math.cos(math.pi / _SIDES)
-    angles = [2.0 * math.pi * k / _SIDES for k in range(_SIDES)]
+    # Sides, not edges, face the axes of the frame: the box along them is that of the cylinder.
+    angles = [2.0 * math.pi * (k + 0.5) / _SIDES for k in range(_SIDES)]
     rim = [(outside * math.cos(angle), outside * math.sin(angle)) for angle in angles]
     return Extent.of_points((x, y, z) for x, y in rim for z in (-length / 2.0, length / 2.0))
 
@@ -316,6 +318,26 @@ def body_extents(case: Case) -> Iterator[tuple[RigidGroup, Extent]]:
         extent = _group_extent(case, group)
         if extent is not None and not extent.empty and extent.diagonal() > 0.0:
             yield group, extent
+
+
+def largest_volume(case: Case, group: RigidGroup) -> float:
+    """Return the largest volume [m^3] of a single shape of the group; a mesh counts as its convex hull."""
+    shapes = (shape for name in group.links for shape in geometry_elements(case.links[name]))
+    return max((_volume(shape, case.source.source) for shape in shapes), default=0.0)
+
+
+def _volume(element: SourceElement, source: str) -> float:
+    if element.tag == "mesh":
+        extent = _mesh(element, source)
+        try:
+            return 0.0 if extent is None else polyhedron_properties(*convex_hull(extent.points)).volume
+        except ArgumentError:
+            return 0.0  # A line.
+    if element.tag == "box":
+        return abs(math.prod(vector_of(element, "size") or (0.0,)))
+    radius, length = (abs(number_of(element, name) or 0.0) for name in ("radius", "length"))
+    ball, tube = 4.0 / 3.0 * math.pi * radius**3, math.pi * radius**2 * length
+    return {"sphere": ball, "cylinder": tube, "capsule": ball + tube}.get(element.tag, 0.0)
 
 
 def group_extents(case: Case) -> Iterator[tuple[Link, Extent]]:

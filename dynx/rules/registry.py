@@ -118,6 +118,19 @@ def checked_choices(given: Iterable[tuple[str, str]]) -> dict[str, str]:
     return chosen
 
 
+# The user's selection of the rules that count.
+
+
+def ignored_rules(ignore: Iterable[str] = (), only: Iterable[str] = ()) -> frozenset[str]:
+    """Return the ids of the rules that do not count: those of `ignore`, and with `only` all but these.
+
+    Both have ids or names of rules. Raises UnknownNameError for an unknown one, with the nearest.
+    """
+    counted = {find_rule(word).id for word in only}
+    others = {rule.id for rule in all_rules() if rule.id not in counted} if counted else set()
+    return frozenset({find_rule(word).id for word in ignore} | others)
+
+
 # Traps: small robots, one for each rule, that show its cause and nothing else.
 
 

@@ -167,7 +167,6 @@ class _RunBuffers:
                 self._drawn[Purpose.MEASUREMENT] = np.zeros((*blocks, 2, sizes["v"]))
             if size:
                 self._drawn[Purpose.CONTROLLER] = np.zeros((*blocks, size))
-        self._stops = None if part.stops is None else part.stops.of_rows(rows)
         self._records: tuple[list[Floats], list[Floats], list[Floats]] = ([], [], [])
 
     def run(self) -> PartOutcome:
@@ -253,16 +252,18 @@ class _RunBuffers:
         )
 
     def _finish(self, bound: BoundSteps, stop: Stop) -> None:
-        """Complete a step in which modes of dry friction are not settled, or joints are beyond limits."""
-        step = stop.step
+        """Complete a step in which modes of dry friction are not settled, or joints passed limits."""
+        step, stops = stop.step, self._part.stops
         self._settling(bound, step, self._kernels[0].image.lanes)
-        if self._stops is not None:
+        status = self._settling.arrays["status"][0, :, 0].astype(np.int64)
+        rows = np.flatnonzero(status & Status.AT_LIMIT)
+        if stops is not None and len(rows):
             before, now = ({name: self._now(name, k) for name in self._state} for k in (step, step + 1))
             fixed = {
                 name: np.broadcast_to(array, (1, self._rows, array.shape[-1]))[0]
                 for name, array in self._fixed.items()
             }
-            self._stops(before, now, fixed, self._part.references[step])
+            stops(rows, before, now, fixed, self._part.references[step])
 
     def _draw(self, number: int, noise: PartNoise) -> None:
         """Draw noise and random numbers for a block of control steps."""
@@ -731,7 +732,8 @@ def refuse_uncompiled(scenario: Scenario) -> None:
         )
     for name in ("controller", "reference"):
         if getattr(scenario, name) is None:
-            raise ArgumentError(f"{name} is None; a batch needs one")
+            why = ", also with needs_setpoint = False: errors are measured from it (such as model.neutral())"
+            raise ArgumentError(f"{name} is None; a batch needs one{why if name == 'reference' else ''}")
     require_duration(scenario)
 
 

@@ -185,6 +185,15 @@ class BatchRollouts:
             save_figure(figure, path)
         return figure
 
+    @door("dynx.viewer.viewer:view")
+    def view(self, **options: Any) -> Any:
+        """Play the recorded states of all rollouts in the browser; return the `dynx.viewer.Viewer`, which
+        takes the options.
+
+        Raises ArgumentError for a batch without a record, and NotInstalledError without the extra ``viewer``.
+        """
+        raise NotImplementedError
+
     @property
     def _losses(self) -> str:
         """Number of diverged rollouts and the first time, as the end of a sentence; empty without any."""

@@ -267,7 +267,7 @@ class ClosedLoop:
                     q, v, a, tau, _ = plant.step_motors(t, command)
                 diverged = is_diverged(v)
                 if stops is not None and not diverged:
-                    stopped = stops(q, v)
+                    stopped = stops(Q[k], q, v)
                     if stopped is not None:
                         q, v = stopped
                         plant.reset(q, v)

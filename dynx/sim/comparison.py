@@ -210,9 +210,6 @@ def scene_factors(ours: ScenePlant, theirs: ScenePlant) -> Iterator[PartFactor]:
     elif ours.settings != theirs.settings:
         both = (str(dict(ours.settings)), str(dict(theirs.settings)))
         yield "plant.settings", both, [(("settings",), theirs.settings)]
-    if ours.joint_limits != theirs.joint_limits:
-        both = (str(ours.joint_limits), str(theirs.joint_limits))
-        yield "plant.joint_limits", both, [(("joint_limits",), theirs.joint_limits)]
     for kind in PARTS:
         for k, (one, other) in enumerate(
             zip(getattr(ours.scene, kind), getattr(theirs.scene, kind), strict=True)

@@ -332,7 +332,7 @@ class LaneLoop(CompiledLoop[BoundSteps]):
             record.steps = stop.step + 1
 
     def _finished(self, record: StateBuffers, stop: Stop) -> Status:
-        """Complete a step in which modes of dry friction are not settled, or joints are beyond limits."""
+        """Complete a step in which modes of dry friction are not settled, or joints passed limits."""
         k = stop.step
         self._settling(self._calls, k, self._lanes)
         status = Status(int(self._settling.arrays["status"][0, 0, 0]))
@@ -344,7 +344,7 @@ class LaneLoop(CompiledLoop[BoundSteps]):
                 }
                 for n in (0, 1)
             )
-            self._stops(before, now, {}, self._arrays["q_reference"][0])
+            self._stops(np.zeros(1, dtype=np.intp), before, now, {}, self._arrays["q_reference"][0])
         return status
 
 
@@ -404,8 +404,8 @@ class CutLoop(CompiledLoop[dict[bool, BoundCuts]]):
                 record.steps += 1
 
     def _stop(self, record: StateBuffers, row: int) -> None:
-        """Stop the joints that are beyond their limits in a row of the record."""
+        """Stop the joints that passed their limits in the step to a row of the record."""
         assert self._loop.stops is not None
-        stopped = self._loop.stops(record.q[row], record.v[row])
+        stopped = self._loop.stops(record.q[row - 1], record.q[row], record.v[row])
         if stopped is not None:
             record.q[row], record.v[row] = stopped

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property, partial
-from math import isfinite, prod
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,7 @@ from dynx.compiled.kernels import evaluate_quantity
 from dynx.compiled.parametric import ParametricDynamics
 from dynx.compiled.simplification import simplify_mechanism
 from dynx.compiled.status import Status
-from dynx.compiled.step import StepText
+from dynx.compiled.step import StepText, position_excess
 from dynx.control.base import Controller, chain_of, gains_of, rebind
 from dynx.control.content import attributes_of, content_of, fields_of, is_foreign
 from dynx.errors import ArgumentError, TraceError, UnsupportedFeatureError, shown
@@ -311,7 +311,7 @@ class LoopStep:
         max_error = np.array([x.maximum(e) for x, e in zip(given["max_error"], error, strict=True)])
         # An infinite torque makes the velocity infinite too, unless it was clamped.
         commanded = results.get("commanded")
-        excess = position_excess(self.model, q) if self.stops else None
+        excess = position_excess(self.model, given["q"], q) if self.stops else None
         return {
             "q": q,
             "v": v,
@@ -525,14 +525,14 @@ def cut_step(step: LoopStep, plant: IntegratedPlant, *, controlled: bool) -> Cut
         return tracer.record(call, shape, *arguments, origin=PLANT, before=written)
 
     q, v, a = plant.advanced(record, given["q"], given["v"], tau)
-    excess = position_excess(step.model, q) if step.stops else None
+    excess = position_excess(step.model, given["q"], q) if step.stops else None
     return tracer.compile({"q": q, "v": v, "a": a, "status": step_status(v, None, excess), **results})
 
 
 def step_status(v: Array, torque: Array | None, excess: Any = None, changes: Any = None) -> Array:
     """Return the status (1,) of a step to the velocity `v` under a commanded `torque`, both (nv,).
 
-    `excess` is positive if a joint is beyond a position limit, `changes` if the modes of dry friction are
+    `excess` is positive if a joint passed a position limit, `changes` if the modes of dry friction are
     not settled.
     """
     found = select(as_traced(squared_speed(v)) < MAX_SQUARED_SPEED, 0.0, float(Status.DIVERGED))
@@ -543,18 +543,6 @@ def step_status(v: Array, torque: Array | None, excess: Any = None, changes: Any
         if amount is not None:
             found = found + select(as_traced(amount) > 0.0, float(flag), 0.0)
     return np.array([as_symbol(found)], dtype=object)
-
-
-def position_excess(model: Model, q: Array) -> Any:
-    """Return a number that is positive if a joint is beyond a position limit at q (nq,), for symbols."""
-    joints = slice(7 if model.floating else 0, None)
-    found: Any = 0.0
-    for x, low, high in zip(q[joints].tolist(), model.lower[joints], model.upper[joints], strict=True):
-        beyond = [float(low) - x] if isfinite(low) else []
-        beyond += [x - float(high)] if isfinite(high) else []
-        for each in beyond:
-            found = each.maximum(found)
-    return found
 
 
 def _sound_steps(before: Array, v: Array, commanded: Array | None) -> Array:

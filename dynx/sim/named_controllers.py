@@ -20,7 +20,7 @@ from dynx.backends import Backend
 from dynx.control import registry
 from dynx.control.base import Controller
 from dynx.control.gains import feedback_gains
-from dynx.errors import GainError, UnknownNameError, nearest, shown
+from dynx.errors import GainError, UnknownNameError, UnsupportedFeatureError, nearest, shown
 from dynx.model import Model
 from dynx.model.numbers import checked_gain
 from dynx.registry import DEFAULT_ENGINE
@@ -59,7 +59,8 @@ class ControllerRequest:
     """Arguments from which a named controller is made.
 
     Gains in N m are scaled by the inertia at `start` (nq,). `limit` is the effort limit of the motors [N m or
-    N], for PID and PyBullet's motors; `frame` is the frame of task-space controllers.
+    N], for PID and PyBullet's motors; `frame` is the frame of task-space controllers. With `joint_dynamics`
+    the model of the controller has the armature, damping and dry friction of the description.
     """
 
     model: Model
@@ -69,6 +70,12 @@ class ControllerRequest:
     frame: str | None = None
     limit: ArrayLike | None = None
     backend: str | Backend = DEFAULT_ENGINE
+    joint_dynamics: bool = False
+
+    @property
+    def computing(self) -> dict[str, Any]:
+        """Options of a controller that computes with a model (`dynx.control.ModelBased`)."""
+        return {"backend": self.backend, "joint_dynamics": self.joint_dynamics}
 
     @property
     def n_joints(self) -> int:
@@ -117,7 +124,8 @@ class NamedController:
 def named_controller(name: str, request: ControllerRequest) -> Controller[Any]:
     """Return the controller of that name, one of `CONTROLLERS`.
 
-    Raises UnknownNameError for another name, GainError for gains that the controller does not take.
+    Raises UnknownNameError for another name, GainError for gains that the controller does not take, and
+    UnsupportedFeatureError for `joint_dynamics` of a controller that computes without a model.
     """
     if name not in CONTROLLERS:
         raise UnknownNameError(f"no controller is called {shown(name)}{nearest(name, CONTROLLERS)}")
@@ -128,7 +136,13 @@ def named_controller(name: str, request: ControllerRequest) -> Controller[Any]:
             raise GainError(f"{name} takes no {gain}; {takes}")
     if named.controls == "frame" and request.frame is None:
         raise UnknownNameError(f"{name} controls a frame, and none is given")
-    return named.make(request)
+    controller = named.make(request)
+    if request.joint_dynamics and not getattr(controller, "joint_dynamics", False):
+        raise UnsupportedFeatureError(
+            f"{name} computes without the dynamics of the joints, so it takes no joint_dynamics; wanted a "
+            "controller with a model, such as computed-torque or gravity-pd"
+        )
+    return controller
 
 
 class NamedControllers(Mapping[str, NamedController]):
@@ -163,7 +177,7 @@ def _of_class(kind: type[Controller[Any]]) -> NamedController:
     constructor: Callable[..., Controller[Any]] = kind
 
     def make(request: ControllerRequest) -> Controller[Any]:
-        options = {"frame": request.frame, "limit": request.limit, "backend": request.backend}
+        options = {"frame": request.frame, "limit": request.limit, **request.computing}
         options |= {"control_dt": request.control_dt, **request.gains.given()}
         try:
             return constructor(
@@ -204,7 +218,7 @@ def _position_motor(request: ControllerRequest) -> Controller[Any]:
 
 def _operational_space(request: ControllerRequest) -> Controller[Any]:
     posture = {name: gain for name, gain in request.gains.given().items() if name.startswith("posture")}
-    options: Any = {**request.rates(6), **posture, "backend": request.backend}
+    options: Any = {**request.rates(6), **posture, **request.computing}
     return control.OperationalSpace(request.model, str(request.frame), **options)
 
 
@@ -218,7 +232,7 @@ def _impedance(request: ControllerRequest) -> Controller[Any]:
         stiffness=gains.kp,
         damping=gains.kd,
         joint_damping=0.0 if gains.posture_kd is None else gains.posture_kd,
-        backend=request.backend,
+        **request.computing,
     )
 
 
@@ -244,27 +258,27 @@ BUILT_IN: dict[str, NamedController] = {
     "gravity-pd": NamedController(
         "pd plus gravity compensation g(q)",
         _FEEDBACK,
-        lambda r: control.GravityCompensatedPD(r.model, **r.torques(), backend=r.backend),
+        lambda r: control.GravityCompensatedPD(r.model, **r.torques(), **r.computing),
     ),
     "feed-forward": NamedController(
         "ID(q*, v*, a*), no feedback",
         (),
-        lambda r: control.FeedForward(r.model, backend=r.backend),
+        lambda r: control.FeedForward(r.model, **r.computing),
     ),
     "feed-forward-pd": NamedController(
         "ID(q*, v*, a*) and pd",
         _FEEDBACK,
-        lambda r: control.FeedForward(r.model, **r.torques(), backend=r.backend),
+        lambda r: control.FeedForward(r.model, **r.torques(), **r.computing),
     ),
     "computed-torque": NamedController(
         "ID(q, v, a* + kd (v* - v) + kp (q* - q))",
         _FEEDBACK,
-        lambda r: control.ComputedTorque(r.model, **r.rates(), backend=r.backend),
+        lambda r: control.ComputedTorque(r.model, **r.rates(), **r.computing),
     ),
     "discrete-computed-torque": NamedController(
         "inverse of the step of the plant",
         (),
-        lambda r: control.DiscreteComputedTorque(r.model, control_dt=r.control_dt, backend=r.backend),
+        lambda r: control.DiscreteComputedTorque(r.model, control_dt=r.control_dt, **r.computing),
     ),
     "operational-space": NamedController(
         "computed torque of a frame",

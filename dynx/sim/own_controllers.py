@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
-from types import CodeType, FrameType, FunctionType
+from types import FrameType
 from typing import Any
 
 import numpy as np
 
-from dynx.backends.dynamics import MATRICES, Dynamics, Evaluation
 from dynx.control.base import Controller, Measurement, chain_of, rebind
 from dynx.control.content import attributes_of, is_foreign, is_foreign_module
 from dynx.errors import TraceError
 from dynx.sim.controller_checks import ControllerWatch, defect_of_outcome
-from dynx.simd.expr import Symbol
+from dynx.sim.reproducibility import (
+    REPETITIONS,
+    RepeatedTraces,
+    UserTrace,
+    shown_values,
+    variables_of,
+)
 from dynx.simd.user_code.arrays import symbol_array, traced_array
 from dynx.simd.user_code.numbers import as_traced
-from dynx.simd.user_code.reproducibility import LocatedGraph, first_difference
-from dynx.spatial.scalar import Array
 from dynx.trajectory.base import Setpoint
-
-REPETITIONS = 4
-"""Number of traces that are compared with the first one."""
 
 
 def is_own(controller: Controller[Any]) -> bool:
@@ -69,17 +70,14 @@ def refuse_irreproducible(controller: Controller[Any], repetitions: int = REPETI
     one, other = controller.initial_state(), controller.initial_state()
     if isinstance(one, np.ndarray) and not np.array_equal(one, other, equal_nan=True):
         raise TraceError(f"{controller.name}.initial_state() returns another state in each call")
-    watch, variables = ControllerWatch(controller), _variables(controller)
-    first = _Trace(controller)
-    for _ in range(repetitions):
-        again = _Trace(controller)
-        found = first_difference(first.graph, first.results, again.graph, again.results)
-        if found is not None:
-            raise TraceError(_difference(controller, *found))
+    watch = ControllerWatch(controller)
+    difference, changed = RepeatedTraces.of(
+        partial(_trace, controller), partial(_variables, controller), repetitions
+    )
+    if difference is not None:
+        raise TraceError(_difference(controller, *difference))
     if watch.changed:
         raise TraceError(f"{watch.changed}: let torque return what changes as its state")
-    after = _variables(controller)
-    changed = next((name for name, value in variables.items() if after.get(name) is not value), None)
     if changed is not None:
         file, line = _definition(controller)
         raise TraceError(
@@ -90,107 +88,34 @@ def refuse_irreproducible(controller: Controller[Any], repetitions: int = REPETI
 
 def _variables(controller: Controller[Any]) -> dict[str, Any]:
     """Return the attributes of the user's classes, and the variables of modules that their methods name."""
-    found: dict[str, Any] = {}
     chain = list(chain_of(controller))
-    waiting = [value for each in chain for value in attributes_of(each).values()]
-    for kind in {kind for each in chain for kind in type(each).__mro__ if is_foreign(kind)}:
-        found |= {f"{kind.__qualname__}.{name}": value for name, value in vars(kind).items()}
-        waiting += vars(kind).values()
-    seen: set[CodeType] = set()
-    while waiting:
-        function = waiting.pop()
-        if not isinstance(function, FunctionType) or function.__code__ in seen:
-            continue
-        seen.add(function.__code__)
-        for name in _names(function.__code__) & function.__globals__.keys():
-            found[name] = value = function.__globals__[name]
-            if is_foreign_module(getattr(value, "__module__", "dynx")):
-                waiting.append(value)
-    return found
+    kinds = dict.fromkeys(kind for each in chain for kind in type(each).__mro__ if is_foreign(kind))
+    return variables_of(kinds, (value for each in chain for value in attributes_of(each).values()))
 
 
-def _names(code: CodeType) -> set[str]:
-    """Return the names that a code and the functions in it refer to."""
-    inner = (each for each in code.co_consts if isinstance(each, CodeType))
-    return {*code.co_names}.union(*map(_names, inner))
-
-
-class _Trace:
-    """One trace of a torque, with symbols for the results of the dynamics."""
-
-    def __init__(self, controller: Controller[Any]) -> None:
-        self.graph = LocatedGraph()
-        self._slots = 0
-        self._values: list[Any] = []
-        model = controller.model
-        q, v = (self.symbols(size) for size in (model.nq, model.nv))
-        setpoint = Setpoint(*(self.symbols(size) for size in (model.nq, model.nv, model.nv)))
-        start = controller.initial_state()
-        state = self.symbols(*start.shape) if isinstance(start, np.ndarray) else start
-        copy = rebind(controller, lambda dynamics: _SymbolicResults(dynamics.model, self), lambda _: {})
-        t: Any = self.symbols()[()]
-        measurement = Measurement(t, q, v).with_random(self.symbols(controller.random_size))
-        outcome = traced_torque(copy, measurement, setpoint, state)
-        self._values += outcome if isinstance(outcome, tuple) else (outcome,)
-        self.results = list(self._indices())
-
-    def symbols(self, *shape: int) -> Array:
-        """Return an array of new inputs."""
-        entries = np.empty(shape, dtype=object)
-        for place in np.ndindex(*shape):
-            entries[place] = Symbol(self.graph, self.graph.input(self._slots))
-            self._slots += 1
-        return entries
-
-    def note(self, values: Any) -> None:
-        """Count the arguments of an evaluation of the dynamics among the results."""
-        self._values.append(values)
-
-    def _indices(self) -> Iterator[int]:
-        for value in self._values:
-            for entry in np.asarray(value, dtype=object).ravel().tolist():
-                if isinstance(entry, Symbol):
-                    yield entry.index
-                elif isinstance(entry, int | float | np.number):
-                    yield self.graph.constant(float(entry))
-
-
-class _SymbolicResults(Dynamics):
-    """Dynamics whose results are symbols of their own."""
-
-    def __init__(self, model: Any, trace: _Trace) -> None:
-        self._trace = trace
-        super().__init__(model)
-
-    def evaluation(self, quantity: str) -> Evaluation:
-        """Return the function that notes its arguments and returns new symbols."""
-        nv = self.model.nv
-        shape = {
-            **dict.fromkeys(MATRICES, (nv, nv)),
-            "forward_kinematics": (4, 4),
-            "jacobian": (6, nv),
-            "jacobian_derivative": (6, nv),
-            "frame_acceleration": (6,),
-        }.get(quantity, (nv,))
-
-        def evaluate(*arguments: Any, **options: Any) -> Array:
-            for argument in (*arguments, *options.values()):
-                if isinstance(argument, str):
-                    continue
-                self._trace.note(argument)
-            return traced_array(self._trace.symbols(*shape))
-
-        return evaluate
+def _trace(controller: Controller[Any]) -> UserTrace:
+    """Trace the torque once, with symbols for the results of the dynamics."""
+    trace, model = UserTrace(), controller.model
+    q, v = (trace.symbols(size) for size in (model.nq, model.nv))
+    setpoint = Setpoint(*(trace.symbols(size) for size in (model.nq, model.nv, model.nv)))
+    start = controller.initial_state()
+    state = trace.symbols(*start.shape) if isinstance(start, np.ndarray) else start
+    copy = rebind(controller, lambda dynamics: trace.dynamics(dynamics.model), lambda _: {})
+    t: Any = trace.symbols()[()]
+    measurement = Measurement(t, q, v).with_random(trace.symbols(controller.random_size))
+    outcome = traced_torque(copy, measurement, setpoint, state)
+    for value in outcome if isinstance(outcome, tuple) else (outcome,):
+        trace.note(value)
+    return trace
 
 
 def _difference(controller: Controller[Any], place: str, values: tuple[float, float] | None) -> str:
-    # A number that meets no symbol is noted here, not in the user's code.
     file, _, line = place.rpartition(":")
-    if not place or file == __file__:
+    if not place:
         file, line = _definition(controller)
-    how = "" if values is None else f", {values[0]:.12g} in one call and {values[1]:.12g} in the next"
     return (
-        f"{controller.name}.torque() depends on more than its arguments and attributes{how}: random numbers, "
+        f"{controller.name}.torque() depends on more than its arguments and attributes"
+        f"{shown_values(values)}: random numbers, "
         "the time or a variable of the module, which tracing would freeze to one value; a controller with an "
         "attribute random_size gets as many seeded random numbers in each control step, measurement.random; "
         "noise of the measurements is noise=dynx.Noise(...), numbers that differ between rollouts are "

@@ -11,6 +11,7 @@ import numpy as np
 from dynx.backends.joint_friction import JointFriction
 from dynx.control.base import Controller
 from dynx.control.bullet import BulletMotor
+from dynx.control.content import is_foreign
 from dynx.control.saturation import checked_limit
 from dynx.errors import ArgumentError, LimitError, LimitViolation
 from dynx.model import Model
@@ -148,7 +149,7 @@ def require_duration(scenario: Scenario) -> None:
     known_controller(scenario)
     if scenario.duration is None and not isinstance(scenario.reference, Trajectory):
         raise ArgumentError(
-            "duration is None, and reference is no trajectory, which has one; wanted a time in seconds"
+            "duration is None, and the reference is no trajectory, which would state one; give duration= [s]"
         )
 
 
@@ -229,7 +230,11 @@ def setpoints_of(
     if setpoint_of is not None:
         return setpoint_of(clock.control_times(controller.lead))
     if controller.needs_setpoint:
-        raise ArgumentError(f"{controller.name} needs a reference: a trajectory, or a configuration to hold")
+        own = is_foreign(type(controller))
+        cure = "; a class that follows none says needs_setpoint = False" if own else ""
+        raise ArgumentError(
+            f"{controller.name} needs a reference: a trajectory, or a configuration to hold{cure}"
+        )
     model = controller.model
     rest = np.broadcast_to(np.zeros(model.nv), (n, model.nv))
     return Setpoint(np.broadcast_to(model.neutral(), (n, model.nq)), rest, rest)

@@ -131,6 +131,7 @@ class Simulation:
             integrator=setup.integrator,
             substeps=scenario.substeps,
             options={"method": scenario.method, "rtol": scenario.rtol, "atol": scenario.atol},
+            joint_limits=scenario.joint_limits,
         )
         self._dt = clock.dt
         self._watch = ControllerWatch.of(setup.controller)
@@ -145,7 +146,9 @@ class Simulation:
             self._plant.refuse(setup.controller)
             step = clock.dt / scenario.substeps
             refuse_small_slip(setup.disturbances, setup.integrator, step, setup.start[0])
-            stops = stops_of(self._plant, setup.disturbances.armature) if scenario.joint_limits else None
+            stops = None
+            if scenario.joint_limits and not isinstance(scenario.plant, ScenePlant):
+                stops = stops_of(self._plant, setup.disturbances.armature)
             self._loop = ClosedLoop(
                 self._plant, setup.controller, setpoints, clock, sensors, setup.limit, stops
             )
@@ -645,9 +648,8 @@ def simulate(given: SimulateArguments) -> Rollout:
     holds a joint at rest up to its magnitude and opposes the motion beyond (`dynx.rbd.joint_friction`), at
     any step; with `friction_slip` [rad/s or m/s] above 0 it is smoothed over that speed instead, so that
     loaded joints creep (`JointFriction`). `effort_limits`, True for the model's, saturate torques and are
-    recorded. `joint_limits` are inelastic stops (`dynx.steppers.joint_stops`), False by default; in a scene
-    joints stop by the engine's own law, unless ``ScenePlant(joint_limits=False)``. `pushes` are external
-    wrenches.
+    recorded. With `joint_limits` joints stop at the limits of the description: inelastically
+    (`dynx.steppers.joint_stops`), in a scene by the engine's own law. `pushes` are external wrenches.
 
     **Model error.** The plant has a `payload` and masses scaled by `mass_scale` (all links, or some) that the
     controller does not know; `noise` is added to the measurements. `sensors` and those of a scene are read

@@ -1,17 +1,17 @@
-"""Completion of a step whose kernel did not settle which joints stick, or moved joints beyond their limits.
+"""Completion of a step that did not settle which joints stick, or in which joints passed their limits.
 
 A kernel corrects the modes of the law of friction (`dynx.rbd.joint_friction`) once, which mostly
 suffices. For the other lanes it is called again with the corrected modes, until they are right. A lane whose
 modes are right gives the same bits again, so no result depends on its neighbours.
 
-Joints beyond their limits are set to them, with the impacts of `dynx.sim.closed_loop`. For the lanes in which
-such a joint moves outwards, and for no other, a kernel computes the velocities after the impact.
+Joints that passed their limits stop by the law of `dynx.steppers.joint_stops`. A kernel computes the
+velocities after the impact for the lanes in which such a joint moves outwards, and for no other.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,8 @@ from dynx.sim.loop_step import LoopStep
 from dynx.simd.kernel import Kernel
 from dynx.spatial.scalar import Array, Floats
 from dynx.steppers.implicit_joints import BLOCK_CORRECTIONS, MAX_SOLUTIONS
-from dynx.steppers.joint_stops import held_at_limits
+from dynx.steppers.joint_stops import held_at_limits, velocity_after_impact
+from dynx.steppers.layout import stop_positions
 
 Rows = NDArray[np.signedinteger[Any]]
 """Numbers of rollouts."""
@@ -61,33 +62,32 @@ class Settling:
             modes[group] = one_by_one[group] = 0.0
 
 
-@dataclass(frozen=True)
 class LaneStops:
-    """Position limits (rows, n) of the joints, which are the last n coordinates, and the kernel of an impact.
+    """Stops of the joints, which are the last n coordinates, in lanes of a batch.
 
-    There is one row of limits, or one for each rollout, which NumPy compares four times as fast.
+    The kernel of an impact is compiled when a lane first needs it, or where the stops are pickled.
     """
 
-    lower: Floats
-    upper: Floats
-    kernel: Kernel
+    def __init__(self, lower: Floats, upper: Floats, impacts: LoopStep | Kernel) -> None:
+        """`lower` and `upper` are position limits (n,); `impacts` is the kernel, or the step it is of."""
+        self._lower, self._upper, self._impacts = lower, upper, impacts
 
     @classmethod
     def of(cls, step: LoopStep) -> LaneStops | None:
         """Make the stops of a batch; None for a robot without limits."""
-        base = 7 if step.model.floating else 0
-        lower, upper = step.model.lower[None, base:], step.model.upper[None, base:]
-        if not np.isfinite([lower, upper]).any():
-            return None
-        return cls(lower, upper, _impact_kernel(step))
+        lower, upper = stop_positions(step.model)
+        return cls(lower, upper, step) if np.isfinite([lower, upper]).any() else None
 
-    def of_rows(self, rows: int) -> LaneStops:
-        """Return the stops for a number of rollouts."""
-        lower, upper = (np.repeat(limits, rows, axis=0) for limits in (self.lower, self.upper))
-        return LaneStops(lower, upper, self.kernel)
+    @cached_property
+    def _kernel(self) -> Kernel:
+        return self._impacts if isinstance(self._impacts, Kernel) else _impact_kernel(self._impacts)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return LaneStops, (self._lower, self._upper, self._kernel)
 
     def __call__(
         self,
+        rows: Rows,
         before: Mapping[str, Floats],
         now: Mapping[str, Floats],
         fixed: Mapping[str, Floats],
@@ -95,19 +95,16 @@ class LaneStops:
     ) -> None:
         """Stop joints of the state `now` after a step from `before`; all arrays have a row for each rollout.
 
-        `reference` (nq,) is the reference configuration, to which the tracking errors are corrected.
+        `rows` are those in which a joint passed a limit, `reference` (nq,) is the reference configuration, to
+        which the tracking errors are corrected.
         """
-        n = self.lower.shape[1]
-        joints, speeds = now["q"][:, -n:], now["v"]
-        below, above = joints < self.lower, joints > self.upper
-        if not (below.any() or above.any()):
-            return
-        rows = np.flatnonzero((below | above).any(axis=1))
+        n = len(self._lower)
+        joints, speeds = now["q"][rows, -n:], now["v"]
         struck = np.zeros((len(rows), speeds.shape[1]))
         held, struck[:, -n:] = held_at_limits(
-            joints[rows], speeds[rows, -n:], self.lower[rows], self.upper[rows]
+            before["q"][rows, -n:], joints, speeds[rows, -n:], self._lower, self._upper
         )
-        joints[rows] = held
+        now["q"][rows, -n:] = held
         hit = struck.any(axis=1)
         if hit.any():
             self._strike(now, fixed, rows[hit], struck[hit])
@@ -122,10 +119,10 @@ class LaneStops:
         coordinate that is struck, and zeros."""
         known = {"q": now["q"], "v": now["v"].copy(), **fixed}
         while len(rows):
-            names = (port.name for port in self.kernel.inputs)
+            names = (port.name for port in self._kernel.inputs)
             inputs = [struck if name == "struck" else known[name][rows] for name in names]
             after, pull = np.empty(struck.shape), np.empty(struck.shape)
-            self.kernel(inputs, [after, pull])
+            self._kernel(inputs, [after, pull])
             now["v"][rows] = np.where(struck != 0.0, 0.0, after)
             # Stops push and do not pull: these joints get no impulse, and the others another one.
             pulled = pull > 0.0
@@ -134,13 +131,9 @@ class LaneStops:
 
 
 def _impact_kernel(step: LoopStep) -> Kernel:
-    """Compile the velocities after inelastic impulses on the coordinates that are struck.
-
-    The change of velocity x has x = -v for these, and no impulse M x on the others: the equation of joints
-    that stick under dry friction. The second output is the impulse along the outward sign.
-    """
+    """Compile the velocities after impacts, and the impulses along the outward signs."""
     mechanism, disturbances = simplify_mechanism(step.model.mechanism), step.disturbances
-    equation = FrictionLaw.of(step.model, np.zeros(step.model.nv))
+    law = FrictionLaw.of(step.model, np.zeros(step.model.nv))
     sizes = {"q": step.model.nq, "v": step.model.nv, "struck": step.model.nv}
     if step.plant is not None:
         sizes["parameters"] = len(step.plant.parameters.names)
@@ -148,13 +141,12 @@ def _impact_kernel(step: LoopStep) -> Kernel:
         sizes["joint_armature"] = disturbances.varied["joint_armature"]
 
     def impact(**given: Array) -> dict[str, Array]:
-        v, stuck = given["v"], abs(given["struck"])
         if step.plant is None:
             M = evaluate_quantity(mechanism, "mass_matrix", (), given["q"])
         else:
             M = step.plant.inertia(given["parameters"], given["q"])
         M = M + np.diag(disturbances.armature_of(given))
-        x, left = equation.accelerations(M, [0.0] * len(v), list(1.0 - stuck), list(-stuck * v))
-        return {"v": v + np.array(x), "pull": -given["struck"] * np.array(left)}
+        v, pull = velocity_after_impact(law, M, given["v"], given["struck"])
+        return {"v": v, "pull": pull}
 
     return compiled(StepText(impact, sizes, "impacts cannot be compiled", step.key("impact")))

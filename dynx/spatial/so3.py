@@ -51,6 +51,15 @@ def rotation_about(axis: Array, angle: Array) -> Array:
     return np.asarray(along + (eye - along) * c + skew(axis) * s)
 
 
+def rotation_of_z(direction: Floats) -> Floats:
+    """Return the smallest rotation (3, 3) that turns z into a unit vector; half a turn is about x."""
+    axis = np.array([-direction[1], direction[0], 0.0])
+    sine = float(np.linalg.norm(axis))
+    if sine < 1e-10:
+        return np.diag([1.0, 1.0, 1.0] if direction[2] > 0.0 else [1.0, -1.0, -1.0])
+    return np.asarray(rotation_about(axis / sine, np.arctan2(sine, direction[2])))
+
+
 def rotation_from_rpy(rpy: Array) -> Array:
     """Return R = Rz(yaw) Ry(pitch) Rx(roll) (..., 3, 3) of URDF's roll, pitch, yaw [rad] (..., 3)."""
     c, s = cos(rpy), sin(rpy)

@@ -28,8 +28,9 @@ class Camera:
     world.
 
     Its axes are x to the right of the picture, y down and z along the optical axis. `field_of_view` is the
-    angle [rad] between the upper and the lower edge of the picture, `size` its width and height in pixels,
-    which are square. What is nearer than `near` or farther than `far` [m] along the optical axis is not seen.
+    vertical angle [rad], between the upper and the lower edge of the picture, `size` its width and height in
+    pixels, which are square. What is nearer than `near` or farther than `far` [m] along the optical axis is
+    not seen.
     """
 
     pose: Pose = IDENTITY

@@ -55,6 +55,13 @@ class Collider:
     material: Material
 
 
+def stop_positions(model: Model) -> tuple[Floats, Floats]:
+    """Return the lowest and the highest position (n,) [rad or m] of each joint of `joint_names`; infinite
+    where it has no stop."""
+    joints = slice(7 if model.floating else 0, None)
+    return model.lower[joints], model.upper[joints]
+
+
 @dataclass(frozen=True, eq=False)
 class RobotLayout:
     """A robot at its start; arrays over joints have an entry for each body of `model.mechanism`."""

@@ -15,7 +15,6 @@ from dynx.errors import (
 )
 from dynx.registry import ClassRegistry
 from dynx.steppers.layout import EMPTY
-from dynx.steppers.native_queries import native_queries_of
 from dynx.steppers.stepper import Feature, Stepper
 
 if TYPE_CHECKING:
@@ -88,4 +87,6 @@ def renderer_of(name: str) -> Draw:
             f"no renderer {shown(name)}; wanted None, for that of dynx, 'mujoco' for MuJoCo's by OpenGL, "
             f"or 'pybullet', for PyBullet's in software{nearest(name, ['mujoco', 'pybullet'])}"
         )
+    from dynx.steppers.native_queries import native_queries_of  # a world that moves draws no picture
+
     return native_queries_of(world_class(name)).draw

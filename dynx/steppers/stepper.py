@@ -94,6 +94,9 @@ class Stepper(ABC):
     contact_law: ClassVar[str] = "contacts of its own"
     """Laws of contacts and joint limits of the engine, as a noun phrase."""
 
+    beyond_limits: ClassVar[str] = "so that it is pushed back in the first steps"
+    """Motion of a joint that begins beyond its limits, as a clause."""
+
     native_queries: ClassVar[str] = ""
     """Class of the engine's own queries (`dynx.steppers.native_queries`), as "package.module:Class"; imported
     when it is used."""

@@ -2,7 +2,8 @@
 
 Each robot and base becomes one test per quantity and per identity that `dynx.agree` checks;
 no test file is needed. ``--dynx-as-loaded`` adds one test in which every engine loads the file itself
-(`dynx.diagnose`). In an ini file, ``dynx_robots`` lists robots for every run. See ``docs/testing.md``.
+(`dynx.diagnose`). In an ini file, ``dynx_robots`` lists robots for every run. The page "Testing
+your robot descriptions" of the documentation shows more.
 
 pytest imports this module in every run if dynx is installed, so it imports nothing slow and does nothing
 without its options.
@@ -26,6 +27,8 @@ _OPTIONS = {
     "dynx_as_loaded": "--dynx-as-loaded",
     "dynx_baseline": "--dynx-baseline",
     "dynx_tolerance": "--dynx-tolerance",
+    "dynx_ignore": "--dynx-ignore",
+    "dynx_only": "--dynx-only",
 }
 _PLAN: pytest.StashKey[RobotPlan] = pytest.StashKey()
 
@@ -66,6 +69,13 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         metavar="ERROR",
         help="relative error above which engines differ for --dynx-as-loaded (default: 1e-12)",
     )
+    for option, subject in (
+        ("--dynx-ignore", "rules of `dynx doctor` that --dynx-as-loaded counts and accepts"),
+        ("--dynx-only", "rules for which --dynx-as-loaded fails; it counts and accepts all others"),
+    ):
+        group.addoption(
+            option, action="append", metavar="RULE,...", help=f"{subject}; may be given several times"
+        )
     parser.addini(
         "dynx_robots",
         "robots to test in every run, one to a line; paths are relative to the ini file",

@@ -105,7 +105,9 @@ def require_same_loading(plan: RobotPlan, robot: str, label: str, base: Base) ->
     chosen: dict[str, Any] = {} if plan.tolerance is None else {"tolerance": plan.tolerance}
     head = f"{label}, {base} base, as engines load the file"
     try:
-        report = diagnose(robot, base=base, engines=plan.engines, **chosen)
+        report = diagnose(
+            robot, base=base, engines=plan.engines, ignore=plan.ignore, only=plan.only, **chosen
+        )
     except DynxError as error:
         raise Disagreement(f"{head}: not examined\n  {type(error).__name__}: {error}") from None
     if report.error is not None:
@@ -115,6 +117,7 @@ def require_same_loading(plan: RobotPlan, robot: str, label: str, base: Base) ->
     new = baseline.compare(replace(report, robot=robot)).new
     if new:
         lines = [f"{head}: {report.verdict}", *(line for each in new for line in _difference(each, report))]
+        lines += [f"  {wording.ignored(report)}"] if report.ignored else []
         tolerance = "" if plan.tolerance is None else f" --tolerance {plan.tolerance:g}"
         lines.append(
             f"  the proof, and the file mended: dynx doctor {label} --base {base}{tolerance} --fix OUT.urdf"

@@ -44,6 +44,9 @@ class RobotPlan:
     as_loaded: bool = False
     tolerance: float | None = None
     baseline: Baseline | None = None
+    ignore: tuple[str, ...] = ()
+    only: tuple[str, ...] = ()
+    """Rules as `dynx.diagnose` takes them: findings of others than `only`, and of `ignore`, are accepted."""
     left_out: tuple[str, ...] = ()
     """Robots in xacro below directories, which are not tested."""
 
@@ -59,6 +62,8 @@ class RobotPlan:
         listed = ", ".join(labels[:5]) + (f" and {len(labels) - 5} more" if len(labels) > 5 else "")
         engines = ", ".join(self.backends or ["all engines"])
         lines = [f"dynx: {listed}; {' and '.join(self.bases)} base; {engines}"]
+        lines += [f"dynx: findings of {', '.join(self.ignore)} are accepted"] if self.ignore else []
+        lines += [f"dynx: findings of {', '.join(self.only)} alone fail"] if self.only else []
         return [*lines, f"dynx: {left_out_note(self.left_out)}"] if self.left_out else lines
 
 
@@ -70,6 +75,7 @@ def plan_robots(config: pytest.Config, requested: Sequence[tuple[str, Path]]) ->
         expansions = [expand([path_or_name(robot, folder)]) for robot, folder in requested]
         robots = dict.fromkeys(_planned(each, config) for found in expansions for each in found.robots)
         left_out = (_label(each, config.rootpath) for found in expansions for each in found.left_out)
+        ignore, only = _rules(config, "ignore"), _rules(config, "only")
         return RobotPlan(
             robots=tuple(robots),
             left_out=tuple(dict.fromkeys(left_out)),
@@ -78,6 +84,8 @@ def plan_robots(config: pytest.Config, requested: Sequence[tuple[str, Path]]) ->
             as_loaded=bool(option.dynx_as_loaded),
             tolerance=option.dynx_tolerance,
             baseline=_baseline(config),
+            ignore=ignore,
+            only=only,
         )
     except DynxError as error:
         raise pytest.UsageError(str(error)) from error
@@ -116,6 +124,24 @@ def _backends(text: str) -> tuple[str, ...]:
         raise pytest.UsageError(f"--dynx-backends is {shown(text)}; wanted names separated by commas")
     for name in names:
         backend_class(name).require_engine()
+    return names
+
+
+def _rules(config: pytest.Config, option: str) -> tuple[str, ...]:
+    """Return the rules of an option; UnknownNameError for one that does not exist."""
+    given: list[str] = getattr(config.option, f"dynx_{option}") or []
+    words = (word.strip() for text in given for word in text.split(","))
+    names = tuple(dict.fromkeys(word for word in words if word))
+    if given and not config.option.dynx_as_loaded:
+        raise pytest.UsageError(f"--dynx-{option} needs --dynx-as-loaded; give both")
+    if given and not names:
+        raise pytest.UsageError(
+            f"--dynx-{option} is {shown(given[0])}; wanted rules separated by commas, such as DX105"
+        )
+    if names:
+        from dynx.rules.registry import ignored_rules
+
+        ignored_rules(names)
     return names
 
 

@@ -35,13 +35,20 @@ _TASK = "task"
 """Argument by which the environments of dynx get the class of their task."""
 
 
-def of_rigid_bodies(spec: TrainingSpec) -> TrainingSpec:
-    """Return the present meaning of what was trained when the robot of a `RobotTask` was one of rigid bodies:
-    its joint dynamics are switched off. Worlds had joint dynamics already."""
+def of_earlier_version(spec: TrainingSpec, schema: str) -> TrainingSpec:
+    """Return the present meaning of what was trained when a document had this `schema`.
+
+    The robot of a `RobotTask` had no stops before version 3, and in version 1 no joint dynamics: these are
+    switched off. Worlds had both already.
+    """
+    version = int(schema.rpartition("/")[2])
+    if version > 2:
+        return spec
     known = specification(spec.task.id)
     if not is_of_dynx(spec.task.id) or known.vector_entry_point is None:
         return spec
-    options = {**dict.fromkeys(vars(JointOptions()), False), **spec.task.options}
+    absent = vars(JointOptions()) if version == 1 else ("joint_limits",)
+    options = {**dict.fromkeys(absent, False), **spec.task.options}
     return replace(spec, task=replace(spec.task, options=options))
 
 

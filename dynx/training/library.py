@@ -7,11 +7,9 @@ somebody else runs no code of theirs; numbers of a file are finite, and fit the 
 from __future__ import annotations
 
 import inspect
-import io
 import os
 import pickle
 import sys
-import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from itertools import pairwise
 from typing import Any, BinaryIO
@@ -21,6 +19,7 @@ from numpy.typing import NDArray
 
 from dynx.envs.library import spaces
 from dynx.errors import ArgumentError, UnknownNameError, importing, nearest, shown
+from dynx.training.networks import CLIPPED_AT, EPSILON, check_archive
 from dynx.training.schedules import SCHEDULED, schedule_of
 
 with importing("training needs stable-baselines3: pip install 'dynx[train]'"):
@@ -56,12 +55,6 @@ __all__ = [
 
 ALGORITHMS: dict[str, type[Any]] = {"ppo": PPO, "a2c": A2C, "dqn": DQN, "sac": SAC, "td3": TD3}
 """Algorithms by the name that `dynx train --algo` takes."""
-
-CLIPPED_AT = 10.0
-"""Bound of scaled observations and rewards, in deviations."""
-
-EPSILON = 1e-8
-"""What is added to a variance before its root is taken, as in stable-baselines3."""
 
 ACTIVATIONS = {
     "tanh": torch.nn.Tanh,
@@ -317,7 +310,7 @@ def read_weights(algorithm: Any, file: BinaryIO, source: str) -> None:
     larger when it is expanded.
     """
     try:
-        _check_archive(file)
+        check_archive(file)
         _, weights, variables = load_from_zip_file(file, device="cpu", load_data=False)
         for each in _tensors([weights, variables]):
             _check_tensor(each)
@@ -340,33 +333,6 @@ def read_weights(algorithm: Any, file: BinaryIO, source: str) -> None:
 def weights_of_file(file: BinaryIO) -> int:
     """Return a number of weights that a file of a policy cannot exceed."""
     return file.seek(0, os.SEEK_END) // 4
-
-
-def check_compression(archive: zipfile.ZipFile) -> None:
-    """Raise ValueError for an archive with members that grow without bound as they are read.
-
-    `zipfile` expands what bzip2 and LZMA compressed in one piece, whatever size the member states.
-    """
-    for part in archive.infolist():
-        if part.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            raise ValueError(f"{shown(part.filename)} is compressed in another way than by deflate")
-
-
-def _check_archive(file: BinaryIO) -> None:
-    """Raise ValueError for an archive, or one inside it, that is larger when it is expanded."""
-    size = file.seek(0, os.SEEK_END)
-    with zipfile.ZipFile(file) as archive:
-        check_compression(archive)
-        parts = archive.infolist()
-        if sum(part.file_size for part in parts) > size:
-            raise ValueError("it is compressed: its members are larger than the file")
-        for part in parts:
-            if part.filename.endswith(".pth"):
-                with zipfile.ZipFile(io.BytesIO(archive.read(part))) as inner:
-                    check_compression(inner)
-                    if sum(each.file_size for each in inner.infolist()) > part.file_size:
-                        raise ValueError(f"{part.filename} is compressed: its members are larger than it")
-    file.seek(0)
 
 
 def _tensors(value: object) -> Iterator[Any]:

@@ -7,34 +7,25 @@ import os
 import warnings
 import zipfile
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dynx._version import __version__
 from dynx.argument_types import checks_types
-from dynx.errors import ArgumentError, shown
+from dynx.envs.library import Env
+from dynx.errors import ArgumentError, ShapeError, nearest, shown
 from dynx.files.documents import convert_document, json_text, parse_json, to_json_values
 from dynx.files.reading import irregularity, named_file
 from dynx.files.writing import atomic_file
 from dynx.model.numbers import MAX_INDEX, real_array, whole_number
 from dynx.training.environments import make
-from dynx.training.file_tasks import of_rigid_bodies, task_of_file
-from dynx.training.library import (
-    CLIPPED_AT,
-    EPSILON,
-    DummyVecEnv,
-    VecNormalize,
-    action_of,
-    check_compression,
-    new_algorithm,
-    read_weights,
-    weights_of_file,
-    write_weights,
-)
-from dynx.training.specification import FIRST_POLICY, POLICY, PolicyDocument, TaskSpec, TrainingSpec
+from dynx.training.file_tasks import of_earlier_version, task_of_file
+from dynx.training.networks import CLIPPED_AT, EPSILON, PolicyNetwork, check_compression, read_network
+from dynx.training.specification import POLICY, PolicyDocument, TaskSpec, TrainingSpec
 
 DOCUMENT = "dynx.json"
 """Member of the file of a policy that says what it was trained on; stable-baselines3 ignores it."""
@@ -53,13 +44,19 @@ class Scaling:
     samples: float
 
     def __call__(self, observation: NDArray[Any]) -> NDArray[np.float32]:
-        """Scale an observation as in training."""
-        scaled = (real_array("observation", observation) - self.mean) / np.sqrt(self.variance + EPSILON)
+        """Scale an observation, or several (n, ...), as in training. Raises ShapeError for another shape."""
+        seen, size = real_array("observation", observation), self.mean.ndim
+        if seen.shape[max(seen.ndim - size, 0) :] != self.mean.shape:
+            wanted = ", ".join(map(str, self.mean.shape))
+            raise ShapeError(f"observation has shape {seen.shape}; wanted (..., {wanted})")
+        scaled = (seen - self.mean) / np.sqrt(self.variance + EPSILON)
         return np.clip(scaled, -CLIPPED_AT, CLIPPED_AT).astype(np.float32)
 
     @staticmethod
     def of(vector: Any) -> Scaling | None:
         """Return the scaling of environments; None where they have none."""
+        from dynx.training.library import VecNormalize
+
         if not isinstance(vector, VecNormalize):
             return None
         seen = vector.obs_rms
@@ -76,7 +73,8 @@ class Policy:
     """A policy that was trained with `spec` for `steps_done` steps.
 
     Called with one observation, or several (n, ...), it returns as many actions: the likeliest, or random
-    ones with `deterministic` False.
+    ones with `deterministic` False. `algorithm` is that of stable-baselines3, or the network in NumPy, which
+    has the likeliest action alone.
     """
 
     def __init__(
@@ -95,12 +93,26 @@ class Policy:
 
     def __call__(self, observation: NDArray[Any], deterministic: bool = True) -> Any:
         seen = observation if self.scaling is None else self.scaling(observation)
+        if isinstance(self.algorithm, PolicyNetwork):
+            return self.algorithm(seen, deterministic)
+        from dynx.training.library import action_of
+
         return action_of(self.algorithm, seen, deterministic)
 
     @checks_types
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the policy: a file that stable-baselines3 loads, which acts there as here, with its origin
-        added."""
+        added.
+
+        Raises ArgumentError for a policy whose network is in NumPy: it has not all that a file holds.
+        """
+        if isinstance(self.algorithm, PolicyNetwork):
+            raise ArgumentError(
+                "the network in NumPy has not all that a file of a policy holds; copy the file, or load it "
+                "by load_policy(..., network='torch')"
+            )
+        from dynx.training.library import write_weights
+
         scaling = self.scaling
         document = PolicyDocument(
             POLICY,
@@ -149,35 +161,44 @@ def read_policy_document(path: str | os.PathLike[str]) -> PolicyDocument:
     try:
         found = convert_document(document, PolicyDocument)
         whole_number("steps_done", found.steps_done, 0, MAX_INDEX)
-        return found if found.schema != FIRST_POLICY else replace(found, spec=of_rigid_bodies(found.spec))
+        return replace(found, spec=of_earlier_version(found.spec, found.schema))
     except ArgumentError as error:
         raise ArgumentError(f"{where}: {error}") from error
 
 
+Network = Literal["torch", "numpy"]
+"""Library that computes the network of a policy."""
+
+NETWORKS: tuple[Network, ...] = ("torch", "numpy")
+
+
 @checks_types
-def load_policy(path: str | os.PathLike[str], task: TaskSpec | None = None) -> Policy:
+def load_policy(
+    path: str | os.PathLike[str], task: TaskSpec | None = None, *, network: Network | None = None
+) -> Policy:
     """Load a policy, for the task that it was trained on or for `task`, such as the same on another engine.
+
+    `network` says what computes it: ``"torch"``, by stable-baselines3, or ``"numpy"``, which needs neither of
+    them, has the likeliest action alone and differs by rounding in single precision. By default it is
+    PyTorch where stable-baselines3 is installed, else NumPy.
 
     Only tensors and JSON are read from the file, so that it runs no code and opens no other file: it names a
     registered task, with options that are numbers, words and robots. A task of your own, an id
     ``module:Env-v0`` and options that name a file are given as `task`, which is also the task of the policy
     then. Raises ArgumentError for a file that is no policy, is damaged, or has a policy for other
-    observations or actions.
+    observations or actions, and for networks that NumPy does not compute.
     """
+    if network is not None and network not in NETWORKS:
+        raise ArgumentError(f"network is {shown(network)}{nearest(network, NETWORKS)}")
     document = read_policy_document(path)
     spec = _spec_of(document, task, os.fspath(path))
-    vector = DummyVecEnv([lambda: make(task or spec.task)])
+    chosen = network or ("numpy" if find_spec("stable_baselines3") is None else "torch")
+    read = _read_network if chosen == "numpy" else _read_algorithm
+    env = make(task or spec.task)
     try:
         with named_file(path) as file:
-            with warnings.catch_warnings():
-                # Warnings about the number of environments concern training.
-                warnings.simplefilter("ignore", UserWarning)
-                most = weights_of_file(file)
-                algorithm = new_algorithm(
-                    spec.algorithm, vector, spec.hyperparameters, None, most_weights=most
-                )
-            read_weights(algorithm, file, os.fspath(path))
-        scaling = scaling_of(document, vector.observation_space.shape, os.fspath(path))
+            algorithm = read(file, spec, env, os.fspath(path))
+        scaling = scaling_of(document, env.observation_space.shape, os.fspath(path))
     except ArgumentError as error:
         if task is None or task.id == spec.task.id:
             raise
@@ -186,8 +207,30 @@ def load_policy(path: str | os.PathLike[str], task: TaskSpec | None = None) -> P
             f"{task.id}"
         ) from error
     finally:
-        vector.close()
+        env.close()
     return Policy(algorithm, spec, document.steps_done, scaling)
+
+
+def _read_network(file: BinaryIO, spec: TrainingSpec, env: Env[Any, Any], source: str) -> PolicyNetwork:
+    return read_network(file, spec, env.observation_space, env.action_space, source)
+
+
+def _read_algorithm(file: BinaryIO, spec: TrainingSpec, env: Env[Any, Any], source: str) -> Any:
+    """Return the algorithm of stable-baselines3 with the weights of a file."""
+    from dynx.training.library import DummyVecEnv, new_algorithm, read_weights, weights_of_file
+
+    with warnings.catch_warnings():
+        # Warnings about the number of environments concern training.
+        warnings.simplefilter("ignore", UserWarning)
+        algorithm = new_algorithm(
+            spec.algorithm,
+            DummyVecEnv([lambda: env]),
+            spec.hyperparameters,
+            None,
+            most_weights=weights_of_file(file),
+        )
+    read_weights(algorithm, file, source)
+    return algorithm
 
 
 def _spec_of(document: PolicyDocument, task: TaskSpec | None, source: str) -> TrainingSpec:

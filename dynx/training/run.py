@@ -15,21 +15,22 @@ from dynx.files.documents import json_text, parse_json
 from dynx.files.reading import checked_path, read_file
 from dynx.files.writing import write_text
 from dynx.training.checkpoints import Checkpoints
-from dynx.training.environments import make, make_vector
+from dynx.training.environments import make
 from dynx.training.evaluation import AT_ONCE, Evaluation
-from dynx.training.file_tasks import of_rigid_bodies
+from dynx.training.file_tasks import of_earlier_version
 from dynx.training.learning import Learning, Progress, Schedule
 from dynx.training.library import new_algorithm, set_threads
 from dynx.training.policy import Policy
 from dynx.training.specification import TrainingSpec, read_spec, spec_document
+from dynx.training.vectors import make_training_vector
 
 RUN = "run.json"
 
-SCHEMA = "dynx.training/2"
+SCHEMA = "dynx.training/3"
 """Name and version of the layout of `RUN`."""
 
-FIRST_SCHEMA = "dynx.training/1"
-"""Version of a run whose `RobotTask` moves rigid bodies."""
+EARLIER_SCHEMAS = ("dynx.training/1", "dynx.training/2")
+"""Versions whose `RobotTask` moves robots without limits, and in the first rigid bodies."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ def train(
     policy of the best evaluation) and `FINAL`. A run that was ended, even by a power failure, goes on with
     `resume` from its last checkpoint: weights, state of the optimizer, schedules, scaling and replay buffer
     are those of the checkpoint; the environments begin new episodes. A run of an earlier dynx goes on with
-    the joint dynamics that its environments had (`of_rigid_bodies`). A finished run is only judged, unless
+    the joint dynamics that its environments had (`of_earlier_version`). A finished run is only judged, unless
     the number of steps is greater now: then it goes on, with schedules that end at the new one.
 
     Raises ArgumentError for a folder that has another run, or one that is not to be resumed, and the errors
@@ -68,11 +69,10 @@ def train(
     schedule = schedule or Schedule()
     place = Path(checked_path(folder))
     schema, given = _checked_schema(place, spec, resume), spec
-    if schema == FIRST_SCHEMA:
-        spec = of_rigid_bodies(spec)
+    spec = of_earlier_version(spec, schema)
     with ExitStack() as stack:
         stack.callback(set_threads(schedule.threads))
-        vector = make_vector(spec)
+        vector = make_training_vector(spec)
         stack.callback(vector.close)
         judged = [
             stack.enter_context(closing(make(spec.task)))
@@ -107,7 +107,8 @@ def _read_run(folder: Path) -> tuple[TrainingSpec, str]:
     try:
         document = parse_json(read_file(str(path)))
         spec: object = document["spec"]
-        schema = FIRST_SCHEMA if document.get("schema") == FIRST_SCHEMA else SCHEMA
+        schema = document.get("schema")
+        schema = schema if schema in EARLIER_SCHEMAS else SCHEMA
     except RobotNotFoundError:
         raise ArgumentError(f"{shown(folder, 300)} has no training run: there is no {RUN} in it") from None
     except (DescriptionError, ValueError, KeyError, TypeError) as error:

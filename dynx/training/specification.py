@@ -79,18 +79,16 @@ class TrainingSpec:
         return self.first_difference(replace(other, steps=self.steps))
 
 
-FIRST_POLICY: Final = "dynx.policy/1"
-"""Version of a policy's document in which the robot of a `RobotTask` was one of rigid bodies."""
-
-POLICY: Final = "dynx.policy/2"
-"""Version of a policy's document in which it has the joint dynamics of its description."""
+POLICY: Final = "dynx.policy/3"
+"""Version of a policy's document in which the robot of a `RobotTask` has the joint dynamics and limits of its
+description; in version 2 it had no limits, in version 1 it was one of rigid bodies."""
 
 
 @dataclass(frozen=True)
 class PolicyDocument:
     """What a file of a policy says about itself (member ``dynx.json``)."""
 
-    schema: Literal["dynx.policy/1", "dynx.policy/2"]
+    schema: Literal["dynx.policy/1", "dynx.policy/2", "dynx.policy/3"]
     dynx: str
     spec: TrainingSpec
     steps_done: int

@@ -25,13 +25,12 @@ from dynx.training.environments import make
 from dynx.training.library import (
     ACTIVATIONS,
     ALGORITHMS,
-    CLIPPED_AT,
-    EPSILON,
     DummyVecEnv,
     VecNormalize,
     hyperparameters_of,
     new_algorithm,
 )
+from dynx.training.networks import CLIPPED_AT, EPSILON
 from dynx.training.policy import DOCUMENT, Policy, Scaling
 from dynx.training.specification import TaskSpec, TrainingSpec
 

@@ -7,8 +7,8 @@
     q, v, a = motion(np.arange(0.0, 2.0, 0.001))   # many: (n, nq), (n, nv), (n, nv)
     trajectory.check(model, motion)                # LimitError before anything moves
 
-Each function returns a `Trajectory`; docs/trajectories.md compares them. Each name is imported when it
-is first used: what follows one trajectory needs no other.
+Each function returns a `Trajectory`; the page "Trajectories" of the documentation compares them. Each name is
+imported when it is first used: what follows one trajectory needs no other.
 """
 
 from typing import TYPE_CHECKING
@@ -18,6 +18,7 @@ from dynx.registry import moved_names
 if TYPE_CHECKING:
     from dynx.trajectory.base import Setpoint, Trajectory
     from dynx.trajectory.concatenation import concatenate
+    from dynx.trajectory.formula import from_function
     from dynx.trajectory.identification import Identifiability, excitation
     from dynx.trajectory.jerk_limited import time_optimal
     from dynx.trajectory.limit_check import check, violations
@@ -36,6 +37,7 @@ __all__ = [
     "cubic",
     "cycloidal",
     "excitation",
+    "from_function",
     "line",
     "quintic",
     "s_curve",
@@ -56,6 +58,7 @@ _HOME = {
     "cubic": "dynx.trajectory.rest_to_rest",
     "cycloidal": "dynx.trajectory.rest_to_rest",
     "excitation": "dynx.trajectory.identification",
+    "from_function": "dynx.trajectory.formula",
     "line": "dynx.trajectory.straight_line",
     "quintic": "dynx.trajectory.rest_to_rest",
     "s_curve": "dynx.trajectory.rest_to_rest",

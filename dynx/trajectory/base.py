@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.errors import ArgumentError
+from dynx.errors import ArgumentError, DTypeError
 from dynx.model.numbers import checked_entries, positive_seconds, read_only, real_array
 from dynx.spatial.scalar import Floats
+
+Self = TypeVar("Self", bound="Trajectory")
 
 
 class Setpoint(NamedTuple):
@@ -37,7 +39,8 @@ class Trajectory(ABC):
     setpoint is exactly `start` or `end`, without rounding. Trajectories are immutable and can be pickled;
     evaluated for an array of times, the results equal those for each single time bit for bit.
 
-    To define your own motion, derive a class and implement `inside`.
+    `dynx.trajectory.from_function` makes one of a formula q(t). To give velocity and acceleration yourself,
+    derive a class and implement `inside`; a class without it raises DTypeError.
     """
 
     duration: float
@@ -46,6 +49,15 @@ class Trajectory(ABC):
     """The setpoint at time 0."""
     end: Setpoint
     """The setpoint at `duration`."""
+
+    def __new__(cls: type[Self], *_: Any, **__: Any) -> Self:
+        """Refuse a class without `inside`, with what to write instead."""
+        if getattr(cls, "__abstractmethods__", ()):
+            raise DTypeError(
+                f"class {cls.__name__} has no method inside(self, t), which returns the Setpoint (q, v, a) "
+                "at times t (n,); a formula q(t) becomes a motion by trajectory.from_function(f, duration)"
+            )
+        return super().__new__(cls)
 
     @property
     def nq(self) -> int:

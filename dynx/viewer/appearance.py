@@ -36,7 +36,7 @@ class PartVisibility:
         self._opacity: dict[str, float] = {}
         gui = page.gui
         with gui.add_folder("parts", expand_by_default=False):
-            self._part = gui.add_dropdown("part", (_ALL, *drawn.parts), initial_value=_ALL)
+            self._part = gui.add_dropdown("part", (_ALL, *drawn.choices), initial_value=_ALL)
             self._visible = gui.add_checkbox("visible", initial_value=True)
             self._slider = gui.add_slider("opacity", 0.0, 1.0, step=0.01, initial_value=1.0)
         self._element = gui.add_html(opacities_element({}), order=math.inf)
@@ -58,7 +58,7 @@ class PartVisibility:
         return None if self._part.value == _ALL else self._part.value
 
     def set_visible(self, part: str | None, visible: bool) -> None:
-        """Show or hide a part; None for all. Raises ArgumentError for an unknown part."""
+        """Show or hide a part, or a robot by its name; None for all. Raises ArgumentError for another."""
         if not isinstance(visible, bool):
             raise ArgumentError(f"visible is {shown(visible)}; wanted True or False")
         with self._page.lock, self._page.together():
@@ -67,19 +67,18 @@ class PartVisibility:
             self._show_values()
 
     def set_opacity(self, part: str | None, opacity: float) -> None:
-        """Let a part be seen through: 1 is opaque, 0 is not seen; None for all. Raises ArgumentError for an
-        unknown part, and for an opacity that is not from 0 to 1."""
+        """Let a part, or a robot by its name, be seen through: 1 is opaque, 0 is not seen; None for all but
+        the ground.
+
+        Raises ArgumentError for another name, and for an opacity that is not from 0 to 1."""
         if not is_real(opacity) or not 0.0 <= opacity <= 1.0:
             raise ArgumentError(f"opacity is {shown(opacity)}; wanted 0 to 1")
         with self._page.lock, self._page.together():
+            kept = self._drawn.grounds if part is None else ()
             for name in self._named(part):
-                self._opacity[name] = float(opacity)
-            paths = {
-                node.name: self._opacity[name]
-                for name, nodes in self._drawn.visuals.items()
-                if name in self._opacity
-                for node in nodes
-            }
+                if name not in kept:
+                    self._opacity[name] = float(opacity)
+            paths = self._drawn.fade(self._opacity)
             self._element.content = self._page.elements["opacities"] = opacities_element(paths)
             self._show_values()
 
@@ -89,15 +88,15 @@ class PartVisibility:
         return self._opacity | dict.fromkeys(self._drawn.hidden, 0.0)
 
     def _named(self, part: str | None) -> list[str]:
-        if part is not None and part not in self._drawn.parts:
-            raise ArgumentError(f"no part {shown(part)}{nearest(part, self._drawn.parts)}")
-        return list(self._drawn.parts) if part is None else [part]
+        return list(self._drawn.parts) if part is None else self._drawn.named(part)
 
     def _show_values(self) -> None:
         """Let the controls show the values of the part that is chosen."""
         named = self._named(self._chosen)
         self._visible.value = all(name not in self._drawn.hidden for name in named)
-        self._slider.value = max((self._opacity.get(name, 1.0) for name in named), default=1.0)
+        kept = self._drawn.grounds if self._chosen is None else ()
+        opacities = [self._opacity.get(name, 1.0) for name in named if name not in kept]
+        self._slider.value = max(opacities, default=1.0)
 
 
 def camera_of(client: Any) -> Camera:

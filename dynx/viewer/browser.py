@@ -28,6 +28,9 @@ from typing import Any, Literal, NamedTuple, Union, get_args, get_origin, get_ty
 
 from dynx.files.temporary import temporary_folder, writing_in
 from dynx.viewer.library import CLIENT
+from dynx.viewer.moving_picture import ALWAYS_WHOLE, COARSE_WHILE_MOVING
+from dynx.viewer.pose_channel import PLACING
+from dynx.viewer.shading import SHADOWS
 from dynx.world.scenery import ROUGHNESS
 
 LOOPBACK_NAMES = ("localhost", "127.0.0.1", "::1")
@@ -290,26 +293,6 @@ _LEGEND_STYLE = (
 )
 """Style of the legend, which is read before any picture."""
 
-_FOR_SOFTWARE = """
-  const context = HTMLCanvasElement.prototype.getContext;
-  HTMLCanvasElement.prototype.getContext = function (kind, options) {
-    return context.call(this, kind, kind.startsWith("webgl") ? {...options, antialias: false} : options);
-  };
-  const whole = window.devicePixelRatio, ratio = 2 / 3;
-  Object.defineProperty(window, "devicePixelRatio", {get: () => ratio});
-  // Plots, whose canvas is small and has letters, keep the resolution.
-  for (const side of ["width", "height"]) {
-    const given = Object.getOwnPropertyDescriptor(HTMLCanvasElement.prototype, side);
-    Object.defineProperty(HTMLCanvasElement.prototype, side, {...given, set(pixels) {
-      const factor = this.parentNode?.className === "u-wrap" ? whole / ratio : 1;
-      given.set.call(this, Math.round(factor * pixels));
-      if (factor !== 1) this.getContext("2d").setTransform(factor, 0, 0, factor, 0, 0);
-    }});
-  }
-"""
-"""Draws each pixel once instead of four times, which halves the time of a picture drawn by software, and lets
-viser, which lowers the resolution by a quarter where pictures come slowly, lower it by half."""
-
 _SCRIPTS_OF_SCRIPTS = """
   const create = document.createElement;
   document.createElement = function (name, ...options) {
@@ -330,8 +313,11 @@ _PRESSES = """
 """Lets viser prevent the default of a press on a part that is dragged: react-three-fiber listens passively,
 and a browser then reports an error."""
 
+_SAMPLES = 16
+"""Largest number of places of an image whose mean a pixel shows (anisotropic filtering)."""
+
 _OWN_COLOURS = (
-    f"const ROUGHNESS = {ROUGHNESS};"
+    f"const ROUGHNESS = {ROUGHNESS}, SAMPLES = {_SAMPLES};"
     + """
   setInterval(() => {
     const page = window.__viserMutable, renderer = page?.scene?.__r3f?.root?.getState?.()?.gl;
@@ -340,10 +326,13 @@ _OWN_COLOURS = (
     renderer.toneMapping = 0;
     page.scene.traverse((each) => {
       for (const material of each.isMesh ? [each.material].flat() : []) {
-        const roughness = window.__dynxRoughness ?? ROUGHNESS;
-        if (!material.isMeshStandardMaterial || material.roughness === roughness) continue;
+        if (!material.isMeshStandardMaterial) continue;
+        const roughness = window.__dynxRoughness ?? ROUGHNESS, image = material.map;
+        changed ||= material.roughness !== roughness;
         material.roughness = roughness;
-        changed = true;
+        if (!image || image.anisotropy === SAMPLES) continue;
+        image.anisotropy = SAMPLES;
+        image.needsUpdate = changed = true;
       }
     });
     if (changed) page.requestRender?.();
@@ -351,7 +340,7 @@ _OWN_COLOURS = (
 """
 )
 """Shows colours as they are, where react-three-fiber makes them greyer, as films of analogue cameras do, and
-the gloss of pictures."""
+the gloss of pictures. Images stay sharp where they are seen at a small angle."""
 
 # A program is not told what the pointer is over. Where a version of viser keeps its scene elsewhere, no name
 # is shown.
@@ -384,7 +373,8 @@ _NAMES_ON_HOVER = (
     const x = (event.clientX - box.left) / box.width, y = (event.clientY - box.top) / box.height;
     picture.raycaster.setFromCamera({x: 2 * x - 1, y: 1 - 2 * y}, picture.camera);
     const [first] = picture.raycaster.intersectObjects([...drawn.keys()], false);
-    return first ? drawn.get(first.object) : null;
+    const part = first && drawn.get(first.object);
+    return Array.isArray(part) ? part[first.instanceId] : part ?? null;
   };
   const show = () => {
     const event = latest;
@@ -478,6 +468,11 @@ _BEFORE_PICTURES = (
   let faded = "{}", fading = {};
   const seenThrough = () => document.getElementById(OPACITIES)?.dataset.opacities ?? faded;
   const fade = () => {
+    for (const [path, colour] of Object.entries(colours))
+      window.__viserMutable.nodeRefFromName[path]?.traverse((each) => {
+        for (const material of each.isMesh ? [each.material].flat() : [])
+          if (material.isMeshStandardMaterial) material.color.setRGB(...colour);
+      });
     if (seenThrough() !== faded) fading = {...fading, ...JSON.parse(faded = seenThrough())};
     for (const [path, opacity] of Object.entries(fading))
       window.__viserMutable.nodeRefFromName[path]?.traverse((each) => {
@@ -506,9 +501,17 @@ _BEFORE_PICTURES = (
     });
     scene.onBeforeRender = (renderer, drawn, camera) => {
       shift(camera);
+      watchCamera(camera);
       write(renderer.domElement, camera);
       fade();
+      castShadows();
+      layAxesOver();
+      // viser draws its background over the whole picture also where there is none.
+      const behind = window.__viserMutable.backgroundMaterial;
+      if (behind) behind.visible = behind.uniforms.enabled.value;
+      drawCoarsely(renderer, drawn, camera);
     };
+    scene.onAfterRender = drawWhole;
   }, 100);
 """
 )
@@ -615,8 +618,8 @@ class Client:
         self._kept = ExitStack()
         self.folder = self._kept.enter_context(temporary_folder("dynx-page-"))
         """The folder that is served."""
-        script = "" if antialiasing else _FOR_SOFTWARE
-        script += _PRESSES + _OWN_COLOURS + _NAMES_ON_HOVER + _BEFORE_PICTURES + _INPUT
+        script = ALWAYS_WHOLE if antialiasing else COARSE_WHILE_MOVING
+        script += PLACING + _PRESSES + _OWN_COLOURS + _NAMES_ON_HOVER + SHADOWS + _BEFORE_PICTURES + _INPUT
         policy = ContentPolicy("'self' data: blob:")
         self.headers = tuple(policy.headers([HANDLER_HASH]))
         """Headers with which the page is served."""
@@ -635,8 +638,9 @@ class Client:
         self._kept.close()
 
 
-def names_element(names: Mapping[str, str]) -> str:
-    """Return the HTML element by which the page knows the names of parts by the paths of their nodes."""
+def names_element(names: Mapping[str, str | list[str]]) -> str:
+    """Return the HTML element by which the page knows the names of parts by the paths of their nodes; of a
+    node that shows many, all their names."""
     return (
         f'<div id="{NAMES}" style="display: none" data-names="{escape(json.dumps(names), quote=True)}"></div>'
     )
@@ -645,7 +649,7 @@ def names_element(names: Mapping[str, str]) -> str:
 def standalone(
     page: str,
     title: str,
-    names: Mapping[str, str],
+    names: Mapping[str, str | list[str]],
     *,
     legend: str = "",
     software: bool = False,
@@ -657,7 +661,8 @@ def standalone(
     With `software` the page does not say that software draws it: its meshes were reduced for that.
     """
     policy = ContentPolicy("data: blob:")
-    page = _guarded(page, _OWN_COLOURS + _NAMES_ON_HOVER + _BEFORE_PICTURES, policy)
+    script = ALWAYS_WHOLE + PLACING + _OWN_COLOURS + _NAMES_ON_HOVER + SHADOWS + _BEFORE_PICTURES
+    page = _guarded(page, script, policy)
     meta = f'<meta http-equiv="Content-Security-Policy" content="{escape(policy.text(), quote=True)}">'
     page = page.replace("<head>", f"<head>{meta}", 1)
     body = page.rfind("</body>")

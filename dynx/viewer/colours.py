@@ -7,7 +7,7 @@ RGB = tuple[int, int, int]
 GREY: RGB = (160, 160, 160)
 """Shapes without a colour of their own."""
 ORANGE: RGB = (230, 159, 0)
-"""Collision shapes."""
+"""Collision shapes, and the lines of robots without shapes."""
 SKY_BLUE: RGB = (86, 180, 233)
 """The second motion of two, and references."""
 GREEN: RGB = (0, 158, 115)

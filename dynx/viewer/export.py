@@ -25,7 +25,7 @@ from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import rotation_from_rpy
 from dynx.steppers.camera import Camera, DrawnShape
 from dynx.viewer.browser import standalone
-from dynx.viewer.colours import GREY, SKY_BLUE
+from dynx.viewer.colours import ORANGE, SKY_BLUE
 from dynx.viewer.drawn_robot import GHOST_OPACITY, size_of
 from dynx.viewer.framing import (
     SHARE,
@@ -42,7 +42,7 @@ from dynx.viewer.motion import MotionFrames
 from dynx.viewer.node_shapes import NodeShapes
 from dynx.viewer.page import Page
 from dynx.world.camera import cast_rays_smoothly, png_bytes
-from dynx.world.scenery import DARK, LIGHT, TILE, Scenery
+from dynx.world.scenery import DARK, LIGHT, SUBTILES, TILE, Scenery
 
 PICTURES_PER_SECOND = 12.5
 """Rate of the pictures of a film, nearly: the motion is a whole number of them."""
@@ -53,7 +53,9 @@ MAX_PICTURES = 500
 SIZE = (480, 360)
 """Width and height of a picture of a film [pixels]."""
 
-_OPAQUE_GREY: Colour = (GREY[0] / 255.0, GREY[1] / 255.0, GREY[2] / 255.0, 1.0)
+_OPAQUE_ORANGE: Colour = (ORANGE[0] / 255.0, ORANGE[1] / 255.0, ORANGE[2] / 255.0, 1.0)
+
+_AXES_LEGEND = "x red, y green, z blue"
 
 _STICK_RADIUS = 0.015
 """Radius of the sticks of a robot without shapes, as a share of its size."""
@@ -61,7 +63,7 @@ _STICK_RADIUS = 0.015
 Progress = Callable[[int], object]
 """Called with the number of pictures that are drawn."""
 
-_CLEAR_SKY_BLUE: Colour = (SKY_BLUE[0] / 255.0, SKY_BLUE[1] / 255.0, SKY_BLUE[2] / 255.0, GHOST_OPACITY)
+CLEAR_SKY_BLUE: Colour = (SKY_BLUE[0] / 255.0, SKY_BLUE[1] / 255.0, SKY_BLUE[2] / 255.0, GHOST_OPACITY)
 
 NodesAt = Callable[[float, Camera], NodeShapes]
 """Function of a time [s] after the start and a camera, which returns the marks and texts that it sees."""
@@ -93,19 +95,37 @@ def stage_for(
     dark: bool = False,
     camera: Camera | None = None,
     direction: Floats = VIEW_DIRECTION,
+    time: float | None = None,
+    ghost: MotionFrames | None = None,
 ) -> Stage:
     """Return a stage whose camera sees a motion from a direction (3,), by default that in which the page
-    begins, or a stage for the `camera` given."""
-    low, high = box_around(motion.poses, motion.bodies, motion.robots)
+    begins, or a stage for the `camera` given.
+
+    With a `time` [s] it sees only what moves at that time, in the motion and in a second one, the `ghost`,
+    which the caption names."""
+    whole_low, _ = box_around(motion.poses, motion.bodies, motion.robots)
+    low, high = box_around(_seen(motion, time), motion.bodies, motion.robots)
     if camera is None:
-        points = points_around(motion.poses, motion.bodies, motion.robots)
+        motions = [motion] if ghost is None or time is None else [motion, ghost]
+        points = np.concatenate(
+            [points_around(_seen(each, time), each.bodies, each.robots) for each in motions]
+        )
         upward = SHARE * math.tan(0.5 * Camera.field_of_view)
         eye, target = fitted_view(points, upward * size[0] / size[1], upward, direction)
         camera = Camera.look_at(eye, target, size=size)
-    floor = None if has_ground(motion.bodies) else ground_height(low, motion.robots)
+    floor = None if has_ground(motion.bodies) else ground_height(whole_low, motion.robots)
     tile = tile_for(low, high)
-    caption = f"large tile: {length_text(tile)}"
+    caption = f"tiles: {length_text(tile)} and {length_text(tile / SUBTILES)}"
+    if ghost is not None:
+        caption = f"solid: {motion.name}, blue: {ghost.name}; {caption}"
     return Stage(camera, DARK if dark else LIGHT, tile, floor, caption)
+
+
+def _seen(motion: MotionFrames, time: float | None) -> Mapping[str, Floats]:
+    """Return the poses (n, 4, 4) of the parts of a motion, or those (1, 4, 4) at a time [s]."""
+    if time is None:
+        return motion.poses
+    return {name: T[None] for name, T in motion.at(motion.frame_at(time)).items()}
 
 
 def picture_of(
@@ -115,25 +135,37 @@ def picture_of(
     but the first motion are see-through, sky blue, and without a shadow."""
     solid: list[DrawnShape] = []
     clear: list[DrawnShape] = []
+    ghosts: list[DrawnShape] = []
     for number, motion in enumerate(motions):
         poses = motion.at(motion.frame_at(time))
-        for part, shape, rgba, T in _shapes(motion):
+        for part, shape, rgba, T in shapes_of(motion):
             if number > 0 and part not in poses:
                 continue
+            rgba = stage.scenery.own_colour(shape, rgba)
             opacity = rgba[3] * stage.opacities.get(part, 1.0)
-            seen = (rgba[0], rgba[1], rgba[2], opacity) if number == 0 else _CLEAR_SKY_BLUE
+            seen = (rgba[0], rgba[1], rgba[2], opacity) if number == 0 else CLEAR_SKY_BLUE
             if opacity > 0.0:
                 drawn = DrawnShape(0, shape, seen, poses.get(part, np.eye(4)) @ T, painted=number == 0)
-                (solid if seen[3] >= 1.0 else clear).append(drawn)
+                (ghosts if number > 0 else solid if seen[3] >= 1.0 else clear).append(drawn)
     if stage.floor is not None:
         T_floor = homogeneous(np.eye(3), np.array([0.0, 0.0, stage.floor]))
         solid.append(DrawnShape(0, Plane(), (*stage.scenery.ground, 1.0), np.asarray(T_floor)))
     camera, beside = stage.camera, beside or NodeShapes()
-    ghosts = [*clear, *beside.shapes]
-    drawing = cast_rays_smoothly(solid, camera.pose.matrix, camera, stage.scenery, stage.tile, ghosts=ghosts)
+    ghosts += beside.shapes
+    drawing = cast_rays_smoothly(
+        solid,
+        camera.pose.matrix,
+        camera,
+        stage.scenery,
+        stage.tile,
+        ghosts=ghosts,
+        veils=clear,
+        seen_through=beside.axes,
+    )
     rgb = drawing.rgb.reshape(camera.size[1], camera.size[0], 3)
     rgb = write_words(rgb, beside.words, camera)
-    return write_caption(rgb, stage.caption) if stage.caption else rgb
+    caption = [stage.caption, *([_AXES_LEGEND] if beside.axes else [])]
+    return write_caption(rgb, "; ".join(caption)) if stage.caption else rgb
 
 
 def write_picture(path: str | os.PathLike[str], rgb: NDArray[np.uint8]) -> None:
@@ -141,8 +173,11 @@ def write_picture(path: str | os.PathLike[str], rgb: NDArray[np.uint8]) -> None:
     write_bytes(path, png_bytes(rgb))
 
 
-def film_length(motions: tuple[MotionFrames, ...]) -> int:
-    """Return the number of pictures of the film of motions that begin together."""
+def film_length(motions: tuple[MotionFrames, ...], fps: float | None = None) -> int:
+    """Return the number of pictures of the film of motions that begin together, with about `fps` pictures a
+    second, or at most `MAX_PICTURES` for None."""
+    if fps is not None:
+        return max(1, round(_duration(motions) * fps))
     return min(MAX_PICTURES, max(1, round(_duration(motions) * PICTURES_PER_SECOND)))
 
 
@@ -154,10 +189,11 @@ def write_film(
     dark: bool = False,
     stage: Stage | None = None,
     nodes_at: NodesAt = _no_nodes,
+    fps: float | None = None,
 ) -> None:
     """Write motions as a film that lasts as long as the longest, by the suffix of the file (`.gif`, which
-    begins again, or `.mp4`). Raises the errors of `write_pictures`."""
-    first, count = motions[0], film_length(motions)
+    begins again, or `.mp4`), with the pictures of `film_length`. Raises the errors of `write_pictures`."""
+    first, count = motions[0], film_length(motions, fps)
     stage = stage or stage_for(first, dark=dark)
     # A film of next to no time is one picture, which has to be seen.
     period = max(_duration(motions) / count, 0.5 / PICTURES_PER_SECOND)
@@ -176,7 +212,7 @@ def _duration(motions: tuple[MotionFrames, ...]) -> float:
     return float(max(each.t[-1] for each in motions) - motions[0].t[0])
 
 
-def _shapes(motion: MotionFrames) -> Iterator[tuple[str, Shape, Colour, Floats]]:
+def shapes_of(motion: MotionFrames) -> Iterator[tuple[str, Shape, Colour, Floats]]:
     """Yield the shapes of every part with the name of the part; those of a fixed body in the world."""
     for robot, model in motion.robots.items():
         shapes = [
@@ -201,7 +237,7 @@ def _sticks(model: Model) -> Iterator[tuple[str, Shape, Colour, Floats]]:
             # The z axis of the stick is turned to the child.
             rpy = np.array([0.0, math.acos(end[2] / length), math.atan2(end[1], end[0])])
             T = np.asarray(homogeneous(rotation_from_rpy(rpy), 0.5 * end))
-            yield joint.parent, Cylinder(_STICK_RADIUS * size_of(model), length), _OPAQUE_GREY, T
+            yield joint.parent, Cylinder(_STICK_RADIUS * size_of(model), length), _OPAQUE_ORANGE, T
 
 
 UPDATES_PER_SECOND = 30.0

@@ -42,7 +42,7 @@ class FollowingCamera:
         with gui.add_folder("camera", expand_by_default=False):
             self._mode = gui.add_dropdown("it is", (_FREE, _FOLLOWS, _FIRST_PERSON), initial_value=_FREE)
             # An empty scene has no part.
-            self._part = gui.add_dropdown("part", tuple(drawn.parts) or (_NO_PART,))
+            self._part = gui.add_dropdown("part", drawn.listed or (_NO_PART,))
         # Outside of the folder, which may be closed.
         self._element = gui.add_html(self._followed(0, _NO_PART), order=math.inf)
         self._mode.on_update(lambda _: self._start())
@@ -62,6 +62,8 @@ class FollowingCamera:
             known = self._drawn.roots | {name: name for name in self._drawn.parts}
             if part not in known:
                 raise ArgumentError(f"no part {shown(part)}{nearest(part, known)}")
+            if known[part] not in self._part.options:
+                self._part.options = (*self._part.options, known[part])
             self._part.value = known[part]
         self._mode.value = _FREE if part is None else _FIRST_PERSON if first_person else _FOLLOWS
         self._start()
@@ -88,7 +90,7 @@ class FollowingCamera:
         if not number:
             return followed_element(0, "", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         origin, start = self._drawn.pose(part)[:3, 3], self._start_poses[part][:3, 3]
-        return followed_element(number, self._drawn.parts[part].name, origin.tolist(), start.tolist())
+        return followed_element(number, self._drawn.path_of(part), origin.tolist(), start.tolist())
 
     def _join(self, _: Any) -> None:
         """Let a page that was opened later look from the part, too."""

@@ -118,8 +118,12 @@ def _boxes(
     moving = _moving(poses, bodies)
     given = {body.name: body for body in bodies if body.name in moving}
     boxes = {name: _body_box(body) for name, body in given.items() if not has_plane(body)}
+    alike: dict[int, dict[str, PartBox]] = {}
     for robot, model in (robots or {}).items():
-        boxes |= {f"{robot}/{link}": box for link, box in link_boxes(model).items()}
+        # Many robots may have one model.
+        if id(model) not in alike:
+            alike[id(model)] = link_boxes(model)
+        boxes |= {f"{robot}/{link}": box for link, box in alike[id(model)].items()}
     return boxes
 
 

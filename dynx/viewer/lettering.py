@@ -97,7 +97,7 @@ class _Letters:
         self._draw.text((x + border - left, y + border - top), text, font=font, fill=colour or _INK)
 
     def write_in_corner(self, text: str) -> None:
-        font = ImageFont.load_default(0.85 * self._size)
+        font = ImageFont.load_default(1.1 * self._size)
         left, top, right, bottom = self._draw.textbbox((0, 0), text, font=font)
         gap, border = 0.8 * self._size, 0.4 * self._size
         x, y = self._width - gap - border - (right - left), self._height - gap - border - (bottom - top)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import io
 import logging
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,8 @@ __all__ = [
     "HOTKEYS",
     "SIMPLIFY_VERSION",
     "nodes_by_path",
+    "put_pose",
+    "send_values",
     "serve",
     "silent",
     "simplify",
@@ -73,6 +75,18 @@ def _is_not_of_a_stranger(record: logging.LogRecord) -> bool:
 def nodes_by_path(server: Any) -> dict[str, Any]:
     """Return the nodes of the scene of a server by their paths, those above before those below."""
     return dict(sorted(server.scene._handle_from_node_name.items()))
+
+
+def send_values(node: Any, values: Mapping[str, Any]) -> None:
+    """Send values of a node by name that viser does not know; the script of the page reads them. A page that
+    is opened later gets the last values of each set of names."""
+    scene = node._impl.api
+    scene._queue_scene_message(viser._messages.SceneNodeUpdateMessage(node.name, dict(values)))
+
+
+def put_pose(node: Any, position: Any, wxyz: Any) -> None:
+    """Set the pose that a node has here, without a message to the page."""
+    node._impl.position[:], node._impl.wxyz[:] = position, wxyz
 
 
 def serve(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from dynx.spatial.scalar import Floats
 from dynx.spatial.so3 import rotation_from_quat
 from dynx.viewer.browser import names_element
 from dynx.viewer.colours import BLUE, RGB, SKY_BLUE, VERMILION, YELLOW
-from dynx.viewer.drawn_robot import DrawnRobot, DrawnScene, size_of, wxyz
+from dynx.viewer.drawn_robot import DrawnParts, DrawnRobot, DrawnScene, size_of, wxyz
 from dynx.viewer.page import Page
 from dynx.viewer.triangles import triangles_of
 
@@ -161,7 +161,7 @@ def _set_visible(label: Any, visible: bool) -> None:
         label.visible = visible
 
 
-INERTIA_OPACITY = 0.45
+INERTIA_OPACITY = 0.6
 
 
 class EquivalentSolid(NamedTuple):
@@ -227,8 +227,8 @@ class Marks:
 
     def _frames(self) -> Iterator[Any]:
         for node in self._robot.links.values():
-            length = 0.08 * self._size
-            yield self._scene.add_frame(f"{node.name}/axes", axes_length=length, axes_radius=0.05 * length)
+            length = 0.1 * self._size
+            yield self._scene.add_frame(f"{node.name}/axes", axes_length=length, axes_radius=0.07 * length)
 
     def _joint_axes(self) -> Iterator[Any]:
         half = 0.1 * self._size
@@ -321,16 +321,15 @@ class NamedParts:
     """The names of parts: that under the pointer, and that of at most one part that was clicked, which stays
     on it and moves with it."""
 
-    def __init__(self, page: Page, parts: Mapping[str, Any], visuals: Mapping[str, Sequence[Any]]) -> None:
-        """`parts` are the nodes of parts, below which all their shapes lie, and `visuals` those of the shapes
-        that are clicked."""
-        self._page, self._parts, self._visuals = page, parts, visuals
+    def __init__(self, page: Page, drawn: DrawnParts) -> None:
+        """The visual shapes of what is drawn are clicked."""
+        self._page, self._drawn = page, drawn
         self._label: Any = None
         self.shown: str | None = None
         """The part whose name stays."""
-        page.part_names = {node.name: name for name, node in parts.items()}
+        page.part_names = drawn.names_by_path
         self._names = page.gui.add_html(names_element(page.part_names), order=math.inf)
-        for name, nodes in visuals.items():
+        for name, nodes in drawn.visuals.items():
             for node in nodes:
                 node.on_click(lambda _, name=name: self.show(None if name == self.shown else name))
 
@@ -342,10 +341,9 @@ class NamedParts:
                 self._label = None
             self.shown = part
             if part is not None:
-                place = centre_of(self._visuals[part])
-                self._label = self._page.scene.add_label(
-                    f"{self._parts[part].name}/name", part, position=place
-                )
+                place = centre_of(self._drawn.visuals[part])
+                path = f"{self._drawn.path_of(part)}/name"
+                self._label = self._page.scene.add_label(path, part, position=place)
 
     def remove(self) -> None:
         """Remove the names from the page."""

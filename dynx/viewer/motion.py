@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from dynx.errors import ArgumentError
 from dynx.model import Model
 from dynx.rbd.kinematics import link_poses
-from dynx.sim import Rollout, ScenePlant
+from dynx.sim import BatchRollouts, Rollout, ScenePlant
 from dynx.spatial.scalar import Floats
 from dynx.steppers.state import WorldState
 from dynx.world.camera import part_poses
@@ -132,6 +133,56 @@ def motion_of_robot(model: Model, q: Floats) -> MotionFrames:
     return MotionFrames(model.name, np.zeros(1), _poses(model.name, model, q[None]), {model.name: model})
 
 
+MAX_POSES = 400_000
+"""Largest number of poses of links in the motion of a batch; a longer or larger one has fewer frames."""
+
+
+def motion_of_copies(
+    model: Model, t: Floats, q: Floats, spacing: float = 0.0, robots: Mapping[str, Model] = {}
+) -> MotionFrames:
+    """Return the motion of n robots with the configurations q (n, len(t), nq), which stand on a square grid
+    with a `spacing` [m]; as pictures show them, they are those of `robots`."""
+    names = [f"{model.name} {k}" for k in range(len(q))]
+    side = math.ceil(math.sqrt(len(q)))
+    column, row = np.arange(len(q)) % side, np.arange(len(q)) // side
+    rows = math.ceil(len(q) / side)
+    places = spacing * np.stack([column - 0.5 * (side - 1), 0.5 * (rows - 1) - row], axis=1)
+    poses: dict[str, Floats] = {}
+    for link, T in link_poses(model, q):
+        moved = np.array(np.broadcast_to(T, (*q.shape[:2], 4, 4)))
+        moved[..., :2, 3] += places[:, None]
+        poses |= {f"{name}/{link}": moved[k] for k, name in enumerate(names)}
+    return MotionFrames(f"{len(q)} {model.name}", t, poses, dict(robots) or dict.fromkeys(names, model))
+
+
+def motion_of_batch(rollouts: BatchRollouts, spacing: float = 0.0) -> tuple[MotionFrames, list[str]]:
+    """Return the motion of the rollouts of a batch that were computed, and sentences on those that are not
+    shown as they are: one that diverged stays where its state was finite last.
+
+    Raises ArgumentError for a batch without a record.
+    """
+    model = rollouts.scenario.model
+    computed = np.flatnonzero(rollouts.done)
+    finite = np.asarray(np.isfinite(rollouts.q_record).all(axis=2))
+    shown_rows = computed[finite[computed, :1].any(axis=1)] if finite.shape[1] else computed[:0]
+    if not len(shown_rows):
+        raise ArgumentError(
+            "the batch has no states to show; simulate_batch records every k-th state with record_every=k"
+        )
+    frames = _frames(rollouts.t, max(2, MAX_POSES // (len(shown_rows) * len(model.links))))
+    q, good = rollouts.q_record[shown_rows], finite[shown_rows]
+    # The last state that is finite, at each time.
+    latest = np.maximum.accumulate(np.where(good, np.arange(good.shape[1]), 0), axis=1)[:, frames]
+    notes = []
+    if not good.all():
+        stopped = int((~good.all(axis=1)).sum())
+        notes.append(f"{stopped} of {len(rollouts)} rollouts diverged; they stay where they were finite last")
+    if len(shown_rows) < len(rollouts):
+        notes.append(f"{len(rollouts) - len(shown_rows)} of {len(rollouts)} rollouts have no state to show")
+    moved = np.take_along_axis(q, latest[:, :, None], axis=1)
+    return motion_of_copies(model, rollouts.t[frames], moved, spacing), notes
+
+
 def motion_of_state(scene: Scene, state: WorldState) -> MotionFrames:
     """Return the motion of a scene that stands still in a state."""
     poses = {name: T[None] for name, T in part_poses(scene, state)}
@@ -158,10 +209,10 @@ def motion_separation(a: MotionFrames, b: MotionFrames) -> Separation:
     return separation(a.record, b.record, a.t)
 
 
-def _frames(t: Floats) -> NDArray[np.intp]:
-    """Return the indices of the states that are shown, the last among them."""
+def _frames(t: Floats, most: int = MAX_FRAMES) -> NDArray[np.intp]:
+    """Return the indices of the states that are shown, at `most` so many, the last among them."""
     duration = float(t[-1] - t[0])
-    count = min(len(t), MAX_FRAMES, max(2, round(duration * FRAME_RATE) + 1))
+    count = min(len(t), most, MAX_FRAMES, max(2, round(duration * FRAME_RATE) + 1))
     return np.unique(np.linspace(0, len(t) - 1, count).round().astype(np.intp))
 
 

@@ -19,6 +19,7 @@ from dynx.viewer.drawn_robot import (
     AS_DESCRIBED,
     GHOST_OPACITY,
     GHOST_SIZE,
+    THICKNESS,
     ContactArrows,
     DrawnScene,
     Look,
@@ -337,7 +338,7 @@ class MotionView:
             (float(np.linalg.norm(a.forces, axis=1).max(initial=0.0)) for a in motion.contacts), default=0.0
         )
         self._arrows = ContactArrows(
-            page.scene, _LONGEST_ARROW * self._size / (largest or 1.0), 0.006 * self._size
+            page.scene, _LONGEST_ARROW * self._size / (largest or 1.0), THICKNESS * self._size
         )
         self.legend = _legend(motion.name, ghost.name) if compare and ghost is not None else ""
         """HTML that says which of two motions is solid; empty without `compare`."""
@@ -349,7 +350,7 @@ class MotionView:
         self._add_curves(curves, step, compare=compare)
         self.camera = FollowingCamera(page, self.drawn)
         """The camera of the page."""
-        self.names = NamedParts(page, self.drawn.parts, self.drawn.visuals)
+        self.names = NamedParts(page, self.drawn)
         """The names of the part under the pointer and of that which was clicked."""
         page.look_at(points_around(motion.poses, motion.bodies, motion.robots), SHARE)
 
@@ -418,17 +419,23 @@ class MotionView:
                 else None
             )
             points = None if forces is None else gui.add_checkbox("contact points", initial_value=False)
+            numbers = None if forces is None else gui.add_checkbox("force numbers", initial_value=False)
             self._marks = SceneMarks(self._page, self.drawn)
             marks = self._marks.add_switches()
-            trace = gui.add_dropdown("trace of", (_NO_PART, *self.motion.poses), initial_value=_NO_PART)
+            trace = gui.add_dropdown(
+                "trace of",
+                (_NO_PART, *(part for part in self.drawn.listed if part in self.motion.poses)),
+                initial_value=_NO_PART,
+            )
 
         def show(_: Any = None) -> None:
             with self._page.lock, self._page.together():
                 self.drawn.show(visuals=not collisions.value, collisions=collisions.value)
                 if ghost is not None and self._ghost_drawn is not None:
                     self._ghost_drawn.visible = ghost.value
-                if forces is not None and points is not None:
+                if forces is not None and points is not None and numbers is not None:
                     self._arrows.shown, self._arrows.points_shown = forces.value, points.value
+                    self._arrows.numbers_shown = numbers.value
                 self._show(self.timeline.time)
 
         def draw_trace(_: Any) -> None:
@@ -444,6 +451,7 @@ class MotionView:
             "second motion" if compare else "reference": ghost,
             "contact forces": forces,
             "contact points": points,
+            "force numbers": numbers,
         }
         self.switches = {name: box for name, box in boxes.items() if box is not None}
         for box in self.switches.values():

@@ -25,7 +25,7 @@ _DOT = 3.0
 _PARTS = re.compile(r"/(motion|second|robot|world)(/.*)?/(visual|shape|stick)\d+$|/(handle|spring|ground)\b")
 """Paths of what a picture draws otherwise, or leaves out: shapes of parts, handles and the ground."""
 
-_AXES = ((0.84, 0.18, 0.16), (0.20, 0.62, 0.22), (0.16, 0.36, 0.84))
+_AXES = ((0.90, 0.05, 0.05), (0.05, 0.65, 0.05), (0.05, 0.20, 0.95))
 """Colours of the x, y and z axes of frames."""
 
 Colour = tuple[float, float, float, float]
@@ -47,6 +47,8 @@ class NodeShapes(NamedTuple):
 
     shapes: tuple[DrawnShape, ...] = ()
     words: tuple[Words, ...] = ()
+    axes: tuple[DrawnShape, ...] = ()
+    """Axes of frames, which are seen through the parts in which they lie."""
 
 
 def node_shapes(page: Page, camera: Camera, *, collisions: bool = False) -> NodeShapes:
@@ -74,6 +76,7 @@ def node_shapes(page: Page, camera: Camera, *, collisions: bool = False) -> Node
 
     shapes: list[DrawnShape] = []
     words: list[Words] = []
+    axes: list[DrawnShape] = []
     for path, node in nodes.items():
         if _PARTS.search(path) or ("/collision" in path and not collisions):
             continue
@@ -83,8 +86,8 @@ def node_shapes(page: Page, camera: Camera, *, collisions: bool = False) -> Node
         if isinstance(getattr(node, "text", None), str):
             words.append(Words(node.text, T[:3, 3]))
         else:
-            shapes += _surfaces(node, T, camera)
-    return NodeShapes(tuple(shapes), tuple(words))
+            (axes if hasattr(node, "axes_length") else shapes).extend(_surfaces(node, T, camera))
+    return NodeShapes(tuple(shapes), tuple(words), tuple(axes))
 
 
 def _surfaces(node: Any, T: Floats, camera: Camera) -> Iterator[DrawnShape]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import errno
 import math
 import socket
@@ -110,8 +111,8 @@ class Page:
         """True for a page drawn as software does fastest, and for a dark page."""
         self._furnish()
         self._view: _FirstView | None = None
-        self.part_names: dict[str, str] = {}
-        """The names of parts by the paths of their nodes."""
+        self.part_names: dict[str, str | list[str]] = {}
+        """The names of parts by the paths of their nodes; of a node that shows many, all their names."""
         self.reserved_keys: dict[str, str] = {}
         """Actions of the keys that the page itself uses, by key."""
         self.elements: dict[str, str] = {}
@@ -122,6 +123,8 @@ class Page:
         self._closed = threading.Event()
         self.ended = threading.Event()
         """Set when what is shown now is removed or the page is closed: threads that move it end then."""
+        # Before viser's own end of the program, which prints that it ends.
+        atexit.register(self.close)
         self._at_end: list[Callable[[], None]] = []
 
     def _furnish(self) -> None:
@@ -183,6 +186,12 @@ class Page:
         """The controls of viser."""
         return self._server.gui
 
+    def has_part(self, name: object) -> bool:
+        """Check whether something that is shown has a name."""
+        return any(
+            name in names if isinstance(names, list) else name == names for names in self.part_names.values()
+        )
+
     def together(self) -> AbstractContextManager[Any]:
         """Send the changes made in a ``with`` block in one piece."""
         context: AbstractContextManager[Any] = self._server.atomic()
@@ -200,11 +209,16 @@ class Page:
             return
         across, along = np.linspace(-0.5, 0.5, _CELLS + 1), np.linspace(-0.5, 0.5, _PIECES + 1)
         x, y = np.broadcast_arrays(along * side, across[:, None] * side)
-        points = np.stack([x, y, np.full_like(x, height)], axis=-1)
+        points = np.stack([x, y, np.zeros_like(x)], axis=-1)
         pieces = np.stack([points[:, :-1], points[:, 1:]], axis=2).reshape(-1, 2, 3)
         lines = np.concatenate([pieces, pieces[:, :, [1, 0, 2]]]).astype(np.float32)
         self.scene.add_line_segments(
-            "/ground", lines, _LINE_COLOUR[self.dark], thickness=1.0, thickness_units="screen"
+            "/ground",
+            lines,
+            _LINE_COLOUR[self.dark],
+            thickness=1.0,
+            thickness_units="screen",
+            position=(0.0, 0.0, height),
         )
 
     def look_at(self, points: Floats, share: float) -> None:
@@ -307,6 +321,7 @@ class Page:
         """End the server. Closing twice is harmless."""
         if self.closed:
             return
+        atexit.unregister(self.close)
         self._closed.set()
         self._end_shown()
         # Whoever draws has ended then, or sees that the page is closed.

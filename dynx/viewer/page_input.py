@@ -80,7 +80,7 @@ class PageInput:
         if told.held is not None:
             self._hold(event.client_id, told.held)
         if told.ray is not None:
-            part = told.part if told.part in self._page.part_names.values() else None
+            part = told.part if self._page.has_part(told.part) else None
             for moved in self._moved:
                 self._submit(moved, part, *told.ray)
 

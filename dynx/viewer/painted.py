@@ -49,13 +49,13 @@ def glb(surface: Surface, rgba: tuple[float, float, float, float]) -> tuple[byte
         # In glTF the origin is the upper left corner of the image.
         corners.append(np.stack([surface.uv[..., 0], 1.0 - surface.uv[..., 1]], axis=-1))
     elif surface.colours is not None:
-        corners.append(_light(surface.colours))
+        corners.append(light_of(surface.colours))
     triangles, values = split_at_edges(surface, *corners)
     parts: list[NDArray[Any]] = [triangles.faces.reshape(-1), triangles.vertices]
     attributes = {"POSITION": 1}
     material: dict[str, Any] = {
         "pbrMetallicRoughness": {
-            "baseColorFactor": [*_light(np.array(rgba[:3])).tolist(), rgba[3]],
+            "baseColorFactor": [*light_of(np.array(rgba[:3])).tolist(), rgba[3]],
             "metallicFactor": 0.0,
             "roughnessFactor": 1.0,
         },
@@ -107,6 +107,6 @@ def _accessor(number: int, values: NDArray[Any]) -> dict[str, Any]:
     return found
 
 
-def _light(values: Floats) -> Floats:
+def light_of(values: Floats) -> Floats:
     """Return the amounts of light of values of sRGB from 0 to 1 (IEC 61966-2-1), as glTF has them."""
     return np.asarray(np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4))

@@ -443,7 +443,7 @@ class RobotView:
         self._add_configuration()
         self.camera = FollowingCamera(page, self.robot)
         """The camera of the page."""
-        self.names = NamedParts(page, self.robot.links, self.robot.visuals)
+        self.names = NamedParts(page, self.robot)
         """The names of the part under the pointer and of that which was clicked."""
         self._handle.put(start)
         self._show(start)

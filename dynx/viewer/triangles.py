@@ -205,7 +205,8 @@ def _hash(*arrays: NDArray[Any]) -> str:
 
 @cache
 def _version() -> str:
-    return f"{np.__version__} {SIMPLIFY_VERSION} {source_hash(Path(__file__).parent)}"
+    here = Path(__file__)
+    return f"{np.__version__} {SIMPLIFY_VERSION} {source_hash(here, here.with_name('reduction.py'))}"
 
 
 def _packed(surface: Surface | None) -> bytes:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import os
 import threading
 import webbrowser
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -18,7 +19,7 @@ from dynx.files.films import WRITERS
 from dynx.files.reading import checked_path
 from dynx.model import Model
 from dynx.model.loading import load
-from dynx.model.numbers import checked_vector, whole_number
+from dynx.model.numbers import checked_vector, is_real, whole_number
 from dynx.spatial.scalar import Floats
 from dynx.steppers.camera import Camera
 from dynx.viewer.appearance import PartVisibility, SavedViews, camera_of, look_from
@@ -27,6 +28,7 @@ from dynx.viewer.drawn_robot import DrawnParts, Look
 from dynx.viewer.page import DEFAULT_HOST, DEFAULT_PORT, Page
 from dynx.viewer.recording import RecordingControls
 from dynx.viewer.triangles import TRIANGLE_BUDGET, has_graphics_processor
+from dynx.world.scenery import DARK, LIGHT
 
 if TYPE_CHECKING:
     from dynx.sim import Rollout
@@ -39,7 +41,9 @@ if TYPE_CHECKING:
 
 _OPTIONS = {
     "a robot": ("q", "engine", "collisions"),
+    "copies of a robot": ("q", "spacing", "collisions"),
     "a motion": ("play", "collisions"),
+    "a batch of rollouts": ("play", "spacing", "collisions"),
     "two rollouts": ("play", "names", "collisions"),
     "a world": ("loads", "play", "steps", "collisions"),
 }
@@ -96,7 +100,7 @@ class View(Protocol):
 
 
 def open_subject(shown_object: object) -> object:
-    """Return what is shown: a Model, a Rollout, two of them, a WorldComparison or a World.
+    """Return what is shown: a Model, a Rollout, two of them, BatchRollouts, a WorldComparison or a World.
 
     A Scene is opened as a World in the first engine installed, and what `dynx.load` takes is loaded. Raises
     the errors of loading, and ArgumentError for anything else.
@@ -105,11 +109,11 @@ def open_subject(shown_object: object) -> object:
         return shown_object
     if isinstance(shown_object, str | os.PathLike | bytes):
         return load(shown_object)
-    from dynx.sim import Rollout
+    from dynx.sim import BatchRollouts, Rollout
     from dynx.world import Scene, World
     from dynx.world.comparison import WorldComparison
 
-    if isinstance(shown_object, Rollout | World | WorldComparison):
+    if isinstance(shown_object, Rollout | BatchRollouts | World | WorldComparison):
         return shown_object
     if isinstance(shown_object, Scene):
         from dynx.steppers.registry import installed_worlds
@@ -120,8 +124,8 @@ def open_subject(shown_object: object) -> object:
             return tuple(shown_object)
         raise ArgumentError(f"shown is {shown(shown_object)}; wanted one object, or two rollouts")
     raise ArgumentError(
-        f"shown is of type {type(shown_object).__name__}; wanted a robot, a Rollout, two of them, a "
-        "WorldComparison, a World or a Scene"
+        f"shown is of type {type(shown_object).__name__}; wanted a robot, a Rollout, two of them, "
+        "BatchRollouts, a WorldComparison, a World or a Scene"
     )
 
 
@@ -134,15 +138,37 @@ def is_world(opened: object) -> bool:
     return isinstance(opened, World)
 
 
+def is_batch(opened: object) -> bool:
+    """Check whether a subject is a batch of rollouts, without importing simulations for one that is not."""
+    if isinstance(opened, Model | tuple):
+        return False
+    from dynx.sim import BatchRollouts
+
+    return isinstance(opened, BatchRollouts)
+
+
+def shows_copies(opened: object, options: Mapping[str, Any]) -> bool:
+    """Check whether a subject is a robot with a row of q for each of its copies."""
+    q: Any = options.get("q")
+    # Numbers that are nested unevenly are refused by the view of one robot.
+    with suppress(ValueError):
+        return isinstance(opened, Model) and q is not None and np.ndim(q) == 2
+    return False
+
+
 def check_options(opened: object, options: Mapping[str, Any]) -> None:
     """Raise ArgumentError for an option that the view of a subject does not have, or of a wrong type."""
     subject = (
-        "a robot"
+        "copies of a robot"
+        if shows_copies(opened, options)
+        else "a robot"
         if isinstance(opened, Model)
         else "two rollouts"
         if isinstance(opened, tuple)
         else "a world"
         if is_world(opened)
+        else "a batch of rollouts"
+        if is_batch(opened)
         else "a motion"
     )
     known = _OPTIONS[subject]
@@ -158,6 +184,8 @@ def check_options(opened: object, options: Mapping[str, Any]) -> None:
             )
         if name in ("collisions", "play", "steps"):
             check_switches({name: value})
+        if name == "spacing" and not (is_real(value) and 0.0 <= value < math.inf):
+            raise ArgumentError(f"spacing is {shown(value)}; wanted 0 or a positive length [m]")
         if name == "loads" and value is not None and not callable(value):
             raise ArgumentError(f"loads is of type {type(value).__name__}; wanted a function of the world")
         if name == "names" and not (isinstance(value, tuple | list) and len(value) == 2):
@@ -177,12 +205,18 @@ def title_of(opened: Any) -> str:
         return opened.name
     if isinstance(opened, tuple):
         return "two rollouts"
+    if is_batch(opened):
+        return f"{len(opened)} rollouts of {opened.scenario.model.name}"
     name: str = opened.scene.name if hasattr(opened, "scene") else opened.model.name
     return name
 
 
 def view_of(page: Page, opened: Any, look: Look, options: dict[str, Any]) -> View:
     """Show a subject of `open_subject` on the page."""
+    if shows_copies(opened, options):
+        from dynx.viewer.copies_view import CopiesView
+
+        return CopiesView(page, opened, look=look, **options)
     if isinstance(opened, Model):
         from dynx.viewer.robot_view import RobotView
 
@@ -196,9 +230,12 @@ def view_of(page: Page, opened: Any, look: Look, options: dict[str, Any]) -> Vie
 
 def _motion_view(page: Page, opened: Any, look: Look, options: dict[str, Any]) -> View:
     from dynx.sim import Rollout
-    from dynx.viewer.motion import motion_of_reference, motion_of_rollout, motion_of_run
+    from dynx.viewer.motion import motion_of_batch, motion_of_reference, motion_of_rollout, motion_of_run
     from dynx.viewer.motion_view import MotionView
 
+    if is_batch(opened):
+        motion, notes = motion_of_batch(opened, options.pop("spacing", 0.0))
+        return MotionView(page, motion, look=look, title=title_of(opened), notes=notes, **options)
     if isinstance(opened, Rollout):
         motion, reference = motion_of_rollout(opened), motion_of_reference(opened)
         return MotionView(page, motion, reference, curves=_curves(opened), look=look, **options)
@@ -238,6 +275,20 @@ def _checked_camera(camera: object) -> Camera:
     return camera
 
 
+MAX_FPS = 100.0
+"""Largest number of pictures of a film a second: GIF files tell hundredths of a second apart."""
+
+
+def _checked_fps(fps: float, suffix: str) -> float:
+    """Return the pictures a second of a film. Raises ArgumentError for another suffix or number."""
+    given = f"{fps:g}" if is_real(fps) else shown(fps)
+    if suffix not in WRITERS:
+        raise ArgumentError(f"fps is {given}; wanted None: it is of a film, not of {suffix or 'a page'}")
+    if not is_real(fps) or not 0.0 < fps <= MAX_FPS:
+        raise ArgumentError(f"fps is {given}; wanted pictures a second above 0, at most {MAX_FPS:g}")
+    return float(fps)
+
+
 def _checked_size(size: object) -> tuple[int, int]:
     if not isinstance(size, tuple | list) or len(size) != 2:
         raise ArgumentError(f"size is {shown(size)}; wanted width and height")
@@ -259,10 +310,12 @@ class Viewer(Controls):
         stiffness = viewer.slider("stiffness", 0.0, 500.0)
         viewer.wait()
 
-    `shown` is a `Model` or what `dynx.load` takes, a `Rollout`, two rollouts of one robot or scene, a
-    `WorldComparison`, a `World`, or a `Scene`, which is opened in PyBullet or the first engine installed.
-    The `options` are those of its view: `q`, `engine` and `collisions` of a robot (`RobotView`), `play` of a
-    motion and `names` of two (`MotionView`), `loads`, `play` and `steps` of a world (`WorldView`).
+    `shown` is a `Model` or what `dynx.load` takes, a `Rollout`, two rollouts of one robot or scene,
+    `BatchRollouts`, a `WorldComparison`, a `World`, or a `Scene`, which is opened in PyBullet or the first
+    engine installed. The `options` are those of its view: `q`, `engine` and `collisions` of a robot
+    (`RobotView`); `q` (n, nq) and `spacing` of n copies of a robot (`CopiesView`); `play` of a motion,
+    `names` of two and `spacing` of a batch (`MotionView`); `loads`, `play` and `steps` of a world
+    (`WorldView`).
     """
 
     def __init__(
@@ -285,7 +338,7 @@ class Viewer(Controls):
         meshes = {} if whole_meshes is None else {"whole_meshes": whole_meshes}
         check_switches({"dark": dark, "open_browser": open_browser, **meshes})
         whole = has_graphics_processor() if whole_meshes is None else whole_meshes
-        self._look = Look(triangles=None if whole else TRIANGLE_BUDGET)
+        self._look = Look(triangles=None if whole else TRIANGLE_BUDGET, scenery=DARK if dark else LIGHT)
         opened: Any = open_subject(shown)
         check_options(opened, options)
         self.page = Page(host, port, title=f"dynx: {title_of(opened)}", dark=dark, plain=not whole)
@@ -295,7 +348,7 @@ class Viewer(Controls):
         super().__init__(self.page)
         self._views = SavedViews()
         self.view: Any = self._view_of(opened, shown, options)
-        """A `RobotView`, `MotionView` or `WorldView`: what is shown, to be moved by the program."""
+        """A `RobotView`, `CopiesView`, `MotionView` or `WorldView`: what is shown, moved by the program."""
 
     def show(self, shown: object, **options: Any) -> None:
         """Show something else on the same page, with the `options` of its view; what was shown is removed,
@@ -335,8 +388,8 @@ class Viewer(Controls):
         return (*self.page.notes, *self.view.notes)
 
     def update(self, q: ArrayLike | None = None) -> None:
-        """Show the present state, from a loop of the program: the configuration q (nq,) of a robot, or the
-        state of a world that the program steps (``steps=False``).
+        """Show the present state, from a loop of the program: the configuration q (nq,) of a robot, those
+        (n, nq) of its copies, or the state of a world that the program steps (``steps=False``).
 
         The page shows as many of these as it can; the last is always among them. Raises ArgumentError for a
         robot without q, a world with one, a recorded motion, which has a timeline, and a viewer that is
@@ -479,6 +532,7 @@ class Viewer(Controls):
         size: tuple[int, int] | None = None,
         camera: Camera | None = None,
         direction: ArrayLike | None = None,
+        fps: float | None = None,
     ) -> None:
         """Write what is shown to a file, by its suffix.
 
@@ -486,11 +540,13 @@ class Viewer(Controls):
         ``.mp4`` (extra ``film``) are films of a motion, and ``.png`` a picture, drawn without a browser
         (`progress` is called with the number of pictures drawn). These have the `size` given, width and
         height [pixels], and are seen from a `direction` (3,) in the world, or by a `camera`, whose size they
-        have then. They show the marks, lines and text of the page, hide the parts that it hides, and say how
+        have then. A film has `fps` pictures a second, or 12.5 and at most 500 in all for None. Pictures and
+        films show the marks, lines and text of the page, hide the parts that it hides, and say how
         large the tiles of the ground are.
 
         Raises ArgumentError for a live world, whose motion is not known before it has happened, for another
-        suffix, for a file that cannot be written, and for a page whose size, camera or direction is given;
+        suffix, for a file that cannot be written, for a page whose size, camera or direction is given, and
+        for an `fps` of another file than a film or beyond 100;
         NotInstalledError without the package that writes the film.
         """
         from dynx.viewer.export import write_film, write_picture, write_recording
@@ -498,6 +554,8 @@ class Viewer(Controls):
         self.page.check_open()
         view = self.view
         suffix = os.path.splitext(checked_path(path))[1].lower()
+        if fps is not None:
+            fps = _checked_fps(fps, suffix)
         if suffix == ".png":
             write_picture(path, self._picture(size, camera, direction))
         elif suffix in WRITERS:
@@ -505,7 +563,7 @@ class Viewer(Controls):
                 raise ArgumentError("a film is made of a rollout, or of two motions; write a picture as .png")
             before = view.time - float(view.motions[0].t[0])
             stage = self._stage(size, camera, direction, FILM_SIZE)
-            write_film(path, view.motions, progress, stage=stage, nodes_at=self._nodes_at)
+            write_film(path, view.motions, progress, stage=stage, nodes_at=self._nodes_at, fps=fps)
             view.go_to(before)
         elif size is not None or camera is not None or direction is not None:
             options = {"size": size, "camera": camera, "direction": direction}
@@ -525,6 +583,7 @@ class Viewer(Controls):
         camera: Camera | None,
         direction: ArrayLike | None,
         usual: tuple[int, int],
+        time: float | None = None,
     ) -> Stage:
         from dynx.viewer.export import stage_for
 
@@ -542,7 +601,9 @@ class Viewer(Controls):
                 )
             given["direction"] = towards / length
         wide, high = _checked_size(usual if size is None else size)
-        stage = stage_for(self.view.motions[0], (wide, high), dark=self.page.dark, **given)
+        first, *others = self.view.motions
+        given |= {"time": time, "ghost": next(iter(others), None)}
+        stage = stage_for(first, (wide, high), dark=self.page.dark, **given)
         # A robot's parts are its links, those of a motion have its name before them.
         opacities = {
             part if part in self.view.motions[0].poses else f"{self.view.title}/{part}": value
@@ -556,7 +617,7 @@ class Viewer(Controls):
         """Return what is shown, drawn without a browser, as colours (height, width, 3)."""
         from dynx.viewer.export import picture_of
 
-        stage = self._stage(size, camera, direction, PICTURE_SIZE)
+        stage = self._stage(size, camera, direction, PICTURE_SIZE, self.view.time)
         return picture_of(self.view.motions, self.view.time, stage, self._nodes(stage.camera))
 
     def _nodes_at(self, time: float, camera: Camera) -> NodeShapes:

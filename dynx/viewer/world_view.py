@@ -16,7 +16,7 @@ from dynx.errors import ArgumentError, ClosedError, DynxError, nearest, shown
 from dynx.model.numbers import checked_array
 from dynx.rbd.kinematics import link_poses
 from dynx.spatial.scalar import Floats
-from dynx.viewer.drawn_robot import AS_DESCRIBED, ContactArrows, DrawnScene, Look
+from dynx.viewer.drawn_robot import AS_DESCRIBED, THICKNESS, ContactArrows, DrawnScene, Look
 from dynx.viewer.following import FollowingCamera
 from dynx.viewer.framing import SHARE, box_around, has_ground, points_around
 from dynx.viewer.marks import NamedParts, SceneMarks
@@ -133,6 +133,9 @@ UPDATES_PER_SECOND = 30.0
 STANDARD_WEIGHT = 9.81
 """Force [N] on a mass of 1 kg, for the scale of the arrows."""
 
+WEIGHT_ARROW = 0.8
+"""Length of the arrow of a force that carries all that moves, as a share of its size: four feet share it."""
+
 _NO_PART = "none"
 
 _NO_PART_CHOSEN = "choose the part that is pushed"
@@ -178,7 +181,7 @@ class WorldView:
         self._size = float(np.linalg.norm(high - low)) or 0.5
         mass = sum(r.model.total_mass for r in scene.robots) + sum(b.mass or 0.0 for b in scene.bodies)
         self._arrows = ContactArrows(
-            page.scene, 0.3 * self._size / (STANDARD_WEIGHT * (mass or 1.0)), 0.006 * self._size
+            page.scene, WEIGHT_ARROW * self._size / (STANDARD_WEIGHT * (mass or 1.0)), THICKNESS * self._size
         )
         self._spring = Spring(page.scene, 0.3 * self._size)
         self._pushes: list[ExternalForce] = []
@@ -189,7 +192,7 @@ class WorldView:
         self.drawn.show(visuals=not collisions, collisions=collisions)
         self.camera = FollowingCamera(page, self.drawn)
         """The camera of the page."""
-        self.names = NamedParts(page, self.drawn.parts, self.drawn.visuals)
+        self.names = NamedParts(page, self.drawn)
         """The names of the part under the pointer and of that which was clicked."""
         if steps:
             self._spring.hold_by_pointer({name: self.drawn.visuals[name] for name in moving})
@@ -226,7 +229,7 @@ class WorldView:
             self.drawn.show(visuals=not colliding, collisions=colliding)
             self.camera.watch(self.drawn)
             self._marks.watch(self.drawn)
-            self.names = NamedParts(self._page, self.drawn.parts, self.drawn.visuals)
+            self.names = NamedParts(self._page, self.drawn)
             self.draw()
             return True
 
@@ -377,6 +380,7 @@ class WorldView:
             collisions = gui.add_checkbox("collision shapes", initial_value=collisions_first)
             forces = gui.add_checkbox("contact forces", initial_value=True)
             points = gui.add_checkbox("contact points", initial_value=False)
+            numbers = gui.add_checkbox("force numbers", initial_value=False)
             self._marks = SceneMarks(self._page, self.drawn)
             marks = self._marks.add_switches()
         with gui.add_folder("pull and push", visible=steps):
@@ -394,6 +398,7 @@ class WorldView:
             with self._page.lock:
                 self.drawn.show(visuals=not collisions.value, collisions=collisions.value)
                 self._arrows.shown, self._arrows.points_shown = forces.value, points.value
+                self._arrows.numbers_shown = numbers.value
                 if not (forces.value or points.value):
                     self._arrows.put(np.zeros((0, 3)), np.zeros((0, 3)))
                 self.draw()
@@ -413,6 +418,7 @@ class WorldView:
                 self.push(self._part.value, impulse.value)
 
         self.switches = {"collision shapes": collisions, "contact forces": forces, "contact points": points}
+        self.switches["force numbers"] = numbers
         for box in self.switches.values():
             box.on_update(show)
         self.switches |= marks

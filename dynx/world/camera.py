@@ -131,6 +131,10 @@ _SMOOTH = math.cos(math.radians(12.0))
 Whole = NDArray[np.intp]
 
 
+BEHIND_OPACITY = 0.75
+"""Opacity of a mark that is seen through the shapes before it."""
+
+
 class DepthBuffer:
     """Depth, normal and number of the shape seen in each pixel; all in the axes of the camera.
 
@@ -446,19 +450,23 @@ def cast_rays_smoothly(
     scenery: Scenery = LIGHT,
     tile: float = TILE,
     ghosts: Sequence[DrawnShape] = (),
+    veils: Sequence[DrawnShape] = (),
+    seen_through: Sequence[DrawnShape] = (),
 ) -> Drawing:
     """Draw shapes as `cast_rays` does, with the mean colour of four rays in pixels at edges, which are not
     jagged then, and in those of images on meshes.
 
     Surfaces near others get less light of the sky. `ghosts` cast no shadow and are seen only where they are
     clearly nearer than the shapes; those whose opacity is below 1 are seen through, the nearest of them
-    alone. Their numbers follow those of the shapes, the opaque ones first. Depth and number, of what is
-    opaque, are those of the first of the four rays, a quarter of a pixel from the centre.
+    alone. `veils` are further ghosts, whose shadows are as weak as they are see-through. Shapes that are
+    `seen_through` others have their own colours without light, paler behind others. Numbers of ghosts
+    and veils follow those of the shapes, the opaque ones first. Depth and number, of what is opaque, are
+    those of the first of the four rays, a quarter of a pixel from the centre.
     """
     width, height = camera.size
     fine = replace(camera, size=(2 * width, 2 * height))
     opaque = [each for each in ghosts if each.rgba[3] >= 1.0]
-    clear = [each for each in ghosts if each.rgba[3] < 1.0]
+    clear = [*veils, *(each for each in ghosts if each.rgba[3] < 1.0)]
     buffer = _buffer_of(shapes, T_world_camera, fine)
     if opaque:
         buffer.lay_over(_buffer_of(opaque, T_world_camera, fine), len(shapes))
@@ -476,7 +484,7 @@ def cast_rays_smoothly(
     varied = np.array([*(_is_varied(each) for each in seen), False])
     edge |= varied[buffer.number[first]]
     openness = _openness(buffer, first, camera, _OPEN_REACH * _ball(_casting(shapes))[1])
-    shading = _Shading(seen, shapes, T_world_camera, fine, scenery, tile)
+    shading = _Shading(seen, shapes, T_world_camera, fine, scenery, tile, veils)
     colours = np.empty((len(every), 3))
     colours[~edge] = shading.colours(buffer, first[~edge], openness[~edge])
     colours[edge] = (
@@ -486,7 +494,14 @@ def cast_rays_smoothly(
     )
     if clear:
         veil = _buffer_of(clear, T_world_camera, fine)
-        _lay_veil(colours, veil, buffer, every, shading._replace(shapes=clear))
+        _lay_veil(colours, veil, buffer, every, shading._replace(shapes=clear, veils=()))
+    if seen_through:
+        marks = _buffer_of(seen_through, T_world_camera, fine)
+        hit = (marks.number >= 0)[every]
+        share = np.where((marks.depth > buffer.depth)[every], BEHIND_OPACITY, 1.0) * hit
+        own = np.array([each.rgba[:3] for each in seen_through])[marks.number[every]]
+        colours *= 1.0 - share.mean(axis=1)[:, None]
+        colours += (share[..., None] * own).mean(axis=1)
     return Drawing(_bytes(colours), buffer.depth[first], buffer.number[first])
 
 
@@ -605,6 +620,8 @@ class _Shading(NamedTuple):
     camera: Camera
     scenery: Scenery
     tile: float
+    veils: Sequence[DrawnShape] = ()
+    """See-through shapes that cast weak shadows."""
 
     def colours(self, buffer: DepthBuffer, pixels: Whole, openness: Floats | None = None) -> Floats:
         """Return the colours (n, 3) of pixels (n,), from 0 to 1; `openness` (n,) is the share of the light of
@@ -657,6 +674,11 @@ class _Shading(NamedTuple):
         colours = np.minimum(colours, 1.0)
         side = int(np.clip(max(self.camera.size) // 2, *SHADOW_SIDES))
         lit = _unshadowed(_casting(self.casters), points, normal, side)
+        if self.veils:
+            opacity = float(np.mean([each.rgba[3] for each in self.veils]))
+            lit = np.minimum(
+                lit, 1.0 - opacity * (1.0 - _unshadowed(_casting(self.veils), points, normal, side))
+            )
         light = self.scenery.light(normal, lit, openness)
         gloss = self.scenery.gloss(normal, rays, lit, openness)
         for on, _ in slopes.values():

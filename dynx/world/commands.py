@@ -51,6 +51,8 @@ class RobotLoads:
         self.motor_memory: tuple[Floats, Floats] | None = None
         """Velocity and generalised force (nv,) of the step before, on which motors at the end of a step
         depend; None if there was no such step."""
+        self.target_notes: list[str] = []
+        """Sentences on targets of motors that are far beyond the limits of their joints."""
 
     @cached_property
     def dynamics(self) -> Backend:
@@ -151,6 +153,14 @@ class RobotLoads:
             self._inertia = implicit * self._h * (law.kd + self._h * law.kp)
             self._metric = np.diag(np.concatenate([np.zeros(self._base), self._inertia]))
             self._saturates = bool(np.isfinite(law.max_force).any())
+            joints = slice(self.model.nq - len(law.kp), None)
+            far = (
+                np.maximum(self.model.lower[joints] - law.target, law.target - self.model.upper[joints]) > 1.0
+            )
+            if not self.target_notes and (far & (law.kp > 0.0)).any():
+                from dynx.model.unlikely_inputs import target_notes
+
+                self.target_notes += target_notes(self.model, self.name, law.kp, law.target)
 
     def torque(
         self,
@@ -376,9 +386,10 @@ class Commands:
         return total
 
     def notes(self) -> Iterator[str]:
-        """Yield one sentence for each feature of a robot's joints that is not exact."""
+        """Yield one sentence for each inexact feature of a robot's joints, and those on targets of motors."""
         for loads in self._loads:
             yield from loads.notes(self._engine)
+            yield from loads.target_notes
 
     def last(self) -> LastLoads:
         """Return the loads of the last step."""

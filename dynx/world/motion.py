@@ -29,7 +29,7 @@ from dynx.steppers.stepper import Stepper
 from dynx.world.commands import Act, Commands
 from dynx.world.notes import likely_causes
 
-Parts = Mapping[str, tuple[ArrayLike, ArrayLike]]
+Parts = Mapping[str, tuple[ArrayLike, ArrayLike | None]]
 
 
 def checked_state(layout: Layout, state: WorldState | None, robots: Parts, bodies: Parts) -> WorldState:
@@ -68,16 +68,21 @@ def apply_state(engine: Stepper, state: WorldState) -> None:
             engine.set_body_state(k, *state.bodies[body.name])
 
 
-def _pair(what: str, parts: str, pair: object) -> tuple[ArrayLike, ArrayLike]:
+def _pair(what: str, parts: str, pair: object) -> tuple[ArrayLike, ArrayLike | None]:
     if not isinstance(pair, tuple) or len(pair) != 2:
         raise ArgumentError(f"the state of {what} is {shown(pair)}; wanted a tuple {parts}")
     return pair
 
 
+def _velocity(given: ArrayLike | None, length: int) -> ArrayLike:
+    """Return a velocity as it was given, zero for None."""
+    return np.zeros(length) if given is None else given
+
+
 def _robot_state(robot: RobotLayout, pair: object) -> RobotState:
     given_q, given_v = _pair(robot.name, f"(q, v) with {robot.model.nq} and {robot.model.nv} numbers", pair)
     q = checked_q(robot.model, given_q, f"q of {robot.name}")
-    v = checked_array(f"v of {robot.name}", given_v, robot.model.nv)
+    v = checked_array(f"v of {robot.name}", _velocity(given_v, robot.model.nv), robot.model.nv)
     if q.ndim != 1 or v.ndim != 1:
         raise ShapeError(f"q and v of {robot.name} have shapes {q.shape} and {v.shape}; wanted one state")
     return RobotState(q.copy(), v.copy())
@@ -87,7 +92,7 @@ def _body_state(body: BodyLayout, pair: object) -> BodyState:
     pose, given_twist = _pair(body.name, "(T_world_body, twist) of shapes (4, 4) and (6,)", pair)
     # Converted to roll, pitch, yaw and back the matrix would be rounded.
     T = rigid_matrix(pose.matrix if isinstance(pose, Pose) else pose, f"pose of {body.name}").copy()
-    twist = checked_array(f"twist of {body.name}", given_twist, 6)
+    twist = checked_array(f"twist of {body.name}", _velocity(given_twist, 6), 6)
     if twist.ndim != 1:
         raise ShapeError(f"twist of {body.name} has shape {twist.shape}; wanted (6,)")
     if body.fixed and (twist.any() or np.abs(T - body.T).max() > 1e-12):

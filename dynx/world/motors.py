@@ -124,7 +124,7 @@ class PositionMotor(_Servo):
     for `PDMotor`.
 
     Where the other forces (Coriolis, contacts, limits) hardly change from one step to the next it is stable
-    at any gain: it uses those of the step before. In long steps stiff gains diverge (docs/world.md)."""
+    at any gain: it uses those of the step before. In long steps stiff gains diverge."""
 
     @checks_types
     def law(self, model: Model) -> tuple[tuple[int, ...], JointLaw]:

@@ -109,8 +109,8 @@ def _massless_gimbal(mechanism: Mechanism) -> tuple[int, int] | None:
     return None
 
 
-MAX_OVERLAPS = 5
-"""Largest number of overlaps that are noted one by one."""
+MAX_NOTED = 5
+"""Largest number of overlaps, and of joints beyond their limits, that are noted one by one."""
 
 LIMIT_EXCESS = 1e-3
 """Distance [rad or m] beyond a limit from which a joint is noted."""
@@ -126,11 +126,11 @@ def notes_on_start(engine: Stepper, state: WorldState) -> tuple[str, ...]:
     """Return one sentence for each overlap, violated constraint and joint beyond its limits of an engine at a
     state, for each robot whose accelerations have no bound, and for each part that is too fast."""
     drawn = "so that they are pulled together in the first steps"
-    moved = "so that it is pushed back in the first steps"
     return (
         *_overlaps_at_start(engine),
         *(f"{each} at the start, {drawn}" for each in violations(engine.layout, state)),
-        *(f"{each} at the start, {moved}" for each in joints_beyond_limits(engine.layout, state)),
+        *notes_on_limits(joints_beyond_limits(engine.layout, state), engine.beyond_limits),
+        *notes_on_held_joints(_joints_without_range(engine.layout)),
         *unbounded_motions(engine.layout, state),
         *_fast_parts(engine, state),
     )
@@ -179,13 +179,13 @@ def _robots_without_shapes(layout: Layout) -> Iterator[str]:
 
 def _overlaps_at_start(engine: Stepper) -> Iterator[str]:
     found = overlaps_of(engine)
-    for each in found[:MAX_OVERLAPS]:
+    for each in found[:MAX_NOTED]:
         yield (
             f"{shown(each.a)} and {shown(each.b)} overlap by {1e3 * each.depth:.3g} mm at the start, so that "
             "they are pushed apart in the first steps"
         )
-    if len(found) > MAX_OVERLAPS:
-        yield f"{len(found) - MAX_OVERLAPS} more pairs of parts overlap at the start"
+    if len(found) > MAX_NOTED:
+        yield f"{len(found) - MAX_NOTED} more pairs of parts overlap at the start"
 
 
 def violations(layout: Layout, state: WorldState) -> Iterator[str]:
@@ -200,16 +200,51 @@ def violations(layout: Layout, state: WorldState) -> Iterator[str]:
             yield f"the ends of the {kind} of {ends} are {1e3 * gap:.3g} mm apart{more}"
 
 
-def joints_beyond_limits(layout: Layout, state: WorldState) -> Iterator[str]:
-    """Yield each joint that is beyond a limit, with both."""
+def notes_on_limits(beyond: Sequence[str], effect: str) -> Iterator[str]:
+    """Yield a sentence for each of the first joints that begin beyond a limit (`beyond_limits`), with the
+    effect on them, and the number of the others."""
+    yield from (f"{each}, {effect}" for each in beyond[:MAX_NOTED])
+    if len(beyond) > MAX_NOTED:
+        yield f"{len(beyond) - MAX_NOTED} more joints are beyond their limits at the start"
+
+
+def notes_on_held_joints(joints: Sequence[str]) -> Iterator[str]:
+    """Yield a sentence on the joints whose limits leave no range, if there is one."""
+    if joints:
+        more = f" and {len(joints) - MAX_NOTED} more" if len(joints) > MAX_NOTED else ""
+        listed = ", ".join(map(shown, joints[:MAX_NOTED]))
+        yield f"limits without a range hold {listed}{more}; joint_limits=False switches them off"
+
+
+def _joints_without_range(layout: Layout) -> list[str]:
+    return [
+        f"{robot.name}/{joint.name}"
+        for robot in layout.robots
+        for joint, low, high in zip(
+            (each for each in robot.model.joints if each.moves), robot.lower, robot.upper, strict=True
+        )
+        if low == high
+    ]
+
+
+def beyond_limits(names: Sequence[str], q: Floats, lower: Floats, upper: Floats) -> list[str]:
+    """Return the beginning of a sentence for each joint, at q (n,), that is beyond a limit."""
+    return [
+        f"{shown(name)} is at {x:.4g}, beyond its limits {low:.4g} to {high:.4g}, at the start"
+        for name, x, low, high in zip(names, q, lower, upper, strict=True)
+        if not low - LIMIT_EXCESS <= x <= high + LIMIT_EXCESS
+    ]
+
+
+def joints_beyond_limits(layout: Layout, state: WorldState) -> list[str]:
+    """Return the beginning of a sentence for each joint that is beyond a limit."""
+    found = []
     for robot in layout.robots:
         model, q = robot.model, state.robots[robot.name].q
         positions = model.mechanism.tree_q(q)[7 if model.floating else 0 :]
-        names = (joint.name for joint in model.joints if joint.moves)
-        for name, x, lower, upper in zip(names, positions, robot.lower, robot.upper, strict=True):
-            if not lower - LIMIT_EXCESS <= x <= upper + LIMIT_EXCESS:
-                joint = shown(f"{robot.name}/{name}")
-                yield f"{joint} is at {x:.4g}, beyond its limits {lower:.4g} to {upper:.4g},"
+        names = [f"{robot.name}/{joint.name}" for joint in model.joints if joint.moves]
+        found += beyond_limits(names, positions, robot.lower, robot.upper)
+    return found
 
 
 def _deviation(layout: Layout, constraint: ConstraintLayout, state: WorldState) -> tuple[float, float]:
@@ -259,15 +294,12 @@ def notes_on_angles(scene: Scene) -> Iterator[str]:
     if not turned and not targets:
         return
     # Imported here, because angles hardly ever are in degrees.
-    from dynx.model.unlikely_inputs import position_notes, rotation_notes
+    from dynx.model.unlikely_inputs import rotation_notes, target_notes
 
     for name, pose in turned:
         yield from rotation_notes(pose.rpy, name)
     for robot, law in targets:
-        q = robot.model.neutral()
-        driven = np.flatnonzero(law.kp)
-        q[len(q) - len(law.target) + driven] = law.target[driven]
-        yield from position_notes(robot.model, q, f"the target of the motors of {shown(robot.name)}")
+        yield from target_notes(robot.model, robot.name, law.kp, law.target)
 
 
 class LastLoads(NamedTuple):
@@ -294,7 +326,7 @@ def likely_causes(
             *_wrenches(layout, loads, h),
             *_overlaps_as_cause(begun),
             *(f"{each} at the start" for each in islice(violations(layout, start), 1)),
-            *(f"{each} at the start" for each in islice(joints_beyond_limits(layout, start), 1)),
+            *joints_beyond_limits(layout, start)[:1],
             *_light_parts(engine),
             *unbounded_motions(layout, start),
         ]

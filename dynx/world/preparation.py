@@ -39,6 +39,10 @@ SHORTEST_STEP = 1e-9
 """Shortest step of an engine [s]."""
 
 
+JointDynamics = bool
+"""Whether joints have the damping, friction or armature of the robot's description: a world has no others."""
+
+
 def checked_options(dt: float, substeps: int, **switches: bool) -> dict[str, Any]:
     """Return the options of a world by name; ArgumentError for an invalid one."""
     seconds, steps = positive_seconds("dt", dt), whole_number("substeps", substeps, 1)

@@ -12,7 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dynx.model.geometry import Plane
 from dynx.spatial.scalar import Floats
+from dynx.steppers.material import DEFAULT_MATERIAL
 
 GAMMA = 2.2
 """Exponent between the values of a colour and its light."""
@@ -29,7 +31,7 @@ TILE = 1.0
 SUBTILES = 5
 """Number of small tiles along a tile."""
 
-TILE_CONTRAST, SUBTILE_CONTRAST = 0.075, 0.025
+TILE_CONTRAST, SUBTILE_CONTRAST = 0.11, 0.022
 """Shares by which tiles are lighter or darker than the colour of their plane."""
 
 _HAZE = 0.12
@@ -48,6 +50,7 @@ _SHINE = 0.01 / ROUGHNESS**4
 """Share of the key light in the middle of its highlight, of a surface that mirrors 0.04 of what meets it."""
 
 Colour = tuple[float, float, float]
+Rgba = tuple[float, float, float, float]
 
 
 class Scenery(NamedTuple):
@@ -56,7 +59,7 @@ class Scenery(NamedTuple):
     zenith: Colour
     horizon: Colour
     ground: Colour
-    """Colour of a ground that is added to a scene without one."""
+    """Colour of a ground that is added to a scene without one, and of a plane in the default grey."""
     key: float
     """Light of the key light on a surface that faces it."""
     fill: float
@@ -67,6 +70,12 @@ class Scenery(NamedTuple):
     polish: float = 1.0
     """Share of the light that surfaces mirror, and by which surfaces hide the sky from each other; 0 for
     matte ones that hide nothing."""
+
+    def own_colour(self, shape: object, rgba: Rgba) -> Rgba:
+        """Return the colour of a shape whose description says `rgba`: a plane in the default grey of bodies
+        has that of the ground, so that it is dark where all is dark."""
+        is_ground = isinstance(shape, Plane) and rgba == DEFAULT_MATERIAL.rgba
+        return (*self.ground, 1.0) if is_ground else rgba
 
     def light(self, normal: Floats, lit: Floats, openness: Floats | float = 1.0) -> Floats:
         """Return the light (n,) on surfaces with unit normals (n, 3), whose share `lit` (n,) from 0 to 1 is
@@ -113,7 +122,7 @@ class Scenery(NamedTuple):
         return np.asarray(np.array(self.horizon) + share * (colours - np.array(self.horizon)))
 
 
-LIGHT = Scenery((0.50, 0.67, 0.86), (0.90, 0.93, 0.96), (0.66, 0.69, 0.72), 0.60, 0.10, 0.36, 0.15)
+LIGHT = Scenery((0.33, 0.56, 0.86), (0.80, 0.88, 0.95), (0.54, 0.61, 0.70), 0.62, 0.10, 0.37, 0.21)
 MATTE = LIGHT._replace(polish=0.0)
 """Light of what a camera measures: surfaces have the hue of their own colour."""
 DARK = Scenery((0.06, 0.08, 0.11), (0.17, 0.19, 0.22), (0.26, 0.28, 0.31), 0.60, 0.10, 0.34, 0.15)

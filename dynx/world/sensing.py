@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dynx.backends import backend
-from dynx.errors import ArgumentError, UnsupportedFeatureError, shown
+from dynx.errors import ArgumentError, UnknownNameError, UnsupportedFeatureError, nearest, shown
 from dynx.spatial.scalar import Floats
 from dynx.steppers.forces import Forces
 from dynx.steppers.layout import Layout
@@ -149,6 +149,26 @@ class _TakenSample:
     motion: SceneMotion | None
     """What it senses; None of one that was restored."""
     reading: SensorReading | None = None
+
+
+class LastReadings(dict[str, SensorReading]):
+    """Last readings by the names of sensors; one that has none, or does not exist, is answered by the
+    reason."""
+
+    time: float = 0.0
+    waiting: Sequence[Sensor] = ()
+    """The sensors without a reading at that time [s]."""
+
+    def __missing__(self, name: object) -> SensorReading:
+        for sensor in self.waiting:
+            if sensor.name == name:
+                later = f" and its delay of {sensor.delay:g} s" if sensor.delay else ""
+                raise ArgumentError(
+                    f"{sensor} has no reading at {self.time:g} s; a sample can be read after the step of the "
+                    f"engine in which it is taken{later}"
+                )
+        names = [*self, *(sensor.name for sensor in self.waiting)]
+        raise UnknownNameError(f"the world has no sensor {shown(name)}{nearest(name, names)}")
 
 
 class WorldSensors:
@@ -297,13 +317,14 @@ class WorldSensors:
         body = next(each for each in self._layout.bodies if each.name == name)
         return SensedBody.of_step(body, before[name], after.bodies[name], self._h)
 
-    def readings(self, time: float) -> dict[str, SensorReading]:
+    def readings(self, time: float) -> LastReadings:
         """Return the last reading of each sensor that is available at `time` [s]."""
-        found: dict[str, SensorReading] = {}
+        found = LastReadings()
         for sensor in self._sensors:
             ready = [each for each in self._samples[sensor.name] if self._is_available(sensor, each, time)]
             if ready:
                 found[sensor.name] = self._read(sensor, ready[-1])
+        found.time, found.waiting = time, [each for each in self._sensors if each.name not in found]
         return found
 
     def _read(self, sensor: Sensor, sample: _TakenSample) -> SensorReading:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,10 +11,12 @@ from dynx.argument_types import checks_types
 from dynx.errors import ArgumentError, ShapeError, shown
 from dynx.model.numbers import is_real
 from dynx.spatial.scalar import Floats
-from dynx.world.record import Record, checked_times
+
+if TYPE_CHECKING:
+    from dynx.world.record import Record
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Separation:
     """Distance of two records at the times that both have."""
 
@@ -28,6 +31,15 @@ class Separation:
     distances: Floats
     """Distance of each part (n, len(names)): of positions [m], the magnitude of the difference of coordinates
     [rad or m]; infinite where one of the records is not a number."""
+
+    def __repr__(self) -> str:
+        ours, theirs = self.records
+        head = f"{type(self).__name__} of {ours} and {theirs}"
+        if not self.distances.size:
+            return f"<{head}: nothing compared>"
+        k, column = self.farthest
+        where = f"{self.names[column]} at {self.times[k]:.6g} s"
+        return f"<{head}: at most {self.largest:.3g} {self.units[column]}, {where}, {len(self.times)} times>"
 
     @property
     def largest(self) -> float:
@@ -71,6 +83,9 @@ def separation(ours: Record, theirs: Record, times: Floats | None = None) -> Sep
     those of the other where only one of them is in the common time. Where a record has no row at a time it is
     interpolated between two. Raises ArgumentError for records without a common channel or time.
     """
+    # Imported here, because most worlds are compared with no other.
+    from dynx.world.record import Record, checked_times
+
     common = [name for name in ours.channels if name in theirs.channels]
     if not common and (ours.channels or theirs.channels):
         raise ArgumentError(

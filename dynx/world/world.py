@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dynx.argument_types import checks_types
-from dynx.errors import ArgumentError, UnknownNameError, shown
+from dynx.argument_types import checks_types, described, takes
+from dynx.errors import ArgumentError, DTypeError, UnknownNameError, shown
 from dynx.model import Model, Pose
 from dynx.model.geometry import Mesh
 from dynx.model.numbers import MAX_INDEX, checked_bool, positive_seconds, whole_number
@@ -43,7 +43,7 @@ from dynx.world.notes import (
     notes_on_start,
     overlaps_of,
 )
-from dynx.world.preparation import checked_options, layout_for, prepare
+from dynx.world.preparation import JointDynamics, checked_options, layout_for, prepare
 from dynx.world.scene.documents import scene_document, scene_from_document
 from dynx.world.scene.paths import ScenePaths
 from dynx.world.scene.scene import MARGIN, Scene
@@ -164,10 +164,10 @@ class World:
     Each step consists of `substeps` steps of the engine. `joint_limits`, `joint_damping`, `joint_friction`
     and `joint_armature` are those of the robots' descriptions; joint dynamics that the engine does not have
     are computed outside of it. Without `collisions` nothing touches. `settings` are those of the engine
-    (`World.settings`); docs/world.md lists them. With `keep_last_step` the state before each step of the
-    engine is kept, from which `joint_wrenches` and `base_wrench` follow, as it is for a scene with sensors;
-    with `contact_interval` [s] the contacts of each step of the engine are summed, of which `mean_contacts`
-    gives the mean over that time. A step then takes longer.
+    (`World.settings`), which the page "Scenes and worlds" of the documentation lists. With `keep_last_step`
+    the state before each step of the engine is kept, from which `joint_wrenches` and `base_wrench` follow, as
+    it is for a scene with sensors; with `contact_interval` [s] the contacts of each step of the engine are
+    summed, of which `mean_contacts` gives the mean over that time. A step then takes longer.
 
     A world is closed by `close` or at the end of a ``with`` block. Arguments are checked before the engine
     gets them, and a call that raises an error leaves the state as it was.
@@ -182,9 +182,9 @@ class World:
         substeps: int = 1,
         collisions: bool = True,
         joint_limits: bool = True,
-        joint_damping: bool = True,
-        joint_friction: bool = True,
-        joint_armature: bool = True,
+        joint_damping: JointDynamics = True,
+        joint_friction: JointDynamics = True,
+        joint_armature: JointDynamics = True,
         keep_last_step: bool = False,
         contact_interval: float | None = None,
         **settings: object,
@@ -259,11 +259,16 @@ class World:
         self._watchers = [each for each in watchers if each is not None]
         """What is read around every step of the engine."""
         self._given = settings
-        self.notes: tuple[str, ...] = self.notes_on_present_state()
+        self._notes = self.notes_on_present_state()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
         """Parts that overlap at the start, constraints that it violates, joints beyond their limits, robots
         whose accelerations have no bound, parts that are too fast for the step, coefficients of contact that
         the engine does not have, joint dynamics that are not exact, a step that is long, angles of the scene
-        that look like degrees, and settings given that the engine changes, one sentence each."""
+        that look like degrees, and settings given that the engine changes, one sentence each; then targets of
+        motors in steps that look like degrees."""
+        return tuple(dict.fromkeys((*self._notes, *self._commands.notes())))
 
     @property
     def version(self) -> str:
@@ -347,8 +352,8 @@ class World:
         """
         _ = self._motion.engine
         real_time = checked_bool("real_time", real_time)
-        if loads is not None and not callable(loads):
-            raise ArgumentError(f"loads is of type {type(loads).__name__}; wanted a function of the world")
+        if loads is not None and not takes(loads, 1):
+            raise DTypeError(f"loads is {described(loads)}; wanted a function of the world")
         run_for(
             duration,
             self.dt,
@@ -434,10 +439,15 @@ class World:
 
         A sample is taken at the beginning of a step of the engine and can be read after that step, or its
         delay later; until the next one it is held. A sensor without a reading since the state was set is
-        absent. `save` keeps the samples that are held or delayed.
+        absent, and ``readings["imu"]`` says so (ArgumentError; UnknownNameError for a sensor that the scene
+        lacks). `save` keeps the samples that are held or delayed.
         """
         _ = self._motion.engine
-        return {} if self._sensors is None else self._sensors.readings(self.time)
+        if self._sensors is None:
+            from dynx.world.sensing import LastReadings
+
+            return LastReadings()
+        return self._sensors.readings(self.time)
 
     def _wrenches(self, quantity: str, robot: str | None, frame: str | None, reference: str) -> Floats:
         step, engine = self._kept_step(), self._motion.engine
@@ -465,12 +475,16 @@ class World:
         self,
         state: WorldState | None = None,
         *,
-        robots: Mapping[str, RobotState | tuple[ArrayLike, ArrayLike]] | None = None,
-        bodies: Mapping[str, BodyState | tuple[ArrayLike, ArrayLike]] | None = None,
+        robots: Mapping[str, RobotState | tuple[ArrayLike, ArrayLike | None]] | None = None,
+        bodies: Mapping[str, BodyState | tuple[ArrayLike, ArrayLike | None]] | None = None,
     ) -> None:
         """Set the state of the world, or of the robots (q, v) and bodies (pose, twist) named.
 
-        The time is that of `state`. Everything is checked before anything is set.
+            world.set_state(robots={"arm": (q, v)})         # (nq,), (nv,)
+            world.set_state(bodies={"box": (dynx.Pose((0.4, 0.0, 0.3)), None)})  # at rest
+
+        None for v or the twist means at rest. The pose is T_world_body (4, 4) or a `Pose`, the twist (6,) in
+        the axes of the world. The time is that of `state`. Everything is checked before anything is set.
         """
         _ = self._motion.engine
         if state is None and robots is None and bodies is None:
@@ -580,7 +594,7 @@ class World:
             world.restore(snapshot)
             defaults = {name: setting.default for name, setting in world._kind.settings.items()}
             chosen = {name: value for name, value in world.settings.items() if value != defaults[name]}
-            world.notes = tuple(world._lasting_notes(chosen))
+            world._notes = tuple(world._lasting_notes(chosen))
         except BaseException:
             world.close()
             raise
@@ -724,6 +738,7 @@ class World:
 
     def _lasting_notes(self, given: Mapping[str, object]) -> Iterator[str]:
         """Yield the notes that hold at every state, with those on the settings `given`."""
+        yield from map(str, self.scene.notes)
         yield from notes_on_gravity(self.scene)
         yield from notes_on_engine(self._motion.engine)
         if self.scene.gravity[2] > 0.0:

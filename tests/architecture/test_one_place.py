@@ -26,7 +26,8 @@ IDEAS = {
     "external torque from a motion": r"^class MomentumObserver\b",
     "acceleration from two states": r"^class MeanAcceleration\b",
     "mean contacts": r"^class ContactInterval\b",
-    "a scene in MuJoCo": r"\bElement\(\"mujoco\"",
+    "a scene in MuJoCo": r"^class MjcfDocument\b",
+    "a document in MJCF": r"\bElement\(\"mujoco\"",
     "types of arguments": r"^def checks_types\b",
 }
 """Text that only the module of an idea contains, by the name of the idea."""

@@ -105,7 +105,7 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 def test_the_signatures_have_it(found: dict[str, Any]) -> None:
     assert found["signatures"] == ["gravity_scale: 'float' = 1.0"] * 3
     assert found["docstring"] == [
-        "gravity_scale: Factor for gravity on the plant, unknown to the controller (default: 1)"
+        "- `gravity_scale`: Factor for gravity on the plant, unknown to the controller (default: 1)"
     ]
     wrong_type, wrong_name = found["errors"]
     assert wrong_type == "gravity_scale is 'half'; wanted a number"

@@ -249,3 +249,19 @@ def test_robots_in_xacro_below_a_directory_are_named(quiet: list[str], tmp_path:
     assert "dynx: note: 1 robot in xacro was not examined" in result.stderr
     assert str(robot) in result.stderr
     assert json.loads(target.read_text())["left_out"] == [str(robot)]
+
+
+def test_robots_of_other_formats_are_compared(tmp_path: Path) -> None:
+    path = tmp_path / "arm.sdf"
+    path.write_text(
+        '<sdf version="1.9"><model name="arm"><link name="base"/><link name="tip"/>'
+        '<joint name="weld" type="fixed"><parent>world</parent><child>base</child></joint>'
+        '<joint name="hinge" type="revolute"><parent>base</parent><child>tip</child>'
+        "<axis><xyz>0 1 0</xyz></axis></joint></model></sdf>"
+    )
+    result = agree(str(path))
+    assert result.exit_code == 0
+    assert "fixed base, nq 1, nv 1" in result.stdout
+    refused = agree(str(path), "--base", "floating")
+    assert refused.exit_code == 2
+    assert "the robot is fixed" in refused.stderr

@@ -75,7 +75,8 @@ def test_a_picture_shows_the_collision_shapes_where_they_are_asked_for(tmp_path:
     assert other == 0
     has_shape = False
     path.write_text(robot.format(blue=blue, colliding=""))
-    assert pixels("--collisions") == (0, 0)
+    lines, other = pixels("--collisions")
+    assert other == 0 < lines < 0.02 * 960 * 720
 
 
 def test_a_film_is_exported_by_its_suffix(

@@ -260,3 +260,49 @@ def test_the_part_that_is_apart_first_is_named() -> None:
     _show_separations(Console(file=out, width=200), [separation])
     (*_, row) = out.getvalue().splitlines()
     assert row.split() == ["a,", "b", "1", "s", "never", "ball", "5.00e-01", "5.00e-01", "cube"]
+
+
+MJCF = """<mujoco model="two">
+  <worldbody>
+    <body name="arm"><joint name="hinge"/><geom size="0.1" pos="1 0 0"/></body>
+    <body name="ball" pos="0 0 5"><freejoint/><geom size="0.1"/></body>
+  </worldbody>
+  <sensor><jointpos joint="hinge"/></sensor>
+  <keyframe><key name="high" qpos="0.5 0 0 9 1 0 0 0"/></keyframe>
+</mujoco>"""
+
+
+@pytest.fixture
+def mjcf(tmp_path: Path) -> str:
+    path = tmp_path / "two.xml"
+    path.write_text(MJCF)
+    return str(path)
+
+
+def test_a_file_in_mjcf_is_a_scene(mjcf: str) -> None:
+    arguments = (mjcf, "--engine", ENGINES[0], "--duration", "0.001", "--keyframe", "high", "--json", "-")
+    result = run(*arguments)
+    assert result.exit_code == 0, result.output
+    (engine,) = json.loads(result.stdout)["engines"]
+    assert engine["robots"][0]["joints"] == ["hinge"]
+    assert engine["robots"][0]["q"] == pytest.approx([0.5], abs=1e-4)
+    assert engine["bodies"][0]["position"][2] == pytest.approx(9.0, abs=1e-4)
+    assert any("<sensor>" in note for note in engine["notes"])
+
+
+def test_a_file_in_mjcf_becomes_one_of_a_scene_with_its_notes(mjcf: str, tmp_path: Path) -> None:
+    result = run(mjcf, "--keyframe", "high", "--export", str(tmp_path / "two.json"))
+    assert result.exit_code == 0, result.output
+    assert "<sensor>" in result.output
+    assert read_scene(tmp_path / "two.json").robot("arm").q == (0.5,)
+
+
+def test_a_keyframe_that_is_not_there_is_refused(mjcf: str, scene: str) -> None:
+    for arguments, message in (
+        ((mjcf, "--keyframe", "hihg"), "'high'"),
+        ((scene, "--keyframe", "high"), "MJCF"),
+    ):
+        result = run(*arguments, "--engine", ENGINES[0])
+        assert result.exit_code == 2
+        assert message in result.stderr
+        assert "Traceback" not in result.output

@@ -193,7 +193,7 @@ ENGINES = [name for name in WORLDS if find_spec(name) is not None]
 
 needs_engine = pytest.mark.skipif(not ENGINES, reason="needs an engine for worlds")
 
-PAGE = Path(__file__).parents[2] / "docs" / "contacts.md"
+PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "write-a-contact-case.md"
 
 
 @needs_engine
@@ -207,7 +207,7 @@ def test_a_case_of_the_program_that_runs_is_refused(monkeypatch: pytest.MonkeyPa
 def test_the_case_of_the_documentation_falls_with_the_step(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    code = PAGE.read_text(encoding="utf-8").partition("## A case of your own")[2]
+    code = PAGE.read_text(encoding="utf-8")
     (tmp_path / "falling_ball.py").write_text(code.split("```python\n")[1].split("```")[0])
     monkeypatch.syspath_prepend(tmp_path)
     import falling_ball  # type: ignore[import-not-found]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,11 +16,18 @@ from hypothesis import strategies as st
 import dynx
 from dynx.agreement.tolerances import BAR
 from dynx.doctor import DoctorReport, compare_as_loaded, diagnose, results_document
-from dynx.errors import ArgumentError, NotInstalledError, UnknownBackendError, UnknownNameError
+from dynx.doctor.formats.baseline import Baseline
+from dynx.errors import (
+    ArgumentError,
+    DescriptionError,
+    NotInstalledError,
+    UnknownBackendError,
+    UnknownNameError,
+)
 from dynx.loaded import ENGINES, installed_engines, loader_class, registry
 from dynx.model import Model
 from dynx.model.tree import Base
-from dynx.rules import Rule, all_rules
+from dynx.rules import Level, Rule, all_rules
 from dynx.rules.registry import find_trap, trap_case
 from dynx.testing.strategies import models
 
@@ -128,6 +136,74 @@ def test_as_loaded_is_the_same_measurement_without_causes(base: Base) -> None:
     assert plain.pairs == full.pairs
     assert plain.findings == ()
     assert plain.mended is None
+
+
+@settings(max_examples=8)
+@given(st.sampled_from(["DX101", "DX120", "DX204", "DX301"]), st.lists(st.sampled_from(ENGINES), min_size=1))
+def test_no_verdict_states_a_cause_that_was_not_searched_for(trap: str, engines: list[str]) -> None:
+    report = compare_as_loaded(find_trap(trap), engines=engines, samples=1)
+    assert report.explained == report.alike
+    assert report.status == ("alike" if report.alike else "unexplained")
+    assert ("dynx doctor search" in report.verdict) == (
+        any(each.no_results for each in report.engines)
+        or max((error for each in report.engines for error in each.before.values()), default=0.0)
+        > report.tolerance
+    )
+    assert "cannot be mended" not in report.verdict
+
+
+def test_a_comparison_names_the_engine_that_is_farthest_off() -> None:
+    report = compare_as_loaded(TRAP, engines=BOTH)
+    largest = max((error, each.engine, key) for each in report.engines for key, error in each.before.items())
+    assert f"{largest[2].replace('_', ' ')} of {largest[1]} is off by {100 * largest[0]:.0f} %" in (
+        report.verdict
+    )
+
+
+ROOT = """<robot name="arm">
+  <link name="base">
+    <inertial><mass value="{}"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+  <link name="arm">
+    <inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+  <joint name="j" type="continuous"><parent link="base"/><child link="arm"/><axis xyz="1 0 0"/></joint>
+</robot>"""
+
+
+@settings(max_examples=5)
+@given(st.floats(1e-3, 1e3), st.sampled_from([compare_as_loaded, diagnose]))
+def test_a_file_that_dynx_refuses_is_not_alike_though_its_engines_are(
+    mass: float, examine: Callable[..., DoctorReport]
+) -> None:
+    text = ROOT.format(-mass)
+    with pytest.raises(DescriptionError) as refused:
+        dynx.load(text)
+    report = examine(text, engines=["pinocchio"], samples=1)
+    assert all(error <= report.tolerance for each in report.engines for error in each.before.values())
+    assert report.refusal is not None
+    assert report.refusal.message == str(refused.value)
+    assert report.refusal.message in report.verdict
+    assert not report.alike
+    [new] = Baseline("").compare(report).new
+    assert new.engines == {"dynx"}
+    assert not Baseline("", (new,)).compare(report).new
+    sound = examine(ROOT.format(mass), engines=["pinocchio"], samples=1)
+    assert sound.alike
+    assert sound.refusal is None
+    assert Baseline("", (new,)).compare(sound).vanished == (new,)
+
+
+@pytest.mark.parametrize("level", ["safe", "physics"])
+def test_the_cause_for_which_only_dynx_refuses_a_file_is_named_and_mended(level: Level) -> None:
+    report = diagnose(ROOT.format(-1.0), engines=["pinocchio"], samples=1, level=level)
+    [finding] = report.differences
+    assert (finding.rule, finding.link, finding.line) == ("DX120", "base", 3)
+    assert (finding.engines, finding.proved) == (("dynx",), True)
+    assert report.explained
+    assert (report.mended is not None) == (level == "physics")
+    if report.mended is not None:
+        assert dynx.load(report.mended).inertial("base").mass == 1.0
 
 
 def test_a_choice_changes_what_is_done() -> None:

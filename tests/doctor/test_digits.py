@@ -60,6 +60,8 @@ def test_new_numbers_have_no_more_digits_than_the_tolerance_needs(tolerance: flo
     assert short.remaining <= 0.1 * tolerance
     largest = {1e-6: 9, 1e-9: 13}[tolerance]
     assert all(digits(word) <= largest for word in new_numbers(text, short.mended))
+    within = f"wrote new numbers with the fewest digits that keep every engine within {0.1 * tolerance:g}"
+    assert any(each.endswith(within) for each in short.choices)
     again = diagnose(short.mended, base="floating", counterexamples=False, tolerance=tolerance)
     assert again.alike
 

@@ -15,6 +15,7 @@ from dynx.doctor.diagnosis import diagnose
 from dynx.doctor.examination import ACCELERATION, TORQUE, Examiner
 from dynx.doctor.mending import mend, place_of
 from dynx.loaded import installed_engines, loader_class
+from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
 from dynx.rules import Case, Rule, all_rules, find_rule
 from dynx.rules.registry import trap_case
@@ -169,3 +170,17 @@ def test_a_report_charges_each_joint_with_its_own_damping() -> None:
         if each.rule == "DX301" and each.effect is not None
     )
     assert small < 1e-4 * large
+
+
+@pytest.mark.skipif("mujoco" not in installed_engines(), reason="MuJoCo is not installed")
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+def test_places_that_one_remedy_mends_together_all_have_their_effect(base: Base) -> None:
+    rods = [link(name, mass=1.0, moments=(0.1, 0.0, 0.1)) for name in ("rod", "end")]
+    fixed = joint("bolt", "rod", "end", '<origin xyz="0 0 0.5"/>', type="fixed")
+    text = case_of(
+        link("base", moments=(0.2, 0.2, 0.3)), *rods, joint("turn", "base", "rod"), fixed
+    ).source.text
+    report = diagnose(text, base=base, engines=["mujoco"], counterexamples=False)
+    found = [each for each in report.differences if each.rule == "DX111"]
+    assert [(each.link, each.proved) for each in found] == [("rod", True), ("end", True)]
+    assert report.explained

@@ -13,7 +13,8 @@ from dynx import load
 from dynx.cli.shell.main import cli
 from dynx.doctor import diagnose
 from dynx.doctor.formats import html_page, junit_xml, sarif_document
-from dynx.doctor.report import DoctorReport
+from dynx.doctor.formats.wording import refusal, unread_meshes
+from dynx.doctor.report import DoctorReport, EngineResult, UnreadMesh
 from dynx.engines.silence import silence
 from dynx.errors import EngineError
 from dynx.loaded import ENGINES, installed_engines, loader_class
@@ -214,3 +215,22 @@ def test_a_mesh_that_only_pybullet_finds_is_said_to_be_found(
 def test_of_text_without_a_file_no_mesh_is_looked_for() -> None:
     [mesh] = diagnose(ARM, engines=["pinocchio"], samples=1).unread_meshes
     assert mesh.reason == "the description was not read from a file"
+
+
+def test_reasons_of_one_kind_are_counted_and_the_first_is_written() -> None:
+    missing = [
+        UnreadMesh(f"{each}.stl", each, 1, f"no file '{each}.stl'; did you mean 'a.stl'?") for each in "pqr"
+    ]
+    report = DoctorReport("robot", meshes=5, unread_meshes=tuple(missing))
+    start = "of 5 mesh files could not be read (no file 'p.stl'; did you mean 'a.stl'?; likewise 2 more"
+    assert f"3 {start}); engines are" in unread_meshes(report)
+    other = UnreadMesh("s.stl", "s", 2, "package 'arm' was not found")
+    report = DoctorReport("robot", meshes=5, unread_meshes=(other, *missing))
+    assert f"4 {start}; 1 for other reasons); engines are" in unread_meshes(report)
+
+
+def test_the_name_of_the_file_that_an_engine_was_given_is_not_in_its_message() -> None:
+    message = "mujoco refuses robot.urdf: Error: no mass; Element name 'a'"
+    refused = EngineResult("mujoco", "4.0.0", "", refused=message, refused_after=message)
+    assert refusal(refused) == "refuses the file: no mass; Element name 'a'"
+    assert refusal(refused, mended=True) == "refuses the mended file too: no mass; Element name 'a'"

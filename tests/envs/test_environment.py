@@ -56,12 +56,15 @@ def test_ids_are_registered_with_time_limits() -> None:
 
 
 def test_pictures_are_drawn_without_a_display() -> None:
-    with TaskEnvironment(CartPole(), "reference", "rgb_array", width=64, height=48) as made:
+    with TaskEnvironment(CartPole(), "reference", "rgb_array", width=128, height=96) as made:
         made.reset(seed=0)
         picture = made.render()
     assert picture is not None
-    assert picture.shape == (48, 64, 3)
-    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 2
+    assert picture.shape == (96, 128, 3)
+    # The cart is blue and the pole is yellow, as their file says.
+    red, _, blue = np.moveaxis(picture.astype(int), -1, 0)
+    assert ((blue > red + 80) & (red < 40)).sum() > 5
+    assert (red > blue + 80).sum() > 5
 
 
 def test_equal_seeds_give_equal_episodes(env: TaskEnvironment) -> None:

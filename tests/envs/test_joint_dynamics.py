@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -19,6 +19,7 @@ from dynx.control import OpenLoop
 from dynx.envs.environment import TaskEnvironment
 from dynx.envs.library import spaces
 from dynx.envs.task import RobotTask, State
+from dynx.envs.task_step import TaskStep
 from dynx.envs.tasks.pendulum import Pendulum
 from dynx.envs.tasks.push import Push
 from dynx.envs.tasks.reach import Reach
@@ -175,6 +176,78 @@ def test_engines_and_kernels_agree(base: Base) -> None:
         assert np.abs(each - rigid).max() > 1e-5
 
 
+def limited(robot: Model, q: Array, width: float) -> Model:
+    """Return a robot whose joints have limits at a distance from the configuration q."""
+    base = 7 if robot.floating else 0
+    own = dict(zip(robot.joint_names, q[base:].tolist(), strict=True))
+    joints = (
+        replace(each, limits=replace(each.limits, lower=own[each.name] - width, upper=own[each.name] + width))
+        if each.name in own and each.type != "continuous"
+        else each
+        for each in robot.joints
+    )
+    return replace(robot, joints=tuple(joints))
+
+
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+@pytest.mark.parametrize("width", [2e-3, -0.1], ids=["within", "beyond"])
+def test_joints_stop_at_their_limits(base: Base, width: float) -> None:
+    """Kernels bit for bit in single and in vector environments, engines as `simulate` to rounding."""
+    robot = mixed_robot(base, mimic=True)
+    q, v = robot.random(1), np.linspace(-3.0, 3.0, robot.nv)
+    if width > 0.0:
+        robot = limited(robot, q, width)
+    else:
+        # Half of the limits are passed already, and the joints move outwards or inwards.
+        robot = limited(robot, q + 0.2 * np.sign(np.arange(robot.nq) % 3 - 1.0), 0.1)
+    task = Pushed(robot, tuple(q.tolist()), tuple(v.tolist()))
+    tau = np.zeros(robot.nv)
+    rollout = simulate(robot, q0=q, v0=v, duration=3 * task.control_dt, dt=STEP, plant="reference")
+    told = np.concatenate([rollout.q[-1], rollout.v[-1]])
+    cases: dict[str, Any] = {"drawn": {"randomize": {"mass_scale": (1.0, 1.0)}}}
+    if base == "fixed":
+        cases["described"] = {}
+    for options in cases.values():
+        found = moved(task, "compiled", 3, tau, **options)
+        for row in moved_in_kernel(task, 3, tau, **options):
+            np.testing.assert_array_equal(row, found)
+        for engine in ("compiled", *installed_backends()):
+            found = moved(task, engine, 3, tau, **options)
+            np.testing.assert_allclose(found, told, rtol=1e-8, atol=1e-8, err_msg=engine)
+    free = moved(task, "reference", 3, tau, joint_limits=False)
+    assert np.abs(free - told).max() > 1e-3
+
+
+def test_a_stop_that_would_pull_gets_no_impulse() -> None:
+    """In kernels as on floats: two joints pass their limits, and the impulse of one pushes the other back."""
+    robot = limited(dynx.load("planar_2r"), np.zeros(2), 1e-3)
+    for v in ([3.0, 6.0], [-1.0, 10.0], [1.0, -3.0]):
+        task = Pushed(robot, tuple((9e-4 * np.sign(v)).tolist()), tuple(v))
+        told = moved(task, "reference", 1, [0.0, 0.0])
+        found = moved(task, "compiled", 1, [0.0, 0.0])
+        np.testing.assert_allclose(found, told, rtol=1e-10, atol=1e-12)
+        np.testing.assert_array_equal(moved_in_kernel(task, 1, [0.0, 0.0]), [found] * 3)
+
+
+def test_a_stop_hides_no_divergence_of_a_task() -> None:
+    robot = limited(dynx.load("planar_2r"), np.zeros(2), 1e-3)
+    task = Pushed(robot, (0.0, 0.0), (1e9, 0.0))
+    for engine in ("reference", "compiled"):
+        with TaskEnvironment(task, engine) as env:
+            env.reset(seed=0)
+            *_, truncated, info = env.step(np.zeros(2))
+            assert truncated
+            assert "not finite or beyond" in info["diverged"]
+
+
+def test_the_kernel_with_stops_is_compiled_when_a_joint_stops(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[object] = []
+    monkeypatch.setattr(TaskStep, "kernel_with_stops", property(asked.append))
+    moved_in_kernel(Reach(), 3, np.zeros(6))
+    moved(Reach(), "compiled", 3, np.zeros(6))
+    assert not asked
+
+
 def test_robots_without_joint_dynamics_move_as_if_they_were_switched_off() -> None:
     for task, action in ((Pendulum(), [0.3]), (Reach(), np.linspace(-1.0, 1.0, 6))):
         np.testing.assert_array_equal(
@@ -198,7 +271,8 @@ def test_options_are_those_of_environments_by_id() -> None:
 
 
 def test_worlds_take_the_same_options() -> None:
-    with TaskEnvironment(Push(), joint_damping=False) as env:
+    with TaskEnvironment(Push(), joint_damping=False, joint_limits=False) as env:
         episodes: Any = env.episodes
         assert not episodes.world.options["joint_damping"]
+        assert not episodes.world.options["joint_limits"]
         assert episodes.world.options["joint_friction"]

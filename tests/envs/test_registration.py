@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 
 from dynx.envs import make_environment
 from dynx.envs.registration import NAMESPACE, TASKS, is_of_dynx, task_class, task_id
+from dynx.envs.task import RobotTask
 from dynx.envs.tasks.cart_pole import CartPole
 from dynx.errors import ArgumentError, UnknownNameError
 
@@ -107,3 +109,22 @@ def test_the_lander_that_dynx_had_names_gymnasiums() -> None:
             call()
     assert not is_of_dynx("dynx/LunarLander-v0")
     assert task_id("LunarLander-v3") == "LunarLander-v3"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "hook"),
+    [
+        ("terminate", lambda self, robot, state: False, "terminated"),
+        ("substep", 4, "substeps"),
+        ("integrater", "rk4", "integrator"),
+    ],
+)
+def test_a_misspelt_hook_of_a_task_is_refused(name: str, value: Any, hook: str) -> None:
+    class Bare(RobotTask):
+        pass
+
+    with pytest.raises(UnknownNameError, match=f"has '{name}'; did you mean '{hook}'"):
+        task_class(type("Own", (Bare,), {name: value}))
+    # A class that also has the hook means what it says, as does a short name or one of its own.
+    task_class(type("Own", (Bare,), {name: value, hook: getattr(RobotTask, hook)}))
+    task_class(type("Own", (Bare,), {"settled": True, "_" + name: value, "bonus": 1.0}))

@@ -138,6 +138,11 @@ def test_a_start_outside_the_limits_is_moved_and_noted(engine: Backend) -> None:
     assert f"joint2 from 99 to {engine.model.upper[1]:.6g}" in found.note
     assert found.note in found.message
     batch = engine.inverse_kinematics(target, "flange", np.array([q0, 0.0 * q0]))
+    degrees = engine.inverse_kinematics(target, "flange", np.array([0.0, 90.0, *q0[2:]]))
+    assert degrees.note == (
+        f"q0 was outside the limits and moved into them: joint2 from 90 to {engine.model.upper[1]:.6g} "
+        "(90 degrees are 1.5708 rad)"
+    )
     assert batch.note == "1 of 2 q0 were outside the limits and moved into them (joint2)"
 
 

@@ -11,6 +11,7 @@ import pytest
 
 import dynx
 from dynx import time_limit
+from dynx.distance import avoidance
 from dynx.distance.avoidance import Avoidance
 from dynx.errors import ArgumentError, TrajectoryError
 from dynx.ik.tracking import TrackStatus
@@ -156,29 +157,36 @@ def test_a_blocked_search_of_one_frame_or_several_ends_in_time(
 
 
 @pytest.mark.parametrize("name", ["pinocchio", "compiled"])
-@pytest.mark.parametrize("pieces", [1, 4, 13])
-def test_a_search_that_avoids_asks_the_clock_between_two_configurations(
-    clock: Clock, monkeypatch: pytest.MonkeyPatch, name: str, pieces: int
+@pytest.mark.parametrize("pairs", [1, 4, 30, 200])
+@pytest.mark.parametrize("call", ["inverse_kinematics", "track"])
+def test_a_search_that_avoids_begins_no_pair_of_bodies_after_its_time(
+    clock: Clock, monkeypatch: pytest.MonkeyPatch, name: str, pairs: int, call: str
 ) -> None:
-    """After its time it computes the distances of two at most: of a step, and of what that arrives at."""
+    """A pair takes a second, all of one configuration 20 or more, and other operations a thousandth."""
     scene, model = blocked("panda_hand")
-    q, timeout = model.clip(model.neutral()), pieces - 0.5
-    late, near = [], Avoidance.near
+    q, timeout = model.clip(model.neutral()), pairs - 0.5
+    begun: list[bool] = []
+    distance = avoidance.separation_of
 
-    def slow(*args: Any, **options: Any) -> Any:
-        late.append(clock.now > end)
+    def slow(*args: Any) -> Any:
+        begun.append(clock.now < end)
         clock.now += 1.0
-        return near(*args, **options)
+        return distance(*args)
 
     with dynx.backend(name, model) as engine:
-        T = engine.forward_kinematics(q, "panda_hand")[:3, 3]
-        scene.avoidance_for(model)
-        monkeypatch.setattr(Avoidance, "near", slow)
+        T = engine.forward_kinematics(q, "panda_hand")
+        assert len(scene.avoidance_for(model).pairs) >= 20
+        monkeypatch.setattr(avoidance, "separation_of", slow)
         end = clock.now + timeout
-        found = engine.inverse_kinematics(T, "panda_hand", q, avoid=scene, timeout=timeout)
-    assert found.timed_out
-    assert late.count(False) <= pieces
-    assert late.count(True) <= 2
+        if call == "track":
+            path = engine.track(np.stack([T] * 3), "panda_hand", q, avoid=scene, timeout=timeout)
+            assert (path.status != TrackStatus.OK).any()
+        else:
+            found = engine.inverse_kinematics(T[:3, 3], "panda_hand", q, avoid=scene, timeout=timeout)
+            assert found.timed_out
+            assert found.message.startswith("stopped by timeout")
+    assert all(begun)
+    assert 0 < len(begun) <= pairs
 
 
 @pytest.mark.parametrize("name", ["pinocchio", "compiled"])

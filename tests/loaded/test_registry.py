@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynx.errors import BackendError, NotInstalledError, UnknownBackendError
+from dynx.errors import BackendError, NotInstalledError, RobotNotFoundError, UnknownBackendError
 from dynx.loaded import (
     COMMON_VARIANTS,
     ENGINES,
@@ -68,6 +68,19 @@ def test_a_robot_is_loaded_by_the_engine_of_that_name(name: str, tmp_path: Path)
     with load_as(name, path, chain(2)) as robot:
         assert robot.name == robot.describe().engine == name
         assert robot.mass_matrix(chain(2).neutral()).shape == (2, 2)
+
+
+@pytest.mark.parametrize("name", LOADERS)
+def test_a_path_is_text_too(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    model = chain(2)
+    (tmp_path / "robot.urdf").write_text(model.to_urdf())
+    monkeypatch.chdir(tmp_path)
+    q = model.random(0)
+    with load_as(name, "robot.urdf", model) as one, load_as(name, tmp_path / "robot.urdf", model) as other:
+        assert np.array_equal(one.mass_matrix(q), other.mass_matrix(q))
+    for missing in ("robott.urdf", ".", "a\0b"):
+        with pytest.raises(RobotNotFoundError, match="wanted the path of a URDF file"):
+            load_as(name, missing, model)
 
 
 def test_every_installed_engine_can_be_used() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 from collections import Counter
 from importlib import metadata
 from pathlib import Path
@@ -11,7 +12,7 @@ import pytest
 
 from dynx.errors import DescriptionError, RobotNotFoundError, UnsupportedFeatureError
 from dynx.model import library
-from dynx.model.library import DYNX_MODELS, EXAMPLE_ROBOT_DATA, find, robots
+from dynx.model.library import DYNX_MODELS, EXAMPLE_ROBOT_DATA, LibraryRobot, find, robots
 from dynx.model.loading import load
 from tests.conftest import needs_examples
 
@@ -257,3 +258,14 @@ def test_a_name_of_the_library_is_no_path(name: str, data: Path) -> None:
     """A file of a policy may name a robot that `find` knows, and no file beside it."""
     with pytest.raises(RobotNotFoundError):
         find(name)
+
+
+@pytest.mark.parametrize("robot", robots(), ids=lambda robot: robot.name)
+def test_the_name_of_a_file_of_the_library_names_the_robot(robot: LibraryRobot) -> None:
+    with pytest.raises(RobotNotFoundError, match=rf"; the library has .*'{re.escape(robot.name)}'"):
+        load(f"nowhere/{robot.path.name}")
+
+
+def test_a_name_far_from_all_names_the_command_that_lists_them() -> None:
+    with pytest.raises(RobotNotFoundError, match=f"`dynx robots` lists the {len(robots())} that are there$"):
+        load("qzqzq")

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+import dynx
 from dynx.errors import (
     ArgumentError,
     DescriptionError,
@@ -121,7 +122,7 @@ def test_a_broken_link_is_not_found(here: Path) -> None:
 
 @pytest.mark.parametrize("x", [None, 3, ["ur5"], object()])
 def test_arguments_of_other_types_raise(x: Any) -> None:
-    with pytest.raises(ArgumentError, match="wanted a path, URDF text, a name or a Model"):
+    with pytest.raises(ArgumentError, match="wanted a path, text, a name or a Model"):
         load(x)
 
 
@@ -214,4 +215,4 @@ def test_the_robots_of_pybullet_data_are_found_without_a_folder() -> None:
 def test_a_misspelt_option_gets_the_nearest_name() -> None:
     wrong: dict[str, Any] = {"bse": "floating"}
     with pytest.raises(UnknownNameError, match=r"load has no option 'bse'; did you mean 'base'\?"):
-        load("pendulum", **wrong)
+        dynx.load("pendulum", **wrong)

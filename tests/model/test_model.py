@@ -264,7 +264,8 @@ def test_a_floating_base_has_its_pose_in_q() -> None:
     assert freed == load(TEXT, base="floating")
 
 
-def test_urdf_text_is_that_of_the_robot_at_the_world_frame() -> None:
+def test_urdf_text_states_the_pose_of_the_base_and_an_argument_replaces_it() -> None:
     model = load(TEXT, base_pose=POSE)
-    assert model.to_urdf() == load(TEXT).to_urdf()
-    assert load(model.to_urdf(), base_pose=model.base_pose) == model
+    assert load(model.to_urdf()) == model
+    assert load(model.to_urdf(), base_pose=Pose()) == load(TEXT)
+    assert load(model.to_urdf(), base="floating") == load(TEXT, base="floating")

@@ -101,7 +101,7 @@ def test_worlds_and_rollouts_have_the_notes() -> None:
         assert any("points up" in each for each in world.notes)
     with World(Scene("s", robots=(robot,))) as world:
         assert not any("points up" in each for each in world.notes)
-    settings: dict[str, Any] = {"duration": 0.01, "plant": "reference"}
+    settings: dict[str, Any] = {"duration": 0.01, "plant": "reference", "joint_limits": False}
     rollout = dynx.simulate(ARM.with_gravity(up), None, q0=DEGREES, **settings)
     assert len(rollout.notes) == 5
     assert "5 notes" in repr(rollout)

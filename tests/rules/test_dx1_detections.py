@@ -288,6 +288,32 @@ def test_one_finding_and_no_invented_mass(links: Sequence[str], base: Base) -> N
         assert absent or engine.before.keys() == {"forward_kinematics", "jacobian"}
 
 
+@pytest.mark.parametrize(
+    ("links", "words"),
+    [
+        (bare("a", "b"), "no link has an <inertial>"),
+        (
+            [*bare("a"), link("b", mass=0.0, moments=(0.0, 0.0, 0.0))],
+            "of 2 links 1 have no <inertial>, and no ",
+        ),
+    ],
+)
+def test_the_finding_counts_the_links_without_inertial(links: Sequence[str], words: str) -> None:
+    case = case_of(*links, joint("j", "a", "b"))
+    (detection,) = find_rule("DX118").detect(case)
+    assert words in detection.message
+
+
+def test_the_plain_call_counts_the_links_without_a_collision_shape() -> None:
+    shape = '<collision><geometry><box size="1 1 1"/></geometry></collision>'
+    parts = [link("a"), link("b", shape), link("c"), joint("j", "a", "b"), joint("k", "b", "c")]
+    (detection,) = find_rule("DX115").detect(case_of(*parts))
+    words = (
+        "the inertia of the 2 links that move is computed from collision shapes; 1 of them has no such shape"
+    )
+    assert detection.message.endswith(words)
+
+
 def test_mass_that_cannot_move_is_none() -> None:
     assert report_on(link("a", mass=4.0), *bare("b", "c")).kinematics_only
     floating = report_on(link("a", mass=4.0), *bare("b", "c"), base="floating")

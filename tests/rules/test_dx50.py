@@ -103,6 +103,19 @@ def test_a_mesh_counts_as_its_hull(tmp_path: Path) -> None:
         assert all("along 0.71 0 0.71" in each.message for each in detections)
 
 
+@pytest.mark.parametrize("attached", [False, True])
+def test_messages_name_the_shapes_of_links_on_fixed_joints(attached: bool) -> None:
+    parts = [
+        link("base", visual('<box size="0.2 0.2 0.2"/>'), center=(0.0, 0.0, 3.0), moments=(9.0, 9.0, 9.0))
+    ]
+    if attached:
+        parts += [link("cover", BOX), joint("bolt", "base", "cover", type="fixed")]
+    words = "the shapes of the link and those fixed to it" if attached else "the link's shape"
+    for rule in (BEYOND, OUTSIDE):
+        (message,) = (each.message for each in rule.detect(case_of(*parts)) if each.link == "base")
+        assert message.endswith(words)
+
+
 def test_a_sphere_of_a_shell_has_the_bound_itself() -> None:
     moments = (0.5, 0.5, 0.5)
     sphere = visual('<sphere radius="0.5"/>')

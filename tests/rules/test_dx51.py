@@ -33,6 +33,13 @@ def test_a_limit_is_found_where_it_is_zero(rule: str, attribute: str, most: floa
     assert found(rule, arm(limit=limit)) == ["elbow"] * (most == 0.0)
 
 
+def test_a_sliding_joint_without_effort_has_no_force() -> None:
+    limit = '<limit lower="-1" upper="1" effort="0" velocity="1"/>'
+    for type, effort in (("revolute", "torque"), ("prismatic", "force")):
+        (each,) = find_rule("DX506").detect(arm(limit=limit, type=type))
+        assert each.message == f"the effort limit is 0, so no {effort} is allowed"
+
+
 @pytest.mark.parametrize("rule", ["DX506", "DX507", "DX508", "DX510"])
 def test_a_follower_needs_no_limits_of_its_own(rule: str) -> None:
     case = case_of(

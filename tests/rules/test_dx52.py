@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +14,9 @@ from hypothesis import strategies as st
 from dynx.doctor.mending import readable
 from dynx.model.library import find, robots
 from dynx.model.xml.source import XmlSource
-from dynx.rules import Case, find_rule
+from dynx.rules import Case, Detection, find_rule
+from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import quat_exp, rotation_from_quat, rpy_from_rotation
 from tests.rules.documents import case_of, joint, link, visual
 from tests.rules.trap_cases import TRAPS
 
@@ -23,8 +27,12 @@ REAL = sorted(entry.name for entry in robots() if entry.source == "example-robot
 DIFFERENT_TWINS = {
     *("alex_nub_hands", "alex_psyonic_hands", "alex_sake_hands", "icub", "icub_reduced"),
     *("romeo", "romeo_laas_small", "romeo_small"),
+    # Limits.
+    *("human", "simple_humanoid", "simple_humanoid_classical"),
+    # Products of inertia.
+    *("talos_reduced", "talos_reduced_box", "talos_reduced_corrected", "tiago_dual"),
 }
-"""Robots of example-robot-data whose right side has another mass or other moments than their left."""
+"""Robots of example-robot-data whose right side has other masses, tensors or limits than their left."""
 
 
 def arm(unit: float, mass: float, lengths: tuple[float, ...] = (0.1, 0.4, 0.02)) -> Case:
@@ -224,6 +232,249 @@ def test_what_differs_is_named(change: dict[str, object], part: str) -> None:
     assert found.message.startswith(part)
 
 
+REFLECTION = np.diag([1.0, -1.0, 1.0])
+"""Reflection at the plane between the sides of these robots, y = 0 in the torso."""
+
+
+@dataclass(frozen=True)
+class Side:
+    """One side in the axes of the torso: place, axis and limits of the joint; centre of mass from there."""
+
+    place: Floats
+    axis: Floats
+    center: Floats
+    tensor: Floats
+    range: tuple[float, float] = (-0.3, 0.8)
+    most: tuple[float, float] = (10.0, 5.0)
+    """Limits of effort and velocity."""
+
+    def reflected(self, sense: float, type: str = "revolute") -> Side:
+        """Return the other side; `sense` is the sign of its positions in a reflected posture."""
+        # A rotation about an axis is reflected into one about the reflected axis in the other sense.
+        sign = sense if type == "prismatic" else -sense
+        low, high = sorted(sense * end for end in self.range)
+        return Side(
+            REFLECTION @ self.place,
+            sign * REFLECTION @ self.axis,
+            REFLECTION @ self.center,
+            REFLECTION @ self.tensor @ REFLECTION,
+            (low, high),
+            self.most,
+        )
+
+
+LEG = Side(
+    np.array([0.1, 0.2, -0.1]),
+    np.array([1.0, 0.0, 0.0]),
+    np.array([0.04, 0.05, -0.1]),
+    np.array([[0.03, 0.002, 0.003], [0.002, 0.03, 0.004], [0.003, 0.004, 0.012]]),
+)
+
+
+def numbers_of(values: Floats) -> str:
+    return " ".join(repr(float(value)) for value in values)
+
+
+def side_of_robot(name: str, side: Side, frames: tuple[Floats, Floats], type: str = "revolute") -> list[str]:
+    """Write a link and its joint; `frames` (3, 3) turn the link's frame and the axes of its tensor."""
+    R_torso_link, R_link_axes = frames
+    to_axes = (R_torso_link @ R_link_axes).T
+    tensor = to_axes @ side.tensor @ to_axes.T
+    (xx, xy, xz), (_, yy, yz), (*_, zz) = tensor.tolist()
+    origin = (
+        f'xyz="{numbers_of(R_torso_link.T @ side.center)}" rpy="{numbers_of(rpy_from_rotation(R_link_axes))}"'
+    )
+    effort, velocity = side.most
+    return [
+        f'<link name="{name}"><inertial><origin {origin}/><mass value="2"/><inertia ixx="{xx!r}" '
+        f'ixy="{xy!r}" ixz="{xz!r}" iyy="{yy!r}" iyz="{yz!r}" izz="{zz!r}"/></inertial></link>',
+        f'<joint name="{name}_joint" type="{type}"><origin xyz="{numbers_of(side.place)}" '
+        f'rpy="{numbers_of(rpy_from_rotation(R_torso_link))}"/><parent link="torso"/><child link="{name}"/>'
+        f'<axis xyz="{numbers_of(R_torso_link.T @ side.axis)}"/><limit lower="{side.range[0]!r}" '
+        f'upper="{side.range[1]!r}" effort="{effort!r}" velocity="{velocity!r}"/></joint>',
+    ]
+
+
+STRAIGHT = np.eye(3), np.eye(3)
+
+
+def two_sides(
+    left: Side,
+    right: Side,
+    frames: tuple[tuple[Floats, Floats], tuple[Floats, Floats]] = (STRAIGHT, STRAIGHT),
+    type: str = "revolute",
+) -> list[Detection]:
+    """Detect what differs on a robot with these legs."""
+    parts = [
+        *side_of_robot("left_leg", left, frames[0], type),
+        *side_of_robot("right_leg", right, frames[1], type),
+    ]
+    return list(TWINS.detect(case_of(link("torso"), *parts)))
+
+
+def random_rotation(rng: np.random.Generator) -> Floats:
+    return np.asarray(rotation_from_quat(quat_exp(rng.uniform(-3.0, 3.0, 3))))
+
+
+def random_side(rng: np.random.Generator) -> Side:
+    """Draw a side with a centre of mass off its axis, and products of inertia that count."""
+    place, axis, center = rng.uniform(-0.3, 0.3, (3, 3))
+    place[1] = rng.uniform(0.05, 0.3)
+    axis /= np.linalg.norm(axis)
+    center += np.sign(center) * 0.03
+    R = random_rotation(rng)
+    low, high = np.sort(rng.uniform(-2.0, 2.0, 2)).tolist()
+    return Side(place, axis, center, R @ np.diag([0.01, 0.02, 0.026]) @ R.T, (low, high))
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([1.0, -1.0]), st.sampled_from(["revolute", "prismatic"]))
+def test_reflected_sides_are_alike_in_any_frames(seed: int, sense: float, type: str) -> None:
+    rng = np.random.default_rng(seed)
+    left = random_side(rng)
+    frames = tuple((random_rotation(rng), random_rotation(rng)) for _ in range(2))
+    assert two_sides(left, left.reflected(sense, type), frames, type) == []  # type: ignore[arg-type]
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([(0, 1), (0, 2), (1, 2)]))
+def test_a_product_that_lost_its_sign_is_found_in_any_frames(seed: int, entry: tuple[int, int]) -> None:
+    rng = np.random.default_rng(seed)
+    left = replace(LEG, place=rng.uniform(0.05, 0.3, 3))
+    right = left.reflected(1.0)
+    tensor = right.tensor.copy()
+    tensor[entry] *= -1.0
+    tensor[entry[::-1]] *= -1.0
+    frames = tuple((random_rotation(rng), random_rotation(rng)) for _ in range(2))
+    (found,) = two_sides(left, replace(right, tensor=tensor), frames)  # type: ignore[arg-type]
+    assert found.link == "left_leg"
+    assert found.message.startswith(
+        "the products of inertia xy, xz, yz in the axes of the root are, reflected, "
+    )
+
+
+def test_products_that_were_copied_are_named_with_both_lines() -> None:
+    (found,) = two_sides(LEG, replace(LEG.reflected(1.0), tensor=LEG.tensor))
+    assert (found.link, found.line) == ("left_leg", 3)
+    assert found.message == (
+        "the products of inertia xy, xz, yz in the axes of the root are, reflected, -0.002, 0.003, -0.004 "
+        "kg m^2, and 0.002, 0.003, 0.004 kg m^2 on its twin right_leg (line 5)"
+    )
+
+
+def test_a_centre_that_lost_its_sign_is_named_where_the_products_are_reflections() -> None:
+    (found,) = two_sides(LEG, replace(LEG.reflected(1.0), center=LEG.center))
+    assert found.link == "left_leg"
+    assert found.message == (
+        "the centre of mass is 0.04, -0.05, -0.1 m from the joint in the axes of the root, reflected, "
+        "and 0.04, 0.05, -0.1 m on its twin right_leg (line 5)"
+    )
+
+
+@pytest.mark.parametrize(
+    ("center", "turn"),
+    [
+        # One part on both sides, and that part turned by half a turn about each axis.
+        ((0.03, 0.04, -0.2), (1.0, 1.0, 1.0)),
+        ((0.03, 0.04, -0.2), (-1.0, -1.0, 1.0)),
+        ((0.03, 0.04, -0.2), (1.0, -1.0, -1.0)),
+        # No centre of mass shows how the part is turned.
+        ((0.0, 0.0, -0.2), (-1.0, -1.0, 1.0)),
+    ],
+)
+def test_one_part_on_both_sides_is_no_difference(center: tuple[float, ...], turn: tuple[float, ...]) -> None:
+    left, turned = replace(LEG, center=np.array(center)), np.diag(turn)
+    part = replace(left.reflected(1.0), center=turned @ left.center, tensor=turned @ left.tensor @ turned)
+    assert two_sides(left, part) == []
+
+
+def test_without_anything_off_the_axis_no_signs_are_compared() -> None:
+    left = replace(LEG, center=np.array([0.1, 0.0, 0.0]))
+    right = left.reflected(-1.0)
+    swapped = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    turned = replace(right, tensor=swapped @ right.tensor @ swapped.T, range=(-0.1, 1.0))
+    assert two_sides(left, turned) == []
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"axis": np.array([0.96, 0.28, 0.0])},
+        {"center": np.array([0.1, 0.05, -0.05])},
+    ],
+)
+def test_twins_that_lie_otherwise_at_zero_are_compared_without_signs(change: dict[str, Floats]) -> None:
+    right = replace(LEG.reflected(-1.0), tensor=LEG.tensor, range=(-0.3, 0.8))
+    assert len(two_sides(LEG, right)) == 2
+    assert two_sides(LEG, replace(right, **change)) == []  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("type", "axis", "sense"),
+    [
+        ("revolute", (1.0, 0.0, 0.0), -1.0),  # roll
+        ("revolute", (0.0, 1.0, 0.0), 1.0),  # pitch
+        ("revolute", (0.0, 0.0, 1.0), -1.0),  # yaw
+        ("prismatic", (1.0, 0.0, 0.0), 1.0),
+        ("prismatic", (0.0, 1.0, 0.0), -1.0),
+        ("prismatic", (0.0, 0.0, 1.0), 1.0),
+    ],
+)
+def test_ranges_of_equal_axes_are_reflected(type: str, axis: tuple[float, ...], sense: float) -> None:
+    left = replace(LEG, axis=np.array(axis))
+    right = left.reflected(sense, type)
+    assert np.array_equal(right.axis, left.axis)
+    assert two_sides(left, right, type=type) == []
+    low, high = (-end for end in reversed(right.range))
+    wrong = replace(right, range=(low, high))
+    (found,) = two_sides(left, wrong, type=type)
+    unit = "rad" if type == "revolute" else "m"
+    reflected = " (reflected -0.8 to 0.3)" if sense < 0.0 else ""
+    assert (found.joint, found.line) == ("left_leg_joint", 4)
+    assert found.message == (
+        f"the range is -0.3 to 0.8 {unit}{reflected}, and {low:g} to {high:g} {unit} on its twin "
+        "right_leg_joint (line 6)"
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"range": (-0.8, 0.8)}, "the range is 1.1 rad, and 1.6 rad"),
+        ({"most": (12.0, 5.0)}, "the effort limit is 10 N m, and 12 N m"),
+        ({"most": (10.0, 6.0)}, "the velocity limit is 5 rad/s, and 6 rad/s"),
+        (
+            {"most": (12.0, 6.0)},
+            "the effort limit is 10 N m, and 12 N m; the velocity limit is 5 rad/s, and 6 rad/s",
+        ),
+    ],
+)
+@pytest.mark.parametrize("mass", ["2", "0"])
+def test_other_limits_are_named(change: dict[str, tuple[float, float]], message: str, mass: str) -> None:
+    right = replace(LEG.reflected(-1.0), **change)  # type: ignore[arg-type]
+    parts = [*side_of_robot("left_leg", LEG, STRAIGHT), *side_of_robot("right_leg", right, STRAIGHT)]
+    if mass == "0":  # links without mass have limits, too
+        parts = [re.sub("<inertial>.*</inertial>", "", part) for part in parts]
+    (found,) = TWINS.detect(case_of(link("torso"), *parts))
+    assert (found.link, found.joint, found.line) == (None, "left_leg_joint", 4)
+    assert found.message == f"{message} on its twin right_leg_joint (line 6)"
+
+
+def test_limits_of_a_joint_that_follows_another_are_not_compared() -> None:
+    right = replace(LEG.reflected(-1.0), range=(-1.0, 1.0), most=(20.0, 5.0))
+    one, joint_of_one, other, joint_of_other = (
+        *side_of_robot("left_leg", LEG, STRAIGHT),
+        *side_of_robot("right_leg", right, STRAIGHT),
+    )
+    assert len(TWINS.detect(case_of(link("torso"), one, joint_of_one, other, joint_of_other))) == 1
+    follower = joint_of_other.replace("<axis", '<mimic joint="left_leg_joint" multiplier="-1"/><axis')
+    assert TWINS.detect(case_of(link("torso"), one, joint_of_one, other, follower)) == []
+
+
+def test_small_differences_of_limits_are_none() -> None:
+    right = LEG.reflected(-1.0)
+    near = replace(right, range=(-0.806, 0.302), most=(10.05, 5.04))
+    assert two_sides(LEG, near) == []
+
+
 BOX, CYLINDER = '<box size="0.1 0.2 0.3"/>', '<cylinder radius="0.05" length="0.3"/>'
 PER_MASS = {
     BOX: np.array([0.2**2 + 0.3**2, 0.1**2 + 0.3**2, 0.1**2 + 0.2**2]) / 12.0,
@@ -278,3 +529,17 @@ def test_the_other_traps_have_none_of_them(rule: object) -> None:
         case = readable(Case(XmlSource(path.read_bytes(), str(path)))).case
         if case.readable:
             assert bool(rule.detect(case)) == (path.stem == rule.trap().removesuffix(".urdf")), path  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(("center", "found"), [(-0.7, 0), (0.0, 2)])
+def test_twins_about_a_plane_beside_the_frame_of_their_parent(center: float, found: int) -> None:
+    """Wheels at y = -0.25 and -1.15 of a body whose frame is the corner of a drawing, or in the body."""
+    wheels = [
+        (f"{side}_{end}_wheel", x, y) for end, x in (("front", 0.45), ("rear", -0.26)) for side, y in SIDES
+    ]
+    joints = [joint(f"{name}_joint", "body", name, f'<origin xyz="{x} {y} 0"/>') for name, x, y in wheels]
+    links = [link("body", center=(0.0, center, 0.0)), *(link(name) for name, _, _ in wheels)]
+    assert len(TWINS.detect(case_of(*links, *joints))) == found
+
+
+SIDES = (("left", -0.25), ("right", -1.15))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -37,6 +40,45 @@ def test_a_thin_plate_is_as_thick_as_a_hundredth_of_its_diagonal() -> None:
     plate = visual('<box size="1 1 0.00001"/>')
     assert found("DX517", case_of(link("plate", plate, mass=10.0))) == []
     assert found("DX517", case_of(link("plate", plate, mass=1000.0))) == ["plate"]
+
+
+ROUND = {
+    "sphere": (lambda radius, length: 4.0 / 3.0 * math.pi * radius**3),
+    "cylinder": (lambda radius, length: math.pi * radius**2 * length),
+    "capsule": (lambda radius, length: math.pi * radius**2 * (length + 4.0 / 3.0 * radius)),
+}
+"""Volumes of round shapes of a radius and a length [m]."""
+
+
+@pytest.mark.parametrize("tag", ROUND)
+@pytest.mark.parametrize(("density", "count"), [(1.001, 0), (0.999, 1), (0.1, 1)])
+@given(radius=sides, length=sides)
+def test_round_shapes_are_lighter_than_air_for_their_own_volume(
+    tag: str, density: float, count: int, radius: float, length: float
+) -> None:
+    volume = ROUND[tag](radius, length)
+    sizes = f'radius="{radius!r}"' + (f' length="{length!r}"' if tag != "sphere" else "")
+    case = case_of(link("part", visual(f"<{tag} {sizes}/>"), mass=repr(density * volume)))
+    messages = [each.message for each in find_rule("DX517").detect(case)]
+    assert len(messages) == count
+    assert all(f"of {volume:.3g} m^3 is {density:.3g} kg/m^3" in each for each in messages)
+
+
+def test_a_mesh_is_lighter_than_air_for_its_hull(tmp_path: Path) -> None:
+    corners = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+    text = [*(f"v {x} {y} {z}" for x, y, z in corners), "f 1 3 2", "f 1 2 4", "f 2 3 4", "f 1 4 3"]
+    (tmp_path / "corner.obj").write_text("\n".join(text))
+    for mass, count in (("0.17", 0), ("0.16", 1)):  # A sixth of a cubic metre.
+        path = tmp_path / "robot.urdf"
+        case = case_of(link("part", visual('<mesh filename="corner.obj"/>'), mass=mass), source=path)
+        path.write_bytes(case.source.data)
+        assert len(found("DX517", case)) == count
+
+
+def test_the_message_multiplies_out() -> None:
+    case = case_of(link("part", visual('<cylinder radius="0.01" length="0.1"/>'), mass=2.0))
+    (detection,) = find_rule("DX517").detect(case)
+    assert detection.message == "2 kg in a box of 0.02 x 0.02 x 0.1 m is 5e+04 kg/m^3"
 
 
 def test_rigidly_connected_shapes_count_together() -> None:

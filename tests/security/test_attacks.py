@@ -17,7 +17,21 @@ pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="devices, pipes and memory are those of Linux"
 )
 
-SURFACES = ("policy", "run folder", "scene", "urdf", "mesh", "world", "npz", "csv", "mcap", "page", "socket")
+SURFACES = (
+    "policy",
+    "run folder",
+    "scene",
+    "urdf",
+    "mjcf",
+    "mesh",
+    "world",
+    "npz",
+    "csv",
+    "mcap",
+    "page",
+    "view",
+    "socket",
+)
 
 OF_A_SURFACE = 2
 """Number of attacks on each surface that are tried here; the whole takes minutes."""

@@ -31,7 +31,7 @@ from dynx.errors import (
 )
 from dynx.model import Inertial, Joint, Link, Model
 from dynx.model.loading import load
-from dynx.sim import Noise, Payload, simulate, simulate_batch
+from dynx.sim import Noise, Payload, Scenario, simulate, simulate_batch
 from dynx.spatial.scalar import Floats
 from dynx.trajectory.base import Setpoint
 from tests.sim.bars import tutorial_motion, tutorial_robot
@@ -113,8 +113,15 @@ def test_what_is_missing_or_of_another_robot() -> None:
     other, no_law = load("panda"), cast(Any, "pd")
     with pytest.raises(ArgumentError, match="duration"):
         simulate(ARM)
-    with pytest.raises(ArgumentError, match="needs a reference"):
+    with pytest.raises(ArgumentError, match=r"needs a reference: a trajectory, or a configuration to hold$"):
         simulate(ARM, LAW, duration=0.01)
+    own = Faulty(lambda _: np.zeros(3))
+    with pytest.raises(ArgumentError, match=r"needs a reference.*needs_setpoint = False"):
+        simulate(ARM, own, duration=0.01)
+    with pytest.raises(
+        ArgumentError, match=r"reference is None.*needs_setpoint = False: errors are measured"
+    ):
+        simulate_batch(ARM, own, None, rollouts=2, duration=0.01)
     with pytest.raises(ArgumentError, match=r"made for control_dt = 0\.002 s; it is 0\.001 s"):
         simulate(ARM, DiscreteComputedTorque(ARM, control_dt=2e-3), REST, duration=0.01)
     with pytest.raises(ArgumentError, match="joints are not"):
@@ -193,7 +200,7 @@ def test_a_simulation_that_runs_away_says_when_and_where(plant: str) -> None:
     pytest.importorskip(plant)
     # So fast that an explicit step of the centrifugal forces overshoots.
     with pytest.raises(DivergedError, match="diverged in step") as caught:
-        simulate(ARM, None, q0=REST, v0=np.full(6, 1e3), plant=plant, duration=1.0)
+        simulate(ARM, None, q0=REST, v0=np.full(6, 1e3), plant=plant, duration=1.0, joint_limits=False)
     error = caught.value
     assert 0 < error.step < 100
     assert error.time == pytest.approx(error.step * 1e-3)
@@ -238,3 +245,12 @@ def test_a_batch_has_the_defaults_of_one_rollout() -> None:
 def test_arguments_of_a_batch_have_their_types(options: dict[str, Any], hint: str) -> None:
     with pytest.raises(ArgumentError, match=hint):
         simulate_batch(ARM, LAW, REST, rollouts=2, duration=0.01, **options)
+
+
+@pytest.mark.parametrize("name", ["semi_implicit", "semi-implicit"])
+def test_the_integrator_has_one_name_in_python_on_the_command_line_and_in_files(name: str) -> None:
+    scenario = Scenario(ARM, LAW, tutorial_motion(), integrator=name)
+    assert scenario.integrator == "semi_implicit"
+    assert Scenario.from_dict({**scenario.to_dict(), "integrator": name}).integrator == "semi_implicit"
+    with pytest.raises(ArgumentError, match="'rk-5'; wanted one of semi_implicit, rk4, adaptive, engine"):
+        simulate(ARM, LAW, tutorial_motion(), duration=0.01, integrator="rk-5")

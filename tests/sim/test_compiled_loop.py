@@ -238,10 +238,11 @@ def test_errors_are_those_of_the_plain_loop(kd: float) -> None:
     """Damping turned round drives the robot away, or its torque beyond all numbers."""
     law = substitute(Velocity(ARM, kd=0.0), kd=np.full(6, kd))
     speed = 1e-3 if kd > -1e300 else 300.0
-    found = both(ARM, law, np.zeros(6), q0=np.zeros(6), v0=np.full(6, speed), duration=1.0)
+    start: dict[str, Any] = {"q0": np.zeros(6), "v0": np.full(6, speed), "joint_limits": False}
+    found = both(ARM, law, np.zeros(6), duration=1.0, **start)
     assert len(found) < 1000
     with pytest.raises(DivergedError if kd > -1e300 else ControlError):
-        simulate(ARM, law, np.zeros(6), q0=np.zeros(6), v0=np.full(6, speed), duration=1.0)
+        simulate(ARM, law, np.zeros(6), duration=1.0, **start)
 
 
 @pytest.mark.parametrize(("kd", "limits"), [(-3e3, False), (-1e306, False), (-1e306, 15.0)])
@@ -250,6 +251,7 @@ def test_errors_of_one_lane_are_those_of_the_plain_loop(kd: float, limits: Any) 
     law = substitute(Velocity(ARM, kd=0.0), kd=np.full(6, kd))
     v0 = np.full(6, 1e-3 if kd > -1e300 else 300.0)
     start: dict[str, Any] = {"q0": np.zeros(6), "v0": v0, "effort_limits": limits, "duration": 0.5}
+    start["joint_limits"] = False
     caught = []
     for plant in ("compiled", "reference"):
         with pytest.raises((DivergedError, ControlError)) as error:

@@ -9,7 +9,8 @@ import pytest
 
 from dynx.backends import backend
 from dynx.control import PD, PID, BulletPositionMotor, ComputedTorque, Impedance, OperationalSpace, Velocity
-from dynx.errors import GainError, LimitError, UnknownNameError
+from dynx.control.base import ModelBased
+from dynx.errors import GainError, LimitError, UnknownNameError, UnsupportedFeatureError
 from dynx.model import Model
 from dynx.model.loading import load
 from dynx.sim import simulate
@@ -33,6 +34,17 @@ def test_every_law_can_be_had_by_its_name(name: str) -> None:
     needed: dict[str, Any] = {"impedance": {"kp": 1.0, "kd": 1.0}}.get(name, {})
     made = law(name, frame="tool0", **needed)
     assert made.model is ARM
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_joint_dynamics_are_known_to_the_controllers_with_a_model(name: str) -> None:
+    needed: dict[str, Any] = {"impedance": {"kp": 1.0, "kd": 1.0}}.get(name, {})
+    if not isinstance(law(name, frame="tool0", **needed), ModelBased):
+        with pytest.raises(UnsupportedFeatureError, match=f"^{name} computes without .* such as computed-"):
+            law(name, frame="tool0", joint_dynamics=True, **needed)
+        return
+    for known in (False, True):
+        assert law(name, frame="tool0", joint_dynamics=known, **needed).joint_dynamics is known
 
 
 def test_gains_are_those_of_one_error_whatever_the_law() -> None:

@@ -81,23 +81,24 @@ def test_a_diverged_simulation_names_the_joint_in_its_error() -> None:
     q0 = model.neutral() + 0.1
     inertia = np.diagonal(dynx.backend("pinocchio", model).mass_matrix(q0))
     damped = control.GravityCompensatedPD(model, kp=0.0, kd=5.0)
+    options: dict[str, Any] = {"q0": q0, "duration": 1.0, "joint_limits": False}
     with pytest.raises(DivergedError) as raised:
-        simulate(model, damped, model.neutral(), q0=q0, v0=np.ones(6), duration=1.0)
+        simulate(model, damped, model.neutral(), v0=np.ones(6), **options)
     ratio, name = 5.0 * DT / inertia.min(), model.joint_names[int(np.argmin(inertia))]
     hint = f"kd dt / inertia is {ratio:.3g} at {name}, and a step is unstable above 2"
     assert hint in str(raised.value)
     with pytest.raises(DivergedError) as raised:
-        simulate(model, damped, model.neutral(), q0=q0, v0=np.ones(6), dt=DT / 2, control_dt=DT, duration=1.0)
+        simulate(model, damped, model.neutral(), v0=np.ones(6), dt=DT / 2, control_dt=DT, **options)
     assert hint.replace(" dt ", " control_dt ") in str(raised.value)
     with pytest.raises(DivergedError) as raised:
-        simulate(model, None, q0=q0, v0=np.full(6, 1e5), duration=1.0)
+        simulate(model, None, v0=np.full(6, 1e5), **options)
     assert "unstable" not in str(raised.value)
 
 
 def test_friction_that_is_compensated_beyond_that_of_the_plant_is_named() -> None:
     model = dynx.load("ur5")
     law = control.FrictionCompensation(control.PD(model, kp=20.0, kd=0.5), damping=[0, 0, 0, 0, 9, 0])
-    options: dict[str, Any] = {"duration": 0.5, "q0": np.zeros(6), "plant": "compiled"}
+    options: dict[str, Any] = {"duration": 0.5, "q0": np.zeros(6), "plant": "compiled", "joint_limits": False}
     with pytest.raises(DivergedError, match=r"of 9 N m s/rad .* at wrist_2_joint, where the plant has 2"):
         simulate(model, law, np.full(6, 0.1), joint_damping=2.0, **options)
     damped = simulate(model, law, np.full(6, 0.1), joint_damping=9.0, **options)
@@ -143,7 +144,8 @@ def test_only_failures_of_dynx_hide_the_explanation_of_a_divergence(monkeypatch:
             raise error
 
         monkeypatch.setattr("dynx.sim.closed_loop.largest_overshoot", fail)
-        simulate(dynx.load("ur5"), None, v0=np.full(6, 1e5), duration=1.0, plant="reference")
+        options: dict[str, Any] = {"duration": 1.0, "plant": "reference", "joint_limits": False}
+        simulate(dynx.load("ur5"), None, v0=np.full(6, 1e5), **options)
 
     with pytest.raises(DivergedError) as raised:
         diverge(SingularMassMatrixError("no inertia"))
@@ -199,7 +201,8 @@ def test_an_oscillation_that_effort_limits_bound_is_named(robot: str, plant: str
 
 
 @pytest.mark.skipif("drake" not in installed_worlds(), reason="drake")
-def test_an_oscillation_that_the_joint_limits_of_drake_bound_is_named() -> None:
+@pytest.mark.parametrize("plant", ["compiled", "pybullet", "drake"])
+def test_an_oscillation_that_joint_limits_bound_is_named(plant: str) -> None:
     model = dynx.load("ur5")
     rollout = simulate(
         model,
@@ -207,7 +210,7 @@ def test_an_oscillation_that_the_joint_limits_of_drake_bound_is_named() -> None:
         np.full(6, 0.5),
         q0=np.zeros(6),
         duration=0.1,
-        plant=scene_of(model, "drake"),
+        plant=scene_of(model, "drake") if plant == "drake" else plant,
     )
     assert np.abs(rollout.v).max() > 1e3
     assert rollout.overshoot is not None

@@ -91,7 +91,7 @@ def test_a_record_of_something_else_is_refused() -> None:
         {"mass_scale": 1.1},
         {"joint_damping": 1.0},
         {"noise": Noise(1e-4, 1e-3, seed=6)},
-        {"joint_limits": True},
+        {"joint_limits": False},
         {"step": STEPS + 1},
     ]
     for change in cases:

@@ -189,7 +189,7 @@ def test_a_simulation_without_a_duration_goes_on() -> None:
         simulation.run(until=3.0)
         assert simulation.time == 3.0
         the_same(simulation.rollout, simulate(replace(free, duration=3.0)))
-    with pytest.raises(ArgumentError, match="duration is None, and reference is no trajectory"):
+    with pytest.raises(ArgumentError, match=r"the reference is no trajectory.*; give duration= \[s\]"):
         simulate(free)
 
 
@@ -221,7 +221,8 @@ def test_an_error_leaves_the_last_whole_step() -> None:
         assert simulation.time == 5e-3
         simulation.step(2, np.zeros(6))
         assert len(simulation.rollout) == 7
-    with Simulation(Scenario(ARM, q0=np.zeros(6), v0=np.full(6, 1e3))) as simulation:
+    unbounded = Scenario(ARM, q0=np.zeros(6), v0=np.full(6, 1e3), joint_limits=False)
+    with Simulation(unbounded) as simulation:
         with pytest.raises(DivergedError) as diverged:
             simulation.step(1000)
         assert len(diverged.value.rollout) == diverged.value.step

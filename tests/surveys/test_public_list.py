@@ -10,18 +10,21 @@ from pathlib import Path
 import pytest
 
 from benchmarks.surveys import public_list
-from benchmarks.surveys.public_list import FILES, PARTS, PER_REPOSITORY, read_list, searched
+from benchmarks.surveys.public_list import ENDS, PARTS, PER_REPOSITORY, read_list, searched
 from tests.rules.documents import case_of, link
 
 
 def test_the_list_is_in_the_order_of_hashes_and_names_no_repository_of_the_project() -> None:
     files = read_list()
     repositories = list(dict.fromkeys(each.repository for each in files))
-    assert len(files) == FILES
+    assert len(files) == ENDS[-1]
     assert max(Counter(each.repository for each in files).values()) <= PER_REPOSITORY
     assert repositories == [each for each in searched() if each in {*repositories}]
-    halves = [{each.repository for each in files if each.part == part} for part in PARTS]
-    assert halves[0].isdisjoint(halves[1])
+    assert len({(each.part, each.repository) for each in files}) == len(repositories)
+    assert list(dict.fromkeys(each.part for each in files)) == list(PARTS)
+    for part, before in PARTS.items():
+        first = next(number for number, each in enumerate(files) if each.part == part)
+        assert before <= first < before + PER_REPOSITORY
     root = Path(public_list.__file__).parents[2]
     pages = "\n".join(path.read_text(encoding="utf-8") for path in root.glob("docs/*.md")).lower()
     assert not [each for each in repositories if each.lower() in pages]

@@ -11,7 +11,7 @@ from typing import Any
 
 from dynx.cli.commands.comparison import doctor
 from dynx.testing import plugin
-from tests.test_readme import ROOT, blocks
+from tests.page_blocks import ROOT, fenced
 
 PAGE = (ROOT / "docs" / "testing.md").read_text(encoding="utf-8")
 
@@ -38,7 +38,7 @@ class Options:
 def workflow_commands() -> Iterator[str]:
     """Yield the commands of the workflow, of the step that stands for one of its steps, and of the hook."""
     yaml = import_module("yaml")
-    action, workflow, step, hooks = map(yaml.safe_load, blocks("yaml", PAGE))
+    action, workflow, step, hooks = map(yaml.safe_load, fenced("yaml", PAGE))
     (used,) = [each for each in action if each["uses"].startswith("OWNER/dynx@")]
     own_action = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))
     assert used["with"].keys() <= own_action["inputs"].keys()
@@ -59,12 +59,12 @@ def own_hook() -> Any:
 
 
 def commands() -> list[str]:
-    shown = [line for block in blocks("sh", PAGE) for line in block.splitlines()]
+    shown = [line for block in fenced("sh", PAGE) for line in block.splitlines()]
     return [*shown, *workflow_commands()]
 
 
 def test_the_hook_of_the_page_takes_the_files_of_dynx_own_hook() -> None:
-    *_, hooks = map(import_module("yaml").safe_load, blocks("yaml", PAGE))
+    *_, hooks = map(import_module("yaml").safe_load, fenced("yaml", PAGE))
     (shown,) = hooks["repos"][0]["hooks"]
     own = own_hook()
     assert all(shown[key] == own[key] for key in ("id", "files", "require_serial"))
@@ -86,12 +86,9 @@ def test_commands_have_the_options() -> None:
         elif program == "pytest":
             flags = {word.partition("=")[0] for word in words if word.startswith("--dynx")}
             assert flags <= Options().flags.keys()
-        elif program == "python":
-            assert words[:2] == ["-m", "tests.mutation"]
-            assert {word for word in words if word.startswith("--")} <= {"--record", "--seed", "--count"}
         else:
-            assert program == "pip"
-    assert programs == {"dynx", "pytest", "python", "pip"}
+            assert program in ("pip", "mkdir")
+    assert programs == {"dynx", "pytest", "pip", "mkdir"}
 
 
 def test_extras_exist() -> None:
@@ -119,10 +116,19 @@ def test_every_option_is_on_the_page() -> None:
         assert f"`{flag}" in PAGE, flag
     for setting in options.settings:
         assert setting in PAGE
-    (ini,) = blocks("toml", PAGE)
+    (ini,) = fenced("toml", PAGE)
     assert re.search(r"^dynx_robots = \[", ini, flags=re.MULTILINE)
 
 
 def test_the_plugin_is_an_entry_point() -> None:
     text = (Path(ROOT) / "pyproject.toml").read_text(encoding="utf-8")
     assert '[project.entry-points.pytest11]\ndynx = "dynx.testing.plugin"\n' in text
+
+
+def test_the_page_on_mutation_testing_has_its_options() -> None:
+    page = (ROOT / "docs" / "explanation" / "how-dynx-is-tested.md").read_text(encoding="utf-8")
+    shown = [shlex.split(line, comments=True) for block in fenced("sh", page) for line in block.splitlines()]
+    found = [words[3:] for words in shown if words[:3] == ["python", "-m", "tests.mutation"]]
+    assert found
+    for words in found:
+        assert {word for word in words if word.startswith("--")} <= {"--record", "--seed", "--count"}

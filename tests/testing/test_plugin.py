@@ -246,6 +246,9 @@ def test_a_description_that_cannot_be_read_is_one_failing_test(run: Run, home: P
         (("--dynx-base", "both"), "use --dynx-robot"),
         (("--dynx-robot", "ur5", "--dynx-tolerance", "1e-6"), "--dynx-as-loaded"),
         (("--dynx-robot", "ur5", "--dynx-baseline", "known.json"), "--dynx-as-loaded"),
+        (("--dynx-robot", "ur5", "--dynx-ignore", "DX101"), "--dynx-as-loaded"),
+        (("--dynx-robot", "ur5", "--dynx-as-loaded", "--dynx-only=DX999"), "no rule 'DX999'"),
+        (("--dynx-robot", "ur5", "--dynx-as-loaded", "--dynx-ignore=,"), "wanted rules separated by commas"),
         (("--dynx-robot", "ur5", "--dynx-as-loaded", "--dynx-tolerance=2"), "between 0 and 1"),
         (("--dynx-robot", "ur5", "--dynx-as-loaded", "--dynx-baseline=known.json"), "no such file"),
     ],
@@ -283,6 +286,11 @@ def test_as_loaded(run: Run, home: Path) -> None:
     (home / "robots" / "known.json").write_text(json.dumps(known))
     accepted = run(*chosen, "--dynx-baseline", "robots/known.json")
     assert accepted.outcome == {"passed": 1}, accepted.stdout
+    ignored = run(*chosen, "--dynx-ignore", "DX301,link-without-inertial")
+    assert ignored.outcome == {"passed": 1}, ignored.stdout
+    assert "dynx: findings of DX301, link-without-inertial are accepted" in ignored.stdout
+    assert run(*chosen, "--dynx-only", "DX105", "--dynx-only", "DX301").outcome == {"passed": 1}
+    assert run(*chosen, "--dynx-only", "DX101").outcome == {"failed": 1}
     tolerant = run(*chosen, "--dynx-tolerance", "0.999")
     assert tolerant.outcome == {"passed": 1}, tolerant.stdout
 

@@ -236,11 +236,11 @@ def test_a_name_longer_than_a_system_allows_is_an_error_of_dynx(name: str, tmp_p
         load_policy(tmp_path / name)
 
 
-def test_policies_of_earlier_versions_move_rigid_bodies(trained: Path, tmp_path: Path) -> None:
-    """As they were trained: their robots had no joint dynamics, which those of worlds had."""
+def test_policies_of_earlier_versions_keep_their_robots(trained: Path, tmp_path: Path) -> None:
+    """As trained: robots had no limits, and at first no joint dynamics; those of worlds had both."""
     parts = members(trained)
     document = json.loads(parts[DOCUMENT])
-    assert document["schema"] == "dynx.policy/2"
+    assert document["schema"] == "dynx.policy/3"
 
     def task(schema: str, env_id: str, **options: Any) -> Any:
         told = {**document["spec"]["task"], "id": env_id, "options": options}
@@ -248,9 +248,12 @@ def test_policies_of_earlier_versions_move_rigid_bodies(trained: Path, tmp_path:
         path = written(tmp_path / "told.zip", {**parts, DOCUMENT: json.dumps(changed).encode()})
         return read_policy_document(path).spec.task
 
-    off = {"joint_damping": False, "joint_friction": False, "joint_armature": False}
+    off = dict.fromkeys(("joint_damping", "joint_friction", "joint_armature", "joint_limits"), False)
     assert task("dynx.policy/1", "dynx/Reach-v0", robot="panda").options == {**off, "robot": "panda"}
     assert task("dynx.policy/1", "dynx/Reach-v0", **off, robot="panda").options == {**off, "robot": "panda"}
-    assert task("dynx.policy/2", "dynx/Reach-v0", robot="panda").options == {"robot": "panda"}
+    limitless = {"joint_limits": False, "robot": "panda"}
+    assert task("dynx.policy/2", "dynx/Reach-v0", robot="panda").options == limitless
+    assert task("dynx.policy/3", "dynx/Reach-v0", robot="panda").options == {"robot": "panda"}
     for env_id in ("dynx/Push-v0", "CartPole-v1", "own/Unknown-v0"):
-        assert task("dynx.policy/1", env_id).options == {}
+        for version in (1, 2, 3):
+            assert task(f"dynx.policy/{version}", env_id).options == {}

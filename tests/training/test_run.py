@@ -231,21 +231,25 @@ def test_a_checkpoint_that_was_cut_off_is_passed_over(tmp_path: Path) -> None:
         train(small_run(), tmp_path, resume=True)
 
 
-def test_a_run_of_an_earlier_version_goes_on_with_rigid_bodies(tmp_path: Path) -> None:
+@pytest.mark.parametrize("version", [1, 2])
+def test_a_run_of_an_earlier_version_goes_on_with_its_robots(tmp_path: Path, version: int) -> None:
     """Twice: the folder keeps its version, and the caller names the task as before."""
     task = TaskSpec("dynx/Pendulum-v0", "compiled")
     spec = small_run(128, task=task)
     train(spec, tmp_path, schedule=OFTEN, final_episodes=1)
     document = json.loads((tmp_path / "run.json").read_text())
-    assert document["schema"] == "dynx.training/2"
-    (tmp_path / "run.json").write_text(json.dumps({**document, "schema": "dynx.training/1"}))
+    assert document["schema"] == "dynx.training/3"
+    (tmp_path / "run.json").write_text(json.dumps({**document, "schema": f"dynx.training/{version}"}))
     for path in (tmp_path / "checkpoints").glob("*.zip"):
         parts = members(path)
-        told = {**json.loads(parts[DOCUMENT]), "schema": "dynx.policy/1"}
+        told = {**json.loads(parts[DOCUMENT]), "schema": f"dynx.policy/{version}"}
         written(path, {**parts, DOCUMENT: json.dumps(told).encode()})
     for steps in (192, 256):
         found = train(replace(spec, steps=steps), tmp_path, resume=True, schedule=OFTEN, final_episodes=1)
         assert found.resumed_at > 0
-        assert found.policy.spec.task.options["joint_friction"] is False
+        options = found.policy.spec.task.options
+        assert options["joint_limits"] is False
+        assert options.get("joint_friction", True) is (version > 1)
         document = json.loads((tmp_path / "run.json").read_text())
-        assert (document["schema"], document["spec"]["task"]["options"]) == ("dynx.training/1", {})
+        kept = document["schema"], document["spec"]["task"]["options"]
+        assert kept == (f"dynx.training/{version}", {})

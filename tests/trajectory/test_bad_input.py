@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import re
 import sys
 from typing import Any
 
@@ -331,3 +332,23 @@ def test_an_error_of_ruckig_is_one_of_dynx(monkeypatch: pytest.MonkeyPatch) -> N
 def test_errors_pickle() -> None:
     error = pickle.loads(pickle.dumps(TrajectoryError("no way", at=0.25)))
     assert (str(error), error.at) == ("no way", 0.25)
+
+
+@pytest.mark.parametrize(
+    ("name", "call"),
+    [
+        ("CubicSpline", "spline(times, waypoints)"),
+        ("quintic_spline", "kind='quintic'"),
+        ("minimum_jerk", "quintic(q0, q1, duration)"),
+        ("lspb", "trapezoidal(q0, q1"),
+    ],
+)
+def test_usual_names_of_motions_lead_to_the_function(name: str, call: str) -> None:
+    with pytest.raises(AttributeError, match=re.escape(call)):
+        getattr(trajectory, name)
+
+
+@pytest.mark.parametrize("kind", [3, "linear", None])
+def test_a_kind_of_splines_is_one_of_two_names(kind: Any) -> None:
+    with pytest.raises(DynxError, match="wanted 'cubic' or 'quintic'"):
+        trajectory.spline([0.0, 1.0], [[0.0], [1.0]], kind=kind)

@@ -11,7 +11,7 @@ import dynx
 from dynx.errors import TrajectoryError
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import pose_error
-from dynx.trajectory import LineTrajectory, line, trapezoidal
+from dynx.trajectory import LineTrajectory, cubic, line, trapezoidal
 from tests.trajectory.motions import REACH, turned, ur5
 
 FRAME = "tool0"
@@ -81,6 +81,18 @@ def test_the_motion_law_holds_along_the_line() -> None:
         speed = engine.frame_velocity(q, v, FRAME)[:, :3]
     # The spline deviates by d within an interval of 1/n, so its slope by about n d.
     assert np.abs(speed - rate * displacement).max() <= 20.0 * motion.intervals * motion.deviation
+
+
+def test_a_law_without_acceleration_moves_the_frame_at_constant_speed() -> None:
+    """Within the deviation, the frame is where a point of constant speed is."""
+    goal, start, duration, bound = target((0.1, -0.05, 0.1), 0.3), pose(REACH), 2.0, 1e-7
+    rate = [1.0 / duration]
+    law = cubic([0.0], [1.0], duration, v0=rate, v1=rate)
+    motion = line(ur5(), FRAME, REACH, goal, law=law, deviation=bound, rotation_deviation=bound)
+    t = np.linspace(0.0, duration, 41)
+    expected = start[:3, 3] + t[:, None] / duration * (goal[:3, 3] - start[:3, 3])
+    assert np.linalg.norm(pose(motion(t).q)[:, :3, 3] - expected, axis=1).max() <= 1.5 * bound
+    assert np.abs(motion(0.0).v).max() > 0.0
 
 
 def test_too_few_joints_for_the_line_raise() -> None:

@@ -15,11 +15,13 @@ from dynx.model import Pose
 from dynx.spatial.scalar import Floats
 from dynx.steppers.camera import Camera
 from dynx.viewer import Viewer, view
-from dynx.world import Scene, World
+from dynx.viewer.moving_picture import MOVING
+from dynx.world import Material, Scene, World
 from dynx.world.scene import SceneRobot, box, ground
 from tests.viewer.conftest import PICTURE, OpenPage, connected, pixel_of, until
 
-CUBE = box("cube", (0.4, 0.4, 0.4), mass=1.0, pose=Pose((0.0, 0.0, 0.2)))
+DARK_GREY = Material(rgba=(0.25, 0.25, 0.25, 1.0))
+CUBE = box("cube", (0.4, 0.4, 0.4), mass=1.0, pose=Pose((0.0, 0.0, 0.2)), material=DARK_GREY)
 SCENE = Scene("yard", bodies=(ground(), CUBE))
 
 
@@ -62,8 +64,15 @@ def test_a_part_stays_hidden_whichever_shapes_are_shown() -> None:
                 call()
 
 
+RATIO = "window.__viserMutable?.scene?.__r3f?.root?.getState?.()?.viewport?.dpr"
+"""Pixels of the picture for a pixel of the page, in its script."""
+
+
 def colour_at(page: Any, place: Floats) -> Floats:
-    """Return the colour (3,) of the page at a place (2,) [pixels]."""
+    """Return the colour (3,) at a place (2,) [pixels] of the page, once it is drawn whole: while something
+    moves, software draws it with fewer pixels and without gloss."""
+    page.wait_for_function(f"() => {RATIO} !== {MOVING}")
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
     pillow = pytest.importorskip("PIL.Image")
     picture = pillow.open(io.BytesIO(page.screenshot())).convert("RGB")
     return np.asarray(picture.getpixel((round(place[0]), round(place[1]))), dtype=np.float64)

@@ -196,7 +196,8 @@ def test_terms_add_up_to_the_reward(name: str) -> None:
         env.action_space.seed(2)
         for _ in range(3):
             _, reward, terminated, _, _ = env.step(env.action_space.sample())
-            terms = env.episodes.reward_terms()
+            terms = env.reward_terms
+            assert terms == env.episodes.reward_terms()
             assert len(terms) > 1
             assert sum(terms.values()) == pytest.approx(reward, rel=1e-6, abs=1e-9)
             assert not terminated

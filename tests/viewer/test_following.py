@@ -146,3 +146,36 @@ def test_the_subject_stays_where_it_is_in_each_picture(open_page: OpenPage) -> N
         until(lambda: not alike(silhouette(page.page), nearer, BOUND), "the camera to stay")
         assert not page.errors
         assert not later.errors
+
+
+def test_a_page_follows_a_robot_by_its_name(open_page: OpenPage) -> None:
+    robot = dynx.load(
+        "<robot name='droid'><link name='base'><visual><geometry><box size='0.4 0.4 0.4'/></geometry>"
+        "<material name='m'><color rgba='1 0.4 0 1'/></material></visual><inertial><mass value='1'/>"
+        "<inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial></link></robot>",
+        base="floating",
+    )
+    scene = Scene("two", robots=(SceneRobot("r2d2", robot),), bodies=(ground(),))
+    with World(scene) as world, world.view(steps=False) as viewer:
+        page = open_page(viewer.url, (700, 425))
+        connected(viewer)
+        T = np.eye(4)
+        T[2, 3] = 0.5
+        viewer.view.drawn.place({"r2d2/base": T})
+        page.page.wait_for_timeout(PICTURE)
+        until(lambda: silhouette(page.page)[2] > 0.05, "the robot")
+        start = silhouette(page.page)
+
+        def move(name: str | None) -> None:
+            viewer.follow(name)
+            page.page.wait_for_timeout(PICTURE)
+            T = viewer.view.drawn.pose("r2d2/base")
+            T[:3, 3] += [0.5, 0.4, 0.0]
+            viewer.view.drawn.place({"r2d2/base": T})
+            page.page.wait_for_timeout(PICTURE)
+
+        move("r2d2")
+        until(lambda: alike(silhouette(page.page), start, BOUND), "the view of the start")
+        move(None)
+        until(lambda: not alike(silhouette(page.page), start, BOUND), "another view")
+        assert not page.errors

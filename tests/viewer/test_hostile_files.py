@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+import sys
 import zlib
 from collections.abc import Callable
 from pathlib import Path
@@ -16,7 +17,9 @@ import pytest
 import dynx
 from dynx.errors import DescriptionError
 from dynx.viewer import Viewer, view
+from tests.security.surfaces.page import MARK
 from tests.viewer.conftest import Opened, OpenPage, connected
+from tests.viewer.hostile_pages import VIEWED_FILES, faults_of_files, faults_of_page
 
 NAMES = (
     "<script>window.ran=1</script>",
@@ -241,3 +244,25 @@ def hover_everywhere(page: Opened) -> None:
     for share in (0.2, 0.4, 0.5, 0.6, 0.8):
         page.page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + share * box["height"])
         page.page.wait_for_timeout(100.0)
+
+
+SAMPLED = 5
+"""One of so many hostile files is opened here; all of them by ``python -m tests.viewer.hostile_pages``."""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the attacks need Linux")
+def test_pages_of_hostile_files_open_without_a_network(browser: Any, tmp_path: Path) -> None:
+    assert len(VIEWED_FILES) >= 20
+    found = faults_of_files(browser, VIEWED_FILES[::SAMPLED], tmp_path)
+    assert {name: wrong for name, wrong in found.items() if wrong} == {}
+    assert len(list(tmp_path.glob("*/here/out.html"))) >= 4
+
+
+def test_what_a_hostile_page_does_is_found(browser: Any, tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    page.write_text(
+        f"<canvas data-engine='x'></canvas><script>{MARK}()</script><img src='https://192.0.2.1/x.png'>"
+    )
+    found = " ".join(faults_of_page(browser, page))
+    assert "ran a script" in found
+    assert "asked for https://192.0.2.1/x.png" in found

@@ -1,4 +1,4 @@
-"""The example of docs/viewer.md that reads a joystick moves its world."""
+"""The example of docs/how-to/controls-in-the-viewer.md that reads a joystick moves its world."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-PAGE = Path(__file__).parents[2] / "docs/viewer.md"
+PAGE = Path(__file__).parents[2] / "docs/how-to/controls-in-the-viewer.md"
 
 
 def test_the_axis_of_a_joystick_pushes_the_cart(tmp_path: Path) -> None:
@@ -23,6 +23,6 @@ def test_the_axis_of_a_joystick_pushes_the_cart(tmp_path: Path) -> None:
     code += "\n    q = world.state.robots['cart'].q\n"
     names: dict[str, Any] = {}
     code = code.replace("daemon=True).start()", "daemon=True).run()")
-    exec(compile(code, "docs/viewer.md", "exec"), names)
+    exec(compile(code, str(PAGE), "exec"), names)
     assert names["axes"] == {0: -16384 / 32767}
     assert np.asarray(names["q"])[0] < -0.1

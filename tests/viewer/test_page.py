@@ -45,8 +45,8 @@ SAME = 0.93
 """Share of the pixels of a silhouette that two renderers have in common; edges differ by a pixel."""
 
 
-def rendered_silhouette(viewer: Viewer, camera: Camera) -> Any:
-    """Return where the page, drawn from a camera's place, shows something (height, width)."""
+def rendered_silhouette(viewer: Viewer, camera: Camera, opacity: float = 0.5) -> Any:
+    """Return where the page, drawn from a camera's place, shows something of an opacity (height, width)."""
     (client,) = connected(viewer)
     T = camera.pose.matrix
     x, y, z, w = quat_from_rotation(T[:3, :3])
@@ -60,7 +60,7 @@ def rendered_silhouette(viewer: Viewer, camera: Camera) -> Any:
         transport_format="png",
         timeout=PATIENCE,
     )
-    return picture[..., 3] > 127
+    return picture[..., 3] > 255.0 * opacity
 
 
 def drawn_silhouette(model: Model, q: Floats, camera: Camera) -> Any:
@@ -159,14 +159,14 @@ def test_held_keys_the_pointer_and_choices_reach_the_program(open_page: OpenPage
         assert "released" not in told
         told.clear()
         page.page.keyboard.down("k")
-        page.page.keyboard.down("ArrowUp")
-        until(lambda: viewer.keys == {"k", "arrowup"}, "the keys that are held")
+        page.page.keyboard.down("Home")
+        until(lambda: viewer.keys == {"k", "home"}, "the keys that are held")
         until(lambda: "pressed" in told, "the press")
         assert "released" not in told
         page.page.keyboard.up("k")
         until(lambda: "released" in told, "the release")
-        assert viewer.keys == {"arrowup"}
-        page.page.keyboard.up("ArrowUp")
+        assert viewer.keys == {"home"}
+        page.page.keyboard.up("Home")
         until(lambda: not viewer.keys, "no key")
 
         target = cube.pose.matrix[:3, 3]
@@ -191,6 +191,39 @@ def test_held_keys_the_pointer_and_choices_reach_the_program(open_page: OpenPage
         assert not page.errors
         page.page.close()
         until(lambda: not viewer.keys, "no key of a page that was closed")
+
+
+def test_a_choice_reaches_the_program_and_everything_is_removed_at_once(open_page: OpenPage) -> None:
+    with view("six_axis_arm") as viewer:
+        page = open_page(viewer.url)
+        connected(viewer)
+        told: list[Any] = []
+        gait = viewer.dropdown("gait", ["walk", "trot"], changed=told.append)
+        wind, mass = viewer.checkbox("wind", changed=told.append), viewer.number("mass", 1.0)
+        viewer.button("press me", lambda: told.append("pressed"))
+        written = viewer.text("here", (0.0, 0.0, 0.5), colour="red", size=20.0)
+        names = {"gait": gait, "wind": wind, "mass": mass, "here": written}
+        shown = {name: page.page.get_by_text(name, exact=True) for name in (*names, "press me")}
+        for each in shown.values():
+            each.first.wait_for()
+        page.page.locator("input[value=walk]").first.click()
+        page.page.get_by_role("option", name="trot").click()
+        until(lambda: told == ["trot"], "the choice")
+        assert gait.value == "trot"
+        wind.value, mass.value, gait.value = True, 2.0, "walk"
+        page.page.wait_for_function(
+            """() => {
+              const values = [...document.querySelectorAll("input")].map((each) => each.value);
+              return values.includes("walk") && values.includes("2") && !values.includes("trot");
+            }"""
+        )
+        assert page.page.get_by_label("wind").is_checked()
+        # What the program sets is not told to it.
+        assert told == ["trot"]
+        viewer.remove_all()
+        until(lambda: not any(each.count() for each in shown.values()), "everything to go")
+        assert page.page.get_by_role("button", name="random").count() == 1
+        assert not page.errors
 
 
 def poses_in_page(page: Opened, paths: Mapping[str, str]) -> dict[str, Floats]:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import re
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,14 +17,19 @@ from numpy.typing import NDArray
 import dynx
 from dynx.errors import ArgumentError
 from dynx.model import Pose
-from dynx.model.geometry import Sphere
+from dynx.model.geometry import Box, Plane, Sphere
+from dynx.spatial.se3 import homogeneous
 from dynx.steppers.camera import Camera, DrawnShape, DrawnTriangles
 from dynx.viewer import Viewer
+from dynx.viewer.colours import RGB
+from dynx.viewer.export import stage_for
 from dynx.viewer.lettering import length_text
 from dynx.viewer.node_shapes import arrow
 from dynx.world import Material, Scene, SceneRobot, World, box, ground, sphere
-from dynx.world.camera import cast_rays_smoothly, drawn_shapes
-from dynx.world.scenery import LIGHT
+from dynx.world.camera import BEHIND_OPACITY, cast_rays_smoothly, drawn_shapes
+from dynx.world.comparison import compare_engines
+from dynx.world.scenery import DARK, LIGHT
+from tests.viewer.test_colours import DICHROMATS, TOLD_APART, distance
 
 ROBOT = (
     "<robot name='r'><link name='base'><inertial><mass value='1'/>"
@@ -72,12 +80,85 @@ def test_a_picture_hides_what_the_page_hides() -> None:
     with dynx.load(ROBOT).view() as viewer:
         whole = greenish(drawn(viewer))
         assert whole > 200
-        viewer.set_opacity(0.4)
+        viewer.set_opacity(0.3)
         clear = drawn(viewer)
         strong = (clear[..., 1] > clear[..., 0] + 60).sum()
         assert strong < 0.5 * whole
         viewer.set_visible("base", False)
         assert greenish(drawn(viewer)) == 0
+
+
+def test_the_ground_stays_when_everything_is_seen_through() -> None:
+    scene = Scene("yard", robots=[SceneRobot("r", dynx.load(ROBOT))], bodies=[ground()])
+    with World(scene) as world, world.view(steps=False) as viewer:
+        before = drawn(viewer)
+        viewer.set_opacity(0.0)
+        after = drawn(viewer)
+        assert greenish(after) == 0
+        corner = np.s_[-12:, :12]
+        assert np.array_equal(after[corner], before[corner])
+        viewer.set_opacity(0.0, "ground")
+        assert np.abs(drawn(viewer)[corner] - before[corner]).max() > 20
+
+
+def test_what_is_seen_through_casts_a_weak_shadow() -> None:
+    camera = Camera.look_at((0.0, -1.0, 2.0), (0.0, 0.0, 0.0), size=(60, 45))
+    plane = DrawnShape(0, Plane(), (0.7, 0.7, 0.7, 1.0), np.eye(4))
+    T = np.eye(4)
+    T[:3, 3] = 0.0, 0.0, 1.5
+    shadows = []
+    for opacity in (1.0, 0.5, 0.0):
+        ball = DrawnShape(0, Sphere(0.2), (0.7, 0.7, 0.7, opacity), T)
+        solid, veils = ([plane, ball], []) if opacity == 1.0 else ([plane], [ball] if opacity else [])
+        picture = cast_rays_smoothly(solid, camera.pose.matrix, camera, LIGHT, veils=veils)
+        shadows.append(picture.rgb.reshape(45, 60, 3).astype(int))
+    # The ball is above the picture, and its shadow in it.
+    dark, weak, none = (int((each.min(axis=2)).min()) for each in shadows)
+    assert dark + 10 < weak < none - 10
+
+
+def test_a_picture_of_a_motion_sees_what_moves_at_its_time() -> None:
+    ball = sphere("ball", 0.1, mass=1.0, pose=Pose((0.0, 0.0, 0.1)), twist=(9.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    slippery = Material(friction=0.0)
+    scene = Scene("lane", bodies=[ground(material=slippery), replace(ball, material=slippery)])
+    run = compare_engines(scene, ["mujoco"], duration=1.0)
+    with Viewer(run, port=0) as viewer:
+        viewer.view.go_to(1.0)
+        seen = viewer._stage(SIZE, None, None, SIZE, viewer.view.time).camera
+        whole = viewer._stage(SIZE, None, None, SIZE).camera
+        first = viewer.view.motions[0]
+        both = stage_for(first, time=1.0, ghost=replace(first, name="other"))
+        assert both.caption.startswith("solid: mujoco, blue: other; tiles: ")
+        place = viewer.view.motions[0].poses["ball"][-1][:3, 3]
+        shares = [
+            0.2 * each.focal_length / (each.pose.matrix[:3, 2] @ (place - each.pose.matrix[:3, 3]))
+            for each in (seen, whole)
+        ]
+    # The box around a ball, which takes the share, is larger than the ball.
+    assert shares[0] / SIZE[1] > 0.4
+    assert shares[1] / SIZE[1] < 0.2
+
+
+def test_a_plane_in_the_default_grey_has_the_colour_of_the_ground() -> None:
+    grey, red = Material().rgba, (0.9, 0.1, 0.1, 1.0)
+    assert DARK.own_colour(Plane(), grey) == (*DARK.ground, 1.0)
+    assert DARK.own_colour(Plane(), red) == red
+    assert DARK.own_colour(Sphere(1.0), grey) == grey
+
+
+def test_numbers_of_contact_forces_stand_at_their_arrows() -> None:
+    cube = box("cube", (0.2, 0.2, 0.2), mass=2.0, pose=Pose((0.0, 0.0, 0.1)))
+    with World(Scene("one", bodies=[ground(), cube]), "mujoco") as world:
+        world.step(500)
+        with world.view(steps=False) as viewer:
+            assert not viewer._nodes(EYE).words
+            viewer.set_shown("force numbers")
+            words = viewer._nodes(EYE).words
+            forces = [float(each.text.removesuffix(" N")) for each in words]
+            assert sum(forces) == pytest.approx(2.0 * 9.81, rel=0.02)
+            assert all(each.point[2] > 0.01 for each in words)
+            viewer.set_shown("contact forces", False)
+            assert not viewer._nodes(EYE).words
 
 
 def test_pictures_of_motions_and_worlds_show_collision_shapes() -> None:
@@ -196,3 +277,65 @@ def test_a_mark_without_a_surface_to_hide_it_is_drawn_as_it_is() -> None:
 )
 def test_lengths_have_a_unit_that_suits_them(length: float, text: str) -> None:
     assert length_text(length) == text
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_the_parts_of_the_cart_pole_stand_out(dark: bool) -> None:
+    """Rail, cart and pole differ from each other and from the ground, also for readers without a kind of
+    cone."""
+    cart_pole = dynx.load("cart_pole")
+    camera = Camera.look_at((1.5, -3.0, 2.0), (0.0, 0.0, 0.2), size=(240, 135))
+    with World(Scene("track", robots=(SceneRobot("r", cart_pole),))) as world:
+        segments = world.camera(camera)
+    with cart_pole.view(q=cart_pole.neutral(), dark=dark) as viewer:
+        picture = viewer._picture(None, camera, None)
+    parts = {name: segments.mask(f"r/{name}") for name in ("rail", "cart", "pole")}
+    # The sky is above.
+    parts["ground"] = ~np.any(list(parts.values()), axis=0) & (np.arange(135) > 60)[:, None]
+    colours: dict[str, RGB] = {}
+    for name, mask in parts.items():
+        r, g, b = np.median(picture[mask], axis=0).astype(int).tolist()
+        colours[name] = (r, g, b)
+    for one, other in itertools.combinations(colours, 2):
+        for kind in DICHROMATS:
+            assert distance(colours[one], colours[other], kind) > TOLD_APART, (one, other)
+
+
+LEVER = (
+    "<robot name='r'><link name='base'><visual><geometry><box size='0.2 0.2 0.2'/></geometry></visual></link>"
+    "<link name='lever'><inertial><origin xyz='0.3 0 0'/><mass value='1'/>"
+    "<inertia ixx='0.01' iyy='0.01' izz='0.01' ixy='0' ixz='0' iyz='0'/></inertial>"
+    "<visual><origin xyz='0.3 0 0'/><geometry><box size='0.4 0.1 0.1'/></geometry></visual></link>"
+    "<joint name='j' type='revolute'><parent link='base'/><child link='lever'/><axis xyz='0 1 0'/>"
+    "<limit lower='-1' upper='1' effort='4' velocity='1'/></joint></robot>"
+)
+"""A lever of grey boxes whose joint bears 2.9 N m at rest."""
+
+
+def test_gravity_torques_are_seen_outside_of_the_links() -> None:
+    lever = dynx.load(LEVER)
+    camera = Camera.look_at((0.55, -0.45, 0.35), (0.0, -0.05, 0.0), size=(320, 240))
+    with lever.view(q=lever.neutral()) as viewer:
+        before = viewer._picture(None, camera, None).astype(int)
+        viewer.set_shown("gravity torques")
+        after = viewer._picture(None, camera, None).astype(int)
+    changed = np.abs(after - before).max(axis=2) > 30
+    arrow_shown = changed & (after.max(axis=2) - after.min(axis=2) > 80)
+    number_shown = changed & (after.min(axis=2) > 200)
+    assert arrow_shown.sum() > 20
+    assert number_shown.sum() > 50
+
+
+def test_axes_are_seen_through_the_shapes_before_them_in_their_own_colour() -> None:
+    wall = DrawnShape(0, Box((0.4, 0.4, 0.4)), (0.5, 0.5, 0.5, 1.0), np.eye(4))
+    axis = DrawnShape(0, Sphere(0.05), (1.0, 0.0, 0.0, 1.0), np.eye(4))
+    pixel = EYE.size[0] * (EYE.size[1] // 2) + EYE.size[0] // 2
+
+    def seen(shapes: list[DrawnShape], through: list[DrawnShape]) -> Any:
+        return cast_rays_smoothly(shapes, EYE.pose.matrix, EYE, seen_through=through).rgb[pixel] / 255.0
+
+    assert seen([], [axis]) == pytest.approx([1.0, 0.0, 0.0], abs=0.01)
+    mixed = BEHIND_OPACITY * np.array([1.0, 0.0, 0.0]) + (1.0 - BEHIND_OPACITY) * seen([wall], [])
+    assert seen([wall], [axis]) == pytest.approx(mixed, abs=0.01)
+    before = axis._replace(T=np.asarray(homogeneous(np.eye(3), 0.7 * EYE.pose.matrix[:3, 3])))
+    assert seen([wall], [before]) == pytest.approx([1.0, 0.0, 0.0], abs=0.01)

@@ -101,8 +101,11 @@ def test_a_film_of_a_world_plays_in_its_time(tmp_path: Path) -> None:
     assert ffmpeg.count_frames_and_secs(str(still))[0] == 1
 
 
+# imageio-ffmpeg leaves the pipe of a process that has ended to the garbage collector.
+@pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
 def test_the_page_saves_pictures_and_films(open_page: OpenPage, tmp_path: Path) -> None:
     pillow = pytest.importorskip("PIL.Image")
+    ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="needs the extra film")
     with World(SCENE) as world, world.view(steps=False) as viewer:
         page = open_page(viewer.url, (700, 400))
         (client,) = connected(viewer)
@@ -130,4 +133,19 @@ def test_the_page_saves_pictures_and_films(open_page: OpenPage, tmp_path: Path) 
         film = saved(lambda: page.page.get_by_role("button", name="stop and save").click())
         assert film.format == "GIF"
         assert film.n_frames == max(1, round(50 * world.dt * PICTURES_PER_SECOND))
+        page.page.get_by_label("as", exact=True).click()
+        page.page.get_by_role("option", name=".mp4").click()
+        page.page.get_by_role("button", name="record film").click()
+        page.page.get_by_role("button", name="stop and save").wait_for()
+        for _ in range(10):
+            world.step(20)
+            viewer.update()
+        with page.page.expect_download() as download:
+            page.page.get_by_role("button", name="stop and save").click()
+        assert download.value.suggested_filename == "dynx.mp4"
+        download.value.save_as(tmp_path / "page.mp4")
+        seconds = 200 * world.dt
+        pictures, shown_for = ffmpeg.count_frames_and_secs(str(tmp_path / "page.mp4"))
+        assert pictures == max(1, round(seconds * PICTURES_PER_SECOND))
+        assert shown_for == pytest.approx(seconds, abs=0.005)
         assert not page.errors

@@ -73,6 +73,10 @@ def test_other_machines_are_let_in_only_if_asked(arm: Model) -> None:
         with arm.view(**options) as viewer, socket.socket() as other:
             # Every address of the network 127 is this machine's; the page has one of them, or all.
             assert (other.connect_ex(("127.0.0.2", viewer.page.port)) == 0) == let_in
+            if let_in:
+                # A server that ends before it has taken up a connection leaves it to the garbage collector.
+                other.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.2\r\n\r\n")
+                assert other.recv(9) == b"HTTP/1.1 "
 
 
 def test_a_port_that_is_taken_is_told(arm: Model) -> None:
@@ -405,6 +409,24 @@ def test_pictures_and_films_are_drawn_without_a_browser(arm: Model, tmp_path: Pa
     assert (tmp_path / "robot.png").stat().st_size > 1000
 
 
+def test_a_film_has_the_pictures_a_second_that_are_wanted(tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image")
+    with dynx.simulate("six_axis_arm", duration=0.4).view() as viewer:
+        viewer.export(tmp_path / "run.gif", size=(60, 40), fps=25)
+        for name, fps in (
+            ("a.gif", 0.0),
+            ("a.gif", 101.0),
+            ("a.gif", "25"),
+            ("a.png", 25.0),
+            ("a.html", 25.0),
+        ):
+            with pytest.raises(ArgumentError, match="fps is"):
+                viewer.export(tmp_path / name, fps=fps)
+    with image.open(tmp_path / "run.gif") as film:
+        assert film.n_frames == 10
+        assert film.info["duration"] == 40
+
+
 def test_a_picture_leaves_out_what_cannot_be_read(tmp_path: Path) -> None:
     """A page leaves out such shapes; a picture once refused a robot for a collision shape."""
     text = """<robot name="r">
@@ -500,3 +522,9 @@ def test_all_curves_of_a_rollout_have_the_axis_of_the_whole_motion() -> None:
     with rollout.view() as viewer:
         ranges = [curves._plot.scales["x"]["range"] for curves in viewer.view._curves]
         assert ranges == [(0.0, 0.001)] * 3
+
+
+def test_a_program_that_closes_no_view_ends_without_a_word() -> None:
+    program = "import dynx; view = dynx.load('pendulum').view()"
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert (run.stdout, run.stderr) == ("", "")

@@ -1,6 +1,6 @@
 """Friction and restitution as they act: measured by sliding bodies and by dropping them.
 
-``python -m tests.world.materials`` prints the tables of docs/world.md.
+``python -m tests.world.materials`` prints the tables of docs/explanation/what-engines-do-differently.md.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ WEIGHT = np.array([0.0, 0.0, -9.81])
 
 RESIDUALS = {"pybullet": 1e-9, "mujoco": 1e-4, "drake": 1e-6}
 """Residual of each engine's own contact solver in a step, relative to the impulses, in Drake to the momenta
-(docs/world.md)."""
+(docs/explanation/what-engines-do-differently.md)."""
 
 
 def mean_force(world: World, part: str) -> Floats:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -118,6 +120,19 @@ def test_the_state_that_is_set_is_the_one_that_is_read(engine: str) -> None:
     assert_allclose(body.twist, twist, atol=1e-12)
 
 
+def test_no_velocity_is_at_rest(engine: str) -> None:
+    model = dynx.load("six_axis_arm")
+    moving = SceneRobot("r", model, v=(0.5,) * model.nv)
+    with World(
+        Scene("s", robots=(moving,), bodies=(box("brick", (0.1, 0.1, 0.1), mass=1.0),)), engine, DT
+    ) as world:
+        world.set_state(
+            robots={"r": (model.neutral(), None)}, bodies={"brick": (Pose((0.0, 0.0, 2.0)), None)}
+        )
+        assert not world.state.robots["r"].v.any()
+        assert not world.state.bodies["brick"].twist.any()
+
+
 @pytest.mark.parametrize("base", ["fixed", "floating"])
 @pytest.mark.parametrize("name", ["six_axis_arm", "panda"])
 def test_a_wrench_on_a_link_acts_as_its_torque(engine: str, name: str, base: Base) -> None:
@@ -148,7 +163,8 @@ def test_robots_step_as_simulate_does(engine: str, name: str, base: Base) -> Non
     rng = np.random.default_rng(4)
     q, v, tau = configuration.random(model, rng), rng.normal(size=model.nv), rng.normal(size=model.nv)
     controller = OpenLoop(model, np.tile(tau, (50, 1)), control_dt=2 * DT)
-    rollout = dynx.simulate(model, controller, plant=engine, duration=0.1, dt=2 * DT, substeps=2, q0=q, v0=v)
+    options: dict[str, Any] = {"plant": engine, "duration": 0.1, "dt": 2 * DT, "substeps": 2}
+    rollout = dynx.simulate(model, controller, q0=q, v0=v, joint_limits=False, **options)
     scene = Scene("s", robots=(SceneRobot("r", model, q=tuple(q), v=tuple(v)),))
     with World(scene, engine, 2 * DT, substeps=2, collisions=False, joint_limits=False) as world:
         world.step(50, torques={"r": tau})

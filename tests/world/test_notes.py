@@ -219,3 +219,21 @@ def test_angles_of_a_scene_that_look_like_degrees_are_noted() -> None:
             if noted:
                 assert "'elbow_joint' is at 90 rad, far beyond its limits" in of_motors[1]
                 assert "90 degrees are 1.5708 rad" in of_motors[1]
+
+
+def test_targets_of_motors_in_steps_are_noted_once_where_they_look_like_degrees() -> None:
+    arm = dynx.load("ur5")
+    target = np.array([0.0, -90.0, 0.0, 0.0, 0.0, 0.0])
+    with World(Scene("s", robots=[SceneRobot("arm", arm)]), "mujoco", dt=1e-3) as world:
+        before = world.notes
+        # Neither a target in radians, a little beyond a limit, nor one without stiffness.
+        for motor in (np.radians(target), np.array([6.9, 0.0, 0.0, 0.0, 0.0, 0.0]), target):
+            world.step(motors={"arm": PDMotor(motor, 0.0 if motor is target else 1.0, 10.0)})
+        assert world.notes == before
+        for _ in range(3):
+            world.step(motors={"arm": PositionMotor(target, 100.0, 10.0)})
+        assert world.notes == (
+            *before,
+            "the target of the motors of 'arm': 'shoulder_lift_joint' is at -90 rad, far beyond its limits "
+            "-6.283 to 6.283; -90 degrees are -1.5708 rad",
+        )

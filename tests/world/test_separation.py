@@ -111,3 +111,13 @@ def test_old_names_of_the_comparison_name_the_new_one() -> None:
     ):
         with pytest.raises(ImportError, match=r"is now dynx\.compare"):
             getattr(package, name)
+
+
+def test_the_text_of_a_separation_is_one_short_line() -> None:
+    t = np.linspace(0.0, 1.0, 11)
+    nothing = separation(Record("ours", t, {}), Record("theirs", t, {}))
+    assert repr(nothing) == "<Separation of ours and theirs: nothing compared>"
+    ours = Record("ours", t, {"cube": position_channel("cube", np.outer(t, (0.0, 0.3, 0.4)))})
+    theirs = Record("theirs", t, {"cube": position_channel("cube", np.zeros((11, 3)))})
+    text = "<Separation of ours and theirs: at most 0.5 m, cube at 1 s, 11 times>"
+    assert repr(separation(ours, theirs)) == text

@@ -30,7 +30,7 @@ from dynx.world import (
 from dynx.world.scene import SceneRobot
 from tests.world.engines import WORLDS
 
-PAGE = (Path(__file__).parents[2] / "docs" / "world.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs/reference/worlds.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("engine", WORLDS)

@@ -1,15 +1,19 @@
-"""Declarations of ``dynx agree``, ``doctor`` and ``bench``: engines compared on robots."""
+"""Declarations of ``dynx agree``, ``doctor``, ``same`` and ``bench``: engines and descriptions compared."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import click
 
 from dynx.cli.shell.lazy import runs
 from dynx.cli.shell.options import (
+    F,
     FiniteRange,
     choice_pair,
     engine_option,
     frame_option,
+    joined,
     json_option,
     model_options,
     name_list,
@@ -74,6 +78,17 @@ def agree() -> None:
     """
 
 
+def _rules_option(option: str, subject: str) -> Callable[[F], F]:
+    return click.option(
+        option,
+        type=name_list,
+        multiple=True,
+        callback=joined,
+        metavar="RULE,...",
+        help=f"{subject}, by number or name (see `dynx explain`); may be given several times.",
+    )
+
+
 @click.command
 @click.argument("robots", nargs=-1, required=True, metavar="ROBOT...")
 @click.option(
@@ -112,8 +127,8 @@ def agree() -> None:
     "--fix",
     "fix",
     metavar="OUT",
-    help="File for the mended URDF; for several robots a directory. A file of that name is replaced, unless "
-    "it is one of the robots that are read.",
+    help="File for the mended URDF; for several robots, or with / at its end, a directory, which is made. A "
+    "file of that name is replaced, unless it is one of the robots that are read.",
 )
 @click.option(
     "--level",
@@ -123,6 +138,8 @@ def agree() -> None:
     help="Largest change of the mended URDF: `safe` changes nothing that a reader notices, `rounding` the "
     "equations of motion by rounding only, `physics` whatever the causes require.",
 )
+@_rules_option("--ignore", "Rules whose findings are counted and make no check fail")
+@_rules_option("--only", "Rules whose findings alone make a check fail; all others are counted")
 @click.option(
     "--in-place", is_flag=True, help="Overwrite the files that were read with the mended descriptions."
 )
@@ -160,16 +177,62 @@ def doctor() -> None:
     Each cause is proved by removing it alone from the file and measuring the engines again. The file
     that was read is changed only with --in-place. Other files named as outputs are replaced where they exist.
 
-    Exit code 0 if no engine differs (or only as the baseline allows, or a baseline was written), 1 if
-    some differ on the file as it was read, mended or not, 2 if some robot cannot be used (the others are
-    examined nevertheless). Ctrl-C ends the run with the results so far and exit code 130.
+    Differences that no rule explains fail always, whatever --ignore and --only name; --fix mends the
+    causes of all rules.
+
+    Exit code 0 if no engine differs (or only as the baseline, --ignore or --only allow, or a baseline was
+    written), 1 if some differ on the file as it was read, mended or not, 2 if some robot cannot be used
+    (the others are examined nevertheless). Ctrl-C ends the run with the results so far and exit code 130.
 
     \b
     Examples:
       dynx doctor ur5
       dynx doctor my.urdf --fix mended.urdf
       dynx doctor robots/ --base both --html report.html --jobs 4
+      dynx doctor my.urdf --ignore DX301,inertia-not-diagonal
       dynx doctor robots/ --tolerance 1e-6 --baseline known.json --sarif out.sarif
+    """
+
+
+@click.command
+@click.argument("first", metavar="A")
+@click.argument("second", metavar="B")
+@click.option(
+    "--base",
+    type=click.Choice(["fixed", "floating"]),
+    help="Mount of the root links; by default that of an MJCF or SDF file, of A or B, else fixed.",
+)
+@click.option(
+    "--tolerance",
+    type=FiniteRange(min=0.0, max=1.0, max_open=True),
+    help="Largest difference of one robot, relative to the natural magnitude (default: 1e-9).",
+)
+@click.option(
+    "--fix",
+    "fix",
+    metavar="OUT",
+    help="File for B with the elements that differ replaced by those of A, in the format of B: .urdf, or "
+    ".xml or .mjcf for MJCF. A file of that name is replaced, unless it is A, B or included by them.",
+)
+@json_option
+@silent_option
+@runs("dynx.cli.same:same")
+def same() -> None:
+    """Decide whether A and B describe the same robot in every state; name and mend what differs.
+
+    A and B are names (see `dynx robots`), URDF, xacro, MJCF or SDF files. Links are merged across fixed
+    joints; frames of links, signs of axes and inertia that no state shows make no difference. Where the
+    robots differ, the fewest elements of B are listed that make them the same when replaced by those of A.
+    Limits, joint dynamics, shapes, frames and names are listed apart from the verdict.
+
+    Exit code 0 if it is the same robot, 1 if not, mended or not, 2 if A or B cannot be used, or B is to be
+    mended and cannot be.
+
+    \b
+    Examples:
+      dynx same robot.urdf robot.xml
+      dynx same old.urdf new.urdf --tolerance 1e-6 --fix mended.urdf
+      dynx same g1 g1_with_hands --json
     """
 
 

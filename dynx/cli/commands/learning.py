@@ -129,25 +129,21 @@ def distance() -> None:
         multiple=True,
         metavar="NAME=VALUE",
         help="Parameter of a task of dynx that each episode draws, such as mass_scale=[0.8,1.2] (uniform) or "
-        "delay=0.02 [s]; may be given several times (docs/environments.md).",
+        "delay=0.02 [s]; may be given several times.",
     ),
     click.option(
         "--algo",
         "algorithm",
-        default="ppo",
-        show_default=True,
         metavar="NAME",
-        help="Algorithm of stable-baselines3: ppo, a2c, dqn, sac or td3.",
+        help="Algorithm of stable-baselines3: ppo, a2c, dqn, sac or td3 (default: ppo).",
     ),
     click.option("--steps", type=click.IntRange(min=1), help="Number of steps (default: the published one)."),
     click.option(
         "--seed",
         "seeds",
         type=whole_numbers,
-        default="0",
-        show_default=True,
         metavar="A,B,C",
-        help="Seeds, each with a run of its own.",
+        help="Seeds, each with a run of its own (default: 0).",
     ),
     click.option(
         "--envs",
@@ -177,7 +173,12 @@ def distance() -> None:
         metavar="FOLDER",
         help="Folder of the run, with a folder for each seed (default: runs/TASK-ENGINE-ALGO).",
     ),
-    click.option("--resume", is_flag=True, help="Go on from the last checkpoint in the folder."),
+    click.option(
+        "--resume",
+        is_flag=True,
+        help="Go on from the last checkpoint in the folder, with the options of its run; only those that "
+        "change, such as --steps, are given.",
+    ),
     click.option(
         "--checkpoint-every",
         type=click.IntRange(min=1),
@@ -234,7 +235,7 @@ def train() -> None:
       dynx train CartPole --engine compiled --seed 0,1,2 --plot curve.png
       dynx train Stand --engine mujoco --out stand
       dynx train LunarLander-v3 --out lander
-      dynx train Stand --engine mujoco --out stand --resume
+      dynx train --resume --out stand
       dynx train CartPole --engine compiled --randomize mass_scale=[0.5,2]
       dynx train Pendulum --algo sac --steps 20000 --set learning_rate=0.001
     """

@@ -50,7 +50,12 @@ from dynx.errors import shown
         show_default=True,
         help="Number of steps of the engine in each step.",
     ),
-    settings_option("Setting of an engine (docs/world.md)"),
+    settings_option("Setting of an engine"),
+    click.option(
+        "--keyframe",
+        metavar="NAME",
+        help="Keyframe of a scene in MJCF at which it starts (default: the pose of the file, at rest).",
+    ),
     click.option(
         "--contact-interval",
         type=FiniteRange(min=0.0, min_open=True),
@@ -89,9 +94,11 @@ from dynx.errors import shown
 def world() -> None:
     """Run a scene of robots and bodies with contacts, and compare the engines.
 
-    SCENE is a scene file (TOML or JSON) or the name of a scene of dynx: bowling, duck, lifting, pushing,
-    rolling, slope, stack or standing. Robots of a scene in .xacro files are expanded, which evaluates
-    expressions of them as Python code: run only scenes with such files that you trust.
+    SCENE is a scene file (TOML or JSON), a file in MJCF (.xml or .mjcf), or the name of a scene of dynx:
+    bowling, duck, landing, lifting, pushing, rolling, slope, stack or standing. Notes name what of MJCF is
+    not read. Robots of a scene in .xacro files are expanded, which evaluates expressions of them as Python
+    code: run only scenes with such files that you trust.
+
     The final states are printed, the contacts of the last step, and for every two engines how far apart
     their motions are over time. Notes name parts that overlap at the start, and constraints that it violates.
 
@@ -104,6 +111,7 @@ def world() -> None:
       dynx world bowling --engine pybullet,mujoco --duration 3 --plot apart.png
       dynx world my_scene.toml --engine mujoco --set impratio=100 --json
       dynx world my_scene.toml --export my_scene.xml
+      dynx world table.xml --keyframe home --export table.toml
     """
 
 
@@ -143,7 +151,7 @@ def steps(text: str) -> tuple[float, ...]:
         help="Steps of 1e-6 to 0.1 s, numbers or fractions such as 1/240 (default: 0.004,0.002,0.001). With "
         "a single step no error can fall.",
     ),
-    settings_option("Setting of an engine (docs/world.md), or substeps"),
+    settings_option("Setting of an engine, or substeps"),
     click.option(
         "--jobs",
         type=click.IntRange(min=1),
@@ -251,7 +259,9 @@ def compare() -> None:
         "--dt", type=FiniteRange(min=0.0, min_open=True), help="Step of a scene [s] (default: 0.001)."
     ),
     click.option(
-        "--base", type=click.Choice(["fixed", "floating"]), help="Base of a robot (default: fixed)."
+        "--base",
+        type=click.Choice(["fixed", "floating"]),
+        help="Base of a robot (default: that of an MJCF or SDF file, else fixed).",
     ),
     sample_option("q", "Configuration of a robot (default: neutral)"),
     click.option(
@@ -299,11 +309,11 @@ def compare() -> None:
 def view() -> None:
     """Show a robot, a rollout or a scene in the browser.
 
-    TARGET is a robot (a URDF or xacro file, or a name), a rollout (.npz or .mcap of `dynx sim --save`), or a
-    scene (TOML or JSON, or the name of a scene of dynx). A robot has sliders and a handle that moves a frame
-    by inverse kinematics; a rollout has a timeline; a scene is stepped live, or recorded first for --compare
-    and --export. A .xacro file, of a scene too, is expanded, which evaluates expressions of it as Python
-    code: show only such files that you trust.
+    TARGET is a robot (a URDF, xacro, MJCF or SDF file, or a name), a rollout (.npz or .mcap of `dynx sim
+    --save`), or a scene (TOML or JSON, or the name of a scene of dynx). A robot has sliders and a handle
+    that moves a frame by inverse kinematics; a rollout has a timeline; a scene is stepped live, or
+    recorded first for --compare and --export. A .xacro file, of a scene too, is expanded, which evaluates
+    expressions of it as Python code: show only such files that you trust.
 
     The page is served until Ctrl-C. Exit code 0; 2 for input that cannot be shown, or a port that is taken.
 

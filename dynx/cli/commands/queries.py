@@ -16,6 +16,7 @@ from dynx.cli.shell.options import (
     model_options,
     number_list,
     one_of,
+    payload_option,
     robot_options,
     sample_option,
     silent_option,
@@ -158,6 +159,7 @@ _force_option = click.option(
 @_v_option
 @sample_option("a", "Acceleration (default: zero)")
 @click.option("--joint-dynamics", is_flag=True, help="Include damping, friction and armature of the joints.")
+@payload_option
 @_force_option
 @click.option(
     "--wrenches",
@@ -176,12 +178,13 @@ def id_() -> None:
     """Compute inverse dynamics: the torque tau (nv) that gives the acceleration a.
 
     Without --v and --a it is the torque that holds the robot against gravity. With --wrenches the forces that
-    its joints and its base transmit are listed too (docs/wrenches.md).
+    its joints and its base transmit are listed too.
 
     \b
     Examples:
       dynx id ur5 --q 0,-1.57,1.57,0,0,0
       dynx id ur5 --q 0,-1,1,0,0,0 --v 0,0.1,0,0,0,0 --a 1,0,0,0,0,0 --json
+      dynx id ur5 --q 0,-1,1,0,0,0 --payload tool0:3:0,0,0.05
       dynx id ur5 --q 0,-1,1,0,0,0 --force tool0:0,0,-20 --wrenches
     """
 
@@ -192,6 +195,7 @@ def id_() -> None:
 @_v_option
 @sample_option("tau", "Torque (default: zero)")
 @click.option("--joint-dynamics", is_flag=True, help="Include damping, friction and armature of the joints.")
+@payload_option
 @_force_option
 @runs("dynx.cli.queries.evaluate:forward_dynamics")
 def fd() -> None:
@@ -209,6 +213,7 @@ def fd() -> None:
 @robot_options
 @_q_option
 @click.option("--joint-dynamics", is_flag=True, help="Include the armature of the joints.")
+@payload_option
 @runs("dynx.cli.queries.evaluate:mass_matrix")
 def mass() -> None:
     """Compute the mass matrix M (nv, nv).

@@ -38,7 +38,7 @@ _robot = group(
 _motion = (
     _configuration_option(
         "--to",
-        help="Target configuration [rad or m]: 0,1.5,... or joint=value,... (default: the initial one).",
+        help="Target configuration [rad or m]: 0,1.5,... or joint=value,... (default: that of --from).",
     ),
     _configuration_option(
         "--to-pose",
@@ -133,6 +133,12 @@ _controller = (
         is_flag=True,
         help="Compensation of the plant's damping and friction by the controller.",
     ),
+    click.option(
+        "--controller-joint-dynamics",
+        is_flag=True,
+        help="Armature, damping and friction of the robot description in the model of the controller "
+        "(default: rigid bodies).",
+    ),
 )
 
 _joint_dynamics = click.option(
@@ -198,9 +204,10 @@ def sim() -> None:
     """Simulate a robot under a controller, which can compute on one engine while the robot moves on another.
 
     The reference motion goes from --from to --to, or moves a frame on a straight line to --to-pose;
-    without either the controller holds the initial configuration. Units are s, rad, m, kg and N; NUMBERS
-    is one number for all joints, or one for each joint, separated by commas. Controllers (--controller),
-    where * marks the reference and ID is inverse dynamics:
+    without either the controller holds that of --from (neutral by default), also if the robot begins at
+    another (--q0). --controller none lets the robot move without motors. Units are s, rad, m, kg and N;
+    NUMBERS is one number for all joints, or one for each joint, separated by commas. Controllers
+    (--controller), where * marks the reference and ID is inverse dynamics:
 
     \b
       computed-torque           ID(q, v, a* + kd (v* - v) + kp (q* - q))

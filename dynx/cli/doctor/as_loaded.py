@@ -81,6 +81,8 @@ def _show_one(out: Console, report: DoctorReport, task: DoctorTask) -> None:
         out.print(f"{who}: not examined", style="yellow")
         return
     words = "all engines load it alike" if report.alike else "engines DIFFER on this file"
+    if report.refusal is not None:
+        words = f"dynx refuses it ({one_line(report.refusal.message)})"
     out.print(f"{who}: {words}", style="bold green" if report.alike else "bold red")
     if report.source is not None:
         out.print(f"({short_line(report.source)})", style="dim")

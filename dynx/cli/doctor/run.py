@@ -16,13 +16,13 @@ from dynx.cli.shell.exits import BAD_INPUT, DONE, NEGATIVE_RESULT, complain, one
 from dynx.cli.shell.output import command_line, console, counted
 from dynx.cli.shell.run import TaskRun, carry_out
 from dynx.doctor.diagnosis import DEFAULT_SAMPLES
-from dynx.doctor.formats.baseline import Baseline, load_baseline
+from dynx.doctor.formats.baseline import Baseline, accepted_by, load_baseline
 from dynx.doctor.report import DoctorReport
 from dynx.doctor.task import DoctorTask, check_engines, examine, missing_engines, refused
 from dynx.errors import DynxError
 from dynx.model.expansion import expand, refusals
 from dynx.model.tree import Base
-from dynx.rules.registry import checked_choices
+from dynx.rules.registry import checked_choices, ignored_rules
 from dynx.rules.rule import Level
 
 
@@ -36,6 +36,8 @@ def doctor(
     choose: tuple[tuple[str, str], ...],
     fix: str | None,
     level: Level,
+    ignore: tuple[str, ...],
+    only: tuple[str, ...],
     in_place: bool,
     json_path: str | None,
     html: str | None,
@@ -53,6 +55,7 @@ def doctor(
     outputs = ReportFiles(json_path, html, junit, sarif, write_baseline, github)
     outputs.check()
     choices = tuple(checked_choices(choose).items())
+    ignored_rules(ignore, only)  # Checked once, so that an error is not reported for every robot.
     check_engines(engines)
     baseline = None if baseline_path is None else load_baseline(baseline_path)
     found = expand(robots)
@@ -72,6 +75,8 @@ def doctor(
                 tolerance,
                 choices,
                 level,
+                ignore,
+                only,
                 fix_tolerance=(tolerance or FIX_TOLERANCE) if fix or in_place else None,
             )
             for each, one in examined
@@ -161,10 +166,11 @@ class Conclusion:
         return NEGATIVE_RESULT if any(self._fails(report) for report in reports) else DONE
 
     def _fails(self, report: DoctorReport) -> bool:
-        """Check whether engines differ in a way that no baseline, read or just written, contains."""
-        if self._baseline is not None:
-            return not report.alike and bool(self._baseline.compare(report).new)
-        return not report.alike and self._outputs.baseline is None
+        """Check whether engines differ in a way that neither a baseline nor the ignored rules accept."""
+        accepted = accepted_by(report, self._baseline)
+        if accepted is not None and not accepted.compare(report).new:
+            return False
+        return not report.alike and (self._baseline is not None or self._outputs.baseline is None)
 
     def _mend(self) -> Mapping[int, str]:
         """Write the mended descriptions; return their files by the number of the result."""
@@ -268,4 +274,6 @@ def doctor_command(task: DoctorTask) -> str:
         words += ["--choose", f"{rule}={choice}"]
     if task.level != "physics":
         words += ["--level", task.level]
+    for option, rules in (("--ignore", task.ignore), ("--only", task.only)):
+        words += [option, ",".join(rules)] if rules else []
     return shlex.join(words)

@@ -6,6 +6,7 @@ import shlex
 import textwrap
 from collections.abc import Mapping, Sequence
 from io import StringIO
+from pathlib import PurePath
 from typing import get_args
 
 from rich.console import Console
@@ -24,6 +25,7 @@ from dynx.doctor.formats.causes import (
     severity,
 )
 from dynx.doctor.report import DoctorReport, EngineResult, Finding, Status
+from dynx.rules import CallingRule
 
 _PLACES = (4, 3, 2, 1)
 """Numbers of places listed for one rule; ``--json`` and ``--html`` have all."""
@@ -70,11 +72,14 @@ def _show(
     show_engines(out, report)
     show_errors(out, report)
     show_variants(out, report)
-    _show_findings(out, causes(report), places)
+    _show_findings(out, [each for each in causes(report) if each.rule not in report.ignored], places)
+    if report.ignored:
+        out.print()
+        show_ignored(out, report)
     if report.unread_meshes:
         out.print()
         sentence(out, f"not examined: {wording.unread_meshes(report)}", 0, "yellow")
-    _show_list(out, "decided where the file is ambiguous", report.choices)
+    _show_list(out, "decided", report.choices)
     _show_changes(out, report)
     _show_calls(out, report)
     _show_unexplained(out, report, saved)
@@ -110,6 +115,10 @@ def show_engines(out: Console, report: DoctorReport) -> None:
                 same = each.no_results_after == each.no_results
                 after = wording.refusal(each, mended=True)
                 sentence(out, after.partition(":")[0] if same else after, 6, "red")
+        if each.step_defaults:
+            sentence(out, wording.step_defaults(each), 6, "dim")
+        for code in each.step_defaults.values():
+            out.print(Text(f"      {code}", "dim"))
 
 
 def show_errors(out: Console, report: DoctorReport, *, mended: bool = True) -> None:
@@ -134,6 +143,11 @@ def show_errors(out: Console, report: DoctorReport, *, mended: bool = True) -> N
         f" tolerance {report.tolerance:.3g}, {counted(report.samples, 'sample')}, seed {report.seed}{known}",
         style="dim",
     )
+    left = [error for each in compared for error in each.after.values()] if then else []
+    if any(report.tolerance < error <= ROUNDING for error in left):
+        limit = f"{ROUNDING:.0e}"
+        kept = f"the mended file keeps errors of up to {limit} (shortened numbers, causes of less effect)"
+        sentence(out, f"{kept}: check it with --tolerance {limit}", 1, "dim")
 
 
 def show_variants(out: Console, report: DoctorReport) -> None:
@@ -167,6 +181,12 @@ def _show_findings(out: Console, found: Sequence[RuleFindings], places: int) -> 
             more = ""
 
 
+def show_ignored(out: Console, *reports: DoctorReport) -> None:
+    """Print the number of findings of ignored rules, by rule."""
+    if line := wording.ignored(*reports):
+        sentence(out, line, 0, "yellow")
+
+
 def _show_causes(out: Console, found: Sequence[RuleFindings], places: int) -> None:
     for cause in found:
         out.print(_cause_line(cause))
@@ -180,7 +200,7 @@ def _show_places(out: Console, cause: RuleFindings, places: int) -> None:
     shown = cause.findings[:places]
     more = f"; and {len(cause.findings) - len(shown)} more" if len(cause.findings) > len(shown) else ""
     for finding in shown:
-        parts = [each for each in (wording.effects(finding), wording.name(finding.message, 300)) if each]
+        parts = [each for each in (wording.effects(finding), wording.message(finding.message, 300)) if each]
         end = more if finding is shown[-1] else ""
         sentence(out, f"{_place(finding)}: {'; '.join(parts)}{end}", 6, "dim")
 
@@ -257,7 +277,8 @@ def _show_next(out: Console, report: DoctorReport, mended: str | None, command: 
         return
     out.print()
     if mended is not None:
-        out.print(f"{_action(report)} {one_line(mended)}", style="bold green")
+        kind = "" if PurePath(mended).suffix else f" (a file; {one_line(mended)}/ would be a directory)"
+        out.print(f"{_action(report)} {one_line(mended)}{kind}", style="bold green")
         if by_hand := _by_hand(report):
             sentence(out, f"not mended, because the file does not say what is right: {by_hand}", 0, "yellow")
     elif report.mended is not None:
@@ -291,7 +312,9 @@ def _by_hand(report: DoctorReport) -> str:
     """Write the rules of bad practice that the written file keeps, such as a unit that it does not state."""
     changed = {change.rule for change in report.changes}
     kept = dict.fromkeys(
-        each.rule for each in report.findings if each.kind == "practice" and each.rule not in changed
+        each.rule
+        for each in report.findings
+        if each.kind == "practice" and each.rule not in changed and each.rule not in report.ignored
     )
     entries = ((rule, catalogue_entry(rule)) for rule in kept)
     return ", ".join(wording.name(rule) + (f" {entry.name}" if entry else "") for rule, entry in entries)
@@ -308,11 +331,26 @@ def _conditions(report: DoctorReport) -> str:
 def _without_calls(report: DoctorReport) -> str:
     """Name the causes that the mended text keeps, because only calls remove them."""
     changed = {change.rule for change in report.changes}
-    kept = list(dict.fromkeys(each.rule for each in report.differences if each.rule not in changed))
+    kept = list(
+        dict.fromkeys(
+            each.rule
+            for each in report.differences
+            if each.rule not in changed and (_is_removed_by_calls(each) or _exceeds(each, report.remaining))
+        )
+    )
     if not (kept and report.calls):
         return ""
     verb = "remains" if len(kept) == 1 else "remain"
     return f"without the calls above, {', '.join(map(wording.name, kept))} {verb}"
+
+
+def _is_removed_by_calls(finding: Finding) -> bool:
+    return isinstance(catalogue_entry(finding.rule), CallingRule)
+
+
+def _exceeds(finding: Finding, error: float) -> bool:
+    """Check whether an effect is much larger than an error; one that is not was left because it is small."""
+    return finding.effect is not None and finding.effect.relative_error > 10.0 * error
 
 
 def _residual(report: DoctorReport) -> str:
@@ -375,6 +413,7 @@ def show_many(out: Console, reports: Sequence[DoctorReport]) -> None:
     out.print(table)
     _count_variants(out, reports)
     _count_practice(out, reports)
+    show_ignored(out, *reports)
     unread = sum(bool(report.unread_meshes) for report in reports)
     if unread:
         share = f"{unread} of {counted(len(reports), 'robot')}"
@@ -397,7 +436,10 @@ def _count_variants(out: Console, reports: Sequence[DoctorReport]) -> None:
 
 def _count_practice(out: Console, reports: Sequence[DoctorReport]) -> None:
     """Print the number of robots with bad practice, which no verdict counts, and the rules that name it."""
-    found = [sorted({each.rule for each in causes(report) if each.kind == "practice"}) for report in reports]
+    found = [
+        sorted({each.rule for each in causes(report) if each.kind == "practice"} - report.ignored.keys())
+        for report in reports
+    ]
     affected = sum(map(bool, found))
     if affected:
         share = f"{affected} of {counted(len(reports), 'robot')}"
@@ -438,7 +480,11 @@ def _remaining(report: DoctorReport) -> Text:
 
 
 def _rules(report: DoctorReport) -> Text:
-    found = [cause for cause in causes(report) if cause.largest_effect is not None]
+    found = [
+        cause
+        for cause in causes(report)
+        if cause.largest_effect is not None and cause.rule not in report.ignored
+    ]
     parts = [Text(wording.name(cause.rule), STYLES[cause.severity]) for cause in found[:_MAX_RULES]]
     if len(found) > _MAX_RULES:
         parts.append(Text(f"+{len(found) - _MAX_RULES}"))

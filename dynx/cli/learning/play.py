@@ -14,12 +14,21 @@ from rich.console import Console
 from dynx.cli.learning.documents import play_document
 from dynx.cli.shell.exits import DONE, exit_code, interruptible, one_line
 from dynx.cli.shell.options import json_value
-from dynx.cli.shell.output import Entry, check_json, check_writable, console, counted, present, progress_bar
+from dynx.cli.shell.output import (
+    Entry,
+    check_json,
+    check_writable,
+    console,
+    counted,
+    log,
+    present,
+    progress_bar,
+)
 from dynx.cli.shell.tables import Table
 from dynx.envs.registration import is_of_dynx, task_id
 from dynx.errors import ArgumentError
 from dynx.files.films import film_suffix, write_pictures
-from dynx.training import Evaluation, Policy, TaskSpec, judge, load_policy, load_stable_baselines, make
+from dynx.training import Evaluation, Policy, TaskSpec, judge, load_policy, make
 from dynx.training.file_tasks import task_of_file
 from dynx.training.policy import read_policy_document
 
@@ -113,6 +122,8 @@ def _given_task(options: Sequence[tuple[str, str]], own_task: str | None) -> Tas
 
 
 def _load_unpickled(path: str, algorithm: str | None, statistics: str | None, task: TaskSpec) -> Policy:
+    from dynx.training import load_stable_baselines  # needs stable-baselines3, unlike files of dynx
+
     return load_stable_baselines(path, task, algorithm, statistics)
 
 
@@ -165,7 +176,11 @@ def _film(
     check_writable(path)
     film_suffix(path)
     pictures: list[Any] = []
-    with interruptible(), closing(make(task, "rgb_array")) as env:
+    with (
+        interruptible(),
+        closing(make(task, "rgb_array")) as env,
+        progress_bar(episodes, words="episodes", enabled=not quiet) as advance,
+    ):
         rate = float(env.metadata.get("render_fps") or PICTURES_PER_SECOND)
         skip = max(1, int(np.ceil(rate / PICTURES_PER_SECOND)))
         steps = count()
@@ -175,7 +190,10 @@ def _film(
                 pictures.append(env.render())
 
         for k in range(episodes):
-            _episode(policy, env, seed + k, deterministic, draw)
+            total, length = _episode(policy, env, seed + k, deterministic, draw)
+            advance(k + 1, "episodes")
+            if not quiet:
+                log(f"episode {k + 1} of {episodes}: return {total:.5g} in {counted(length, 'step')}")
     write_pictures(path, pictures, skip / rate)
     if not quiet:
         console().print(f"wrote {one_line(path)}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 
@@ -14,15 +15,23 @@ from dynx.cli.shell.options import json_value, one_task
 from dynx.cli.shell.output import Advance, Entry, check_json, check_writable, log, present, progress_bar
 from dynx.cli.shell.tables import Table
 from dynx.envs.registration import bare_name, task_id
+from dynx.errors import ArgumentError, shown
 from dynx.files.figures import new_figure, picture_format, save_figure
 from dynx.training import Progress, Schedule, TaskSpec, Trained, TrainingSpec, recipe_of
 from dynx.training import train as train_run
-from dynx.training.hyperparameters import Recipe
+from dynx.training.file_tasks import task_of_file
 from dynx.training.learning import CURVE, EVALUATIONS
 from dynx.training.records import read_lines
+from dynx.training.run import RUN, read_run
 
 DEFAULT_STEPS = 100_000
 """Steps of a task without a published number."""
+
+ALGORITHM = "ppo"
+"""Algorithm of a run for which none is given."""
+
+MAX_ENVS_OF_FILE = 1024
+"""Largest number of environments that the file of a run starts; more are given by the caller."""
 
 SECONDS_BETWEEN_LINES = 30.0
 """Shortest time between two lines of progress where standard error is no terminal."""
@@ -34,9 +43,9 @@ def train(
     engine: str | None,
     options: Sequence[tuple[str, str]],
     randomize: Sequence[tuple[str, str]],
-    algorithm: str,
+    algorithm: str | None,
     steps: int | None,
-    seeds: tuple[int, ...],
+    seeds: tuple[int, ...] | None,
     envs: int | None,
     processes: bool,
     normalize: bool | None,
@@ -60,17 +69,26 @@ def train(
     chosen = {name: json_value(word) for name, word in options}
     if randomize:
         chosen["randomize"] = {name: json_value(word) for name, word in randomize}
-    spec = TaskSpec(task_id(one_task(task, named_task)), engine, chosen)
-    recipe = recipe_of(algorithm, spec.id)
+    resumes_folder = resume and out is not None and task is None and named_task is None
+    name = None if resumes_folder else task_id(one_task(task, named_task))
     given = {name: json_value(word) for name, word in values}
     schedule = Schedule(checkpoint_every, evaluate_every, threads=threads, tensorboard=tensorboard)
-    base = Path(out if out is not None else _folder_of(spec, algorithm))
+    base = Path(out if out is not None else _folder_of(str(name), engine, algorithm or ALGORITHM))
+    known = _known_runs(base) if resume else {}
+    if name is None and not known:
+        raise ArgumentError(f"{shown(base, 300)} has no training run that could be resumed")
+    seeds = seeds or tuple(known) or (0,)
+    in_folders = len(seeds) > 1 or (bool(known) and not (base / RUN).exists())
     runs: list[Trained] = []
     times: list[float] = []
     with interruptible() as interruption:
         for seed in seeds:
-            run = _specification(spec, algorithm, recipe, steps, envs, seed, normalize, processes, given)
-            folder = base / f"seed-{seed}" if len(seeds) > 1 else base
+            earlier = known.get(seed) or next(iter(known.values()), None)
+            spec = _task(name, engine, chosen, earlier, base)
+            run = _specification(
+                spec, algorithm, steps, envs, seed, normalize, processes, given, earlier, base
+            )
+            folder = base / f"seed-{seed}" if in_folders else base
             started = time.perf_counter()
             with progress_bar(run.steps, words="steps", enabled=not quiet) as advance:
                 reporter = _Reporter(advance, seed if len(seeds) > 1 else None, quiet)
@@ -79,14 +97,16 @@ def train(
                         run,
                         folder,
                         # A seed that has not begun is begun: the run was ended in an earlier one.
-                        resume=resume and (len(seeds) == 1 or (folder / "run.json").exists()),
+                        resume=resume and (not in_folders or (folder / RUN).exists()),
                         schedule=schedule,
                         final_episodes=episodes,
                         progress=reporter,
                     )
                 except KeyboardInterrupt:
                     if any((folder / "checkpoints").glob("*.zip")):
-                        log(f"{folder} has a checkpoint; the same command with --resume goes on from there")
+                        own = _own_task(spec.id)
+                        again = f"dynx train --resume --out {one_line(base)}{own}"
+                        log(f"{folder} has a checkpoint; {again} goes on from there")
                     raise
             runs.append(trained)
             times.append(time.perf_counter() - started)
@@ -117,17 +137,55 @@ class _Reporter:
             log(f"{self._prefix}{progress.steps:,} of {progress.total:,} {words[len(self._prefix) :]}")
 
 
+def _known_runs(base: Path) -> dict[int, TrainingSpec]:
+    """Read the runs in a folder, by seed: its own, or those of its folders ``seed-N``."""
+    folders = [base] if (base / RUN).exists() else sorted(base.glob("seed-*"))
+    found = [read_run(folder) for folder in folders if (folder / RUN).exists()]
+    return {spec.seed: spec for spec in sorted(found, key=lambda spec: spec.seed)}
+
+
+def _task(
+    name: str | None, engine: str | None, chosen: dict[str, Any], earlier: TrainingSpec | None, base: Path
+) -> TaskSpec:
+    """Return the task with the options given, and those of the run that is resumed."""
+    if earlier is None:
+        return TaskSpec(str(name), engine, chosen)
+    return task_of_file(earlier.task, str(base / RUN), chosen, name).on(engine)
+
+
 def _specification(
     task: TaskSpec,
-    algorithm: str,
-    recipe: Recipe,
+    algorithm: str | None,
     steps: int | None,
     envs: int | None,
     seed: int,
     normalize: bool | None,
     processes: bool,
     given: dict[str, object],
+    earlier: TrainingSpec | None,
+    base: Path,
 ) -> TrainingSpec:
+    """Return what is trained: what is given, or else what the run that is resumed has, or what is published.
+
+    Raises ArgumentError for a file that would start more than `MAX_ENVS_OF_FILE` environments.
+    """
+    if earlier is not None:
+        if envs is None and earlier.envs > MAX_ENVS_OF_FILE:
+            raise ArgumentError(
+                f"{shown(base / RUN, 300)} wants {earlier.envs} environments; give so many yourself: --envs"
+            )
+        return TrainingSpec(
+            task,
+            algorithm or earlier.algorithm,
+            steps or earlier.steps,
+            envs or earlier.envs,
+            seed,
+            earlier.normalize if normalize is None else normalize,
+            processes or earlier.processes,
+            {**earlier.hyperparameters, **given},
+        )
+    algorithm = algorithm or ALGORITHM
+    recipe = recipe_of(algorithm, task.id)
     return TrainingSpec(
         task,
         algorithm,
@@ -140,8 +198,13 @@ def _specification(
     )
 
 
-def _folder_of(task: TaskSpec, algorithm: str) -> Path:
-    return Path("runs") / "-".join(each for each in (bare_name(task.id), task.engine, algorithm) if each)
+def _folder_of(task: str, engine: str | None, algorithm: str) -> Path:
+    return Path("runs") / "-".join(each for each in (bare_name(task), engine, algorithm) if each)
+
+
+def _own_task(task: str) -> str:
+    """Return the option for a task of the user: files of runs and policies import no module."""
+    return f" --task {one_line(task)}" if ":" in task else ""
 
 
 def show(out: Console, report: Entry) -> None:
@@ -169,8 +232,7 @@ def show(out: Console, report: Entry) -> None:
             f"mean of the runs {report['mean']:.5g}, with 95 % confidence between {report['low']:.5g} and "
             f"{report['high']:.5g}"
         )
-    # The file of a policy imports no module.
-    own = f" --task {one_line(report['task'])}" if ":" in report["task"] else ""
+    own = _own_task(report["task"])
     out.print(f"to see it: dynx play {one_line(report['runs'][0]['folder'])}/final.zip --view{own}")
 
 

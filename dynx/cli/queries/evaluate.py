@@ -18,7 +18,7 @@ from dynx.cli.shell.inputs import (
     velocity,
     velocity_names,
 )
-from dynx.cli.shell.options import spelled
+from dynx.cli.shell.options import PayloadInput, spelled
 from dynx.cli.shell.output import Entry, console, number, write_json
 from dynx.cli.shell.tables import Table, listing
 from dynx.errors import ArgumentError
@@ -81,6 +81,7 @@ def inverse_dynamics(
     v: Numbers,
     a: Numbers,
     joint_dynamics: bool,
+    payload: Sequence[PayloadInput],
     forces: Sequence[tuple[str, list[float]]],
     wrenches: bool,
     frame: str | None,
@@ -91,8 +92,8 @@ def inverse_dynamics(
     """Print the torque that gives an acceleration, and the wrenches that joints transmit."""
     if (frame is not None or reference != LOCAL) and not wrenches:
         raise ArgumentError("--frame and --reference are those of the wrenches; give --wrenches too")
-    with open_backend(**robot) as engine:
-        sample, result = _sample(engine, q, v=v, a=a)
+    with open_backend(**robot, payload=payload) as engine:
+        sample, result = _sample(engine, q, payload, v=v, a=a)
         options = _external_forces(forces, result)
         result["tau"] = engine.inverse_dynamics(*sample, joint_dynamics=joint_dynamics, **options).tolist()
         if wrenches:
@@ -124,22 +125,25 @@ def forward_dynamics(
     v: Numbers,
     tau: Numbers,
     joint_dynamics: bool,
+    payload: Sequence[PayloadInput],
     forces: Sequence[tuple[str, list[float]]],
     json_path: str | None,
     **robot: Any,
 ) -> None:
     """Print the acceleration that a torque gives."""
-    with open_backend(**robot) as engine:
-        sample, result = _sample(engine, q, v=v, tau=tau)
+    with open_backend(**robot, payload=payload) as engine:
+        sample, result = _sample(engine, q, payload, v=v, tau=tau)
         options = _external_forces(forces, result)
         result["a"] = engine.forward_dynamics(*sample, joint_dynamics=joint_dynamics, **options).tolist()
     _report_vectors(result, json_path, "forward dynamics", ("v", "tau", "a"))
 
 
-def mass_matrix(q: Numbers, joint_dynamics: bool, json_path: str | None, **robot: Any) -> None:
+def mass_matrix(
+    q: Numbers, joint_dynamics: bool, payload: Sequence[PayloadInput], json_path: str | None, **robot: Any
+) -> None:
     """Print the mass matrix."""
-    with open_backend(**robot) as engine:
-        sample, result = _sample(engine, q)
+    with open_backend(**robot, payload=payload) as engine:
+        sample, result = _sample(engine, q, payload)
         result["mass_matrix"] = engine.mass_matrix(*sample, joint_dynamics=joint_dynamics).tolist()
     if not write_json(result, json_path):
         names = result["velocity_names"]
@@ -167,14 +171,17 @@ def title(result: Entry) -> str:
     return f"{one_line(result['robot'])}, {result['base']} base, {result['backend']}"
 
 
-def _sample(engine: Backend, q: Numbers, **vectors: Numbers) -> tuple[list[Any], dict[str, Any]]:
+def _sample(
+    engine: Backend, q: Numbers, payload: Sequence[PayloadInput], **vectors: Numbers
+) -> tuple[list[Any], dict[str, Any]]:
     """Return the arguments of an engine call, and the document that contains them."""
     model = engine.model
     sample = {"q": configuration(model, q)}
     sample |= {name: velocity(model, given, f"--{name}") for name, given in vectors.items()}
     names = {"velocity_names": velocity_names(model)}
     listed = {name: values.tolist() for name, values in sample.items()}
-    return list(sample.values()), {**document_head(engine), **names, **listed}
+    bodies = {"payload": [each._asdict() for each in payload]}
+    return list(sample.values()), {**document_head(engine), **bodies, **names, **listed}
 
 
 def _report_vectors(result: Entry, json_path: str | None, quantity: str, columns: Sequence[str]) -> bool:

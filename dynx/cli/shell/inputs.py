@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dynx.cli.shell.exits import one_line, remark
+from dynx.cli.shell.options import PayloadInput
 from dynx.errors import ArgumentError, NotInstalledError, UnknownNameError, nearest, shown
 from dynx.model import Model, Pose
 from dynx.model.configuration import checked_q
@@ -39,7 +40,7 @@ _LISTED_NAMES = 8
 
 def load_robot(
     robot: str,
-    base: Base,
+    base: Base | None,
     lock: Locks,
     base_pose: Sequence[float] | None = None,
     gravity: Sequence[float] | None = None,
@@ -53,17 +54,23 @@ def load_robot(
 
 def open_backend(
     robot: str,
-    base: Base,
+    base: Base | None,
     lock: Locks,
     base_pose: Sequence[float] | None = None,
     engine: str | None = None,
     gravity: Sequence[float] | None = None,
+    payload: Sequence[PayloadInput] = (),
 ) -> Backend:
-    """Open the backend of a robot by its name; None is Pinocchio if it is installed, else `compiled`."""
+    """Open the backend of a robot by its name, with bodies fixed to its frames; None is Pinocchio if it is
+    installed, else `compiled`."""
     # Commands that open none start sooner.
     from dynx.backends import backend
 
     model = load_robot(robot, base, lock, base_pose, gravity)
+    if payload:
+        from dynx.rbd.parameters import Payload, plant_model
+
+        model = plant_model(model, [Payload(*each) for each in payload])
     if engine is not None:
         return backend(engine, model)
     try:

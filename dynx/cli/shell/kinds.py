@@ -13,11 +13,14 @@ from typing import Any, NamedTuple
 import click
 
 from dynx.cli.shell.options import (
+    PAYLOAD_FORM,
+    PAYLOAD_NOTE,
     F,
     finite_number,
     group,
     number_list,
     one_of,
+    payload,
     plain_numbers,
     spelled,
     stacked,
@@ -37,7 +40,6 @@ Coefficients = float | list[float] | dict[str, float] | bool
 _PUSH = re.compile(
     r"(?P<frame>.+?):(?P<wrench>[^:,]+(,[^:,]+)+)(:(?P<start>[^:,]+))?(:(?P<duration>[^:,]+))?"
 )
-_PAYLOAD = re.compile(r"(?P<frame>.+?):(?P<mass>[^:,]+)(:(?P<center>[^:,]+(,[^:,]+)+))?")
 
 
 class PushInput(NamedTuple):
@@ -47,14 +49,6 @@ class PushInput(NamedTuple):
     wrench: list[float]
     start: float
     duration: float
-
-
-class PayloadInput(NamedTuple):
-    """First fields of a `dynx.sim.Payload`."""
-
-    frame: str
-    mass: float
-    center: list[float]
 
 
 def gain(text: str) -> float | list[float]:
@@ -92,19 +86,6 @@ def push(text: str) -> PushInput:
     )
 
 
-def payload(text: str) -> PayloadInput:
-    """Read ``FRAME:mass[:x,y,z]``."""
-    found = _PAYLOAD.fullmatch(text.strip())
-    center = [0.0, 0.0, 0.0]
-    if found is not None and found["center"] is not None:
-        center = plain_numbers(found["center"])
-    if found is None or len(center) != 3:
-        raise click.BadParameter(
-            f"{shown(text)} is not of the form FRAME:MASS[:x,y,z], such as tool0:2.5:0,0,0.05"
-        )
-    return PayloadInput(found["frame"], finite_number(found["mass"]), center)
-
-
 def scale(text: str) -> tuple[str | None, float]:
     """Read a factor for all links, or ``LINK=factor``."""
     link, equals, factor = text.rpartition("=")
@@ -128,7 +109,10 @@ class CommandKind(NamedTuple):
 
 
 def _joint_numbers(own: str, others: str) -> CommandKind:
-    note = f": urdf for {own} of the description, numbers, or numbers by joint, the others {others}"
+    note = (
+        f": urdf for {own} of the description (also of MJCF and SDF), numbers, or numbers by joint, the "
+        f"others {others}"
+    )
     return CommandKind(coefficients, "urdf|NUMBERS|joint=NUMBER,...", note)
 
 
@@ -145,8 +129,8 @@ COMMAND_KINDS: dict[Kind, CommandKind] = {
     declared.FACTORS: CommandKind(scale, "[LINK=]FACTOR", several=True),
     declared.PAYLOADS: CommandKind(
         payload,
-        "FRAME:MASS[:x,y,z]",
-        ": a point mass [kg], at x,y,z [m] in the frame (default: 0,0,0)",
+        PAYLOAD_FORM,
+        f": {PAYLOAD_NOTE}",
         several=True,
     ),
     declared.PUSHES: CommandKind(
@@ -193,6 +177,9 @@ def command_option(option: Option) -> Callable[[F], F]:
     if option.kind is declared.NOISE:
         return NOISE_OPTIONS
     if isinstance(option.kind, Flag):
+        if option.default:
+            either = f"{flag}/--no-{flag[2:]}"
+            return click.option(either, option.name, default=None, help=f"{_in_words(described)} (default).")
         return click.option(flag, option.name, is_flag=True, help=f"{_in_words(described)}.")
     if isinstance(option.kind, Choice):
         kind = CommandKind(one_of(source=option.kind.source), "NAME")

@@ -21,6 +21,8 @@ COMMANDS = {
     for name, target, line in (
         ("agree", "comparison:agree", "Compare the results of all engines on robots."),
         ("doctor", "comparison:doctor", "Find, prove and mend the causes of differences between engines."),
+        ("convert", "conversion:convert", "Write a robot as URDF or MJCF, with its meshes."),
+        ("same", "comparison:same", "Decide whether two files describe the same robot; mend one."),
         ("sim", "sim:sim", "Simulate a robot under a controller."),
         ("world", "motion:world", "Run a scene with contacts on several engines, and compare them."),
         ("compare", "motion:compare", "Compare two rollouts, and find out why they part."),
@@ -47,6 +49,7 @@ COMMANDS = {
 SYNONYMS = {
     "compute-torque": "id",
     "diagnose": "doctor",
+    "export": "convert",
     "evaluate": "play",
     "fix": "doctor",
     "forward-dynamics": "fd",
@@ -108,6 +111,7 @@ def _show_traceback(ctx: click.Context, option: click.Parameter, wanted: bool) -
 
 
 @click.group(
+    "dynx",
     cls=CommandLine,
     table=COMMANDS,
     synonyms=SYNONYMS,
@@ -144,7 +148,7 @@ def _show_traceback(ctx: click.Context, option: click.Parameter, wanted: bool) -
 def cli(ctx: click.Context) -> None:
     """One interface over several rigid-body dynamics engines, and tests that they agree.
 
-    ROBOT is the path of a URDF or xacro file, or a name from `dynx robots`.
+    ROBOT is the path of a URDF, xacro, MJCF or SDF file, or a name from `dynx robots`.
     Arguments of a xacro file follow in the same word: "ur.xacro name:=ur".
     """
     if ctx.invoked_subcommand is None:

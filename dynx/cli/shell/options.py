@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import click
 
@@ -54,6 +54,13 @@ def whole_numbers(text: str) -> tuple[int, ...]:
     if not numbers:
         raise click.BadParameter("wanted whole numbers separated by commas, such as 0,1,2")
     return tuple(numbers)
+
+
+def joined(
+    ctx: click.Context, option: click.Parameter, given: tuple[tuple[str, ...], ...]
+) -> tuple[str, ...]:
+    """Join the lists of an option that may be given several times, each name once."""
+    return tuple(dict.fromkeys(name for names in given for name in names))
 
 
 def name_list(text: str) -> tuple[str, ...]:
@@ -161,9 +168,8 @@ def model_options(command: F) -> F:
         click.option(
             "--base",
             type=click.Choice(["fixed", "floating"]),
-            default="fixed",
-            show_default=True,
-            help="Mount of the root link: fixed to the world, or floating (free to move).",
+            help="Mount of the root link: fixed to the world, or floating (free to move); by default that of "
+            "an MJCF or SDF file, else fixed.",
         ),
         click.option(
             "--base-pose",
@@ -340,6 +346,42 @@ def sample_option(name: str, quantity: str) -> Callable[[F], F]:
     return click.option(
         f"--{name}", type=number_list, metavar="NUMBERS", help=f"{quantity}: 0,1.5,... or joint=value,..."
     )
+
+
+PAYLOAD_FORM = "FRAME:MASS[:x,y,z]"
+PAYLOAD_NOTE = "a point mass [kg], at x,y,z [m] in the frame (default: 0,0,0)"
+
+_PAYLOAD = re.compile(r"(?P<frame>.+?):(?P<mass>[^:,]+)(:(?P<center>[^:,]+(,[^:,]+)+))?")
+
+
+class PayloadInput(NamedTuple):
+    """First fields of a `dynx.sim.Payload`."""
+
+    frame: str
+    mass: float
+    center: list[float]
+
+
+def payload(text: str) -> PayloadInput:
+    """Read ``FRAME:mass[:x,y,z]``."""
+    found = _PAYLOAD.fullmatch(text.strip())
+    center = [0.0, 0.0, 0.0]
+    if found is not None and found["center"] is not None:
+        center = plain_numbers(found["center"])
+    if found is None or len(center) != 3:
+        raise click.BadParameter(
+            f"{shown(text)} is not of the form FRAME:MASS[:x,y,z], such as tool0:2.5:0,0,0.05"
+        )
+    return PayloadInput(found["frame"], finite_number(found["mass"]), center)
+
+
+payload_option = click.option(
+    "--payload",
+    type=payload,
+    multiple=True,
+    metavar=PAYLOAD_FORM,
+    help=f"Body fixed to a frame, {PAYLOAD_NOTE}; may be given several times.",
+)
 
 
 def wrench_numbers(text: str) -> list[float]:

@@ -130,6 +130,7 @@ class SimDocument(TypedDict):
     joints: list[JointEntry]
     final: FinalState
     files: list[str]
+    notes: list[str]
 
 
 SCHEMA = 1
@@ -178,6 +179,7 @@ def document(request: SimulationRequest, rollout: Rollout, seconds: float, ended
         "base_error": base_error(rollout),
         "frame_error": frame_error(rollout, request.motion.frame),
         "joints": _joints(model, rollout),
+        "notes": list(rollout.notes),
         "final": {"t": float(rollout.t[-1]), "q": rollout.q[-1].tolist(), "v": rollout.v[-1].tolist()},
     }
 
@@ -256,7 +258,14 @@ def _is_passive(request: SimulationRequest, rollout: Rollout) -> bool:
     """Check whether nothing does work on the robot, so that its energy is conserved."""
     joints = rollout.settings["joints"]
     disturbed = any(joints["damping"]) or any(joints["friction"]) or request.scenario.pushes
-    return request.controller is None and not disturbed and not request.scenario.joint_limits
+    return request.controller is None and not disturbed and not _reaches_limits(rollout)
+
+
+def _reaches_limits(rollout: Rollout) -> bool:
+    """Check whether a joint with stops was at one of its limits, where an impact takes energy."""
+    model, joints = rollout.model, slice(7 if rollout.model.floating else 0, None)
+    q, lower, upper = rollout.q[:, joints], model.lower[joints], model.upper[joints]
+    return bool(rollout.settings["joint_limits"] and ((q <= lower) | (q >= upper)).any())
 
 
 def _status(ended: EarlyEnd) -> str:
@@ -323,6 +332,8 @@ def show(out: Console, report: Entry) -> None:
         out.print(_saturation(report))
     if report["overshoot"] is not None and report["overshoot"]["finding"]:
         out.print(one_line(report["overshoot"]["finding"]))
+    for note in report["notes"]:
+        out.print(f"note: {one_line(note)}", style="yellow")
     out.print(f"simulated {number(report['simulated'])} s in {report['seconds']:.2f} s")
 
 
@@ -486,8 +497,8 @@ def _plant_deviations(report: Entry) -> list[str]:
     joints = {name: settings["joints"][name][base:] for name in ("damping", "friction", "armature")}
     parts += [f"{name} {value_range(each)}" for name, each in joints.items() if any(each)]
     parts += _listed([_push_text(each) for each in settings["pushes"]], "pushes")
-    if settings["joint_limits"]:
-        parts.append("stops at the position limits")
+    if not settings["joint_limits"]:
+        parts.append("no stops at the position limits")
     if settings["substeps"] > 1:
         parts.append(f"{settings['substeps']} substeps")
     return parts

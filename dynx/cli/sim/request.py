@@ -13,6 +13,7 @@ from dynx.backends.joint_friction import JointFriction
 from dynx.backends.registry import backend_class
 from dynx.cli.shell.inputs import Numbers, chosen_frame, configuration, load_robot, target_pose, velocity
 from dynx.cli.shell.kinds import Coefficients, command_flag, is_command_option
+from dynx.cli.shell.options import spelled
 from dynx.cli.shell.output import counted
 from dynx.control import BulletMotor, FrictionCompensation, ModelBased
 from dynx.control.base import Controller
@@ -92,9 +93,17 @@ def _controller(
 ) -> Controller[Any] | None:
     gains = Gains(**{name: given[name] for name in GAINS})
     if given["controller"] == "none":
-        if gains.given() or given["friction_compensation"]:
-            raise ArgumentError("--controller none takes no gains and no --friction-compensation")
+        if gains.given():
+            raise ArgumentError("--controller none takes no gains")
+        for name in ("friction_compensation", "controller_joint_dynamics"):
+            if given[name]:
+                raise ArgumentError(f"--controller none takes no --{spelled(name)}")
         return None
+    if given["friction_compensation"] and given["controller_joint_dynamics"]:
+        raise ArgumentError(
+            "--friction-compensation and --controller-joint-dynamics would both compensate damping and "
+            "friction; wanted one of them"
+        )
     controller = named_controller(
         given["controller"],
         ControllerRequest(
@@ -105,6 +114,7 @@ def _controller(
             motion.frame,
             _motor_limit(model, given["effort_limits"]),
             given["backend"],
+            given["controller_joint_dynamics"],
         ),
     )
     if not given["friction_compensation"]:

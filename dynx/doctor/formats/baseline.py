@@ -1,4 +1,5 @@
-"""Baselines: JSON files of accepted differences, with which a check fails only on new ones.
+"""Accepted differences: those of the rules that the user ignores, and those in baselines, JSON files with
+which a check fails only on new ones.
 
 A difference is identified by robot, base, rule, link or joint, and engines; not by its line, nor by its
 magnitude. A difference that no rule explains has the rule ``unexplained``, and a quantity instead of a link
@@ -75,11 +76,12 @@ class PlacedDifference:
 
 @dataclass(frozen=True)
 class BaselineComparison:
-    """Differences of a report that are new or known, and known ones that have vanished."""
+    """Differences of a report that are new, known or of ignored rules, and known ones that have vanished."""
 
     new: tuple[PlacedDifference, ...]
     known: tuple[PlacedDifference, ...]
     vanished: tuple[PlacedDifference, ...]
+    ignored: tuple[PlacedDifference, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,7 @@ class Baseline:
     """The known differences. Robots given as paths are relative to `folder`, where their file is, so that a
     checkout elsewhere has the same baseline."""
 
-    folder: str
+    folder: str = ""
     known: tuple[PlacedDifference, ...] = ()
 
     def compare(self, report: DoctorReport) -> BaselineComparison:
@@ -95,18 +97,25 @@ class Baseline:
         allowed: dict[Place, frozenset[str]] = {}
         for each in self.known:
             allowed[each.place] = allowed.get(each.place, frozenset()) | each.engines
-        found = differences(report, self.folder)
+        every = differences(report, self.folder)
+        ignored = tuple(each for each in every if each.place.rule in report.ignored)
+        found = [each for each in every if each not in ignored]
         new = tuple(each for each in found if not each.engines <= allowed.get(each.place, frozenset()))
         known = tuple(each for each in found if each not in new)
         robot = (robot_key(report, self.folder), report.base or "")
-        present = {each.engine for each in report.engines}
-        gone = allowed.keys() - {each.place for each in found}
+        present = {"dynx", *(each.engine for each in report.engines)}
+        gone = allowed.keys() - {each.place for each in every}
         vanished = tuple(
             each
             for each in self.known
             if each.place in gone and (each.place.robot, each.place.base) == robot and each.engines & present
         )
-        return BaselineComparison(new, known, vanished)
+        return BaselineComparison(new, known, vanished, ignored)
+
+
+def accepted_by(report: DoctorReport, baseline: Baseline | None) -> Baseline | None:
+    """Return the baseline, or an empty one where only rules are ignored; None where nothing is accepted."""
+    return Baseline() if baseline is None and report.ignored else baseline
 
 
 def differences(report: DoctorReport, folder: str) -> tuple[PlacedDifference, ...]:
@@ -137,6 +146,8 @@ def differences(report: DoctorReport, folder: str) -> tuple[PlacedDifference, ..
         for quantity, error in engine.before.items():
             if engine.no_results is None and not error <= report.tolerance:
                 add_unexplained(engine.engine, quantity, error)
+    if report.refusal is not None and not merged:
+        add_unexplained("dynx", "loading", math.inf)
     return tuple(merged.values())
 
 
@@ -158,8 +169,13 @@ def robot_key(report: DoctorReport, folder: str) -> str:
 
 
 def baseline_document(reports: Iterable[DoctorReport], folder: str) -> dict[str, Any]:
-    """Make the document that accepts all differences of these reports."""
-    found = [each for report in reports for each in differences(report, folder)]
+    """Make the document that accepts all differences of these reports but those of ignored rules."""
+    found = [
+        each
+        for report in reports
+        for each in differences(report, folder)
+        if each.place.rule not in report.ignored
+    ]
     found.sort(key=lambda each: tuple(str(value or "") for value in vars(each.place).values()))
     known = []
     for each in found:

@@ -39,7 +39,7 @@ class RuleFindings:
     @property
     def title(self) -> str:
         """The cause in one sentence."""
-        return self.entry.title if self.entry is not None else wording.name(self.findings[0].message, 1000)
+        return self.entry.title if self.entry is not None else wording.message(self.findings[0].message)
 
     @property
     def advice(self) -> str:

@@ -381,8 +381,16 @@ def template_environment() -> Environment:
     """Return the templates with the functions that they use."""
     environment = page_environment("dynx.doctor.formats")
     words = (wording.name, wording.relative, wording.quantity, wording.effect, wording.part)
-    more = (wording.unexplained, wording.finding_effect, wording.variant, wording.change)
-    filters = (*words, *more, wording.unread_meshes, wording.loads_mended, wording.refusal)
+    more = (wording.unexplained, wording.finding_effect, wording.variant, wording.change, wording.message)
+    filters = (
+        *words,
+        *more,
+        wording.unread_meshes,
+        wording.loads_mended,
+        wording.refusal,
+        wording.step_defaults,
+        wording.ignored,
+    )
     environment.filters.update({each.__name__: each for each in filters})
     views: tuple[Callable[..., Any], ...] = (causes, step_of, bar_position, largest_error)
     views += (wording.difference, engine_map, pair_map, joint_map, model_tables, changes, excerpt)

@@ -2,7 +2,7 @@
 
 There are two kinds of test case. A quantity (``mass matrix as loaded``) fails where some engine differs
 from the reference values; a rule (``DX101 link-without-inertial``) fails where its cause has an effect. Bad
-practice passes, with its text as output. A difference in the baseline is skipped.
+practice passes, with its text as output. A difference in the baseline or of an ignored rule is skipped.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from xml.etree import ElementTree
 
 from dynx.doctor.formats import wording
-from dynx.doctor.formats.baseline import Baseline, PlacedDifference
+from dynx.doctor.formats.baseline import Baseline, PlacedDifference, accepted_by
 from dynx.doctor.formats.causes import RuleFindings, causes
 from dynx.doctor.report import DoctorReport, Finding
 from dynx.errors import located
@@ -22,6 +22,8 @@ _SHOWN_PLACES = 50
 """Largest number of places of one rule that are listed; SARIF and JSON have all."""
 
 KNOWN = "known: in the baseline"
+
+IGNORED = "ignored: no finding of this rule fails"
 
 _CAN_BE_EXAMINED = "the file can be examined"
 
@@ -44,6 +46,7 @@ def junit_xml(
 
 
 def _suite(report: DoctorReport, baseline: Baseline | None) -> Element:
+    baseline = accepted_by(report, baseline)
     new = None if baseline is None else baseline.compare(report).new
     title = f"{wording.name(report.robot)}, {report.base} base"
     suite = _suite_of(title, report.seconds, _cases(report, new))
@@ -71,7 +74,7 @@ def _cases(
 ) -> Iterator[tuple[str, Element | None]]:
     """Yield the name of each test case with its result; None for one that passes."""
     if report.error is not None:
-        message = wording.name(report.error.message, 2000)
+        message = wording.message(report.error.message, 2000)
         yield _CAN_BE_EXAMINED, _result("error", message, report.error.type)
         return
     yield from _quantities(report, accepted=new is not None and not new)
@@ -88,6 +91,9 @@ def _cases(
 
 def _quantities(report: DoctorReport, *, accepted: bool) -> Iterator[tuple[str, Element | None]]:
     prefix = "known: " if accepted else ""
+    if report.refusal is not None:
+        message = f"{prefix}dynx refuses the file: {wording.name(report.refusal.message, 1000)}"
+        yield "dynx loads the file", _failure(message, known=accepted)
     for each in report.engines:
         if each.no_results is not None:
             message = f"{prefix}{each.engine}, {wording.refusal(each)}"
@@ -111,7 +117,7 @@ def _cause(cause: RuleFindings, report: DoctorReport, *, known: bool) -> Element
         output.text = text
         return output
     if known:
-        return _failure(KNOWN, known=True)
+        return _failure(IGNORED if cause.rule in report.ignored else KNOWN, known=True)
     return _result("failure", f"{wording.effect(cause.largest_effect)}: {cause.title}", cause.name, text)
 
 
@@ -129,6 +135,6 @@ def _result(tag: str, message: str, kind: str | None = None, text: str | None = 
 
 def _place(finding: Finding, report: DoctorReport) -> str:
     where = wording.name(report.source or report.robot, 300)
-    message = wording.name(finding.message, 1000)
+    message = wording.message(finding.message)
     text = f"{wording.part(finding)}: {message} ({wording.finding_effect(finding)})"
     return located(text, where, finding.line)

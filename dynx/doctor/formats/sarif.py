@@ -19,7 +19,7 @@ from urllib.parse import quote
 
 from dynx._version import __version__
 from dynx.doctor.formats import wording
-from dynx.doctor.formats.baseline import UNEXPLAINED, Baseline, Place
+from dynx.doctor.formats.baseline import UNEXPLAINED, Baseline, Place, accepted_by
 from dynx.doctor.formats.causes import advice, catalogue_entry, causes, severity
 from dynx.doctor.report import DoctorReport, Finding, Unexplained
 from dynx.errors import located
@@ -28,6 +28,9 @@ SCHEMA_URI = "https://json.schemastore.org/sarif-2.1.0.json"
 
 REFUSED = "refused"
 """Rule of a file that cannot be examined."""
+
+IGNORED = "the rule is ignored"
+"""Justification of a suppressed result whose rule the user ignores."""
 
 MAX_RESULTS = 25_000
 """Largest number of results; GitHub rejects a run with more."""
@@ -54,7 +57,7 @@ def sarif_document(
     not_done: Sequence[str] = (),
     left_out: Sequence[str] = (),
 ) -> dict[str, Any]:
-    """Make the document. Differences in the baseline are marked as suppressed.
+    """Make the document. Differences in the baseline and findings of ignored rules are marked as suppressed.
 
     `not_done` names the robots that an interrupted run left out, `left_out` those in xacro below a directory.
     """
@@ -71,6 +74,7 @@ def sarif_document(
     results = [{**result, "ruleIndex": numbers[result["ruleId"]]} for result in merged.values()]
     notes = [f"{wording.name(robot)} was not examined: the run was interrupted" for robot in not_done]
     notes += [f"{wording.name(robot)} {wording.LEFT_OUT}" for robot in left_out]
+    notes += filter(None, [wording.ignored(*reports)])
     if len(results) > MAX_RESULTS:
         notes.append(f"{len(results) - MAX_RESULTS} of {len(results)} results were left out")
         results = sorted(results, key=_severity, reverse=True)[:MAX_RESULTS]
@@ -99,6 +103,7 @@ def _severity(result: dict[str, Any]) -> int:
 
 
 def _results(report: DoctorReport, baseline: Baseline | None) -> Iterator[dict[str, Any]]:
+    baseline = accepted_by(report, baseline)
     new = None if baseline is None else {_key(each.place) for each in baseline.compare(report).new}
     if report.error is not None:
         result = _refusal(report)
@@ -116,8 +121,10 @@ def _results(report: DoctorReport, baseline: Baseline | None) -> Iterator[dict[s
         if new is not None:
             # A baseline cannot hold bad practice, which makes no check fail.
             counts = isinstance(each, Unexplained) or each.effect is not None
-            known = counts and _key(each) not in new
-            justification = {"kind": "external", "justification": "in the baseline"}
+            ignored = isinstance(each, Finding) and each.rule in report.ignored
+            known = ignored or (counts and _key(each) not in new)
+            reason = IGNORED if ignored else "in the baseline"
+            justification = {"kind": "external", "justification": reason}
             result["suppressions"] = [justification] if known else []
         yield result
 
@@ -126,7 +133,7 @@ def _refusal(report: DoctorReport) -> dict[str, Any]:
     assert report.error is not None
     # The place is in the result itself.
     where = located("", report.source, report.error_line).strip()
-    message = wording.name(report.error.message.removeprefix(where).strip() or report.error.type, 2000)
+    message = wording.message(report.error.message.removeprefix(where).strip() or report.error.type, 2000)
     return _result(report, REFUSED, "error", message, report.error_line)
 
 
@@ -135,7 +142,7 @@ def _finding(report: DoctorReport, each: Finding, repetition: int) -> dict[str, 
     names = () if wording.differs_by_engine(each) else each.engines
     engines = f": {', '.join(names)}" if names else ""
     effect = f"{wording.finding_effect(each)}, {report.base} base{engines}"
-    message = f"{wording.name(each.message, 1000)} ({effect})."
+    message = f"{wording.message(each.message)} ({effect})."
     if each.effect is not None or each.kind == "practice":
         message += f" Remedy: {advice(each).rstrip('.')}." if advice(each) else ""
     if each.effect is not None and any(each.rule == left.rule for left in report.undone):

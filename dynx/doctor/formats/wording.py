@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import PurePath
 from typing import Any
 
-from dynx.doctor.report import Change, DoctorReport, Effect, EngineResult, Finding, Unexplained, VariantResult
+from dynx.doctor.report import (
+    Change,
+    DoctorReport,
+    Effect,
+    EngineResult,
+    Finding,
+    Unexplained,
+    UnreadMesh,
+    VariantResult,
+)
 from dynx.errors import escaped
 from dynx.rules.registry import all_rules
 
@@ -44,9 +54,28 @@ def name(text: object, limit: int = NAME_LENGTH) -> str:
     return escaped(text, limit)
 
 
+def message(text: object, limit: int = 1000) -> str:
+    """Write a message, in which names are escaped already, in one line without control characters."""
+    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in str(text))
+    ending = f"... ({len(line)} characters)"
+    return line if len(line) <= limit else line[: limit - len(ending)] + ending
+
+
 def quantity(key: str) -> str:
     """Write ``mass_matrix`` as ``mass matrix``."""
     return name(key.replace("_", " "))
+
+
+def ignored(*reports: DoctorReport) -> str:
+    """Count the findings of the rules that the user ignores, by rule: ``2 findings ignored: DX105
+    inertia-not-diagonal (2)``; empty without any."""
+    counts: Counter[str] = Counter()
+    for report in reports:
+        counts.update(report.ignored)
+    names = {each.rule: each.name for report in reports for each in report.findings}
+    rules = ", ".join(f"{name(rule)} {name(names[rule])} ({count})" for rule, count in sorted(counts.items()))
+    total = counts.total()
+    return f"{total} finding{'s' * (total != 1)} ignored: {rules}" if counts else ""
 
 
 def relative(error: float) -> str:
@@ -138,8 +167,18 @@ def refusal(each: EngineResult, *, mended: bool = False) -> str:
     if mended:
         refused = each.refused_after is not None
         start = "refuses the mended file too" if refused else "not used on the mended file either"
-        return f"{start}: {name(each.no_results_after, 1000)}"
-    return f"{'not used' if each.refused is None else 'refuses the file'}: {name(each.no_results, 1000)}"
+        return f"{start}: {_message(each.no_results_after)}"
+    return f"{'not used' if each.refused is None else 'refuses the file'}: {_message(each.no_results)}"
+
+
+def _message(error: str | None) -> str:
+    """Return the message of an engine without the name of the file that it was given."""
+    return message(re.sub(r"^[a-z]+ refuses robot\.urdf: (Error: )?", "", error or ""))
+
+
+def step_defaults(each: EngineResult) -> str:
+    """Write what a step of an engine does by itself; the code that switches it off follows."""
+    return f"not compared: a step of the engine {' and '.join(each.step_defaults)}, unless you write"
 
 
 def variant(each: VariantResult) -> list[str]:
@@ -153,7 +192,7 @@ def variant(each: VariantResult) -> list[str]:
     for cause in each.findings:
         proof = "proved" if cause.proved else "not proved"
         rule = f"{name(cause.rule)} {name(cause.name)}, {proof}"
-        lines.append(f"{effect(cause.effect)}: {rule}; {name(cause.message, 300)}")
+        lines.append(f"{effect(cause.effect)}: {rule}; {message(cause.message, 300)}")
     return lines
 
 
@@ -162,15 +201,25 @@ def unread_meshes(report: DoctorReport) -> str:
     unread = report.unread_meshes
     if not unread:
         return ""
-    reasons = Counter(each.reason for each in unread)
-    (reason, count), *others = reasons.most_common()
-    shown = name(reason, 300) + (f" for {count} of them" if others else "")
+    kinds = Counter(map(_kind_of_reason, unread))
+    (kind, count), *others = kinds.most_common()
+    first = next(each for each in unread if _kind_of_reason(each) == kind)
+    shown = message(first.reason, 300)
+    if count > 1 and any(each.reason != first.reason for each in unread if _kind_of_reason(each) == kind):
+        shown += f"; likewise {count - 1} more"
+    if others:
+        shown += f"; {len(unread) - count} for other reasons"
     which = f"{len(unread)} of {report.meshes} mesh files" if report.meshes > 1 else "the mesh file"
     without = refused_without_mesh(report.refused_without_meshes)
     return (
         f"{which} could not be read ({shown}); engines are compared without meshes, but masses and inertias "
         f"of such links are not checked against the size of their shapes ({SHAPE_RULES}){without}"
     )
+
+
+def _kind_of_reason(mesh: UnreadMesh) -> str:
+    """Return the reason why a mesh was not read, without names and advice."""
+    return re.sub("'[^']*'", "''", mesh.reason.partition(";")[0])
 
 
 def refused_without_mesh(engines: Sequence[str]) -> str:

@@ -53,7 +53,7 @@ class DrakeBackend(Backend):
 
     A batch is a Python loop over the engine's calls. For batches the backend ``compiled`` gives the same
     numbers, to rounding, about 400 times as fast: inverse dynamics of UR5, one thread, to one significant
-    figure (``dynx bench ur5 --batch 65536 --threads 1``; other quantities are in docs/bench.md).
+    figure (``dynx bench ur5 --batch 65536 --threads 1``, which measures the other quantities too).
 
     To open a robot of thousands of joints, Drake itself takes seconds, more than in proportion to them
     (Drake 1.51, a chain of 5,000: 13 s of 14 s are `Finalize` and the first context).

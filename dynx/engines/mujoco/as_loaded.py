@@ -366,7 +366,7 @@ class LoadedMujoco(LoadedRobot):
         return a
 
     def contacts(self, q: Floats) -> Mapping[tuple[str, str], float]:
-        """Pairs of `data.contact`, by the links into which MuJoCo merged others; the world is the root."""
+        """Pairs of `data.contact`; the world is the root."""
         # Contacts depend on the configuration alone, and are asked for at hundreds of them.
         self._set_positions(q)
         mujoco.mj_kinematics(self._loaded, self._data)
@@ -374,11 +374,14 @@ class LoadedMujoco(LoadedRobot):
         found: dict[tuple[str, str], float] = {}
         # The list of contacts takes 0.1 ms to make, also where it is empty.
         for contact in self._data.contact[: self._data.ncon] if self._data.ncon else ():
-            bodies = self._loaded.geom_bodyid[[contact.geom1, contact.geom2]]
-            names = (self._loaded.body(body).name if body > WORLD else self._model.root for body in bodies)
-            one, other = sorted(names)
+            one, other = sorted(map(self._name_of_shape, (contact.geom1, contact.geom2)))
             found[one, other] = max(found.get((one, other), 0.0), -float(contact.dist))
         return found
+
+    def _name_of_shape(self, geom: int) -> str:
+        body = int(self._loaded.geom_bodyid[geom])
+        link = self._loaded.body(body).name if body > WORLD else self._model.root
+        return str(self._loaded.geom(geom).name or link)
 
     def close(self) -> None:
         """Release MuJoCo's model and data."""

@@ -230,7 +230,7 @@ class MujocoBackend(Backend):
     A batch is a Python loop over the engine's calls. For batches the backend ``compiled`` gives the same
     numbers, to rounding, about 200 times as fast in forward dynamics, which is MuJoCo's own, and 8,000 times
     in inverse dynamics, which is composed in Python (UR5, one thread, to one significant figure:
-    ``dynx bench ur5 --batch 65536 --threads 1``; other quantities are in docs/bench.md).
+    ``dynx bench ur5 --batch 65536 --threads 1``, which measures the other quantities too).
     """
 
     name: ClassVar[str] = "mujoco"

@@ -24,10 +24,11 @@ import numpy as np
 from dynx.backends.solvability import Solvability, refuse_singular_start
 from dynx.engines.mujoco.library import MAX_DEPTH, mujoco, silence_warnings, silent_data
 from dynx.engines.mujoco.materials import ContactMaterials
-from dynx.engines.mujoco.mjcf import SUBSTITUTE, MjcfDocument, quat_wxyz
+from dynx.engines.mujoco.mjcf import SUBSTITUTE, MjcfDocument
 from dynx.errors import EngineError, EngineLimitError
 from dynx.model import Model
 from dynx.model.elements import Inertial, Pose
+from dynx.model.mjcf.attributes import quat_wxyz
 from dynx.spatial.scalar import Array, Floats, jacobi_eigen, longdouble
 from dynx.spatial.so3 import rotation_from_rpy
 from dynx.steppers.layout import Layout, RobotLayout

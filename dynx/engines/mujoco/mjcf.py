@@ -21,12 +21,11 @@ excluded one by one.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import groupby, product
 from typing import Any, NamedTuple
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
@@ -39,46 +38,28 @@ from dynx.engines.mujoco.materials import (
 )
 from dynx.errors import EngineLimitError, UnsupportedFeatureError, shown
 from dynx.model import Model
-from dynx.model.elements import Joint
-from dynx.model.geometry import Box, Capsule, Cylinder, HeightField, Mesh, Plane, Shape, Sphere
+from dynx.model.elements import Joint, JointDynamics
+from dynx.model.geometry import HeightField, Mesh, Plane, Shape
 from dynx.model.mechanism import ROOT
+from dynx.model.mjcf.attributes import (
+    MAX_DEPTH,
+    attributes,
+    document_text,
+    joint_attributes,
+    new_document,
+    placement,
+    primitive_attributes,
+    quat_wxyz,
+    text,
+)
 from dynx.spatial.inertia import RigidInertia
 from dynx.spatial.scalar import FLOAT64_EPS, Array, Floats, jacobi_eigen, longdouble
 from dynx.spatial.se3 import homogeneous
-from dynx.spatial.so3 import cross, quat_from_rotation, rotation_from_quat, skew
+from dynx.spatial.so3 import cross, rotation_from_quat, skew
 from dynx.steppers.layout import WORLD, BodyLayout, Layout, Owner, RobotLayout, SensorLayout
 from dynx.steppers.materials import EffectiveCoefficient
 
-# -- numbers ------------------------------------------------------------------------------------------------
-
-
-def quat_wxyz(R: Array) -> Floats:
-    """Return the quaternion (w, x, y, z) of a rotation matrix (3, 3)."""
-    x, y, z, w = quat_from_rotation(np.asarray(R, dtype=np.float64))
-    return np.array([w, x, y, z])
-
-
-def text(value: Any) -> str:
-    """Return an attribute as text: a word, or numbers, each the shortest that reads back exactly."""
-    if isinstance(value, str):
-        return value
-    if isinstance(value, int | np.integer):
-        return str(value)
-    if isinstance(value, Iterable):
-        return " ".join(repr(float(each)) for each in value)
-    return repr(float(value))
-
-
-def attributes(values: Mapping[str, Any], defaults: Mapping[str, Any] | None = None) -> dict[str, str]:
-    """Return attributes as text, without those that are equal to the defaults."""
-    written = {name: text(value) for name, value in values.items()}
-    absent = {} if defaults is None else attributes(defaults)
-    return {name: value for name, value in written.items() if absent.get(name) != value}
-
-
-def placement(R: Array, p: Array) -> dict[str, str]:
-    """Return the attributes of a pose, with the rotation R (3, 3) and the position p (3,)."""
-    return attributes({"pos": np.asarray(p, dtype=np.float64), "quat": quat_wxyz(R)})
+# -- coordinates -----------------------------------------------------------------------------------------
 
 
 def robot_coordinates(model: Model, q: Floats, v: Floats) -> tuple[Floats, Floats]:
@@ -222,18 +203,11 @@ class ShapeWriter:
         SubElement(body, "geom", {**given, **placement(T[:3, :3], position), **options})
 
     def _form(self, shape: Shape) -> dict[str, str]:
-        if isinstance(shape, Box):
-            return {"type": "box", "size": text(0.5 * np.array(shape.size))}
-        if isinstance(shape, Sphere):
-            return {"type": "sphere", "size": text(shape.radius)}
-        if isinstance(shape, Cylinder | Capsule):
-            kind = "cylinder" if isinstance(shape, Cylinder) else "capsule"
-            return {"type": kind, "size": text([shape.radius, 0.5 * shape.length])}
-        if isinstance(shape, Plane):
-            return {"type": "plane", "size": "0 0 1"}
         if isinstance(shape, HeightField):
             return {"type": "hfield", "hfield": self._field(shape)}
-        return {"type": "mesh", "mesh": self._hull(shape)}
+        if isinstance(shape, Mesh):
+            return {"type": "mesh", "mesh": self._hull(shape)}
+        return primitive_attributes(shape)
 
     def _field(self, shape: HeightField) -> str:
         if shape not in self._names:
@@ -307,16 +281,6 @@ def _by_robot(layout: Layout) -> list[tuple[int | None, list[int]]]:
 
 # -- the document -------------------------------------------------------------------------------------------
 
-MAX_DEPTH = 490
-"""Largest number of links in a row; MuJoCo's reader refuses elements that are nested 500 deep."""
-
-UNLIMITED = 1e10
-"""Joint limit [rad or m] that stands for an absent one beside one that is stated."""
-
-RANGE_GAP = 1e-12
-"""Range given to a joint whose limits are equal, which MuJoCo refuses, relative to the limit and at least in
-rad or m."""
-
 
 class Carrier(NamedTuple):
     """The body of an owner in the document, and the origin (3,) of its frame in that of the owner."""
@@ -344,9 +308,7 @@ class MjcfDocument:
         """The free body of each robot and body of the scene that moves freely."""
         self._colliders = {each.name: number for number, each in enumerate(layout.colliders)}
         self._bodies_of_colliders: dict[int, str] = {}
-        self._root = root = Element("mujoco", model=layout.name)
-        flags = {"angle": "radian", "autolimits": "true", "inertiafromgeom": "false", "fusestatic": "false"}
-        SubElement(root, "compiler", flags)
+        self._root = root = new_document(layout.name)
         option = SubElement(root, "option", attributes(option_attributes(settings, layout.gravity, dt)))
         # MuJoCo's reset after a divergence would replace the state by another one, and its filter of parents
         # and children is replaced by that of the scene.
@@ -383,7 +345,6 @@ class MjcfDocument:
             SubElement(SubElement(root, "keyframe"), "key", attributes(state))
         for empty in [part for part in root if len(part) == 0 and not part.attrib]:
             root.remove(empty)
-        indent(root)
 
     def effective_materials(self) -> Mapping[str, EffectiveCoefficient]:
         """Return coefficients of contact in effect, as `Stepper.effective_materials` does."""
@@ -391,9 +352,7 @@ class MjcfDocument:
 
     def text(self, remarks: Iterable[str] = ()) -> str:
         """Return the document, with remarks as comments at its beginning."""
-        # A comment cannot have two hyphens in a row.
-        lines = [f"<!-- {re.sub('-(?=-)', '- ', remark)} -->\n" for remark in remarks]
-        return "".join(lines) + tostring(self._root, encoding="unicode") + "\n"
+        return document_text(self._root, remarks)
 
     def _add_defaults(self) -> None:
         settings, dt = self._settings, self._dt
@@ -679,19 +638,9 @@ def _append_state(q: list[Floats], v: list[Floats], state: tuple[Floats, Floats]
 
 
 def _add_joint(body: Element, robot: RobotLayout, index: int, joint: Joint) -> None:
-    values: dict[str, Any] = {
-        "name": f"{robot.name}/{joint.name}",
-        "type": "slide" if joint.type == "prismatic" else "hinge",
-        "axis": joint.axis,
-    }
-    lower, upper = float(robot.lower[index]), float(robot.upper[index])
-    if np.isfinite(lower) or np.isfinite(upper):
-        lower, upper = max(lower, -UNLIMITED), min(upper, UNLIMITED)
-        values["range"] = lower, max(upper, lower + RANGE_GAP * max(1.0, abs(lower)))
-    losses = {
-        "damping": robot.damping[index],
-        "frictionloss": robot.friction[index],
-        "armature": robot.armature[index],
-    }
-    values |= {name: value for name, value in losses.items() if value}
-    SubElement(body, "joint", attributes(values))
+    given = joint_attributes(
+        joint,
+        (float(robot.lower[index]), float(robot.upper[index])),
+        JointDynamics(robot.damping[index], robot.friction[index], robot.armature[index]),
+    )
+    SubElement(body, "joint", {"name": f"{robot.name}/{joint.name}"} | given)

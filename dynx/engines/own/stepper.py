@@ -24,7 +24,7 @@ from dynx.spatial.se3 import homogeneous
 from dynx.spatial.so3 import cross, quat_from_rotation, rotation_from_quat
 from dynx.steppers.forces import NO_FORCES, Forces
 from dynx.steppers.integrators import METHODS
-from dynx.steppers.joint_stops import JointStops
+from dynx.steppers.joint_stops import MOVES_NO_FURTHER, JointStops
 from dynx.steppers.layout import BodyLayout, Layout, RobotLayout
 from dynx.steppers.robot_step import SCHEMES, RobotStep
 from dynx.steppers.settings import Setting
@@ -58,8 +58,9 @@ class OwnRobot:
 
     def step(self, tau: Floats | None) -> None:
         """Take one step under a generalised force (nv,)."""
-        self.q, self.v, _ = self._step(self.q, self.v, self._no_torque if tau is None else tau)
-        stopped = None if self._stops is None else self._stops(self.q, self.v)
+        before = self.q
+        self.q, self.v, _ = self._step(before, self.v, self._no_torque if tau is None else tau)
+        stopped = None if self._stops is None else self._stops(before, self.q, self.v)
         if stopped is not None:
             self.q, self.v = stopped
 
@@ -118,6 +119,7 @@ class OwnStepper(Stepper):
         ),
     }
     contact_law: ClassVar[str] = "no contacts, and joint limits at which joints stop without a rebound"
+    beyond_limits: ClassVar[str] = MOVES_NO_FURTHER
 
     def __init__(self, layout: Layout, dt: float, settings: Mapping[str, Any]) -> None:
         super().__init__(layout, dt, settings)

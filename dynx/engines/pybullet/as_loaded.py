@@ -68,6 +68,13 @@ CALLS: Mapping[str, str] = {
 }
 """The lines of code, by the id of the remedy."""
 
+STEP_DEFAULTS: Mapping[str, str] = {
+    # Set for the root, the damping is that of all links.
+    "damps every link by 0.04 per second": "p.changeDynamics(robot, -1, linearDamping=0, angularDamping=0)",
+}
+"""What ``stepSimulation`` does by itself, besides driving the motors of joints -> the line of code that
+switches it off."""
+
 _JOINT_VALUES = {
     "pybullet.no_damping": {"jointDamping": 0.0},
     # Limits that no joint reaches.
@@ -77,7 +84,7 @@ _JOINT_VALUES = {
 
 
 def disable_simulation_settings(client: LoadedClient) -> None:
-    """Switch off motors, damping of the base and the limit of speeds, which do not come from the file."""
+    """Switch off motors, damping of links and the limit of speeds, which do not come from the file."""
     client.disable_damping()
     client.release_motors()
 
@@ -197,6 +204,7 @@ class LoadedPyBullet(LoadedRobot):
 
     name: ClassVar[str] = "pybullet"
     CALLS: ClassVar[Mapping[str, str]] = CALLS
+    STEP_DEFAULTS: ClassVar[Mapping[str, str]] = STEP_DEFAULTS
     refuses_without: ClassVar[tuple[str, ...]] = ("visual", "collision")
     searches_above: ClassVar[bool] = True
 

@@ -336,7 +336,7 @@ class PyBulletBackend(Backend):
 
     A batch is a Python loop over the engine's calls. For batches the backend ``compiled`` gives the same
     numbers, to rounding, about 300 times as fast: inverse dynamics of UR5, one thread, to one significant
-    figure (``dynx bench ur5 --batch 65536 --threads 1``; other quantities are in docs/bench.md).
+    figure (``dynx bench ur5 --batch 65536 --threads 1``, which measures the other quantities too).
     """
 
     name: ClassVar[str] = "pybullet"

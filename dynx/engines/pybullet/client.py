@@ -271,9 +271,9 @@ class RobotClient(BulletClient, ABC):
             self.control_motors(self.engine.VELOCITY_CONTROL, forces=[0.0] * len(self.moving))
 
     def disable_damping(self) -> None:
-        """Switch off the damping of the base and the limit of joint speeds, which are not the file's."""
-        # This needs a separate call: together with a setting of a link, Bullet would apply that setting to
-        # the root.
+        """Switch off the damping of links and the limit of joint speeds, which are not the file's."""
+        # Set for the root, the damping is that of all links. This needs a separate call: together with a
+        # setting of a link, Bullet would apply that setting to the root.
         options = {"linearDamping": 0.0, "angularDamping": 0.0, "maxJointVelocity": 1e300}
         self.call(self.engine.changeDynamics, self.body, ROOT, **options)
 

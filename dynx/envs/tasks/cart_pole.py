@@ -7,7 +7,7 @@ model whose dynamics an engine evaluates; its explicit Euler step of 0.02 s is t
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -111,7 +111,10 @@ class CartPole(RobotTask):
             cart_colour=painted("blue"),
             pole_colour=painted("orange"),
         )
-        return load(text, gravity=(0.0, 0.0, -9.8))
+        model = load(text, gravity=(0.0, 0.0, -9.8))
+        slide, pivot = model.joints
+        # The rail has no ends, as in Gymnasium; a URDF cannot say that.
+        return replace(model, joints=(replace(slide, limits=pivot.limits), pivot))
 
     @cached_property
     def observation_space(self) -> spaces.Box:

@@ -1,7 +1,7 @@
 """Reach: bring a frame of an arm to a random pose, by torque or velocity.
 
 The arm is any robot that `dynx.load` takes. Goals are poses of the frame at configurations drawn within the
-limits of the joints, so each can be reached; the limits do not stop the joints.
+limits of the joints, so each can be reached.
 """
 
 from __future__ import annotations

@@ -287,7 +287,7 @@ class AvoidingFollower:
         return found
 
     def _is_clear(self, q: Floats) -> bool:
-        return self._avoidance.is_clear(self._backend, q)
+        return self._avoidance.is_clear(self._backend, q, self._requirement.tolerances.time_limit)
 
     def _avoid(self, q: Floats, target: Targets, bounds: StepBounds) -> Followed:
         """Return the sample of a target (1,) that keeps the margins, or else stays clear, near q."""

@@ -89,6 +89,8 @@ def read_texture(content: bytes, wraps: tuple[bool, bool] = (True, True)) -> Tex
         return Texture(np.array(image.convert("RGB")), wraps)
     except ValueError:
         raise
+    except library.UnidentifiedImageError:
+        raise ValueError(f"it cannot be read: it is none of {', '.join(_FORMATS)}") from None
     # Pillow raises whatever exception damaged data lead to.
     except Exception as error:
         raise ValueError(f"it cannot be read: {shown(str(error) or type(error).__name__, 200)}") from None

@@ -6,6 +6,7 @@ import os
 import re
 from collections.abc import Iterable
 from contextlib import suppress
+from difflib import get_close_matches
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
@@ -42,12 +43,13 @@ def find_mesh(filename: str, source: str, package_dirs: Iterable[StrPath] = ()) 
 
     A description may come from anyone, so nothing is searched or listed outside the folder of its files (see
     `enclosing_folder`) and the packages: a path that leads elsewhere, also by a symbolic link, gives None.
-    Folders in `package_dirs`, which the user names, are searched first: for packages, and for full paths.
+    Folders in `package_dirs`, which the user names, are searched first: for packages, and for other paths
+    that lead into them.
     ``package:///NAME/FILE``, with a slash too many, is read as ``package://NAME/FILE``.
     """
     filename = _THREE_SLASHES.sub("package://", filename)
     for folder in package_dirs:
-        found = _in_user_folder(filename, Path(folder))
+        found = _in_user_folder(filename, Path(folder), source)
         if found is not None:
             return found
     if not os.path.isfile(source):
@@ -110,7 +112,9 @@ def reason_unknown(filename: str, source: str) -> str:
         return "the description was not read from a file"
     filename = _THREE_SLASHES.sub("package://", filename)
     if filename.startswith("package://"):
-        name = filename.removeprefix("package://").partition("/")[0]
+        name, _, inside = filename.removeprefix("package://").partition("/")
+        if not inside:
+            return f"{shown(filename, 200)} names a package and no file in it"
         try:
             found = package_of(name, Path(os.path.realpath(source)).parent, environment_folders())
         except (OSError, ValueError, RuntimeError):
@@ -122,7 +126,13 @@ def reason_unknown(filename: str, source: str) -> str:
         return "only xacro and launch files expand $(...)"
     if "://" in filename and not filename.startswith("file://"):
         return f"dynx reads no {shown(filename.partition('://')[0] + '://')}"
-    return f"{shown(filename, 200)} is outside the folder of the description"
+    host = urlsplit(filename).netloc if filename.startswith("file://") else ""
+    if host and host != "localhost":
+        return f"{shown(host)} is the host in {shown(filename, 200)}; an address of a path begins file:///"
+    return (
+        f"{shown(filename, 200)} is outside the folder of the description; a .git or package.xml in a folder "
+        "around both includes it, and so does package_dirs=[FOLDER] in Python"
+    )
 
 
 def _possible_package(uri: str, source: str) -> str:
@@ -138,14 +148,19 @@ def _possible_package(uri: str, source: str) -> str:
     return f"; if it is {shown(folder, 300)}, a package.xml there can state its name"
 
 
-def _in_user_folder(filename: str, root: Path) -> Path | None:
-    """Return the file of a mesh in a folder that the user named, or None."""
+def _in_user_folder(filename: str, root: Path, source: str) -> Path | None:
+    """Return the file of a mesh in a folder that the user named, or None; a relative path starts from the
+    folder of the description."""
     try:
         if filename.startswith("package://"):
             return resolve_package(filename, [root])
         full = filename.removeprefix("file://")
-        found = Path(os.path.realpath(full)) if os.path.isabs(full) else None
-        inside = found is not None and found.is_relative_to(os.path.realpath(root)) and found.is_file()
+        if not os.path.isabs(full):
+            if "://" in filename or not os.path.isfile(source):
+                return None
+            full = os.path.join(os.path.dirname(os.path.realpath(source)), full)
+        found = Path(os.path.realpath(full))
+        inside = found.is_relative_to(os.path.realpath(root)) and found.is_file()
         return found if inside else None
     except (DescriptionError, OSError, ValueError, RuntimeError):
         return None
@@ -183,5 +198,8 @@ def _similar(path: Path) -> str:
         names = sorted(os.listdir(path.parent))
     except (OSError, ValueError):
         return ""
-    hint = nearest(path.name, names)
+    # Names that are near without their endings, which are alike in many files.
+    stems = {name: os.path.splitext(name)[0] for name in names}
+    near = get_close_matches(path.stem.lower(), {stem.lower() for stem in stems.values()}, n=3, cutoff=0.55)
+    hint = nearest(path.name, [name for name, stem in stems.items() if stem.lower() in near])
     return hint if "did you mean" in hint else ""

@@ -283,6 +283,14 @@ def _texture(
 def image_content(path: str, name: str) -> bytes:
     """Return the bytes of an image that the file of a mesh names, relative to its folder or beside it.
 
+    Raises the errors of `image_file`.
+    """
+    return read_file(image_file(path, name))
+
+
+def image_file(path: str, name: str) -> str:
+    """Return the path of an image that the file of a mesh names, relative to its folder or beside it.
+
     Raises ValueError for one outside the folder of what belongs to the mesh, and where none is there.
     """
     folder = Path(os.path.realpath(os.path.dirname(path)))
@@ -292,7 +300,10 @@ def image_content(path: str, name: str) -> bytes:
         if not real.is_relative_to(root):
             continue
         if os.path.isfile(real):
-            return read_file(str(real))
+            return str(real)
+    scheme, address, _ = name.partition("://")
+    if address and scheme != "file":
+        raise ValueError(f"dynx reads no {shown(scheme + address)}")
     outside = not Path(os.path.realpath(folder / name)).is_relative_to(root)
     raise ValueError(f"it is outside the folder {shown(root.name)}" if outside else "no such file")
 

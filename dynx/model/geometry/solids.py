@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynx.errors import ArgumentError
+from dynx.model.elements import Inertial, Pose
 from dynx.model.geometry.mesh import Mesh
 from dynx.model.geometry.shapes import Box, Capsule, Cylinder, HeightField, Plane, Sphere
 from dynx.spatial.scalar import Floats
@@ -27,6 +28,10 @@ class SolidProperties:
         """Return the properties in frame A, where T (4, 4) is the pose of this frame in A."""
         R = T[:3, :3]
         return SolidProperties(self.volume, R @ self.center + T[:3, 3], R @ self.inertia @ R.T)
+
+    def of_density(self, density: float) -> SolidProperties:
+        """Return mass [kg] and moments of inertia [kg m^2] in place of volume and second moments."""
+        return SolidProperties(density * self.volume, self.center, density * self.inertia)
 
     def __add__(self, other: SolidProperties) -> SolidProperties:
         volume = self.volume + other.volume
@@ -57,8 +62,30 @@ def solid_properties(shape: Shape) -> SolidProperties:
     if isinstance(shape, Capsule):
         return _capsule(shape.radius, shape.length)
     if isinstance(shape, Mesh):
-        return _polyhedron(*shape.hull)
+        return polyhedron_properties(*shape.hull)
     raise ArgumentError(f"a {type(shape).__name__} has no volume, so it cannot have a mass")
+
+
+def ellipsoid_properties(x: float, y: float, z: float) -> SolidProperties:
+    """Return the properties of an ellipsoid with these half axes [m]."""
+    volume = 4.0 / 3.0 * math.pi * x * y * z
+    return SolidProperties(volume, np.zeros(3), volume / 5.0 * _diagonal(x * x, y * y, z * z))
+
+
+def cone_properties(radius: float, length: float) -> SolidProperties:
+    """Return the properties of a cone about z whose origin is halfway [m] between base and tip, which is
+    up."""
+    volume = math.pi * radius**2 * length / 3.0
+    square = 3.0 / 20.0 * radius**2
+    moments = volume * _diagonal(square, square, 3.0 / 80.0 * length**2)
+    return SolidProperties(volume, np.array([0.0, 0.0, -length / 4.0]), moments)
+
+
+def inertial_of(properties: SolidProperties, line: int | None) -> Inertial:
+    """Return the inertial of properties that have the mass in place of the volume (`of_density`)."""
+    x, y, z = properties.center.tolist()
+    xx, xy, xz, yy, yz, zz = properties.inertia[np.triu_indices(3)].tolist()
+    return Inertial(properties.volume, Pose((x, y, z)), xx, xy, xz, yy, yz, zz, line=line)
 
 
 def _diagonal(xx: float, yy: float, zz: float) -> Floats:
@@ -78,8 +105,11 @@ def _capsule(radius: float, length: float) -> SolidProperties:
     return SolidProperties(tube + ball, np.zeros(3), _diagonal(xx, xx, zz))
 
 
-def _polyhedron(vertices: Floats, faces: np.ndarray[tuple[int, int], np.dtype[np.intp]]) -> SolidProperties:
-    """Add the tetrahedra between an inner point and each triangle."""
+def polyhedron_properties(
+    vertices: Floats, faces: np.ndarray[tuple[int, int], np.dtype[np.intp]]
+) -> SolidProperties:
+    """Return the properties of the solid with these vertices (n, 3) [m] and triangles (m, 3) of them,
+    counter-clockwise from outside: the sum of the tetrahedra between an inner point and each triangle."""
     middle = vertices.mean(axis=0)
     corners = (vertices - middle)[faces]
     volumes = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0

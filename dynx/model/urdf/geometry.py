@@ -25,8 +25,8 @@ from dynx.model.geometry import (
 from dynx.model.geometry.mesh_files import MeshNotFoundError, find_above, find_mesh, reason_unknown
 from dynx.model.package_search import StrPath
 from dynx.model.urdf.reader import read_origin, reads_quaternions
-from dynx.model.urdf.values import Reading
 from dynx.model.xml.reading import Element, read_xml
+from dynx.model.xml.values import Reading
 
 _OPAQUE = frozenset(["joint", "inertial", "transmission", "gazebo", "sensor", "ros2_control", "contact"])
 _SHAPES = ("box", "sphere", "cylinder", "capsule", "mesh", "plane")
@@ -34,19 +34,28 @@ _SHAPES = ("box", "sphere", "cylinder", "capsule", "mesh", "plane")
 Placed = TypeVar("Placed", Visual, Collision)
 
 
-def urdf_geometry(data: str | bytes, source: str, package_dirs: Iterable[StrPath] = ()) -> Geometry:
-    """Return the geometry of a URDF document, which is read when it is first asked for."""
-    return Geometry(partial(read_link_shapes, data, source, tuple(map(str, package_dirs))))
+def urdf_geometry(
+    data: str | bytes, source: str, package_dirs: Iterable[StrPath] = (), frames: Iterable[str] = ()
+) -> Geometry:
+    """Return the geometry of a URDF document, which is read when it is first asked for.
+
+    `frames` are the links of the document that stand for frames, and are no links of the robot.
+    """
+    return Geometry(partial(read_link_shapes, data, source, tuple(map(str, package_dirs)), frozenset(frames)))
 
 
 def read_link_shapes(
-    data: str | bytes, source: str, package_dirs: tuple[str, ...] = ()
+    data: str | bytes,
+    source: str,
+    package_dirs: tuple[str, ...] = (),
+    frames: frozenset[str] = frozenset(),
 ) -> dict[str, LinkGeometry]:
-    """Read the shapes of each link of a URDF document that `read_urdf` accepts."""
+    """Read the shapes of each link, but for `frames`, of a URDF document that `read_urdf` accepts."""
     notes: list[Note] = []
     root = read_xml(data, source, notes, opaque=_OPAQUE)
     reading = Reading(source, notes, reads_quaternions(root.attributes.get("version")))
-    return _ShapeReader(root, reading, package_dirs).links()
+    links = _ShapeReader(root, reading, package_dirs).links()
+    return {name: shapes for name, shapes in links.items() if name not in frames}
 
 
 class _ShapeReader:

@@ -7,9 +7,10 @@ rigid-body dynamics and are skipped; meshes are not opened.
 from __future__ import annotations
 
 import math
+import re
 import sys
 from collections import Counter
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -31,8 +32,9 @@ from dynx.model.elements import (
 )
 from dynx.model.numbers import MAX_MAGNITUDE
 from dynx.model.topology import MAX_LINKS
-from dynx.model.urdf.values import Reading, name_fault, urdf_version
+from dynx.model.tree import Description
 from dynx.model.xml.reading import Element, read_xml
+from dynx.model.xml.values import Reading, name_fault
 from dynx.spatial.so3 import rotation_from_quat, rpy_from_rotation
 
 # Reader of URDF's ``<origin>``: a translation and an orientation, as angles or as a quaternion.
@@ -48,11 +50,13 @@ FULL_TURN = 6.29
 """Largest angle of an orientation that is written in radians: 2 pi, rounded up."""
 
 _FIRST_VERSION = (1, 1)
+_VERSION = re.compile(r"\s*([0-9]{1,9})(?:\.([0-9]{1,9}))?")
 
 
 def reads_quaternions(version: str | None) -> bool:
     """Check whether `quat_xyzw` has a meaning in a robot whose attribute ``version`` is this one."""
-    return urdf_version(version) >= _FIRST_VERSION
+    found = _VERSION.match(version or "")
+    return found is not None and (int(found.group(1)), int(found.group(2) or 0)) >= _FIRST_VERSION
 
 
 def rpy_of_quaternion(quat_xyzw: tuple[float, ...]) -> Vector:
@@ -193,6 +197,9 @@ FRAME_TAG = "dynx_frame"
 
 LOCKED_TAG = "dynx_locked"
 """Extension written by `write_urdf`: the position at which a joint, written as fixed, was locked."""
+
+ROBOT_TAG = "dynx_robot"
+"""Extension written by `write_urdf`: base, gravity and pose of the base, where they are not the default."""
 
 _TYPES: dict[str, JointType] = {
     "revolute": "revolute",
@@ -350,24 +357,11 @@ _OPAQUE = frozenset(
 _SRDF = frozenset(["group", "group_state", "disable_collisions", "virtual_joint"])
 """Elements of SRDF, whose root is named as that of URDF."""
 
-_KNOWN = _OPAQUE | {"link", "joint", "plugin", "static"}
+_KNOWN = _OPAQUE | {"link", "joint", "plugin", "static", ROBOT_TAG}
 
 
-@dataclass(frozen=True)
-class UrdfContent:
-    """Content of a document: parts in document order, not yet checked to form a tree."""
-
-    name: str | None
-    links: list[Link]
-    joints: list[Joint]
-    frames: list[Frame]
-    notes: list[Note]
-    unread: Note | None
-    """The first ignored element that may hold links or joints; it explains why the parts form no tree."""
-
-
-def read_urdf(data: str | bytes, source: str) -> UrdfContent:
-    """Read a URDF document.
+def read_urdf(data: str | bytes, source: str) -> Description:
+    """Read a URDF document, except for the shapes of its links (`urdf_geometry`).
 
     Raises DescriptionError for malformed content, UnsupportedFeatureError for a feature that dynx does not
     support; the message begins with `source` and the line.
@@ -389,9 +383,50 @@ def read_urdf(data: str | bytes, source: str) -> UrdfContent:
         else:
             joints.append(joint)
     names = {frame.name for frame in frames}
+    for element, link in zip(link_elements, links, strict=True):
+        if link.name in names:
+            _require_bare(element, link, reading)
     links = [link for link in links if link.name not in names]
     reading.note_ignored()
-    return UrdfContent(_robot_name(root, reading), links, joints, frames, notes, _unread_part(root))
+    return Description(
+        _robot_name(root, reading),
+        links,
+        joints,
+        frames,
+        notes,
+        unread=_unread_part(root),
+        **_read_settings(root, reading),
+    )
+
+
+def _read_settings(root: Element, reading: Reading) -> dict[str, Any]:
+    """Return base, gravity and pose of the base, as far as the extension of dynx states them."""
+    element = reading.only(root, ROBOT_TAG)
+    if element is None:
+        return {}
+    what, settings = f"<{ROBOT_TAG}>", dict[str, Any]()
+    if "base" in element.attributes:
+        base = settings["base"] = element.attributes["base"]
+        if base not in ("fixed", "floating"):
+            raise reading.error(element, f"base of {what} is {shown(base)}; wanted fixed or floating")
+    if "gravity" in element.attributes:
+        settings["gravity"] = reading.vector(element, "gravity", what)
+    if element.all("origin"):
+        settings["base_pose"] = read_origin(element, what, reading)
+    return settings
+
+
+def _require_bare(element: Element, link: Link, reading: Reading) -> None:
+    """Refuse mass and shapes of a link that is read as a frame. An inertial of zeros says what a frame is."""
+    massless = link.inertial is None or not (link.inertial.mass or link.inertial.tensor.any())
+    refused = ("visual", "collision") if massless else ("inertial", "visual", "collision")
+    for child in element.children:
+        if child.tag in refused:
+            raise reading.error(
+                child,
+                f"link {shown(link.name)} has <{child.tag}>, but its joint has <{FRAME_TAG}>, which makes it "
+                "a frame; remove one of the two",
+            )
 
 
 def _require_robot(root: Element, reading: Reading) -> None:

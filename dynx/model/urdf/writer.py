@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from dynx.argument_types import checks_types
 from dynx.errors import DescriptionError, shown
-from dynx.model.elements import Inertial, Joint, JointDynamics, Pose, Vector
+from dynx.model.elements import IDENTITY, Frame, Inertial, Joint, JointDynamics, Pose, Vector
 from dynx.model.geometry import (
     Appearance,
     Box,
@@ -16,16 +16,17 @@ from dynx.model.geometry import (
     Collision,
     Cylinder,
     Geometry,
+    LinkGeometry,
     Mesh,
     Plane,
     Shape,
     Sphere,
     Visual,
 )
-from dynx.model.tree import Tree
-from dynx.model.urdf.reader import FRAME_TAG, LOCKED_TAG
-from dynx.model.urdf.values import name_fault
+from dynx.model.tree import STANDARD_GRAVITY, Tree
+from dynx.model.urdf.reader import FRAME_TAG, LOCKED_TAG, ROBOT_TAG
 from dynx.model.xml.text import quoteattr
+from dynx.model.xml.values import name_fault
 
 # -- visual and collision shapes of a link --------------------------------------------------------
 
@@ -35,8 +36,30 @@ INDENT = "    "
 WriteOrigin = Callable[[Pose, str], Iterator[str]]
 
 
-def write_shapes(geometry: Geometry, link: str, origin: WriteOrigin) -> Iterator[str]:
-    """Yield the lines of the shapes of a link, with the files of meshes by their full paths.
+MeshPath = Callable[[Mesh], str]
+"""Function from a mesh to the path of its file in the document."""
+
+ImagePath = Callable[[str], str]
+"""Function from the path of an image to that in the document."""
+
+
+def _as_it_is(path: str) -> str:
+    return path
+
+
+def _file_of(mesh: Mesh) -> str:
+    return mesh.file
+
+
+def write_shapes(
+    geometry: Geometry,
+    link: str,
+    origin: WriteOrigin,
+    mesh_path: MeshPath = _file_of,
+    image_path: ImagePath = _as_it_is,
+) -> Iterator[str]:
+    """Yield the lines of the shapes of a link, with the files of meshes by their full paths, unless other
+    paths are given.
 
     Visual shapes with a fault in the description are left out. Raises DescriptionError for a fault in a
     collision shape, and for a shape that URDF cannot express.
@@ -48,13 +71,13 @@ def write_shapes(geometry: Geometry, link: str, origin: WriteOrigin) -> Iterator
         name = f" name={quoteattr(each.name)}" if each.name else ""
         yield f"{INDENT}<{tag}{name}>"
         yield from origin(each.origin, f"{INDENT}  ")
-        yield f"{INDENT}  <geometry>{_shape(each.shape, link)}</geometry>"
+        yield f"{INDENT}  <geometry>{_shape(each.shape, link, mesh_path)}</geometry>"
         if isinstance(each, Visual) and each.material is not None:
-            yield f"{INDENT}  {_material(each.material)}"
+            yield f"{INDENT}  {_material(each.material, image_path)}"
         yield f"{INDENT}</{tag}>"
 
 
-def _shape(shape: Shape, link: str) -> str:
+def _shape(shape: Shape, link: str, mesh_path: MeshPath) -> str:
     if isinstance(shape, Box):
         return f'<box size="{_finite_numbers(shape.size)}"/>'
     if isinstance(shape, Sphere):
@@ -66,13 +89,18 @@ def _shape(shape: Shape, link: str) -> str:
         return '<plane normal="0 0 1"/>'
     if isinstance(shape, Mesh):
         # A mesh that was not found keeps the name that it has in the description, and is not found again.
-        return f'<mesh filename={quoteattr(shape.file)} scale="{_finite_numbers(shape.scale)}"/>'
+        path = shape.file if shape.fault is not None else mesh_path(shape)
+        return f'<mesh filename={quoteattr(path)} scale="{_finite_numbers(shape.scale)}"/>'
     raise DescriptionError(f"URDF cannot express the {type(shape).__name__} of link {shown(link)}")
 
 
-def _material(material: Appearance) -> str:
+def _material(material: Appearance, image_path: ImagePath) -> str:
     colour = "" if material.rgba is None else f'<color rgba="{_finite_numbers(material.rgba)}"/>'
-    texture = "" if material.texture is None else f"<texture filename={quoteattr(material.texture)}/>"
+    # An image that was not found keeps its name, too.
+    path = material.texture
+    if path is not None and not material.fault:
+        path = image_path(path)
+    texture = "" if path is None else f"<texture filename={quoteattr(path)}/>"
     return f"<material name={quoteattr(material.name)}>{colour}{texture}</material>"
 
 
@@ -84,24 +112,35 @@ def _finite_numbers(numbers: tuple[float, ...]) -> str:
 
 
 @checks_types
-def write_urdf(tree: Tree, *, geometry: bool = False) -> str:
+def write_urdf(tree: Tree, /, *, geometry: bool = False) -> str:
     """Return the robot as URDF text in canonical form: one element a line, and nothing that has its default.
 
-    With the same base, base pose and gravity, which URDF cannot express, `dynx.load` of the text returns an
-    equal model; equality ignores shapes. A locked joint is written as fixed, with its position in the
-    extension ``<dynx_locked>``; an added frame as a massless link on a fixed joint, marked by
-    ``<dynx_frame>``; other readers ignore both marks. An infinite limit is written as the largest double,
-    which every engine can read; limits of 1e60 (`dynx.model.numbers.MAX_MAGNITUDE`) or more are read back as
-    infinite. With `geometry` the visual and collision shapes are written too.
+    `dynx.load` of the text returns an equal model; equality ignores shapes. Extensions state what URDF cannot
+    express, and other readers ignore them: ``<dynx_robot>`` the base, its pose and gravity where they are
+    not the default, ``<dynx_locked>`` the position of a locked joint, which is written as fixed,
+    ``<dynx_frame>`` that a massless link on a fixed joint is an added frame. An infinite limit is written as
+    the largest double, which every engine can read; limits of 1e60 (`dynx.model.numbers.MAX_MAGNITUDE`) or
+    more are read back as infinite. With `geometry` the visual and collision shapes are written too.
 
     Raises DescriptionError for a name that URDF cannot express and for a number that is NaN, and with
     `geometry` as `write_shapes` does.
     """
-    lines = ['<?xml version="1.0"?>', f"<robot name={_name(tree.name)}>"]
+    return urdf_text(tree, geometry=geometry)
+
+
+def urdf_text(
+    tree: Tree,
+    *,
+    geometry: bool,
+    mesh_path: MeshPath = _file_of,
+    image_path: ImagePath = _as_it_is,
+) -> str:
+    """Return the robot as `write_urdf` does, with other paths of meshes and images."""
+    lines = ['<?xml version="1.0"?>', f"<robot name={_name(tree.name)}>", *_settings(tree)]
     for link in tree.links:
         content = [] if link.inertial is None else [*_inertial(link.inertial)]
         if geometry:
-            content += write_shapes(tree.geometry, link.name, _origin)
+            content += write_shapes(tree.geometry, link.name, _origin, mesh_path, image_path)
         if content:
             lines += [f"  <link name={_name(link.name)}>", *content, "  </link>"]
         else:
@@ -119,6 +158,76 @@ def write_urdf(tree: Tree, *, geometry: bool = False) -> str:
         lines += _joint(marked, f"    <{FRAME_TAG}/>")
     lines += ["</robot>", ""]
     return "\n".join(lines)
+
+
+def urdf_notes(tree: Tree) -> Iterator[str]:
+    """Yield sentences on what URDF cannot say of a robot with its shapes, each with its effect."""
+    alone = f"dynx alone reads it, in <{ROBOT_TAG}>"
+    if tree.gravity != STANDARD_GRAVITY:
+        yield f"URDF states no gravity: {_vector(tree.gravity)} m/s^2 is in an extension; {alone}."
+    if tree.floating:
+        yield f"URDF does not state that the base moves freely; {alone}."
+    if tree.base_pose != IDENTITY:
+        yield f"URDF does not state the pose of the base in the world; {alone}."
+    for reason, names in (
+        ("Added frames are links without mass on fixed joints to other readers", _names(tree.extra_frames)),
+        (
+            "Locked joints are fixed joints to other readers",
+            [joint.name for joint in tree.joints if joint.locked_at is not None],
+        ),
+        (
+            "The armature is an attribute of <dynamics> that other readers may ignore",
+            [joint.name for joint in tree.joints if joint.dynamics.armature],
+        ),
+    ):
+        if names:
+            yield f"{reason} ({listed(names)})."
+    kinds: dict[str, list[str]] = {}
+    for link in tree.links:
+        shapes = tree.geometry.links.get(link.name, LinkGeometry())
+        for kind, fault in (("visual", shapes.visual_fault), ("collision", shapes.collision_fault)):
+            if fault is not None:
+                yield f"The {kind} shapes of link {shown(link.name)} are left out: {fault.message}."
+        every: tuple[Visual | Collision, ...] = (*shapes.visuals, *shapes.collisions)
+        for each in every:
+            if isinstance(each.shape, Capsule | Plane):
+                tag = f"<{type(each.shape).__name__.lower()}>"
+                kind = f"{tag} is no shape of URDF, and some readers alone have it"
+                kinds.setdefault(kind, []).append(link.name)
+            if isinstance(each.shape, Mesh) and each.shape.fault is not None:
+                kind = f"Meshes are named and not copied: {each.shape.fault.message}"
+                kinds.setdefault(kind, []).append(link.name)
+    for kind, names in kinds.items():
+        yield note_of_kind(kind, names)
+
+
+def note_of_kind(kind: str, names: Sequence[str]) -> str:
+    """Return the one note on all parts that it concerns: how many there are, and their first names."""
+    times = f"{len(names)} times: " if len(names) > 1 else ""
+    return f"{kind} ({times}{listed(dict.fromkeys(names))})."
+
+
+def listed(names: Iterable[str]) -> str:
+    """Return the first names of a list, and how many more there are."""
+    every = list(names)
+    more = f" and {len(every) - 3} more" if len(every) > 3 else ""
+    return f"{', '.join(map(shown, every[:3]))}{more}"
+
+
+def _names(frames: Iterable[Frame]) -> list[str]:
+    return [frame.name for frame in frames]
+
+
+def _settings(tree: Tree) -> Iterator[str]:
+    """Yield the element of base, gravity and pose of the base, unless they are the default."""
+    base = ' base="floating"' if tree.floating else ""
+    gravity = f' gravity="{_vector(tree.gravity)}"' if tree.gravity != STANDARD_GRAVITY else ""
+    if tree.base_pose != IDENTITY:
+        yield f"  <{ROBOT_TAG}{gravity}>"
+        yield from _origin(tree.base_pose, "    ")
+        yield f"  </{ROBOT_TAG}>"
+    elif base or gravity:
+        yield f"  <{ROBOT_TAG}{base}{gravity}/>"
 
 
 def _inertial(inertial: Inertial) -> Iterator[str]:

@@ -366,22 +366,23 @@ class _TreeBuilder:
         """Return the error of dynx for one that expat raised."""
         line = self._lines_before + error.lineno
         begun = self._root is not None
-        from dynx.model.other_formats import format_hint
+        from dynx.model.other_formats import format_hint, wanted_root
 
         hint = "" if begun else format_hint(self._source)
-        return self._error(_explain(error.code, begun) + hint, line)
+        return self._error(_explain(error.code, begun, wanted_root(self._source)) + hint, line)
 
     def _error(self, message: str, line: int) -> DescriptionError:
         return DescriptionError(message, source=self._source, line=line)
 
 
-def _explain(code: int, begun: bool) -> str:
-    """Describe the expat error `code`; `begun` says whether a first element was read."""
+def _explain(code: int, begun: bool, root: str) -> str:
+    """Describe the expat error `code`; `begun` says whether a first element was read, of which `root` is the
+    one that is wanted."""
     reason = expat.ErrorString(code) or "unknown error"
     if reason == expat.errors.XML_ERROR_JUNK_AFTER_DOC_ELEMENT:
         return "content follows the root element; wanted one root element"
     if reason == expat.errors.XML_ERROR_NO_ELEMENTS and not begun:
-        return "the text has no element; wanted <robot name=...>"
+        return f"the text has no element; wanted {root}"
     if reason in (
         expat.errors.XML_ERROR_NO_ELEMENTS,
         expat.errors.XML_ERROR_UNCLOSED_TOKEN,

@@ -101,7 +101,7 @@ class InertiaFromShapes(CallingRule):
         unread = sum(bullet_box(name, case.source.source) is None for name in files)
         of_all = "the link that moves" if len(links) == 1 else f"the {len(links)} links that move"
         parts = [f"the inertia of {of_all} is computed from collision shapes"]
-        parts += [f"without any: {bare}"] if bare else []
+        parts += [f"{bare} of them {'has' if bare == 1 else 'have'} no such shape"] if bare else []
         parts += [f"meshes that are not read here and left out: {unread} of {len(files)}"] if unread else []
         yield found_at(case.source.root, "; ".join(parts))
 

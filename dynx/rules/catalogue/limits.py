@@ -317,9 +317,9 @@ class EffortLimitZero(Rule):
         """Yield moving joints with a coordinate of their own and an effort limit of exactly zero."""
         for joint in case.model.coordinate_joints:
             if joint.limits.effort == 0.0:
-                yield Detection(
-                    None, joint.name, joint.line, "the effort limit is 0, so no torque is allowed"
-                )
+                effort = "force" if joint.type == "prismatic" else "torque"
+                message = f"the effort limit is 0, so no {effort} is allowed"
+                yield Detection(None, joint.name, joint.line, message)
 
 
 class VelocityLimitZero(Rule):

@@ -68,7 +68,7 @@ class LinkWithoutInertial(Rule):
 
     The effect is large: torques, mass matrices and accelerations are off by 10 % to many times their size
     wherever such a link moves. With a floating base, the root counts too; with a fixed base, the root and the
-    links rigidly connected to it cannot move, so their mass has no effect.
+    links rigidly connected to it cannot move, so their mass has no effect, and they are not listed.
 
     What to do: write the mass and the inertia of the link. If it is only a frame, write zeros explicitly.
 
@@ -375,7 +375,9 @@ class NoInertialData(Rule):
         missing = sum(element.first("inertial") is None for element in case.links.values())
         count = len(case.links)
         message = (
-            f"of {count} links {missing} have no <inertial>, and no other that moves has mass or moments"
+            "no link has an <inertial>"
+            if missing == count
+            else f"of {count} links {missing} have no <inertial>, and no other that moves has mass or moments"
         )
         yield Detection(None, None, case.source.root.line, message)
 

@@ -90,10 +90,12 @@ def make_plant(
     integrator: str,
     substeps: int,
     options: Mapping[str, Any],
+    joint_limits: bool = True,
 ) -> Plant:
     """Make the plant `name`, or that of a robot in a scene, with `integrator`.
 
-    `options` are those of the adaptive integrator.
+    `options` are those of the adaptive integrator. `joint_limits` are the stops of the engine in a scene;
+    other plants have none of their own.
 
     Raises ArgumentError for an integrator that the plant does not have, UnknownBackendError for an unknown
     name, NotInstalledError where its engine is missing, EngineError where its constructor fails.
@@ -109,7 +111,7 @@ def make_plant(
             )
         from dynx.sim.plants.world_plant import WorldPlant
 
-        return WorldPlant(name, model, disturbances, dt, substeps=substeps)
+        return WorldPlant(name, model, disturbances, dt, substeps=substeps, joint_limits=joint_limits)
     if integrator == ENGINE:
         if name in ENGINES:
             from dynx.sim.plants.world_plant import LoneRobotPlant

@@ -23,8 +23,8 @@ class ScenePlant:
 
     `robot` is the name of the simulated robot in the scene; it may be left out if the scene has one robot
     only. The motors of the scene drive the other robots; in the place of those of the simulated robot the
-    controller acts. `engine` and `settings` are those of `dynx.world.World`; with
-    `joint_limits` joints stop at the limits of the description, by the engine's own law.
+    controller acts. `engine` and `settings` are those of `dynx.world.World`. Joints stop by the engine's own
+    law, unless the simulation has ``joint_limits=False``.
 
     Raises ArgumentError and its kinds for a robot, an engine or a setting that does not exist.
     """
@@ -34,7 +34,6 @@ class ScenePlant:
     engine: str = "pybullet"
     settings: Mapping[str, Any] | tuple[tuple[str, Any], ...] = ()
     """The engine's settings by name; kept as sorted pairs."""
-    joint_limits: bool = True
 
     def __post_init__(self) -> None:
         if not isinstance(self.scene, Scene):
@@ -48,8 +47,6 @@ class ScenePlant:
             raise ArgumentError(f"wanted the name of the robot of the scene that is simulated; {known}")
         if robot not in names:
             raise UnknownNameError(f"the scene has no robot {shown(robot)}{nearest(robot, names)}")
-        if not isinstance(self.joint_limits, bool):
-            raise ArgumentError(f"joint_limits is {shown(self.joint_limits)}; wanted True or False")
         given = dict(self.settings)
         checked_settings(self.engine, world_class(self.engine).settings, given)
         object.__setattr__(self, "robot", robot)

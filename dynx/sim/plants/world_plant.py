@@ -145,7 +145,14 @@ class WorldPlant(Plant):
     """
 
     def __init__(
-        self, place: ScenePlant, model: Model, disturbances: Disturbances, dt: float, *, substeps: int = 1
+        self,
+        place: ScenePlant,
+        model: Model,
+        disturbances: Disturbances,
+        dt: float,
+        *,
+        substeps: int = 1,
+        joint_limits: bool = True,
     ) -> None:
         """Raises the errors of `World`."""
         super().__init__(model, disturbances, dt, substeps=substeps)
@@ -155,7 +162,7 @@ class WorldPlant(Plant):
             _scene_of(place, model, disturbances),
             place.engine,
             self._h,
-            joint_limits=place.joint_limits,
+            joint_limits=joint_limits,
             **dict(place.settings),
         )
         self._acceleration = MeanAcceleration(model, self._h)

@@ -29,6 +29,8 @@ from dynx.sim.scenario.scenario import RecordedScenario, Scenario
 from dynx.sim.setup import clock_of, disturbances_of, effort_limits_of, refuse_unknown
 from dynx.spatial.scalar import Floats
 from dynx.steppers.forces import ExternalForce
+from dynx.steppers.joint_stops import MOVES_NO_FURTHER
+from dynx.steppers.layout import stop_positions
 from dynx.trajectory.base import Setpoint
 from dynx.trajectory.limit_check import UNITS
 from dynx.world.record import (
@@ -248,7 +250,7 @@ class Rollout:
         raise NotImplementedError
 
     @door("dynx.sim.record.sensing:read_sensors")
-    def read_sensors(self, sensors: Sensor | Iterable[Sensor]) -> dict[str, Readings]:
+    def read_sensors(self, sensors: Sensor | Iterable[Sensor]) -> Mapping[str, Readings]:
         """Return the readings of sensors along the recorded motion, by their names."""
         raise NotImplementedError
 
@@ -353,12 +355,21 @@ class Rollout:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences on what is hardly meant: joints that start far beyond their limits, gravity that points
-        up; in a scene also those of its world at the start (`dynx.world.World.notes`)."""
+        """Sentences on what is hardly meant: joints that start beyond their limits, which stop them, or far
+        beyond, gravity that points up; in a scene also those of its world at the start
+        (`dynx.world.World.notes`)."""
         # Imported here, because `simulate` needs it no more than other programs.
         from dynx.model.unlikely_inputs import gravity_notes, position_notes
 
-        own = (*position_notes(self.model, self.q[0], "q0"), *gravity_notes(self.model.gravity))
+        model, q, scenario = self.model, self.q[0], self.scenario
+        own = [*position_notes(model, q, "q0"), *gravity_notes(model.gravity)]
+        if scenario is not None and scenario.joint_limits and not isinstance(scenario.plant, ScenePlant):
+            from dynx.world.notes import beyond_limits, notes_on_held_joints, notes_on_limits
+
+            joints, names = q[7 if model.floating else 0 :], model.joint_names
+            own += notes_on_limits(beyond_limits(names, joints, *stop_positions(model)), MOVES_NO_FURTHER)
+            limits = [(each.name, each.limits) for each in model.coordinate_joints]
+            own += notes_on_held_joints([name for name, each in limits if each.lower == each.upper])
         return tuple(dict.fromkeys((*own, *(self.surroundings.notes if self.surroundings else ()))))
 
     def __repr__(self) -> str:

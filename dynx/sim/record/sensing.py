@@ -28,7 +28,7 @@ SHORT_STEP = 1e-6
 """Length [s] of a step for a log without steps, in which no sensor takes a sample."""
 
 
-def read_sensors(rollout: Rollout, sensors: Sensor | Iterable[Sensor]) -> dict[str, Readings]:
+def read_sensors(rollout: Rollout, sensors: Sensor | Iterable[Sensor]) -> Mapping[str, Readings]:
     """Return the readings of sensors along the recorded motion, by their names.
 
     Samples are taken as steps begin. Random numbers are those of the rollout's number in the scenario's
@@ -37,7 +37,8 @@ def read_sensors(rollout: Rollout, sensors: Sensor | Iterable[Sensor]) -> dict[s
     """
     motion = sensed_motion(rollout)
     number = _number(rollout)
-    return {each.name: read_sensor(each, motion, number) for each in checked_sensors(sensors, motion.parts)}
+    read = checked_sensors(sensors, motion.parts)
+    return OwnReadings({each.name: read_sensor(each, motion, number) for each in read})
 
 
 def read_own_sensors(rollout: Rollout) -> Mapping[str, Readings]:

@@ -29,7 +29,6 @@ from dynx.errors import ArgumentError, DynxError, UnknownNameError, shown
 from dynx.model import Model
 from dynx.model.documents import robot_document, robot_from_document
 from dynx.sim.controller_checks import controller_numbers
-from dynx.sim.scenario.moved import present_fields, present_name
 from dynx.trajectory.base import Trajectory
 from dynx.world.scene import Scene
 
@@ -265,6 +264,8 @@ def _decoded(document: Document, model: Model | None) -> Any:
         raise TypeError("a model is written as URDF text")
     if kind is None:
         return Unknown(document[CLASS].rpartition(":")[2], json.dumps(document))
+    from dynx.sim.scenario.moved import present_fields
+
     given = present_fields(document[CLASS], document["fields"])
     return kind(**{name: _decoded(each, model) for name, each in given.items()})
 
@@ -351,6 +352,9 @@ def _class_of(name: str) -> Any:
 
     Only the module that defines a class has it, not one that imports it.
     """
+    # Imported here, because most simulations read no document.
+    from dynx.sim.scenario.moved import present_name
+
     module, _, path = present_name(name).partition(":")
     package, *rooms = module.split(".")
     if package == "dynx" and not _ROOMS_ABOVE & {*rooms[:1]}:

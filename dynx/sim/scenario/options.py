@@ -2,7 +2,7 @@
 
 From the fields of `SimulationOptions` follow the signatures of `dynx.simulate` and `dynx.simulate_batch`
 (`takes`), the fields of `Scenario` and their checks, a scenario's document and its JSON
-Schema, the options of ``dynx sim`` (`dynx.cli.shell.kinds`), and the table in docs/simulation.md. A new
+Schema, the options of ``dynx sim`` (`dynx.cli.shell.kinds`), and the table of the documentation. A new
 option is a field here, and the code in which it acts.
 
 The command line shows its help by this module, so it imports NumPy and the rest of dynx only for checks.
@@ -112,10 +112,14 @@ class Choice(Kind):
     """Names, as ``module:attribute``."""
 
     def checked(self, name: str, value: Any, model: Model) -> Any:
-        """Return a name or None."""
+        """Return a name or None; the spelling of the command line, semi-implicit, is that of Python."""
         if not isinstance(value, str | None):
             raise ArgumentError(f"{name} is {shown(value)}; wanted the name of one, or None")
-        return value
+        if value is None or "-" not in value:
+            return value
+        module, _, attribute = self.source.partition(":")
+        name = value.replace("-", "_")
+        return name if name in getattr(import_module(module), attribute) else value
 
 
 class PlantKind(Kind):
@@ -475,7 +479,10 @@ class SimulationOptions:
         default_words="unlimited",
     )
     joint_limits: bool = option(
-        False, "Inelastic stops at the position limits of the joints", kind=FLAG, group=JOINTS
+        True,
+        "Inelastic stops at the position limits of the joints; in a scene those of its engine",
+        kind=FLAG,
+        group=JOINTS,
     )
     payload: Payload | Sequence[Payload] | None = option(
         (), "Body fixed to a frame, unknown to the controller", kind=PAYLOADS, group=ERRORS
@@ -568,12 +575,12 @@ def takes(
             return function(arguments(*given, **options))
 
         lines = [
-            f"        {each.name}: {each.metadata['option'].line}"
+            f"    - `{each.name}`: {each.metadata['option'].line}"
             for each in fields(cast(Any, arguments))
             if "option" in each.metadata
         ]
         if function.__doc__ and lines:
-            called.__doc__ = "\n".join([function.__doc__.rstrip(), "", "    Options:", *lines, "    "])
+            called.__doc__ = "\n".join([function.__doc__.rstrip(), "", "    Options:", "", *lines, "    "])
         returned = inspect.signature(function).return_annotation
         called.__signature__ = signature.replace(return_annotation=returned)  # type: ignore[attr-defined]
         return called

@@ -24,7 +24,6 @@ from dynx.option_names import checks_field_names
 from dynx.rbd.parameters import Payload
 from dynx.sim.controller_checks import copy_for_record
 from dynx.sim.plants.registry import default_integrator
-from dynx.sim.plants.scene_plant import ScenePlant
 from dynx.sim.scenario.documents import (
     ARRAY,
     CLASS,
@@ -40,9 +39,10 @@ from dynx.sim.scenario.documents import (
     in_words,
 )
 from dynx.sim.scenario.documents import NUMBERS as CONTROLLER_NUMBERS
-from dynx.sim.scenario.options import COEFFICIENTS, FORMER_NAMES, OPTIONS, SimulationOptions, as_array
+from dynx.sim.scenario.options import FORMER_NAMES, OPTIONS, SimulationOptions, as_array
 from dynx.steppers.clock import TIME_ROUNDING, Clock
 from dynx.steppers.forces import ExternalForce
+from dynx.steppers.layout import stop_positions
 from dynx.trajectory.base import Trajectory
 
 SCHEMA = "dynx.scenario/2"
@@ -99,8 +99,8 @@ class Scenario(SimulationOptions):
     record contains.
 
     The fields are the arguments of `dynx.simulate`, which documents them. Two scenarios are equal if all
-    fields are, element by element, with the defaults filled in; joint dynamics that a description does not
-    have are those that are switched off. ``dataclasses.replace`` changes one field;
+    fields are, element by element, with the defaults filled in; joint dynamics and limits that a description
+    does not have are those that are switched off. ``dataclasses.replace`` changes one field;
     `to_json` and `from_json` keep every bit. Types are checked here, values when a simulation is made of it.
     """
 
@@ -117,18 +117,16 @@ class Scenario(SimulationOptions):
         if isinstance(self.reference, str) or (
             callable(self.reference) and not isinstance(self.reference, Trajectory)
         ):
+            formula = (
+                "" if isinstance(self.reference, str) else "; trajectory.from_function(f, duration) makes one"
+            )
             raise ArgumentError(
-                f"reference is {shown(self.reference)}; wanted a trajectory of dynx.trajectory, one "
+                f"reference is {shown(self.reference)}; wanted a trajectory of dynx.trajectory{formula}, one "
                 "configuration to hold, or None"
             )
         object.__setattr__(self, "reference", as_array("reference", self.reference))
         for name, each in OPTIONS.items():
             object.__setattr__(self, name, each.kind.checked(name, getattr(self, name), self.model))
-        if self.joint_limits and isinstance(self.plant, ScenePlant):
-            raise ArgumentError(
-                "joint_limits are the stops of dynx; a plant in a scene has those of its engine, by "
-                "ScenePlant(joint_limits=True)"
-            )
 
     if not TYPE_CHECKING:  # type checkers report an unknown attribute themselves
 
@@ -183,7 +181,7 @@ class Scenario(SimulationOptions):
                     found.append(Difference(name, mine, its))
                 continue
             if (
-                name in JOINT_TERMS
+                name in (*JOINT_TERMS, LIMITS)
                 and (_acts(name, mine, self.model), _acts(name, its, other.model)) == NEITHER
             ):
                 continue
@@ -226,8 +224,13 @@ class Scenario(SimulationOptions):
     def from_dict(cls, document: Mapping[str, Document]) -> Scenario:
         """Return the scenario of a document, of an earlier dynx too. Raises ArgumentError for a document of
         another layout."""
+        # Imported here, because most simulations read no document.
+        from dynx.sim.scenario.earlier import of_present_schema, with_joint_limits
+
         if isinstance(document, Mapping) and document.get("schema") == FIRST_SCHEMA:
-            document = _of_present_schema(document)
+            document = {**of_present_schema(document), "schema": SCHEMA}
+        if isinstance(document, Mapping):
+            document = with_joint_limits(document)
         if not isinstance(document, Mapping) or document.get("schema") != SCHEMA:
             has = f"has the schema {shown(document['schema'])}" if "schema" in document else "lacks a schema"
             raise ArgumentError(f"the document {has}; wanted that of a scenario, {SCHEMA!r}")
@@ -321,11 +324,16 @@ class ScenarioArguments(SimulationOptions):
 JOINT_TERMS = {"joint_damping": "damping", "joint_friction": "friction", "joint_armature": "rotors"}
 """Attribute of `JointDynamicsTerms` with the coefficients of the description, by the name of the option."""
 
+LIMITS = "joint_limits"
+"""Option that acts on robots with position limits."""
+
 NEITHER = (False, False)
 
 
 def _acts(option: str, value: object, model: Model) -> bool:
-    """Check whether an option of joint dynamics acts: True does not where the description has none."""
+    """Check whether an option of joints acts: True does not where the description has none."""
+    if value is True and option == LIMITS:
+        return bool(np.isfinite(stop_positions(model)).any())
     if value is True:
         return bool(getattr(JointDynamicsTerms(model), JOINT_TERMS[option]).any())
     return value is not False
@@ -339,21 +347,6 @@ def _is_default(value: object, default: object) -> bool:
 def field_names() -> tuple[str, ...]:
     """Return the names of all fields of a scenario, those that can be given by position first."""
     return ("model", "controller", "reference", *OPTIONS)
-
-
-def _of_present_schema(document: Mapping[str, Document]) -> dict[str, Document]:
-    """Return the document of a scenario of `FIRST_SCHEMA` in the present layout, with the same meaning."""
-    former = {present: name for name, present in FORMER_NAMES.items()}
-    wrong = [name for name in former if name in document]
-    if wrong:
-        raise ArgumentError(
-            f"the document of schema {FIRST_SCHEMA!r} has {wrong[0]}; there it is {former[wrong[0]]}"
-        )
-    found = {FORMER_NAMES.get(name, name): each for name, each in document.items()}
-    absent = {
-        name: False for name, each in OPTIONS.items() if each.kind is COEFFICIENTS and name not in found
-    }
-    return {**found, **absent, "schema": SCHEMA}
 
 
 def _is_number(document: Document) -> bool:

@@ -125,14 +125,15 @@ class RobotDocument:
     ``package://pybullet_data/FILE``; `urdf` is the text of its description,
     whose meshes are looked for in `mesh_folders`.
 
-    `q` is a list (nq) or the positions of joints by name; `pose` is that of the base, fixed or floating.
+    `base` replaces that of the description. `q` is a list (nq) or the positions of joints by name; `pose` is
+    that of the base, fixed or floating.
     """
 
     name: str
     robot: str | None = None
     urdf: str | None = None
     mesh_folders: list[str] = field(default_factory=list)
-    base: Literal["fixed", "floating"] = "fixed"
+    base: Literal["fixed", "floating"] | None = None
     pose: Vector | None = None
     lock: dict[str, float] = field(default_factory=dict)
     q: list[float] | dict[str, float] | None = None
@@ -527,9 +528,10 @@ def _robot_document(robot: SceneRobot) -> RobotDocument:
     model = robot.model
     return RobotDocument(
         robot.name,
-        urdf=model.to_urdf(geometry=True),
+        # Base and pose have keys of their own; gravity is stated by the text.
+        urdf=replace(model, base="fixed", base_pose=IDENTITY).to_urdf(geometry=True),
         mesh_folders=_mesh_folders(model),
-        base=model.base,
+        base="floating" if model.floating else None,
         pose=_pose_document(model.base_pose),
         q=list(robot.q or ()),
         v=list(robot.v or ()),

@@ -32,6 +32,10 @@ from dynx.world.scene.paths import ScenePaths
 from dynx.world.scene.scene import Scene
 
 SUFFIXES = (".toml", ".json")
+"""Suffixes of files of scenes that are read and written."""
+
+MJCF_SUFFIXES = (".xml", ".mjcf")
+"""Suffixes of files in MJCF, of which scenes are read."""
 
 MAX_TOML = 8 * 2**20
 """Largest size of a scene in TOML, of which Python reads about a million characters a second."""
@@ -44,18 +48,36 @@ _LONG_KEY = re.compile(rf"{_PART}(?:[ \t]*\.[ \t]*{_PART}){{{MAX_KEY_PARTS}}}")
 
 
 @checks_types
-def read_scene(source: str | os.PathLike[str], *, package_dirs: Iterable[StrPath] = ()) -> Scene:
-    """Read a scene from a ``.toml`` or ``.json`` file, or one of the scenes of dynx by its name.
+def read_scene(
+    source: str | os.PathLike[str],
+    *,
+    package_dirs: Iterable[StrPath] = (),
+    keyframe: str | None = None,
+) -> Scene:
+    """Read a scene from a ``.toml`` or ``.json`` file, one of the scenes of dynx by its name, or MJCF.
 
-    docs/world.md describes the keys. The robots and meshes that a file names lie in its folder (its
-    repository or package, if it lies in one), in the libraries of robots, or in `package_dirs`, and no other
-    file is read. A robot in a ``.xacro`` file is expanded, which evaluates expressions of that file as Python
-    code: read only scenes with such files that you trust. Other files may come from anyone.
+    The page "Scenes and worlds" of the documentation describes the keys. The robots and meshes
+    that a file names lie in its folder (its repository or package, if it lies in one), in the libraries of
+    robots, or in `package_dirs`, and no other file is read. A robot in a ``.xacro`` file is expanded, which
+    evaluates expressions of that file as Python code: read only scenes with such files that you trust. Other
+    files may come from anyone.
+
+    A file in MJCF (``.xml``, ``.mjcf``) starts at its `qpos0`, or at the `keyframe` of that name; the page
+    "Robots in MJCF" says what becomes what, and `notes` of the scene name what is not read.
+
     Raises RobotNotFoundError where nothing is there, ArgumentError and its kinds for a file that is no scene,
-    with the place in it, and the errors of `dynx.load` for its robots.
+    with the place in it, and the errors of `dynx.load` for its robots. UnknownNameError for a keyframe that
+    the file has not.
     """
     path = Path(checked_path(source))
-    if path.suffix.lower() not in SUFFIXES:
+    suffix = path.suffix.lower()
+    if suffix in MJCF_SUFFIXES:
+        return _read_mjcf(path, package_dirs, keyframe)
+    if keyframe is not None:
+        raise ArgumentError(
+            f"keyframe is {shown(keyframe)}, and {shown(str(path))} is no file in MJCF, which has keyframes"
+        )
+    if suffix not in SUFFIXES:
         path = _named(str(path))
     name = printable(str(path))
     text = _text(read_file(str(path)), name)
@@ -68,6 +90,19 @@ def read_scene(source: str | os.PathLike[str], *, package_dirs: Iterable[StrPath
     except (ArgumentError, DescriptionError, RobotNotFoundError) as error:
         kind = DescriptionError if isinstance(error, DescriptionError) else type(error)
         raise kind(f"{name}: {error}") from error
+
+
+def _read_mjcf(path: Path, package_dirs: Iterable[StrPath], keyframe: str | None) -> Scene:
+    # Imported here, because most scenes are no files in MJCF.
+    from dynx.world.scene.mjcf_reading import scene_from_mjcf
+
+    name = printable(str(path))
+    scene = scene_from_mjcf(read_file(str(path)), name, package_dirs, keyframe)
+    if scene is None:
+        raise ArgumentError(
+            f"{name} is no scene: its first element is not <mujoco>; dynx.load(file) reads a robot in URDF"
+        )
+    return scene
 
 
 @checks_types
@@ -97,9 +132,11 @@ def _named(name: str) -> Path:
         if name in scene_names() and path.is_file():
             return path
     known = scene_names()
-    hint = ", and names its robots" if name in _robot_names() else ""
+    robot = name in _robot_names() or name.endswith((".urdf", ".xacro"))
+    hint = ", and names its robots" if robot else ""
     raise RobotNotFoundError(
-        f"no scene {shown(name)} (a file of a scene ends in .toml or .json{hint}){format_hint(name)}"
+        f"no scene {shown(name)} (a file of a scene ends in .toml, .json or, in MJCF, .xml{hint})"
+        f"{format_hint(name)}"
         f"{nearest(name, known)}"
     )
 

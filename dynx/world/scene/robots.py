@@ -16,7 +16,7 @@ from dynx.model.configuration import checked_q, neutral
 from dynx.model.elements import checked_pose
 from dynx.model.model import refuse_other_than_model
 from dynx.model.numbers import checked_array
-from dynx.model.urdf.values import name_fault
+from dynx.model.xml.values import name_fault
 from dynx.rbd.kinematics import body_poses
 from dynx.spatial.scalar import Floats
 from dynx.spatial.se3 import homogeneous

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from types import UnionType
 from typing import TYPE_CHECKING
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from dynx.argument_types import checks_types, is_listed
 from dynx.errors import ArgumentError, UnknownNameError, nearest, shown
 from dynx.model import Model
-from dynx.model.elements import Vector
+from dynx.model.elements import Note, Vector
 from dynx.model.numbers import checked_gravity, is_real
 from dynx.model.tree import STANDARD_GRAVITY
 from dynx.registry import explains_names
@@ -39,7 +39,8 @@ class Scene:
     A part is named by its body, its robot, or ``robot/link``. `ignored` are pairs of names that do not
     collide, where a robot stands for all its links and a name in `groups` for all its members; a pair of one
     name twice makes the parts behind it ignore one another. Gravity (3,) [m/s^2] is that of the scene, not of
-    the models. `sensors` are read by `World.read_sensors`.
+    the models. `sensors` are read by `World.read_sensors`. `notes` say how a file was read that states more
+    than a scene, such as one in MJCF.
     """
 
     name: str = "scene"
@@ -50,6 +51,7 @@ class Scene:
     groups: tuple[tuple[str, tuple[str, ...]], ...] = ()
     gravity: Vector = STANDARD_GRAVITY
     sensors: tuple[Sensor, ...] = ()
+    notes: tuple[Note, ...] = field(default=(), compare=False)
 
     if TYPE_CHECKING:
         # Type checkers see what is accepted; the fields hold what is made of it.
@@ -63,6 +65,7 @@ class Scene:
             groups: Mapping[str, Iterable[str]] | Iterable[tuple[str, Iterable[str]]] = (),
             gravity: ArrayLike = STANDARD_GRAVITY,
             sensors: Iterable[Sensor] = (),
+            notes: Iterable[Note] = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -72,6 +75,7 @@ class Scene:
         put(self, "bodies", _instances("bodies", self.bodies, SceneBody))
         put(self, "constraints", _instances("constraints", self.constraints, Weld | PointToPoint))
         put(self, "gravity", checked_gravity(self.gravity))
+        put(self, "notes", _instances("notes", self.notes, Note))
         _refuse_repeated([*(r.name for r in self.robots), *(b.name for b in self.bodies)])
         groups = [
             (name, _names(f"group {shown(name)}", members))
@@ -103,7 +107,6 @@ class Scene:
     def _groups(self) -> dict[str, tuple[str, ...]]:
         return dict(self.groups)
 
-    @checks_types
     @checks_types
     def robot(self, name: str) -> SceneRobot:
         """Return the robot of that name; UnknownNameError if there is none."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 from dynx.argument_types import is_listed
 from dynx.errors import ArgumentError, shown
 from dynx.model.numbers import checked_seed, is_real
-from dynx.model.urdf.values import name_fault
+from dynx.model.xml.values import name_fault
 from dynx.spatial.scalar import Floats
 from dynx.world.sensors.errors import SensorErrors
 from dynx.world.sensors.places import SensedParts, SensorPlace

@@ -78,6 +78,22 @@ def test_a_baseline_just_written_accepts_everything(tmp_path: Path) -> None:
     assert conclude([differing(link="another")], tmp_path, known) == 1
 
 
+def test_ignored_rules_fail_no_check_but_what_no_rule_explains_does(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    report = replace(differing(), ignored={"DX901": 2, "DX902": 1, "DX903": 1})
+    explained = replace(report, unexplained=(), residual=0.0)
+    assert conclude([report], tmp_path) == 1
+    capsys.readouterr()
+    assert conclude([explained], tmp_path) == 0
+    shown = capsys.readouterr().out
+    assert "4 findings ignored: DX901 planted-cause (2), DX902 planted-rounding (1)" in shown
+    assert "write an explicit zero inertial" not in shown
+    assert conclude([replace(explained, ignored={"DX901": 2})], tmp_path) == 1
+    assert conclude([explained, alike(), refused()], tmp_path) == 2
+    assert "4 findings ignored" in capsys.readouterr().out
+
+
 def test_the_document_names_what_was_not_done(tmp_path: Path) -> None:
     path = tmp_path / "x.json"
     conclude([alike()], tmp_path, outputs=ReportFiles(json=str(path)), left=2)

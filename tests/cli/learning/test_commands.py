@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -50,7 +51,55 @@ def test_several_seeds_have_a_folder_each_a_mean_and_a_plot(tmp_path: Path) -> N
     assert {each.name for each in out.iterdir()} == {"seed-3", "seed-5"}
     again = run(*command, "--resume", "--quiet")
     assert (again.exit_code, again.output) == (0, "")
+    shutil.rmtree(out / "seed-5")
+    alone = run("train", "--resume", "--out", str(out), "--steps", "96", "--episodes", "1", "--json")
+    assert alone.exit_code == 0, alone.output
+    (continued,) = json.loads(alone.stdout)["runs"]
+    assert (continued["seed"], continued["resumed_at"], continued["steps"]) == (3, 64, 96)
     assert run(*command).exit_code == 2
+
+
+def test_a_run_is_resumed_with_the_options_of_its_folder(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    options = [*("--engine", "reference", "--algo", "a2c", "--seed", "7", "--envs", "2", "--normalize")]
+    options += ["--option", "pole_mass=0.2", "--set", "gamma=0.9", "--set", "n_steps=16"]
+    begun = run("train", "CartPole", *options, "--steps", "64", "--episodes", "1", "--out", str(out))
+    assert begun.exit_code == 0, begun.output
+    resumed = ("train", "--resume", "--out", str(out), "--steps", "128", "--episodes", "1")
+    result = run(*resumed, "--json")
+    assert result.exit_code == 0, result.output
+    found: dict[str, Any] = json.loads(result.stdout)
+    assert (found["algorithm"], found["hyperparameters"]) == ("a2c", {"gamma": 0.9, "n_steps": 16})
+    assert [(each["seed"], each["resumed_at"]) for each in found["runs"]] == [(7, 64)]
+    spec = json.loads((out / "run.json").read_text())["spec"]
+    assert (spec["steps"], spec["envs"], spec["normalize"]) == (128, 2, True)
+    assert spec["task"]["options"] == {"pole_mass": 0.2}
+    for wrong, message in (
+        (("--set", "gamma=0.5"), "has another run: hyperparameters"),
+        (("--seed", "8"), "has another run: seed is '8', there '7'"),
+        (("--algo", "ppo"), "has another run: algorithm"),
+    ):
+        refused = run(*resumed, *wrong)
+        assert (refused.exit_code, message in refused.stderr) == (2, True), refused.output
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"task": {"id": "evil:Env-v0", "options": {}}}, "name the task yourself: --task"),
+        ({"task": {"id": "dynx/Stand-v0", "options": {"robot": "r.xacro"}}}, "robot"),
+        ({"envs": 100_000_000}, "give so many yourself: --envs"),
+    ],
+)
+def test_a_folder_names_no_module_no_file_and_few_environments(
+    change: dict[str, Any], message: str, tmp_path: Path
+) -> None:
+    task = {"id": "dynx/CartPole-v0", "engine": "reference", "options": {}}
+    spec = {"task": task, "algorithm": "ppo", "steps": 64, "envs": 1, "seed": 0} | change
+    (tmp_path / "run.json").write_text(json.dumps({"schema": "dynx.training/3", "spec": spec}))
+    result = run("train", "--resume", "--out", str(tmp_path))
+    assert result.exit_code == 2, result.output
+    assert message in result.stderr
 
 
 def test_drawn_parameters_are_part_of_the_run(tmp_path: Path) -> None:
@@ -91,6 +140,10 @@ def test_a_film_is_written(folder: Path, tmp_path: Path) -> None:
     result = run("play", str(folder / "final.zip"), "--export", str(film))
     assert result.exit_code == 0, result.output
     assert film.read_bytes()[:6] == b"GIF89a"
+    assert "wrote" in result.stdout
+    assert "episode 1 of 1" in result.stderr  # progress, where no bar is shown
+    result = run("play", str(folder / "final.zip"), "--export", str(film), "--quiet")
+    assert (result.stdout, result.stderr) == ("", "")
     pytest.importorskip("imageio_ffmpeg", reason="needs the extra film")
     film = tmp_path / "film.MP4"
     result = run("play", str(folder / "final.zip"), "--export", str(film))
@@ -202,6 +255,9 @@ def test_a_task_of_a_module_is_trained_played_and_compared(
     assert f"final.zip --view --task {task}" in trained.output.replace("\n", " ")
     resumed = run("train", task, *on, "--steps", "96", "--resume", "--out", str(tmp_path / "run"), *FEW)
     assert resumed.exit_code == 0, resumed.output
+    again = ("train", "--steps", "128", "--resume", "--out", str(tmp_path / "run"), "--episodes", "1")
+    assert "name the task yourself: --task" in run(*again).stderr  # a file imports nothing
+    assert run(*again, "--task", task).exit_code == 0
     unnamed = run("play", policy)  # a file imports nothing
     assert unnamed.exit_code == 2
     assert "name the task yourself: --task" in unnamed.output

@@ -20,6 +20,7 @@ from dynx.cli.shell.output import counted
 from dynx.ik import IKSolutions
 from dynx.model.loading import load
 from dynx.model.numbers import MAX_MAGNITUDE
+from dynx.rbd.parameters import Payload, plant_model
 from dynx.spatial.so3 import quat_from_rotation, rpy_from_rotation
 from dynx.world.scene import read_scene
 from dynx.world.scene.scene import MARGIN
@@ -113,6 +114,29 @@ def test_wrenches_of_joints_under_external_forces() -> None:
         result = CliRunner().invoke(cli, ["id", "ur5", *wrong])
         assert result.exit_code == 2
         assert says in result.stderr
+
+
+def test_quantities_with_a_payload() -> None:
+    """At rest it is a weight; its centre of mass and several payloads count."""
+    bodies = ("--payload", "tool0:3:0,0,0.05", "--payload", "wrist_1_link:0.5")
+    model = plant_model(load("ur5"), [Payload("tool0", 3.0, (0, 0, 0.05)), Payload("wrist_1_link", 0.5)])
+    with backend("pinocchio", model) as engine:
+        a = np.linspace(0.1, 0.6, 6)
+        found = document("id", "ur5", "--q", Q_TEXT, "--a", ",".join(map(str, a)), *bodies)
+        assert found["tau"] == engine.inverse_dynamics(Q, np.zeros(6), a).tolist()
+        assert (
+            document("mass", "ur5", "--q", Q_TEXT, *bodies)["mass_matrix"] == engine.mass_matrix(Q).tolist()
+        )
+        fallen = engine.forward_dynamics(Q, np.zeros(6), np.zeros(6))
+        assert document("fd", "ur5", "--q", Q_TEXT, *bodies)["a"] == fallen.tolist()
+    assert [each["mass"] for each in found["payload"]] == [3.0, 0.5]
+    assert document("id", "ur5")["payload"] == []
+    weight = document("id", "ur5", "--q", Q_TEXT, "--force", f"tool0:0,0,{-3 * 9.81}")
+    hung = document("id", "ur5", "--q", Q_TEXT, "--payload", "tool0:3")
+    np.testing.assert_allclose(hung["tau"], weight["tau"], rtol=0, atol=1e-12 * max(map(abs, hung["tau"])))
+    for wrong, says in (("tool0", "not of the form FRAME:MASS"), ("tol0:1", "did you mean 'tool0'")):
+        result = CliRunner().invoke(cli, ["id", "ur5", "--payload", wrong])
+        assert (result.exit_code, says in result.stderr) == (2, True)
 
 
 def test_fd_under_external_forces() -> None:

@@ -20,6 +20,8 @@ PARENTS = {"env": ("list", "distance")}
 CALLS = {
     "agree": "agree double_pendulum --backends reference,mujoco --samples 1 --jobs 1",
     "doctor": "doctor double_pendulum",
+    "convert": "convert double_pendulum --out pendulum.xml",
+    "same": "same double_pendulum double_pendulum",
     "sim": "sim double_pendulum --to joint1=0 --duration 0.01 --save run.npz",
     "world": "world stack --duration 0.002",
     "compare": "compare run.npz run.npz",

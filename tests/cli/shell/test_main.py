@@ -172,3 +172,9 @@ def test_a_mistyped_option_of_every_command_names_the_nearest(command: str) -> N
     assert ("--json" in result.output.partition("; did you mean ")[2]) == (command != "view"), result.output
     result = CliRunner().invoke(cli, [command, "--wholly-else"])
     assert "no option '--wholly-else' (see" in result.output
+
+
+@pytest.mark.parametrize("words", [[], ["id"], ["env", "list"]])
+def test_usage_begins_with_the_program(words: list[str]) -> None:
+    text = CliRunner().invoke(cli, [*words, "--help"]).output
+    assert text.startswith(" ".join(("Usage: dynx", *words)))

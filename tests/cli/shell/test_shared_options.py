@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from dynx.cli.shell.main import COMMANDS, cli
 from dynx.cli.shell.options import ENGINE_SPELLINGS
 
-WITHOUT_ENGINES = {"info", "explain", "robots", "backends", "compare", "env list"}
+WITHOUT_ENGINES = {"info", "explain", "robots", "backends", "compare", "convert", "same", "env list"}
 """Commands in which no engine is chosen."""
 
 

@@ -31,7 +31,7 @@ KEYS = """
     schema dynx robot source base base_pose gravity nq nv law backend gains motor_limits frame frame_given
     motion settings payload mass_scale total_mass passive status error overshoot dt steps steps_asked
     simulated seconds max_error max_error_joint max_error_time rms_error final_error base_error frame_error
-    energy_change energy_drift max_kinetic_energy saturated joints final files
+    energy_change energy_drift max_kinetic_energy saturated joints final files notes
 """
 """Keys of the document, schema 1."""
 
@@ -245,6 +245,14 @@ def test_friction_compensation_removes_the_error() -> None:
     assert document("ur5", *SHORT, *smooth)["max_error"] < 1e-10
 
 
+def test_a_controller_knows_the_joint_dynamics_of_the_description() -> None:
+    move = ("six_axis_arm", "--to", "joint1=0.3,joint2=0.2", "--duration", "0.5", "--ignore-limits")
+    without = document(*move)
+    given = document(*move, "--controller-joint-dynamics")
+    assert given["rms_error"] < 0.3 * without["rms_error"]
+    assert given["settings"]["controller"] == f"{without['settings']['controller']}, joint dynamics known"
+
+
 def test_a_passive_robot_keeps_its_energy() -> None:
     made = document(
         *("pendulum", "--q0", "1.5", "--controller", "none", "--integrator", "rk4", "--duration", "1"),
@@ -349,6 +357,12 @@ ELBOW = ["ur5", "--to", "elbow_joint=0.1"]
         ([*ELBOW, "--controller", "none", "--kp", "1"], "takes no gains"),
         ([*ELBOW, "--controller", "impedance"], "impedance needs kp"),
         ([*ELBOW, "--controller", "position-motor"], "pybullet"),
+        ([*ELBOW, "--controller", "none", "--controller-joint-dynamics"], "--controller none takes no"),
+        ([*ELBOW, "--controller", "pd", "--controller-joint-dynamics"], "pd computes without"),
+        (
+            [*ELBOW, "--joint-friction", "1", "--friction-compensation", "--controller-joint-dynamics"],
+            "would both compensate",
+        ),
         ([*ELBOW, "--friction-compensation"], "needs damping or friction of a joint"),
         ([*ELBOW, "--damping", "1"], "no option '--damping'; it is now --joint-damping"),
         ([*ELBOW, "--friction", "1"], "no option '--friction'; it is now --joint-friction"),
@@ -435,7 +449,7 @@ def test_a_record_is_resumed_to_the_last_bit(tmp_path: Path) -> None:
     assert "the rollout to resume" in other.stderr
 
 
-DIVERGING = ["ur5", "--controller", "none", "--v0", "1e4,1e4,1e4,1e4,1e4,1e4"]
+DIVERGING = ["ur5", "--controller", "none", "--v0", "1e4,1e4,1e4,1e4,1e4,1e4", "--no-joint-limits"]
 
 
 @pytest.mark.parametrize("damage", ["truncated", "compression", "header", "path"])

@@ -35,7 +35,7 @@ FALLING = ["solo12", "--base", "floating", "--controller", "pd", "--duration", "
         (["--joint-armature", "0.1"], "plant: armature 0.1"),
         (["--push", "tool0:1,0,0"], "plant: push on tool0 from 0 s"),
         (["--push", "tool0:1,0,0:0.01:0.02"], "plant: push on tool0 from 0.01 s for 0.02 s"),
-        (["--joint-limits"], "plant: stops at the position limits"),
+        (["--no-joint-limits"], "plant: no stops at the position limits"),
         (["--substeps", "2"], "plant: 2 substeps"),
         (["--noise-q", "1e-4", "--noise-v", "0.01"], "controller: noise 0.0001 in q and 0.01 in v"),
         (["--delay", "0.002"], "controller: delay 0.002 s"),
@@ -227,6 +227,7 @@ def test_a_fixed_base_has_no_error() -> None:
     ],
 )
 def test_gains_too_large_for_the_step_are_named(arguments: list[str], name: str) -> None:
+    arguments = [*arguments, "--no-joint-limits"]
     result = sim(*arguments)
     assert result.exit_code == 1
     assert (
@@ -250,7 +251,7 @@ def test_an_oscillation_within_the_limits_is_named_though_nothing_diverges() -> 
 
 
 def test_divergence_for_another_reason_has_no_overshoot() -> None:
-    diverging = ["ur5", "--controller", "none", "--v0", "1e4,1e4,1e4,1e4,1e4,1e4"]
+    diverging = ["ur5", "--controller", "none", "--v0", "1e4,1e4,1e4,1e4,1e4,1e4", "--no-joint-limits"]
     assert document(*diverging, code=1)["overshoot"] is None
     assert "smaller gains" not in sim(*diverging).stderr
     assert document("ur5", *SHORT)["overshoot"] is None

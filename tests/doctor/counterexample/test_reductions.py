@@ -24,6 +24,7 @@ from dynx.doctor.counterexample import (
     unit_numbers,
 )
 from dynx.model import Model
+from dynx.model.documents import bare_urdf
 from dynx.model.library import find
 from dynx.model.xml.source import XmlSource
 from dynx.testing.strategies import models
@@ -35,7 +36,7 @@ ROBOTS = models(from_urdf=True, locks=False, mimics=False)
 @given(st.data())
 def test_links_are_taken_from_a_tree(cut: Callable[[XmlSource], Reductions], data: st.DataObject) -> None:
     model = data.draw(ROBOTS)
-    source = XmlSource(model.to_urdf())
+    source = XmlSource(bare_urdf(model))
     reductions = cut(source)
     assert len(reductions.changes) == len(model.joints)
     chosen = [change for change in reductions.changes if data.draw(st.booleans())]
@@ -52,7 +53,7 @@ def test_links_are_taken_from_a_tree(cut: Callable[[XmlSource], Reductions], dat
 
 @given(ROBOTS)
 def test_a_single_link_can_be_left_of_any_robot(model: Model) -> None:
-    source = XmlSource(model.to_urdf())
+    source = XmlSource(bare_urdf(model))
     for cut in (fewer_links, higher_links):
         assert len(load(cut(source).apply(cut(source).changes).text).links) == 1
 
@@ -60,7 +61,7 @@ def test_a_single_link_can_be_left_of_any_robot(model: Model) -> None:
 @given(st.data())
 def test_joints_become_fixed(data: st.DataObject) -> None:
     model = data.draw(ROBOTS)
-    reductions = fewer_moving_joints(XmlSource(model.to_urdf()))
+    reductions = fewer_moving_joints(XmlSource(bare_urdf(model)))
     chosen = [joint for joint in reductions.changes if data.draw(st.booleans())]
     names = {joint.attributes["name"] for joint in chosen}
     left = load(reductions.apply(chosen).text)
@@ -79,7 +80,7 @@ def test_what_says_nothing_about_dynamics_goes(robot: str) -> None:
 
 @given(ROBOTS, st.booleans())
 def test_tidy_text_says_the_same(model: Model, numbers: bool) -> None:
-    source = XmlSource(model.to_urdf())
+    source = XmlSource(bare_urdf(model))
     text = format_document(source, numbers=numbers)
     assert load(text) == load(source.text)
     assert format_document(XmlSource(text), numbers=numbers) == text
@@ -92,7 +93,7 @@ def test_tidy_text_says_the_same(model: Model, numbers: bool) -> None:
 def test_numbers_become_simpler_and_stay_so(
     cut: Callable[[XmlSource], Reductions], data: st.DataObject
 ) -> None:
-    source = XmlSource(data.draw(ROBOTS).to_urdf())
+    source = XmlSource(bare_urdf(data.draw(ROBOTS)))
     reductions = cut(source)
     chosen = [change for change in reductions.changes if data.draw(st.booleans())]
     simpler = reductions.apply(chosen)

@@ -20,6 +20,7 @@ from dynx.doctor.examination import model_without_mimics
 from dynx.doctor.report import Counterexample
 from dynx.errors import DynxError
 from dynx.model import Model
+from dynx.model.documents import bare_urdf
 from dynx.model.library import find
 from dynx.model.tree import Base
 from dynx.model.xml.source import XmlSource
@@ -228,7 +229,7 @@ def test_the_number_of_trials_is_bounded(monkeypatch: pytest.MonkeyPatch) -> Non
 def robots_with_a_difference(draw: st.DrawFn) -> tuple[Case, Difference]:
     """Draw a robot, and an engine with an error that depends on a joint angle or on the mass of a link."""
     model = draw(models(from_urdf=True, locks=False, min_links=2))
-    case = Case(XmlSource(model.to_urdf(), "<random>"), model.base)
+    case = Case(XmlSource(bare_urdf(model), "<random>"), model.base)
     names = [link.name for link in model.links]
     moving = [joint.name for joint in model.joints if joint.moves]
     link = draw(st.sampled_from(names))

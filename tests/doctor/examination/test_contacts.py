@@ -18,6 +18,7 @@ from dynx.doctor.examination import (
 )
 from dynx.doctor.formats import wording
 from dynx.loaded import installed_engines
+from dynx.model.tree import Base
 from dynx.rules import Case
 from dynx.rules.registry import trap_case
 from tests.rules.documents import case_of, joint, link
@@ -50,6 +51,29 @@ def test_fingers_that_follow_do_not_touch() -> None:
     assert not links_in_contact(gripper('<mimic joint="left_slide"/>'), "mujoco", 0)
     assert {*links_in_contact(gripper(""), "mujoco", 0)} == {("left", "right")}
     assert "none touch" in describe_contacts(gripper('<mimic joint="left_slide"/>'), "mujoco", 0)
+
+
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+def test_the_links_of_the_shapes_are_named_and_not_those_they_are_merged_into(base: Base) -> None:
+    hand = [link("hand"), link("pad", BALL, BALL), joint("grip", "hand", "pad", type="fixed")]
+    ground = [link("world"), link("table", BALL), joint("stand", "world", "table", type="fixed")]
+    slide = joint("slide", "table", "wrist", type="prismatic")
+    turn = joint("turn", "wrist", "hand")
+    case = case_of(*ground, link("wrist"), *hand, slide, turn, base=base)
+    report = diagnose(case.source.text, base=base, counterexamples=False)
+    (finding,) = (each for each in report.findings if each.rule == "DX308")
+    assert finding.proved
+    assert "pad and table touch in" in finding.message
+    assert finding.message.count(" touch in ") == 1
+
+
+def test_a_renamed_link_has_its_name_in_the_file() -> None:
+    parts = [link("world", BALL, mass=2.0), link("wrist"), link("pad", BALL)]
+    joints = [joint("slide", "world", "wrist", type="prismatic"), joint("turn", "wrist", "pad")]
+    report = diagnose(case_of(*parts, *joints).source.text, base="floating", counterexamples=False)
+    assert "DX109" in {each.rule for each in report.differences}
+    (finding,) = (each for each in report.differences if each.rule == "DX308")
+    assert "pad and world touch in" in finding.message
 
 
 def test_an_engine_without_contacts_and_one_that_refuses_the_file_name_none() -> None:

@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dynx.doctor.formats import baseline_document, read_baseline
+from dynx.doctor.formats import (
+    baseline_document,
+    github_annotations,
+    html_page,
+    junit_xml,
+    read_baseline,
+    sarif_document,
+    wording,
+)
 from dynx.doctor.formats.baseline import Baseline, differences
 from dynx.doctor.report import DoctorReport, EngineResult
 from dynx.errors import ArgumentError
@@ -40,6 +50,47 @@ def test_another_link_is_new_and_the_old_one_gone() -> None:
     found = written(differing(link="a")).compare(differing(link="b"))
     assert [each.place.link for each in found.new] == ["b"]
     assert [each.place.link for each in found.vanished] == ["a"]
+
+
+def ignoring(*rules: str) -> DoctorReport:
+    """Return the report of a robot that differs, with these rules ignored."""
+    counts = Counter(each.rule for each in differing().findings)
+    return replace(differing(), ignored={rule: counts[rule] for rule in rules})
+
+
+@given(st.sets(st.sampled_from(["DX901", "DX902", "DX903"])), st.booleans())
+def test_differences_of_ignored_rules_are_neither_new_nor_known(rules: set[str], known: bool) -> None:
+    report = ignoring(*sorted(rules))
+    found = (written(differing()) if known else Baseline()).compare(report)
+    every = {each.place.rule for each in differences(report, "")}
+    assert {each.place.rule for each in found.ignored} == every & rules
+    assert {each.place.rule for each in (found.known if known else found.new)} == every - rules
+    assert (found.new if known else found.known, found.vanished) == ((), ())
+    assert {each.place.rule for each in written(report).known} == every - rules
+
+
+def test_every_format_counts_the_findings_of_ignored_rules() -> None:
+    report = ignoring("DX901", "DX903")
+    line = "3 findings ignored: DX901 planted-cause (2), DX903 planted-practice (1)"
+    assert wording.ignored(report) == line
+    assert wording.ignored(differing()) == ""
+    assert line in html_page([report])
+    assert report.to_dict()["ignored"] == {"DX901": 2, "DX903": 1}
+    assert len(report.to_dict()["findings"]) == len(report.findings)
+    document = sarif_document([report])
+    (run,) = document["runs"]
+    notes = run["invocations"][0]["toolExecutionNotifications"]
+    assert [each["message"]["text"] for each in notes] == [line]
+    suppressed = {each["ruleId"] for each in run["results"] if each["suppressions"]}
+    assert suppressed == {"DX901", "DX903"}
+    annotations = github_annotations(document)
+    assert annotations.pop() == (
+        "::notice title=3 findings ignored::DX901 planted-cause (2), DX903 planted-practice (1)"
+    )
+    assert len(annotations) == len(run["results"]) - 3
+    cases = {each.get("name"): each for each in ElementTree.fromstring(junit_xml([report])).iter("testcase")}
+    assert cases["DX901 planted-cause"].find("skipped") is not None
+    assert cases["DX902 planted-rounding"].find("failure") is not None
 
 
 def test_bad_practice_is_no_difference() -> None:

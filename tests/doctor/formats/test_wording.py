@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from dynx.doctor.formats import html_page, junit_xml, sarif_document, wording
 from dynx.doctor.formats.causes import ROUNDING, causes, severity
 from dynx.doctor.report import Effect, EngineResult
+from dynx.errors import shown
 from tests.doctor.formats.reports import alike, differing, refused
 
 
@@ -120,3 +121,12 @@ def test_why_an_engine_has_no_results_is_said_with_its_reason(reason: str) -> No
         (replace(engine, not_used_after=reason), "not used on the mended file either: "),
     ):
         assert wording.refusal(result, mended=True) == start + told
+
+
+def test_names_in_messages_are_escaped_once_and_long_ones_are_cut() -> None:
+    file = "meshes" + chr(92) + "base.stl"
+    text = f'no file {shown(file)}; it says \x1b[2J and "it\'s"'
+    assert wording.message(text) == f'no file {shown(file)}; it says {chr(92)}x1b[2J and "it\'s"'
+    cut = wording.message("long " * 100, 60)
+    assert len(cut) == 60
+    assert cut.endswith("... (500 characters)")

@@ -20,6 +20,7 @@ from dynx.loaded.difference import model_difference
 from dynx.model import Inertial, Joint, Link, Model, Pose
 from dynx.model.tree import Base
 from dynx.reference.backend import ReferenceBackend
+from dynx.spatial.scalar import Floats
 from tests.backends.robots import chain, motion
 from tests.loaded import fork
 from tests.loaded.files import TILTED, assert_alike, clean, clean_robots, error, loaded
@@ -232,6 +233,45 @@ def test_the_calls_that_are_shown_can_be_made(base: Base, tmp_path: Path) -> Non
     finally:
         bullet.disconnect(client)
     assert LoadedPyBullet.engine_version().startswith("3.")
+
+
+@pytest.mark.parametrize("base", BASES)
+def test_what_a_step_does_by_itself_is_shown_with_the_call_that_switches_it_off(
+    base: Base, tmp_path: Path
+) -> None:
+    model = forked(base)
+    path = tmp_path / "robot.urdf"
+    path.write_text(model.to_urdf())
+    rng = np.random.default_rng(0)
+    speeds = rng.uniform(1.0, 3.0, len(model.joint_names))
+    (switched_off,) = LoadedPyBullet.STEP_DEFAULTS.values()
+
+    def accelerations(*calls: str) -> Floats:
+        """Return those of joints in a step from these speeds, without motors and joint damping."""
+        client = bullet.connect(bullet.DIRECT)
+        try:
+            names: dict[str, Any] = {"p": _Client(client), "path": str(path)}
+            exec(LoadedPyBullet.load_call(model.floating), names)
+            p, robot = names["p"], names["robot"]
+            p.setTimeStep(1e-4)
+            for code in (LoadedPyBullet.CALLS["pybullet.no_damping"], *calls):
+                exec(code, names)
+            moving = [
+                j for j in range(p.getNumJoints(robot)) if p.getJointInfo(robot, j)[2] != bullet.JOINT_FIXED
+            ]
+            for joint, speed in zip(moving, speeds, strict=True):
+                p.setJointMotorControl2(robot, joint, bullet.VELOCITY_CONTROL, force=0)
+                p.resetJointState(robot, joint, 0.1, speed)
+            p.stepSimulation()
+            return np.array([p.getJointState(robot, j)[1] for j in moving]) - speeds
+        finally:
+            bullet.disconnect(client)
+
+    # The call for the root acts on all links, as the calls on every one of them do.
+    each = f"for k in range(-1, p.getNumJoints(robot)): {switched_off.replace('-1', 'k')}"
+    as_loaded, free, free_each = accelerations(), accelerations(switched_off), accelerations(each)
+    assert np.array_equal(free, free_each)
+    assert np.abs(as_loaded - free).max() > 1e-3 * np.abs(free).max()
 
 
 class _Client:

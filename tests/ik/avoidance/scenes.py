@@ -17,7 +17,7 @@ ARMS = {"ur5": "ee_link", "panda": "panda_hand", "kinova": "j2s6s200_end_effecto
 
 ENGINE_ERROR = 1e-6
 """Bound [m] on MuJoCo's distances of separated hulls and boxes, whose vertices are 32-bit floats
-(docs/distances.md measures 3e-8)."""
+(docs/results.md has 3e-8)."""
 
 TABLE = box("table", (1.6, 1.6, 0.1), pose=Pose((0.0, 0.0, -0.12)))
 

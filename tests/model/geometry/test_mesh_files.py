@@ -52,6 +52,40 @@ def test_a_mesh_that_is_not_there_is_missed_and_the_nearest_name_told(robot: Pat
     assert ("did you mean 'Base.stl'" in str(raised.value)) == ("nowhere" not in name)
 
 
+@pytest.mark.parametrize(
+    ("wanted", "hint"),
+    [
+        ("trunk.stl", ""),  # what is alike is the ending
+        ("thigh.obj", "; did you mean 'thigh.stl'?"),
+        ("thihg.stl", "; did you mean 'thigh.stl'?"),
+        ("Thigh.STL", "; did you mean 'thigh.stl'?"),
+    ],
+)
+def test_the_nearest_name_is_near_without_its_ending(tmp_path: Path, wanted: str, hint: str) -> None:
+    description = tmp_path / "robot.urdf"
+    description.write_text("<robot/>")
+    (tmp_path / "thigh.stl").touch()
+    (tmp_path / "calf.stl").touch()
+    with pytest.raises(MeshNotFoundError) as missing:
+        find_mesh(wanted, str(description))
+    assert str(missing.value) == f"no file '{wanted}'{hint}"
+
+
+def test_an_address_of_a_package_without_a_file_is_called_so(tmp_path: Path) -> None:
+    description = tmp_path / "robot.urdf"
+    description.write_text("<robot/>")
+    for name in ("package://base.stl", "package://base.stl/"):
+        assert reason_unknown(name, str(description)) == f"'{name}' names a package and no file in it"
+
+
+def test_the_host_of_an_address_is_named(tmp_path: Path) -> None:
+    description = tmp_path / "robot.urdf"
+    description.write_text("<robot/>")
+    assert reason_unknown("file://biped/meshes/a.stl", str(description)) == (
+        "'biped' is the host in 'file://biped/meshes/a.stl'; an address of a path begins file:///"
+    )
+
+
 @pytest.mark.parametrize("name", ["package://hand/meshes/a.stl", "http://x/a.stl", "$(find a)/b.stl", ""])
 def test_what_may_be_elsewhere_is_neither_found_nor_missed(robot: Path, name: str) -> None:
     assert find_mesh(name, str(robot)) is None
@@ -160,6 +194,24 @@ def test_paths_may_climb_within_the_package_or_repository(tmp_path: Path, marker
     assert find_mesh("../../meshes/a.stl", str(robot)) == mesh
     with pytest.raises(MeshNotFoundError):
         find_mesh("../../meshes/b.stl", str(robot))
+
+
+def test_paths_may_climb_within_a_python_package(tmp_path: Path) -> None:
+    """Robots in MJCF come in Python packages, with folders of data below the modules."""
+    robot = tmp_path / "site-packages/envs/robots/assets/hand/robot.xml"
+    robot.parent.mkdir(parents=True)
+    robot.write_text("<mujoco/>")
+    mesh = robot.parents[1] / "stls/a.stl"
+    mesh.parent.mkdir()
+    mesh.write_bytes(b"")
+    assert find_mesh("../stls/a.stl", str(robot)) is None
+    for package in (robot.parents[2], robot.parents[3]):
+        (package / "__init__.py").touch()
+    package_search.enclosing_folder.cache_clear()
+    assert find_mesh("../stls/a.stl", str(robot)) == mesh
+    with pytest.raises(MeshNotFoundError):
+        find_mesh("../../../b.stl", str(robot))
+    assert find_mesh("../../../../b.stl", str(robot)) is None
 
 
 @pytest.mark.parametrize("name", ["circle/a.stl", "pipe.stl", "a/b/../../c.stl"])

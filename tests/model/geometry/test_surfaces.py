@@ -191,7 +191,8 @@ REFUSED = {
     "/etc/hostname": "outside the folder",
     "damaged.png": "cannot be read",
     "huge.png": "pixels; at most",
-    "empty.png": "cannot be read",
+    "empty.png": "cannot be read: it is none of PNG, JPEG",
+    "https://evil.test/absent.png": "dynx reads no 'https://'",
 }
 
 

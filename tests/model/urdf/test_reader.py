@@ -14,7 +14,7 @@ from dynx.errors import DescriptionError, ModelError, UnsupportedFeatureError
 from dynx.model import JointDynamics, Limits, Mimic, Model, Pose
 from dynx.model.loading import load
 from dynx.model.urdf.reader import reads_quaternions
-from dynx.model.urdf.values import MAX_NAME
+from dynx.model.xml.values import MAX_NAME
 from dynx.spatial.so3 import rotation_from_quat
 from dynx.testing.strategies import models, unit_vectors, urdf_text
 from tests.model.descriptions import INERTIAL, chain, joint, link, robot
@@ -352,7 +352,7 @@ BAD: dict[str, tuple[str, int | None, str]] = {
         1,
         "this is an SRDF file, which has groups of joints and no robot; wanted a URDF file",
     ),
-    "no robot": ("\n<sdf/>", 2, "the root element is <sdf>; wanted <robot>; this file is SDF"),
+    "no robot": ("\n<sdf/>", 2, "<sdf> of the file has no attribute version"),
     "two robots": (robot('<link name="a"/>') + "<robot", 4, "wanted one root element"),
     "no link": (robot(""), None, "the robot has no link"),
     "link in capitals": (robot("<Link name='a'/>"), 2, "did you mean 'link'?"),

@@ -21,7 +21,7 @@ LOADABLE = [entry.name for entry in robots() if entry.name != "ur_description_ur
 
 
 def read_back(model: Model) -> Model:
-    return load(model.to_urdf(), base=model.base, gravity=model.gravity, base_pose=model.base_pose)
+    return load(model.to_urdf())
 
 
 @given(models(physical=False))
@@ -92,10 +92,65 @@ def test_frames_that_were_added_stay_frames_and_are_links_to_others() -> None:
     model = load("ur5").with_frame("tip", "tool0", Pose((0.0, 0.0, 0.1))).with_frame("tip_frame", "tool0")
     assert read_back(model) == model
     root = ElementTree.fromstring(model.to_urdf())
+    assert model.geometry.links.keys() == read_back(model).geometry.links.keys()
     links = [element.get("name") for element in root.iter("link")]
     joints = [element.get("name") for element in root.iter("joint")]
     assert {"tip", "tip_frame"} <= set(links)
     assert len(links) == len(set(links)) == len(joints) + 1 == len(set(joints)) + 1
+
+
+POSE = Pose((1.0, -2.0, 0.5), (0.3, -0.2, 2.0))
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        load("ur5", gravity=(0.1, -0.2, -1.62)),
+        load("ur5", base="floating"),
+        load("ur5", base="floating", gravity=(0.0, 0.0, 0.0)),
+        load("ur5", base_pose=POSE),
+        load("ur5", base_pose=POSE, gravity=(1.0, 2.0, 3.0)),
+    ],
+)
+def test_gravity_and_the_base_are_read_back_and_arguments_replace_them(model: Model) -> None:
+    assert read_back(model) == model
+    text = model.to_urdf()
+    assert load(text, gravity=(0.0, 0.0, -9.81)).gravity == (0.0, 0.0, -9.81)
+    assert load(text, base="fixed").base == "fixed"
+    assert load(text, base="floating").base_pose == Pose()
+
+
+def test_only_what_differs_from_the_defaults_is_written() -> None:
+    assert "dynx_robot" not in load("ur5").to_urdf()
+
+
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [('base="free"', "base of <dynx_robot>"), ('gravity="0 0"', "gravity"), ('gravity="0 0 x"', "gravity")],
+)
+def test_faulty_settings_of_the_extension_are_refused_with_their_line(setting: str, message: str) -> None:
+    text = f'<robot name="r">\n  <dynx_robot {setting}/>\n  <link name="a"/>\n</robot>'
+    with pytest.raises(DescriptionError, match=message) as raised:
+        load(text)
+    assert raised.value.line == 2
+
+
+INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
+
+
+def test_a_frame_may_state_that_it_has_no_mass() -> None:
+    model = load("ur5").with_frame("tip", "tool0")
+    zeros = INERTIAL.replace('"1"', '"0"')
+    assert load(model.to_urdf().replace('<link name="tip"/>', f'<link name="tip">{zeros}</link>')) == model
+
+
+@pytest.mark.parametrize("content", [INERTIAL, "<visual/>", "<collision/>"])
+def test_a_frame_with_mass_or_shapes_is_refused(content: str) -> None:
+    text = load("ur5").with_frame("tip", "tool0").to_urdf()
+    line = text.split("\n").index('  <link name="tip"/>') + 1
+    text = text.replace('<link name="tip"/>', f'<link name="tip">{content}</link>')
+    with pytest.raises(DescriptionError, match=rf":{line}: .*'tip' has <\w+>.*frame"):
+        load(text)
 
 
 @pytest.mark.parametrize("bad", ["", "a\nb", "\x00", "\ud800", "x" * 1001, "\uffff"])

@@ -6,6 +6,7 @@ from tests.security.surfaces import (
     description,
     further_files,
     mesh,
+    mjcf,
     page,
     published_files,
     published_pages,
@@ -13,6 +14,7 @@ from tests.security.surfaces import (
     scene,
     socket,
     table,
+    viewed_files,
     world_state,
 )
 
@@ -23,6 +25,7 @@ __all__ = [
     "description",
     "further_files",
     "mesh",
+    "mjcf",
     "page",
     "published_files",
     "published_pages",
@@ -30,6 +33,7 @@ __all__ = [
     "scene",
     "socket",
     "table",
+    "viewed_files",
     "world_state",
 ]
 

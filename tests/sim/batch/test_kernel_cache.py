@@ -130,6 +130,7 @@ def test_impacts_at_position_limits_are_traced_once(monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr(step, "trace", trace_and_count)
     for _ in range(2):
-        simulate_batch(ARM, law(), tutorial_motion(), rollouts=2, duration=0.01, joint_limits=True)
+        start: dict[str, Any] = {"q0": ARM.upper[None], "v0": np.full((2, ARM.nv), 10.0)}
+        simulate_batch(ARM, law(), tutorial_motion(), duration=0.01, effort_limits=1.0, **start)
     # One kernel is that of the step.
     assert len(traced) == 2

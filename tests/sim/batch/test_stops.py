@@ -11,7 +11,7 @@ import dynx
 from dynx.control import PD
 from dynx.model import Model
 from dynx.model.loading import load
-from dynx.sim import BatchRollouts, Payload, simulate, simulate_batch
+from dynx.sim import BatchRollouts, Payload, simulate, simulate_batch, step_completion
 from dynx.spatial.scalar import Floats
 from tests.sim.bars import tutorial_robot
 
@@ -100,6 +100,29 @@ def test_a_rollout_does_not_depend_on_its_neighbours() -> None:
     np.testing.assert_array_equal(whole.q[4:6], part.q)
     np.testing.assert_array_equal(whole.v[4:6], part.v)
     np.testing.assert_array_equal(whole.max_error[4:6], part.max_error)
+
+
+def test_rollouts_that_begin_beyond_limits_are_those_of_simulate_bit_for_bit() -> None:
+    q0, v0 = starts(ARM)
+    q0[::2] = ARM.upper + 0.2
+    law, goal = PD(ARM, kp=50, kd=2), ARM.upper + 0.3
+    options: dict[str, Any] = {"duration": 0.05, "joint_limits": True, "check_reference": False}
+    batch = simulate_batch(ARM, law, goal, q0=q0, v0=v0, record_every=1, **options)
+    assert (batch.q_record <= np.maximum(ARM.upper, q0)[:, None]).all()
+    assert (batch.q_record[::2] == ARM.upper + 0.2).any()
+    for k in range(ROLLOUTS):
+        alone = simulate(ARM, law, goal, plant="compiled", q0=q0[k], v0=v0[k], **options)
+        np.testing.assert_array_equal(batch.q_record[k], alone.q[1:])
+        np.testing.assert_array_equal(batch.v_record[k], alone.v[1:])
+
+
+def test_the_kernel_of_an_impact_is_compiled_when_a_joint_stops(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[object] = []
+    monkeypatch.setattr(step_completion, "_impact_kernel", asked.append)
+    law, goal = PD(ARM, kp=50, kd=5), 0.5 * (ARM.lower + ARM.upper)
+    simulate_batch(ARM, law, goal, rollouts=3, duration=0.05, joint_limits=True)
+    simulate(ARM, law, goal, plant="compiled", duration=0.05, joint_limits=True)
+    assert not asked
 
 
 def test_without_a_joint_at_its_limit_stops_change_nothing() -> None:

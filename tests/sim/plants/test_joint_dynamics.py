@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ import dynx
 from dynx.backends import installed_backends
 from dynx.backends.joint_dynamics import JointDynamicsTerms
 from dynx.control import PD, MomentumObserver, OpenLoop
-from dynx.errors import ArgumentError, DynxError, UnknownNameError
+from dynx.errors import DynxError, UnknownNameError
 from dynx.model import Model
 from dynx.sim import Scenario, ScenePlant, simulate, simulate_batch
 from dynx.sim.plants.disturbances import Disturbances
@@ -40,6 +41,13 @@ def in_scene(model: Model, engine: str, q: float = 0.0) -> ScenePlant:
     """Return the plant of a robot that is alone in a scene."""
     robot = SceneRobot("robot", model, q=(q,))
     return ScenePlant(Scene("joint", robots=(robot,), gravity=model.gravity), "robot", engine=engine)
+
+
+def pendulum_above(lower: float) -> Model:
+    """Return a pendulum whose joint stops at a lower limit [rad]."""
+    model = dynx.load("pendulum")
+    joints = (replace(each, limits=replace(each.limits, lower=lower, upper=np.inf)) for each in model.joints)
+    return replace(model, joints=tuple(joints))
 
 
 def one_joint(text: str, dynamics: str) -> Model:
@@ -185,7 +193,33 @@ def test_former_names_are_answered_with_those_of_today(former: str, present: str
 
 
 @pytest.mark.skipif(not WORLDS, reason="needs an engine with a world")
-def test_the_stops_of_a_scene_are_those_of_its_engine() -> None:
-    model = one_joint(PENDULUM, "")
-    with pytest.raises(ArgumentError, match="joint_limits are the stops of dynx"):
-        Scenario(model, plant=in_scene(model, WORLDS[0]), joint_limits=True)
+@pytest.mark.parametrize("stops", [True, False])
+def test_one_option_has_the_stops_of_every_plant(stops: bool) -> None:
+    """In a scene they are those of the engine; by default there are stops everywhere."""
+    model = pendulum_above(0.5)
+    for name, plant in every_plant(model, 1.0).items():
+        rollout = simulate(model, q0=[1.0], duration=1.0, joint_limits=stops, **plant)
+        assert (rollout.q.min() > 0.45) == stops, name
+        assert rollout.settings["joint_limits"] is stops
+        if stops:
+            default = simulate(model, q0=[1.0], duration=1.0, **plant)
+            np.testing.assert_array_equal(default.q, rollout.q, err_msg=name)
+
+
+def test_the_notes_name_joints_that_begin_beyond_their_limits() -> None:
+    model = pendulum_above(1.5)
+    (joint,) = model.joint_names
+
+    def noted(**given: Any) -> list[str]:
+        notes = simulate(model, duration=0.01, **given).notes
+        return [each for each in notes if "beyond its limits" in each]
+
+    for name, plant in every_plant(model, 1.0).items():
+        (note,) = noted(q0=[1.0], **plant)
+        assert f"{joint}' is at 1, beyond its limits 1.5 to inf, at the start, so that it " in note, name
+        assert not noted(q0=[1.6], **plant), name
+    assert not noted(q0=[1.0], joint_limits=False)
+    arm = dynx.load("ur5")
+    *first, others = simulate(arm, q0=arm.upper + 0.1, duration=0.01).notes
+    assert len(first) == 5
+    assert others == "1 more joints are beyond their limits at the start"

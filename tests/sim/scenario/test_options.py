@@ -38,7 +38,7 @@ def test_docstrings_list_every_option() -> None:
     for function in (simulate, simulate_batch):
         text = inspect.getdoc(function) or ""
         for each in options_of(SimulationOptions):
-            assert f"    {each.name}: " in text
+            assert f"- `{each.name}`: " in text
             assert each.unit in text
 
 
@@ -98,7 +98,8 @@ def test_takes_gives_a_function_the_signature_of_a_dataclass() -> None:
     assert product(3) == 6.0
     assert product(size=3, rate=1.0) == 3.0
     assert str(inspect.signature(product)) == "(size: 'int', rate: 'float' = 2.0) -> 'float'"
-    assert inspect.getdoc(product) == "Multiply.\n\nOptions:\n    rate: Rate [1/s], as measured (default: 2)"
+    item = "- `rate`: Rate [1/s], as measured (default: 2)"
+    assert inspect.getdoc(product) == f"Multiply.\n\nOptions:\n\n{item}"
 
 
 @pytest.mark.parametrize("slip", ["much", None, [1.0], -1.0, 1e-30, math.inf, 10**5000, True], ids=type)
@@ -152,7 +153,7 @@ OTHERS: dict[str, Any] = {
     "friction_slip": 0.1,
     "joint_armature": 0.3,
     "effort_limits": 0.1,
-    "joint_limits": True,
+    "joint_limits": False,
     "payload": Payload(TIP, 1.0),
     "mass_scale": 2.0,
     "pushes": dynx.ExternalForce(TIP, [5.0, 0.0, 5.0, 0.0, 0.0, 0.0]),

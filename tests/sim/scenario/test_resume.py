@@ -65,7 +65,7 @@ CHANGES: dict[str, Any] = {
     "friction_slip": 2e-2,
     "joint_armature": np.full(6, 0.01),
     "effort_limits": True,
-    "joint_limits": True,
+    "joint_limits": False,
     "payload": Payload("tool0", 1.0, center=(0.0, 0.0, 0.01)),
     "mass_scale": {"forearm_link": 1.2},
     "pushes": [ExternalForce("tool0", [1.0, 0, 0, 0, 0, 1e-9], start=0.002, duration=0.01)],

@@ -18,6 +18,7 @@ import pytest
 from dynx.backends import installed_backends
 from dynx.errors import ArgumentError
 from dynx.model import JointDynamics
+from dynx.model.elements import Limits
 from dynx.model.library import example_roots
 from dynx.model.loading import load
 from dynx.sim import Scenario, ScenePlant, simulate
@@ -50,6 +51,10 @@ def test_a_saved_document_is_read_and_written_alike(name: str) -> None:
     document = {FORMER_NAMES.get(key, key): each for key, each in document.items()} | {"schema": SCHEMA}
     assert written.keys() == document.keys() | ADDED.keys()
     assert {key: written[key] for key in ADDED} == ADDED
+    if isinstance(document["plant"], dict):
+        # The stops were an option of the plant.
+        document["joint_limits"] = document["plant"]["fields"]["joint_limits"]
+        assert "joint_limits" not in written["plant"]["fields"]
     objects = {"controller", "reference", *(each for each in OPTIONS if has_objects(OPTIONS[each].kind))}
     assert [key for key in document if key not in objects and written[key] != document[key]] == []
 
@@ -81,11 +86,31 @@ def test_a_document_of_the_first_schema_without_joint_dynamics_has_none() -> Non
     first = Scenario.from_dict({**former, "schema": FIRST_SCHEMA})
     assert (first.joint_damping, first.joint_friction, first.joint_armature) == (False, False, False)
     assert Scenario.from_dict({**former, "schema": SCHEMA}).joint_damping is True
+    assert Scenario.from_dict({**former, "schema": SCHEMA}).joint_limits is False
     assert Scenario.from_json(first.to_json()) == first
     given = {"damping": True, "friction": 0.2, "armature": {"array": [0.1]}, "position_limits": True}
     told = Scenario.from_dict({**former, **given, "schema": FIRST_SCHEMA})
     assert (told.joint_damping, told.joint_friction, told.joint_limits) == (True, 0.2, True)
     np.testing.assert_array_equal(told.joint_armature, [0.1])
+
+
+@pytest.mark.parametrize("schema", [FIRST_SCHEMA, SCHEMA])
+@pytest.mark.parametrize("name", ["scene", "controller pd", "limits"])
+def test_a_document_that_does_not_tell_its_stops_keeps_them(name: str, schema: str) -> None:
+    """Joints had none by default; in a scene they had those of the engine, an option of the plant."""
+    given = {FORMER_NAMES.get(key, key): each for key, each in document_of(name).items()}
+    del given["joint_limits"]
+    if schema == FIRST_SCHEMA:
+        given = {key: each for key, each in given.items() if not key.startswith("joint_")}
+    in_scene = isinstance(given["plant"], dict)
+    assert Scenario.from_dict({**given, "schema": schema}).joint_limits is in_scene
+    for stops in (True, False) if in_scene else ():
+        fields = {**given["plant"]["fields"], "joint_limits": stops}
+        own = "position_limits" if schema == FIRST_SCHEMA else "joint_limits"
+        former = {**given, "plant": {**given["plant"], "fields": fields}, own: False}
+        read = Scenario.from_dict({**former, "schema": schema})
+        assert read.joint_limits is stops
+        assert Scenario.from_json(read.to_json()) == read
 
 
 @pytest.mark.parametrize(
@@ -95,6 +120,17 @@ def test_names_of_another_schema_are_refused(schema: str, name: str) -> None:
     document = {**Scenario(load("pendulum"), duration=0.1).to_dict(), "schema": schema, name: 0.3}
     with pytest.raises(ArgumentError, match=name if schema != "dynx.scenario/3" else "wanted that of a scen"):
         Scenario.from_dict(document)
+
+
+def test_stops_of_a_robot_without_limits_are_no_difference() -> None:
+    """So a record of an earlier version, without stops, is resumed by today's scenario."""
+    robot = load("pendulum")
+    free = replace(robot, joints=tuple(replace(each, limits=Limits()) for each in robot.joints))
+    for model, wanted in ((free, []), (load("ur5"), ["joint_limits"])):
+        ours = Scenario(model, duration=0.01)
+        theirs = replace(ours, joint_limits=False)
+        assert [each.field for each in ours.differences(theirs)] == wanted
+        assert [each.field for each in theirs.differences(ours)] == wanted
 
 
 @pytest.mark.parametrize("name", ["joint_damping", "joint_friction", "joint_armature"])

@@ -1,17 +1,25 @@
-"""Documents of scenes with values of wrong types: the place, what is there, and what is valid."""
+"""Documents of scenes: values of wrong types, and robots that are read as they were written."""
 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from dynx.errors import ArgumentError
 from dynx.files.documents import convert_document
-from dynx.world import read_scene
-from dynx.world.scene.documents import SceneDocument
+from dynx.model import Model, Pose
+from dynx.model.elements import Vector
+from dynx.model.geometry import Box, Collision, Geometry, LinkGeometry
+from dynx.testing.strategies import models
+from dynx.testing.strategies.geometry import origins, vectors
+from dynx.world import Scene, SceneRobot, read_scene
+from dynx.world.scene.documents import SceneDocument, scene_document, scene_from_document
 
 BODY: dict[str, Any] = {"name": "cube", "shape": {"box": [1, 1, 1]}}
 ROBOT: dict[str, Any] = {"name": "arm", "robot": "planar_2r"}
@@ -114,3 +122,34 @@ def places(part: Any, at: tuple[Any, ...] = ()) -> Any:
         yield (*at, key)
         if isinstance(each, dict | list):
             yield from places(each, (*at, key))
+
+
+@given(
+    model=models(),
+    gravity=vectors(12.0),
+    placement=origins(),
+    shape=st.sampled_from([None, Box((0.1, 0.2, 0.3))]),
+)
+def test_a_robot_of_a_scene_is_read_as_it_was_written(
+    model: Model, gravity: Vector, placement: Pose, shape: Box | None
+) -> None:
+    """Its gravity, base and added frames too, which URDF does not have."""
+    model = model.with_gravity(gravity)
+    model = model.with_frame("one more frame", model.links[-1].name, placement)
+    if shape is not None:
+        shapes = {model.links[-1].name: LinkGeometry(collisions=(Collision(shape),))}
+        model = replace(model, geometry=Geometry(shapes).for_links(link.name for link in model.links))
+    scene = Scene("s", robots=(SceneRobot("robot", model),))
+    document = json.loads(json.dumps(scene_document(scene)))
+    again = scene_from_document(document).robots[0].model
+    assert again == model
+    assert again.geometry.links == model.geometry.links
+
+
+def test_the_base_of_a_robot_of_a_scene_is_that_of_its_file(tmp_path: Path) -> None:
+    text = '<mujoco><worldbody><body name="b"><freejoint/><geom size="0.1"/></body></worldbody></mujoco>'
+    (tmp_path / "free.xml").write_text(text)
+    (tmp_path / "s.toml").write_text(
+        'schema = "dynx.scene/1"\nname = "s"\n[[robots]]\nname = "r"\nrobot = "free.xml"\n'
+    )
+    assert read_scene(tmp_path / "s.toml").robots[0].model.floating

@@ -166,6 +166,31 @@ def test_the_number_of_a_rollout_is_that_of_a_simulation() -> None:
     assert (values[0] != values[1]).any()
 
 
+def test_a_sensor_without_a_reading_is_named_with_the_reason() -> None:
+    with World(field()[0], WORLDS[0]) as world:
+        with pytest.raises(ArgumentError) as early:
+            world.read_sensors()["imu"]
+        assert str(early.value) == (
+            "the imu sensor 'imu' has no reading at 0 s; a sample can be read after the step of the engine "
+            "in which it is taken"
+        )
+        world.step()
+        readings = world.read_sensors()
+        assert readings["imu"].t == 0.0
+        with pytest.raises(
+            ArgumentError, match=r"'tool' has no reading at 0.001 s; .* and its delay of 0.003 s"
+        ):
+            readings["tool"]
+        with pytest.raises(UnknownNameError, match=r"the world has no sensor 'tol'; did you mean 'tool'"):
+            readings["tol"]
+        assert "tool" not in readings
+        assert readings.get("tool") is None
+        assert pickle.loads(pickle.dumps(readings)).keys() == readings.keys()
+    bare = replace(field()[0], sensors=())
+    with World(bare, WORLDS[0]) as world, pytest.raises(UnknownNameError, match="has no sensor 'imu'"):
+        world.read_sensors()["imu"]
+
+
 def test_a_state_that_is_set_has_no_readings_before_the_next_step() -> None:
     scene, _ = field()
     with World(scene, "mujoco") as world:

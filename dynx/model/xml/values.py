@@ -1,4 +1,4 @@
-"""Strict readers of URDF attributes (names, numbers, vectors), with the line in each error."""
+"""Strict readers of attributes of a description (names, numbers, vectors), with the line in each error."""
 
 from __future__ import annotations
 
@@ -17,11 +17,10 @@ MAX_NAME = 1000
 """Largest length of a name [characters]; 1,264 characters overflow PyBullet's stack."""
 
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
-_VERSION = re.compile(r"\s*([0-9]{1,9})(?:\.([0-9]{1,9}))?")
 _NOT_IN_XML = "\ufffe\uffff"
 _XACRO = "; xacro did not expand it"
 _WHY_IGNORED = {"loop_joint": "; the loop that it closes stays open"}
-_COUNTS = {3: "three", 4: "four"}
+_COUNTS = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five", 6: "six", 7: "seven"}
 
 
 @dataclass
@@ -123,7 +122,7 @@ class Reading:
         """Return a required attribute of `count` finite numbers; raise an error otherwise."""
         text = self.attribute(element, attribute, what)
         words = text.split()
-        wanted = f"{_COUNTS[count]} numbers separated by white space"
+        wanted = f"{_COUNTS.get(count, count)} numbers separated by white space"
         if len(words) != count:
             raise self._unreadable(element, attribute, text, what, wanted)
         return tuple(self._parsed(element, attribute, word, what, wanted, text) for word in words)
@@ -159,12 +158,6 @@ class Reading:
             hint = "; decimals take a point, and numbers are separated by white space"
         message = f"{attribute} in <{element.tag}> of {what} is {shown(text)}; wanted {wanted}{hint}"
         return self.error(element, message)
-
-
-def urdf_version(text: str | None) -> tuple[int, int]:
-    """Return the version of URDF in the attribute ``version`` of a robot; 1.0 where it states none."""
-    found = _VERSION.match(text or "")
-    return (1, 0) if found is None else (int(found.group(1)), int(found.group(2) or 0))
 
 
 def name_fault(name: str) -> str | None:

@@ -1,0 +1,226 @@
+"""Run of ``dynx same``: both descriptions compared, with the mended file, a JSON document and exit code."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Sequence
+from itertools import takewhile
+from pathlib import PurePath
+
+from rich.console import Console
+
+from dynx.cli.shell.exits import exit_code, failure_of, one_line, short_line
+from dynx.cli.shell.output import (
+    Entry,
+    check_json,
+    check_writable,
+    present,
+    require_apart,
+)
+from dynx.cli.shell.tables import MAX_ROWS, Table, print_rest
+from dynx.errors import ArgumentError, shown
+from dynx.files.writing import write_bytes
+from dynx.model.conversion import SUFFIXES
+from dynx.model.loading import read_description, split_arguments
+from dynx.model.tree import Base
+from dynx.model.xml.source import XmlSource
+from dynx.same import SameReport, same_robot
+from dynx.same.comparison import TOLERANCE
+
+MAX_CELL = 40
+"""Largest number of characters of a value in a table; ``--json`` has all of it."""
+
+MAX_MESSAGE = 60
+"""Largest number of characters of a message in a table."""
+
+FORMATS = {"robot": "urdf", "mujoco": "mjcf"}
+"""Formats that are mended, by the root element of their files."""
+
+
+def same(
+    first: str,
+    second: str,
+    base: Base | None,
+    tolerance: float | None,
+    fix: str | None,
+    json_path: str | None,
+) -> int:
+    """Compare two descriptions; return the exit code."""
+    check_json(json_path)
+    if fix is not None:
+        _check_output(fix, first, second)
+    report = same_robot(first, second, base=base, tolerance=TOLERANCE if tolerance is None else tolerance)
+    written = None if fix is None else failure_of(_write_mended, report, fix)
+    error = present(report.to_dict(), show, json_path)
+    return exit_code(error, written, negative=not report.same)
+
+
+def _check_output(path: str, first: str, second: str) -> None:
+    """Raise ArgumentError for a file that cannot be written, is read, or has the suffix of another format
+    than the second robot."""
+    check_writable(path)
+    read: list[str] = []
+    for robot in (first, second):
+        data, source, _ = read_description(robot)
+        root = XmlSource(data, source).root
+        folder = os.path.dirname(source)
+        included = [each.attributes.get("file", "") for each in root.walk() if each.tag == "include"]
+        read += [split_arguments(robot)[0], source, *(os.path.join(folder, name) for name in included)]
+    require_apart([path], read, "a file that is read")
+    format_ = FORMATS.get(root.tag)
+    # Other formats are compared and not mended; the report says so.
+    if format_ is None:
+        return
+    wanted = SUFFIXES[format_]
+    if PurePath(path).suffix.lower() not in wanted:
+        raise ArgumentError(
+            f"--fix {shown(path, 300)}: {one_line(second)} is {format_.upper()}, and so is the mended file; "
+            f"wanted a file in {' or '.join(wanted)}"
+        )
+
+
+def _write_mended(report: SameReport, path: str) -> None:
+    """Write the mended file; there is none where the robots are the same."""
+    if report.same:
+        return
+    if report.mended_text is None:
+        raise ArgumentError(f"{shown(path, 300)} is not written: {report.not_mended}")
+    write_bytes(path, report.mended_text)
+
+
+def show(out: Console, report: Entry) -> None:
+    """Print the verdict, what differs, what differs apart from the verdict, and what is a freedom."""
+    names = f"{one_line(report['first'])} and {one_line(report['second'])}"
+    out.print(f"{names}: {report['verdict']}", style="bold")
+    for note in report["notes"]:
+        out.print(f"note: {one_line(note)}", style="yellow")
+    _show_differences(out, report)
+    for each in report["unmatched"]:
+        out.print(f"{_places(each)}{one_line(each['message'])}", style="red")
+    if report["not_mended"] is not None:
+        out.print(f"not mended: {one_line(report['not_mended'])}", style="yellow")
+    _show_attributes(out, report["attributes"])
+    _show_freedoms(out, report["freedoms"])
+    _show_coordinates(out, report["coordinates"])
+    if report["bounds"] is not None:
+        size = report["bounds"]
+        out.print(
+            f"bounds over all states within limits at |v|, |a| <= 1: {_size(size['position'])} m, "
+            f"{_size(size['rotation'])} rad, mass matrix {_size(size['mass_matrix'])}, "
+            f"torque {_size(size['torque'])}"
+        )
+
+
+def _show_differences(out: Console, report: Entry) -> None:
+    differences: Sequence[Entry] = report["differences"]
+    if not differences:
+        return
+    numbers = ("line A", "line B", "size", "moves [m]", "mass matrix", "torque")
+    table = Table("element of B", *numbers, "difference", right=numbers, keys=1)
+    for each in differences[:MAX_ROWS]:
+        effect = each["effect"] or {}
+        table.add_row(
+            one_line(f"{each['tag']} {each['theirs']}, {each['part']}"),
+            _line(each["first_line"]),
+            _line(each["second_line"]),
+            _size(each["size"]),
+            *(_size(effect.get(name)) for name in ("position", "mass_matrix", "torque")),
+            _cell(each["message"], MAX_MESSAGE),
+        )
+    out.print("\nelements of B that make it the same robot when replaced by those of A")
+    out.print(table)
+    print_rest(out, len(differences) - MAX_ROWS)
+    for each in differences[:MAX_ROWS]:
+        out.print(
+            f"{one_line(each['theirs'])}, {each['part']}: {short_line(each['first'])} in A, "
+            f"{short_line(each['second'])} in B; wanted in B: {short_line(each['wanted'])}"
+        )
+
+
+def _show_attributes(out: Console, attributes: Sequence[Entry]) -> None:
+    """Print one line for each kind, with the first of its differences."""
+    if not attributes:
+        return
+    table = Table("apart from the verdict", "count", "first", "in A", "in B", right=("count",), keys=1)
+    counts = Counter(each["kind"] for each in attributes)
+    for kind, count in counts.items():
+        each = next(each for each in attributes if each["kind"] == kind)
+        table.add_row(
+            kind,
+            str(count),
+            f"{one_line(each['theirs'] or each['ours'])}{_lines(each)}",
+            *_cells(each["first"], each["second"]),
+        )
+    out.print("")
+    out.print(table)
+
+
+def _show_freedoms(out: Console, freedoms: Sequence[Entry]) -> None:
+    if not freedoms:
+        return
+    out.print("\nno difference of the robots")
+    for each in freedoms[:MAX_ROWS]:
+        out.print(f"  {one_line(each['message'])}")
+    print_rest(out, len(freedoms) - MAX_ROWS)
+
+
+def _show_coordinates(out: Console, coordinates: Sequence[Entry]) -> None:
+    """Print how coordinates correspond, where they do not one by one."""
+    rows = [
+        each
+        for each in coordinates
+        if each["sign"] < 0 or each["first_index"] != each["second_index"] or each["ours"] != each["theirs"]
+    ]
+    if not rows:
+        return
+    table = Table("q of A", "joint of A", "q of B", "joint of B", "sign", right=("q of A", "q of B", "sign"))
+    for each in rows[:MAX_ROWS]:
+        table.add_row(
+            str(each["first_index"]),
+            one_line(each["ours"]),
+            str(each["second_index"]),
+            one_line(each["theirs"]),
+            "-" if each["sign"] < 0 else "+",
+        )
+    out.print("\ncoordinates that correspond otherwise than by number and name")
+    out.print(table)
+    print_rest(out, len(rows) - MAX_ROWS)
+
+
+def _cell(text: str, length: int = MAX_CELL) -> str:
+    """Make one line of at most `length` characters: a cell can list a hundred meshes."""
+    line = one_line(text)
+    return line if len(line) <= length else f"{line[: length - 4].rstrip(' ,')} ..."
+
+
+def _cells(first: str, second: str) -> tuple[str, str]:
+    """Make cells of two values that differ; where their beginnings are equal, these are left out."""
+    cells = _cell(first), _cell(second)
+    if cells[0] == cells[1] and first != second:
+        equal = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], zip(first, second, strict=False)))
+        start = first.rfind(" ", 0, equal) + 1
+        return _cell(f"... {first[start:]}"), _cell(f"... {second[start:]}")
+    return cells
+
+
+def _places(each: Entry) -> str:
+    lines = [
+        f"line {each[key]} of {name}"
+        for key, name in (("first_line", "A"), ("second_line", "B"))
+        if each[key] is not None
+    ]
+    return f"{', '.join(lines)}: " if lines else ""
+
+
+def _lines(each: Entry) -> str:
+    lines = [_line(each[key]) for key in ("first_line", "second_line")]
+    return f" ({lines[0] or '-'}, {lines[1] or '-'})" if any(lines) else ""
+
+
+def _line(line: int | None) -> str:
+    return "" if line is None else str(line)
+
+
+def _size(value: float | None) -> str:
+    return "-" if value is None else "0" if value == 0.0 else f"{value:.2g}"

@@ -1,0 +1,451 @@
+"""Writer of a robot as MJCF: each link a body, each joint at the origin of its body.
+
+It lies among the formats of a model, below the engines, because it needs no engine: who has no MuJoCo writes
+MJCF too, and what it writes is read back by the reader beside it. A world in MuJoCo has a writer of its own
+(`dynx.engines.mujoco.mjcf`), which merges links and names bodies by robots; both state numbers, joints and
+shapes by `dynx.model.mjcf.attributes`.
+
+Bodies, joints and sites have the names of links, joints and frames. Fixed joints have no element; names of
+theirs, limits of speed and the like are in ``<custom>`` (`dynx.model.mjcf.extension`), which dynx reads.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from pathlib import PurePath
+from typing import Any
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+
+from dynx.argument_types import checks_types
+from dynx.errors import DescriptionError, UnsupportedFeatureError, shown
+from dynx.model.elements import IDENTITY, Inertial, Joint, Limits, Link, Pose
+from dynx.model.geometry import Appearance, Collision, HeightField, LinkGeometry, Mesh, Plane, Visual
+from dynx.model.mjcf.attributes import (
+    MAX_DEPTH,
+    UNLIMITED,
+    attributes,
+    document_text,
+    joint_attributes,
+    new_document,
+    placement,
+    primitive_attributes,
+    text,
+)
+from dynx.model.mjcf.extension import MIMIC, Extension
+from dynx.model.tree import Tree
+from dynx.model.urdf.reader import inertia_fault
+from dynx.model.urdf.writer import listed, note_of_kind
+from dynx.model.xml.reading import MAX_DEPTH as MAX_ELEMENT_DEPTH
+from dynx.model.xml.values import name_fault
+
+WORLD = "world"
+"""MJCF's name of the body that does not move."""
+
+MAX_LINKS_IN_A_ROW = min(MAX_DEPTH, MAX_ELEMENT_DEPTH - 4)
+"""Largest number of links in a row in a document that both MuJoCo and dynx read."""
+
+MESH_SUFFIXES = (".obj", ".stl", ".msh")
+"""Formats of meshes that MuJoCo reads."""
+
+_AT_ORIGIN = {"pos": (0.0, 0.0, 0.0), "quat": (1.0, 0.0, 0.0, 0.0)}
+_SITE_SIZE = 0.005
+"""Radius [m] with which viewers show a frame."""
+
+AssetPath = Callable[[str], str]
+"""Function from the path of an image to the path in the document."""
+
+MeshPath = Callable[[Mesh], str]
+"""Function from a mesh to the path in the document of a file with its triangles, before they are scaled."""
+
+
+@checks_types
+def write_mjcf(tree: Tree, /) -> str:
+    """Return the robot as MJCF text, with comments on what the format cannot say.
+
+    `dynx.load` of the text returns a model with the same links, joints, frames, inertias, limits and
+    coefficients, to rounding. MuJoCo compiles it unless a comment says why not. Angles are in radians. Visual
+    geoms are in group 2 and do not collide; collision geoms are in group 3. A motor acts on each joint with
+    a coordinate of its own; its range is the effort limit. Meshes are named by their full paths; ``dynx
+    convert`` copies them.
+
+    Raises DescriptionError for a name that MJCF cannot express and a limit that is NaN,
+    UnsupportedFeatureError for a link that moves or is free and is named ``world``, and for too many links
+    in a row.
+    """
+    return RobotWriter(tree).text()
+
+
+class RobotWriter:
+    """The MJCF document of a robot, with notes on what it cannot say."""
+
+    def __init__(
+        self,
+        tree: Tree,
+        mesh_path: MeshPath = lambda mesh: mesh.file,
+        image_path: AssetPath = lambda path: path,
+    ) -> None:
+        """`mesh_path` and `image_path` name the files in the document. Raises the errors of `write_mjcf`."""
+        self._tree = tree
+        self._mesh_path, self._image_path = mesh_path, image_path
+        self.notes: list[str] = []
+        """Sentences on what MJCF cannot say of the robot, each with its effect."""
+        self._extension = Extension()
+        self._root = root = new_document(_checked_name(tree.name))
+        SubElement(root, "option", gravity=text(tree.gravity))
+        self._add_defaults()
+        self._kinds: dict[str, list[str]] = {}
+        self._assets = _Assets(SubElement(root, "asset"), mesh_path, image_path, self.notes, self._kinds)
+        self._add_bodies(SubElement(root, "worldbody"))
+        self._equality, self._actuator = SubElement(root, "equality"), SubElement(root, "actuator")
+        for joint in tree.joints:
+            if joint.moves and joint.mimic is not None:
+                self._couple(joint)
+        for joint in tree.coordinate_joints:
+            self._add_motor(joint)
+        self._extension.write(root)
+        for empty in [
+            part for part in root if len(part) == 0 and not part.attrib and part.tag != "worldbody"
+        ]:
+            root.remove(empty)
+        self._add_notes()
+
+    def text(self) -> str:
+        """Return the document, with its notes as comments at the beginning."""
+        return document_text(self._root, self.notes)
+
+    # -- the tree -------------------------------------------------------------------------------
+
+    def _add_defaults(self) -> None:
+        default = SubElement(self._root, "default")
+        for name, values in (
+            ("visual", {"group": "2", "contype": "0", "conaffinity": "0"}),
+            ("collision", {"group": "3"}),
+        ):
+            SubElement(SubElement(default, "default", {"class": name}), "geom", values)
+
+    def _add_bodies(self, world: Element) -> None:
+        tree = self._tree
+        above: dict[str, Joint] = {joint.child: joint for joint in tree.joints}
+        bodies: dict[str, Element] = {}
+        depths: dict[str, int] = {}
+        frames: dict[str, list[Any]] = {}
+        for frame in tree.extra_frames:
+            frames.setdefault(frame.link, []).append(frame)
+        self._geom_names: set[str] = set()
+        # Links are in depth-first order, so that the body of the parent is there, and children keep theirs.
+        for link in tree.links:
+            joint = above.get(link.name)
+            if joint is None:
+                body = self._root_body(world, link)
+                depths[link.name] = 0
+            else:
+                if link.name == WORLD:
+                    raise self._refusal(f"link {shown(WORLD)} is not the root", link)
+                depths[link.name] = depths[joint.parent] + 1
+                if depths[link.name] > MAX_LINKS_IN_A_ROW:
+                    raise self._refusal(
+                        f"more than {MAX_LINKS_IN_A_ROW} links are in a row, and no deeper document is read",
+                        link,
+                    )
+                body = _body(bodies[joint.parent], link.name, joint.origin)
+                self._add_joint(body, joint, link)
+            bodies[link.name] = body
+            if link.name != WORLD and link.inertial is not None:
+                SubElement(body, "inertial", _inertial_attributes(link.inertial))
+            self._add_shapes(body, link)
+            for frame in frames.get(link.name, ()):
+                name = _checked_name(frame.name)
+                site = {"name": name, "size": text(_SITE_SIZE), "group": "4"}
+                SubElement(body, "site", site | _pose_attributes(frame.placement))
+
+    def _root_body(self, world: Element, root: Link) -> Element:
+        tree = self._tree
+        if root.name == WORLD:
+            if tree.floating:
+                raise self._refusal(f"the root link {shown(WORLD)} moves freely", root)
+            if root.inertial is not None and root.inertial != Inertial():
+                self.notes.append("The inertia of the link 'world' is left out: it does not move.")
+            if tree.base_pose == IDENTITY:
+                return world
+            self.notes.append(
+                "The pose of the base is that of a <frame>: the root link 'world' is at the origin."
+            )
+            return SubElement(world, "frame", _pose_attributes(tree.base_pose))
+        body = _body(world, root.name, tree.base_pose)
+        if tree.floating:
+            name = f"{root.name}_free"
+            while any(joint.name == name for joint in tree.joints):
+                name += "_"
+            # Aligning would turn the frame to the principal axes.
+            SubElement(body, "freejoint", name=name, align="false")
+        else:
+            self._extension.texts["root"][""] = root.name
+        return body
+
+    def _add_joint(self, body: Element, joint: Joint, link: Link) -> None:
+        if not joint.moves:
+            self._extension.texts["fixed"][link.name] = _checked_name(joint.name)
+            if joint.locked_at is not None:
+                self._extension.numbers["locked"][joint.name] = joint.locked_at
+            return
+        limits = joint.limits
+        _refuse_nan(joint)
+        ends = (-math.inf, math.inf)
+        if joint.type != "continuous":
+            ends = min(limits.lower, limits.upper), max(limits.lower, limits.upper)
+        given = joint_attributes(joint, ends, joint.dynamics)
+        for kind, end in zip(("lower", "upper"), ends, strict=True):
+            if UNLIMITED <= abs(end) < math.inf or (kind == "upper" and end == ends[0]):
+                self._extension.numbers[kind][joint.name] = end
+        if 0.0 < limits.effort < UNLIMITED:
+            given["actuatorfrcrange"] = text((-limits.effort, limits.effort))
+        elif limits.effort != Limits().effort:
+            self._extension.numbers["effort"][joint.name] = limits.effort
+        if limits.velocity != Limits().velocity:
+            self._extension.numbers["velocity"][joint.name] = limits.velocity
+        SubElement(body, "joint", {"name": _checked_name(joint.name)} | given)
+
+    def _couple(self, joint: Joint) -> None:
+        assert joint.mimic is not None
+        numbers = (joint.mimic.offset, joint.mimic.multiplier, 0.0, 0.0, 0.0)
+        ends = {"joint1": joint.name, "joint2": joint.mimic.joint, "polycoef": text(numbers)}
+        SubElement(self._equality, "joint", {"name": f"{MIMIC}{joint.name}"} | ends)
+
+    def _add_motor(self, joint: Joint) -> None:
+        effort = joint.limits.effort
+        if effort > 0.0:
+            given = {"ctrlrange": text((-effort, effort))} if effort < UNLIMITED else {}
+            SubElement(self._actuator, "motor", {"name": joint.name, "joint": joint.name} | given)
+
+    # -- shapes ---------------------------------------------------------------------------------
+
+    def _add_shapes(self, body: Element, link: Link) -> None:
+        shapes = self._tree.geometry.links.get(link.name, LinkGeometry())
+        for kind, fault in (("visual", shapes.visual_fault), ("collision", shapes.collision_fault)):
+            if fault is not None:
+                self.notes.append(
+                    f"The {kind} shapes of link {shown(link.name)} are left out: {fault.message}."
+                )
+        every: tuple[Visual | Collision, ...] = (*shapes.visuals, *shapes.collisions)
+        for placed in every:
+            self._add_shape(body, link, placed)
+
+    def _add_shape(self, body: Element, link: Link, placed: Visual | Collision) -> None:
+        kind = "visual" if isinstance(placed, Visual) else "collision"
+        what = f"A {kind} shape of link {shown(link.name)}"
+        given: dict[str, str] = {"class": kind}
+        if placed.name:
+            if placed.name in self._geom_names or name_fault(placed.name) is not None:
+                _add(self._kinds, "Geoms have no name, because it is not that of one geom alone", placed.name)
+            else:
+                given = {"name": placed.name, **given}
+                self._geom_names.add(placed.name)
+        shape = placed.shape
+        if isinstance(shape, HeightField):
+            _add(self._kinds, "Height fields are left out", link.name)
+            return
+        if isinstance(shape, Mesh):
+            name = self._assets.mesh(shape, what)
+            if name is None:
+                return
+            given |= {"type": "mesh", "mesh": name}
+        else:
+            given |= primitive_attributes(shape)
+        if isinstance(shape, Plane) and (self._tree.floating or link.name != self._tree.root):
+            _add(self._kinds, "MuJoCo accepts planes on bodies that do not move alone", link.name)
+        if isinstance(placed, Visual) and placed.material is not None:
+            given |= self._assets.material(placed.material, what)
+        SubElement(body, "geom", given | _pose_attributes(placed.origin))
+
+    # -- notes ----------------------------------------------------------------------------------
+
+    def _add_notes(self) -> None:
+        extension, tree = self._extension, self._tree
+        self.notes += [note_of_kind(kind, names) for kind, names in self._kinds.items()]
+        kept = "dynx alone reads it in <custom>"
+        if extension.numbers["velocity"]:
+            self._note_names("MuJoCo has no limit of speed", extension.numbers["velocity"], kept)
+        if extension.numbers["effort"]:
+            self._note_names("MuJoCo has no effort limit of 0 or below", extension.numbers["effort"], kept)
+        if extension.numbers["locked"]:
+            self._note_names(
+                "Locked joints are fixed, without their axes and limits",
+                extension.numbers["locked"],
+                "dynx reads their positions in <custom>",
+            )
+        followers = [joint.name for joint in tree.joints if joint.mimic is not None]
+        if followers:
+            self._note_names(
+                "Equality constraints couple mimic joints, which MuJoCo obeys softly",
+                followers,
+                "dynx reads them as mimic joints",
+            )
+        for reason, names in _refused_inertias(tree).items():
+            self._note_names(f"MuJoCo does not compile the document: {reason}", names, "dynx reads it")
+
+    def _note_names(self, what: str, names: Iterable[str], effect: str) -> None:
+        self.notes.append(f"{what} ({listed(names)}); {effect}.")
+
+    def _refusal(self, message: str, link: Link) -> UnsupportedFeatureError:
+        return UnsupportedFeatureError(
+            f"{message}, which MJCF cannot say", source=self._tree.source, line=link.line
+        )
+
+
+class _Assets:
+    """Meshes, materials and images of a document, each of them once."""
+
+    def __init__(
+        self,
+        section: Element,
+        mesh_path: MeshPath,
+        image_path: AssetPath,
+        notes: list[str],
+        kinds: dict[str, list[str]],
+    ) -> None:
+        self._section, self._notes, self._kinds = section, notes, kinds
+        self._mesh_path, self._image_path = mesh_path, image_path
+        self._meshes: dict[Mesh, str | None] = {}
+        self._materials: dict[str, Appearance] = {}
+        self._images: dict[str, str] = {}
+        self._names: set[str] = set()
+
+    def mesh(self, mesh: Mesh, what: str) -> str | None:
+        """Return the name of the asset of a mesh; None for one without a file that can be named."""
+        if mesh not in self._meshes:
+            self._meshes[mesh] = self._add_mesh(mesh, what)
+        return self._meshes[mesh]
+
+    def _add_mesh(self, mesh: Mesh, what: str) -> str | None:
+        if mesh.fault is not None:
+            self._notes.append(f"{what} is left out: {mesh.fault.message}.")
+            return None
+        try:
+            path = self._mesh_path(mesh)
+        except DescriptionError as error:
+            self._notes.append(f"{what} is left out: {error}.")
+            return None
+        fault = name_fault(path)
+        if fault is not None:
+            self._notes.append(f"{what} is left out: the path of its mesh {fault}.")
+            return None
+        suffix = PurePath(path).suffix.lower()
+        if suffix not in MESH_SUFFIXES:
+            kind = f"MuJoCo does not read meshes in {shown(suffix)}, which dynx convert writes as OBJ"
+            _add(self._kinds, kind, PurePath(path).name)
+        name = self._new_name(PurePath(path).stem)
+        given = {"name": name, "file": path}
+        if mesh.scale != (1.0, 1.0, 1.0):
+            given["scale"] = text(mesh.scale)
+        # The moments of a shell need no volume, so that a flat mesh is accepted too.
+        SubElement(self._section, "mesh", given | {"inertia": "shell"})
+        return name
+
+    def material(self, material: Appearance, what: str) -> dict[str, str]:
+        """Return the attributes of a geom with an appearance."""
+        rgba = None if material.rgba is None else text(material.rgba)
+        if material.name and name_fault(material.name) is None:
+            known = self._materials.get(material.name)
+            if known is None and (material.rgba is not None or material.texture is not None):
+                known = self._materials[material.name] = material
+                given = {"name": material.name} | ({} if rgba is None else {"rgba": rgba})
+                if material.fault:
+                    self._notes.append(f"{what} has an image that is left out: {material.fault}.")
+                elif material.texture is not None and self._image(material.texture, what):
+                    given["texture"] = self._images[material.texture]
+                SubElement(self._section, "material", given)
+            if known == material:
+                return {"material": material.name}
+        if rgba is None:
+            _add(self._kinds, "Materials without a colour are left out", material.name)
+            return {}
+        return {"rgba": rgba}
+
+    def _image(self, path: str, what: str) -> bool:
+        """Add an image that MuJoCo reads; return whether it does."""
+        if path not in self._images:
+            try:
+                named = self._image_path(path)
+            except DescriptionError as error:
+                self._notes.append(f"The image of {what[:1].lower()}{what[1:]} is left out: {error}.")
+                return False
+            if not named.lower().endswith(".png") or name_fault(named) is not None:
+                _add(self._kinds, "Images that are no PNG are left out", named)
+                return False
+            name = self._images[path] = self._new_name(PurePath(named).stem)
+            SubElement(self._section, "texture", {"name": name, "type": "2d", "file": named})
+        return True
+
+    def _new_name(self, stem: str) -> str:
+        name, number = stem, 2
+        while name in self._names:
+            name, number = f"{stem}_{number}", number + 1
+        self._names.add(name)
+        return name
+
+
+def _add(kinds: dict[str, list[str]], kind: str, name: str) -> None:
+    kinds.setdefault(kind, []).append(name)
+
+
+def _body(parent: Element, name: str, pose: Pose) -> Element:
+    return SubElement(parent, "body", {"name": _checked_name(name)} | _pose_attributes(pose))
+
+
+def _pose_attributes(pose: Pose) -> dict[str, str]:
+    if pose == IDENTITY:
+        return {}
+    given = placement(pose.matrix[:3, :3], pose.matrix[:3, 3])
+    absent = attributes(_AT_ORIGIN)
+    return {name: value for name, value in given.items() if value != absent[name]}
+
+
+def _inertial_attributes(inertial: Inertial) -> dict[str, str]:
+    """Return mass, centre and moments: principal ones with their axes, else the tensor in the link's axes."""
+    T = inertial.origin.matrix
+    tensor, R = inertial.tensor, T[:3, :3]
+    given = attributes({"mass": inertial.mass, "pos": T[:3, 3]})
+    if not (inertial.ixy or inertial.ixz or inertial.iyz):
+        pose = _pose_attributes(inertial.origin)
+        turned = {"quat": pose["quat"]} if "quat" in pose else {}
+        return given | turned | {"diaginertia": text(np.diag(tensor))}
+    if (np.eye(3) != R).any():
+        tensor = R @ tensor @ R.T
+    return given | {"fullinertia": text([*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2]])}
+
+
+def _refused_inertias(tree: Tree) -> dict[str, list[str]]:
+    """Return the links of which MuJoCo refuses the inertia, by the reason."""
+    found: dict[str, list[str]] = {}
+    carried: dict[str, bool] = {}
+    above = {joint.child: joint for joint in tree.joints}
+    for link in reversed(tree.links):
+        inertial, joint = link.inertial, above.get(link.name)
+        if inertial is not None:
+            fault = inertia_fault(inertial)
+            if fault is not None and inertial.mass:
+                found.setdefault("an inertia is not physical", []).append(link.name)
+        has = carried.get(link.name, False) or (inertial is not None and inertial.mass > 0.0)
+        moves = tree.floating if joint is None else joint.moves
+        if moves and not has:
+            found.setdefault("a body moves without mass", []).append(link.name)
+        if joint is not None and not joint.moves:
+            carried[joint.parent] = carried.get(joint.parent, False) or has
+    return {reason: names[::-1] for reason, names in found.items()}
+
+
+def _refuse_nan(joint: Joint) -> None:
+    limits = joint.limits
+    for value in (limits.lower, limits.upper, limits.velocity, limits.effort):
+        if math.isnan(value):
+            raise DescriptionError(f"a limit of joint {shown(joint.name)} is NaN, which MJCF cannot express")
+
+
+def _checked_name(name: str) -> str:
+    fault = name_fault(name)
+    if fault is not None:
+        raise DescriptionError(f"a name that MJCF cannot express: it {fault}")
+    return name

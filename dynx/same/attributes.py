@@ -1,0 +1,280 @@
+"""What two descriptions of a robot say beside its rigid-body dynamics: limits, joint dynamics, shapes,
+frames, names, gravity. It is listed apart from the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import PurePath
+from typing import Literal
+
+import numpy as np
+
+from dynx.errors import DescriptionError
+from dynx.model import Model
+from dynx.model.elements import Joint
+from dynx.model.geometry.links import Collision, Visual
+from dynx.model.geometry.mesh import Mesh
+from dynx.model.mechanism import ROOT
+from dynx.same.decimals import rounded
+from dynx.same.elements import pose_text, vector_text
+from dynx.same.fit import BodyFit, Fit, angle_of
+from dynx.same.limits import differs, limit_differences
+from dynx.spatial.scalar import Array
+from dynx.spatial.se3 import homogeneous, inverse
+
+Kind = Literal[
+    "lower limit",
+    "upper limit",
+    "velocity limit",
+    "effort limit",
+    "damping",
+    "friction",
+    "armature",
+    "collision shapes",
+    "visual shapes",
+    "frame",
+    "name",
+    "gravity",
+    "base pose",
+]
+
+DIGITS = 9
+"""Significant digits in which the sizes of shapes are compared."""
+
+NEGLIGIBLE = 1e-12
+"""Distance [m] or angle [rad] below which two frames are the same."""
+
+
+@dataclass(frozen=True)
+class Attribute:
+    """A difference beside the verdict, with the values in both descriptions and their lines."""
+
+    kind: Kind
+    tag: Literal["joint", "link", "robot"]
+    ours: str | None
+    theirs: str | None
+    first: str
+    second: str
+    first_line: int | None = None
+    second_line: int | None = None
+
+
+@dataclass(frozen=True)
+class DescriptionFreedom:
+    """A difference of two descriptions that is none of the robots, in words."""
+
+    kind: Literal["frame", "axis", "order", "links", "inertia"]
+    ours: str | None
+    theirs: str | None
+    message: str
+
+
+def attributes(ours: Model, theirs: Model, found: Fit, tolerance: float) -> Iterator[Attribute]:
+    """Yield what differs beside the verdict, joints first."""
+    for each in found.bodies:
+        if each.ours != ROOT:
+            mine = ours.joint(found.ours.joints[each.ours].name)
+            yield from _of_joint(mine, theirs.joint(found.theirs.joints[each.theirs].name), each, tolerance)
+    for each in found.bodies:
+        yield from _of_links(ours, theirs, found, each, tolerance)
+    if not np.allclose(ours.gravity, theirs.gravity, rtol=tolerance, atol=tolerance):
+        first, second = (vector_text(model.gravity) for model in (ours, theirs))
+        yield Attribute("gravity", "robot", ours.name, theirs.name, first, second)
+    if ours.base_pose != theirs.base_pose and not (ours.floating or theirs.floating):
+        first, second = (pose_text(model.base_pose) for model in (ours, theirs))
+        yield Attribute("base pose", "robot", ours.name, theirs.name, first, second)
+
+
+def _of_joint(mine: Joint, joint: Joint, each: BodyFit, tolerance: float) -> Iterator[Attribute]:
+    if mine.name != joint.name:
+        yield Attribute("name", "joint", mine.name, joint.name, mine.name, joint.name, mine.line, joint.line)
+    rows: list[tuple[Kind, float, float]] = [
+        *limit_differences(mine.limits, joint.limits, each.sign, tolerance),
+        ("damping", mine.dynamics.damping, joint.dynamics.damping),
+        ("friction", mine.dynamics.friction, joint.dynamics.friction),
+        ("armature", mine.dynamics.armature, joint.dynamics.armature),
+    ]
+    for kind, first, second in rows:
+        if differs(first, second, tolerance):
+            yield Attribute(
+                kind, "joint", mine.name, joint.name, _number(first), _number(second), mine.line, joint.line
+            )
+
+
+def _number(value: float) -> str:
+    return "none" if np.isinf(value) else f"{value + 0.0:.9g}"
+
+
+def _of_links(ours: Model, theirs: Model, found: Fit, each: BodyFit, tolerance: float) -> Iterator[Attribute]:
+    """Yield differences of the links of a body: names, shapes of the whole body, frames of the same name."""
+    mine = {ours.links[k].name: k for k in found.ours.links[each.ours]}
+    other = {theirs.links[k].name: k for k in found.theirs.links[each.theirs]}
+    if each.ours != ROOT:
+        first, second = found.ours.joints[each.ours].child, found.theirs.joints[each.theirs].child
+        if first != second and first not in other and second not in mine:
+            lines = ours.link(first).line, theirs.link(second).line
+            yield Attribute("name", "link", first, second, first, second, *lines)
+    for kind in ("collision shapes", "visual shapes"):
+        yield from _of_shapes(kind, ours, theirs, found, each, tolerance)
+
+
+def _of_shapes(
+    kind: Literal["collision shapes", "visual shapes"],
+    ours: Model,
+    theirs: Model,
+    found: Fit,
+    each: BodyFit,
+    tolerance: float,
+) -> Iterator[Attribute]:
+    """Compare the shapes of a body, wherever in its links they are; meshes by their names and scales."""
+    mine = _shapes(kind, ours, found.ours.links[each.ours], found, None)
+    others = _shapes(kind, theirs, found.theirs.links[each.theirs], found, each)
+    length = found.ours.reach
+    left = list(others)
+    unmatched = []
+    for text, T in mine:
+        same = next(
+            (
+                k
+                for k, (other, S) in enumerate(left)
+                if other == text and _close(T, S, max(tolerance, NEGLIGIBLE) * max(length, 1.0))
+            ),
+            None,
+        )
+        if same is None:
+            unmatched.append(text)
+        else:
+            left.pop(same)
+    if unmatched or left:
+        names = [
+            model.links[numbers[0]]
+            for model, numbers in (
+                (ours, found.ours.links[each.ours]),
+                (theirs, found.theirs.links[each.theirs]),
+            )
+        ]
+        first, second = (", ".join(sorted(texts)) or "none" for texts in (unmatched, [t for t, _ in left]))
+        if first == second:
+            second = f"placed otherwise: {second}"
+        lines = names[0].line, names[1].line
+        yield Attribute(kind, "link", names[0].name, names[1].name, first, second, *lines)
+
+
+def _shapes(
+    kind: str, model: Model, links: list[int], found: Fit, each: BodyFit | None
+) -> list[tuple[str, Array]]:
+    """Return the shapes of some links as words, with their poses in the frame of our body."""
+    shapes = []
+    skeleton = found.ours if each is None else found.theirs
+    for number in links:
+        name = model.links[number].name
+        try:
+            placed: tuple[Visual | Collision, ...] = (
+                model.geometry.collisions(name)
+                if kind == "collision shapes"
+                else model.geometry.visuals(name)
+            )
+        except DescriptionError as error:
+            shapes.append((f"a fault ({error.message})", np.eye(4)))
+            continue
+        if not placed:
+            continue
+        T = rounded(skeleton.link_pose(number))
+        if each is not None:
+            T = rounded(each.D) @ T
+        shapes += [(_words(shape), T @ shape.origin.matrix) for shape in placed]
+    return shapes
+
+
+def _words(placed: Visual | Collision) -> str:
+    shape = placed.shape
+    if isinstance(shape, Mesh):
+        scale = "" if shape.scale == (1.0, 1.0, 1.0) else f" scaled by {vector_text(shape.scale, DIGITS)}"
+        return f"mesh {PurePath(shape.file).name}{scale}"
+    sizes = ", ".join(
+        f"{name} {vector_text(value, DIGITS) if isinstance(value, tuple) else format(value, f'.{DIGITS}g')}"
+        for name, value in vars(shape).items()
+        if not isinstance(value, tuple) or len(value) <= 3
+    )
+    return f"{type(shape).__name__.lower()}{' ' + sizes if sizes else ''}"
+
+
+def _close(T: Array, S: Array, tolerance: float) -> bool:
+    return bool(np.max(np.abs(T - S)) <= tolerance)
+
+
+def frame_differences(
+    ours: Model, theirs: Model, found: Fit, tolerance: float
+) -> Iterator[Attribute | DescriptionFreedom]:
+    """Yield frames of one name that stand elsewhere: as a freedom where the whole body is described in
+    another frame, as a difference where the frame alone is moved."""
+    fits = {each.theirs: each for each in found.bodies}
+    mine = {frame.name: frame for frame in found.ours.mechanism.frames}
+    for frame in found.theirs.mechanism.frames:
+        other, each = mine.get(frame.name), fits.get(frame.body)
+        if other is None or each is None or other.body != each.ours:
+            continue
+        place = each.D @ homogeneous(frame.R, frame.p)
+        off = inverse(homogeneous(other.R, other.p)) @ place
+        turn, shift = angle_of(off), float(np.linalg.norm(rounded(off[:3, 3])))
+        if turn <= tolerance and shift <= tolerance * found.ours.reach:
+            continue
+        moved = " and ".join(
+            words
+            for size, words in ((turn, f"turned by {turn:.6g} rad"), (shift, f"moved by {shift:.6g} m"))
+            if size > NEGLIGIBLE
+        )
+        is_body = _belongs_to_joint(frame.name, found, each)
+        if is_body or max(each.frame_turn, each.frame_shift) > NEGLIGIBLE:
+            yield DescriptionFreedom("frame", frame.name, frame.name, f"frame of {frame.name} {moved}")
+        else:
+            lines = _line(ours, frame.name), _line(theirs, frame.name)
+            yield Attribute("frame", "link", frame.name, frame.name, "", moved, *lines)
+
+
+def _belongs_to_joint(name: str, found: Fit, each: BodyFit) -> bool:
+    return each.theirs != ROOT and found.theirs.joints[each.theirs].child == name
+
+
+def _line(model: Model, frame: str) -> int | None:
+    link = next((link for link in model.links if link.name == frame), None)
+    return None if link is None else link.line
+
+
+def freedoms(found: Fit, tolerance: float) -> Iterator[DescriptionFreedom]:
+    """Yield opposite axes, other orders of joints and links split otherwise."""
+    for each in found.bodies:
+        if each.sign < 0:
+            mine, other = found.ours.joints[each.ours].name, found.theirs.joints[each.theirs].name
+            yield DescriptionFreedom(
+                "axis",
+                mine,
+                other,
+                f"axis of {other} reversed: its position, velocity and torque change sign",
+            )
+    joints = [each.theirs for each in found.bodies if each.ours != ROOT]
+    if joints != sorted(joints):
+        yield DescriptionFreedom("order", None, None, "the joints are listed in another order")
+    for each in found.bodies:
+        first = _heavy_links(found.ours.model, found.ours.links[each.ours])
+        second = _heavy_links(found.theirs.model, found.theirs.links[each.theirs])
+        if len(first) != len(second):
+            yield DescriptionFreedom(
+                "links",
+                first[0] if first else None,
+                second[0] if second else None,
+                f"a body of {_listed(first)} is described as {_listed(second)}",
+            )
+
+
+def _heavy_links(model: Model, numbers: list[int]) -> list[str]:
+    links = (model.links[k] for k in numbers)
+    return [link.name for link in links if link.inertial is not None and link.inertial.mass]
+
+
+def _listed(names: list[str]) -> str:
+    if not names:
+        return "no link with mass"
+    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    return f"{', '.join(names[:3])}{more}"

@@ -1,0 +1,332 @@
+"""`same_robot`: are two descriptions those of one robot, for every state, and if not, what differs?"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from dynx.argument_types import checks_types
+from dynx.errors import ArgumentError, DynxError, shown
+from dynx.files.reading import printable
+from dynx.model import Model
+from dynx.model.loading import load, read_description, read_model
+from dynx.model.mechanism import ROOT
+from dynx.model.numbers import is_real
+from dynx.model.package_search import StrPath
+from dynx.model.tree import Base
+from dynx.model.xml.source import XmlSource
+from dynx.same.attributes import Attribute, DescriptionFreedom, attributes, frame_differences, freedoms
+from dynx.same.bounds import bounds
+from dynx.same.decimals import fifty_digits, rounded
+from dynx.same.effects import ElementEffect, Values, values
+from dynx.same.elements import (
+    PARTS,
+    Analysis,
+    DifferingElement,
+    FieldChange,
+    analyse,
+    apply,
+    inertial_text,
+    pose_text,
+    vector_text,
+)
+from dynx.same.fit import Fit
+from dynx.same.mending import NotMendedError, mended_text
+from dynx.same.report import Coordinate, ElementDifference, SameReport, Unmatched
+from dynx.same.skeleton import without_standing_mimics
+
+Robot = StrPath | bytes | bytearray | Model
+
+TOLERANCE = 1e-9
+"""Default of the largest difference of one robot, relative to the natural magnitude."""
+
+MAX_EFFECTS = 64
+"""Largest number of differences of which effects are measured."""
+
+
+@dataclass(frozen=True)
+class _Loaded:
+    """A description that was read; `data` is its text, None for a model."""
+
+    model: Model
+    name: str
+    data: str | bytes | None = None
+
+    @property
+    def leaves_base_open(self) -> bool:
+        """True for URDF, which does not say whether the base moves freely."""
+        return self.data is not None and self.source.root.tag == "robot"
+
+    @cached_property
+    def source(self) -> XmlSource:
+        """The text, to be edited."""
+        assert self.data is not None
+        return XmlSource(self.data, self.model.source)
+
+    def line_of(self, element: DifferingElement, name: str) -> int | None:
+        """Return the line on which an element stands, of the joint or link of that name; in URDF that of the
+        part itself."""
+        if self.leaves_base_open:
+            for each in self.source.root.all(element.tag):
+                if each.attributes.get("name") == name:
+                    part = each.first(PARTS[element.part])
+                    return each.line if part is None else part.line
+        if element.tag == "joint":
+            return self.model.joint(name).line
+        link = self.model.link(name)
+        return link.line if link.inertial is None else link.inertial.line or link.line
+
+
+@checks_types
+def same_robot(
+    a: Robot,
+    b: Robot,
+    *,
+    base: Base | None = None,
+    tolerance: float = TOLERANCE,
+    package_dirs: Iterable[StrPath] = (),
+) -> SameReport:
+    """Decide whether two descriptions are those of one robot, and list what differs.
+
+        report = dynx.same_robot("arm.urdf", "arm.xml")
+        assert report.same, report.differences
+
+    `a` and `b` are what `dynx.load` takes: files, text, names, models, in any of its formats. `base` is that
+    of both; by default a URDF file has the base that the other description states, or a fixed one.
+
+    Links are merged across fixed joints; what remains of a robot are the lines of its joint axes at the zero
+    positions, and the base inertial parameters of its bodies (Gautier and Khalil 1990). Frames of links, the
+    signs of axes, and inertia that no state shows are freedoms of a description. The robots are the same if
+    all else differs by at most `tolerance` of its natural magnitude: the reach of the robot for lengths,
+    1 rad for angles, the body's own inertia for inertias. It is computed in 50 digits from the decimals of
+    the files. Where the robots differ, the report has the fewest elements of `b` to replace, and `b` mended.
+
+    Raises the errors of `dynx.load`; ArgumentError for a `tolerance` that is no number from 0 to below 1.
+    """
+    start = time.perf_counter()
+    if not (is_real(tolerance) and 0.0 <= tolerance < 1.0):
+        raise ArgumentError(f"tolerance is {shown(tolerance)}; wanted a finite number from 0 to below 1")
+    tolerance = float(tolerance)
+    folders: list[StrPath] = [package_dirs] if isinstance(package_dirs, str) else list(package_dirs)
+    first, second = _read(a, base, folders), _read(b, base, folders)
+    first, second, notes, unmatched = _with_one_base(first, second)
+    ours, theirs = (without_standing_mimics(each.model) for each in (first, second))
+    analysis = analyse(ours, theirs, tolerance)
+    unmatched += _unmatched(analysis.fit)
+    same = analysis.equal and not unmatched
+    mended, text, reason = None, None, None
+    if not same:
+        mended, text, reason = _mended(second, ours, theirs, analysis, unmatched, tolerance)
+    differences = _differences(analysis, first, second)
+    with fifty_digits():
+        apart = list(attributes(first.model, second.model, analysis.fit, max(tolerance, 1e-15)))
+        frames = list(frame_differences(ours, theirs, analysis.fit, max(tolerance, 1e-15)))
+        free = [each for each in frames if isinstance(each, DescriptionFreedom)]
+        apart += [each for each in frames if isinstance(each, Attribute)]
+        free += [*freedoms(analysis.fit, tolerance), *_unseen(analysis)]
+        limits = bounds(analysis.fit, _unseen_bodies(analysis)) if same else None
+    root = analysis.fit.bodies[0].D
+    return SameReport(
+        first=first.name,
+        second=second.name,
+        first_source=first.model.source,
+        second_source=second.model.source,
+        same=same,
+        tolerance=tolerance,
+        differences=differences,
+        unmatched=tuple(unmatched),
+        attributes=tuple(apart),
+        freedoms=tuple(free),
+        coordinates=_coordinates(analysis.fit),
+        bounds=limits,
+        T_first_second=rounded(root) if first.model.floating else None,
+        notes=tuple(notes),
+        seconds=round(time.perf_counter() - start, 4),
+        not_mended=reason,
+        mended=mended,
+        mended_text=text,
+    )
+
+
+def _read(x: Robot, base: Base | None, folders: list[StrPath]) -> _Loaded:
+    if isinstance(x, Model):
+        model = load(x, base=base)
+        return _Loaded(model, model.name)
+    data, source, name = read_description(x, folders)
+    model = read_model(data, source, name, base=base, package_dirs=folders)
+    if name is None:
+        return _Loaded(model, model.name, data)
+    return _Loaded(model, printable(x if isinstance(x, str) else source), data)
+
+
+def _with_one_base(first: _Loaded, second: _Loaded) -> tuple[_Loaded, _Loaded, list[str], list[Unmatched]]:
+    """Return both descriptions with a base of one kind, what was assumed for it, and what differs by it."""
+    kinds = first.model.base, second.model.base
+    if kinds[0] == kinds[1]:
+        return first, second, [], []
+    for number, each in enumerate((first, second)):
+        if each.leaves_base_open:
+            kind = kinds[1 - number]
+            changed = replace(each, model=each.model.with_base(kind))
+            note = f"{each.name} does not state its base; it is read as {kind}, as the other is"
+            return (changed, second, [note], []) if number == 0 else (first, changed, [note], [])
+    message = (
+        f"the base is {kinds[1]} instead of {kinds[0]}, and neither description leaves it open; in Python, "
+        f"dynx.load(...).with_base({kinds[0]!r}) makes the second robot {kinds[0]}"
+    )
+    lines = first.model.links[0].line, second.model.links[0].line
+    found = Unmatched("base", first.model.root, second.model.root, *lines, message)
+    return first, replace(second, model=second.model.with_base(kinds[0])), [], [found]
+
+
+# -- what differs -----------------------------------------------------------------------------------
+
+
+def _unmatched(found: Fit) -> list[Unmatched]:
+    missing = {found.ours.joints[k].name: k for k in found.missing}
+    extra = {found.theirs.joints[k].name: k for k in found.extra}
+    entries = []
+    for name, k in missing.items():
+        joint = found.ours.joints[k]
+        if name in extra:
+            other = found.theirs.joints[extra.pop(name)]
+            was, now = (f"{each.type} below {each.parent}" for each in (joint, other))
+            message = f"joint {name} is {now} instead of {was}"
+            entries.append(Unmatched("moved", name, name, joint.line, other.line, message))
+        else:
+            message = f"joint {name} below {joint.parent} has no counterpart in the second robot"
+            entries.append(Unmatched("missing", name, None, joint.line, None, message))
+    for name, k in extra.items():
+        joint = found.theirs.joints[k]
+        message = f"joint {name} below {joint.parent} has no counterpart in the first robot"
+        entries.append(Unmatched("extra", None, name, None, joint.line, message))
+    return entries
+
+
+def _differences(analysis: Analysis, first: _Loaded, second: _Loaded) -> tuple[ElementDifference, ...]:
+    effects = _effects(analysis, second.model)
+    found = []
+    for element, effect in zip(analysis.elements, effects, strict=True):
+        found.append(
+            ElementDifference(
+                part=element.part,
+                tag=element.tag,
+                ours=element.ours,
+                theirs=element.theirs,
+                first=element.first,
+                second=element.second,
+                wanted=_value_text(element.changes[0]),
+                first_line=None if element.ours is None else first.line_of(element, element.ours),
+                second_line=second.line_of(element, element.theirs),
+                size=element.size,
+                message=element.message,
+                effect=effect,
+            )
+        )
+    return tuple(found)
+
+
+def _value_text(change: FieldChange) -> str:
+    value = change.value
+    if change.field == "origin":
+        return pose_text(value)
+    if change.field == "axis":
+        return vector_text(value)
+    if change.field == "inertial":
+        return inertial_text(value)
+    if change.field == "mimic":
+        return (
+            "follows no joint"
+            if value is None
+            else f"{value.multiplier!r} * {value.joint} + {value.offset!r}"
+        )
+    return str(value)
+
+
+def _effects(analysis: Analysis, theirs: Model) -> list[ElementEffect | None]:
+    """Put each element back alone, as it is in `theirs`, into the robot with all of them replaced."""
+    if not analysis.elements:
+        return []
+    mended = apply(theirs, (change for each in analysis.elements for change in each.changes))
+    try:
+        right = values(mended, mended)
+        return [
+            _effect(right, mended, theirs, element) if k < MAX_EFFECTS else None
+            for k, element in enumerate(analysis.elements)
+        ]
+    except DynxError:  # a robot that no backend can evaluate, such as one without links that move
+        return [None] * len(analysis.elements)
+
+
+def _effect(right: Values, mended: Model, theirs: Model, element: DifferingElement) -> ElementEffect | None:
+    changes = []
+    for change in element.changes:
+        part = theirs.joint(change.name) if change.tag == "joint" else theirs.link(change.name)
+        changes.append(replace(change, value=getattr(part, change.field)))
+    return right.effect_of(values(apply(mended, changes), mended))
+
+
+def _unseen(analysis: Analysis) -> list[DescriptionFreedom]:
+    found = []
+    for each in analysis.unseen:
+        why = "no state shows it" if each.size == 0.0 else f"{each.size:.2g} of what is seen of it"
+        found.append(
+            DescriptionFreedom("inertia", each.ours, each.theirs, f"inertia of {each.theirs} differs; {why}")
+        )
+    return found
+
+
+def _unseen_bodies(analysis: Analysis) -> frozenset[int]:
+    body_of = analysis.fit.theirs.body_of
+    numbers = {body_of[each.theirs] for each in analysis.unseen}
+    return frozenset(each.ours for each in analysis.fit.bodies if each.theirs in numbers)
+
+
+def _coordinates(found: Fit) -> tuple[Coordinate, ...]:
+    ours, theirs = found.ours.model, found.theirs.model
+    base = 7 if ours.floating else 0
+    mine = {name: base + k for k, name in enumerate(ours.joint_names)}
+    other = {name: base + k for k, name in enumerate(theirs.joint_names)}
+    rows = []
+    for each in found.bodies:
+        if each.ours == ROOT:
+            continue
+        a, b = found.ours.joints[each.ours].name, found.theirs.joints[each.theirs].name
+        if a in mine and b in other:
+            rows.append(Coordinate(a, b, mine[a], other[b], each.sign))
+    return tuple(sorted(rows, key=lambda row: row.first_index))
+
+
+# -- the mended description -------------------------------------------------------------------------
+
+
+def _mended(
+    second: _Loaded,
+    ours: Model,
+    theirs: Model,
+    analysis: Analysis,
+    unmatched: list[Unmatched],
+    tolerance: float,
+) -> tuple[Model | None, bytes | None, str | None]:
+    """Return the second robot with its elements replaced, its text, and why there is none."""
+    if any(each.kind != "base" for each in unmatched):
+        return None, None, "joints without counterpart are not mended by replacing elements"
+    if unmatched:
+        return None, None, "the kind of the base is not mended by replacing elements"
+    changes = [change for each in analysis.elements for change in each.changes]
+    mended = apply(second.model, changes)
+    if not analyse(ours, without_standing_mimics(mended), tolerance).equal:
+        return None, None, "the replaced elements do not make the robots the same"
+    if second.data is None:
+        return mended, mended.to_urdf().encode(), None
+    try:
+        source = mended_text(second.source, second.model, mended)
+        again = read_model(source.to_bytes(), second.model.source, None, base=None)
+    except (NotMendedError, DynxError) as error:
+        return mended, None, str(error)
+    again = without_standing_mimics(again.with_base(theirs.base))
+    if not analyse(ours, again, tolerance).equal:
+        return mended, None, "the mended text is not read as the same robot"
+    return mended, source.to_bytes(), None

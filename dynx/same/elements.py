@@ -1,0 +1,708 @@
+"""Elements of one description that differ from the other, with what would replace each of them.
+
+The elements of `theirs` are found in this order: joints of another type, places and axes of joints, mimics,
+inertias. Values are those of `ours` in the frames of `theirs`.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from itertools import combinations, islice
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from dynx.model import Model
+from dynx.model.elements import Inertial, Joint, Link, Pose
+from dynx.model.mechanism import ROOT, pose_arrays
+from dynx.model.topology import resolve_mimics
+from dynx.same.decimals import decimals, fifty_digits, rounded
+from dynx.same.fit import BodyFit, Fit, angle_of, drive, fit
+from dynx.same.matching import UNCHANGED, Matching
+from dynx.same.observability import Observability
+from dynx.same.scales import inertia_ratio
+from dynx.same.skeleton import Skeleton, float_inertia, subtract, transformed
+from dynx.spatial.inertia import RigidInertia
+from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.se3 import homogeneous, inverse
+from dynx.spatial.so3 import skew
+
+Part = Literal["type", "origin", "axis", "mimic", "inertial"]
+"""Part of a joint or link that differs."""
+
+PARTS = {part: part for part in get_args(Part)} | {"type": ""}
+"""Tag of the element of URDF in which a part stands; the type is an attribute of the joint."""
+
+SNAP = 1e-13
+"""Difference [m, rad] below which a computed pose or axis is taken to be that of the other description."""
+
+ROUNDING = 1e-15
+"""Share of the largest number of a vector below which another one is rounding, and written as 0."""
+
+NOTHING = 1e-4
+"""Share of the tolerance below which what is seen of a difference is rounding."""
+
+MAX_TRIALS = 12
+"""Largest number of fixed joints that are tried at a time."""
+
+MAX_SUBSETS = 8
+"""Largest number of inertias of which all subsets are tried for the smallest one."""
+
+
+@dataclass(frozen=True)
+class FieldChange:
+    """Value of a field of a joint, or of the inertial of a link, by name."""
+
+    tag: Literal["joint", "link"]
+    name: str
+    field: str
+    value: Any
+
+
+@dataclass(frozen=True)
+class DifferingElement:
+    """A part of a joint or link of `theirs` that differs from `ours`.
+
+    `size` is the difference relative to its natural magnitude: the length of the robot, 1 rad, or the body's
+    own inertia. `first` and `second` are the values in the two descriptions, `changes` what replaces it.
+    """
+
+    part: Part
+    tag: Literal["joint", "link"]
+    ours: str | None
+    theirs: str
+    size: float
+    message: str
+    first: str
+    second: str
+    changes: tuple[FieldChange, ...] = field(repr=False, default=())
+    unchanged: bool = False
+    """True if it is written as in `ours`: what stands before it differs."""
+
+
+@dataclass(frozen=True)
+class Unseen:
+    """Links whose inertias differ without effect; `size` is what is seen of the differences of all of them,
+    relative to its natural magnitude: 0 where no state shows anything."""
+
+    ours: str | None
+    theirs: str
+    size: float
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Comparison of two models: how their bodies fit, what differs, and what differs without being seen."""
+
+    fit: Fit
+    elements: tuple[DifferingElement, ...]
+    unseen: tuple[Unseen, ...] = ()
+
+    @property
+    def equal(self) -> bool:
+        """True if nothing differs in any state."""
+        return not (self.elements or self.fit.missing or self.fit.extra)
+
+    @property
+    def cost(self) -> float:
+        """Number of elements and bodies that differ; an element that is written as its counterpart counts a
+        little more."""
+        costs = (UNCHANGED if each.unchanged else 1.0 for each in self.elements)
+        return sum(costs) + 2.0 * (len(self.fit.missing) + len(self.fit.extra))
+
+
+def apply(model: Model, changes: Iterable[FieldChange]) -> Model:
+    """Return the model with other values of some fields."""
+    joints = {joint.name: joint for joint in model.joints}
+    links = {link.name: link for link in model.links}
+    retyped = False
+    for change in changes:
+        retyped = retyped or change.field in ("type", "mimic")
+        if change.tag == "joint":
+            joints[change.name] = replace(joints[change.name], **{change.field: change.value})
+        else:
+            links[change.name] = replace(links[change.name], **{change.field: change.value})
+    # Joints may follow one that has become fixed.
+    ordered = resolve_mimics(list(joints.values()), [], model.source) if retyped else list(joints.values())
+    return replace(model, joints=tuple(ordered), links=tuple(links.values()))
+
+
+def analyse(ours: Model, theirs: Model, tolerance: float) -> Analysis:
+    """Compare two models whose bases are of one kind."""
+    retyped = list(_other_types(ours, theirs))
+    return _with_fixed_joints(ours, theirs, retyped, tolerance)
+
+
+def _with_fixed_joints(
+    ours: Model, theirs: Model, known: list[DifferingElement], tolerance: float
+) -> Analysis:
+    """Compare two models with some elements replaced; find fixed joints that explain what then differs."""
+    changed = apply(theirs, (change for each in known for change in each.changes))
+    best = _analysed(ours, changed, known, tolerance)
+    tried: set[str] = {each.theirs for each in known}
+    while len(best.elements) > len(known):
+        trials: list[tuple[Analysis, DifferingElement, Model]] = []
+        for each in islice(_fixed_joints(best, ours, tried), MAX_TRIALS):
+            placed = apply(changed, each.changes)
+            trials.append((_analysed(ours, placed, [*known, each], tolerance), each, placed))
+        found = min(trials, key=lambda trial: trial[0].cost, default=None)
+        if found is None or found[0].cost >= best.cost:
+            break
+        best, element, changed = found
+        known = [*known, element]
+        tried.add(element.theirs)
+    return best
+
+
+def _analysed(ours: Model, changed: Model, known: list[DifferingElement], tolerance: float) -> Analysis:
+    with fifty_digits():
+        mine, other = Skeleton(ours), Skeleton(changed)
+        found = fit(mine, other, Matching(mine, other, tolerance).find())
+        elements = [*known, *_of_joints(found, tolerance)]
+        inertials, unseen = _Inertias(found, tolerance).find()
+    names = [*(link.name for link in changed.links), *(joint.name for joint in changed.joints)]
+    order = {name: k for k, name in enumerate(names)}
+    elements = sorted([*elements, *inertials], key=lambda each: (_line(changed, each), order[each.theirs]))
+    return Analysis(found, tuple(elements), unseen)
+
+
+def _fixed_joints(analysis: Analysis, ours: Model, tried: set[str]) -> Iterator[DifferingElement]:
+    """Yield fixed joints of `theirs`, in document order, below which elements differ, each placed so that the
+    first of these does not."""
+    found = analysis.fit
+    model = found.theirs.model
+    above = {joint.child: joint for joint in model.joints}
+    below: dict[str, DifferingElement] = {}
+    counts: Counter[str] = Counter()
+    for element in analysis.elements:
+        if element.tag == "joint" and (element.part != "origin" or not model.joint(element.theirs).moves):
+            continue
+        link = element.theirs if element.tag == "link" else model.joint(element.theirs).parent
+        while link in above and not above[link].moves:
+            below.setdefault(above[link].name, element)
+            counts[above[link].name] += 1
+            link = above[link].parent
+    mine = {joint.name: joint for joint in ours.joints if not joint.moves}
+    for joint in [joint for joint in model.joints if joint.name in below and joint.name not in tried]:
+        # What is written as in the other description is not at fault; what has no counterpart there may be
+        # if several elements, or the place of a joint, depend on it.
+        if joint.name in mine:
+            suspect = mine[joint.name].origin != joint.origin
+        else:
+            suspect = below[joint.name].tag == "joint" or counts[joint.name] > 1
+        if suspect:
+            placed = _placed(found, ours, joint, below[joint.name])
+            if placed is not None:
+                yield placed
+
+
+def _placed(found: Fit, ours: Model, joint: Joint, element: DifferingElement) -> DifferingElement | None:
+    """Return the element of a fixed joint that is placed so that another element below it is right."""
+    theirs = found.theirs
+    names = {link.name: k for k, link in enumerate(theirs.model.links)}
+    my_names = {link.name: k for k, link in enumerate(found.ours.model.links)}
+    with fifty_digits():
+        fits = {each.theirs: each for each in found.bodies}
+        here = fits[theirs.body_of[joint.child]]
+        if element.tag == "joint":
+            each = fits[theirs.number[element.theirs]]
+            now = theirs.exact[each.theirs]
+            wanted = inverse(here.D) @ found.ours.exact[each.ours] @ each.D
+        elif element.ours in my_names and found.ours.body_of[element.ours or ""] == here.ours:
+            now = theirs.link_pose(names[element.theirs])
+            wanted = inverse(here.D) @ found.ours.link_pose(my_names[element.ours or ""])
+        else:
+            return None
+        own = theirs.link_pose(names[joint.child])
+        moved = wanted @ inverse(now) @ own
+        place = inverse(theirs.link_pose(names[joint.parent])) @ moved
+        off = inverse(own) @ moved
+        turn, shift = angle_of(off), float(np.linalg.norm(rounded(off[:3, 3])))
+    if max(turn, shift / found.ours.reach) < SNAP:
+        return None
+    mine = next((each for each in ours.joints if each.name == joint.name and not each.moves), None)
+    pose = nearest_pose(place, joint.origin if mine is None else mine.origin)
+    return DifferingElement(
+        "origin",
+        "joint",
+        None if mine is None else mine.name,
+        joint.name,
+        max(turn, shift / found.ours.reach),
+        _away("fixed joint", shift, turn),
+        "none" if mine is None else pose_text(mine.origin),
+        pose_text(joint.origin),
+        (FieldChange("joint", joint.name, "origin", pose),),
+        unchanged=mine is not None and mine.origin == joint.origin,
+    )
+
+
+def _away(what: str, shift: float, turn: float) -> str:
+    parts = [f"{size:.3g} {unit}" for size, unit in ((shift, "m"), (turn, "rad")) if size > SNAP]
+    return f"the {what} is {' and '.join(parts) or '0 m'} away from its place"
+
+
+def _line(model: Model, element: DifferingElement) -> int:
+    part = model.joint(element.theirs) if element.tag == "joint" else model.link(element.theirs)
+    return part.line or 0
+
+
+# -- joints ---------------------------------------------------------------------------------------
+
+
+def _other_types(ours: Model, theirs: Model) -> Iterator[DifferingElement]:
+    """Yield the joints of both names of which one is fixed or slides and the other turns."""
+    mine = {joint.name: joint for joint in ours.joints}
+    drivers = set(theirs.joint_names)
+    for joint in theirs.joints:
+        other = mine.get(joint.name)
+        if other is None or _kind(other) == _kind(joint):
+            continue
+        changes = [FieldChange("joint", joint.name, "type", other.type)]
+        if other.moves:
+            fields = ["limits", "dynamics", "mimic"] if not joint.moves else []
+            fields += [] if joint.moves else ["axis", "locked_at"]
+            values = {name: getattr(other, name) for name in fields}
+            if values.get("mimic") is not None and values["mimic"].joint not in drivers:
+                values["mimic"] = None
+            changes += [FieldChange("joint", joint.name, name, value) for name, value in values.items()]
+        yield DifferingElement(
+            "type",
+            "joint",
+            other.name,
+            joint.name,
+            1.0,
+            f"the joint is {joint.type} instead of {other.type}",
+            other.type,
+            joint.type,
+            tuple(changes),
+        )
+
+
+def _kind(joint: Joint) -> str:
+    return "revolute" if joint.type == "continuous" else joint.type
+
+
+def _of_joints(found: Fit, tolerance: float) -> Iterator[DifferingElement]:
+    frames = {each.theirs: each for each in found.bodies}
+    length = found.ours.reach
+    for each in found.bodies:
+        if each.ours == ROOT:
+            continue
+        parent = frames[found.theirs.bodies[each.theirs].parent]
+        if max(each.turn, each.shift / length) > tolerance:
+            yield _origin(found, each, parent)
+        if each.line / length > tolerance:
+            yield _moved_axis(found, each)
+        if each.axis > tolerance:
+            yield _axis(found, each)
+        if each.scale > tolerance * _unit_scale(found, each) or each.offset > tolerance * (
+            1.0 if found.ours.bodies[each.ours].revolute else length
+        ):
+            yield _mimic(found, each)
+
+
+def _unit_scale(found: Fit, each: BodyFit) -> float:
+    mimic = found.ours.joints[each.ours].mimic
+    return 1.0 if mimic is None else abs(mimic.multiplier)
+
+
+def _joints(found: Fit, each: BodyFit) -> tuple[Joint, Joint]:
+    return found.ours.joints[each.ours], found.theirs.joints[each.theirs]
+
+
+def _origin(found: Fit, each: BodyFit, parent: BodyFit) -> DifferingElement:
+    mine, joint = _joints(found, each)
+    wanted = inverse(parent.D) @ found.ours.exact[each.ours] @ each.D
+    place = inverse(found.theirs.parent_pose(each.theirs)) @ wanted
+    pose = nearest_pose(place, mine.origin)
+    off = inverse(decimals(joint.origin.matrix)) @ place
+    axis = np.array(joint.axis)
+    message = _away("joint", each.shift, each.turn)
+    if each.shift <= 1e-12 * found.ours.reach and _about(off, axis):
+        message = f"position 0 of the joint is turned by {each.turn:.3g} rad about its axis"
+    return DifferingElement(
+        "origin",
+        "joint",
+        mine.name,
+        joint.name,
+        max(each.turn, each.shift / found.ours.reach),
+        message,
+        pose_text(mine.origin),
+        pose_text(joint.origin),
+        (FieldChange("joint", joint.name, "origin", pose),),
+        unchanged=mine.origin == joint.origin,
+    )
+
+
+def _about(off: Array, axis: Floats) -> bool:
+    """Check whether the rotation of a pose is about an axis."""
+    R = rounded(off[:3, :3])
+    return float(np.linalg.norm(R @ axis - axis)) < 1e-12 * max(1.0, float(np.linalg.norm(R - np.eye(3))))
+
+
+def _moved_axis(found: Fit, each: BodyFit) -> DifferingElement:
+    """Make the element of a joint whose axis is moved parallel, while its link is where it should be."""
+    mine, joint = _joints(found, each)
+    D, axis = rounded(each.D), found.ours.axes[each.ours]
+    foot = axis * float(axis @ D[:3, 3])
+    shift = D[:3, :3].T @ (foot - D[:3, 3])
+    there, back = homogeneous(np.eye(3), shift), homogeneous(np.eye(3), -shift)
+    origin = nearest_pose(decimals(joint.origin.matrix @ there), mine.origin)
+    changes = [FieldChange("joint", joint.name, "origin", origin)]
+    link = found.theirs.model.link(joint.child)
+    if link.inertial is not None:
+        moved = replace(link.inertial, origin=Pose.from_matrix(back @ link.inertial.origin.matrix))
+        changes.append(FieldChange("link", link.name, "inertial", moved))
+    changes += [
+        FieldChange("joint", other.name, "origin", Pose.from_matrix(back @ other.origin.matrix))
+        for other in found.theirs.model.joints
+        if other.parent == link.name
+    ]
+    return DifferingElement(
+        "origin",
+        "joint",
+        mine.name,
+        joint.name,
+        each.line / found.ours.reach,
+        f"the axis is {each.line:.3g} m beside its place; its link is where it should be",
+        pose_text(mine.origin),
+        pose_text(joint.origin),
+        tuple(changes),
+        unchanged=mine.origin == joint.origin,
+    )
+
+
+def _axis(found: Fit, each: BodyFit) -> DifferingElement:
+    mine, joint = _joints(found, each)
+    turned = each.sign * (rounded(each.D[:3, :3]).T @ found.ours.axes[each.ours])
+    own = np.array(mine.axis) * each.sign
+    wanted = own if float(np.max(np.abs(turned - own))) < SNAP else turned
+    x, y, z = (wanted + 0.0).tolist()
+    return DifferingElement(
+        "axis",
+        "joint",
+        mine.name,
+        joint.name,
+        each.axis,
+        f"the axis is turned by {np.arcsin(min(1.0, each.axis)):.3g} rad",
+        vector_text(mine.axis),
+        vector_text(joint.axis),
+        (FieldChange("joint", joint.name, "axis", (x, y, z)),),
+        unchanged=mine.axis == joint.axis,
+    )
+
+
+def _mimic(found: Fit, each: BodyFit) -> DifferingElement:
+    mine, joint = _joints(found, each)
+    wanted, names = mine.mimic, {}
+    for other in found.bodies:
+        if other.ours != ROOT:
+            a, b = _joints(found, other)
+            names[a.name] = (b.name, other.sign)
+    if wanted is not None:
+        driver, sign = names[wanted.joint]
+        wanted = replace(
+            wanted,
+            joint=driver,
+            multiplier=each.sign * sign * wanted.multiplier,
+            offset=each.sign * wanted.offset + 0.0,
+        )
+    return DifferingElement(
+        "mimic",
+        "joint",
+        mine.name,
+        joint.name,
+        min(1.0, max(each.scale / _unit_scale(found, each), each.offset)),
+        f"the joint follows {drive(joint)} instead of {drive(mine)}"
+        if mine.mimic and joint.mimic
+        else f"the joint {drive(joint) if joint.mimic is None else 'follows ' + drive(joint)}",
+        drive(mine),
+        drive(joint),
+        (FieldChange("joint", joint.name, "mimic", wanted),),
+    )
+
+
+# -- inertias -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _InertiaCandidate:
+    """A link of `theirs`, by number, whose inertia differs: `difference`, ours minus theirs, in the frame of
+    our body; `mine` is the number of the link of `ours` that it is compared with."""
+
+    body: BodyFit
+    link: int
+    mine: int | None
+    difference: RigidInertia
+    single: bool
+    """True if `mine` alone is what `link` should be."""
+
+
+class _Inertias:
+    """The fewest inertias that must be replaced."""
+
+    def __init__(self, found: Fit, tolerance: float) -> None:
+        self._fit, self._tolerance = found, tolerance
+        self._whole = found.ours.whole
+
+    def find(self) -> tuple[list[DifferingElement], tuple[Unseen, ...]]:
+        """Return the elements, and the links whose differences have no effect."""
+        off = [each for each in self._fit.bodies if self._ratio(each) > self._tolerance]
+        if not off:
+            return [], ()
+        self._observability = Observability(self._fit.ours)
+        candidates = [candidate for each in off for candidate in self._candidates(each)]
+        if not self._seen(candidates):
+            return [], self._unseen(candidates)
+        chosen = self._smallest(candidates)
+        sizes = self._observability.observed(self._sum(chosen))
+        elements = [self._element(each, sizes) for each in chosen]
+        others = [each for each in candidates if each not in chosen]
+        return elements, self._unseen(others)
+
+    def _ratio(self, each: BodyFit) -> float:
+        assert each.inertia is not None
+        return inertia_ratio(float_inertia(each.inertia), self._fit.ours.inertias[each.ours], self._whole)
+
+    def _unseen(self, candidates: list[_InertiaCandidate]) -> tuple[Unseen, ...]:
+        if not candidates:
+            return ()
+        ours, theirs = self._fit.ours.model.links, self._fit.theirs.model.links
+        seen = max(self._sizes(candidates).values(), default=0.0)
+        size = seen if seen > NOTHING * self._tolerance else 0.0
+        return tuple(
+            Unseen(None if each.mine is None else ours[each.mine].name, theirs[each.link].name, size)
+            for each in candidates
+        )
+
+    def _candidates(self, each: BodyFit) -> Iterator[_InertiaCandidate]:
+        """Yield the links of a body whose inertias differ; their differences add up to that of the body."""
+        ours, theirs, D = self._fit.ours, self._fit.theirs, each.D
+        mine = {ours.model.links[k].name: k for k in ours.links[each.ours]}
+        pairs = [
+            (k, mine[theirs.model.links[k].name])
+            for k in theirs.links[each.theirs]
+            if theirs.model.links[k].name in mine
+        ]
+        if len(pairs) > 1:
+            # Beside others, a link with mass in one description only counts as split off or merged there.
+            pairs = [(k, j) for k, j in pairs if self._heavy(theirs, k) == self._heavy(ours, j)]
+        for k, _ in pairs:
+            del mine[theirs.model.links[k].name]
+        alone = [
+            k for k in theirs.links[each.theirs] if k not in {k for k, _ in pairs} and self._heavy(theirs, k)
+        ]
+        rest = [k for k in mine.values() if self._heavy(ours, k)]
+        if len(alone) == 1 and len(rest) == 1:
+            pairs.append((alone.pop(), rest.pop()))
+        if alone or rest:
+            yield from self._regrouped(each, pairs, alone, rest)
+            return
+        for k, j in pairs:
+            difference = subtract(ours.link_inertia(j), transformed(theirs.link_inertia(k), D))
+            own = float_inertia(ours.link_inertia(j))
+            if inertia_ratio(float_inertia(difference), own, self._whole) > self._tolerance:
+                yield _InertiaCandidate(each, k, j, difference, single=True)
+
+    def _regrouped(
+        self, each: BodyFit, pairs: list[tuple[int, int]], alone: list[int], rest: list[int]
+    ) -> Iterator[_InertiaCandidate]:
+        """Yield the candidates of a body whose links are split otherwise in the two descriptions."""
+        ours, theirs, D = self._fit.ours, self._fit.theirs, each.D
+        assert each.inertia is not None
+        left = each.inertia
+        for k, j in pairs:
+            difference = subtract(ours.link_inertia(j), transformed(theirs.link_inertia(k), D))
+            own = float_inertia(ours.link_inertia(j))
+            if inertia_ratio(float_inertia(difference), own, self._whole) <= self._tolerance:
+                continue
+            if not _near(difference, each.inertia, self._tolerance):
+                continue
+            # This link alone explains the difference of the whole body.
+            yield _InertiaCandidate(each, k, j, difference, single=True)
+            return
+        heavy = [k for k in theirs.links[each.theirs] if self._heavy(theirs, k)]
+        first = min(heavy or theirs.links[each.theirs])
+        named = dict(pairs)
+        yield _InertiaCandidate(each, first, named.get(first), left, single=False)
+
+    @staticmethod
+    def _heavy(skeleton: Skeleton, link: int) -> bool:
+        inertial = skeleton.model.links[link].inertial
+        return inertial is not None and bool(inertial.mass or inertial.tensor.any())
+
+    def _sum(self, candidates: Iterable[_InertiaCandidate]) -> Mapping[int, RigidInertia]:
+        total: dict[int, RigidInertia] = {}
+        for each in candidates:
+            number = each.body.ours
+            total[number] = total[number] + each.difference if number in total else each.difference
+        return total
+
+    def _seen(self, candidates: Iterable[_InertiaCandidate]) -> bool:
+        return any(size > self._tolerance for size in self._sizes(candidates).values())
+
+    def _sizes(self, candidates: Iterable[_InertiaCandidate]) -> dict[int, float]:
+        """Return how much is seen of the sum of some differences, by body."""
+        total = self._sum(candidates)
+        own = self._fit.ours.inertias
+        total = {
+            body: inertia
+            for body, inertia in total.items()
+            if inertia_ratio(float_inertia(inertia), own[body], self._whole) > self._tolerance
+        }
+        return self._observability.observed(total)
+
+    def _smallest(self, candidates: list[_InertiaCandidate]) -> list[_InertiaCandidate]:
+        """Return the fewest candidates without which no difference is seen, the first in document order."""
+        if len(candidates) <= MAX_SUBSETS:
+            for count in range(1, len(candidates)):
+                for chosen in combinations(range(len(candidates)), count):
+                    rest = [each for k, each in enumerate(candidates) if k not in chosen]
+                    if not self._seen(rest):
+                        return [candidates[k] for k in chosen]
+            return candidates
+        chosen_ones = list(candidates)
+        for each in reversed(candidates):
+            without = [other for other in chosen_ones if other is not each]
+            if not self._seen([other for other in candidates if other not in without]):
+                chosen_ones = without
+        return chosen_ones
+
+    def _element(self, each: _InertiaCandidate, sizes: Mapping[int, float]) -> DifferingElement:
+        ours, theirs = self._fit.ours, self._fit.theirs
+        link = theirs.model.links[each.link]
+        mine = None if each.mine is None else ours.model.links[each.mine]
+        T = theirs.link_pose(each.link)
+        new = self._new_inertial(each, T, mine)
+        old = link.inertial or Inertial()
+        own = self._ratio(each.body)
+        my_others, others = [], []
+        if not each.single:
+            my_others = self._beside(ours, ours.links[each.body.ours], each.mine)
+            others = self._beside(theirs, theirs.links[each.body.theirs], each.link)
+        message = _inertial_message(old, new)
+        if my_others or others:
+            less = f" less {_names_text(others)}" if others else ""
+            message = f"merged body{less}: {message}"
+        return DifferingElement(
+            "inertial",
+            "link",
+            None if mine is None else mine.name,
+            link.name,
+            max(sizes.get(each.body.ours, 0.0), own) if each.single else own,
+            message,
+            _beside_text(None if mine is None else mine.inertial, my_others),
+            _beside_text(link.inertial, others),
+            (FieldChange("link", link.name, "inertial", new),),
+            unchanged=mine is not None and mine.inertial == link.inertial,
+        )
+
+    def _beside(self, skeleton: Skeleton, links: list[int], own: int | None) -> list[str]:
+        """Return the names of the links with mass that are merged with a link."""
+        return [skeleton.model.links[k].name for k in links if k != own and self._heavy(skeleton, k)]
+
+    def _new_inertial(self, each: _InertiaCandidate, T: Array, mine: Link | None) -> Inertial | None:
+        """Return the inertial of the link of `theirs` that has the inertia of `ours`."""
+        theirs, D = self._fit.theirs, each.body.D
+        line = theirs.model.links[each.link].line
+        if each.single and mine is not None:
+            assert each.mine is not None
+            if mine.inertial is None:
+                return None
+            place = inverse(T) @ inverse(D) @ self._fit.ours.link_pose(each.mine)
+            if float(np.max(np.abs(rounded(place - np.eye(4))))) < SNAP:
+                return mine.inertial
+            origin = place @ decimals_of_pose(mine.inertial.origin)
+            return replace(mine.inertial, origin=nearest_pose(origin, mine.inertial.origin), line=line)
+        back = inverse(T) @ inverse(D)
+        inertia = theirs.mechanism.links[each.link].inertia + transformed(each.difference, back)
+        return inertial_of(float_inertia(inertia))
+
+
+def decimals_of_pose(pose: Pose) -> Array:
+    """Return the matrix (4, 4) of a pose in 50 digits."""
+    return homogeneous(*pose_arrays(pose, decimals))
+
+
+def inertial_of(inertia: RigidInertia) -> Inertial:
+    """Return the inertial, in the axes of its link, of an inertia about the origin of the link."""
+    mass, h = float(inertia.mass), inertia.first_moment
+    c = h / mass if mass else np.zeros(3)
+    H = skew(h)
+    tensor = inertia.rotational_inertia + (H @ H / mass if mass else 0.0)
+    x, y, z = c.tolist()
+    xx, xy, xz, yy, yz, zz = tensor[np.triu_indices(3)].tolist()
+    return Inertial(mass, Pose((x, y, z)), xx, xy, xz, yy, yz, zz)
+
+
+def _near(one: RigidInertia, other: RigidInertia, tolerance: float) -> bool:
+    """Check whether two differences are equal to a relative tolerance, part by part."""
+    return all(
+        float(np.max(np.abs(rounded(x - y)))) <= max(tolerance, 1e-9) * float(np.max(np.abs(rounded(x))))
+        for x, y in (
+            (one.mass, other.mass),
+            (one.first_moment, other.first_moment),
+            (one.rotational_inertia, other.rotational_inertia),
+        )
+    )
+
+
+def _inertial_message(old: Inertial, new: Inertial | None) -> str:
+    if new is None:
+        return "the link has an inertia instead of none"
+    parts = []
+    if old.mass != new.mass:
+        parts.append(f"mass {old.mass:.12g} kg instead of {new.mass:.12g} kg")
+    offset = float(np.linalg.norm(np.subtract(old.origin.xyz, new.origin.xyz)))
+    if offset > 0.0:
+        parts.append(f"centre of mass {offset:.3g} m off")
+    R, S = (each.origin.matrix[:3, :3] for each in (old, new))
+    one, other = R @ old.tensor @ R.T, S @ new.tensor @ S.T
+    largest = float(np.max(np.abs(other))) or float(np.max(np.abs(one))) or 1.0
+    change = float(np.max(np.abs(one - other))) / largest
+    if change > 1e-15:
+        parts.append(f"moments off by {change:.2g} of the largest")
+    return ", ".join(parts) or "the inertia differs"
+
+
+# -- text -----------------------------------------------------------------------------------------
+
+
+def nearest_pose(T: Array, own: Pose) -> Pose:
+    """Return `own` if it is the pose T (4, 4) to rounding, else the pose of T."""
+    matrix = rounded(T)
+    if float(np.max(np.abs(matrix - own.matrix))) < SNAP:
+        return own
+    return Pose.from_matrix(matrix)
+
+
+def vector_text(vector: Iterable[float], digits: int = 12) -> str:
+    """Write numbers as an attribute has them; those that are rounding beside the largest are 0."""
+    numbers = list(vector)
+    rounding = ROUNDING * max(map(abs, numbers), default=0.0)
+    return " ".join(f"{0.0 if abs(x) < rounding else x + 0.0:.{digits}g}" for x in numbers)
+
+
+def pose_text(pose: Pose) -> str:
+    """Write a pose as position and angles."""
+    return f"xyz {vector_text(pose.xyz)}, rpy {vector_text(pose.rpy)}"
+
+
+def inertial_text(inertial: Inertial | None) -> str:
+    """Write an inertial in one line."""
+    if inertial is None:
+        return "none"
+    moments = (inertial.ixx, inertial.iyy, inertial.izz, inertial.ixy, inertial.ixz, inertial.iyz)
+    return f"{inertial.mass:.12g} kg at {vector_text(inertial.origin.xyz)}, moments {vector_text(moments)}"
+
+
+def _names_text(names: list[str]) -> str:
+    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    return f"{', '.join(names[:3])}{more}"
+
+
+def _beside_text(inertial: Inertial | None, merged: list[str]) -> str:
+    """Write the inertial of a link, and the links that are merged with it."""
+    return inertial_text(inertial) + (f", merged with {_names_text(merged)}" if merged else "")

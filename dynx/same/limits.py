@@ -1,0 +1,32 @@
+"""Limits of two joints that correspond, compared in the sign of the first one's position."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Literal
+
+from dynx.model.elements import Limits
+
+LimitKind = Literal["lower limit", "upper limit", "velocity limit", "effort limit"]
+
+
+def differs(first: float, second: float, tolerance: float) -> bool:
+    """Check whether two values differ by more than `tolerance` of the larger one."""
+    size = max(abs(first), abs(second))
+    return first != second and (math.isinf(size) or abs(first - second) > tolerance * size)
+
+
+def limit_differences(
+    first: Limits, second: Limits, sign: int, tolerance: float
+) -> Iterator[tuple[LimitKind, float, float]]:
+    """Yield the limits that differ; positions of the second joint are those of the first times `sign`."""
+    low, high = sorted((first.lower, first.upper))
+    other_low, other_high = sorted((sign * second.lower, sign * second.upper))
+    rows: tuple[tuple[LimitKind, float, float], ...] = (
+        ("lower limit", low, other_low),
+        ("upper limit", high, other_high),
+        ("velocity limit", first.velocity, second.velocity),
+        ("effort limit", first.effort, second.effort),
+    )
+    yield from (row for row in rows if differs(row[1], row[2], tolerance))

@@ -1,0 +1,402 @@
+"""Matching of the bodies of two robots, and the pose of each body's frame in that of its counterpart.
+
+If the robots are the same, these poses D follow from the root to the tips: with T the pose of a joint in the
+body of its parent, ``T_ours D = D_parent T_theirs``. What then differs is the axis of the joint, or the
+inertia. Where a joint is placed otherwise, D is the pose that leaves the fewest elements to replace; it is
+among the candidates of `dynx.same.registration`.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from itertools import chain, islice
+
+import numpy as np
+
+from dynx.model.mechanism import ROOT
+from dynx.rbd.base_parameters import rotation_to_axis, split_inertia
+from dynx.same.limits import limit_differences
+from dynx.same.registration import candidates
+from dynx.same.scales import inertia_ratio
+from dynx.same.skeleton import Skeleton, subtract, transformed
+from dynx.spatial.inertia import RigidInertia
+from dynx.spatial.scalar import Floats
+from dynx.spatial.se3 import homogeneous, inverse
+from dynx.spatial.so3 import cross, rotation_about
+
+MAX_PLANS = 1_500
+"""Largest number of placements of bodies that are tried."""
+
+NEARLY = 0.1
+"""Difference of inertias and places, relative to their magnitudes, up to which frames count as unmoved."""
+
+FRAMES_PER_JOINT = 12
+"""Number of calls inside one another, at most, for each joint between the root and a tip."""
+
+MAX_CANDIDATES = 100
+"""Largest number of candidates for the frame of one body."""
+
+MAX_BASES = 3
+"""Largest number of frames of a floating base below which all others are tried."""
+
+ROUNDING = 1e-6
+"""Difference of two distances of joints, relative to the size of the robot, that may be rounding."""
+
+MIN_TOLERANCE = 1e-11
+"""Smallest relative difference that counts while bodies are matched in float64."""
+
+UNCHANGED = 1.001
+"""Cost of replacing an element that is written as its counterpart is: another one differs, if one can."""
+
+Key = tuple[int, int, bytes]
+
+
+@dataclass(frozen=True)
+class BodyPair:
+    """Body `ours` and its counterpart `theirs`; `chosen` is the pose D (4, 4) where it does not follow from
+    the parent's, and where the bodies are roots."""
+
+    ours: int
+    theirs: int
+    chosen: Floats | None = None
+
+
+@dataclass(frozen=True)
+class MatchingPlan:
+    """Pairs of a subtree, the bodies of both robots without counterpart, the number of elements that differ,
+    and that of joints whose axes are opposite."""
+
+    cost: float
+    pairs: tuple[BodyPair, ...] = ()
+    missing: tuple[int, ...] = ()
+    extra: tuple[int, ...] = ()
+    opposite: int = 0
+
+    @property
+    def rank(self) -> tuple[float, int]:
+        """Order of preference, the lowest first: fewer elements, then fewer opposite axes."""
+        return round(self.cost, 6), self.opposite
+
+
+@dataclass
+class Matching:
+    """Search for the plan with the fewest differing elements."""
+
+    ours: Skeleton
+    theirs: Skeleton
+    tolerance: float
+    _plans: dict[Key, MatchingPlan] = field(default_factory=dict)
+    _own_costs: dict[Key, float] = field(default_factory=dict)
+    _unmoved: dict[tuple[int, int], bool] = field(default_factory=dict)
+    _exhausted: set[tuple[int, int]] = field(default_factory=set)
+    _candidates: dict[tuple[int, int], list[Floats]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.tolerance = max(self.tolerance, MIN_TOLERANCE)
+        self.length = max(self.ours.reach, self.theirs.reach)
+        self._axis_frames = [rotation_to_axis(np.eye(3), axis) for axis in self.ours.axes]
+
+    def find(self) -> MatchingPlan:
+        """Return the best plan of the whole robots. The frame of a floating base may be anywhere in it."""
+        before = sys.getrecursionlimit()
+        sys.setrecursionlimit(before + FRAMES_PER_JOINT * self.ours.depth)
+        try:
+            return self._best()
+        finally:
+            sys.setrecursionlimit(before)
+
+    def _best(self) -> MatchingPlan:
+        if not (self.ours.model.floating and self.theirs.model.floating):
+            return self._chosen(ROOT, ROOT, np.eye(4), 0.0)
+        found: list[tuple[float, int, Floats]] = []
+        # A root without mass looks the same in any frame.
+        unmoved = float(self.ours.inertias[ROOT].mass) > 0.0 and self._is_unmoved(ROOT, ROOT)
+        bases = [np.eye(4)] if unmoved else self._candidates_of(ROOT, ROOT)
+        for number, D in enumerate(bases):
+            limit = found[MAX_BASES - 1][0] if len(found) >= MAX_BASES else np.inf
+            found = sorted([*found, (self._followed(ROOT, ROOT, D, limit), number, D)], key=_first_two)
+            # The frame as it is stays in the choice: below a misplaced joint all differs, in any frame.
+            found = [*found[:MAX_BASES], *(entry for entry in found[MAX_BASES:] if entry[1] == 0)]
+            if found[0][0] == 0.0:
+                break
+        if found[0][0] == 0.0 or found[0][1] == 0:
+            found = found[:1]
+        return min((self._chosen(ROOT, ROOT, D, 0.0) for _, _, D in found), key=lambda plan: plan.rank)
+
+    def _followed(self, a: int, b: int, D: Floats, limit: float) -> float:
+        """Return how many elements differ if every frame follows from D, or any number from `limit` on."""
+        cost = self._own_cost(a, b, D)
+        matched = self._by_name(a, b, D)
+        lost = len(self.ours.children[a]) + len(self.theirs.children[b]) - 2 * len(matched)
+        cost += 2.0 * lost
+        for i, j in matched:
+            if cost >= limit:
+                break
+            followed = inverse(self.ours.placements[i]) @ D @ self.theirs.placements[j]
+            cost += self._followed(i, j, followed, limit - cost)
+        return cost
+
+    def _chosen(self, a: int, b: int, D: Floats, extra: float) -> MatchingPlan:
+        plan = self._subtree(a, b, D)
+        return replace(plan, cost=plan.cost + extra, pairs=(BodyPair(a, b, D), *plan.pairs[1:]))
+
+    def _joined(self, a: int, b: int, D_parent: Floats) -> MatchingPlan:
+        """Return the best plan of two bodies whose parents have the frames D_parent."""
+        ours, theirs = self.ours.placements[a], self.theirs.placements[b]
+        followed = inverse(ours) @ D_parent @ theirs
+        unmoved = self._is_unmoved(a, b)
+        if unmoved and not _is_identity(followed) and self._axis_cost(a, b, followed) > 0.0:
+            return self._chosen(a, b, np.eye(4), _cost(self._has_equal_origins(a, b)))
+        best = self._subtree(a, b, followed)
+        # Another frame is one element at least.
+        if best.rank <= (1.0, 0):
+            return best
+        if unmoved:
+            plan = self._chosen(a, b, np.eye(4), _cost(self._has_equal_origins(a, b)))
+            return plan if plan.rank < best.rank else best
+        own = self._own_cost(a, b, followed)
+        replaced = _cost(self._has_equal_origins(a, b))
+        for D in chain([np.eye(4)], self._aligned(a, b, followed), self._candidates_of(a, b)):
+            if len(self._plans) > MAX_PLANS:
+                break
+            # A frame in which the body itself fits worse than before is not that of the body.
+            cost = self._own_cost(a, b, D)
+            least = round(replaced + cost, 6), 0
+            if cost > own or least >= best.rank or np.allclose(D, followed, rtol=0.0, atol=1e-12):
+                continue
+            plan = self._chosen(a, b, D, replaced)
+            if plan.rank < best.rank:
+                best = plan
+            if best.rank <= (1.0, 0):
+                break
+        return best
+
+    def _aligned(self, a: int, b: int, D: Floats) -> Iterator[Floats]:
+        """Yield the frames nearest to D in which the axes and the centres of mass of two bodies coincide, as
+        far as they can; they are the only ones where a body is symmetric about its axis."""
+        axis, other = self.ours.axes[a], D[:3, :3] @ self.theirs.axes[b]
+        mine, theirs = self.ours.inertias[a], self.theirs.inertias[b]
+        for sign in (1.0, -1.0):
+            normal = cross(sign * other, axis)
+            sine, cosine = float(np.linalg.norm(normal)), float(sign * other @ axis)
+            R = D[:3, :3]
+            if sine > 0.0:
+                R = rotation_about(normal / sine, np.asarray(np.arctan2(sine, cosine))) @ R
+            elif cosine < 0.0:
+                continue
+            p = axis * float(axis @ D[:3, 3])
+            if float(mine.mass) > 0.0 and float(theirs.mass) > 0.0:
+                at = mine.first_moment / mine.mass - R @ (theirs.first_moment / theirs.mass)
+                p = axis * float(axis @ at) if self.ours.bodies[a].revolute else at
+            yield homogeneous(R, p)
+
+    def _candidates_of(self, a: int, b: int) -> Iterator[Floats]:
+        """Yield each candidate once."""
+        found = self._candidates.setdefault((a, b), [])
+        yield from found
+        if (a, b) in self._exhausted:
+            return
+        for D in islice(candidates(self.ours, self.theirs, a, b), MAX_CANDIDATES):
+            if not any(float(np.max(np.abs(D - each))) < 1e-12 for each in found):
+                found.append(D)
+                yield D
+        self._exhausted.add((a, b))
+
+    def _subtree(self, a: int, b: int, D: Floats) -> MatchingPlan:
+        """Return the best plan of two bodies with the frames D, and of all below them."""
+        key = (a, b, np.round(D, 9).tobytes())
+        plan = self._plans.get(key)
+        if plan is None:
+            plan = self._plans[key] = self._evaluated(a, b, D)
+        return plan
+
+    def _evaluated(self, a: int, b: int, D: Floats) -> MatchingPlan:
+        own = self._own_cost(a, b, D)
+        plans = [self._children(a, b, D, self._by_name)]
+        if plans[0].cost >= 2.0 or plans[0].missing:
+            plans.append(self._children(a, b, D, self._by_place))
+        best = min(plans, key=lambda plan: plan.rank)
+        opposite = best.opposite + (a != ROOT and self._cosine(a, b, D) < 0.0)
+        return replace(best, cost=own + best.cost, pairs=(BodyPair(a, b), *best.pairs), opposite=opposite)
+
+    def _children(
+        self, a: int, b: int, D: Floats, match: Callable[[int, int, Floats], list[tuple[int, int]]]
+    ) -> MatchingPlan:
+        matched = match(a, b, D)
+        plans = [self._joined(i, j, D) for i, j in matched]
+        missing = [i for i in self.ours.children[a] if i not in {i for i, _ in matched}]
+        extra = [j for j in self.theirs.children[b] if j not in {j for _, j in matched}]
+        lost = sum(self.ours.sizes[i] for i in missing) + sum(self.theirs.sizes[j] for j in extra)
+        return MatchingPlan(
+            sum(plan.cost for plan in plans) + 2.0 * lost,
+            tuple(pair for plan in plans for pair in plan.pairs),
+            (*missing, *(i for plan in plans for i in plan.missing)),
+            (*extra, *(j for plan in plans for j in plan.extra)),
+            sum(plan.opposite for plan in plans),
+        )
+
+    # -- children ---------------------------------------------------------------------------------
+
+    def _by_name(self, a: int, b: int, D: Floats) -> list[tuple[int, int]]:
+        """Match joints of the same name, then those whose links have the same name, then by place."""
+        matched: list[tuple[int, int]] = []
+        left, right = list(self.ours.children[a]), list(self.theirs.children[b])
+        for attribute in ("name", "child"):
+            names = {getattr(self.theirs.joints[j], attribute): j for j in right}
+            for i in list(left):
+                j = names.get(getattr(self.ours.joints[i], attribute))
+                if j is not None and self._alike(i, j):
+                    matched.append((i, j))
+                    left.remove(i)
+                    right.remove(j)
+        return sorted(matched + self._nearest(left, right, D))
+
+    def _by_place(self, a: int, b: int, D: Floats) -> list[tuple[int, int]]:
+        return sorted(self._nearest(self.ours.children[a], self.theirs.children[b], D))
+
+    def _nearest(self, left: list[int], right: list[int], D: Floats) -> list[tuple[int, int]]:
+        """Match joints that are nearest; among those equally near, the ones whose axes have the same sign,
+        then those with the same limits, then the first in document order."""
+        same = min(max(10.0 * self.tolerance, ROUNDING), NEARLY)
+        pairs = sorted(
+            # Symmetric fingers are equally near to both of their kind, but for rounding.
+            (round(self._distance(i, j, D) / same), *self._apart(i, j, D), i, j)
+            for i in left
+            for j in right
+            if self._alike(i, j)
+        )
+        matched: dict[int, int] = {}
+        for *_, i, j in pairs:
+            if i not in matched and j not in matched.values():
+                matched[i] = j
+        return list(matched.items())
+
+    def _apart(self, i: int, j: int, D: Floats) -> tuple[bool, int]:
+        """Return whether the axes of two joints are opposite, and how many of their limits differ then."""
+        followed = inverse(self.ours.placements[i]) @ D @ self.theirs.placements[j]
+        opposite = self._cosine(i, j, followed) < 0.0
+        limits = self.ours.joints[i].limits, self.theirs.joints[j].limits
+        return opposite, len(list(limit_differences(*limits, -1 if opposite else 1, self.tolerance)))
+
+    def _alike(self, i: int, j: int) -> bool:
+        return self.ours.bodies[i].revolute == self.theirs.bodies[j].revolute
+
+    def _distance(self, i: int, j: int, D: Floats) -> float:
+        """Return how far apart two joints of matched parents are, relative to the size of the robot."""
+        T, axis = D @ self.theirs.placements[j], self.theirs.axes[j]
+        mine, my_axis = self.ours.placements[i], self.ours.axes[i]
+        direction, mine_direction = T[:3, :3] @ axis, mine[:3, :3] @ my_axis
+        offset = T[:3, 3] - mine[:3, 3]
+        if self.ours.bodies[i].revolute:
+            offset = cross(offset, mine_direction)
+        sizes = abs(self.ours.sizes[i] - self.theirs.sizes[j])
+        sine = float(np.linalg.norm(cross(direction, mine_direction)))
+        mass = abs(float(self.ours.inertias[i].mass - self.theirs.inertias[j].mass))
+        total = abs(float(self.ours.inertias[i].mass)) + abs(float(self.theirs.inertias[j].mass)) or 1.0
+        roles = (self.ours.joints[i].mimic is None) != (self.theirs.joints[j].mimic is None)
+        own = self._own_cost(i, j, inverse(mine) @ T)
+        apart = float(np.linalg.norm(offset)) / self.length + sine
+        return apart + sizes + 0.1 * mass / total + 0.5 * roles + 0.2 * own
+
+    def _cosine(self, a: int, b: int, D: Floats) -> float:
+        """Return the cosine of the angle between the axes of two bodies."""
+        return float(D[:3, :3] @ self.theirs.axes[b] @ self.ours.axes[a])
+
+    # -- elements ---------------------------------------------------------------------------------
+
+    def _own_cost(self, a: int, b: int, D: Floats) -> float:
+        """Return how many elements must be replaced for the axes and inertias of two bodies to coincide."""
+        key = (a, b, np.round(D, 9).tobytes())
+        cost = self._own_costs.get(key)
+        if cost is None:
+            cost = 0.0 if a == ROOT else self._axis_cost(a, b, D)
+            if self._observes(a) and not self._has_same_inertia(a, b, D):
+                cost += _cost(self._has_equal_inertials(a, b))
+            self._own_costs[key] = cost
+        return cost
+
+    def _axis_cost(self, a: int, b: int, D: Floats) -> float:
+        """Return how many elements must be replaced for the joint axes of two bodies to coincide."""
+        axis, mine = D[:3, :3] @ self.theirs.axes[b], self.ours.axes[a]
+        cost = 0.0
+        if float(np.linalg.norm(cross(axis, mine))) > self.tolerance:
+            cost = _cost(self.ours.joints[a].axis == self.theirs.joints[b].axis)
+        if self.ours.bodies[a].revolute:
+            off = float(np.linalg.norm(cross(D[:3, 3], mine)))
+            if off > self.tolerance * self.length:
+                # The joint must be moved and what is attached to its link moved back.
+                cost += 1.0 + attachments(self.theirs, b)
+        return cost
+
+    def _observes(self, a: int) -> bool:
+        return a != ROOT or self.ours.model.floating
+
+    def _is_unmoved(self, a: int, b: int) -> bool:
+        """Check whether two bodies are nearly the same in the frames as they are: these are then the frames,
+        and what differs is rounding of a file or a difference."""
+        known = self._unmoved.get((a, b))
+        if known is None:
+            mine, other = self.ours.inertias[a], self.theirs.inertias[b]
+            known = inertia_ratio(subtract(mine, other), mine, self.ours.whole) < NEARLY
+            if a != ROOT:
+                scale = np.array([[1.0] * 3 + [1.0 / self.length]] * 3)
+                apart = (self.ours.placements[a] - self.theirs.placements[b])[:3] * scale
+                turned = np.abs(self.ours.axes[a] - self.theirs.axes[b])
+                known = known and max(float(np.max(np.abs(apart))), float(np.max(turned))) < NEARLY
+            self._unmoved[a, b] = known
+        return known
+
+    def _has_equal_origins(self, a: int, b: int) -> bool:
+        return self.ours.joints[a].origin == self.theirs.joints[b].origin
+
+    def _has_equal_inertials(self, a: int, b: int) -> bool:
+        """Check whether the links of two bodies are written with the same inertials."""
+        mine, other = (
+            {each.model.links[k].name: each.model.links[k].inertial for k in each.links[body]}
+            for each, body in ((self.ours, a), (self.theirs, b))
+        )
+        return mine == other
+
+    def _has_same_inertia(self, a: int, b: int, D: Floats) -> bool:
+        """Check whether two bodies have the same inertia but for what may belong to their parents."""
+        mine = self.ours.inertias[a]
+        difference = subtract(mine, transformed(self.theirs.inertias[b], D))
+        if inertia_ratio(difference, mine, self.ours.whole) <= self.tolerance:
+            return True
+        if a == ROOT or self._has_equal_inertials(a, b):
+            # What is written alike and differs here is in another frame.
+            return False
+        Q = self._axis_frames[a]
+        turned = difference.transform(Q.T, np.zeros(3))
+        remaining, _ = split_inertia(turned, self.ours.bodies[a].revolute)
+        back: RigidInertia = remaining.transform(Q, np.zeros(3))
+        return inertia_ratio(back, mine, self.ours.whole) <= self.tolerance
+
+
+def _first_two(entry: tuple[float, int, Floats]) -> tuple[float, int]:
+    return entry[:2]
+
+
+def _is_identity(T: Floats) -> bool:
+    return float(np.max(np.abs(T - np.eye(4)))) < 1e-12
+
+
+def _cost(unchanged: bool) -> float:
+    return UNCHANGED if unchanged else 1.0
+
+
+def attachments(skeleton: Skeleton, body: int) -> int:
+    """Count what is attached to the child link of a body's joint: its inertia, and joints.
+
+    A link without mass on a joint beside a fixed one, as readers make for a joint off the origin of its
+    body, has nothing but that joint, which moves with the joint.
+    """
+    link = skeleton.joints[body].child
+    joints = [joint for joint in skeleton.model.joints if joint.parent == link]
+    inertial = skeleton.model.inertial(link)
+    heavy = bool(inertial.mass or inertial.tensor.any())
+    if not heavy and len(joints) == 1 and not joints[0].moves:
+        return 0
+    return heavy + len(joints)

@@ -1,0 +1,233 @@
+"""Mended text: the description with some elements replaced, and all else as it is written.
+
+What is written follows from two models, the one that was read and the one that it is to be. URDF can be
+mended wherever they differ; in MJCF inertias, places of bodies and axes of joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from dynx.model import Model
+from dynx.model.elements import Inertial, Joint, Pose
+from dynx.model.mjcf.document import read_document
+from dynx.model.xml.reading import Element
+from dynx.model.xml.source import Edit, SourceElement, XmlSource
+from dynx.model.xml.text import quoteattr
+from dynx.spatial.scalar import Floats
+from dynx.spatial.so3 import quat_from_rotation
+
+MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+_ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
+
+
+class NotMendedError(Exception):
+    """A change cannot be written into the text; the message says which."""
+
+
+def mended_text(source: XmlSource, before: Model, after: Model) -> XmlSource:
+    """Return the text in which the joints and links of `before` are those of `after`.
+
+    Raises NotMendedError for a change that cannot be written.
+    """
+    if source.root.tag not in ("robot", "mujoco"):
+        raise NotMendedError(f"a file whose root is <{source.root.tag}> is not mended; URDF and MJCF are")
+    edits = _Urdf(source) if source.root.tag == "robot" else _Mjcf(source, before)
+    found: list[Edit] = []
+    for old, new in zip(before.joints, after.joints, strict=True):
+        if old != new:
+            found += edits.joint(old, new)
+    for link, other in zip(before.links, after.links, strict=True):
+        if link != other:
+            found += edits.inertial(link.name, link.inertial, other.inertial)
+    return source.apply(*found)
+
+
+def number(value: float) -> str:
+    """Write a number so that it reads back exactly."""
+    return repr(float(value) + 0.0)
+
+
+def numbers(values: object) -> str:
+    """Write several numbers."""
+    return " ".join(number(value) for value in np.ravel(np.asarray(values)).tolist())
+
+
+class _Urdf:
+    def __init__(self, source: XmlSource) -> None:
+        self._source = source
+
+    def _element(self, tag: str, name: str) -> SourceElement:
+        for element in self._source.root.all(tag):
+            if element.attributes.get("name") == name:
+                return element
+        raise NotMendedError(f"<{tag}> {name} does not stand in the file itself")
+
+    def joint(self, old: Joint, new: Joint) -> Iterator[Edit]:
+        element = self._element("joint", old.name)
+        if old.type != new.type:
+            yield self._source.attribute_edit(element, "type", new.type)
+        if old.origin != new.origin:
+            yield from self._origin(element, old.origin, new.origin)
+        if new.moves and old.axis != new.axis:
+            yield from self._set(element, "axis", {"xyz": numbers(new.axis)})
+        if new.type in ("revolute", "prismatic") and element.first("limit") is None:
+            limits = new.limits
+            values = {
+                name: number(getattr(limits, name)) for name in ("lower", "upper", "effort", "velocity")
+            }
+            yield from self._set(element, "limit", {k: v for k, v in values.items() if "inf" not in v})
+        if old.mimic != new.mimic and new.moves:
+            present = element.first("mimic")
+            if new.mimic is None:
+                if present is not None:
+                    yield self._source.removal(present)
+                return
+            mimic = new.mimic
+            values = {
+                "joint": mimic.joint,
+                "multiplier": number(mimic.multiplier),
+                "offset": number(mimic.offset),
+            }
+            yield from self._set(element, "mimic", values)
+
+    def _origin(self, parent: SourceElement, old: Pose, new: Pose) -> Iterator[Edit]:
+        values = {}
+        if old.xyz != new.xyz:
+            values["xyz"] = numbers(new.xyz)
+        if old.rpy != new.rpy:
+            values["rpy"] = numbers(new.rpy)
+            present = parent.first("origin")
+            if present is not None and "quat_xyzw" in present.attributes:
+                yield self._source.attribute_removal(present, "quat_xyzw")
+        yield from self._set(parent, "origin", values)
+
+    def _set(self, parent: SourceElement, tag: str, values: dict[str, str]) -> Iterator[Edit]:
+        """Yield the edits that set attributes of a child element, which is made where there is none."""
+        present = parent.first(tag)
+        if present is None:
+            written = "".join(f" {name}={quoteattr(value)}" for name, value in values.items())
+            yield self._source.insertion(parent, f"<{tag}{written}/>", first=True)
+            return
+        old = [name for name in values if name in present.attributes]
+        for name in old:
+            yield self._source.attribute_edit(present, name, values[name])
+        new = {name: value for name, value in values.items() if name not in old}
+        if new:
+            # All at once: edits at one place would be in no order.
+            first, *others = new.items()
+            edit = self._source.attribute_edit(present, *first)
+            rest = "".join(f" {name}={quoteattr(value)}" for name, value in others)
+            yield Edit(edit.start, edit.end, edit.text + rest)
+
+    def inertial(self, link: str, old: Inertial | None, new: Inertial | None) -> Iterator[Edit]:
+        element = self._element("link", link)
+        present = element.first("inertial")
+        if new is None:
+            if present is not None:
+                yield self._source.removal(present)
+            return
+        if present is None or old is None:
+            lines = [
+                "<inertial>",
+                f'  <origin xyz="{numbers(new.origin.xyz)}" rpy="{numbers(new.origin.rpy)}"/>',
+                f'  <mass value="{number(new.mass)}"/>',
+                "  <inertia " + " ".join(f'{k}="{number(getattr(new, k))}"' for k in MOMENTS) + "/>",
+                "</inertial>",
+            ]
+            yield self._source.insertion(element, "\n".join(lines), first=True)
+            return
+        if old.origin != new.origin:
+            yield from self._origin(present, old.origin, new.origin)
+        if old.mass != new.mass:
+            yield from self._set(present, "mass", {"value": number(new.mass)})
+        moments = {k: number(getattr(new, k)) for k in MOMENTS if getattr(old, k) != getattr(new, k)}
+        if moments:
+            yield from self._set(present, "inertia", moments)
+
+
+class _Mjcf:
+    def __init__(self, source: XmlSource, model: Model) -> None:
+        self._source, self._model = source, model
+        self._bodies: dict[str, SourceElement] = {}
+        self._joints: dict[str, SourceElement] = {}
+        for element in source.root.walk():
+            name = element.attributes.get("name")
+            table = {"body": self._bodies, "joint": self._joints}.get(element.tag)
+            if table is not None and name is not None:
+                table.setdefault(name, element)
+        compilers = source.root.all("compiler")
+        self._from_geoms = any(each.attributes.get("inertiafromgeom") == "true" for each in compilers)
+
+    def _body(self, name: str) -> SourceElement:
+        element = self._bodies.get(name)
+        if element is None:
+            raise NotMendedError(f"body {name} has no name in the file, or stands in an included one")
+        return element
+
+    def joint(self, old: Joint, new: Joint) -> Iterator[Edit]:
+        if (old.type, old.mimic) != (new.type, new.mimic):
+            raise NotMendedError(f"the type or coupling of joint {old.name}: MJCF is not mended for it")
+        if old.axis != new.axis:
+            element = self._joints.get(old.name)
+            if element is None or element.parent is None or element.parent.tag != "body":
+                raise NotMendedError(f"joint {old.name} does not stand in its body in the file itself")
+            yield self._source.attribute_edit(element, "axis", numbers(new.axis))
+        if old.origin != new.origin:
+            yield from self._place(old, new)
+
+    def _place(self, old: Joint, new: Joint) -> Iterator[Edit]:
+        """Move the body of a joint: the first of its joints keeps its place in it."""
+        at: SourceElement | None
+        if old.moves:
+            joint = self._joints.get(old.name)
+            at = None if joint is None else joint.parent
+            first = at is not None and at.tag == "body" and at.all("joint")[0] is joint
+        else:
+            at = self._bodies.get(old.child)
+            first = at is not None and not at.all("joint")
+        if at is None or not first or at.parent is None or at.parent.tag not in ("body", "worldbody"):
+            raise NotMendedError(f"the place of joint {old.name} does not follow from one <body> alone")
+        body = self._placement(at)
+        moved = new.origin.matrix @ np.linalg.inv(old.origin.matrix) @ body
+        x, y, z, w = quat_from_rotation(moved[:3, :3]).tolist()
+        values = {"pos": numbers(moved[:3, 3]), "quat": numbers((w, x, y, z))}
+        present = [name for name in values if name in at.attributes]
+        for name in present:
+            yield self._source.attribute_edit(at, name, values[name])
+        for name in _ORIENTATIONS[1:]:
+            if name in at.attributes:
+                yield self._source.attribute_removal(at, name)
+        new_ones = [name for name in values if name not in present]
+        if new_ones:
+            end = at.start_tag.start + 1 + len(at.tag)
+            written = "".join(f' {name}="{values[name]}"' for name in new_ones)
+            yield Edit(end, end, written)
+
+    def _placement(self, element: SourceElement) -> Floats:
+        """Return the pose (4, 4) of a body in its parent, as the reader of MJCF has it."""
+        document = read_document(self._source.text_with_lines_before, self._source.source)
+        assert document is not None
+        return document.pose(Element(element.tag, dict(element.attributes), element.line), "a body")
+
+    def inertial(self, link: str, old: Inertial | None, new: Inertial | None) -> Iterator[Edit]:
+        if self._from_geoms:
+            raise NotMendedError(f"the inertia of body {link} follows from its geoms")
+        if new is None:
+            raise NotMendedError(f"body {link} cannot be without an inertia in MJCF")
+        R = new.origin.matrix[:3, :3]
+        tensor = R @ new.tensor @ R.T
+        rows = tensor[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        text = (
+            f'<inertial pos="{numbers(new.origin.xyz)}" mass="{number(new.mass)}" '
+            f'fullinertia="{numbers(rows)}"/>'
+        )
+        body = self._body(link)
+        present = body.first("inertial")
+        if present is not None:
+            yield self._source.replacement(present, text)
+        else:
+            yield self._source.insertion(body, text, first=True)

@@ -1,0 +1,164 @@
+"""Observability of differences of inertial parameters: what of them no motion and no torque shows.
+
+The torque is linear in the inertial parameters. A difference of two robots of the same kinematics is seen in
+no state if and only if it lies in the null space of the regressor. Most of the null space is known in closed
+form (`dynx.rbd.base_parameters`): parameters that may belong to the parent of a joint. The rest of it, on a
+fixed base or through mimic joints, is found from the regressor at random states: an analytic function that
+vanishes there vanishes everywhere, with probability 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from dynx.model.mechanism import ROOT, BodyFrame, Mechanism
+from dynx.rbd.base_parameters import align_frames, regroup_inertias
+from dynx.rbd.regressor import inertial_regressor_at, parameters_from_inertia
+from dynx.same.decimals import rounded
+from dynx.same.scales import inertia_ratio
+from dynx.same.skeleton import Skeleton, float_inertia
+from dynx.spatial.inertia import RigidInertia
+from dynx.spatial.scalar import Floats
+
+STATES, SEED = 24, 0
+"""Number of random states at which the regressor is evaluated, and their seed."""
+
+NULL = 1e-8
+"""Singular value, relative to columns of length 1, below which a direction is in the null space."""
+
+Differences = Mapping[int, RigidInertia]
+"""Difference of the inertia of some bodies, by the number of the body."""
+
+
+class Observability:
+    """Which differences of inertias of one robot are seen in some state."""
+
+    def __init__(self, skeleton: Skeleton) -> None:
+        self._skeleton = skeleton
+        # Differences are computed in 50 digits; what is seen of them needs no more than float64.
+        self._mechanism = _rounded(skeleton.mechanism)
+        self._aligned = align_frames(self._mechanism)
+        inertias = [self._aligned.root, *(body.inertia for body in self._aligned.bodies)]
+        self._own = {number: float_inertia(inertia) for number, inertia in enumerate(inertias, ROOT)}
+
+    def observed(self, differences: Differences) -> dict[int, float]:
+        """Return, for each body in whose parameters a difference is seen, its size relative to the natural
+        magnitude of the body (`inertia_ratio`), after parameters were moved to where they are seen."""
+        remaining = {
+            body: (inertia, inertia_ratio(inertia, self._own[body], self._skeleton.whole))
+            for body, inertia in self._regrouped(differences).items()
+        }
+        if not self._skeleton.model.floating:
+            remaining.pop(ROOT, None)
+        ratios = {body: ratio for body, (_, ratio) in remaining.items() if ratio > 0.0}
+        if not ratios or (self._skeleton.model.floating and self._mechanism.coupling is None):
+            return ratios
+        return self._projected({body: remaining[body][0] for body in ratios}, ratios)
+
+    def _regrouped(self, differences: Differences) -> dict[int, RigidInertia]:
+        mechanism = self._mechanism
+        zero = RigidInertia(*(0 * x for x in _parts(mechanism.root)))
+        changed: Mechanism = replace(
+            mechanism,
+            root=float_inertia(differences.get(ROOT, zero)),
+            bodies=tuple(
+                replace(body, inertia=float_inertia(differences.get(k, zero)))
+                for k, body in enumerate(mechanism.bodies)
+            ),
+            frames=(),
+        )
+        regrouped = regroup_inertias(align_frames(changed))
+        inertias = [regrouped.root, *(body.inertia for body in regrouped.bodies)]
+        return {body: float_inertia(inertia) for body, inertia in enumerate(inertias, ROOT)}
+
+    def _projected(self, inertias: Differences, ratios: dict[int, float]) -> dict[int, float]:
+        """Remove the part in the null space of the regressor, which is taken at the bodies that differ."""
+        bodies = list(inertias)
+        parameters = np.concatenate([parameters_from_inertia(inertias[body]) for body in bodies])
+        scales = np.concatenate([self._scales(body) for body in bodies])
+        columns = self._regressor(bodies) * scales
+        lengths = np.linalg.norm(columns, axis=0)
+        seen = lengths > NULL * float(np.max(lengths, initial=0.0))
+        if not seen.any():
+            return {}
+        x = np.where(seen, parameters / scales, 0.0)
+        unit = columns[:, seen] / lengths[seen]
+        _, values, rows = np.linalg.svd(unit, full_matrices=False)
+        kept = rows[values > NULL * values[0]]
+        weighted = x[seen] * lengths[seen]
+        x[seen] = kept.T @ (kept @ weighted) / lengths[seen]
+        if float(np.linalg.norm(kept @ weighted)) <= NULL * float(np.linalg.norm(weighted)):
+            return {}
+        sizes = np.max(np.abs(x.reshape(-1, 10)), axis=1)
+        before = np.max(np.abs((parameters / scales).reshape(-1, 10)), axis=1)
+        return {
+            body: ratios[body] * float(size / whole)
+            for body, size, whole in zip(bodies, sizes, before, strict=True)
+            if size > NULL * whole
+        }
+
+    def _scales(self, body: int) -> Floats:
+        own, length = self._own[body], self._skeleton.reach
+        mass = abs(float(own.mass)) or 1.0
+        moment = float(np.max(np.abs(own.rotational_inertia))) or mass * length**2
+        return np.array([mass] + [np.sqrt(mass * moment)] * 3 + [moment] * 6)
+
+    def _regressor(self, bodies: list[int]) -> Floats:
+        """Return the rows (states * nv, 10 n) of the regressor of some aligned bodies."""
+        aligned = self._aligned
+        frames = [frame.name for frame in aligned.frames]
+        model, rng = self._skeleton.model, np.random.default_rng(SEED)
+        q = rng.uniform(-1.5, 1.5, (STATES, aligned.nq))
+        if model.floating:
+            q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
+        q = _coupled_q(aligned, q)
+        S = np.eye(aligned.nv) if aligned.coupling is None else aligned.coupling.matrix()
+        v, a = (rng.standard_normal((STATES, S.shape[1])) @ S.T for _ in range(2))
+        # A frame has the pose that it had before the bodies got other frames: those of the bodies are taken.
+        aligned = replace(aligned, frames=_body_frames(aligned))
+        numbers = [frames.index(str(body)) for body in bodies]
+        Y = inertial_regressor_at(aligned, q, v, a, numbers)
+        return np.asarray((S.T @ Y).reshape(-1, 10 * len(bodies)))
+
+
+def _coupled_q(mechanism: Mechanism, q: Floats) -> Floats:
+    """Return configurations in which mimic joints follow their drivers."""
+    coupling = mechanism.coupling
+    if coupling is None:
+        return q
+    base = 7 if coupling.floating else 0
+    return coupling.expand_q(q[:, : base + coupling.n_joints])
+
+
+def _parts(inertia: RigidInertia) -> tuple[Floats, Floats, Floats]:
+    return inertia.mass, inertia.first_moment, inertia.rotational_inertia
+
+
+def _rounded(mechanism: Mechanism) -> Mechanism:
+    """Round a mechanism to float64, with one frame at each body."""
+    return replace(
+        mechanism,
+        gravity=rounded(mechanism.gravity),
+        root=float_inertia(mechanism.root),
+        bodies=tuple(
+            replace(
+                body,
+                R=rounded(body.R),
+                p=rounded(body.p),
+                axis=rounded(body.axis),
+                inertia=float_inertia(body.inertia),
+            )
+            for body in mechanism.bodies
+        ),
+        frames=_body_frames(mechanism),
+    )
+
+
+def _body_frames(mechanism: Mechanism) -> tuple[BodyFrame, ...]:
+    """Return a frame at each body, named for its number."""
+    return tuple(
+        BodyFrame(str(body), body, np.eye(3), np.zeros(3)) for body in range(ROOT, len(mechanism.bodies))
+    )

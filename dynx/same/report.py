@@ -1,0 +1,177 @@
+"""Report of `dynx.same_robot`, and its JSON document (schema ``dynx.same/1``)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from dynx._version import __version__
+from dynx.files.documents import document_of
+from dynx.files.pages import html_grid
+from dynx.model import Model
+from dynx.same.attributes import Attribute, DescriptionFreedom
+from dynx.same.bounds import Bounds
+from dynx.same.effects import ElementEffect
+from dynx.same.elements import Part
+from dynx.spatial.scalar import Floats
+
+SCHEMA: Literal["dynx.same/1"] = "dynx.same/1"
+
+
+@dataclass(frozen=True)
+class ElementDifference:
+    """An element of the second description that differs: a part of a joint or link, with the values and lines
+    in both.
+
+    `size` is relative to the natural magnitude: the reach of the robot for a length, 1 rad for an angle, and
+    for an inertia that of the body. `wanted` is what it is in the mended file, in the frames of that file.
+    `effect` is what the element alone changes; None where it changes the number of coordinates, or where the
+    description is not mended.
+    """
+
+    part: Part
+    tag: Literal["joint", "link"]
+    ours: str | None
+    theirs: str
+    first: str
+    second: str
+    wanted: str
+    first_line: int | None
+    second_line: int | None
+    size: float
+    message: str
+    effect: ElementEffect | None
+
+
+@dataclass(frozen=True)
+class Unmatched:
+    """A joint that only one description has, with all below it, or the base, if one alone floats."""
+
+    kind: Literal["missing", "extra", "moved", "base"]
+    ours: str | None
+    theirs: str | None
+    first_line: int | None
+    second_line: int | None
+    message: str
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """A coordinate of the first robot, ``q_first[first_index] = sign * q_second[second_index]``; the same
+    sign and indices, less 1 with a floating base, hold for velocity and torque."""
+
+    ours: str
+    theirs: str
+    first_index: int
+    second_index: int
+    sign: int
+
+
+@dataclass(frozen=True)
+class SameReport:
+    """Whether two descriptions are those of one robot, and what differs.
+
+    `first` and `second` are the names that the caller gave, the sources where they were read from.
+    `differences` are the fewest elements of the second description that make it the same when replaced,
+    `unmatched` what cannot be mended by replacing elements. `attributes` are listed apart from the verdict,
+    `freedoms` are differences of the descriptions and not of the robots. `bounds` hold for robots that are
+    the same. `mended` is the second robot with the differences removed; `mended_text` the bytes of its file,
+    None where nothing is to be mended or `not_mended` says why not. `T_first_second` (4, 4) is the pose of
+    the second robot's base frame in the first's, for floating bases.
+    """
+
+    first: str
+    second: str
+    first_source: str
+    second_source: str
+    same: bool
+    tolerance: float
+    differences: tuple[ElementDifference, ...]
+    unmatched: tuple[Unmatched, ...]
+    attributes: tuple[Attribute, ...]
+    freedoms: tuple[DescriptionFreedom, ...]
+    coordinates: tuple[Coordinate, ...]
+    bounds: Bounds | None
+    T_first_second: Floats | None
+    notes: tuple[str, ...]
+    seconds: float
+    not_mended: str | None = None
+    mended: Model | None = field(default=None, repr=False)
+    mended_text: bytes | None = field(default=None, repr=False)
+
+    def __bool__(self) -> bool:
+        return self.same
+
+    @property
+    def verdict(self) -> str:
+        """Verdict in one sentence."""
+        if self.same:
+            return f"the same robot (tolerance {self.tolerance:g})"
+        parts = []
+        if self.differences:
+            count = len(self.differences)
+            parts.append(f"{count} element{'s' * (count != 1)} differ{'s' * (count == 1)}")
+        if any(each.kind == "base" for each in self.unmatched):
+            parts.append("one base is fixed, the other floating")
+        count = sum(each.kind != "base" for each in self.unmatched)
+        if count:
+            parts.append(f"{count} joint{'s' * (count != 1)} without counterpart")
+        return f"different robots (tolerance {self.tolerance:g}): {', '.join(parts)}"
+
+    def __repr__(self) -> str:
+        return f"<SameReport {self.first} and {self.second}: {self.verdict}>"
+
+    def _repr_html_(self) -> str:
+        rows = (
+            (each.part, each.theirs, each.second_line, f"{each.size:.2g}", each.message)
+            for each in self.differences
+        )
+        head = ("part", "joint or link", "line", "size", "difference")
+        return html_grid(f"{self.first} and {self.second}: {self.verdict}", head, rows)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Make the JSON document, of plain numbers, strings and lists."""
+        pose = self.T_first_second
+        return document_of(
+            SameDocument,
+            _Source(
+                **{
+                    name: getattr(self, name)
+                    for name in SameDocument.__dataclass_fields__
+                    if name not in ("schema", "dynx", "T_first_second")
+                },
+                T_first_second=None if pose is None else tuple(map(tuple, pose.tolist())),
+            ),
+        )
+
+
+@dataclass(frozen=True)
+class SameDocument:
+    """The JSON document of ``dynx same``."""
+
+    first: str
+    second: str
+    first_source: str
+    second_source: str
+    same: bool
+    verdict: str
+    tolerance: float
+    differences: tuple[ElementDifference, ...]
+    unmatched: tuple[Unmatched, ...]
+    attributes: tuple[Attribute, ...]
+    freedoms: tuple[DescriptionFreedom, ...]
+    coordinates: tuple[Coordinate, ...]
+    bounds: Bounds | None
+    T_first_second: tuple[tuple[float, ...], ...] | None
+    notes: tuple[str, ...]
+    seconds: float
+    not_mended: str | None
+    schema: Literal["dynx.same/1"] = SCHEMA
+    dynx: str = __version__
+
+
+class _Source:
+    """Values of a document by name."""
+
+    def __init__(self, **values: object) -> None:
+        self.__dict__.update(values, schema=SCHEMA, dynx=__version__)

@@ -1,0 +1,152 @@
+"""Skeleton of a robot: its moving bodies, with links merged across fixed joints, in 50 digits and float64."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from dynx.model import Model
+from dynx.model.elements import IDENTITY, Joint
+from dynx.model.mechanism import ROOT, Body, Mechanism, build_mechanism
+from dynx.model.topology import lock_joint
+from dynx.same.decimals import decimals, rounded
+from dynx.same.scales import Whole
+from dynx.spatial.inertia import RigidInertia
+from dynx.spatial.scalar import Array, Floats
+from dynx.spatial.se3 import homogeneous
+
+
+def without_standing_mimics(model: Model) -> Model:
+    """Return the model with its base at the identity, and with mimic joints of multiplier 0, which do not
+    move, fixed at their offsets."""
+    joints = tuple(
+        lock_joint(joint, joint.mimic.offset)
+        if joint.moves and joint.mimic is not None and joint.mimic.multiplier == 0.0
+        else joint
+        for joint in model.joints
+    )
+    return replace(model, joints=joints, base_pose=IDENTITY)
+
+
+def float_inertia(inertia: RigidInertia) -> RigidInertia:
+    """Round an inertia to float64."""
+    return RigidInertia(
+        rounded(inertia.mass), rounded(inertia.first_moment), rounded(inertia.rotational_inertia)
+    )
+
+
+def subtract(one: RigidInertia, other: RigidInertia) -> RigidInertia:
+    """Return the difference of two inertias in the same frame."""
+    return RigidInertia(
+        np.asarray(one.mass - other.mass),
+        one.first_moment - other.first_moment,
+        one.rotational_inertia - other.rotational_inertia,
+    )
+
+
+def transformed(inertia: RigidInertia, T: Array) -> RigidInertia:
+    """Return an inertia in the frame in which its own frame has the pose T (4, 4)."""
+    return inertia.transform(T[:3, :3], T[:3, 3])
+
+
+class Skeleton:
+    """Bodies of a model, numbered as in its mechanism; ROOT is the root body.
+
+    Build it inside `fifty_digits`. Poses T (4, 4) of joints are those in the body of the parent, at
+    position 0.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.mechanism: Mechanism = build_mechanism(model, decimals)
+        self.joints: tuple[Joint, ...] = tuple(joint for joint in model.joints if joint.moves)
+        self.bodies: tuple[Body, ...] = self.mechanism.bodies
+        self.exact = [homogeneous(body.R, body.p) for body in self.bodies]
+        self.placements: list[Floats] = [rounded(T) for T in self.exact]
+        self.axes: list[Floats] = [rounded(body.axis) for body in self.bodies]
+        self.children: dict[int, list[int]] = {body: [] for body in range(ROOT, len(self.bodies))}
+        for number, body in enumerate(self.bodies):
+            self.children[body.parent].append(number)
+        self.body_of = {
+            link.name: frame.body for link, frame in zip(model.links, self.mechanism.frames, strict=False)
+        }
+        self.links: dict[int, list[int]] = {body: [] for body in self.children}
+        for number, link in enumerate(model.links):
+            self.links[self.body_of[link.name]].append(number)
+        self.number = {joint.name: k for k, joint in enumerate(self.joints)}
+
+    def inertia(self, body: int) -> RigidInertia:
+        """Return the merged inertia of a body in 50 digits, in its frame."""
+        return self.mechanism.root if body == ROOT else self.bodies[body].inertia
+
+    @cached_property
+    def inertias(self) -> dict[int, RigidInertia]:
+        """Merged inertias in float64."""
+        return {body: float_inertia(self.inertia(body)) for body in self.children}
+
+    def link_pose(self, link: int) -> Array:
+        """Return the pose (4, 4) of a link, by its number, in the frame of its body, in 50 digits."""
+        frame = self.mechanism.frames[link]
+        return homogeneous(frame.R, frame.p)
+
+    def link_inertia(self, link: int) -> RigidInertia:
+        """Return the inertia of a link in 50 digits, in the frame of its body."""
+        frame = self.mechanism.frames[link]
+        return self.mechanism.links[link].inertia.transform(frame.R, frame.p)
+
+    def parent_pose(self, body: int) -> Array:
+        """Return the pose (4, 4) of the link to which the joint of a body is attached, in the parent body."""
+        names = [link.name for link in self.model.links]
+        return self.link_pose(names.index(self.joints[body].parent))
+
+    @cached_property
+    def reach(self) -> float:
+        """Length [m] of the longest path along the links from the root to a joint, a link or a centre of mass
+        with prismatic joints at the end of their range; 1 where every length is 0."""
+        path = {ROOT: 0.0}
+        for number, body in enumerate(self.bodies):
+            length = float(np.linalg.norm(self.placements[number][:3, 3]))
+            path[number] = path[body.parent] + length + self.travel(number)
+        ends = [path[frame.body] + float(np.linalg.norm(rounded(frame.p))) for frame in self.mechanism.frames]
+        ends += [path[number] + radius(inertia) for number, inertia in self.inertias.items()]
+        return max(ends) or 1.0
+
+    @cached_property
+    def whole(self) -> Whole:
+        """Mass and reach of the robot."""
+        return Whole(sum(abs(float(each.mass)) for each in self.inertias.values()), self.reach)
+
+    def travel(self, body: int) -> float:
+        """Return the largest distance [m] that a prismatic joint moves from 0; 0 without limits, and for a
+        revolute joint."""
+        limits = self.joints[body].limits
+        if self.bodies[body].revolute:
+            return 0.0
+        ends = [abs(end) for end in (limits.lower, limits.upper)]
+        return max((end for end in ends if np.isfinite(end)), default=0.0)
+
+    @cached_property
+    def depth(self) -> int:
+        """Largest number of joints between the root and a body."""
+        depths = {ROOT: 0}
+        for number, body in enumerate(self.bodies):
+            depths[number] = depths[body.parent] + 1
+        return max(depths.values())
+
+    @cached_property
+    def sizes(self) -> dict[int, int]:
+        """Number of bodies of the subtree of each body."""
+        sizes = dict.fromkeys(self.children, 1)
+        for number in reversed(range(len(self.bodies))):
+            sizes[self.bodies[number].parent] += sizes[number]
+        return sizes
+
+
+def radius(inertia: RigidInertia) -> float:
+    """Return the distance [m] at which the whole mass of a body has the largest moment of its tensor."""
+    mass = abs(float(inertia.mass))
+    if mass == 0.0:
+        return 0.0
+    return float(np.sqrt(np.max(np.abs(inertia.rotational_inertia)) / mass))

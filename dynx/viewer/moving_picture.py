@@ -1,0 +1,226 @@
+"""Script of the page that draws fewer pixels and triangles while something moves, where software draws.
+
+A page that stands still has the pixels of the screen and all triangles. viser itself lowers the resolution
+once pictures come slowly, by a quarter, and raises it again after seconds.
+"""
+
+from __future__ import annotations
+
+import json
+
+MOVING = 0.5
+"""Pixels of the picture along each side for a pixel of the page, while something moves."""
+
+STILL_AFTER = 0.3
+"""Time without a motion after which the picture is whole [s]."""
+
+_CHECKS = 3
+"""Number of checks, one after another, that must find no motion: a page that is slow draws between them."""
+
+CELL = 3.0
+"""Largest size of the cells in which the vertices of a shape become one, while something moves, in pixels of
+the picture."""
+
+_LIGHT = 200
+"""Number of triangles up to which a shape is always drawn whole."""
+
+_LEVELS = 8
+"""Number of sizes of cells; the smallest divide the diagonal of a shape by two to this power."""
+
+_SAVED = 0.7
+"""Share of the triangles of a shape above which coarser ones are not drawn instead."""
+
+ALWAYS_WHOLE = """
+  const noteMotion = () => {}, noteMessage = () => {}, watchCamera = () => {};
+  const drawCoarsely = () => {}, drawWhole = () => {};
+"""
+"""Part of the script of a page that draws whole pictures, whose resolution viser chooses."""
+
+COARSE_WHILE_MOVING = (
+    f"const MOVING = {json.dumps(MOVING)}, CHECK_AFTER = {round(1e3 * STILL_AFTER / _CHECKS)};"
+    f"const CHECKS = {_CHECKS}, CELL = {CELL}, LIGHT = {_LIGHT}, LEVELS = {_LEVELS}, SAVED = {_SAVED};"
+    + """
+  const context = HTMLCanvasElement.prototype.getContext;
+  HTMLCanvasElement.prototype.getContext = function (kind, options) {
+    const cheap = {...options, antialias: false, preserveDrawingBuffer: false};
+    return context.call(this, kind, kind.startsWith("webgl") ? cheap : options);
+  };
+  let waiting = false, quiet = 0, view = null;
+  const stateOfPicture = () => window.__viserMutable?.scene?.__r3f?.root?.getState?.();
+  let setRatio = null;
+  const setResolution = (ratio) => {
+    const state = stateOfPicture();
+    if (!state) return;
+    // viser sets its own ratio whenever it lays out its page, and where pictures come slowly.
+    if (!setRatio) {
+      setRatio = state.setDpr;
+      window.__viserMutable.scene.__r3f.root.setState({setDpr: () => {}});
+    }
+    if (state.viewport.dpr === ratio) return;
+    setRatio(ratio);
+    window.__viserMutable.requestRender?.();
+  };
+  const check = () => {
+    quiet += 1;
+    waiting = quiet < CHECKS;
+    if (waiting) setTimeout(check, CHECK_AFTER);
+    else setResolution(1);
+  };
+  // A picture that a program wants is whole.
+  const isWanted = ({type}) => type === "GetRenderRequestMessage";
+  const noteMessage = (message) => { if (isWanted(message)) setResolution(1); };
+  const noteMotion = () => {
+    const page = window.__viserMutable;
+    quiet = 0;
+    if (page?.getRenderRequestState === "ready" && !page.messageQueue.some(isWanted)) setResolution(MOVING);
+    if (waiting) return;
+    waiting = true;
+    setTimeout(check, CHECK_AFTER);
+  };
+  const watchCamera = (camera) => {
+    if (window.__viserMutable.cameraControl?.camera !== camera) return;
+    const now = camera.matrixWorld.elements.map((each) => Math.fround(each)).join();
+    // A picture that is being drawn keeps its size.
+    if (view !== null && now !== view) setTimeout(noteMotion);
+    view = now;
+  };
+  // All vertices of a shape in one cell are at one place; those that face different ways stay apart.
+  const coarser = (geometry, cell) => {
+    const {position, normal} = geometry.attributes, index = geometry.index, count = position.count;
+    const {min} = geometry.boundingBox, cells = new Map(), vertices = new Map();
+    const at = new Uint32Array(count), of = new Uint32Array(count), places = [], points = [], normals = [];
+    for (let k = 0; k < count; k++) {
+      const x = position.getX(k), y = position.getY(k), z = position.getZ(k);
+      const key = Math.floor((x - min.x) / cell) + 1024 * (Math.floor((y - min.y) / cell)
+        + 1024 * Math.floor((z - min.z) / cell));
+      let place = cells.get(key);
+      if (place === undefined) { cells.set(key, place = cells.size); places.push(0, 0, 0, 0); }
+      places[4 * place] += x; places[4 * place + 1] += y; places[4 * place + 2] += z;
+      places[4 * place + 3] += 1;
+      at[k] = place;
+      const a = normal.getX(k), b = normal.getY(k), c = normal.getZ(k);
+      const faces = Math.round(a) + 1 + 3 * (Math.round(b) + 1) + 9 * (Math.round(c) + 1);
+      let vertex = vertices.get(27 * place + faces);
+      if (vertex === undefined) {
+        vertices.set(27 * place + faces, vertex = vertices.size);
+        normals.push(a, b, c);
+        points.push(place, 0, 0);
+      }
+      of[k] = vertex;
+    }
+    for (let k = 0; k < points.length; k += 3) {
+      const from = 4 * points[k], share = 1 / places[from + 3];
+      for (let axis = 0; axis < 3; axis++) points[k + axis] = places[from + axis] * share;
+    }
+    const faces = [], known = new Set(), total = index ? index.count : count, size = cells.size;
+    for (let k = 0; k + 2 < total; k += 3) {
+      const corners = [0, 1, 2].map((j) => index ? index.getX(k + j) : k + j);
+      const [a, b, c] = corners.map((j) => at[j]);
+      if (a === b || b === c || c === a) continue;
+      const key = a < b && a < c ? (a * size + b) * size + c
+        : b < c ? (b * size + c) * size + a : (c * size + a) * size + b;
+      if (known.has(key)) continue;
+      known.add(key);
+      faces.push(...corners.map((j) => of[j]));
+    }
+    if (faces.length > SAVED * total) return geometry;
+    const Attribute = position.constructor, found = new geometry.constructor();
+    found.setAttribute("position", new Attribute(new Float32Array(points), 3));
+    found.setAttribute("normal", new Attribute(new Float32Array(normals), 3));
+    found.setIndex(faces);
+    found.boundingBox = geometry.boundingBox;
+    found.boundingSphere = geometry.boundingSphere;
+    return found;
+  };
+  const levels = new WeakMap();
+  // Copies, colours that vary and shaders of others stay as they are.
+  const isPlain = (mesh) => {
+    const {material, geometry} = mesh;
+    return material.isMeshStandardMaterial && !material.map && !material.vertexColors
+      && !Object.hasOwn(material, "onBeforeCompile") && geometry.attributes.normal
+      && mesh.instancesCount === undefined && !mesh.isInstancedMesh && !mesh.isSkinnedMesh;
+  };
+  const coarserFor = (mesh, camera, height) => {
+    const {geometry} = mesh, {position} = geometry.attributes;
+    if (!((geometry.index ?? position).count / 3 > LIGHT)) return geometry;
+    if (!geometry.boundingSphere) geometry.computeBoundingSphere();
+    if (!geometry.boundingBox) geometry.computeBoundingBox();
+    const {center, radius} = geometry.boundingSphere, {min, max} = geometry.boundingBox;
+    const scale = mesh.matrixWorld.getMaxScaleOnAxis();
+    const away = center.clone().applyMatrix4(mesh.matrixWorld).distanceTo(camera.position) - scale * radius;
+    const pixel = 2 * Math.max(away, camera.near) * Math.tan(0.5 * camera.fov * Math.PI / 180) / height;
+    const diagonal = min.distanceTo(max), level = Math.ceil(Math.log2(scale * diagonal / (CELL * pixel)));
+    if (!(level <= LEVELS)) return geometry;
+    if (!levels.has(geometry)) levels.set(geometry, []);
+    const found = levels.get(geometry), k = Math.max(level, 1);
+    return found[k] ??= coarser(geometry, diagonal / 2 ** k);
+  };
+  // A matte surface takes a third of the time of one with gloss.
+  const MATTE = `
+    uniform vec3 diffuse;
+    uniform float opacity;
+    varying vec3 vViewPosition;
+    #ifndef FLAT_SHADED
+      varying vec3 vNormal;
+    #endif
+    #include <common>
+    #include <lights_pars_begin>
+    void main() {
+      #ifdef FLAT_SHADED
+        vec3 n = normalize(cross(dFdx(vViewPosition), dFdy(vViewPosition)));
+      #else
+        vec3 n = normalize(vNormal);
+        #ifdef DOUBLE_SIDED
+          n *= gl_FrontFacing ? 1.0 : -1.0;
+        #endif
+      #endif
+      vec3 light = ambientLightColor;
+      #if NUM_DIR_LIGHTS > 0
+        for (int k = 0; k < NUM_DIR_LIGHTS; k++)
+          light += max(dot(n, directionalLights[k].direction), 0.0) * directionalLights[k].color;
+      #endif
+      #if NUM_HEMI_LIGHTS > 0
+        for (int k = 0; k < NUM_HEMI_LIGHTS; k++)
+          light += getHemisphereLightIrradiance(hemisphereLights[k], n);
+      #endif
+      gl_FragColor = vec4(RECIPROCAL_PI * diffuse * light, opacity);
+      #include <colorspace_fragment>
+    }`;
+  const matte = new WeakMap();
+  const matteOf = (material) => {
+    if (!matte.has(material)) {
+      const made = material.clone();
+      made.onBeforeCompile = (shader) => { shader.fragmentShader = MATTE; };
+      made.customProgramCacheKey = () => "dynx-matte";
+      matte.set(material, made);
+    }
+    const found = matte.get(material);
+    found.color.copy(material.color);
+    for (const name of ["opacity", "side", "flatShading", "transparent", "depthWrite", "depthTest"]) {
+      if (found[name] === material[name]) continue;
+      found[name] = material[name];
+      found.needsUpdate = true;
+    }
+    return found;
+  };
+  let whole = [];
+  const drawCoarsely = (renderer, scene, camera) => {
+    const state = stateOfPicture();
+    if (state?.viewport.dpr !== MOVING || state.camera !== camera) return;
+    scene.traverseVisible((mesh) => {
+      const {geometry, material} = mesh;
+      if (!mesh.isMesh || !isPlain(mesh)) return;
+      whole.push([mesh, geometry, material]);
+      mesh.geometry = coarserFor(mesh, camera, renderer.domElement.height);
+      mesh.material = matteOf(material);
+    });
+  };
+  const drawWhole = () => {
+    for (const [mesh, geometry, material] of whole) Object.assign(mesh, {geometry, material});
+    whole = [];
+  };
+"""
+)
+"""Part of the script of a page that software draws. Each pixel is drawn once instead of four times, and the
+picture is not kept for others to read, which a program gets in another way. Coarse shapes replace whole ones
+only while a picture is drawn: the pointer meets whole ones."""

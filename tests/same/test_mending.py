@@ -1,0 +1,225 @@
+"""The mended file: elements of the second description replaced in its text, and nothing else changed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import dynx
+from dynx.model.elements import Inertial, Joint, Link, Pose
+from dynx.model.library import find
+from dynx.same import same_robot
+from dynx.same.elements import vector_text
+
+ARM = """<?xml version="1.0"?>
+<!-- an arm -->
+<robot name="arm">
+  <link name="base"/>
+  <link name="upper">
+    <inertial>
+      <origin xyz="0.2 0.05 0.1"/>
+      <mass value="1.5"/>
+      <inertia ixx="0.02" ixy="0.001" ixz="0.002" iyy="0.03" iyz="0.003" izz="0.04"/>
+    </inertial>
+  </link>
+  <link name="lower">
+    <inertial>
+      <mass value="0.5"/>
+      <inertia ixx="0.002" ixy="0" ixz="0" iyy="0.003" iyz="0" izz="0.004"/>
+    </inertial>
+  </link>
+  <joint name="shoulder" type="revolute">
+    <origin xyz="0 0 0.3" rpy="0.3 0 0"/>
+    <parent link="base"/>
+    <child link="upper"/>
+    <axis xyz="0 1 0"/>
+    <limit lower="-1" upper="1" effort="10" velocity="2"/>
+  </joint>
+  <joint name="elbow" type="revolute">
+    <origin xyz="0.5 0 0"/>
+    <parent link="upper"/>
+    <child link="lower"/>
+    <axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" effort="10" velocity="2"/>
+  </joint>
+</robot>
+"""
+
+BODIES = """<mujoco model="arm">
+  <compiler angle="radian"/>
+  <worldbody>
+    <!-- an arm -->
+    <body name="upper" pos="0 0 0.3" euler="0.3 0 0">
+      <inertial pos="0.2 0.05 0.1" mass="1.5" fullinertia="0.02 0.03 0.04 0.001 0.002 0.003"/>
+      <joint name="shoulder" axis="0 1 0" range="-1 1"/>
+      <body name="lower" pos="0.5 0 0">
+        <inertial pos="0 0 0" mass="0.5" diaginertia="0.002 0.003 0.004"/>
+        <joint name="elbow" axis="0 0 1" range="-1 1"/>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def lines_changed(one: str, other: str) -> list[str]:
+    """Return the lines of `other` that are not those of `one`."""
+    first, second = one.splitlines(), other.splitlines()
+    assert len(first) == len(second)
+    return [b.strip() for a, b in zip(first, second, strict=True) if a != b]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "element"),
+    [
+        ('<mass value="0.5"/>', '<mass value="0.6"/>', ("inertial", "lower")),
+        ('xyz="0.2 0.05 0.1"', 'xyz="0.21 0.05 0.1"', ("inertial", "upper")),
+        ('iyy="0.03"', 'iyy="0.031"', ("inertial", "upper")),
+        ('xyz="0.5 0 0"', 'xyz="0.5 0 0.01"', ("origin", "elbow")),
+        ('rpy="0.3 0 0"', 'rpy="0.31 0 0"', ("origin", "shoulder")),
+        ('<axis xyz="0 0 1"/>', '<axis xyz="0 0.1 1"/>', ("axis", "elbow")),
+        ('<axis xyz="0 1 0"/>', '<axis xyz="1 0 0"/>', ("axis", "shoulder")),
+    ],
+)
+def test_one_line_of_urdf_is_mended(old: str, new: str, element: tuple[str, str]) -> None:
+    changed = ARM.replace(old, new)
+    report = same_robot(ARM, changed)
+    assert [(each.part, each.theirs) for each in report.differences] == [element]
+    line = ARM[: ARM.index(old)].count("\n") + 1
+    assert abs((report.differences[0].second_line or 0) - line) <= 3
+    assert report.first != ""
+    assert report.mended_text is not None
+    mended = report.mended_text.decode()
+    (written,) = lines_changed(changed, mended)
+    assert written != ""
+    again = same_robot(ARM, mended)
+    assert again.same
+    assert again.attributes == ()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "element"),
+    [
+        ('mass="0.5"', 'mass="0.6"', ("inertial", "lower")),
+        ('pos="0.5 0 0"', 'pos="0.5 0.01 0"', ("origin", "elbow")),
+        ('euler="0.3 0 0"', 'euler="0.31 0 0"', ("origin", "shoulder")),
+        ('axis="0 0 1"', 'axis="0 0.1 1"', ("axis", "elbow")),
+    ],
+)
+def test_one_element_of_mjcf_is_mended(old: str, new: str, element: tuple[str, str]) -> None:
+    changed = BODIES.replace(old, new)
+    report = same_robot(ARM, changed)
+    assert [(each.part, each.theirs) for each in report.differences] == [element]
+    assert report.not_mended is None
+    assert report.mended_text is not None
+    assert "<!-- an arm -->" in report.mended_text.decode()
+    assert same_robot(ARM, report.mended_text).same
+
+
+def test_urdf_and_mjcf_of_one_robot_are_the_same() -> None:
+    report = same_robot(ARM, BODIES)
+    assert report.same
+    assert {each.kind for each in report.attributes} == {"velocity limit", "effort limit"}
+
+
+def test_the_joint_position_of_mjcf_moves_one_line() -> None:
+    """A joint off the origin of its body: the axis is moved, and the body stays where it is."""
+    changed = BODIES.replace('<joint name="elbow"', '<joint name="elbow" pos="0 0.02 0"')
+    report = same_robot(ARM, changed)
+    assert not report.same
+    assert [each.theirs for each in report.differences] == ["elbow"]
+    assert report.mended is not None
+    assert same_robot(ARM, report.mended).same
+
+
+def test_an_inertial_is_added_and_removed() -> None:
+    start = ARM.index("    <inertial>", ARM.index('"lower"'))
+    end = ARM.index("  </link>", start)
+    without = ARM[:start] + ARM[end:]
+    for first, second in ((ARM, without), (without, ARM)):
+        report = same_robot(first, second)
+        assert [(each.part, each.theirs) for each in report.differences] == [("inertial", "lower")]
+        assert report.mended_text is not None
+        assert same_robot(first, report.mended_text).same
+
+
+def test_a_type_is_mended() -> None:
+    fixed = ARM.replace('<joint name="elbow" type="revolute">', '<joint name="elbow" type="fixed">')
+    for first, second in ((ARM, fixed), (fixed, ARM)):
+        report = same_robot(first, second)
+        assert [(each.part, each.theirs) for each in report.differences] == [("type", "elbow")]
+        assert report.mended_text is not None
+        assert same_robot(first, report.mended_text).same
+
+
+def test_a_public_file_keeps_all_but_one_attribute() -> None:
+    text = Path(find("ur5")).read_text(encoding="utf-8")
+    changed = text.replace('<mass value="2.275"/>', '<mass value="2.3"/>')
+    report = same_robot("ur5", changed)
+    assert report.mended_text is not None
+    assert report.mended_text.decode() == text
+
+
+def test_what_mjcf_cannot_be_mended_for_is_said() -> None:
+    slides = BODIES.replace('<joint name="elbow"', '<joint name="elbow" type="slide"')
+    report = same_robot(ARM, slides)
+    assert not report.same
+    assert report.mended_text is None
+    assert report.not_mended is not None
+    assert "elbow" in report.not_mended
+
+
+def test_a_model_is_mended_as_urdf() -> None:
+    links = [Link("a"), Link("b", Inertial(1.0, Pose((0.1, 0.2, 0.3)), 0.1, 0.0, 0.0, 0.1, 0.0, 0.1))]
+    model = dynx.Model.build("r", links, [Joint("j", "continuous", "a", "b", Pose((0.1, 0.0, 0.0)))])
+    other = replace(model, joints=(replace(model.joints[0], origin=Pose((0.1, 0.1, 0.0))),))
+    report = same_robot(model, other)
+    assert report.mended == model
+    assert report.mended_text is not None
+    assert same_robot(model, report.mended_text).same
+
+
+def test_sdf_is_compared_and_not_mended() -> None:
+    text = """<sdf version="1.7"><model name="arm"><link name="base"/><link name="upper">
+      <pose>0 0 0.3 0.3 0 0</pose>
+      <inertial><pose>0.2 0.05 0.1 0 0 0</pose><mass>1.5</mass><inertia>
+        <ixx>0.02</ixx><ixy>0.001</ixy><ixz>0.002</ixz><iyy>0.03</iyy><iyz>0.003</iyz><izz>0.04</izz>
+      </inertia></inertial></link>
+      <joint name="fixed_base" type="fixed"><parent>world</parent><child>base</child></joint>
+      <joint name="shoulder" type="revolute"><parent>base</parent><child>upper</child>
+      <axis><xyz>0 1 0</xyz><limit><lower>-1</lower><upper>1</upper></limit></axis></joint></model></sdf>"""
+    other = text.replace("<xyz>0 1 0</xyz>", "<xyz>0 1 0.1</xyz>")
+    assert same_robot(text, text).same
+    report = same_robot(text, other)
+    assert [(each.part, each.theirs) for each in report.differences] == [("axis", "shoulder")]
+    assert report.mended is not None
+    assert report.mended_text is None
+    assert report.not_mended is not None
+
+
+def test_values_of_merged_bodies_are_called_so() -> None:
+    """A link merged into its parent: its mass is in the wanted value alone."""
+    cap = """<link name="cap"><inertial><mass value="0.001"/>
+      <inertia ixx="1e-6" ixy="0" ixz="0" iyy="1e-6" iyz="0" izz="1e-6"/></inertial></link>
+      <joint name="lid" type="fixed"><parent link="upper"/><child link="cap"/></joint></robot>"""
+    report = same_robot(ARM.replace("</robot>", cap), ARM)
+    (each,) = report.differences
+    assert each.theirs == "upper"
+    assert "merged" in each.message
+    assert "cap" in each.first
+    assert each.first != each.second != each.wanted
+
+
+def test_values_that_differ_are_written_with_digits_that_differ() -> None:
+    report = same_robot(
+        ARM, ARM.replace('<mass value="0.5"/>', '<mass value="0.50000000001"/>'), tolerance=1e-12
+    )
+    (each,) = report.differences
+    assert each.first != each.second
+
+
+def test_rounding_is_written_as_zero() -> None:
+    assert vector_text((2.298e-18, 0.0, -1.0)) == "0 0 -1"
+    assert vector_text((1e-18, -2e-18, 0.0)) == "1e-18 -2e-18 0"

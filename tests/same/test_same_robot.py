@@ -1,0 +1,365 @@
+"""`same_robot`: rewrites that keep a robot are the same, planted differences are found and named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import dynx
+from dynx.model import Model
+from dynx.model.elements import Inertial, Joint, Link, Mimic, Pose
+from dynx.same import SameReport, same_robot
+from dynx.testing import assert_same_robot
+from dynx.testing.strategies import models
+from tests.same.planted import Planted, other_mass, plantings, with_inertial, with_joint
+from tests.same.rewrites import (
+    rebuilt,
+    with_flipped_axes,
+    with_merged_links,
+    with_moved_frames,
+    with_other_joint_attributes,
+    with_other_names,
+    with_other_order,
+    with_split_links,
+    with_turned_inertias,
+)
+
+Rewrite = Callable[[Model, np.random.Generator], Model]
+
+REWRITES: dict[str, Rewrite] = {
+    "frames moved": with_moved_frames,
+    "axes reversed": with_flipped_axes,
+    "inertias in other axes": with_turned_inertias,
+    "links split": with_split_links,
+    "links merged": lambda model, _: with_merged_links(model),
+    "another order": with_other_order,
+    "other names": lambda model, _: with_other_names(model),
+    "other limits and friction": lambda model, _: with_other_joint_attributes(model),
+    "URDF text": lambda model, _: dynx.load(model.to_urdf(), base=model.base),
+}
+ROBOTS = ("ur5", "panda", "solo12", "double_pendulum", "simple_humanoid")
+SLOW = settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
+
+
+def torques(model: Model, report: SameReport | None, seed: int) -> np.ndarray:
+    """Return torques at random states of the first robot, in its coordinates; `report` maps them to those of
+    another robot with a fixed base."""
+    rng = np.random.default_rng(seed)
+    n = len(model.joint_names)
+    q, v, a = rng.uniform(-1.0, 1.0, (3, 4, n))
+    engine = dynx.backend("reference", model)
+    if report is None:
+        return engine.inverse_dynamics(q, v, a)
+    other = [np.empty_like(each) for each in (q, v, a)]
+    for row in report.coordinates:
+        for to, given_values in zip(other, (q, v, a), strict=True):
+            to[:, row.second_index] = row.sign * given_values[:, row.first_index]
+    tau = engine.inverse_dynamics(*other)
+    back = np.empty_like(tau)
+    for row in report.coordinates:
+        back[:, row.first_index] = row.sign * tau[:, row.second_index]
+    return back
+
+
+@pytest.mark.parametrize("rewrite", REWRITES)
+@SLOW
+@given(model=models(max_links=6), seed=st.integers(0, 1000))
+def test_a_rewritten_robot_is_the_same(rewrite: str, model: Model, seed: int) -> None:
+    other = REWRITES[rewrite](model, np.random.default_rng(seed))
+    report = same_robot(model, other)
+    assert report.same, (report.differences, report.unmatched)
+    assert report.bounds is not None
+
+
+@pytest.mark.parametrize("base", ["fixed", "floating"])
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_a_public_robot_rewritten_in_every_way_is_the_same(robot: str, base: str) -> None:
+    model = dynx.load(robot, base=base)  # type: ignore[arg-type]
+    rng = np.random.default_rng(3)
+    other = with_split_links(with_other_order(model, rng), rng)
+    other = with_moved_frames(with_flipped_axes(other, rng), rng)
+    report = same_robot(model, other)
+    assert report.same, (report.differences, report.unmatched)
+    assert len(report.coordinates) == len(model.joint_names)
+    assert {each.kind for each in report.freedoms} >= {"frame", "links"}
+    if base == "fixed":
+        tau, back = torques(model, None, 0), torques(other, report, 0)
+        assert back == pytest.approx(tau, rel=1e-9, abs=1e-9 * float(np.max(np.abs(tau))))
+
+
+def test_names_are_matched_by_structure() -> None:
+    model = dynx.load("panda")
+    report = same_robot(model, with_other_names(model))
+    assert report.same
+    assert [(each.ours, each.theirs) for each in report.coordinates] == [
+        (name, f"j_{name}") for name in model.joint_names
+    ]
+    assert {each.kind for each in report.attributes if each.tag == "joint"} == {"name"}
+
+
+@pytest.mark.parametrize("robot", ["ur5", "solo12", "panda"])
+@pytest.mark.parametrize("exponent", [-8, -6, -4, -2, -0.3])
+def test_a_planted_difference_is_found_at_its_element(robot: str, exponent: float) -> None:
+    model = dynx.load(robot)
+    rng = np.random.default_rng(int(-10 * exponent))
+    for planted in plantings(model, 10.0**exponent, rng):
+        report = same_robot(model, planted.model)
+        assert_found(model, planted, report)
+
+
+def assert_found(model: Model, planted: Planted, report: SameReport) -> None:
+    if report.same:
+        assert_without_effect(model, planted, report)
+        return
+    assert [(each.part, each.theirs) for each in report.differences] == [(planted.part, planted.name)]
+    assert report.not_mended is None
+    assert report.mended is not None
+    assert same_robot(model, report.mended).same
+    effect = report.differences[0].effect
+    assert effect is not None
+    assert max(effect.position, effect.rotation, effect.mass_matrix, effect.torque) > 0.0
+
+
+def assert_without_effect(model: Model, planted: Planted, report: SameReport) -> None:
+    """Check by torques at random states that a difference is not seen."""
+    assert planted.part == "inertial"
+    assert [each.theirs for each in report.freedoms if each.kind == "inertia"] == [planted.name]
+    tau, back = torques(model, None, 1), torques(planted.model, report, 1)
+    assert back == pytest.approx(tau, rel=0.0, abs=1e-9 * float(np.max(np.abs(tau))))
+
+
+def test_a_difference_planted_into_a_rewritten_robot_needs_one_element() -> None:
+    """Where frames are turned, one of several elements may be replaced: it is one, and mends the robot."""
+    model = dynx.load("ur5")
+    rng = np.random.default_rng(5)
+    rewritten = with_moved_frames(with_flipped_axes(model, rng), rng)
+    for planted in plantings(rewritten, 1e-5, rng):
+        report = same_robot(model, planted.model)
+        if report.same:
+            assert planted.part == "inertial"
+            continue
+        assert len(report.differences) == 1
+        assert report.mended is not None
+        assert same_robot(model, report.mended).same
+
+
+def test_two_planted_differences_are_two_elements() -> None:
+    model = dynx.load("ur5")
+    joint = model.joint("elbow_joint")
+    moved = with_joint(model, replace(joint, origin=Pose((0.0, -0.11, 0.425), joint.origin.rpy)))
+    other = other_mass(moved, "wrist_2_link", 0.1).model
+    report = same_robot(model, other)
+    assert {(each.part, each.theirs) for each in report.differences} == {
+        ("origin", "elbow_joint"),
+        ("inertial", "wrist_2_link"),
+    }
+    assert report.not_mended is None
+
+
+def test_a_misplaced_fixed_joint_is_one_element_for_all_that_it_carries() -> None:
+    model = dynx.load("panda")
+    hand = model.joint("panda_hand_joint")
+    other = with_joint(model, replace(hand, origin=Pose((0.0, 0.01, 0.0), hand.origin.rpy)))
+    report = same_robot(model, other)
+    assert [(each.part, each.theirs) for each in report.differences] == [("origin", "panda_hand_joint")]
+
+
+def test_inertia_that_no_state_shows_is_no_difference() -> None:
+    """The base of a fixed arm; mass moved from a link to its parent along the joint axis between them."""
+    model = dynx.load("ur5")
+    base = other_mass(model, "base_link", 1.0).model
+    report = same_robot(model, base)
+    assert report.same
+    assert [(each.kind, each.theirs) for each in report.freedoms] == [("inertia", "base_link")]
+    # A point mass on the axis of the elbow belongs to either link.
+    arm = two_links(0.3)
+    moved = with_inertial(arm, "lower", point_added(arm.inertial("lower"), -0.2, (0.0, 0.0, 0.4)))
+    moved = with_inertial(moved, "upper", point_added(arm.inertial("upper"), 0.2, (0.5, 0.0, 0.4)))
+    report = same_robot(arm, moved)
+    assert report.same, report.differences
+    assert {each.theirs for each in report.freedoms if each.kind == "inertia"} == {"upper", "lower"}
+    # The same mass beside the axis is seen.
+    beside = with_inertial(arm, "lower", point_added(arm.inertial("lower"), -0.2, (0.1, 0.0, 0.4)))
+    beside = with_inertial(beside, "upper", point_added(arm.inertial("upper"), 0.2, (0.6, 0.0, 0.4)))
+    assert not same_robot(arm, beside).same
+
+
+def two_links(tilt: float) -> Model:
+    """Return an arm of two links, whose first joint leans against gravity."""
+    body = Inertial(1.0, Pose((0.2, 0.05, 0.1)), 0.02, 0.001, 0.002, 0.03, 0.003, 0.04)
+    links = [Link("world"), Link("upper", body), Link("lower", body)]
+    joints = [
+        Joint(
+            "shoulder",
+            "continuous",
+            "world",
+            "upper",
+            Pose(rpy=(tilt, 0.0, 0.0)),
+            (0.0, 1.0, 0.0),
+        ),
+        Joint("elbow", "continuous", "upper", "lower", Pose((0.5, 0.0, 0.0)), (0.0, 0.0, 1.0)),
+    ]
+    return Model.build("arm", links, joints)
+
+
+def point_added(inertial: Inertial, mass: float, at: tuple[float, float, float]) -> Inertial:
+    """Return an inertial with a point mass more."""
+    from tests.same.rewrites import merged
+
+    return merged(inertial, Inertial(mass, Pose(at)))
+
+
+def test_coordinates_of_reversed_and_reordered_joints() -> None:
+    model = dynx.load("solo12", base="floating")
+    rng = np.random.default_rng(0)
+    other = with_flipped_axes(with_other_order(model, rng), rng)
+    report = same_robot(model, other)
+    assert report.same
+    assert {each.sign for each in report.coordinates} == {1, -1}
+    for row in report.coordinates:
+        assert model.joint_names[row.first_index - 7] == row.ours
+        assert other.joint_names[row.second_index - 7] == row.theirs
+    assert report.T_first_second == pytest.approx(np.eye(4))
+
+
+def test_a_base_frame_that_is_turned_is_stated() -> None:
+    model = dynx.load("solo12", base="floating")
+    report = same_robot(model, with_moved_frames(model, np.random.default_rng(2)))
+    assert report.same
+    assert report.T_first_second is not None
+    assert np.max(np.abs(report.T_first_second - np.eye(4))) > 0.1
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_frame_of_a_floating_base_without_mass_may_be_anywhere(seed: int) -> None:
+    links = [Link("base"), Link("upper"), Link("lower")]
+    joints = [
+        Joint("first", "continuous", "base", "upper", axis=(0.0, 0.0, 1.0)),
+        Joint("second", "continuous", "upper", "lower", axis=(0.0, 0.0, 1.0)),
+    ]
+    model = Model.build("massless", links, joints, base="floating")
+    assert same_robot(model, with_moved_frames(model, np.random.default_rng(seed))).same
+
+
+def test_joints_of_another_type_are_elements() -> None:
+    model = dynx.load("ur5")
+    other = with_joint(model, replace(model.joint("wrist_2_joint"), type="fixed"))
+    report = same_robot(model, other)
+    assert [(each.part, each.theirs) for each in report.differences] == [("type", "wrist_2_joint")]
+    assert report.not_mended is None
+    assert not same_robot(other, model).same
+
+
+def test_joints_without_counterpart_are_named() -> None:
+    report = same_robot("g1", "g1_with_hands")
+    assert not report.same
+    assert len([each for each in report.unmatched if each.kind == "extra"]) == 6
+    assert report.mended is None
+    assert report.not_mended is not None
+    moved = dynx.load("double_pendulum")
+    assert not same_robot("ur5", moved).same
+
+
+def test_a_mimic_joint_that_follows_otherwise_is_an_element() -> None:
+    model = dynx.load("panda")
+    joint = model.joint("panda_finger_joint2")
+    assert joint.mimic is not None
+    report = same_robot(model, with_joint(model, replace(joint, mimic=Mimic(joint.mimic.joint, 0.5))))
+    assert [(each.part, each.theirs) for each in report.differences] == [("mimic", joint.name)]
+    assert report.not_mended is None
+
+
+def test_limits_and_joint_dynamics_stand_apart() -> None:
+    model = dynx.load("ur5")
+    report = same_robot(model, with_other_joint_attributes(model))
+    assert report.same
+    kinds = {each.kind for each in report.attributes if each.tag == "joint"}
+    assert {"lower limit", "upper limit", "velocity limit", "damping", "friction", "armature"} <= kinds
+
+
+def test_limits_of_a_reversed_axis_are_the_same() -> None:
+    model = dynx.load("ur5")
+    report = same_robot(model, with_flipped_axes(model, np.random.default_rng(0)))
+    assert [each for each in report.attributes if each.tag == "joint"] == []
+
+
+def test_shapes_and_frames_stand_apart() -> None:
+    text = dynx.load("six_axis_arm").to_urdf(geometry=True)
+    report = same_robot(text, text.replace("<box size=", "<box size=") + "<!-- -->")
+    assert report.same
+    model = dynx.load("ur5")
+    tool = model.joint("wrist_3_link-tool0_fixed_joint")
+    moved = with_joint(model, replace(tool, origin=Pose((0.0, 0.1, 0.0), tool.origin.rpy)))
+    report = same_robot(model, moved)
+    assert report.same
+    assert [each.theirs for each in report.attributes if each.kind == "frame"] == ["tool0"]
+
+
+def test_the_base_of_a_urdf_file_is_that_of_the_other_description() -> None:
+    model = dynx.load("solo12", base="floating")
+    report = same_robot("solo12", model)
+    assert report.same
+    assert report.notes
+    other = same_robot(model.with_base("fixed"), model)
+    assert [each.kind for each in other.unmatched] == ["base"]
+    assert other.verdict.endswith("one base is fixed, the other floating")
+    assert "counterpart" not in f"{other.verdict} {other.not_mended}"
+    assert "with_base('fixed')" in other.unmatched[0].message
+    assert same_robot(model.with_base("fixed"), model.with_base("fixed")).same
+
+
+def test_gravity_and_the_pose_of_the_base_stand_apart() -> None:
+    model = dynx.load("ur5")
+    other = model.with_gravity((0.0, 0.0, -1.62)).with_base_pose(Pose((0.0, 0.0, 1.0)))
+    report = same_robot(model, other)
+    assert report.same
+    assert {each.kind for each in report.attributes if each.tag == "robot"} == {"gravity", "base pose"}
+
+
+def test_bounds_hold_at_random_states() -> None:
+    model = dynx.load("ur5")
+    rng = np.random.default_rng(7)
+    other = with_moved_frames(model, rng)
+    report = same_robot(model, other)
+    assert report.bounds is not None
+    q = model.random(rng, 20)
+    first, second = (dynx.backend("reference", each).mass_matrix(q) for each in (model, other))
+    rounding = 1e-14 * float(np.max(np.abs(first)))
+    assert float(np.max(np.abs(first - second))) <= report.bounds.mass_matrix + rounding
+
+
+def test_a_long_chain() -> None:
+    count = 250
+    body = Inertial(1.0, Pose((0.05, 0.01, 0.02)), 0.02, 0.0, 0.0, 0.03, 0.0, 0.04)
+    links = [Link(f"l{k}", body) for k in range(count)]
+    joints = [
+        Joint(f"j{k}", "continuous", f"l{k}", f"l{k + 1}", Pose((0.1, 0.0, 0.0)), (0.0, 0.0, 1.0))
+        for k in range(count - 1)
+    ]
+    model = Model.build("chain", links, joints)
+    assert same_robot(model, rebuilt(model, links, joints)).same
+
+
+@pytest.mark.parametrize(
+    "tolerance", [-1e-9, 1.0, float("nan"), float("inf"), "x", None, True, [1e-9], 10**400]
+)
+def test_invalid_tolerances_are_refused(tolerance: Any) -> None:
+    with pytest.raises(dynx.errors.ArgumentError, match="tolerance"):
+        same_robot("ur5", "ur5", tolerance=tolerance)
+    with pytest.raises(dynx.errors.ArgumentError, match="tolerance"):
+        assert_same_robot("ur5", "ur5", tolerance=tolerance)
+
+
+def test_unusable_descriptions_raise_the_errors_of_load() -> None:
+    with pytest.raises(dynx.errors.RobotNotFoundError):
+        same_robot("ur5", "./none.urdf")
+    with pytest.raises(dynx.errors.DescriptionError):
+        same_robot("<robot name='r'><link name='a'/><link name='b'/></robot>", "ur5")
+    with pytest.raises(dynx.errors.ArgumentError):
+        same_robot("ur5", 3)  # type: ignore[arg-type]

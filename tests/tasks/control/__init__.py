@@ -1,0 +1,1 @@
+"""Tasks of a control engineer who knows PyBullet."""

@@ -1,0 +1,1 @@
+"""Tasks of a student who knows Python and little robotics."""
