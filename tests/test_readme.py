@@ -12,7 +12,9 @@ import pytest
 
 from tests.page_blocks import (
     PAGES,
+    PARSED,
     ROOT,
+    RUN,
     Block,
     absent_packages,
     blocks_of,
@@ -66,6 +68,17 @@ def test_blocks_bind_each_name_that_they_read(page: str) -> None:
     for block in blocks_of(page):
         if block.language == "python":
             assert unbound_names(block.text) == set(), str(block)
+
+
+SHOWN = ("text", "powershell")
+"""Languages whose blocks are only shown: what a command prints, and commands for Windows."""
+
+
+def test_each_block_is_run_parsed_or_only_shown() -> None:
+    """A block of another language, such as `py`, would be checked by nobody."""
+    for page, text in PAGES.items():
+        for language in re.findall(r"^ *```(\w+)$", text, flags=re.MULTILINE):
+            assert language in (*RUN, *PARSED, *SHOWN), page
 
 
 def test_documents_are_parsed() -> None:
