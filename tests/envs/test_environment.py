@@ -190,7 +190,7 @@ def test_code_of_the_page_runs() -> None:
 
 
 MAX_DIFFERENCE = 1e-13
-"""Largest difference of a state after one step: the bar of the environments (docs/environments.md)."""
+"""Largest difference of a state after one step: the bar of docs/explanation/environments.md."""
 
 ENGINES = ("compiled", "mujoco", "pinocchio", VECTOR)
 

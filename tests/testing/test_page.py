@@ -1,4 +1,4 @@
-"""docs/testing.md: its workflow and hook are YAML, and its commands have the options that it uses."""
+"""docs/testing.md: its YAML is valid, its commands have the options that they use; its reference has all."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from dynx.testing import plugin
 from tests.page_blocks import ROOT, fenced
 
 PAGE = (ROOT / "docs" / "testing.md").read_text(encoding="utf-8")
+REFERENCE = (ROOT / "docs" / "reference" / "testing.md").read_text(encoding="utf-8")
 
 
 class Options:
@@ -110,12 +111,15 @@ def test_the_sarif_that_is_written_is_the_one_uploaded() -> None:
     assert written == uploaded
 
 
-def test_every_option_is_on_the_page() -> None:
+def test_every_option_and_input_is_in_the_reference() -> None:
     options = Options()
     for flag in options.flags:
-        assert f"`{flag}" in PAGE, flag
+        assert f"`{flag}" in REFERENCE, flag
     for setting in options.settings:
-        assert setting in PAGE
+        assert setting in REFERENCE
+    action = import_module("yaml").safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))
+    for name in (*action["inputs"], *action["outputs"]):
+        assert f"`{name}`" in REFERENCE, name
     (ini,) = fenced("toml", PAGE)
     assert re.search(r"^dynx_robots = \[", ini, flags=re.MULTILINE)
 
