@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from dynx.argument_types import checks_types
 from dynx.model.numbers import is_real, whole_number
 from dynx.training.checkpoints import Checkpoints
-from dynx.training.evaluation import Evaluation, evaluate
+from dynx.training.evaluation import MAX_EPISODES, Evaluation, evaluate
 from dynx.training.library import log_to
 from dynx.training.observer import Observer
 from dynx.training.policy import Policy, Scaling
@@ -22,6 +23,9 @@ TENSORBOARD = "tensorboard"
 
 CHECKPOINTS_PER_RUN, EVALUATIONS_PER_RUN = 20, 10
 """Numbers of checkpoints and of evaluations of a run, unless their distance is given."""
+
+MAX_THREADS = 1024
+"""Largest number of threads that PyTorch is asked for: it makes all of them at once."""
 
 REPORTS_PER_RUN = 200
 """Number of points of the curve of a run."""
@@ -41,6 +45,7 @@ class Progress:
     last_evaluation: Evaluation | None
 
 
+@checks_types
 @dataclass(frozen=True)
 class Schedule:
     """What a run does beside training, which does not change what is learned.
@@ -54,6 +59,14 @@ class Schedule:
     episodes: int = 10
     threads: int = 1
     tensorboard: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("checkpoint_every", "evaluate_every"):
+            steps = getattr(self, name)
+            if steps is not None:
+                whole_number(name, steps, 1)
+        whole_number("episodes", self.episodes, 1, MAX_EPISODES)
+        whole_number("threads", self.threads, 1, MAX_THREADS)
 
     def distances(self, steps: int) -> tuple[int, int]:
         """Return the steps between checkpoints and between evaluations of a run of `steps`."""

@@ -14,9 +14,10 @@ from dynx.errors import ArgumentError, DescriptionError, RobotNotFoundError, sho
 from dynx.files.documents import json_text, parse_json
 from dynx.files.reading import checked_path, read_file
 from dynx.files.writing import write_text
+from dynx.model.numbers import whole_number
 from dynx.training.checkpoints import Checkpoints
 from dynx.training.environments import make
-from dynx.training.evaluation import AT_ONCE, Evaluation
+from dynx.training.evaluation import AT_ONCE, MAX_EPISODES, Evaluation
 from dynx.training.file_tasks import of_earlier_version
 from dynx.training.learning import Learning, Progress, Schedule
 from dynx.training.library import new_algorithm, set_threads
@@ -66,6 +67,7 @@ def train(
     Raises ArgumentError for a folder that has another run, or one that is not to be resumed, and the errors
     of the task and the algorithm.
     """
+    whole_number("final_episodes", final_episodes, 1, MAX_EPISODES)  # Before the training, which takes hours.
     schedule = schedule or Schedule()
     place = Path(checked_path(folder))
     schema, given = _checked_schema(place, spec, resume), spec

@@ -275,7 +275,10 @@ def doors() -> tuple[Door, ...]:
     for module in public_modules():
         for name in getattr(module, "__all__", ()):
             full = f"{module.__name__}.{name}"
-            value = getattr(module, name)
+            try:
+                value = getattr(module, name)
+            except NotInstalledError:
+                continue
             if not isinstance(value, type) and not inspect.isroutine(inspect.unwrap(value)):
                 continue
             if id(value) in seen:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -166,7 +166,7 @@ def _traces(value: Any) -> Iterator[str]:
         yield f"{len(value)} "
         if not len(value):
             yield from ("empty", "no ", "nothing", "lacks")
-        elif not isinstance(value, (str, bytes)):
+        elif isinstance(value, Iterable) and not isinstance(value, (str, bytes)):
             yield from ("not finite",) if any(map(_is_not_finite, value)) else ()
             for each in value:
                 yield from (_text(repr, each)[:25], _text(str, each)[:25], type(each).__name__)

@@ -210,6 +210,12 @@ def test_errors_name_the_argument_what_was_given_and_what_is_valid() -> None:
         assert omissions(call, ArgumentError(text)) == expected, text
 
 
+def test_errors_about_objects_without_elements_are_read() -> None:
+    """An object may have a length and no elements."""
+    call = Call(Door("f", lambda: lambda samples: None), lambda samples: None, {"samples": NoNumbers()}, {})
+    assert omissions(call, ArgumentError("samples is of type NoNumbers; wanted a whole number")) == []
+
+
 def test_a_number_that_no_float_holds_is_refused_and_a_seed_may_be_one() -> None:
     engine = dynx.backend("reference", arm())
     with pytest.raises(ArgumentError, match=r"max_iterations is .* at most 1000000000"):

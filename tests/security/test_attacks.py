@@ -23,6 +23,7 @@ SURFACES = (
     "scene",
     "urdf",
     "mjcf",
+    "sdf",
     "mesh",
     "world",
     "npz",

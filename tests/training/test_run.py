@@ -43,6 +43,17 @@ def test_a_run_leaves_policies_checkpoints_and_curves(tmp_path: Path) -> None:
     assert kept == ["000000000192.zip", "000000000256.zip"]
 
 
+@pytest.mark.parametrize("wrong", [None, 0, -3, 2.5, "a", True, float("nan"), 10**12, np.zeros(2)])
+def test_wrong_numbers_are_refused_before_the_training(wrong: Any, tmp_path: Path) -> None:
+    with pytest.raises(ArgumentError, match=r"^final_episodes is .*; wanted a whole number"):
+        train(small_run(), tmp_path, final_episodes=wrong)
+    for name in ("checkpoint_every", "evaluate_every", "episodes", "threads"):
+        if wrong is not None or not name.endswith("_every"):
+            with pytest.raises(ArgumentError, match=f"^{name} is .*; wanted a whole number"):
+                Schedule(**{name: wrong})
+    assert not list(tmp_path.iterdir())
+
+
 def test_the_same_seed_gives_the_same_weights_and_another_seed_others(tmp_path: Path) -> None:
     for name, seed in (("a", 0), ("b", 0), ("c", 1)):
         train(small_run(64, seed=seed), tmp_path / name, schedule=OFTEN, final_episodes=1)

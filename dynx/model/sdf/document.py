@@ -34,6 +34,9 @@ Kind = Literal["link", "joint", "frame"]
 OLDEST, NEWEST = (1, 4), (1, 12)
 """Versions of SDF that are read."""
 
+MAX_PARTS = 10 * MAX_LINKS
+"""Largest number of links, joints, frames and shapes, in included models each time they are included."""
+
 MODEL_FRAME, WORLD = "__model__", "world"
 
 ONE_ROBOT = (
@@ -139,6 +142,8 @@ class Scope:
     merged: bool = False
     parts: dict[str, NamedPart] = field(default_factory=dict)
     models: dict[str, Scope] = field(default_factory=dict)
+    merged_names: dict[str, NamedPart | Scope] = field(default_factory=dict)
+    """Parts and models of the merged models, by their names in this scope."""
 
     @property
     def is_world(self) -> bool:
@@ -162,21 +167,13 @@ class Scope:
 
     def names(self) -> list[str]:
         """Return the names that may be referred to in this scope."""
-        inside = [
-            name for each in self.content if isinstance(each, Scope) and each.merged for name in each.names()
-        ]
-        return [*self.parts, *self.models, *inside]
+        return [*self.parts, *self.models, *self.merged_names]
 
     def find(self, name: str) -> NamedPart | Scope | None:
         """Return the part or model of that name, also one of a merged model; None if there is none."""
-        found: NamedPart | Scope | None = self.parts.get(name) or self.models.get(name)
+        found = self.parts.get(name) or self.models.get(name) or self.merged_names.get(name)
         if found is not None:
             return found
-        for each in self.content:
-            if isinstance(each, Scope) and each.merged:
-                found = each.find(name)
-                if found is not None:
-                    return found
         first, _, rest = name.partition("::")
         inner = self.find(first) if rest else None
         if not isinstance(inner, Scope):
@@ -206,8 +203,10 @@ class _ScopeReader:
         self._reading, self._package_dirs = reading, package_dirs
         self._open_files: list[str] = []
         self._roots: dict[str, Element] = {}
+        self._sizes: dict[str, int] = {}
         self._elements = 0
         self._links = 0
+        self._parts = 0
 
     def read(self, root: Element) -> Scope:
         version = self._checked(root)
@@ -330,6 +329,11 @@ class _ScopeReader:
         name = reading.name(element, "name", f"a <{element.tag}>")
         kind: Kind = "link" if element.tag == "link" else "joint" if element.tag == "joint" else "frame"
         part = NamedPart(kind, name, element, scope)
+        self._parts += 1 + len(element.all("visual")) + len(element.all("collision"))
+        if self._parts > MAX_PARTS:
+            raise reading.error(
+                element, f"the file has more than {MAX_PARTS} links, joints, frames and shapes"
+            )
         reserved = name == WORLD or (name.startswith("__") and name.endswith("__"))
         if reserved and (kind == "link" or scope.version >= (1, 7)):
             raise reading.error(element, f"{part.what} has a name that the format keeps for itself")
@@ -354,12 +358,14 @@ class _ScopeReader:
                 )
             scope.models[model.name] = model
         else:
-            for name in model.names():
+            inside = {**model.merged_names, **model.models, **model.parts}
+            for name in inside:
                 if scope.find(name) is not None:
                     raise self._reading.error(
                         model.element,
                         f"the merged {model.what} has a part {shown(name)}, and so has {scope.what}",
                     )
+            scope.merged_names |= inside
         scope.content.append(model)
 
     # -- included files -------------------------------------------------------------------------
@@ -377,14 +383,15 @@ class _ScopeReader:
         root = self._roots.get(path)
         if root is None:
             root = self._roots[path] = reading.read_included(path, opaque=OPAQUE, with_text=TEXTS)
-            self._elements += sum(1 for _ in _walk(root))
-            if self._elements > MAX_ELEMENTS:
-                raise reading.error(include, f"the included files have more than {MAX_ELEMENTS} elements")
+            self._sizes[path] = sum(1 for _ in _walk(root))
             if root.tag != "sdf":
                 raise reading.unsupported(
                     include, f"{what} has the root <{escaped(root.tag)}>; dynx includes SDF alone"
                 )
             self._checked(root)
+        self._elements += self._sizes[path]  # Each time: a file may be included often.
+        if self._elements > MAX_ELEMENTS:
+            raise reading.error(include, f"the included files have more than {MAX_ELEMENTS} elements")
         models = root.all("model")
         if len(models) != 1 or root.all("world"):
             raise reading.error(

@@ -330,6 +330,61 @@ def test_cycles_floods_and_files_elsewhere_are_refused(tmp_path: Path) -> None:
         dynx.load(included(folder, INCLUDE.format("", "x0.sdf", "one::"), **bomb))
 
 
+@pytest.mark.parametrize(
+    ("bound", "element"),
+    [
+        ("MAX_PARTS", '<frame name="f{}"/>'),
+        ("MAX_PARTS", '<joint name="f{}" type="fixed"><parent>a</parent><child>l</child></joint>'),
+        ("MAX_ELEMENTS", '<plugin name="p{}" filename="f"/>'),
+    ],
+)
+def test_what_a_file_holds_counts_each_time_it_is_included(
+    bound: str, element: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    held = "".join(element.format(k) for k in range(10))
+    file = f'<sdf version="1.9"><model name="m"><link name="l"/>{held}</model></sdf>'
+    extra = "".join(f"<include><uri>x.sdf</uri><name>n{k}</name></include>" for k in range(20))
+    monkeypatch.setattr(f"dynx.model.sdf.document.{bound}", 200)
+    with pytest.raises(DescriptionError, match=r"more than 200 (links, joints, frames and shapes|elements)"):
+        dynx.load(included(tmp_path, extra, x=file))
+
+
+def test_the_shapes_of_a_link_count(monkeypatch: pytest.MonkeyPatch) -> None:
+    shapes = "".join(f'<visual name="v{k}"/>' for k in range(12))
+    monkeypatch.setattr("dynx.model.sdf.document.MAX_PARTS", 10)
+    with pytest.raises(DescriptionError, match=r":1: the file has more than 10 links, joints, frames"):
+        dynx.load(f'<sdf version="1.9"><model name="m"><link name="l">{shapes}</link></model></sdf>')
+
+
+def test_names_of_merged_models_are_found_at_any_depth(tmp_path: Path) -> None:
+    """Each of the models is merged into the one that includes it; one in the middle holds a model."""
+    files = {
+        f"x{k}": f'<sdf version="1.9"><model name="m{k}"><link name="l{k}"/>'
+        f'<include merge="true"><uri>x{k + 1}.sdf</uri></include></model></sdf>'
+        for k in range(5)
+    }
+    inner = '<model name="inner"><link name="a"/><frame name="tip"><pose>0 0 1 0 0 0</pose></frame></model>'
+    files["x5"] = f'<sdf version="1.9"><model name="m5"><link name="l5"/>{inner}</model></sdf>'
+    names = [*(f"l{k}" for k in range(6)), "inner::a"]
+    joints = "".join(
+        f'<joint name="j{k}" type="fixed"><parent>base</parent><child>{name}</child></joint>'
+        for k, name in enumerate(names)
+    )
+    found = '<frame name="found" attached_to="inner::tip"/>'
+    chain = f'<include merge="true"><uri>x0.sdf</uri></include>{joints}{found}'
+    model = dynx.load(included(tmp_path, chain, **files))
+    assert [each.child for each in model.joints if each.name != "weld"] == names
+    require_close(pose_of(model, "found", [])[:3, 3], np.array([0.0, 0.0, 1.0]))
+    for name in ("l5", "inner"):
+        other = f'<model name="o"><link name="{name}"/></model>'
+        files["y"] = f'<sdf version="1.9">{other}</sdf>'
+        twice = f'{chain}<include merge="true"><uri>y.sdf</uri></include>'
+        with pytest.raises(DescriptionError, match=f"the merged model 'o' has a part '{name}', and so has"):
+            dynx.load(included(tmp_path, twice, **files))
+    with pytest.raises(DescriptionError, match=r"names 'l6', which model 'robot' has not; 17 are known"):
+        dynx.load(included(tmp_path, chain.replace("<child>l5", "<child>l6"), **files))
+
+
 def test_an_error_in_an_included_file_names_it(tmp_path: Path) -> None:
     broken = '<sdf version="1.9"><model name="m">\n<link name="a"><pose>x</pose></link></model></sdf>'
     with pytest.raises(DescriptionError, match=r"x\.sdf:2: pose in <pose> of link 'a'"):
